@@ -1,0 +1,40 @@
+"""The immutable description of a machine: what it is made of, in SI units, with no numerics."""
+
+from stiffmap.description.elements import (
+    Block,
+    Body,
+    Branch,
+    Drive,
+    Element,
+    Joint,
+    Offset,
+    Point,
+    Spring,
+)
+from stiffmap.description.laws import CommandError, Law
+from stiffmap.description.machine import (
+    AppliedEffect,
+    ExternalSpring,
+    Leg,
+    MachineDescription,
+)
+from stiffmap.description.pose import Pose
+
+__all__ = [
+    "AppliedEffect",
+    "Block",
+    "Body",
+    "Branch",
+    "CommandError",
+    "Drive",
+    "Element",
+    "ExternalSpring",
+    "Joint",
+    "Law",
+    "Leg",
+    "MachineDescription",
+    "Offset",
+    "Point",
+    "Pose",
+    "Spring",
+]

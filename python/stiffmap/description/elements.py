@@ -1,0 +1,138 @@
+"""Elements of a chain, in the order in which they follow each other from base to platform.
+
+Names are unique within their sequence. A full name joins the sequence names with dots:
+``x.bar_low.bar`` is element ``bar`` of branch ``bar_low`` in leg ``x``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from stiffmap.description.laws import CommandError, Law
+from stiffmap.description.pose import IDENTITY, Pose, Rows, Vector
+
+Matrix6 = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Offset:
+    """Constant transform. ``actual`` differs from ``nominal`` where the machine has an error:
+    the controller computes its commands with ``nominal``, the real machine is built with ``actual``
+    (``None``: as nominal)."""
+
+    name: str
+    nominal: Pose
+    actual: Pose | None = None
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What a motor adds to an actuated joint; used by limits and dynamics (SI)."""
+
+    range: tuple[float, float] | None = None
+    speed: float | None = None
+    force: float | None = None
+    encoder_error: float | None = None
+    coulomb_friction: float | None = None
+    viscous_friction: float | None = None
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Joint at the current frame about or along local ``axes``.
+
+    kind
+        ``revolute``, ``prismatic`` (one axis), ``universal`` (two revolutes in sequence),
+        ``spherical`` (three).
+    home
+        Coordinates (m, rad) in the home configuration, one per axis.
+    actuated
+        One axis only. ``law`` is then the compliance of the drive (``None``: rigid); a passive
+        joint with ``law=None`` turns freely, otherwise ``law`` applies to each of its axes about
+        its home coordinate.
+    compliance_slope
+        Relative change of the drive's compliance per metre (or rad) of the commanded coordinate,
+        measured from ``home``.
+    """
+
+    name: str
+    kind: str
+    axes: tuple[Vector, ...]
+    home: tuple[float, ...] = (0.0,)
+    actuated: bool = False
+    law: Law | None = None
+    compliance_slope: float = 0.0
+    command_errors: tuple[CommandError, ...] = ()
+    limits: tuple[float, float] | None = None
+    drive: Drive | None = None
+
+
+@dataclass(frozen=True)
+class Spring:
+    """Virtual spring of a link: translations t then rotations phi, the frame behind it being
+    ``p + R t``, ``R Rx(phi1) Ry(phi2) Rz(phi3)``.
+
+    Exactly one of ``compliance`` and ``stiffness`` is given (6x6 in m, rad, N, N·m, local axes,
+    translations first), symmetric positive semidefinite: a null direction of a compliance is
+    rigid, one of a stiffness is free. ``laws`` replaces single *diagonal* directions by nonlinear
+    laws, ((direction index, law), ...): allowed where that direction is not coupled.
+    ``rest`` is the deflection (6,) at which the spring is free of force (preload).
+    """
+
+    name: str
+    compliance: Matrix6 | None = None
+    stiffness: Matrix6 | None = None
+    laws: tuple[tuple[int, Law], ...] = ()
+    rest: tuple[float, ...] = (0.0,) * 6
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body that moves with the current frame: mass (kg), centre of mass in it (m),
+    inertia about that centre in its axes (kg·m²)."""
+
+    name: str
+    mass: float
+    com: Vector = (0.0, 0.0, 0.0)
+    inertia: Rows = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class Point:
+    """A named point that moves with the current frame, at ``offset`` in it (m)."""
+
+    name: str
+    offset: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One of the sequences of a parallel block."""
+
+    name: str
+    elements: tuple[Element, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Two or more branches between the same two frames."""
+
+    name: str
+    branches: tuple[Branch, ...] = field(default=())
+
+
+Element = Offset | Joint | Spring | Body | Point | Block
+
+__all__ = [
+    "IDENTITY",
+    "Block",
+    "Body",
+    "Branch",
+    "Drive",
+    "Element",
+    "Joint",
+    "Matrix6",
+    "Offset",
+    "Point",
+    "Spring",
+]

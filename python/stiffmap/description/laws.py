@@ -1,0 +1,39 @@
+"""Force laws of one coordinate, and errors of a commanded coordinate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+Knot = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Law:
+    """Force against deflection of one coordinate (SI: m and N, or rad and N·m).
+
+    ``stiffness`` is the slope of the linear part. With ``cubic`` the force is
+    ``stiffness * a + cubic * a**3``. With ``knots`` the law is the monotone polyline through the
+    points (deflection, force), which may contain steps in either coordinate (a dead zone is a
+    piece of zero force, a stuck friction contact a piece of zero deflection); beyond the first and
+    last knot it goes on with slope ``stiffness``. The two do not combine.
+    A free coordinate has no law at all (``None``), a rigid one none either but is actuated.
+    """
+
+    stiffness: float
+    cubic: float = 0.0
+    knots: tuple[Knot, ...] = ()
+
+
+@dataclass(frozen=True)
+class CommandError:
+    """Error of a commanded actuator coordinate u (m or rad), added to the command:
+
+    ``offset + slope * (u - reference) + amplitude * sin(2 pi (u - reference) / period + phase)``
+    """
+
+    offset: float = 0.0
+    slope: float = 0.0
+    amplitude: float = 0.0
+    period: float = 1.0
+    phase: float = 0.0
+    reference: float = 0.0

@@ -1,0 +1,71 @@
+"""The whole machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from stiffmap.description.elements import Element
+from stiffmap.description.pose import Pose, Vector
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A chain from the base to the platform."""
+
+    name: str
+    elements: tuple[Element, ...]
+
+
+@dataclass(frozen=True)
+class ExternalSpring:
+    """A straight spring between two points: a cable, a hose, a counterbalance.
+
+    ``anchor`` is fixed in base axes (m); ``point`` is the full name of a `Point` on the machine.
+    Force ``stiffness * (distance - length)`` along the line; zero when slack if ``tension_only``.
+    """
+
+    name: str
+    point: str
+    anchor: Vector
+    stiffness: float
+    length: float
+    tension_only: bool = False
+
+
+@dataclass(frozen=True)
+class AppliedEffect:
+    """Record of an effect that has been added: its kind, place and parameters (SI)."""
+
+    kind: str
+    element: str
+    legs: tuple[str, ...] = ()
+    parameters: tuple[tuple[str, float], ...] = ()
+    options: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class MachineDescription:
+    """Base elements, then legs in parallel, then platform elements; the last frame is the TCP.
+
+    A serial arm has one leg. ``home`` is the TCP pose of the home configuration, in which every
+    joint has its ``home`` coordinate. ``workspace`` is an axis-aligned box of TCP positions.
+    ``gravity`` (m/s², base axes) applies unless a call says otherwise; ``None`` is none.
+    ``uncertainty`` holds a standard uncertainty (SI) beside any number, keyed by
+    ``full.element.name/field``; ``notes`` says where numbers come from, by the same keys.
+    """
+
+    name: str
+    legs: tuple[Leg, ...]
+    base: tuple[Element, ...] = ()
+    platform: tuple[Element, ...] = ()
+    home: Pose = field(default_factory=Pose)
+    workspace: tuple[Vector, Vector] | None = None
+    gravity: Vector | None = None
+    external_springs: tuple[ExternalSpring, ...] = ()
+    effects: tuple[AppliedEffect, ...] = ()
+    title: str = ""
+    source: str = ""
+    uncertainty: tuple[tuple[str, float], ...] = ()
+    notes: tuple[tuple[str, str], ...] = ()
+    extra: tuple[tuple[str, Any], ...] = ()
