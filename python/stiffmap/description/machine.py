@@ -53,6 +53,8 @@ class MachineDescription:
     ``gravity`` (m/s², base axes) applies unless a call says otherwise; ``None`` is none.
     ``uncertainty`` holds a standard uncertainty (SI) beside any number, keyed by
     ``full.element.name/field``; ``notes`` says where numbers come from, by the same keys.
+    ``declared`` is the machine before its effects were added (``None``: no effect has been);
+    files save it together with the records in ``effects``.
     """
 
     name: str
@@ -69,3 +71,4 @@ class MachineDescription:
     uncertainty: tuple[tuple[str, float], ...] = ()
     notes: tuple[tuple[str, str], ...] = ()
     extra: tuple[tuple[str, Any], ...] = ()
+    declared: MachineDescription | None = None

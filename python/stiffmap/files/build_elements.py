@@ -1,0 +1,236 @@
+"""Elements of a file to the SI elements of a description."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stiffmap.description import (
+    Block,
+    Body,
+    Branch,
+    CommandError,
+    Drive,
+    Element,
+    Joint,
+    Law,
+    Offset,
+    Point,
+)
+from stiffmap.description.pose import Rows, vector
+from stiffmap.files.build_geometry import build_pose, build_vector
+from stiffmap.files.build_springs import build_law, build_spring
+from stiffmap.files.context import Context
+from stiffmap.files.schema.base import Number
+from stiffmap.files.schema.elements import (
+    ActuatorModel,
+    BlockModel,
+    BodyModel,
+    CommandErrorModel,
+    ElementModel,
+    JointModel,
+    OffsetModel,
+    PointModel,
+    SpringModel,
+)
+from stiffmap.files.units import ANGLE, FORCE, INERTIA, LENGTH, MASS, MOMENT, NONE, Dimension
+
+ZERO = Number(value=0.0)
+
+
+def build_elements(models: Sequence[ElementModel], context: Context) -> tuple[Element, ...]:
+    """A sequence; raises `FileError` where a name occurs twice.
+
+    Bodies and points have names of their own sort: a body may be called as the spring that follows it.
+    """
+    taken: set[tuple[str, str]] = set()
+    elements = []
+    for i, model in enumerate(models):
+        here = context.at(i)
+        element = build_element(model, here)
+        names = [element.name]
+        if isinstance(element, Block):
+            names += [branch.name for branch in element.branches]
+        sort = {Body: "body", Point: "point"}.get(type(element), "element")
+        for name in names:
+            if (sort, name) in taken:
+                here.fail(f"the name '{name}' is taken by an earlier {sort} of this sequence")
+            taken.add((sort, name))
+        elements.append(element)
+    return tuple(elements)
+
+
+def build_element(model: ElementModel, context: Context) -> Element:
+    """One element."""
+    match model:
+        case OffsetModel():
+            return _offset(model, _named(model.offset, model.note, context))
+        case JointModel():
+            return _joint(model, _named(model.joint, model.note, context))
+        case ActuatorModel():
+            return _actuator(model, _named(model.actuator, model.note, context))
+        case SpringModel():
+            return build_spring(model, _named(model.spring, model.note, context))
+        case BodyModel():
+            return _body(model, _named(model.body, model.note, context))
+        case PointModel():
+            return _point(model, _named(model.point, model.note, context))
+        case BlockModel():
+            return _block(model, context)
+
+
+def _named(name: str, note: str, context: Context) -> Context:
+    inside = context.inside(name)
+    inside.note(note)
+    return inside
+
+
+def _offset(model: OffsetModel, context: Context) -> Offset:
+    actual = None
+    if model.actual is not None:
+        actual = build_pose(model.actual, context.at("actual"), "actual.")
+    return Offset(model.offset, build_pose(model, context), actual)
+
+
+def _joint(model: JointModel, context: Context) -> Joint:
+    axes = tuple(model.axes) if model.axes is not None else (model.axis,)
+    angular = model.kind != "prismatic"
+    coordinate = ANGLE if angular else LENGTH
+    home = model.home if isinstance(model.home, list) else [model.home or ZERO] * len(axes)
+    limits = None
+    if model.limits is not None:
+        limits = build_range(model.limits, coordinate, context, "limits")
+    return Joint(
+        model.joint,
+        model.kind,
+        tuple(a for a in axes if a is not None),
+        home_coordinates(home, coordinate, context),
+        law=_law(model, angular, context),
+        limits=limits,
+    )
+
+
+def home_coordinates(numbers: Sequence[Number], dimension: Dimension, context: Context) -> tuple[float, ...]:
+    """SI home coordinates, one per axis."""
+    names = ["home"] if len(numbers) == 1 else [f"home.{i + 1}" for i in range(len(numbers))]
+    return tuple(context.si(n, dimension, name) for n, name in zip(numbers, names, strict=True))
+
+
+def _law(model: JointModel | ActuatorModel, angular: bool, context: Context) -> Law | None:
+    linear = Dimension(length=1, force=1) if angular else Dimension(length=-1, force=1)
+    if model.stiffness is not None:
+        if model.stiffness.value <= 0.0:
+            context.at("stiffness").fail(f"must be positive; found {model.stiffness.value}")
+        return Law(context.si(model.stiffness, linear, "stiffness"))
+    if model.compliance is not None:
+        inverse = Dimension(*(-n for n in linear))
+        return Law(context.at("compliance").inverse(model.compliance, inverse, "stiffness"))
+    if model.law is not None:
+        return build_law(model.law, angular, context.at("law"), "law")
+    return None
+
+
+def build_range(pair: list[Number], dimension: Dimension, context: Context, name: str) -> tuple[float, float]:
+    """SI interval; raises `FileError` where it is empty."""
+    low, high = (context.si(n, dimension, f"{name}.{w}") for n, w in zip(pair, ("min", "max"), strict=True))
+    if low >= high:
+        context.at(name).fail(f"the lower end {pair[0].value} is not below the upper end {pair[1].value}")
+    return (low, high)
+
+
+def _actuator(model: ActuatorModel, context: Context) -> Joint:
+    angular = model.kind == "revolute"
+    coordinate = ANGLE if angular else LENGTH
+
+    def optional(number: Number | None, dimension: Dimension, name: str) -> float | None:
+        return None if number is None else context.si(number, dimension, name)
+
+    slope = optional(model.compliance_slope, Dimension(*(-n for n in coordinate)), "compliance_slope")
+    effort = MOMENT if angular else FORCE
+    viscous = Dimension(*(e - c for e, c in zip(effort, coordinate, strict=True)))
+    friction = model.friction
+    drive = Drive(
+        range=None if model.range is None else build_range(model.range, coordinate, context, "range"),
+        speed=optional(model.speed, coordinate, "speed"),
+        force=optional(model.force, effort, "force"),
+        encoder_error=optional(model.encoder_error, coordinate, "encoder_error"),
+        coulomb_friction=optional(friction.coulomb, effort, "friction.coulomb") if friction else None,
+        viscous_friction=optional(friction.viscous, viscous, "friction.viscous") if friction else None,
+    )
+    return Joint(
+        model.actuator,
+        model.kind,
+        (model.axis,),
+        home_coordinates([model.home or ZERO], coordinate, context),
+        actuated=True,
+        law=_law(model, angular, context),
+        compliance_slope=slope or 0.0,
+        command_errors=tuple(_command_error(e, coordinate, context) for e in model.command_errors or []),
+        limits=None if model.limits is None else build_range(model.limits, coordinate, context, "limits"),
+        drive=None if drive == Drive() else drive,
+    )
+
+
+def _command_error(model: CommandErrorModel, coordinate: Dimension, context: Context) -> CommandError:
+    dimensions = {"slope": NONE, "phase": ANGLE}
+    given = {
+        key: context.si(getattr(model, key), dimensions.get(key, coordinate), f"command_errors.{key}")
+        for key in CommandErrorModel.model_fields
+        if getattr(model, key) is not None
+    }
+    return replace(CommandError(), **given)
+
+
+def _body(model: BodyModel, context: Context) -> Body:
+    if model.mass.value < 0.0:
+        context.at("mass").fail(f"must not be negative; found {model.mass.value}")
+    mass = context.si(model.mass, MASS, "mass")
+    com = (0.0, 0.0, 0.0)
+    if model.com is not None:
+        com = build_vector(model.com, LENGTH, context, "com")
+    if model.inertia is None:
+        return Body(model.body, mass, com)
+    return Body(model.body, mass, com, _inertia(model.inertia, context))
+
+
+def _inertia(terms: list[Number | list[Number]], context: Context) -> Rows:
+    here = context.at("inertia")
+    rows = [[ZERO] * 3 for _ in range(3)]
+    for i, term in enumerate(terms):
+        if len(terms) != 3 or isinstance(term, list) != isinstance(terms[0], list):
+            here.fail("expected three moments about x, y, z, or three rows of three")
+        if isinstance(term, list):
+            rows[i] = term
+        else:
+            rows[i][i] = term
+    matrix = np.array(
+        [
+            [context.si(n, INERTIA, f"inertia.{'xyz'[min(i, j)]}{'xyz'[max(i, j)]}") for j, n in enumerate(row)]
+            for i, row in enumerate(rows)
+        ]
+    )
+    if np.any(matrix != matrix.T):
+        here.fail(f"the inertia is not symmetric (by {np.abs(matrix - matrix.T).max():.3g} kg m^2)")
+    principal = np.linalg.eigvalsh(matrix)
+    if principal[0] < -1e-12 * principal[2]:
+        here.fail(f"the inertia has a negative principal moment ({principal[0]:.3g} kg m^2)")
+    a, b, c = (vector(row) for row in matrix)
+    return (a, b, c)
+
+
+def _point(model: PointModel, context: Context) -> Point:
+    if model.at is None:
+        return Point(model.point)
+    return Point(model.point, build_vector(model.at, LENGTH, context, "at"))
+
+
+def _block(model: BlockModel, context: Context) -> Block:
+    context.inside(model.block).note(model.note)
+    branches = tuple(
+        # a full name holds the branch, not the block
+        Branch(name, build_elements(models, context.at("branches", name).inside(name)))
+        for name, models in model.branches.items()
+    )
+    return Block(model.block, branches)

@@ -1,0 +1,172 @@
+"""Springs and force laws of a file to SI."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.description import Law, Spring
+from stiffmap.description.elements import Matrix6
+from stiffmap.files import sections
+from stiffmap.files.cantilever import cantilever_compliance
+from stiffmap.files.context import Context
+from stiffmap.files.matrix_checks import asymmetry, lowest_eigenvalue
+from stiffmap.files.schema.base import Number
+from stiffmap.files.schema.elements import SpringModel
+from stiffmap.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix
+from stiffmap.files.units import ANGLE, BENDING, FORCE, LENGTH, MODULUS, MOMENT, NONE, Dimension
+
+_COMPLIANCE = {0: Dimension(length=1, force=-1), 1: Dimension(force=-1), 2: Dimension(length=-1, force=-1)}
+_STIFFNESS = {0: Dimension(length=-1, force=1), 1: FORCE, 2: MOMENT}
+
+
+def build_spring(model: SpringModel, context: Context) -> Spring:
+    """SI spring; raises `FileError` for an asymmetric or indefinite matrix."""
+    name = model.spring
+    laws = tuple(
+        (DIRECTIONS.index(d), build_law(law, DIRECTIONS.index(d) > 2, context.at("laws", d), f"laws.{d}"))
+        for d, law in (model.laws or {}).items()
+    )
+    rest = (0.0,) * 6
+    if model.rest is not None:
+        rest = tuple(
+            context.si(n, ANGLE if i > 2 else LENGTH, f"rest.{d}")
+            for i, (n, d) in enumerate(zip(model.rest, DIRECTIONS, strict=True))
+        )
+    if model.stiffness is not None:
+        stiffness = build_matrix(model.stiffness, "stiffness", context.at("stiffness"))
+        return Spring(name, stiffness=stiffness, laws=laws, rest=rest)
+    if model.beam is not None:
+        compliance = as_rows(build_beam(model.beam, context.at("beam")))
+    elif model.link is not None:
+        compliance = load_link(model.link, context.at("link"))
+    else:
+        assert model.compliance is not None  # the schema asks for one of the four
+        compliance = build_matrix(model.compliance, "compliance", context.at("compliance"))
+    return Spring(name, compliance=compliance, laws=laws, rest=rest)
+
+
+def build_matrix(model: Matrix, word: str, context: Context) -> Matrix6:
+    """Symmetric positive semidefinite 6x6 in SI, exactly as written."""
+    dimensions = _COMPLIANCE if word == "compliance" else _STIFFNESS
+    matrix = np.zeros((6, 6))
+
+    def read(number: Number, i: int, j: int) -> float:
+        low, high = sorted((i, j))
+        return context.si(number, dimensions[(i > 2) + (j > 2)], f"{word}.k{low + 1}{high + 1}")
+
+    for i, row in enumerate(model.rows or []):
+        matrix[i] = [read(number, i, j) for j, number in enumerate(row)]
+    for i, number in enumerate(model.diagonal or []):
+        matrix[i, i] = read(number, i, i)
+    for key, number in (model.entries or {}).items():
+        i, j = int(key[1]) - 1, int(key[2]) - 1
+        matrix[i, j] = matrix[j, i] = read(number, i, j)
+    _check(matrix, word, context)
+    return as_rows(matrix)
+
+
+def _check(matrix: NDArray[np.float64], word: str, context: Context) -> None:
+    size, i, j = asymmetry(matrix)
+    if size > 0.0:
+        context.fail(
+            f"the {word} is not symmetric: k{i + 1}{j + 1} and k{j + 1}{i + 1} differ by {size:.3g} "
+            "of the geometric mean of their diagonal terms"
+        )
+    lowest = lowest_eigenvalue(matrix)
+    if lowest < 0.0:
+        context.fail(
+            f"the {word} is indefinite: its lowest eigenvalue, scaled to unit diagonal, is {lowest:.3g}; "
+            "it must not be negative"
+        )
+
+
+def build_beam(beam: Beam, context: Context) -> NDArray[np.float64]:
+    """Compliance (6, 6) of a beam, SI."""
+    length = _positive(beam.length, LENGTH, "length", context)
+    if beam.EA is not None:
+        dims = (FORCE, BENDING, BENDING, BENDING)
+        given = [(name, getattr(beam, name), dim) for name, dim in zip(beam.products, dims, strict=True)]
+        values = [_positive(number, dim, name, context) for name, number, dim in given]
+    else:
+        e, g = _moduli(beam, context)
+        s = _section(beam, context)
+        values = [e * s.area, g * s.torsion, e * s.about_width, e * s.about_height]
+    return cantilever_compliance(length, beam.along, *values)
+
+
+def _moduli(beam: Beam, context: Context) -> tuple[float, float]:
+    material = beam.material
+    if isinstance(material, str):
+        if material not in context.materials:
+            known = ", ".join(context.materials) or "none"
+            context.at("material").fail(f"unknown material '{material}'; declared under materials: {known}")
+        material = context.materials[material]
+    assert material is not None  # the schema asks for it beside a section
+    e = _positive(material.E, MODULUS, "material.E", context)
+    if material.G is not None:
+        return e, _positive(material.G, MODULUS, "material.G", context)
+    assert material.nu is not None
+    return e, e / (2 * (1 + context.si(material.nu, NONE, "beam.material.nu")))
+
+
+def _section(beam: Beam, context: Context) -> sections.Section:
+    if beam.round is not None:
+        return sections.round_section(_positive(beam.round.diameter, LENGTH, "round.diameter", context))
+    if beam.tube is not None:
+        outer = _positive(beam.tube.outer, LENGTH, "tube.outer", context)
+        inner = _positive(beam.tube.inner, LENGTH, "tube.inner", context)
+        if inner >= outer:
+            context.at("tube").fail("the inner diameter must be smaller than the outer one")
+        return sections.tube_section(outer, inner)
+    shape, sort = (beam.rectangle, "rectangle") if beam.rectangle is not None else (beam.hollow, "hollow")
+    assert shape is not None
+    width = _positive(shape.width, LENGTH, f"{sort}.width", context)
+    height = _positive(shape.height, LENGTH, f"{sort}.height", context)
+    if beam.hollow is None:
+        return sections.rectangle_section(width, height)
+    wall = _positive(beam.hollow.wall, LENGTH, "hollow.wall", context)
+    if 2 * wall >= min(width, height):
+        context.at("hollow").fail("twice the wall must be smaller than width and height")
+    return sections.hollow_section(width, height, wall)
+
+
+def _positive(number: Number, dimension: Dimension, name: str, context: Context) -> float:
+    if number.value <= 0.0:
+        context.at(*name.split(".")).fail(f"must be positive; found {number.value}")
+    return context.si(number, dimension, f"beam.{name}")
+
+
+def build_law(model: LawModel, angular: bool, context: Context, name: str) -> Law:
+    """SI law of a translation or a rotation."""
+    stiffness = context.si(model.stiffness, _STIFFNESS[2 if angular else 0], f"{name}.stiffness")
+    cubic = 0.0
+    if model.cubic is not None:
+        dimension = MOMENT if angular else Dimension(force=1, length=-3)
+        cubic = context.si(model.cubic, dimension, f"{name}.cubic")
+    across, along = (ANGLE, MOMENT) if angular else (LENGTH, FORCE)
+    knots = tuple((context.si(a, across), context.si(f, along)) for a, f in model.knots or [])
+    if any(b < a or g < f for (a, f), (b, g) in pairwise(knots)):
+        context.at("knots").fail("knots must not decrease in deflection or force")
+    return Law(stiffness, cubic, knots)
+
+
+def load_link(name: str, context: Context) -> Matrix6:
+    """Compliance of an identified link file, whose path is relative to the machine file."""
+    from stiffmap.files.optional import optional
+
+    path = context.folder / name
+    if not path.exists():
+        context.fail(f"no link file '{name}' in {context.folder}")
+    link = optional("stiffmap.link", "load_link", "identified link files")(path)
+    matrix = np.asarray(link.compliance, dtype=float)
+    _check(matrix, "compliance", context)
+    context.note(name, "link")
+    return as_rows(matrix)
+
+
+def as_rows(matrix: ArrayLike) -> Matrix6:
+    """6x6 as hashable rows."""
+    return tuple(tuple(float(v) for v in row) for row in np.asarray(matrix))

@@ -1,0 +1,74 @@
+"""Where the builder is in the file and in the machine, and what it gathers besides elements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import NoReturn
+
+from stiffmap.errors import FileError
+from stiffmap.files.report import key_text
+from stiffmap.files.schema.base import Number
+from stiffmap.files.schema.springs import Material
+from stiffmap.files.units import Dimension, UnitSystem
+from stiffmap.files.yaml_text import Document, KeyPath
+
+
+@dataclass
+class Gathered:
+    """What belongs to the whole machine, in the order of the file, keyed ``full.name/field``."""
+
+    uncertainty: dict[str, float] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Context:
+    """Units and materials of the file; ``path`` in it; ``full`` name in the machine."""
+
+    file: str
+    document: Document
+    folder: Path
+    units: UnitSystem
+    materials: dict[str, Material]
+    gathered: Gathered
+    path: KeyPath = ()
+    full: str = ""
+
+    def at(self, *keys: str | int) -> Context:
+        """The same place in the machine, deeper in the file."""
+        return replace(self, path=self.path + keys)
+
+    def inside(self, name: str) -> Context:
+        """An element or sequence of the machine."""
+        return replace(self, full=f"{self.full}.{name}" if self.full else name)
+
+    def fail(self, message: str) -> NoReturn:
+        """Raise a `FileError` at this place."""
+        line = self.document.line(self.path)
+        raise FileError(message, file=self.file, line=line, key=key_text(self.path))
+
+    def note(self, text: str, field_name: str = "") -> None:
+        """Keep a note about the element, or about one of its fields."""
+        if text:
+            self.gathered.notes[f"{self.full}/{field_name}" if field_name else self.full or "/"] = text
+
+    def si(self, number: Number, dimension: Dimension, field_name: str = "") -> float:
+        """SI value; its uncertainty and note are kept under ``field_name`` of the element."""
+        if field_name:
+            self.note(number.note, field_name)
+            if number.u is not None:
+                u = self.units.to_si(number.u, dimension)
+                self.gathered.uncertainty[f"{self.full}/{field_name}"] = u
+        return self.units.to_si(number.value, dimension)
+
+    def inverse(self, number: Number, dimension: Dimension, field_name: str) -> float:
+        """SI value of 1/number (a stiffness from a compliance); the uncertainty follows to first order."""
+        value = self.units.to_si(number.value, dimension)
+        if value <= 0.0:
+            self.fail(f"a compliance must be positive (use rigid: true for none); found {number.value}")
+        self.note(number.note, field_name)
+        if number.u is not None:
+            u = self.units.to_si(number.u, dimension)
+            self.gathered.uncertainty[f"{self.full}/{field_name}"] = u / value**2
+        return 1.0 / value

@@ -1,0 +1,56 @@
+"""Reading machine files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from stiffmap.description import MachineDescription
+from stiffmap.errors import FileError
+from stiffmap.files.build import build, build_effect
+from stiffmap.files.optional import optional
+from stiffmap.files.report import file_error
+from stiffmap.files.schema import MachineFile
+from stiffmap.files.schema.base import describe
+from stiffmap.files.shipped import find
+from stiffmap.files.yaml_text import Document, parse, read
+
+
+def load_description(name_or_path: str | Path) -> MachineDescription:
+    """Description of a shipped machine (by name) or of a machine file (by path).
+
+    Raises `UnknownMachineError` where there is neither, `FileError` for anything wrong in the file.
+    """
+    path = find(name_or_path)
+    return describe_document(read(path), str(path), path.parent)
+
+
+def description_from_text(text: str, file: str = "text", folder: Path = Path()) -> MachineDescription:
+    """Description from the text of a machine file; ``folder`` is where its link files are."""
+    return describe_document(parse(text, file), file, folder)
+
+
+def describe_document(document: Document, file: str, folder: Path) -> MachineDescription:
+    """Schema, then SI, then effects."""
+    model = validate(document, file)
+    base = build(model, document, file, folder)
+    if not model.effects:
+        return base
+    apply_records = optional("stiffmap.effects", "apply_records", "the effects of a machine file")
+    applied: MachineDescription = apply_records(base, tuple(build_effect(e) for e in model.effects))
+    return applied if applied.declared is not None else replace(applied, declared=base)
+
+
+def validate(document: Document, file: str) -> MachineFile:
+    """Plain data against the schema; raises `FileError` with the first problem."""
+    if not isinstance(document.data, dict):
+        found = describe(document.data)
+        raise FileError(f"a machine file is a mapping with name, units and legs; found {found}", file=file)
+    data: dict[str, Any] = document.data
+    try:
+        return MachineFile.model_validate(data)
+    except ValidationError as error:
+        raise file_error(error, document, file) from error

@@ -1,0 +1,74 @@
+"""Validation errors told in one sentence: file, line, key, what was expected and what was found."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import ValidationError
+
+from stiffmap.errors import FileError
+from stiffmap.files.schema.base import describe, suggestion
+from stiffmap.files.schema.elements import SORTS
+from stiffmap.files.yaml_text import Document, KeyPath
+
+
+def file_error(error: ValidationError, document: Document, file: str) -> FileError:
+    """The first of pydantic's errors; how many more there are is said."""
+    errors = error.errors(include_url=False)
+    first = errors[0]
+    missing = first["type"] == "missing"
+    path = _path(first["loc"], document.data, missing)
+    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    if missing:
+        path, message = path[:-1], f"missing key '{path[-1]}'"
+    else:
+        message = _message(first)
+    line = document.line(path) or 1
+    return FileError(message + more, file=file, line=line, key=key_text(path))
+
+
+def key_text(path: KeyPath) -> str:
+    """``legs.x.elements[2].axis``."""
+    text = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in path)
+    return text.removeprefix(".")
+
+
+def _path(loc: tuple[Any, ...], data: Any, missing: bool) -> KeyPath:
+    """Location in the *file*: without the schema's own steps (union tags, forms of a matrix)."""
+    path: list[str | int] = []
+    for i, step in enumerate(loc):
+        last = i == len(loc) - 1
+        if isinstance(data, dict):
+            # an element's tag comes before its keys, and its name stands under a key of the same name
+            if step in SORTS and not last and "command_errors" not in path:
+                continue
+            if str(step) in data or (last and missing):
+                path.append(str(step))
+                data = data.get(str(step))
+        elif isinstance(data, list) and isinstance(step, int) and step < len(data):
+            path.append(step)
+            data = data[step]
+    return tuple(path)
+
+
+def _message(error: Any) -> str:
+    kind, found, context = error["type"], error["input"], error.get("ctx", {})
+    if kind == "finite_number":
+        return f"expected a finite number; found {found}"
+    if kind == "literal_error":
+        near = suggestion(str(found), _choices(context))
+        return f"expected {context['expected']}; found {describe(found)}{near}"
+    if kind == "string_pattern_mismatch":
+        return f"a name has letters, digits, '_' and '-' only; found {describe(found)}"
+    if kind in ("too_short", "too_long"):
+        wanted = context.get("min_length", context.get("max_length"))
+        return f"expected {wanted} entries; found {context['actual_length']}"
+    if kind.endswith("_type"):
+        sorts = {"list": "a list", "dict": "a mapping", "string": "text", "bool": "true or false"}
+        return f"expected {sorts.get(kind.removesuffix('_type'), 'a number')}; found {describe(found)}"
+    message: str = error["msg"]
+    return message.removeprefix("Value error, ")
+
+
+def _choices(context: dict[str, Any]) -> list[str]:
+    return [part.strip(" '") for part in str(context["expected"]).replace(" or ", ",").split(",")]

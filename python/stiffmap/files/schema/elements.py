@@ -1,0 +1,181 @@
+"""Elements of a chain as a file writes them: each is a mapping whose first key says its sort."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic_core import PydanticCustomError
+
+from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Pair, Vector3
+from stiffmap.files.schema.geometry import Axis, Frame
+from stiffmap.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix
+
+SORTS = ("offset", "joint", "actuator", "spring", "body", "point", "block")
+AXES_OF = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 3}
+
+
+class OffsetModel(Frame):
+    """Constant transform; ``actual`` is what the machine was built with, if not the nominal."""
+
+    offset: Name
+    actual: Frame | None = None
+    note: str = ""
+
+
+class JointModel(FileModel):
+    """Passive joint; it turns or slides freely unless it has a stiffness or a law."""
+
+    joint: Name
+    kind: Literal["revolute", "prismatic", "universal", "spherical"]
+    axis: Axis | None = None
+    axes: list[Axis] | None = None
+    home: Number | Numbers | None = None
+    limits: Pair | None = None
+    stiffness: Number | None = None
+    compliance: Number | None = None
+    law: LawModel | None = None
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _axes(self) -> JointModel:
+        needed = AXES_OF[self.kind]
+        given = [self.axis] if self.axis is not None else self.axes
+        if (self.axis is not None and self.axes is not None) or given is None or len(given) != needed:
+            raise PydanticCustomError(
+                "axes",
+                "a {kind} joint needs {what}",
+                {"kind": self.kind, "what": "one axis" if needed == 1 else f"axes: a list of {needed}"},
+            )
+        if isinstance(self.home, list) and len(self.home) != needed:
+            raise PydanticCustomError("home", "home needs {n} coordinates", {"n": needed})
+        if isinstance(self.home, Number) and needed != 1:
+            raise PydanticCustomError("home", "home needs a list of {n} coordinates", {"n": needed})
+        one_of(self, ("stiffness", "compliance", "law"))
+        return self
+
+
+class Friction(FileModel):
+    """Friction of a drive: Coulomb force (or torque) and viscous coefficient."""
+
+    coulomb: Number | None = None
+    viscous: Number | None = None
+
+
+class CommandErrorModel(FileModel):
+    """Error added to the commanded coordinate u: offset + slope*(u - reference) + amplitude*sin(...)."""
+
+    offset: Number | None = None
+    slope: Number | None = None
+    amplitude: Number | None = None
+    period: Number | None = None
+    phase: Number | None = None
+    reference: Number | None = None
+
+
+class ActuatorModel(FileModel):
+    """Actuated joint, one axis; give its stiffness, its compliance, a law, or ``rigid: true``."""
+
+    actuator: Name
+    kind: Literal["revolute", "prismatic"]
+    axis: Axis
+    home: Number | None = None
+    stiffness: Number | None = None
+    compliance: Number | None = None
+    law: LawModel | None = None
+    rigid: Literal[True] | None = None
+    compliance_slope: Number | None = None
+    range: Pair | None = None
+    limits: Pair | None = None
+    speed: Number | None = None
+    force: Number | None = None
+    encoder_error: Number | None = None
+    friction: Friction | None = None
+    command_errors: list[CommandErrorModel] | None = None
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _one_law(self) -> ActuatorModel:
+        one_of(self, ("stiffness", "compliance", "law", "rigid"), required=True)
+        return self
+
+
+class SpringModel(FileModel):
+    """Virtual spring of a link, at the place where its compliance holds."""
+
+    spring: Name
+    compliance: Matrix | None = None
+    stiffness: Matrix | None = None
+    beam: Beam | None = None
+    link: Annotated[str, Field(description="Identified link file, relative to this file.")] | None = None
+    laws: dict[Literal[DIRECTIONS], LawModel] | None = None  # type: ignore[valid-type]
+    rest: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = None
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _one_form(self) -> SpringModel:
+        one_of(self, ("compliance", "stiffness", "beam", "link"), required=True)
+        return self
+
+
+class BodyModel(FileModel):
+    """Rigid body that moves with the current frame."""
+
+    body: Name
+    mass: Number
+    com: Vector3 | None = None
+    inertia: list[Number | Vector3] | None = None
+    note: str = ""
+
+
+class PointModel(FileModel):
+    """Named point that moves with the current frame."""
+
+    point: Name
+    at: Vector3 | None = None
+    note: str = ""
+
+
+class BlockModel(FileModel):
+    """Two or more branches between the same two frames."""
+
+    block: Name
+    branches: Annotated[dict[Name, list[ElementModel]], Field(min_length=2)]
+    note: str = ""
+
+
+def one_of(model: FileModel, keys: tuple[str, ...], *, required: bool = False) -> None:
+    """Refuse two of ``keys`` together, and none of them where one is required."""
+    given = [k for k in keys if getattr(model, k) is not None]
+    if len(given) > 1 or (required and not given):
+        raise PydanticCustomError(
+            "one_of",
+            "give {how} of {keys}; found {found}",
+            {
+                "how": "exactly one" if required else "at most one",
+                "keys": ", ".join(keys),
+                "found": ", ".join(given) or "none",
+            },
+        )
+
+
+def _sort(data: Any) -> str | None:
+    found = [k for k in SORTS if (k in data if isinstance(data, dict) else hasattr(data, k))]
+    return found[0] if len(found) == 1 else None
+
+
+ElementModel = Annotated[
+    Annotated[OffsetModel, Tag("offset")]
+    | Annotated[JointModel, Tag("joint")]
+    | Annotated[ActuatorModel, Tag("actuator")]
+    | Annotated[SpringModel, Tag("spring")]
+    | Annotated[BodyModel, Tag("body")]
+    | Annotated[PointModel, Tag("point")]
+    | Annotated[BlockModel, Tag("block")],
+    Discriminator(
+        _sort,
+        custom_error_type="element",
+        custom_error_message="an element needs exactly one of the keys " + ", ".join(SORTS),
+    ),
+]
+BlockModel.model_rebuild()

@@ -1,0 +1,88 @@
+"""The machine file as a whole."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Vector3
+from stiffmap.files.schema.elements import ElementModel
+from stiffmap.files.schema.geometry import Box, Frame
+from stiffmap.files.schema.springs import Material
+
+
+class UnitsModel(FileModel):
+    """Units of every number in the file; derived units follow (compliance in mm/N, ...).
+    Stiffness and compliance are always per radian, gravity always in m/s²."""
+
+    length: Literal["m", "cm", "mm", "um", "in"]
+    force: Literal["N", "kN", "MN"]
+    angle: Literal["rad", "deg"]
+    mass: Literal["kg", "g", "t"] = "kg"
+
+
+class LegModel(FileModel):
+    """A chain from the base to the platform, from a template or written out.
+
+    ``frame`` places the leg's first frame in the base. ``attach`` is the platform frame seen from
+    the leg's last frame; ``base_axes`` turns back by the rotation of ``frame``.
+    ``home`` gives home coordinates of single joints where they differ from the template's.
+    """
+
+    template: Name | None = None
+    elements: list[ElementModel] | None = None
+    frame: Frame | None = None
+    attach: Literal["base_axes"] | Frame | None = None
+    home: dict[str, Number | Numbers] | None = None
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _one_chain(self) -> LegModel:
+        if (self.template is None) == (self.elements is None):
+            raise PydanticCustomError("leg", "give exactly one of template and elements")
+        return self
+
+
+class ExternalSpringModel(FileModel):
+    """Straight spring from a point of the machine to an anchor fixed in base axes."""
+
+    point: str
+    anchor: Vector3
+    stiffness: Number
+    length: Number
+    tension_only: bool = False
+    note: str = ""
+
+
+class EffectModel(FileModel):
+    """Record of an effect added to the machine; its parameters are in SI units."""
+
+    kind: str
+    element: str
+    legs: list[Name] = []
+    parameters: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = {}
+    options: dict[str, str] = {}
+
+
+class MachineFile(FileModel):
+    """A machine: base, legs in parallel, platform; the platform's last frame is the TCP."""
+
+    name: Name
+    title: str = ""
+    source: str = ""
+    units: UnitsModel
+    gravity: Annotated[Vector3, Field(description="m/s², base axes; left out: none.")] | None = None
+    home: Annotated[Frame, Field(description="TCP pose of the home configuration.")] | None = None
+    workspace: Box | None = None
+    materials: dict[Name, Material] = {}
+    templates: dict[Name, list[ElementModel]] = {}
+    base: list[ElementModel] = []
+    legs: Annotated[dict[Name, LegModel], Field(min_length=1)]
+    platform: list[ElementModel] = []
+    external_springs: dict[Name, ExternalSpringModel] = {}
+    effects: list[EffectModel] = []
+    uncertainty: Annotated[dict[str, float], Field(description="Written on saving: SI, by full name.")] = {}
+    notes: dict[str, str] = {}
+    extra: dict[str, Any] = {}

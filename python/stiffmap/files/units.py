@@ -1,0 +1,62 @@
+"""Units of a machine file, and their exact conversion to SI."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
+
+LENGTHS = {
+    "m": Fraction(1),
+    "cm": Fraction(1, 100),
+    "mm": Fraction(1, 1000),
+    "um": Fraction(1, 10**6),
+    "in": Fraction(254, 10**4),
+}
+FORCES = {"N": Fraction(1), "kN": Fraction(1000), "MN": Fraction(10**6)}
+MASSES = {"kg": Fraction(1), "g": Fraction(1, 1000), "t": Fraction(1000)}
+ANGLES = ("rad", "deg")
+
+
+class Dimension(NamedTuple):
+    """Exponents of length, force, angle and mass; times are always in seconds."""
+
+    length: int = 0
+    force: int = 0
+    angle: int = 0
+    mass: int = 0
+
+
+NONE = Dimension()
+LENGTH = Dimension(length=1)
+FORCE = Dimension(force=1)
+MOMENT = Dimension(length=1, force=1)
+ANGLE = Dimension(angle=1)
+MASS = Dimension(mass=1)
+INERTIA = Dimension(mass=1, length=2)
+MODULUS = Dimension(force=1, length=-2)
+BENDING = Dimension(force=1, length=2)
+
+
+@dataclass(frozen=True)
+class UnitSystem:
+    """The units that a file declares once; derived units follow from them."""
+
+    length: str = "m"
+    force: str = "N"
+    angle: str = "rad"
+    mass: str = "kg"
+
+    def to_si(self, value: float, dimension: Dimension) -> float:
+        """SI value of ``value``, rounded once: 775 mm is the double nearest to 0.775 m."""
+        scale = (
+            LENGTHS[self.length] ** dimension.length
+            * FORCES[self.force] ** dimension.force
+            * MASSES[self.mass] ** dimension.mass
+        )
+        # repr gives the decimal number that was written, so that no binary rounding enters twice
+        result = value if scale == 1 else float(Fraction(repr(float(value))) * scale)
+        if self.angle == "deg" and dimension.angle:
+            result *= math.radians(1.0) ** dimension.angle
+        return float(result)
