@@ -54,7 +54,7 @@ class MachineDescription:
     ``uncertainty`` holds a standard uncertainty (SI) beside any number, keyed by
     ``full.element.name/field``; ``notes`` says where numbers come from, by the same keys.
     ``declared`` is the machine before its effects were added (``None``: no effect has been);
-    files save it together with the records in ``effects``.
+    files save it together with the records in ``effects``. It does not count in comparisons.
     """
 
     name: str
@@ -71,4 +71,4 @@ class MachineDescription:
     uncertainty: tuple[tuple[str, float], ...] = ()
     notes: tuple[tuple[str, str], ...] = ()
     extra: tuple[tuple[str, Any], ...] = ()
-    declared: MachineDescription | None = None
+    declared: MachineDescription | None = field(default=None, compare=False)

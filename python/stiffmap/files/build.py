@@ -8,37 +8,33 @@ from typing import Any
 
 from stiffmap.description import (
     AppliedEffect,
-    Block,
-    Branch,
-    Element,
     ExternalSpring,
-    Joint,
-    Leg,
     MachineDescription,
-    Offset,
-    Pose,
 )
 from stiffmap.description.pose import Vector
-from stiffmap.files.build_elements import build_elements, build_range, home_coordinates
+from stiffmap.files.build_elements import build_elements, build_range
 from stiffmap.files.build_geometry import build_pose, build_vector
+from stiffmap.files.build_legs import build_leg
 from stiffmap.files.context import Context, Gathered
 from stiffmap.files.schema import MachineFile
-from stiffmap.files.schema.base import Number, suggestion
+from stiffmap.files.schema.base import Number
 from stiffmap.files.schema.geometry import Box
-from stiffmap.files.schema.machine import EffectModel, ExternalSpringModel, LegModel
-from stiffmap.files.units import ANGLE, LENGTH, NONE, Dimension, UnitSystem
+from stiffmap.files.schema.machine import EffectModel, ExternalSpringModel
+from stiffmap.files.units import LENGTH, NONE, Dimension, UnitSystem
 from stiffmap.files.yaml_text import Document
 
 GRAVITY_LIMIT = 1000.0  # m/s²; above it, the file gave mm/s²
 
 
-def build(model: MachineFile, document: Document, file: str = "", folder: Path = Path()) -> MachineDescription:
+def build(
+    model: MachineFile, document: Document, file: str = "", folder: Path = Path()
+) -> MachineDescription:
     """Description without its effects, which the caller applies; raises `FileError`."""
     units = UnitSystem(**model.units.model_dump())
     context = Context(file, document, folder, units, model.materials, Gathered())
     description = MachineDescription(
         name=model.name,
-        legs=tuple(_leg(name, leg, model, context) for name, leg in model.legs.items()),
+        legs=tuple(build_leg(name, leg, model.templates, context) for name, leg in model.legs.items()),
         base=build_elements(model.base, context.at("base").inside("base")),
         platform=build_elements(model.platform, context.at("platform").inside("platform")),
         home=build_pose(model.home, context.at("home"), "home."),
@@ -58,70 +54,6 @@ def build(model: MachineFile, document: Document, file: str = "", folder: Path =
         uncertainty=tuple({**gathered.uncertainty, **model.uncertainty}.items()),
         notes=tuple({**gathered.notes, **model.notes}.items()),
     )
-
-
-def _leg(name: str, leg: LegModel, model: MachineFile, context: Context) -> Leg:
-    here = context.at("legs", name).inside(name)
-    here.note(leg.note)
-    if leg.template is not None:
-        if leg.template not in model.templates:
-            known = list(model.templates)
-            near = suggestion(leg.template, known)
-            here.at("template").fail(f"no template '{leg.template}'{near}; there are: {', '.join(known) or 'none'}")
-        template = replace(here, path=("templates", leg.template))
-        elements = build_elements(model.templates[leg.template], template)
-    else:
-        elements = build_elements(leg.elements or [], here.at("elements"))
-    for joint, home in (leg.home or {}).items():
-        elements = _with_home(elements, joint.split("."), home, here.at("home", joint).inside(joint))
-    return Leg(name, (*_frame(leg, here, elements), *elements, *_attach(leg, here, elements)))
-
-
-def _frame(leg: LegModel, context: Context, elements: tuple[Element, ...]) -> tuple[Element, ...]:
-    if leg.frame is None:
-        return ()
-    here = context.at("frame")
-    _refuse_taken("frame", elements, here)
-    return (Offset("frame", build_pose(leg.frame, here.inside("frame"))),)
-
-
-def _attach(leg: LegModel, context: Context, elements: tuple[Element, ...]) -> tuple[Element, ...]:
-    if leg.attach is None:
-        return ()
-    here = context.at("attach")
-    _refuse_taken("attach", elements, here)
-    if leg.attach != "base_axes":
-        return (Offset("attach", build_pose(leg.attach, here.inside("attach"))),)
-    turned = build_pose(leg.frame, replace(context, gathered=Gathered()).at("frame"))
-    return (Offset("attach", Pose(rotation=turned.inverse().rotation)),)
-
-
-def _refuse_taken(name: str, elements: tuple[Element, ...], context: Context) -> None:
-    if any(element.name == name for element in elements):
-        context.fail(f"the leg already has an element called '{name}', which is the name of this offset")
-
-
-def _with_home(
-    elements: tuple[Element, ...], names: list[str], home: Number | list[Number], context: Context
-) -> tuple[Element, ...]:
-    """The sequence with other home coordinates of one joint, named from here on."""
-    for i, element in enumerate(elements):
-        if isinstance(element, Joint) and names == [element.name]:
-            numbers = home if isinstance(home, list) else [home]
-            if len(numbers) != len(element.axes):
-                context.fail(f"joint {element.name} has {len(element.axes)} coordinates; found {len(numbers)}")
-            dimension = LENGTH if element.kind == "prismatic" else ANGLE
-            element = replace(element, home=home_coordinates(numbers, dimension, context))
-            return (*elements[:i], element, *elements[i + 1 :])
-        if isinstance(element, Block):
-            for k, branch in enumerate(element.branches):
-                if branch.name == names[0] and len(names) > 1:
-                    inner = Branch(branch.name, _with_home(branch.elements, names[1:], home, context))
-                    block = replace(element, branches=(*element.branches[:k], inner, *element.branches[k + 1 :]))
-                    return (*elements[:i], block, *elements[i + 1 :])
-    known = [e.name for e in elements if isinstance(e, Joint)]
-    known += [f"{b.name}." for e in elements if isinstance(e, Block) for b in e.branches]
-    context.fail(f"no joint '{names[-1]}' here{suggestion(names[-1], known)}; there are: {', '.join(known)}")
 
 
 def _workspace(box: Box | None, context: Context) -> tuple[Vector, Vector] | None:

@@ -207,7 +207,10 @@ def _inertia(terms: list[Number | list[Number]], context: Context) -> Rows:
             rows[i][i] = term
     matrix = np.array(
         [
-            [context.si(n, INERTIA, f"inertia.{'xyz'[min(i, j)]}{'xyz'[max(i, j)]}") for j, n in enumerate(row)]
+            [
+                context.si(n, INERTIA, f"inertia.{'xyz'[min(i, j)]}{'xyz'[max(i, j)]}")
+                for j, n in enumerate(row)
+            ]
             for i, row in enumerate(rows)
         ]
     )

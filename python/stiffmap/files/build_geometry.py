@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.description.pose import IDENTITY, Pose, Rows, Vector, vector
 from stiffmap.files.context import Context
+from stiffmap.files.rotation import rotation_about
 from stiffmap.files.schema.base import Number
 from stiffmap.files.schema.geometry import NAMED, Frame, Turn
 from stiffmap.files.units import ANGLE, LENGTH, NONE, Dimension
@@ -66,12 +65,4 @@ def _checked_rows(rows: list[list[Number]], context: Context) -> Rows:
 
 
 def _turn(turn: Turn, context: Context) -> NDArray[np.float64]:
-    """Rotation about an axis (Rodrigues)."""
-    angle = context.si(turn.by, ANGLE)
-    cosine, sine = math.cos(angle), math.sin(angle)
-    # quarter turns exactly, so that frames of perpendicular axes stay free of 1e-17
-    cosine, sine = (float(round(v)) if abs(v - round(v)) < 1e-15 else v for v in (cosine, sine))
-    x, y, z = turn.about
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    matrix: NDArray[np.float64] = np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
-    return matrix
+    return rotation_about(np.array(turn.about), context.si(turn.by, ANGLE))

@@ -29,7 +29,7 @@ def build_spring(model: SpringModel, context: Context) -> Spring:
         (DIRECTIONS.index(d), build_law(law, DIRECTIONS.index(d) > 2, context.at("laws", d), f"laws.{d}"))
         for d, law in (model.laws or {}).items()
     )
-    rest = (0.0,) * 6
+    rest: tuple[float, ...] = (0.0,) * 6
     if model.rest is not None:
         rest = tuple(
             context.si(n, ANGLE if i > 2 else LENGTH, f"rest.{d}")

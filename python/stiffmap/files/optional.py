@@ -15,5 +15,7 @@ def optional(module: str, name: str, purpose: str) -> Callable[..., Any]:
         found: Callable[..., Any] = getattr(import_module(module), name)
     except (ModuleNotFoundError, AttributeError) as error:
         missing = getattr(error, "name", None) or module
-        raise MissingPartError(f"{purpose} need {module}.{name}, which is not installed ({missing})") from error
+        raise MissingPartError(
+            f"{purpose} need {module}.{name}, which is not installed ({missing})"
+        ) from error
     return found

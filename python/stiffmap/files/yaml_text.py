@@ -27,11 +27,15 @@ _Loader.yaml_implicit_resolvers = {
     first: [(tag, regexp) for tag, regexp in entries if tag.rsplit(":", 1)[1] in ("null", "merge")]
     for first, entries in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
-_Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"^(?:true|false)$", re.I), list("tTfF"))
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:bool", re.compile(r"^(?:true|false)$", re.IGNORECASE), list("tTfF")
+)
 _Loader.add_implicit_resolver("tag:yaml.org,2002:int", re.compile(r"^[-+]?[0-9]+$"), list("-+0123456789"))
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
-    re.compile(r"^(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.inf|\.nan)$", re.I),
+    re.compile(
+        r"^(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.inf|\.nan)$", re.IGNORECASE
+    ),
     list("-+.0123456789"),
 )
 
@@ -78,7 +82,9 @@ def parse(text: str, file: str = "") -> Document:
         loader.dispose()
 
 
-def _text_keys(node: Any, path: KeyPath, lines: dict[KeyPath, int], file: str, above: tuple[int, ...]) -> None:
+def _text_keys(
+    node: Any, path: KeyPath, lines: dict[KeyPath, int], file: str, above: tuple[int, ...]
+) -> None:
     """Record lines, make every key text, and refuse repeated keys and self-containing anchors."""
     lines.setdefault(path, node.start_mark.line + 1)
     if id(node) in above:
@@ -116,6 +122,9 @@ def read(path: Path) -> Document:
     return parse(text, str(path))
 
 
+_RESERVED = frozenset(["true", "false", "null", "yes", "no", "on", "off"])
+
+
 class _Dumper(yaml.SafeDumper):
     def ignore_aliases(self, data: Any) -> bool:
         return True
@@ -132,9 +141,7 @@ def _list(dumper: Any, data: list[Any]) -> Any:
 
 def _text(dumper: Any, data: str) -> Any:
     # quote what this module's reader or a YAML 1.1 reader would not read as text
-    plain = re.fullmatch(r"[A-Za-z_][\w .,()/°²³·-]*", data) and data.lower() not in (
-        "true", "false", "null", "yes", "no", "on", "off", "y", "n",
-    )  # fmt: skip
+    plain = re.fullmatch(r"[A-Za-z_][\w .,()/°²³·-]*", data) and data.lower() not in _RESERVED
     return dumper.represent_scalar("tag:yaml.org,2002:str", data, style=None if plain else '"')
 
 

@@ -61,9 +61,9 @@ class EffectModel(FileModel):
 
     kind: str
     element: str
-    legs: list[Name] = []
-    parameters: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = {}
-    options: dict[str, str] = {}
+    legs: list[Name] = Field(default_factory=list)
+    parameters: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = Field(default_factory=dict)
+    options: dict[str, str] = Field(default_factory=dict)
 
 
 class MachineFile(FileModel):
@@ -76,13 +76,15 @@ class MachineFile(FileModel):
     gravity: Annotated[Vector3, Field(description="m/s², base axes; left out: none.")] | None = None
     home: Annotated[Frame, Field(description="TCP pose of the home configuration.")] | None = None
     workspace: Box | None = None
-    materials: dict[Name, Material] = {}
-    templates: dict[Name, list[ElementModel]] = {}
-    base: list[ElementModel] = []
+    materials: dict[Name, Material] = Field(default_factory=dict)
+    templates: dict[Name, list[ElementModel]] = Field(default_factory=dict)
+    base: list[ElementModel] = Field(default_factory=list)
     legs: Annotated[dict[Name, LegModel], Field(min_length=1)]
-    platform: list[ElementModel] = []
-    external_springs: dict[Name, ExternalSpringModel] = {}
-    effects: list[EffectModel] = []
-    uncertainty: Annotated[dict[str, float], Field(description="Written on saving: SI, by full name.")] = {}
-    notes: dict[str, str] = {}
-    extra: dict[str, Any] = {}
+    platform: list[ElementModel] = Field(default_factory=list)
+    external_springs: dict[Name, ExternalSpringModel] = Field(default_factory=dict)
+    effects: list[EffectModel] = Field(default_factory=list)
+    uncertainty: dict[str, float] = Field(
+        default_factory=dict, description="Standard uncertainties by full name, SI; written on saving."
+    )
+    notes: dict[str, str] = Field(default_factory=dict)
+    extra: dict[str, Any] = Field(default_factory=dict)

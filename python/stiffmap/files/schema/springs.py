@@ -53,7 +53,9 @@ def _upper(entries: dict[Any, Any]) -> dict[str, Any]:
             name = name[0] + name[:0:-1]
         if name not in ENTRIES:
             raise PydanticCustomError(
-                "unknown_key", "unknown key '{key}'; entries are k11 ... k66, translations first", {"key": key}
+                "unknown_key",
+                "unknown key '{key}'; entries are k11 ... k66, translations first",
+                {"key": key},
             )
         if name in out:
             raise PydanticCustomError("twice", "entry {name} is given twice", {"name": name})
@@ -94,7 +96,8 @@ class Tube(FileModel):
 
 
 class Rectangle(FileModel):
-    """Solid rectangle: width along the axis after the beam's (y of x, z of y, x of z), height along the other."""
+    """Solid rectangle: width along the axis after the beam's (y of x, z of y, x of z), height along
+    the other."""
 
     width: Number
     height: Number
@@ -148,7 +151,8 @@ class Beam(FileModel):
                 {
                     "along": self.along,
                     "products": ", ".join(self.products),
-                    "found": ", ".join(sections + given + (["material"] if self.material else [])) or "neither",
+                    "found": ", ".join(sections + given + (["material"] if self.material else []))
+                    or "neither",
                 },
             )
         return self

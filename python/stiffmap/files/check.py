@@ -1,0 +1,78 @@
+"""What is in a machine file, and whether it is sound."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from stiffmap.description import Block, Element, Joint, MachineDescription
+from stiffmap.files.home import Gap, home_gaps
+from stiffmap.files.load import load_description
+
+GAP_LIMIT = 1e-6
+
+
+@dataclass(frozen=True)
+class FileCheck:
+    """Result of `check_file`.
+
+    ``counts`` says how many elements of each sort there are (``actuators`` apart from ``joints``);
+    ``gaps`` how well the home configuration closes; ``warnings`` what deserves a second look.
+    """
+
+    path: Path
+    description: MachineDescription
+    counts: dict[str, int]
+    gaps: list[Gap]
+    warnings: list[str]
+
+
+def check_file(path: str | Path) -> FileCheck:
+    """Load a machine (by path or shipped name) and look it over; raises `StiffmapError` if unusable."""
+    from stiffmap.files.shipped import find
+
+    description = load_description(path)
+    gaps = home_gaps(description)
+    return FileCheck(find(path), description, _counts(description), gaps, _warnings(description, gaps))
+
+
+def walk(elements: tuple[Element, ...]) -> Iterator[Element]:
+    """Every element of a sequence, those inside blocks included."""
+    for element in elements:
+        yield element
+        if isinstance(element, Block):
+            for branch in element.branches:
+                yield from walk(branch.elements)
+
+
+def _everything(description: MachineDescription) -> Iterator[Element]:
+    yield from walk(description.base)
+    for leg in description.legs:
+        yield from walk(leg.elements)
+    yield from walk(description.platform)
+
+
+def _counts(description: MachineDescription) -> dict[str, int]:
+    names = {"Offset": "offsets", "Spring": "springs", "Body": "bodies", "Point": "points", "Block": "blocks"}
+    counts = Counter(
+        ("actuators" if e.actuated else "joints") if isinstance(e, Joint) else names[type(e).__name__]
+        for e in _everything(description)
+    )
+    keys = ("actuators", "joints", "springs", "blocks", "bodies", "points")
+    return {"legs": len(description.legs), **{key: counts[key] for key in keys}}
+
+
+def _warnings(description: MachineDescription, gaps: list[Gap]) -> list[str]:
+    warnings = [
+        f"home: {gap.name} is {gap.translation * 1e3:.4g} mm and {gap.rotation:.4g} rad off; "
+        "home coordinates should close the machine"
+        for gap in gaps
+        if max(gap.translation, gap.rotation) > GAP_LIMIT
+    ]
+    if not any(isinstance(e, Joint) and e.actuated for e in _everything(description)):
+        warnings.append("no actuator: the machine cannot be commanded")
+    if description.workspace is None:
+        warnings.append("no workspace: maps need their ranges given")
+    return warnings

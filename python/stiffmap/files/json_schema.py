@@ -1,0 +1,32 @@
+"""JSON schema of machine files, kept in docs/machine.schema.json for editors.
+
+``python -m stiffmap.files.json_schema docs/machine.schema.json`` writes it anew.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from stiffmap.files.schema import MachineFile
+
+
+def machine_schema() -> dict[str, Any]:
+    """JSON schema (draft 2020-12)."""
+    schema = MachineFile.model_json_schema()
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "title": "stiffmap machine file",
+    }
+
+
+def schema_text() -> str:
+    """The text of docs/machine.schema.json."""
+    return json.dumps(machine_schema(), indent=2, sort_keys=True) + "\n"
+
+
+if __name__ == "__main__":
+    Path(sys.argv[1]).write_text(schema_text(), encoding="utf-8")

@@ -1,0 +1,47 @@
+"""Writing machine files, with the promise that they load back equal."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import yaml
+
+from stiffmap.description import MachineDescription
+from stiffmap.errors import FileError, StiffmapError
+from stiffmap.files.dump import dump
+from stiffmap.files.load import description_from_text
+from stiffmap.files.yaml_text import text_of
+
+
+def save_description(description: MachineDescription, path: str | Path) -> None:
+    """Write a machine file (SI units) that loads back equal, floats exactly.
+
+    A machine with effects is saved as the declared machine and its effect records.
+    Raises `StiffmapError` where a file cannot hold the machine, or cannot be written.
+    """
+    text = description_text(description)
+    try:
+        Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
+
+
+def description_text(description: MachineDescription) -> str:
+    """The text that `save_description` writes; raises `StiffmapError`."""
+    try:
+        text = text_of(dump(description))
+        back = description_from_text(text, f"machine '{description.name}' as a file")
+    except yaml.YAMLError as error:
+        raise StiffmapError(f"machine '{description.name}' cannot be saved: {error}") from error
+    if back != description:
+        changed = [
+            f.name
+            for f in fields(description)
+            if f.compare and getattr(back, f.name) != getattr(description, f.name)
+        ]
+        raise StiffmapError(
+            f"machine '{description.name}' cannot be saved unchanged: a file would not keep its "
+            f"{', '.join(changed)}"
+        )
+    return text
