@@ -1,0 +1,20 @@
+"""Array alias and the cross-product matrix that the link modules share."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+
+
+def skew(vectors: Floats) -> Floats:
+    """Cross-product matrices S(v), (..., 3) -> (..., 3, 3), so that ``S(v) @ w == cross(v, w)``."""
+    v = np.asarray(vectors, dtype=float)
+    out = np.zeros((*v.shape[:-1], 3, 3))
+    out[..., 0, 1], out[..., 0, 2] = -v[..., 2], v[..., 1]
+    out[..., 1, 0], out[..., 1, 2] = v[..., 2], -v[..., 0]
+    out[..., 2, 0], out[..., 2, 1] = -v[..., 1], v[..., 0]
+    return out
