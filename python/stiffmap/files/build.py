@@ -16,8 +16,9 @@ from stiffmap.files.build_elements import build_elements, build_range
 from stiffmap.files.build_geometry import build_pose, build_vector
 from stiffmap.files.build_legs import build_leg
 from stiffmap.files.context import Context, Gathered
+from stiffmap.files.names import point_names
 from stiffmap.files.schema import MachineFile
-from stiffmap.files.schema.base import Number
+from stiffmap.files.schema.base import Number, suggestion
 from stiffmap.files.schema.geometry import Box
 from stiffmap.files.schema.machine import EffectModel, ExternalSpringModel
 from stiffmap.files.units import LENGTH, NONE, Dimension, UnitSystem
@@ -48,12 +49,22 @@ def build(
         source=model.source,
         extra=tuple((key, _tuples(value)) for key, value in model.extra.items()),
     )
+    _check_points(description, context.at("external_springs"))
     gathered = context.gathered
     return replace(
         description,
         uncertainty=tuple({**gathered.uncertainty, **model.uncertainty}.items()),
         notes=tuple({**gathered.notes, **model.notes}.items()),
     )
+
+
+def _check_points(description: MachineDescription, context: Context) -> None:
+    known = point_names(description)
+    for spring in description.external_springs:
+        if spring.point not in known:
+            near = suggestion(spring.point, known)
+            there = ", ".join(known) or "none"
+            context.at(spring.name, "point").fail(f"no point '{spring.point}'{near}; there are: {there}")
 
 
 def _workspace(box: Box | None, context: Context) -> tuple[Vector, Vector] | None:

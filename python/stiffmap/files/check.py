@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
-from stiffmap.description import Block, Element, Joint, MachineDescription
+from stiffmap.description import Joint, MachineDescription
 from stiffmap.files.home import Gap, home_gaps
 from stiffmap.files.load import load_description
+from stiffmap.files.names import all_elements
 
 GAP_LIMIT = 1e-6
 
@@ -29,7 +30,7 @@ class FileCheck:
     warnings: list[str]
 
 
-def check_file(path: str | Path) -> FileCheck:
+def check_file(path: str | PathLike[str]) -> FileCheck:
     """Load a machine (by path or shipped name) and look it over; raises `StiffmapError` if unusable."""
     from stiffmap.files.shipped import find
 
@@ -38,27 +39,11 @@ def check_file(path: str | Path) -> FileCheck:
     return FileCheck(find(path), description, _counts(description), gaps, _warnings(description, gaps))
 
 
-def walk(elements: tuple[Element, ...]) -> Iterator[Element]:
-    """Every element of a sequence, those inside blocks included."""
-    for element in elements:
-        yield element
-        if isinstance(element, Block):
-            for branch in element.branches:
-                yield from walk(branch.elements)
-
-
-def _everything(description: MachineDescription) -> Iterator[Element]:
-    yield from walk(description.base)
-    for leg in description.legs:
-        yield from walk(leg.elements)
-    yield from walk(description.platform)
-
-
 def _counts(description: MachineDescription) -> dict[str, int]:
     names = {"Offset": "offsets", "Spring": "springs", "Body": "bodies", "Point": "points", "Block": "blocks"}
     counts = Counter(
         ("actuators" if e.actuated else "joints") if isinstance(e, Joint) else names[type(e).__name__]
-        for e in _everything(description)
+        for _, e in all_elements(description)
     )
     keys = ("actuators", "joints", "springs", "blocks", "bodies", "points")
     return {"legs": len(description.legs), **{key: counts[key] for key in keys}}
@@ -71,7 +56,7 @@ def _warnings(description: MachineDescription, gaps: list[Gap]) -> list[str]:
         for gap in gaps
         if max(gap.translation, gap.rotation) > GAP_LIMIT
     ]
-    if not any(isinstance(e, Joint) and e.actuated for e in _everything(description)):
+    if not any(isinstance(e, Joint) and e.actuated for _, e in all_elements(description)):
         warnings.append("no actuator: the machine cannot be commanded")
     if description.workspace is None:
         warnings.append("no workspace: maps need their ranges given")

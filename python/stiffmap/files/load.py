@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from stiffmap.files.shipped import find
 from stiffmap.files.yaml_text import Document, parse, read
 
 
-def load_description(name_or_path: str | Path) -> MachineDescription:
+def load_description(name_or_path: str | PathLike[str]) -> MachineDescription:
     """Description of a shipped machine (by name) or of a machine file (by path).
 
     Raises `UnknownMachineError` where there is neither, `FileError` for anything wrong in the file.

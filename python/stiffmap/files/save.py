@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from os import PathLike
 from pathlib import Path
 
 import yaml
@@ -14,7 +15,7 @@ from stiffmap.files.load import description_from_text
 from stiffmap.files.yaml_text import text_of
 
 
-def save_description(description: MachineDescription, path: str | Path) -> None:
+def save_description(description: MachineDescription, path: str | PathLike[str]) -> None:
     """Write a machine file (SI units) that loads back equal, floats exactly.
 
     A machine with effects is saved as the declared machine and its effect records.

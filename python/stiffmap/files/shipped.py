@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 from stiffmap.errors import UnknownMachineError
@@ -40,7 +41,7 @@ def shipped_machines() -> list[ShippedMachine]:
     return machines
 
 
-def find(name_or_path: str | Path) -> Path:
+def find(name_or_path: str | PathLike[str]) -> Path:
     """File of a shipped machine or of a path; raises `UnknownMachineError`, which lists what exists."""
     names = shipped_names()
     if str(name_or_path) in names:

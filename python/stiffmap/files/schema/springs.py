@@ -63,7 +63,9 @@ def _upper(entries: dict[Any, Any]) -> dict[str, Any]:
     missing = [k for k in DIAGONAL if k not in out]
     if missing:
         raise PydanticCustomError(
-            "missing", "missing diagonal entries {keys} (write 0 if meant)", {"keys": ", ".join(missing)}
+            "missing_entries",
+            "missing diagonal entries {keys} (write 0 if meant)",
+            {"keys": ", ".join(missing)},
         )
     return out
 

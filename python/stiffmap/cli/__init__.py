@@ -1,0 +1,5 @@
+"""The command line, ``stiffmap``."""
+
+from stiffmap.cli.app import main
+
+__all__ = ["main"]

@@ -1,0 +1,104 @@
+"""The root of the command line: finds the command, runs it, turns errors into one line."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import Annotated, Any
+
+import typer
+
+from stiffmap.cli.commands import COMMANDS, Command
+from stiffmap.errors import MissingPartError, StiffmapError
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+HELP = """How far is a loaded machine pushed off its commanded position?
+
+Lengths in mm, forces in N, angles in deg. Every command has [bold]--help[/bold] with examples and
+[bold]--json[/bold]. Exit codes: 0 done, 1 done with findings, 2 bad input, 130 interrupted.
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run ``stiffmap`` (default: with the process's arguments); returns the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        build_app(given)(args=given, prog_name="stiffmap")
+    except StiffmapError as error:
+        print(f"stiffmap: {one_line(error)}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
+    return 0
+
+
+def one_line(error: Exception) -> str:
+    """The message without line breaks."""
+    return " ".join(str(error).split())
+
+
+def build_app(arguments: Sequence[str]) -> typer.Typer:
+    """App in which only the command that ``arguments`` name is imported; the others are their summaries."""
+    wanted = next((a for a in arguments if not a.startswith("-")), None)
+    app = typer.Typer(
+        help=HELP,
+        no_args_is_help=True,
+        add_completion=False,
+        rich_markup_mode="rich",
+        pretty_exceptions_enable=False,
+    )
+    app.callback()(_root)
+    for command in COMMANDS:
+        if command.exists():
+            function = load(command) if command.name == wanted else _summary(command)
+            app.command(command.name)(function)
+    return app
+
+
+def load(command: Command) -> Callable[..., Any]:
+    """Import a command's function; raises `MissingPartError` for what is not installed."""
+    try:
+        function: Callable[..., Any] = getattr(import_module(command.module), command.function)
+    except ModuleNotFoundError as error:
+        missing = error.name or command.module
+        if missing.split(".")[0] == "stiffmap":
+            advice = "which this installation of stiffmap lacks"
+        else:
+            advice = "which is not installed: pip install 'stiffmap[all]'"
+        raise MissingPartError(f"'stiffmap {command.name}' needs {missing}, {advice}") from error
+    return function
+
+
+def _summary(command: Command) -> Callable[[], None]:
+    def summary() -> None:
+        """Stands for a command that is not asked for."""
+
+    summary.__doc__ = command.summary
+    return summary
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            print(f"stiffmap {version('stiffmap')}")
+        except PackageNotFoundError:
+            print("stiffmap (not installed: version unknown)")
+        raise typer.Exit
+
+
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+_root.__doc__ = HELP

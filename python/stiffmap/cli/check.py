@@ -1,0 +1,66 @@
+"""``stiffmap check``."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.files import FileCheck, check_file
+
+
+def check(
+    file: Annotated[str, typer.Argument(help="Machine file, or the name of a shipped machine.")],
+    strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 where there are warnings.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Validate a machine file: keys, units, springs, names, and whether its home configuration closes.
+
+    Exit codes: 0 usable, 1 usable with warnings (--strict), 2 not usable.
+
+    Examples:
+
+      [cyan]stiffmap check my_machine.yaml[/cyan]
+
+      [cyan]stiffmap check orthoglide-revised --json[/cyan]
+
+      [cyan]stiffmap check --strict my_machine.yaml[/cyan]
+    """
+    result = check_file(file)
+    if as_json:
+        print_json(as_plain(result))
+    else:
+        _print(result)
+    if strict and result.warnings:
+        raise typer.Exit(1)
+
+
+def as_plain(result: FileCheck) -> dict[str, Any]:
+    """A check as JSON data (SI)."""
+    return {
+        "file": str(result.path),
+        "name": result.description.name,
+        "title": result.description.title,
+        "counts": result.counts,
+        "home_gaps": {g.name: {"translation": g.translation, "rotation": g.rotation} for g in result.gaps},
+        "effects": [effect.kind for effect in result.description.effects],
+        "warnings": result.warnings,
+    }
+
+
+def _print(result: FileCheck) -> None:
+    # soft_wrap: a path or a count must not be broken when piped
+    console = Console(highlight=False, soft_wrap=True)
+    machine = result.description
+    console.print(f"[bold]{machine.name}[/bold]  {escape(machine.title)}")
+    console.print("  " + ", ".join(f"{n} {sort}" for sort, n in result.counts.items() if n))
+    worst = max(result.gaps, key=lambda gap: gap.translation)
+    console.print(f"  home configuration closes within {worst.translation * 1e3:.2g} mm (leg {worst.name})")
+    for effect in machine.effects:
+        console.print(f"  effect: {effect.kind} of {effect.element} {' '.join(effect.legs)}")
+    for warning in result.warnings:
+        console.print(f"  [yellow]warning:[/yellow] {escape(warning)}")
+    console.print("  [green]usable[/green]")

@@ -1,0 +1,35 @@
+"""The table of commands; each lives in a file of its own, which is imported only when it is run."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import NamedTuple
+
+
+class Command(NamedTuple):
+    """Name on the command line, module and function behind it, and the line in ``stiffmap --help``."""
+
+    name: str
+    module: str
+    function: str
+    summary: str
+
+    def exists(self) -> bool:
+        """Whether this installation has the module (it is not imported)."""
+        try:
+            return find_spec(self.module) is not None
+        except ModuleNotFoundError:
+            return False
+
+
+COMMANDS = (
+    Command("machines", "stiffmap.cli.machines", "machines", "List the machines that come with stiffmap."),
+    Command("new", "stiffmap.cli.new", "new", "Start a machine file from a template that explains itself."),
+    Command("check", "stiffmap.cli.check", "check", "Validate a machine file."),
+    Command("show", "stiffmap.cli.show", "show", "Draw a machine and print what it is made of."),
+    Command("solve", "stiffmap.cli.solve", "solve", "Deflection and stiffness at one pose under one wrench."),
+    Command("map", "stiffmap.cli.map", "map_command", "Error maps of z-planes under a force."),
+    Command("polar", "stiffmap.cli.polar", "polar", "Deflection against the direction of a force."),
+    Command("sweep", "stiffmap.cli.sweep", "sweep", "Deflection against the size of a force."),
+    Command("paper", "stiffmap.cli.paper", "paper", "Reproduce the figures and statements of the paper."),
+)

@@ -1,0 +1,44 @@
+"""``stiffmap new``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.errors import FileError
+from stiffmap.files.starter import starter_text
+
+
+def new(
+    file: Annotated[Path, typer.Argument(help="File to write; its stem becomes the machine's name.")],
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Start a machine file from a template in which every key is explained.
+
+    Examples:
+
+      [cyan]stiffmap new my_machine.yaml[/cyan]
+
+      [cyan]stiffmap new --force my_machine.yaml[/cyan]
+    """
+    if file.exists() and not force:
+        raise FileError("exists already; use --force to overwrite it", file=str(file))
+    name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
+    try:
+        file.write_text(starter_text(name), encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror}", file=str(file)) from error
+    if as_json:
+        print_json({"file": str(file), "name": name})
+    else:
+        console = Console(highlight=False, soft_wrap=True)
+        console.print(
+            f"wrote {escape(str(file))}; edit it, then: [cyan]stiffmap check {escape(str(file))}[/cyan]"
+        )
