@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// Many poses at once: plain arrays in, plain arrays out, on all threads.
+#pragma once
+
+#include "stiffmap/solve.hpp"
+
+namespace stiffmap {
+
+/// Row-major inputs of `count` poses.
+struct BatchInput {
+  Index count = 0;
+  const double* position = nullptr;  ///< count x 3
+  const double* rotation = nullptr;  ///< count x 9
+  const double* wrench = nullptr;    ///< count x load points x 6
+  std::vector<LoadPoint> load_points;
+  std::vector<Index> read_points;
+  Vec3 gravity = Vec3::Zero();
+};
+
+/// Row-major outputs; null pointers are not written.
+struct BatchOutput {
+  double* displacement = nullptr;  ///< count x read points x 6
+  double* stiffness = nullptr;     ///< count x 36
+  double* compliance = nullptr;    ///< count x 36
+  double* free_twists = nullptr;   ///< count x 36
+  double* effort = nullptr;        ///< count x drives
+  double* leg_wrench = nullptr;    ///< count x legs x 6
+  double* coordinates = nullptr;   ///< count x coordinates
+  std::uint8_t* indeterminate = nullptr;  ///< count x coordinates
+  std::uint8_t* status = nullptr;
+  std::uint32_t* flags = nullptr;
+  std::int32_t* iterations = nullptr;
+};
+
+/// The dense reference path for every pose.
+void solve_batch(const Mechanism& m, const BatchInput& in, const SolveOptions& options, int threads,
+                 const BatchOutput& out);
+
+}  // namespace stiffmap

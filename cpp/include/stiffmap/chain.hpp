@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// A chain as a person writes it: named elements in sequence, blocks of parallel branches among them.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "stiffmap/law.hpp"
+#include "stiffmap/se3.hpp"
+#include "stiffmap/spring.hpp"
+
+namespace stiffmap {
+
+/// Constant transform: `nominal` is what the controller believes, `actual` what was built.
+struct Offset {
+  std::string name;
+  Pose nominal, actual;
+};
+
+enum class JointType : std::uint8_t { revolute, prismatic };
+
+/// Error of a commanded coordinate u, theory (G1):
+/// offset + slope (u - reference) + amplitude sin(2 pi (u - reference) / period + phase).
+struct CommandError {
+  double offset = 0, slope = 0, amplitude = 0, period = 1, phase = 0, reference = 0;
+};
+
+/// One-axis joint. Actuated: `law` is the drive's compliance (none: rigid).
+/// Passive: `law` acts about the home coordinate (none: free).
+struct Joint {
+  std::string name;
+  JointType type = JointType::revolute;
+  Vec3 axis = Vec3::UnitZ();
+  bool actuated = false;
+  double home = 0;
+  std::optional<Law> law;
+  double compliance_slope = 0;  ///< relative change of the drive compliance per unit of travel
+  std::vector<CommandError> command_errors;
+  double lower = -1e300, upper = 1e300;
+  double force_limit = 1e300;
+};
+
+/// Virtual spring of six coordinates (t, phi): p + R t, R Rx Ry Rz (theory S2). `laws` replace single
+/// uncoupled directions; `rest` is the deflection without force.
+struct Spring {
+  std::string name;
+  SpringMatrix matrix;
+  Vec6 rest = Vec6::Zero();
+  std::vector<std::pair<int, Law>> laws;
+};
+
+struct Body {
+  std::string name;
+  double mass = 0;
+  Vec3 com = Vec3::Zero();
+};
+
+struct Point {
+  std::string name;
+  Vec3 offset = Vec3::Zero();
+};
+
+struct Chain;
+
+/// Two or more branches between the same two frames.
+struct Block {
+  std::string name;
+  std::vector<std::pair<std::string, Chain>> branches;
+};
+
+struct Chain {
+  std::vector<std::variant<Offset, Joint, Spring, Body, Point, Block>> elements;
+};
+
+/// A straight spring from a point of the machine to a fixed anchor (cable, hose, counterbalance).
+struct ExternalSpring {
+  std::string name, point;
+  Vec3 anchor = Vec3::Zero();
+  double stiffness = 0, length = 0;
+  bool tension_only = false;
+};
+
+}  // namespace stiffmap

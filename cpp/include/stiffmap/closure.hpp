@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Kinematics by closure with the springs at rest: from a platform pose to the coordinates, and from
+// the actuators to the pose, by continuation from home so that the assembly branch is kept.
+#pragma once
+
+#include <Eigen/QR>
+
+#include "stiffmap/kinematics.hpp"
+
+namespace stiffmap {
+
+/// Scratch of one thread.
+struct ClosureWorkspace {
+  explicit ClosureWorkspace(const Mechanism& m);
+  Frames frames;
+  MatX J, A;
+  VecX e, step, x, trial, start;
+  std::vector<Index> unknown;
+  Eigen::CompleteOrthogonalDecomposition<MatX> qr;
+};
+
+struct ClosureResult {
+  Status status = Status::unreachable;
+  std::uint32_t flags = 0;
+  int iterations = 0;
+  double residual = 0;  ///< length of the closure error, m
+  Pose tip;
+};
+
+/// Coordinates `x` at which the tip has the pose (nominal geometry, springs zero).
+ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x);
+
+/// Coordinates `x` and tip pose for given actuator coordinates.
+ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x);
+
+/// Closes the mechanism at home exactly, starting from the declared coordinates, and locks passive
+/// coordinates that spin without effect on any frame that carries load (theory C6).
+/// Throws with the residual of each leg where the home configuration is impossible.
+void close_home(Mechanism& m);
+
+/// Moves passive coordinates only, tip and actuators held, to close the loops again (Gauss-Newton of
+/// least norm); returns the remaining error.
+double close_passive(const Mechanism& m, const Pose& tip, ClosureWorkspace& ws, VecX& x);
+
+}  // namespace stiffmap

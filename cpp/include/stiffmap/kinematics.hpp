@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// Frames and Jacobian columns of a mechanism at given coordinates (theory C1, C4).
+#pragma once
+
+#include "stiffmap/mechanism.hpp"
+
+namespace stiffmap {
+
+enum class Geometry : std::uint8_t { nominal, actual };
+
+/// Frames of all nodes, and axis and origin of all coordinates, in base axes.
+struct Frames {
+  explicit Frames(const Mechanism& m)
+      : pose(m.nodes.size()), axis(3, m.size()), origin(3, m.size()) {}
+  std::vector<Pose> pose;
+  Mat3X axis, origin;
+
+  const Pose& at(Index node) const { return pose[static_cast<std::size_t>(node)]; }
+  Vec3 point(Index node, const Vec3& offset) const { return at(node) * offset; }
+};
+
+void forward(const Mechanism& m, Geometry geometry, const VecX& x, Frames& out);
+
+/// Twist of a body point p per unit of coordinate j, seen from beyond the joint (theory C4).
+inline Vec6 column(const Mechanism& m, const Frames& f, Index j, const Vec3& p) {
+  Vec6 c;
+  const Vec3 w = f.axis.col(j);
+  if (m.coordinates[static_cast<std::size_t>(j)].type == JointType::prismatic) c << w, Vec3::Zero();
+  else c << w.cross(p - f.origin.col(j)), w;
+  return c;
+}
+
+/// Adds sign times the Jacobian of point p of `node` to `J`, whose columns are all coordinates.
+template <class Matrix>
+void add_jacobian(const Mechanism& m, const Frames& f, Index node, const Vec3& p, double sign, Matrix&& J) {
+  for (Index j : m.path[static_cast<std::size_t>(node)]) J.col(j) += sign * column(m, f, j, p);
+}
+
+/// Twist that carries frame a to frame b: translation and rotation vector, base axes (theory C3).
+Vec6 frame_error(const Pose& a, const Pose& b);
+
+}  // namespace stiffmap

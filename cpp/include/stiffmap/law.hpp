@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// Force law of one coordinate, as a monotone graph traced by one parameter.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+namespace stiffmap {
+
+/// A point of the graph and its tangent: deflection a(z), force tau(z), da/dz, dtau/dz >= 0.
+/// da = 0: stuck (rigid); dtau = 0: free; otherwise the stiffness is dtau / da.
+struct LawPoint {
+  double a, tau, da, dtau;
+};
+
+/// Linear with an optional cubic term (z = a), or a monotone polyline (z = a + tau / stiffness,
+/// theory L1: both coordinates are then Lipschitz in z, so steps of either are ordinary points).
+class Law {
+ public:
+  explicit Law(double stiffness, double cubic = 0.0, std::vector<std::pair<double, double>> knots = {});
+
+  /// The point at z for a drive whose compliance is `scale` times the declared one.
+  LawPoint at(double z, double scale = 1.0) const;
+
+  /// Parameter of the point that carries force tau: the start of a Newton iteration.
+  double from_force(double tau, double scale = 1.0) const;
+
+  bool linear() const { return cubic_ == 0.0 && knots_.empty(); }
+  bool has_knots() const { return !knots_.empty(); }
+  double stiffness() const { return stiffness_; }
+  double cubic() const { return cubic_; }
+
+ private:
+  double stiffness_, cubic_;
+  std::vector<std::pair<double, double>> knots_;  // (a, tau)
+  std::vector<double> z_;
+};
+
+}  // namespace stiffmap

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+// The immutable mechanism shared by all threads: the chains flattened to a tree of frames with one
+// elementary coordinate each, and six closure equations per extra branch (theory C1-C3).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "stiffmap/chain.hpp"
+
+namespace stiffmap {
+
+enum class Role : std::uint8_t { actuator, passive, spring };
+
+/// A frame: its parent's frame, a constant transform, then the motion of one coordinate (or none).
+struct Node {
+  Index parent = -1;
+  Pose nominal, actual;
+  Index coordinate = -1;
+  JointType type = JointType::revolute;
+  Vec3 axis = Vec3::UnitZ();
+};
+
+struct Coordinate {
+  std::string name;
+  Role role = Role::passive;
+  Index node = -1;
+  JointType type = JointType::revolute;
+  double home = 0;
+  double lower = -1e300, upper = 1e300;
+  Index actuator = -1;  ///< index among the actuators
+  Index law = -1;       ///< index into laws, -1: none
+  bool locked = false;  ///< rigid drive, or a spin that changes nothing (held at home)
+};
+
+/// A coupled spring over coordinates first .. first+5.
+struct SpringGroup {
+  std::string name;
+  Index first = 0;
+  SpringMatrix matrix;
+  Vec6 rest = Vec6::Zero();
+};
+
+struct Drive {
+  std::string name;
+  Index coordinate = -1;
+  double home = 0, compliance_slope = 0;
+  std::vector<CommandError> errors;
+  double force_limit = 1e300;
+};
+
+/// Two frames that a closed loop makes one: `end` of an extra branch and `primary` of the first.
+struct Loop {
+  std::string block, branch;
+  Index primary = -1, end = -1;
+  bool leg = false;  ///< a loop of the outermost block: its multiplier is the leg's wrench
+};
+
+struct NodePoint {
+  std::string name;
+  Index node = -1;
+  Vec3 offset = Vec3::Zero();
+};
+
+struct NodeBody {
+  std::string name;
+  Index node = -1;
+  double mass = 0;
+  Vec3 com = Vec3::Zero();
+};
+
+struct NodeSpring {
+  std::string name;
+  Index node = -1;
+  Vec3 offset = Vec3::Zero(), anchor = Vec3::Zero();
+  double stiffness = 0, length = 0;
+  bool tension_only = false;
+};
+
+/// The legs' block is the first block of `root` whose name is "legs".
+class Mechanism {
+ public:
+  Mechanism(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs = {});
+
+  std::vector<Node> nodes;
+  std::vector<Coordinate> coordinates;
+  std::vector<SpringGroup> groups;
+  std::vector<Law> laws;
+  std::vector<Drive> drives;
+  std::vector<Loop> loops;
+  std::vector<NodePoint> points;  ///< the first is "tcp"
+  std::vector<NodeBody> bodies;
+  std::vector<NodeSpring> external_springs;
+  std::vector<std::string> legs;       ///< names of the branches of the legs' block
+  std::vector<bool> beyond_legs;       ///< per node: on the platform's side of the legs' block
+  std::vector<std::vector<Index>> path;  ///< per node: its coordinates from the base outwards
+  Pose home;                           ///< tip pose of the home configuration
+  VecX home_coordinates;               ///< closed exactly at home
+  double length = 1;     ///< characteristic length: turns angles into lengths in every norm
+  double stiffness = 1;  ///< characteristic stiffness, N/m: turns forces into lengths
+  Index tip = -1;
+
+  Index size() const { return static_cast<Index>(coordinates.size()); }
+  Index closures() const { return 6 * static_cast<Index>(loops.size()); }
+  Index point(const std::string& name) const;  ///< throws with the names that exist
+
+  /// Length that a unit of coordinate j stands for.
+  double unit(Index j) const { return coordinates[static_cast<std::size_t>(j)].type == JointType::revolute ? length : 1.0; }
+
+ private:
+  Index add_node(Index parent, const Pose& nominal, const Pose& actual);
+  Index add_coordinate(Index node, const std::string& name, Role role, JointType type, const Vec3& axis, double home);
+  Index add_chain(const Chain& chain, Index node, const std::string& prefix, bool outermost);
+  Index add_block(const Block& block, Index node, const std::string& prefix, bool outermost);
+  Index add_joint(const Joint& joint, Index node, const std::string& prefix);
+  Index add_spring(const Spring& spring, Index node, const std::string& prefix);
+  void finish(const std::vector<ExternalSpring>& springs);
+  void set_scales();
+};
+
+}  // namespace stiffmap

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// One pose from command to answer: closure, equilibrium, stiffness, and what kind of pose it is.
+#pragma once
+
+#include "stiffmap/closure.hpp"
+#include "stiffmap/equilibrium.hpp"
+#include "stiffmap/stiffness.hpp"
+
+namespace stiffmap {
+
+/// What one pose asks.
+struct PoseInput {
+  Pose commanded;              ///< tip, base axes
+  Vec3 gravity = Vec3::Zero();
+  std::vector<LoadPoint> load_points;
+  std::vector<Vec6> wrenches;  ///< one per load point
+  std::vector<Index> read_points;  ///< indices into Mechanism::points; the first defines stiffness
+};
+
+struct SolveOptions {
+  EquilibriumOptions equilibrium;
+  bool stiffness = true;  ///< false: displacements only
+};
+
+struct PoseResult {
+  Status status = Status::unreachable;
+  std::uint32_t flags = 0;
+  int iterations = 0;
+  std::vector<Vec6> displacement;  ///< per read point: translation, rotation vector
+  StiffnessResult point;
+  VecX effort;                     ///< per drive
+  Eigen::Matrix<double, 6, Eigen::Dynamic> leg_wrench;
+  VecX x;                          ///< coordinates at equilibrium
+  std::vector<bool> indeterminate; ///< passive coordinates that the pose leaves open
+};
+
+/// Everything one thread needs; allocated once per mechanism.
+struct SolveWorkspace {
+  explicit SolveWorkspace(const Mechanism& m);
+  ClosureWorkspace closure;
+  EquilibriumWorkspace equilibrium;
+  StiffnessWorkspace stiffness;
+  Problem problem;
+  State state;
+  Frames nominal;
+  VecX x;
+};
+
+/// Never throws for a pose: see PoseResult::status.
+void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& options, SolveWorkspace& ws,
+                PoseResult& out);
+
+/// Mechanism closed at home, spins locked: ready to solve.
+Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs = {});
+
+}  // namespace stiffmap

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: MIT
+#include "stiffmap/closure.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "stiffmap/check.hpp"
+
+namespace stiffmap {
+namespace {
+
+constexpr double closed = 1e-12;        // relative to the mechanism's length
+constexpr double contraction = 0.25;    // Newton steps of a trusted continuation shrink at least so
+constexpr double shortest_leap = 1e-3;  // of the way from home
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+/// What is to be closed: the loops, and the tip where its pose is given.
+struct Target {
+  const Pose* tip = nullptr;
+};
+
+void select_unknowns(const Mechanism& m, bool actuators, ClosureWorkspace& ws) {
+  ws.unknown.clear();
+  for (Index j = 0; j < m.size(); ++j) {
+    const Coordinate& c = m.coordinates[at(j)];
+    if (c.role == Role::spring) continue;
+    if (c.role == Role::actuator ? actuators : !c.locked) ws.unknown.push_back(j);
+  }
+}
+
+/// Residual, angles as lengths; returns its largest entry relative to the length.
+double residual(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws) {
+  forward(m, Geometry::nominal, x, ws.frames);
+  ws.e.setZero();
+  if (target.tip) ws.e.head<6>() = -frame_error(ws.frames.at(m.tip), *target.tip);
+  for (std::size_t i = 0; i < m.loops.size(); ++i)
+    ws.e.segment<6>(6 + 6 * static_cast<Index>(i)) =
+        frame_error(ws.frames.at(m.loops[i].primary), ws.frames.at(m.loops[i].end));
+  for (Index i = 0; i < ws.e.size(); ++i)
+    if (i % 6 >= 3) ws.e[i] *= m.length;
+  return ws.e.cwiseAbs().maxCoeff() / m.length;
+}
+
+/// Gauss-Newton step of least norm over the unknowns, at the frames of the last residual.
+double newton_step(const Mechanism& m, const Target& target, ClosureWorkspace& ws) {
+  ws.J.setZero();
+  if (target.tip) add_jacobian(m, ws.frames, m.tip, ws.frames.at(m.tip).p, 1.0, ws.J.topRows<6>());
+  for (std::size_t i = 0; i < m.loops.size(); ++i) {
+    const Index row = 6 + 6 * static_cast<Index>(i);
+    const Loop& loop = m.loops[i];
+    add_jacobian(m, ws.frames, loop.end, ws.frames.at(loop.end).p, 1.0, ws.J.middleRows<6>(row));
+    add_jacobian(m, ws.frames, loop.primary, ws.frames.at(loop.primary).p, -1.0, ws.J.middleRows<6>(row));
+  }
+  const Index n = static_cast<Index>(ws.unknown.size());
+  ws.A.resize(ws.J.rows(), n);
+  for (Index k = 0; k < n; ++k) {
+    const Index j = ws.unknown[at(k)];
+    ws.A.col(k) = ws.J.col(j) / m.unit(j);
+  }
+  for (Index i = 0; i < ws.A.rows(); ++i)
+    if (i % 6 >= 3) ws.A.row(i) *= m.length;
+  ws.qr.setThreshold(rank_threshold);
+  ws.qr.compute(ws.A);
+  ws.step.head(n) = ws.qr.solve(-ws.e);
+  const double norm = ws.step.head(n).norm() / m.length;
+  for (Index k = 0; k < n; ++k) ws.step[k] /= m.unit(ws.unknown[at(k)]);
+  return norm;
+}
+
+void apply(ClosureWorkspace& ws, VecX& x, double factor) {
+  for (std::size_t k = 0; k < ws.unknown.size(); ++k) x[ws.unknown[k]] += factor * ws.step[static_cast<Index>(k)];
+}
+
+enum class Pace { contracting, damped };
+
+/// Newton to the target. Contracting: gives up unless the steps shrink fast (theory C5), so that the
+/// solution is the continuation of the start. Damped: steps limited, as many as it takes.
+bool close(const Mechanism& m, const Target& target, Pace pace, ClosureWorkspace& ws, VecX& x, int& iterations) {
+  const int most = pace == Pace::contracting ? 12 : 120;
+  double previous = 0, error = residual(m, x, target, ws);
+  for (int k = 0; k < most; ++k) {
+    if (!std::isfinite(error)) return false;
+    ++iterations;
+    const double norm = newton_step(m, target, ws);
+    if (pace == Pace::contracting && norm > 0.3) return false;
+    if (pace == Pace::contracting && k > 0 && norm > contraction * previous && norm > 1e-9) return false;
+    apply(ws, x, norm > 0.1 ? 0.1 / norm : 1.0);
+    previous = norm;
+    error = residual(m, x, target, ws);
+    if (error < closed && norm < 1e-7) return true;
+  }
+  return error < closed;
+}
+
+/// Interpolates between home and the pose.
+Pose on_the_way(const Pose& a, const Pose& b, double s) {
+  if (s == 1) return b;
+  return {a.p + s * (b.p - a.p), exp_so3(s * log_so3(b.R * a.R.transpose())) * a.R};
+}
+
+/// Adaptive continuation: `set(s)` puts the target to the share s of the way.
+template <class Set>
+bool continuation(const Mechanism& m, const Target& target, Set&& set, ClosureWorkspace& ws, VecX& x,
+                  ClosureResult& out) {
+  double done = 0, leap = 1;
+  while (done < 1) {
+    const double s = std::min(1.0, done + leap);
+    ws.trial = x;
+    set(s, ws.trial);
+    if (close(m, target, Pace::contracting, ws, ws.trial, out.iterations)) {
+      x = ws.trial;
+      done = s;
+      leap *= 2;
+      continue;
+    }
+    leap *= 0.5;
+    if (leap >= shortest_leap) continue;
+    // At a border of the workspace the steps shrink without end: one patient attempt.
+    ws.trial = x;
+    set(1.0, ws.trial);
+    if (close(m, target, Pace::damped, ws, ws.trial, out.iterations)) {
+      x = ws.trial;
+      if (1 - done > 0.05) out.flags |= flag::branch_unverified;
+      return true;
+    }
+    return false;
+  }
+  return true;
+}
+
+void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace& ws, VecX& x, ClosureResult& out) {
+  out.residual = residual(m, x, target, ws) * m.length;
+  out.tip = ws.frames.at(m.tip);
+  out.status = ok ? Status::converged : Status::unreachable;
+  if (!ok) return;
+  for (Index j = 0; j < m.size(); ++j) {
+    const Coordinate& c = m.coordinates[at(j)];
+    if (x[j] >= c.lower && x[j] <= c.upper) continue;
+    out.flags |= c.role == Role::actuator ? flag::drive_range : flag::joint_limit;
+  }
+}
+
+/// A spin moves passive coordinates and nothing that the closure sees, at home as anywhere: the null
+/// direction is found at home and at a configuration turned along it, and one coordinate of it held.
+void lock_spins(Mechanism& m, ClosureWorkspace& ws) {
+  const Target target{&m.home};
+  for (;;) {
+    select_unknowns(m, false, ws);
+    residual(m, m.home_coordinates, target, ws);
+    newton_step(m, target, ws);
+    const Eigen::BDCSVD<MatX> svd(ws.A, Eigen::ComputeFullV);
+    const Index n = ws.A.cols(), rank = (svd.singularValues().array() > rank_threshold).count();
+    if (n == 0 || rank == n) return;
+    const VecX spin = svd.matrixV().col(n - 1);
+    VecX turned = m.home_coordinates;
+    for (Index k = 0; k < n; ++k) turned[ws.unknown[at(k)]] += 0.3 * spin[k];
+    if (residual(m, turned, target, ws) > 1e-9) return;  // singular at home, but no spin
+    Index held = 0;
+    spin.cwiseAbs().maxCoeff(&held);
+    m.coordinates[at(ws.unknown[at(held)])].locked = true;
+  }
+}
+
+}  // namespace
+
+ClosureWorkspace::ClosureWorkspace(const Mechanism& m)
+    : frames(m),
+      J(MatX::Zero(6 + m.closures(), m.size())),
+      A(MatX::Zero(6 + m.closures(), m.size())),
+      e(VecX::Zero(6 + m.closures())),
+      step(VecX::Zero(m.size())),
+      x(VecX::Zero(m.size())),
+      trial(VecX::Zero(m.size())),
+      start(VecX::Zero(m.size())) {}
+
+ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x) {
+  ClosureResult out;
+  if (!pose.p.allFinite() || !pose.R.allFinite()) return out;
+  select_unknowns(m, true, ws);
+  x = m.home_coordinates;
+  Pose way;
+  const Target target{&way};
+  const auto set = [&](double s, VecX&) { way = on_the_way(m.home, pose, s); };
+  bool ok = continuation(m, target, set, ws, x, out);
+  if (!ok) {  // the straight way may leave the workspace although its end lies inside
+    x = m.home_coordinates;
+    way = pose;
+    ok = close(m, target, Pace::damped, ws, x, out.iterations);
+    if (ok) out.flags |= flag::branch_unverified;
+  }
+  way = pose;
+  finish(m, target, ok, ws, x, out);
+  return out;
+}
+
+ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x) {
+  ClosureResult out;
+  if (!actuators.allFinite()) return out;
+  select_unknowns(m, false, ws);
+  x = m.home_coordinates;
+  const auto set = [&](double s, VecX& trial) {
+    for (std::size_t i = 0; i < m.drives.size(); ++i) {
+      const Index j = m.drives[i].coordinate;
+      trial[j] = m.home_coordinates[j] + s * (actuators[static_cast<Index>(i)] - m.home_coordinates[j]);
+    }
+  };
+  const bool ok = continuation(m, Target{}, set, ws, x, out);
+  finish(m, Target{}, ok, ws, x, out);
+  return out;
+}
+
+void close_home(Mechanism& m) {
+  ClosureWorkspace ws(m);
+  VecX& x = m.home_coordinates;
+  select_unknowns(m, true, ws);
+  const Target target{&m.home};
+  const double declared = residual(m, x, target, ws);
+  std::ostringstream misfit;
+  misfit << "platform " << ws.e.head<6>().norm() << " m";
+  for (std::size_t i = 0; i < m.loops.size(); ++i)
+    misfit << ", " << m.loops[i].block << "." << m.loops[i].branch << " "
+           << ws.e.segment<6>(6 + 6 * static_cast<Index>(i)).norm() << " m";
+  int iterations = 0;
+  const bool ok = declared < 0.05 && close(m, target, Pace::damped, ws, x, iterations);
+  require(ok, "home configuration", "coordinates that close every leg and loop (within 5 % of the machine's size)",
+          misfit.str());
+  lock_spins(m, ws);
+}
+
+double close_passive(const Mechanism& m, const Pose& tip, ClosureWorkspace& ws, VecX& x) {
+  select_unknowns(m, false, ws);
+  const Target target{&tip};
+  int iterations = 0;
+  close(m, target, Pace::damped, ws, x, iterations);
+  return residual(m, x, target, ws);
+}
+
+}  // namespace stiffmap

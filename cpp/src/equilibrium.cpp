@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT
+#include "stiffmap/equilibrium.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stiffmap {
+namespace {
+
+constexpr double trusted_contraction = 0.2;  // of the second against the first Newton step
+constexpr double largest_step = 0.2;         // of a trusted load step, relative to the length
+constexpr double shortest_load_step = 1.0 / 1024;
+constexpr int patient_steps = 8;
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+/// Right-hand side of the force balance; a stuck coordinate follows its own law alone.
+void balance(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, VecX& force) {
+  for (Index j = 0; j < m.size(); ++j) {
+    force[j] = -lin.da[j] * lin.r[j];
+    if (lin.kind[at(j)] != Kind::fixed) continue;
+    const bool stuck = lin.dtau[j] > 0 && !m.coordinates[at(j)].locked;
+    force[j] = stuck ? -lin.r[j] / (lin.dtau[j] * saddle.scale()[j] * saddle.scale()[j]) : 0.0;
+  }
+}
+
+bool has_knots(const Mechanism& m) {
+  return std::any_of(m.laws.begin(), m.laws.end(), [](const Law& law) { return law.has_knots(); });
+}
+
+/// After an iteration with all laws linear: put each law where it carries the force just found.
+void start_laws(const Mechanism& m, const Problem& p, State& state) {
+  for (Index j = 0; j < m.size(); ++j) {
+    const Coordinate& c = m.coordinates[at(j)];
+    if (c.law < 0 || c.locked) continue;
+    const Law& law = m.laws[at(c.law)];
+    state.z[j] = law.from_force(law.stiffness() / p.drive_scale[j] * state.z[j], p.drive_scale[j]);
+  }
+}
+
+enum class Outcome { converged, failed, distrusted };
+
+/// Counts where the determinant changed sign since the last converged load step.
+void count_sign(const SaddleSystem& saddle, double& sign, EquilibriumResult& out) {
+  if (!saddle.regular()) return;
+  if (sign != 0 && sign != saddle.determinant_sign()) ++out.sign_changes;
+  sign = saddle.determinant_sign();
+}
+
+/// Sign of the determinant before any load.
+double unloaded_sign(const Mechanism& m, Problem& p, EquilibriumWorkspace& ws, const State& state) {
+  if (!p.has_dead_moment()) return 0;
+  p.factor = 0;
+  linearize(m, p, state, ws.lin);
+  ws.saddle.assemble(m, ws.lin);
+  ws.saddle.factorize();
+  return ws.saddle.regular() ? ws.saddle.determinant_sign() : 0;
+}
+
+/// Halves the step until the merit falls; keeps the shortest if it never does.
+void line_search(const Mechanism& m, const Problem& p, EquilibriumWorkspace& ws, State& state, double merit) {
+  ws.before = state;
+  double share = 1;
+  for (int k = 0; k < 8; ++k, share *= 0.5) {
+    state.z = ws.before.z + share * ws.dz;
+    state.lambda = ws.before.lambda + share * ws.dlambda;
+    linearize(m, p, state, ws.lin);
+    if (ws.saddle.merit(ws.lin) < (1 - 0.1 * share) * merit) return;
+  }
+}
+
+/// Newton at one load. `trusting`: leave as soon as the first steps do not shrink fast, so that the
+/// result is the continuation of the start and no other root (theory E9).
+Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bool cold, bool trusting,
+               EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
+  const bool knots = has_knots(m);
+  double first = 0, previous = 0;
+  p.secant_laws = cold && knots;
+  linearize(m, p, state, ws.lin);
+  for (int k = 0; k < opt.max_iterations; ++k) {
+    ws.saddle.assemble(m, ws.lin);
+    ws.saddle.factorize();
+    balance(m, ws.lin, ws.saddle, ws.force);
+    ws.saddle.solve(ws.force, ws.lin.e, ws.dz, ws.dlambda);
+    ++out.iterations;
+    const double norm = ws.saddle.step_norm(m, ws.dz);
+    out.last_step = norm;
+    if (!std::isfinite(norm)) return Outcome::failed;
+    if (p.secant_laws) {
+      state.z += ws.dz;
+      state.lambda += ws.dlambda;
+      start_laws(m, p, state);
+      p.secant_laws = false;
+      linearize(m, p, state, ws.lin);
+      continue;
+    }
+    if (norm < opt.tolerance) {
+      state.z += ws.dz;
+      state.lambda += ws.dlambda;
+      return Outcome::converged;
+    }
+    if (trusting && !knots) {
+      if (first == 0) first = norm;
+      if (norm > largest_step) return Outcome::distrusted;
+      if (previous > 0 && norm > trusted_contraction * previous && norm > 1e-7) return Outcome::distrusted;
+    }
+    previous = norm;
+    const double merit = ws.saddle.merit(ws.lin);
+    ws.before = state;
+    state.z += ws.dz;
+    state.lambda += ws.dlambda;
+    linearize(m, p, state, ws.lin);
+    // The merit mixes closure and force: far steps may raise it harmlessly once, so only guard
+    // against growth when the steps have stopped shrinking.
+    if ((knots || !trusting) && k > 2 && !(ws.saddle.merit(ws.lin) < 2 * merit)) {
+      state = ws.before;
+      line_search(m, p, ws, state, merit);
+    }
+  }
+  return Outcome::failed;
+}
+
+Outcome equal_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, int steps,
+                    EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
+  double sign = unloaded_sign(m, p, ws, state);
+  for (int k = 1; k <= steps; ++k) {
+    p.factor = static_cast<double>(k) / steps;
+    if (newton(m, p, opt, k == 1, false, ws, state, out) != Outcome::converged) return Outcome::failed;
+    count_sign(ws.saddle, sign, out);
+  }
+  return Outcome::converged;
+}
+
+Outcome adaptive_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
+                       State& state, EquilibriumResult& out) {
+  double done = 0, step = 1, sign = unloaded_sign(m, p, ws, state);
+  while (done < 1) {
+    p.factor = std::min(1.0, done + step);
+    ws.step_start = state;
+    if (newton(m, p, opt, done == 0, true, ws, state, out) == Outcome::converged) {
+      done = p.factor;
+      count_sign(ws.saddle, sign, out);
+      step *= 2;
+      continue;
+    }
+    out.flags |= flag::load_stepped;
+    state = ws.step_start;
+    step *= 0.5;
+    if (step < shortest_load_step) return Outcome::failed;
+  }
+  return Outcome::converged;
+}
+
+}  // namespace
+
+EquilibriumWorkspace::EquilibriumWorkspace(const Mechanism& m)
+    : lin(m),
+      saddle(m),
+      start(m),
+      step_start(m),
+      before(m),
+      dz(VecX::Zero(m.size())),
+      dlambda(VecX::Zero(m.closures())),
+      force(VecX::Zero(m.size())) {}
+
+EquilibriumResult solve_equilibrium(const Mechanism& m, Problem& problem, const EquilibriumOptions& options,
+                                    EquilibriumWorkspace& ws, State& state) {
+  EquilibriumResult out;
+  Outcome how;
+  if (options.load_steps > 0) {
+    how = equal_steps(m, problem, options, options.load_steps, ws, state, out);
+  } else {
+    ws.start = state;
+    how = adaptive_steps(m, problem, options, ws, state, out);
+    if (how != Outcome::converged) {  // next to a singular pose Newton is slow but finds its way
+      state = ws.start;
+      out.sign_changes = 0;
+      how = equal_steps(m, problem, options, patient_steps, ws, state, out);
+      out.flags |= flag::branch_unverified;
+    }
+  }
+  problem.factor = 1;
+  if (how != Outcome::converged) return out;
+  linearize(m, problem, state, ws.lin);
+  ws.saddle.assemble(m, ws.lin);
+  ws.saddle.factorize();
+  out.status = Status::converged;
+  return out;
+}
+
+}  // namespace stiffmap

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+#include "stiffmap/law.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stiffmap/check.hpp"
+
+namespace stiffmap {
+
+Law::Law(double stiffness, double cubic, std::vector<std::pair<double, double>> knots)
+    : stiffness_(stiffness), cubic_(cubic), knots_(std::move(knots)) {
+  require(std::isfinite(stiffness) && stiffness > 0, "law.stiffness", "a positive finite number", stiffness);
+  require(cubic >= 0, "law.cubic", "a number >= 0", cubic);
+  require(knots_.empty() || cubic == 0, "law", "either knots or a cubic term", "both");
+  require(knots_.size() != 1, "law.knots", "two or more points", knots_.size());
+  for (std::size_t i = 0; i < knots_.size(); ++i) {
+    if (i) {
+      const double da = knots_[i].first - knots_[i - 1].first, dt = knots_[i].second - knots_[i - 1].second;
+      require(da >= 0 && dt >= 0 && da + dt > 0, "law.knots", "points that rise in deflection and force",
+              i);
+    }
+    z_.push_back(knots_[i].first + knots_[i].second / stiffness_);
+  }
+}
+
+LawPoint Law::at(double z, double scale) const {
+  const double k = stiffness_ / scale;
+  if (knots_.empty()) return {z, k * z + cubic_ * z * z * z, 1.0, k + 3 * cubic_ * z * z};
+  // A knot's z does not move with `scale`: only the slope beyond the ends does, theory (L2).
+  const std::size_t n = z_.size();
+  if (z <= z_.front() || z >= z_.back()) {
+    const std::size_t end = z <= z_.front() ? 0 : n - 1;
+    const double d = z - z_[end], da = scale / (1 + scale);  // a' + tau'/stiffness = 1, tau' = k a'
+    return {knots_[end].first + da * d, knots_[end].second + k * da * d, da, k * da};
+  }
+  const std::size_t i = static_cast<std::size_t>(std::upper_bound(z_.begin(), z_.end(), z) - z_.begin());
+  const double width = z_[i] - z_[i - 1], s = (z - z_[i - 1]) / width;
+  const double Da = knots_[i].first - knots_[i - 1].first, Dt = knots_[i].second - knots_[i - 1].second;
+  return {knots_[i - 1].first + s * Da, knots_[i - 1].second + s * Dt, Da / width, Dt / width};
+}
+
+double Law::from_force(double tau, double scale) const {
+  const double k = stiffness_ / scale;
+  if (knots_.empty()) return tau / (k + cubic_ * (tau / k) * (tau / k));
+  if (tau <= knots_.front().second) {
+    const double a = knots_.front().first + (tau - knots_.front().second) / k;
+    return z_.front() + (a - knots_.front().first) + (tau - knots_.front().second) / stiffness_;
+  }
+  if (tau > knots_.back().second) {
+    const double a = knots_.back().first + (tau - knots_.back().second) / k;
+    return z_.back() + (a - knots_.back().first) + (tau - knots_.back().second) / stiffness_;
+  }
+  // First and last point at this force; their middle where a gap makes it a whole interval.
+  double lo = z_.front(), hi = z_.back();
+  for (std::size_t i = 1; i < z_.size(); ++i) {
+    const double t0 = knots_[i - 1].second, t1 = knots_[i].second;
+    if (t1 < tau) lo = z_[i];
+    else if (t1 > t0 && t0 < tau) lo = z_[i - 1] + (tau - t0) / (t1 - t0) * (z_[i] - z_[i - 1]);
+  }
+  for (std::size_t i = z_.size(); i-- > 1;) {
+    const double t0 = knots_[i - 1].second, t1 = knots_[i].second;
+    if (t0 > tau) hi = z_[i - 1];
+    else if (t1 > t0 && t1 > tau) hi = z_[i - 1] + (tau - t0) / (t1 - t0) * (z_[i] - z_[i - 1]);
+  }
+  return 0.5 * (lo + hi);
+}
+
+}  // namespace stiffmap

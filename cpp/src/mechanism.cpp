@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+#include "stiffmap/mechanism.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "stiffmap/check.hpp"
+
+namespace stiffmap {
+namespace {
+
+template <class... Ts>
+struct Overload : Ts... {
+  using Ts::operator()...;
+};
+template <class... Ts>
+Overload(Ts...) -> Overload<Ts...>;
+
+std::string join(const std::string& prefix, const std::string& name) { return prefix.empty() ? name : prefix + "." + name; }
+
+}  // namespace
+
+Mechanism::Mechanism(const Chain& root, const Pose& home_pose, const std::vector<ExternalSpring>& springs)
+    : home(home_pose) {
+  nodes.push_back({});  // the base
+  path.push_back({});
+  beyond_legs.push_back(false);
+  tip = add_chain(root, 0, "", true);
+  points.insert(points.begin(), NodePoint{"tcp", tip, Vec3::Zero()});
+  finish(springs);
+}
+
+Index Mechanism::add_node(Index parent, const Pose& nominal, const Pose& actual) {
+  nodes.push_back({parent, nominal, actual, -1, JointType::revolute, Vec3::UnitZ()});
+  path.push_back(path[static_cast<std::size_t>(parent)]);
+  beyond_legs.push_back(beyond_legs[static_cast<std::size_t>(parent)]);
+  return static_cast<Index>(nodes.size()) - 1;
+}
+
+Index Mechanism::add_coordinate(Index parent, const std::string& name, Role role, JointType type, const Vec3& axis,
+                                double home_value) {
+  const Index node = add_node(parent, {}, {});
+  Node& n = nodes[static_cast<std::size_t>(node)];
+  n.coordinate = size();
+  n.type = type;
+  n.axis = axis;
+  path[static_cast<std::size_t>(node)].push_back(n.coordinate);
+  Coordinate c;
+  c.name = name;
+  c.role = role;
+  c.node = node;
+  c.type = type;
+  c.home = home_value;
+  coordinates.push_back(c);
+  return node;
+}
+
+Index Mechanism::add_joint(const Joint& joint, Index node, const std::string& prefix) {
+  const std::string name = join(prefix, joint.name);
+  require(std::abs(joint.axis.norm() - 1) < 1e-9, name + ".axis", "a unit vector", joint.axis.norm());
+  node = add_coordinate(node, name, joint.actuated ? Role::actuator : Role::passive, joint.type, joint.axis, joint.home);
+  Coordinate& c = coordinates.back();
+  c.lower = joint.lower;
+  c.upper = joint.upper;
+  if (joint.law) {
+    c.law = static_cast<Index>(laws.size());
+    laws.push_back(*joint.law);
+  }
+  if (joint.actuated) {
+    c.actuator = static_cast<Index>(drives.size());
+    c.locked = !joint.law;
+    drives.push_back({name, size() - 1, joint.home, joint.compliance_slope, joint.command_errors,
+                      joint.force_limit});
+  }
+  return node;
+}
+
+Index Mechanism::add_spring(const Spring& spring, Index node, const std::string& prefix) {
+  const std::string name = join(prefix, spring.name);
+  SpringGroup group{name, size(), spring.matrix, spring.rest};
+  static const char* axes[] = {"tx", "ty", "tz", "rx", "ry", "rz"};
+  for (int i = 0; i < 6; ++i) {
+    node = add_coordinate(node, name + "." + axes[i], Role::spring, i < 3 ? JointType::prismatic : JointType::revolute,
+                          Vec3::Unit(i % 3), 0.0);
+  }
+  for (const auto& [direction, law] : spring.laws) {
+    Mat6& K = group.matrix.stiffness;
+    require(!group.matrix.rotated, name, "a law on a spring without hidden rank defect", direction);
+    for (int i = 0; i < 6; ++i)
+      require(i == direction || K(i, direction) == 0, name + ".laws", "an uncoupled direction", axes[direction]);
+    K(direction, direction) = 0;
+    group.matrix.rigid[direction] = false;
+    coordinates[static_cast<std::size_t>(group.first + direction)].law = static_cast<Index>(laws.size());
+    laws.push_back(law);
+  }
+  groups.push_back(group);
+  return node;
+}
+
+Index Mechanism::add_block(const Block& block, Index start, const std::string& prefix, bool outermost) {
+  const bool is_legs = outermost && block.name == "legs" && legs.empty();
+  const std::string name = join(prefix, block.name);
+  require(!block.branches.empty(), name, "one branch or more", 0);
+  Index primary = -1;
+  for (const auto& [branch, chain] : block.branches) {
+    // A leg's elements are named after the leg alone: "x.foot", not "legs.x.foot".
+    const Index end = add_chain(chain, start, is_legs ? branch : join(name, branch), false);
+    if (is_legs) legs.push_back(branch);
+    if (primary < 0) primary = end;
+    else loops.push_back({name, branch, primary, end, is_legs});
+  }
+  if (is_legs) {
+    primary = add_node(primary, {}, {});  // the platform: what follows belongs to no leg
+    beyond_legs[static_cast<std::size_t>(primary)] = true;
+  }
+  return primary;
+}
+
+Index Mechanism::add_chain(const Chain& chain, Index node, const std::string& prefix, bool outermost) {
+  for (const auto& element : chain.elements) {
+    std::visit(Overload{
+                   [&](const Offset& e) { node = add_node(node, e.nominal, e.actual); },
+                   [&](const Joint& e) { node = add_joint(e, node, prefix); },
+                   [&](const Spring& e) { node = add_spring(e, node, prefix); },
+                   [&](const Body& e) { bodies.push_back({join(prefix, e.name), node, e.mass, e.com}); },
+                   [&](const Point& e) { points.push_back({join(prefix, e.name), node, e.offset}); },
+                   [&](const Block& e) { node = add_block(e, node, prefix, outermost); },
+               },
+               element);
+  }
+  return node;
+}
+
+Index Mechanism::point(const std::string& name) const {
+  std::string known;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points[i].name == name) return static_cast<Index>(i);
+    known += (i ? ", " : "") + points[i].name;
+  }
+  require(false, "point", "one of " + known, name);
+  return -1;
+}
+
+void Mechanism::finish(const std::vector<ExternalSpring>& springs) {
+  std::set<std::string> names;
+  for (const Coordinate& c : coordinates)
+    require(names.insert(c.name).second, "element names", "different names within a sequence", c.name);
+  for (const ExternalSpring& s : springs) {
+    const NodePoint& p = points[static_cast<std::size_t>(point(s.point))];
+    external_springs.push_back({s.name, p.node, p.offset, s.anchor, s.stiffness, s.length, s.tension_only});
+  }
+  home_coordinates = VecX::Zero(size());
+  for (Index j = 0; j < size(); ++j) home_coordinates[j] = coordinates[static_cast<std::size_t>(j)].home;
+  set_scales();
+}
+
+void Mechanism::set_scales() {
+  // Length: the farthest frame from the base's centre of all, at home.
+  std::vector<Pose> at(nodes.size());
+  Vec3 mean = Vec3::Zero();
+  for (std::size_t i = 1; i < nodes.size(); ++i) {
+    const Node& n = nodes[i];
+    at[i] = at[static_cast<std::size_t>(n.parent)] * n.nominal;
+    if (n.coordinate >= 0) {
+      const double x = coordinates[static_cast<std::size_t>(n.coordinate)].home;
+      if (n.type == JointType::revolute) at[i].R = (at[i].R * rotation_about(n.axis, x)).eval();
+      else at[i].p += at[i].R * n.axis * x;
+    }
+    mean += at[i].p;
+  }
+  mean /= static_cast<double>(std::max<std::size_t>(1, nodes.size() - 1));
+  double radius = 0;
+  for (std::size_t i = 1; i < nodes.size(); ++i) radius = std::max(radius, (at[i].p - mean).norm());
+  if (radius > 0) length = radius;
+
+  // Stiffness: geometric mean over all elastic directions, angles as arcs at that length.
+  double sum = 0;
+  int count = 0;
+  const auto add = [&](double k) {
+    if (k > 0) {
+      sum += std::log(k);
+      ++count;
+    }
+  };
+  for (const SpringGroup& g : groups)
+    for (int i = 0; i < 6; ++i) {
+      const double u = i < 3 || g.matrix.rotated ? 1.0 : length;
+      add(g.matrix.stiffness(i, i) / (u * u));
+    }
+  for (Index j = 0; j < size(); ++j) {
+    const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
+    if (c.law >= 0) add(laws[static_cast<std::size_t>(c.law)].stiffness() / (unit(j) * unit(j)));
+  }
+  if (count) stiffness = std::exp(sum / count);
+}
+
+}  // namespace stiffmap

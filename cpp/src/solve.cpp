@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: MIT
+#include "stiffmap/solve.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace stiffmap {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+/// Drive coordinates with their errors, and the drive compliance at that stroke (theory G1, G2).
+void command(const Mechanism& m, const VecX& x, Problem& p) {
+  for (Index j = 0; j < m.size(); ++j) {
+    const Coordinate& c = m.coordinates[at(j)];
+    p.base[j] = c.role == Role::spring ? 0.0 : c.role == Role::passive && c.law >= 0 ? m.home_coordinates[j] : x[j];
+  }
+  for (const Drive& d : m.drives) {
+    const double u = x[d.coordinate];
+    p.drive_scale[d.coordinate] = 1 + d.compliance_slope * (u - d.home);
+    for (const CommandError& e : d.errors)
+      p.base[d.coordinate] += e.offset + e.slope * (u - e.reference) +
+                              e.amplitude * std::sin(2 * std::numbers::pi * (u - e.reference) / e.period + e.phase);
+  }
+}
+
+void start_state(const Mechanism& m, const VecX& x, State& state) {
+  state.z.setZero();
+  state.lambda.setZero();
+  for (Index j = 0; j < m.size(); ++j) {
+    const Coordinate& c = m.coordinates[at(j)];
+    if (c.role == Role::passive && c.law >= 0) state.z[j] = x[j] - m.home_coordinates[j];
+  }
+}
+
+/// The leg wrenches: multipliers of the outermost loops, and for the first leg what is left of all
+/// that pushes on the platform (theory E3).
+void leg_wrenches(const Mechanism& m, const PoseInput& in, const SolveWorkspace& ws, const Vec3& p, PoseResult& out) {
+  const Frames& f = ws.equilibrium.lin.frames;
+  out.leg_wrench.setZero(6, static_cast<Index>(m.legs.size()));
+  if (m.legs.empty()) return;
+  Vec6 left = Vec6::Zero();
+  const auto add = [&](Vec6& w, const Vec3& force, const Vec3& moment, const Vec3& where, double sign) {
+    w.head<3>() += sign * force;
+    w.tail<3>() += sign * (moment + (where - p).cross(force));
+  };
+  for (std::size_t i = 0; i < in.load_points.size(); ++i) {
+    const LoadPoint& l = in.load_points[i];
+    if (!m.beyond_legs[at(l.node)]) continue;
+    const Mat3 turn = l.type == LoadType::follower ? f.at(l.node).R : Mat3::Identity();
+    add(left, turn * in.wrenches[i].head<3>(), turn * in.wrenches[i].tail<3>(), f.point(l.node, l.offset), -1);
+  }
+  for (const NodeBody& b : m.bodies)
+    if (m.beyond_legs[at(b.node)]) add(left, b.mass * in.gravity, Vec3::Zero(), f.point(b.node, b.com), -1);
+  for (const NodeSpring& s : m.external_springs) {
+    if (!m.beyond_legs[at(s.node)]) continue;
+    const Vec3 q = f.point(s.node, s.offset), d = q - s.anchor;
+    const double length = d.norm();
+    if (length < 1e-12 || (s.tension_only && length <= s.length)) continue;
+    add(left, -s.stiffness * (length - s.length) / length * d, Vec3::Zero(), q, -1);
+  }
+  Index leg = 1;
+  for (std::size_t i = 0; i < m.loops.size(); ++i) {
+    if (!m.loops[i].leg) continue;
+    const Vec6 w = ws.state.lambda.segment<6>(6 * static_cast<Index>(i));
+    Vec6 on_platform = Vec6::Zero();
+    add(on_platform, w.head<3>(), w.tail<3>(), f.at(m.loops[i].end).p, -1);
+    out.leg_wrench.col(leg++) = on_platform;
+    left -= on_platform;
+  }
+  out.leg_wrench.col(0) = left;
+}
+
+void fail(const Mechanism& m, const PoseInput& in, Status status, PoseResult& out) {
+  out.status = status;
+  out.displacement.assign(in.read_points.size(), Vec6::Constant(nan));
+  out.point.stiffness.setConstant(nan);
+  out.point.compliance.setConstant(nan);
+  out.point.free_twists.setConstant(nan);
+  out.effort.setConstant(static_cast<Index>(m.drives.size()), nan);
+  out.leg_wrench.setConstant(6, static_cast<Index>(m.legs.size()), nan);
+  out.x.setConstant(m.size(), nan);
+}
+
+/// A free motion of passive coordinates at a pose: does it leave the stiffness as it is? Moves along
+/// it, closes again, compares (theory K3).
+bool configuration_undetermined(const Mechanism& m, const PoseInput& in, const VecX& motion, SolveWorkspace& ws,
+                                const Mat6& stiffness) {
+  VecX x = ws.x;
+  double size = 0;
+  for (Index j = 0; j < m.size(); ++j)
+    if (m.coordinates[at(j)].role == Role::passive) size = std::max(size, std::abs(motion[j]) * m.unit(j) / m.length);
+  if (size < 1e-6) return false;
+  constexpr double stride = 0.05;
+  for (Index j = 0; j < m.size(); ++j)
+    if (m.coordinates[at(j)].role == Role::passive) x[j] += stride / size * motion[j];
+  const VecX moved = x;
+  if (close_passive(m, in.commanded, ws.closure, x) > 1e-9) return false;
+  double kept = 0;
+  for (Index j = 0; j < m.size(); ++j) kept = std::max(kept, std::abs(x[j] - ws.x[j]) * m.unit(j) / m.length);
+  if (kept < 0.5 * stride) return false;  // came back: only an infinitesimal freedom
+  Problem p(m);
+  command(m, x, p);
+  p.secant_laws = true;
+  State state(m);
+  start_state(m, x, state);
+  Linearization lin(m);
+  SaddleSystem saddle(m);
+  linearize(m, p, state, lin);
+  saddle.assemble(m, lin);
+  const NodePoint& point = m.points[at(in.read_points.front())];
+  const StiffnessResult k = point_stiffness(m, lin, saddle, point.node, point.offset, ws.stiffness);
+  const Vec6 s = stiffness.diagonal().cwiseAbs().cwiseSqrt().cwiseMax(1e-300);
+  const Mat6 change = s.cwiseInverse().asDiagonal() * (k.stiffness - stiffness) * s.cwiseInverse().asDiagonal();
+  return change.cwiseAbs().maxCoeff() > 1e-6;
+}
+
+/// Rank at the commanded configuration before any load: the four cases of theory (K3). True: go on.
+bool examine_unloaded(const Mechanism& m, const PoseInput& in, SolveWorkspace& ws, PoseResult& out) {
+  ws.problem.factor = 0;
+  ws.problem.secant_laws = true;
+  EquilibriumWorkspace& eq = ws.equilibrium;
+  linearize(m, ws.problem, ws.state, eq.lin);
+  eq.saddle.assemble(m, eq.lin);
+  eq.saddle.factorize();
+  ws.problem.factor = 1;
+  ws.problem.secant_laws = false;
+  if (eq.saddle.regular()) return true;
+
+  const NodePoint& point = m.points[at(in.read_points.front())];
+  const StiffnessResult k = point_stiffness(m, eq.lin, eq.saddle, point.node, point.offset, ws.stiffness);
+  const MatX null = eq.saddle.null_space();
+  const Index n = m.size();
+  Eigen::Matrix<double, 6, Eigen::Dynamic> J(6, n);
+  eq.lin.point_jacobian(m, m.tip, Vec3::Zero(), J);
+  for (Index c = 0; c < null.cols(); ++c) {
+    VecX v = null.col(c);
+    const double inside = v.head(n).norm();
+    eq.saddle.to_coordinates(v);
+    Vec6 tip = J * v.head(n);
+    tip.tail<3>() *= m.length;
+    double motion = 0;
+    for (Index j = 0; j < n; ++j) motion = std::max(motion, std::abs(v[j]) * m.unit(j));
+    if (inside < 1e-6) {
+      out.flags |= flag::internal_wrench_undetermined;
+    } else if (tip.norm() > 1e-5 * motion) {
+      out.flags |= flag::platform_singular;
+    } else {
+      out.flags |= flag::leg_singular;
+      for (Index j = 0; j < n; ++j)
+        if (m.coordinates[at(j)].role == Role::passive && std::abs(v[j]) * m.unit(j) > 1e-3 * motion)
+          out.indeterminate[at(j)] = true;
+      if (configuration_undetermined(m, in, v.head(n), ws, k.stiffness)) out.flags |= flag::configuration_undetermined;
+    }
+  }
+  if (k.free > 0) out.flags |= flag::platform_singular;
+  if (!(out.flags & (flag::platform_singular | flag::configuration_undetermined))) return true;
+  const std::uint32_t flags = out.flags;
+  fail(m, in, Status::singular, out);
+  out.flags = flags;
+  if (!(flags & flag::configuration_undetermined)) {
+    out.point.stiffness = k.stiffness;
+    out.point.free_twists = k.free_twists;
+    out.point.free = k.free;
+  }
+  return false;
+}
+
+/// Compliance by the force-driven tangent: also where some motion of the point is impossible.
+Mat6 compliance_of(const Mechanism& m, const NodePoint& p, EquilibriumWorkspace& eq) {
+  MatX J(6, m.size());
+  eq.lin.point_jacobian(m, p.node, p.offset, J);
+  for (Index j = 0; j < m.size(); ++j) J.col(j) *= eq.saddle.kind()[at(j)] == Kind::fixed ? 0.0 : eq.lin.da[j];
+  Mat6 C;
+  for (int k = 0; k < 6; ++k) {
+    eq.saddle.solve(J.row(k).transpose(), VecX::Zero(m.closures()), eq.dz, eq.dlambda);
+    C.col(k) = J * eq.dz;
+  }
+  return C;
+}
+
+void report(const Mechanism& m, const PoseInput& in, const SolveWorkspace& ws, PoseResult& out) {
+  const Linearization& lin = ws.equilibrium.lin;
+  out.displacement.resize(in.read_points.size());
+  for (std::size_t i = 0; i < in.read_points.size(); ++i) {
+    const NodePoint& p = m.points[at(in.read_points[i])];
+    const Pose &now = lin.frames.at(p.node), &then = p.node == m.tip ? in.commanded : ws.nominal.at(p.node);
+    out.displacement[i] << now * p.offset - then * p.offset, log_so3(now.R * then.R.transpose());
+  }
+  out.effort.resize(static_cast<Index>(m.drives.size()));
+  for (std::size_t i = 0; i < m.drives.size(); ++i) {
+    const Index j = m.drives[i].coordinate;
+    out.effort[static_cast<Index>(i)] = m.coordinates[at(j)].locked ? lin.r[j] : -lin.tau[j];
+    if (std::abs(out.effort[static_cast<Index>(i)]) > m.drives[i].force_limit) out.flags |= flag::drive_force;
+  }
+  const NodePoint& first = m.points[at(in.read_points.front())];
+  leg_wrenches(m, in, ws, lin.frames.point(first.node, first.offset), out);
+  out.x = lin.x;
+  for (Index j = 0; j < m.size(); ++j)
+    if (m.coordinates[at(j)].locked && m.coordinates[at(j)].role == Role::passive) {
+      out.flags |= flag::free_spin;
+      out.indeterminate[at(j)] = true;
+    }
+}
+
+/// Internal wrenches that the machine leaves open are not numbers.
+void hide_undetermined(const Mechanism& m, const SolveWorkspace& ws, PoseResult& out) {
+  if (ws.equilibrium.saddle.regular()) return;
+  const MatX null = ws.equilibrium.saddle.null_space();
+  for (Index c = 0; c < null.cols(); ++c) {
+    if (null.col(c).head(m.size()).norm() > 1e-6) continue;
+    out.flags |= flag::internal_wrench_undetermined;
+    Index leg = 1;
+    for (std::size_t i = 0; i < m.loops.size(); ++i) {
+      if (!m.loops[i].leg) continue;
+      if (null.col(c).segment<6>(m.size() + 6 * static_cast<Index>(i)).norm() > 1e-6) {
+        out.leg_wrench.col(leg).setConstant(nan);
+        out.leg_wrench.col(0).setConstant(nan);
+      }
+      ++leg;
+    }
+  }
+}
+
+}  // namespace
+
+SolveWorkspace::SolveWorkspace(const Mechanism& m)
+    : closure(m), equilibrium(m), stiffness(m), problem(m), state(m), nominal(m), x(VecX::Zero(m.size())) {}
+
+void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& options, SolveWorkspace& ws,
+                PoseResult& out) {
+  out.flags = 0;
+  out.iterations = 0;
+  out.point.free = 0;
+  out.indeterminate.assign(static_cast<std::size_t>(m.size()), false);
+  const ClosureResult closure = inverse_closure(m, in.commanded, ws.closure, ws.x);
+  if (closure.status != Status::converged) return fail(m, in, Status::unreachable, out);
+  out.flags = closure.flags;
+  forward(m, Geometry::nominal, ws.x, ws.nominal);
+  command(m, ws.x, ws.problem);
+  start_state(m, ws.x, ws.state);
+  ws.problem.gravity = in.gravity;
+  ws.problem.load_points = in.load_points;
+  ws.problem.wrenches = in.wrenches;
+  if (!examine_unloaded(m, in, ws, out)) return;
+
+  const EquilibriumResult eq = solve_equilibrium(m, ws.problem, options.equilibrium, ws.equilibrium, ws.state);
+  out.iterations = eq.iterations;
+  out.flags |= eq.flags;
+  if (eq.status != Status::converged) return fail(m, in, eq.status, out);
+  out.status = Status::converged;
+  report(m, in, ws, out);
+
+  const NodePoint& p = m.points[at(in.read_points.front())];
+  const EquilibriumWorkspace& done = ws.equilibrium;
+  out.point = point_stiffness(m, done.lin, done.saddle, p.node, p.offset, ws.stiffness);
+  out.flags |= out.point.flags;
+  if (out.flags & flag::rigid_direction) out.point.compliance = compliance_of(m, p, ws.equilibrium);
+  if (ws.problem.has_dead_moment()) {
+    out.flags |= flag::nonconservative;
+    if (eq.sign_changes > 0) out.status = Status::unstable;
+  } else if (!is_stable(done.saddle, out.point)) {
+    out.status = Status::unstable;
+  }
+  if (out.point.free > 0 && out.status == Status::converged) {
+    out.status = Status::singular;
+    bool gap = false;
+    for (Index j = 0; j < m.size(); ++j)
+      gap = gap || (m.coordinates[at(j)].law >= 0 && done.lin.kind[at(j)] == Kind::free);
+    out.flags |= gap ? flag::free_play | flag::platform_singular : flag::platform_singular;
+  }
+  hide_undetermined(m, ws, out);
+}
+
+Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs) {
+  Mechanism m(root, home, springs);
+  close_home(m);
+  return m;
+}
+
+}  // namespace stiffmap

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+#include "stiffmap/spring.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "stiffmap/check.hpp"
+
+namespace stiffmap {
+namespace {
+
+/// Scaling that makes the diagonal one: rank and sign decisions must not depend on units.
+Vec6 unit_diagonal(const Mat6& M) {
+  Vec6 s;
+  for (int i = 0; i < 6; ++i) s[i] = M(i, i) > 0 ? 1 / std::sqrt(M(i, i)) : 0.0;
+  return s;
+}
+
+void check_symmetric_psd(const Mat6& M, const std::string& name) {
+  require(M.allFinite(), name, "finite numbers", "NaN or infinity");
+  for (int i = 0; i < 6; ++i) require(M(i, i) >= 0, name, "a positive semidefinite 6x6 matrix", M(i, i));
+  const Vec6 s = unit_diagonal(M);
+  const Mat6 N = s.asDiagonal() * M * s.asDiagonal();
+  require((N - N.transpose()).cwiseAbs().maxCoeff() < 1e-9, name,
+          "a symmetric 6x6 matrix; max |M - M^T| must vanish", (M - M.transpose()).cwiseAbs().maxCoeff());
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j)
+      require(M(i, j) == 0 || (s[i] > 0 && s[j] > 0), name, "a positive semidefinite 6x6 matrix",
+              "a coupling to a zero diagonal entry");
+  const double lowest = Eigen::SelfAdjointEigenSolver<Mat6>(N, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  require(lowest > -1e-9, name, "a positive semidefinite 6x6 matrix; lowest scaled eigenvalue >= 0", lowest);
+}
+
+}  // namespace
+
+SpringMatrix spring_from_stiffness(const Mat6& K, const std::string& name) {
+  check_symmetric_psd(K, name);
+  SpringMatrix out;
+  out.stiffness = 0.5 * (K + K.transpose());
+  return out;
+}
+
+SpringMatrix spring_from_compliance(const Mat6& C, const std::string& name) {
+  check_symmetric_psd(C, name);
+  const Vec6 s = unit_diagonal(C);
+  const Mat6 N = 0.5 * (s.asDiagonal() * (C + C.transpose()) * s.asDiagonal());
+  SpringMatrix out;
+  // Directions with a zero diagonal are rigid as they stand; the rest may hide a rank defect.
+  Eigen::SelfAdjointEigenSolver<Mat6> eigen(N);
+  int rank = 0, moving = 0;
+  for (int i = 0; i < 6; ++i) {
+    rank += eigen.eigenvalues()[i] > 1e-9;
+    moving += s[i] > 0;
+  }
+  if (rank == moving) {
+    for (int i = 0; i < 6; ++i) out.rigid[i] = s[i] == 0;
+    Mat6 full = N;
+    for (int i = 0; i < 6; ++i)
+      if (out.rigid[i]) full(i, i) = 1;
+    Mat6 K = full.inverse();
+    for (int i = 0; i < 6; ++i)
+      if (out.rigid[i]) K(i, i) = 0;
+    out.stiffness = s.asDiagonal() * K * s.asDiagonal();
+    out.stiffness = (0.5 * (out.stiffness + out.stiffness.transpose())).eval();
+    return out;
+  }
+  Eigen::SelfAdjointEigenSolver<Mat6> plain(0.5 * (C + C.transpose()));
+  out.basis = plain.eigenvectors();
+  out.rotated = true;
+  for (int i = 0; i < 6; ++i) {
+    const double c = plain.eigenvalues()[i];
+    out.rigid[i] = c < 1e-9 * plain.eigenvalues()[5];
+    out.stiffness(i, i) = out.rigid[i] ? 0 : 1 / c;
+  }
+  return out;
+}
+
+Mat6 beam_compliance(double L, const BeamSection& b) {
+  require(L > 0, "beam.length", "a positive length", L);
+  require(b.EA > 0 && b.EIy > 0 && b.EIz > 0 && b.GJ > 0, "beam.section", "positive rigidities EA, EIy, EIz, GJ",
+          std::min(std::min(b.EA, b.GJ), std::min(b.EIy, b.EIz)));
+  Mat6 C = Mat6::Zero();
+  C(0, 0) = L / b.EA;
+  C(1, 1) = L * L * L / (3 * b.EIz);
+  C(2, 2) = L * L * L / (3 * b.EIy);
+  C(3, 3) = L / b.GJ;
+  C(4, 4) = L / b.EIy;
+  C(5, 5) = L / b.EIz;
+  C(1, 5) = C(5, 1) = L * L / (2 * b.EIz);
+  C(2, 4) = C(4, 2) = -L * L / (2 * b.EIy);
+  return C;
+}
+
+}  // namespace stiffmap

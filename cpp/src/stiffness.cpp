@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+#include "stiffmap/stiffness.hpp"
+
+#include <Eigen/SVD>
+#include <cmath>
+#include <limits>
+
+namespace stiffmap {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double pivot_alarm = 1e-5;
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+/// Splits the unknowns into elastic coordinates theta and free ones q.
+void partition(const SaddleSystem& saddle, StiffnessWorkspace& ws) {
+  ws.theta.clear();
+  ws.q.clear();
+  for (std::size_t j = 0; j < saddle.kind().size(); ++j) {
+    if (saddle.kind()[j] == Kind::elastic) ws.theta.push_back(static_cast<Index>(j));
+    if (saddle.kind()[j] == Kind::free) ws.q.push_back(static_cast<Index>(j));
+  }
+}
+
+bool well_conditioned(const Eigen::PartialPivLU<MatX>& lu) {
+  const auto d = lu.matrixLU().diagonal().cwiseAbs();
+  return d.minCoeff() > pivot_alarm * std::min(1.0, d.maxCoeff());
+}
+
+/// A scaled 6x6 to SI: force rows and columns times the scales.
+Mat6 unscale(const Mat6& K, const Vec6& s) { return s.asDiagonal() * K * s.asDiagonal(); }
+
+/// Null twists of the scaled stiffness; compliance only where there are none.
+void invert(const Mat6& scaled, const Vec6& s, StiffnessResult& out) {
+  const Eigen::JacobiSVD<Mat6> svd(scaled, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Vec6& sv = svd.singularValues();
+  for (int i = 0; i < 6; ++i) out.free += sv[i] <= rank_threshold * std::max(sv[0], 1e-12);
+  out.free_twists.setConstant(nan);
+  if (out.free == 0) {
+    const Vec6 si = s.cwiseInverse();
+    out.compliance = unscale(scaled.partialPivLu().inverse(), si);
+    return;
+  }
+  out.compliance.setConstant(nan);
+  for (int k = 0; k < out.free; ++k) {
+    const Vec6 twist = s.cwiseInverse().asDiagonal() * svd.matrixV().col(6 - out.free + k);
+    out.free_twists.col(k) = twist.normalized();
+  }
+}
+
+}  // namespace
+
+StiffnessWorkspace::StiffnessWorkspace(const Mechanism& m) {
+  const Index n = m.size(), nl = m.closures();
+  J.setZero(6 + nl, n);
+  K.setZero(n, n);
+  Jt.setZero(6 + nl, n);
+  M.setZero(6 + nl + n, 6 + nl + n);
+}
+
+StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, Index node,
+                                const Vec3& offset, StiffnessWorkspace& ws) {
+  StiffnessResult out;
+  const Index n = m.size(), nl = m.closures(), rows = 6 + nl;
+  const MatX& A = saddle.matrix();
+  partition(saddle, ws);
+  const Index nt = static_cast<Index>(ws.theta.size()), nq = static_cast<Index>(ws.q.size());
+
+  // Stacked Jacobian: the point, then the loops; dimensionless like the tangent.
+  Vec6 s;
+  s << Vec3::Constant(std::sqrt(m.stiffness)), Vec3::Constant(std::sqrt(m.stiffness) * m.length);
+  lin.point_jacobian(m, node, offset, ws.J.topRows(6));
+  saddle.to_unknowns(lin, ws.J.topRows(6));
+  ws.J.topRows(6) = (s.asDiagonal() * ws.J.topRows(6)).eval();
+  ws.J.bottomRows(nl) = -A.bottomLeftCorner(nl, n);
+
+  // Blocks of theory (K1); the tangent holds K - H.
+  ws.K.resize(nt, nt);
+  ws.Jt.resize(nt, rows);
+  ws.Hq.resize(nt, nq);
+  for (Index b = 0; b < nt; ++b) {
+    for (Index a = 0; a < nt; ++a) ws.K(a, b) = A(ws.theta[at(a)], ws.theta[at(b)]);
+    ws.Jt.row(b) = ws.J.col(ws.theta[at(b)]).transpose();
+  }
+  for (Index b = 0; b < nq; ++b)
+    for (Index a = 0; a < nt; ++a) ws.Hq(a, b) = -A(ws.theta[at(a)], ws.q[at(b)]);
+  ws.lu_theta.compute(ws.K);                                      // k_theta^F = (K_theta - H_thetatheta)^-1
+  ws.B.resize(nt, rows + nq);
+  ws.B << ws.Jt, ws.Hq;
+  ws.X.noalias() = ws.lu_theta.solve(ws.B);                       // k_theta^F [J_theta^T, H_thetaq]
+  ws.M.resize(rows + nq, rows + nq);
+  ws.M.topLeftCorner(rows, rows).noalias() = ws.Jt.transpose() * ws.X.leftCols(rows);
+  ws.M.topRightCorner(rows, nq).noalias() = ws.Jt.transpose() * ws.X.rightCols(nq);
+  for (Index b = 0; b < nq; ++b) {
+    const Index j = ws.q[at(b)];
+    ws.M.col(rows + b).head(rows) += ws.J.col(j);
+    for (Index a = 0; a < nt; ++a) ws.Hq(a, b) = -A(j, ws.theta[at(a)]);  // now H_qtheta, transposed
+  }
+  ws.M.bottomRows(nq).noalias() = ws.Hq.transpose() * ws.X;
+  for (Index b = 0; b < nq; ++b) {
+    ws.M.row(rows + b).head(rows) += ws.J.col(ws.q[at(b)]).transpose();
+    for (Index a = 0; a < nq; ++a) ws.M(rows + a, rows + b) -= A(ws.q[at(a)], ws.q[at(b)]);
+  }
+
+  // Inertia of the whole tangent from its parts: theory (K4).
+  ws.sub = ws.K;
+  ws.sub = 0.5 * (ws.sub + ws.sub.transpose()).eval();
+  ws.llt.compute(ws.sub);
+  out.elastic_definite = nt == 0 || ws.llt.info() == Eigen::Success;
+  ws.sub = 0.5 * (ws.M.bottomRightCorner(nl + nq, nl + nq) + ws.M.bottomRightCorner(nl + nq, nl + nq).transpose());
+  out.positive = symmetric_inertia(ws.sub, rank_threshold).positive;
+
+  // K_F is the block of the inverse that belongs to the point: (25).
+  const double soft = std::sqrt(std::max(1.0, ws.M.diagonal().head(rows).cwiseAbs().maxCoeff()));
+  ws.M.topRows(rows) /= soft;
+  ws.M.leftCols(rows) /= soft;
+  ws.B.setZero(rows + nq, 6);
+  ws.B.topRows(6).setIdentity();
+  ws.lu.compute(ws.M);
+  Mat6 scaled;
+  if (well_conditioned(ws.lu)) {
+    scaled = ws.lu.solve(ws.B).topRows<6>() / (soft * soft);
+  } else {
+    Eigen::CompleteOrthogonalDecomposition<MatX> cod(ws.M.rows(), ws.M.cols());
+    cod.setThreshold(rank_threshold);
+    cod.compute(ws.M);
+    const MatX X = cod.solve(ws.B);
+    scaled = X.topRows<6>() / (soft * soft);
+    // Nothing solves for a motion that is impossible; a truncated near-null direction leaves far less.
+    if ((ws.M * X - ws.B).cwiseAbs().maxCoeff() > 0.3) out.flags |= flag::rigid_direction;
+  }
+  if (out.flags & flag::rigid_direction) {  // some motion of the point is impossible: see compliance
+    out.stiffness.setConstant(nan);
+    out.compliance.setConstant(nan);
+    out.free_twists.setConstant(nan);
+    return out;
+  }
+  out.stiffness = unscale(scaled, s);
+  invert(scaled, s, out);
+  return out;
+}
+
+bool is_stable(const SaddleSystem& saddle, const StiffnessResult& k) {
+  const Index closures = saddle.regular() ? saddle.closures() : saddle.closure_rank();
+  return k.elastic_definite && k.positive <= closures;
+}
+
+}  // namespace stiffmap

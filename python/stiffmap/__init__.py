@@ -1,0 +1,58 @@
+"""Stiffness of robots and parallel machines under load."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
+
+from stiffmap.errors import StiffmapError
+from stiffmap.status import Flag, Status
+
+if TYPE_CHECKING:
+    from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
+    from stiffmap.link import identify_link
+    from stiffmap.machine import Machine, load_machine
+    from stiffmap.solution import Solution
+
+try:
+    __version__ = version("stiffmap")
+except PackageNotFoundError:  # a source tree that is not installed
+    __version__ = "0"
+
+# Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
+_HOME = {
+    "Kinematics": "stiffmap.kinematics",
+    "Machine": "stiffmap.machine",
+    "Solution": "stiffmap.solution",
+    "forward_kinematics": "stiffmap.kinematics",
+    "identify_link": "stiffmap.link",
+    "inverse_kinematics": "stiffmap.kinematics",
+    "load_machine": "stiffmap.machine",
+}
+
+__all__ = [
+    "Flag",
+    "Kinematics",
+    "Machine",
+    "Solution",
+    "Status",
+    "StiffmapError",
+    "__version__",
+    "forward_kinematics",
+    "identify_link",
+    "inverse_kinematics",
+    "load_machine",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'stiffmap' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

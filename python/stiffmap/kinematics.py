@@ -1,0 +1,67 @@
+"""Kinematics by closure, springs at rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
+from stiffmap.machine import Machine
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """Configurations of a batch of poses; NaN where the status is UNREACHABLE."""
+
+    actuators: Floats
+    """(..., actuators) m or rad, in the order of `Machine.actuators`."""
+    position: Floats
+    """(..., 3) m, TCP."""
+    rotation: Floats
+    """(..., 3, 3)."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+    coordinates: Floats
+    """(..., coordinates) all coordinates, springs at zero."""
+
+    def __array__(self, dtype: object = None, copy: bool | None = None) -> Floats:
+        return np.asarray(self.actuators, dtype=dtype)  # type: ignore[call-overload, no-any-return]
+
+
+def inverse_kinematics(
+    machine: Machine, position: ArrayLike, rotation: ArrayLike | None = None, *, threads: int | None = None
+) -> Kinematics:
+    """Actuator and passive coordinates at commanded TCP poses, on the declared assembly branch.
+
+    position (..., 3) m; rotation (..., 3, 3), None: as at home. docs/theory.md (C3), (C5).
+    """
+    p = trailing(position, (3,), "position", "positions (m)")
+    home = machine.description.home.r
+    r = trailing(home if rotation is None else rotation, (3, 3), "rotation", "rotation matrices")
+    shape = batch(p.shape[:-1], r.shape[:-2])
+    out = machine._core.closure(rows(p, shape, (3,)), rows(r, shape, (3, 3)), True, thread_count(threads))
+    return _kinematics(machine, out, shape)
+
+
+def forward_kinematics(machine: Machine, actuators: ArrayLike, *, threads: int | None = None) -> Kinematics:
+    """TCP pose at actuator coordinates (..., actuators) m or rad, by continuation from home."""
+    n = len(machine.actuators)
+    a = trailing(actuators, (n,), "actuators", f"{n} actuator coordinates")
+    shape = a.shape[:-1]
+    out = machine._core.closure(rows(a, shape, (n,)), np.zeros((0, 3, 3)), False, thread_count(threads))
+    return _kinematics(machine, out, shape)
+
+
+def _kinematics(machine: Machine, out: tuple[Floats, ...], shape: tuple[int, ...]) -> Kinematics:
+    x, p, r, status, flags = out
+    index = [i for _, i in machine._core.actuators]
+    return Kinematics(
+        actuators=x[:, index].reshape((*shape, len(index))),
+        position=p.reshape((*shape, 3)),
+        rotation=r.reshape((*shape, 3, 3)),
+        status=status.reshape(shape),  # type: ignore[arg-type]
+        flags=flags.reshape(shape),  # type: ignore[arg-type]
+        coordinates=x.reshape((*shape, x.shape[1])),
+    )

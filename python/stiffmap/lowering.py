@@ -1,0 +1,115 @@
+"""From the description of a machine to the compiled mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiffmap import _core
+from stiffmap.description import (
+    Block,
+    Body,
+    Element,
+    Joint,
+    Law,
+    MachineDescription,
+    Offset,
+    Point,
+    Pose,
+    Spring,
+)
+from stiffmap.errors import StiffmapError
+
+UNLIMITED = 1e300
+
+
+def build_mechanism(machine: MachineDescription) -> _core.Mechanism:
+    """Compiled mechanism; raises StiffmapError where the core refuses the description."""
+    root = _core.Chain()
+    try:
+        add_elements(root, machine.base)
+        root.block("legs", [(leg.name, chain(leg.elements)) for leg in machine.legs])
+        add_elements(root, machine.platform)
+        springs = [
+            _core.ExternalSpring(
+                s.name, s.point, np.array(s.anchor), s.stiffness, s.length, s.tension_only
+            )
+            for s in machine.external_springs
+        ]
+        return _core.Mechanism(root, pose(machine.home), springs)
+    except ValueError as problem:
+        raise StiffmapError(f"{machine.name}: {problem}") from None
+
+
+def pose(p: Pose) -> _core.Pose:
+    """Compiled pose."""
+    return _core.Pose(p.p, p.r)
+
+
+def law(of: Law) -> _core.Law:
+    """Compiled force law."""
+    return _core.Law(of.stiffness, of.cubic, list(of.knots))
+
+
+def chain(elements: Sequence[Element]) -> _core.Chain:
+    """Compiled chain of a sequence."""
+    out = _core.Chain()
+    add_elements(out, elements)
+    return out
+
+
+def add_elements(out: _core.Chain, elements: Sequence[Element]) -> None:
+    """Append each element to a compiled chain."""
+    for e in elements:
+        match e:
+            case Offset():
+                out.offset(e.name, pose(e.nominal), pose(e.actual or e.nominal))
+            case Joint():
+                add_joint(out, e)
+            case Spring():
+                add_spring(out, e)
+            case Body():
+                out.body(e.name, e.mass, np.array(e.com))
+            case Point():
+                out.point(e.name, np.array(e.offset))
+            case Block():
+                out.block(e.name, [(b.name, chain(b.elements)) for b in e.branches])
+
+
+def add_joint(out: _core.Chain, e: Joint) -> None:
+    """A joint as elementary joints; several axes get the names ``name.1``, ``name.2`` …"""
+    if len(e.axes) != len(e.home):
+        raise StiffmapError(
+            f"joint {e.name}: expected one home coordinate per axis ({len(e.axes)}), got {len(e.home)}"
+        )
+    range_ = e.drive.range if e.drive and e.drive.range else e.limits
+    lower, upper = range_ or (-UNLIMITED, UNLIMITED)
+    force = e.drive.force if e.drive and e.drive.force else UNLIMITED
+    errors = [
+        _core.CommandError(c.offset, c.slope, c.amplitude, c.period, c.phase, c.reference)
+        for c in e.command_errors
+    ]
+    for i, (axis, home) in enumerate(zip(e.axes, e.home, strict=True)):
+        out.joint(
+            name=e.name if len(e.axes) == 1 else f"{e.name}.{i + 1}",
+            prismatic=e.kind == "prismatic",
+            axis=np.array(axis),
+            actuated=e.actuated,
+            home=home,
+            law=law(e.law) if e.law else None,
+            compliance_slope=e.compliance_slope,
+            errors=errors,
+            lower=lower,
+            upper=upper,
+            force_limit=force,
+        )
+
+
+def add_spring(out: _core.Chain, e: Spring) -> None:
+    """A link spring given by exactly one matrix."""
+    if (e.compliance is None) == (e.stiffness is None):
+        raise StiffmapError(f"spring {e.name}: expected either a compliance or a stiffness matrix")
+    matrix = e.compliance if e.compliance is not None else e.stiffness
+    laws = [(i, law(entry)) for i, entry in e.laws]
+    out.spring(e.name, np.array(matrix), e.compliance is not None, np.array(e.rest), laws)

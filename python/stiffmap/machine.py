@@ -1,0 +1,240 @@
+"""A machine that can be solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap import _core
+from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing, wrench_array
+from stiffmap.description import MachineDescription
+from stiffmap.errors import StiffmapError
+from stiffmap.lowering import build_mechanism
+from stiffmap.solution import Solution
+
+LOAD_TYPES = {"dead": 0, "follower": 1, "semitangential": 2}
+
+
+class Machine:
+    """An immutable machine; `load_machine` makes one from a shipped name or a file.
+
+    Pickles, compares by its description, and may be shared by threads.
+    """
+
+    def __init__(self, description: MachineDescription) -> None:
+        self._description = description
+        self._core  # noqa: B018 - refuse an impossible machine when it is made, not when it is used
+
+    @property
+    def description(self) -> MachineDescription:
+        """What the machine is made of."""
+        return self._description
+
+    @property
+    def name(self) -> str:
+        """Name of the machine."""
+        return self._description.name
+
+    @cached_property
+    def _core(self) -> _core.Mechanism:
+        return build_mechanism(self._description)
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Full names of the actuators."""
+        return tuple(n for n, _ in self._core.actuators)
+
+    @property
+    def legs(self) -> tuple[str, ...]:
+        """Names of the legs."""
+        return tuple(self._core.legs)
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the points that wrenches and readings may refer to."""
+        return tuple(self._core.points)
+
+    @property
+    def free_spins(self) -> tuple[str, ...]:
+        """Passive coordinates that turn without any effect, held at their home value."""
+        c = self._core
+        return tuple(n for n, k, r in zip(c.coordinates, c.locked, c.roles, strict=True) if k and r == 1)
+
+    @property
+    def workspace(self) -> Floats:
+        """(2, 3) m: lowest and highest corner of the workspace box."""
+        if self._description.workspace is None:
+            raise StiffmapError(f"{self.name}: the machine file declares no workspace box")
+        return np.array(self._description.workspace)
+
+    def solve(
+        self,
+        position: ArrayLike,
+        wrench: ArrayLike | None = None,
+        *,
+        rotation: ArrayLike | None = None,
+        point: str = "tcp",
+        wrenches: Mapping[str, ArrayLike] | None = None,
+        load_type: str = "dead",
+        read_points: Sequence[str] = (),
+        gravity: ArrayLike | None = None,
+        method: str = "fast",
+        load_steps: int | str = "auto",
+        threads: int | None = None,
+    ) -> Solution:
+        """Equilibrium, stiffness and compliance at commanded poses under external wrenches.
+
+        Parameters
+        ----------
+        position
+            (..., 3) m, commanded TCP, base axes.
+        wrench
+            (..., 6) N, N·m, acting on the machine at `point`, base axes, moment about the point.
+            None: no external wrench.
+        rotation
+            (..., 3, 3), commanded orientation; None: as at home.
+        point
+            Named point where `wrench` acts and `displacement`, `stiffness` and `compliance` are.
+        wrenches
+            More wrenches: point name -> (..., 6).
+        load_type
+            How `wrench` follows its body: ``dead``, ``follower`` or ``semitangential``
+            (docs/conventions.md).
+        read_points
+            Further points whose displacement is wanted: `Solution.readings` holds `point` first.
+        gravity
+            (3,) m/s², base axes; None: what the machine file says.
+        method
+            ``fast`` or ``reference``.
+        load_steps
+            ``auto`` (adaptive continuation) or the number of equal steps.
+        threads
+            None: all cores that this process may use.
+
+        Poses never raise: see `Solution.status`. Raises StiffmapError for bad input.
+        """
+        p = trailing(position, (3,), "position", "positions (m)")
+        w = wrench_array(wrench)
+        r = trailing(
+            self._description.home.r if rotation is None else rotation, (3, 3), "rotation", "rotation matrices"
+        )
+        self._check_rotation(r)
+        extra = {n: wrench_array(v, f"wrenches[{n!r}]") for n, v in (wrenches or {}).items()}
+        shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2], *(v.shape[:-1] for v in extra.values()))
+        if load_type not in LOAD_TYPES:
+            raise StiffmapError(f"load_type: expected one of {', '.join(LOAD_TYPES)}, got {load_type!r}")
+        if method not in ("fast", "reference"):
+            raise StiffmapError(f"method: expected 'fast' or 'reference', got {method!r}")
+        for name in (point, *extra, *read_points):
+            if name not in self.points:
+                raise StiffmapError(f"point: expected one of {', '.join(self.points)}, got {name!r}")
+        loads = np.stack([rows(v, shape, (6,)) for v in (w, *extra.values())], axis=1)
+        answer = self._core.solve(
+            rows(p, shape, (3,)),
+            rows(r, shape, (3, 3)),
+            np.ascontiguousarray(loads),
+            [point, *extra],
+            [LOAD_TYPES[load_type]] + [0] * len(extra),
+            [point, *read_points],
+            self._gravity(gravity),
+            self._steps(load_steps),
+            thread_count(threads),
+        )
+        return self._solution(answer, shape, point)
+
+    @staticmethod
+    def _check_rotation(r: Floats) -> None:
+        finite = np.isfinite(r).all(axis=(-2, -1))
+        off = np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(axis=(-2, -1), initial=0)
+        bad = finite & ((off > 1e-9) | (np.linalg.det(np.where(finite[..., None, None], r, np.eye(3))) < 0))
+        if np.any(bad):
+            raise StiffmapError(
+                f"rotation: expected rotation matrices, got one with |R^T R - I| = {np.max(off[bad]):.1e}"
+            )
+
+    def _gravity(self, gravity: ArrayLike | None) -> Floats:
+        if gravity is None:
+            return np.array(self._description.gravity or (0.0, 0.0, 0.0))
+        g = np.asarray(gravity, dtype=float)
+        if g.shape != (3,) or not np.isfinite(g).all():
+            raise StiffmapError(f"gravity: expected 3 finite numbers (m/s², base axes), got {gravity!r}")
+        return g
+
+    @staticmethod
+    def _steps(load_steps: int | str) -> int:
+        if load_steps == "auto":
+            return 0
+        if isinstance(load_steps, bool) or not isinstance(load_steps, int) or load_steps < 1:
+            raise StiffmapError(f"load_steps: expected 'auto' or a positive number, got {load_steps!r}")
+        return load_steps
+
+    def _solution(self, a: dict[str, Any], shape: tuple[int, ...], point: str) -> Solution:
+        def out(key: str) -> Any:
+            return a[key].reshape(shape + a[key].shape[1:])
+
+        c = self._core
+        readings = out("displacement")
+        joints = {
+            n: i for i, (n, role) in enumerate(zip(c.coordinates, c.roles, strict=True)) if role != 2
+        }
+        return Solution(
+            displacement=np.ascontiguousarray(readings[..., 0, :]),
+            stiffness=out("stiffness"),
+            compliance=out("compliance"),
+            status=out("status"),
+            flags=out("flags"),
+            free_twists=out("free_twists"),
+            iterations=out("iterations"),
+            actuator_effort=out("actuator_effort"),
+            leg_wrench=out("leg_wrench"),
+            readings=readings,
+            point=point,
+            actuators=self.actuators,
+            legs=self.legs,
+            coordinates=out("coordinates"),
+            coordinate_names=tuple(c.coordinates),
+            spring_index=dict(c.springs),
+            joint_index=joints,
+            indeterminate_mask=out("indeterminate"),
+        )
+
+    def with_effect(
+        self, kind: str, *, element: str | None = None, legs: Sequence[str] | None = None, **parameters: Any
+    ) -> Machine:
+        """A new machine with an effect added; see `stiffmap.effects`."""
+        from stiffmap.effects import add_effect
+
+        return Machine(add_effect(self._description, kind, element=element, legs=legs, **parameters))
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a machine file that loads back equal."""
+        from stiffmap.files import save_description
+
+        save_description(self._description, path)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Machine) and other._description == self._description
+
+    def __hash__(self) -> int:
+        return hash((self.name, len(self._description.legs)))
+
+    def __reduce__(self) -> tuple[type[Machine], tuple[MachineDescription]]:
+        return (Machine, (self._description,))
+
+    def __repr__(self) -> str:
+        return f"Machine({self.name!r}: legs {', '.join(self.legs)}; actuators {', '.join(self.actuators)})"
+
+
+def load_machine(name_or_path: str | PathLike[str]) -> Machine:
+    """Machine from a shipped name (`stiffmap machines` lists them) or a YAML file.
+
+    Raises StiffmapError naming file, key, what was expected and what was found.
+    """
+    from stiffmap.files import load_description
+
+    return Machine(load_description(name_or_path))
