@@ -43,10 +43,14 @@ class Context:
         """An element or sequence of the machine."""
         return replace(self, full=f"{self.full}.{name}" if self.full else name)
 
-    def fail(self, message: str) -> NoReturn:
-        """Raise a `FileError` at this place."""
+    def error(self, message: str) -> FileError:
+        """An error at this place."""
         line = self.document.line(self.path)
-        raise FileError(message, file=self.file, line=line, key=key_text(self.path))
+        return FileError(message, file=self.file, line=line, key=key_text(self.path))
+
+    def fail(self, message: str) -> NoReturn:
+        """Raise an error at this place."""
+        raise self.error(message)
 
     def note(self, text: str, field_name: str = "") -> None:
         """Keep a note about the element, or about one of its fields."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NoReturn
 
 from stiffmap.description import Block, Branch, Element, Joint
+from stiffmap.errors import FileError
 from stiffmap.files.build_elements import home_coordinates
 from stiffmap.files.context import Context
 from stiffmap.files.schema.base import Number, suggestion
@@ -26,7 +26,7 @@ def with_home(
             changed = _block(element, names, home, context)
         if changed is not None:
             return (*elements[:i], changed, *elements[i + 1 :])
-    _unknown(elements, names[0], context)
+    raise _unknown(elements, names[0], context)
 
 
 def _joint(joint: Joint, home: Home, context: Context) -> Joint:
@@ -47,8 +47,8 @@ def _block(block: Block, names: list[str], home: Home, context: Context) -> Bloc
     return replace(block, branches=branches)
 
 
-def _unknown(elements: tuple[Element, ...], name: str, context: Context) -> NoReturn:
+def _unknown(elements: tuple[Element, ...], name: str, context: Context) -> FileError:
     known = [e.name for e in elements if isinstance(e, Joint)]
     known += [b.name for e in elements if isinstance(e, Block) for b in e.branches]
     there = ", ".join(known) or "none"
-    context.fail(f"no joint or branch '{name}'{suggestion(name, known)}; there are: {there}")
+    return context.error(f"no joint or branch '{name}'{suggestion(name, known)}; there are: {there}")
