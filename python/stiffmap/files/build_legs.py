@@ -13,10 +13,14 @@ from stiffmap.files.schema.base import suggestion
 from stiffmap.files.schema.elements import ElementModel
 from stiffmap.files.schema.machine import LegModel
 
+RESERVED = ("base", "platform")
+
 
 def build_leg(name: str, leg: LegModel, templates: dict[str, list[ElementModel]], context: Context) -> Leg:
     """A leg placed in the base; raises `FileError`."""
     here = context.at("legs", name).inside(name)
+    if name in RESERVED:
+        here.fail(f"'{name}' cannot be a leg's name: full names use it")
     here.note(leg.note)
     if leg.template is not None:
         if leg.template not in templates:

@@ -23,29 +23,36 @@ _STIFFNESS = {0: Dimension(length=-1, force=1), 1: FORCE, 2: MOMENT}
 
 
 def build_spring(model: SpringModel, context: Context) -> Spring:
-    """SI spring; raises `FileError` for an asymmetric or indefinite matrix."""
-    name = model.spring
+    """SI spring; raises `FileError` for an asymmetric or indefinite matrix and for a law on a direction
+    that is coupled to others."""
     laws = tuple(
         (DIRECTIONS.index(d), build_law(law, DIRECTIONS.index(d) > 2, context.at("laws", d), f"laws.{d}"))
         for d, law in (model.laws or {}).items()
     )
-    rest: tuple[float, ...] = (0.0,) * 6
-    if model.rest is not None:
-        rest = tuple(
-            context.si(n, ANGLE if i > 2 else LENGTH, f"rest.{d}")
-            for i, (n, d) in enumerate(zip(model.rest, DIRECTIONS, strict=True))
-        )
-    if model.stiffness is not None:
-        stiffness = build_matrix(model.stiffness, "stiffness", context.at("stiffness"))
-        return Spring(name, stiffness=stiffness, laws=laws, rest=rest)
+    rest = tuple(
+        context.si(n, ANGLE if i > 2 else LENGTH, f"rest.{DIRECTIONS[i]}")
+        for i, n in enumerate(model.rest or [])
+    )
+    word = "stiffness" if model.stiffness is not None else "compliance"
+    matrix = _spring_matrix(model, context)
+    for i, _ in laws:
+        if any(matrix[i][j] != 0.0 for j in range(6) if j != i):
+            context.at("laws", DIRECTIONS[i]).fail(
+                f"the {word} couples this direction to others; it has no law alone"
+            )
+    stiffness, compliance = (matrix, None) if word == "stiffness" else (None, matrix)
+    return Spring(model.spring, compliance, stiffness, laws, rest or (0.0,) * 6)
+
+
+def _spring_matrix(model: SpringModel, context: Context) -> Matrix6:
     if model.beam is not None:
-        compliance = as_rows(build_beam(model.beam, context.at("beam")))
-    elif model.link is not None:
-        compliance = load_link(model.link, context.at("link"))
-    else:
-        assert model.compliance is not None  # the schema asks for one of the four
-        compliance = build_matrix(model.compliance, "compliance", context.at("compliance"))
-    return Spring(name, compliance=compliance, laws=laws, rest=rest)
+        return as_rows(build_beam(model.beam, context.at("beam")))
+    if model.link is not None:
+        return load_link(model.link, context.at("link"))
+    if model.stiffness is not None:
+        return build_matrix(model.stiffness, "stiffness", context.at("stiffness"))
+    assert model.compliance is not None  # the schema asks for one of the four
+    return build_matrix(model.compliance, "compliance", context.at("compliance"))
 
 
 def build_matrix(model: Matrix, word: str, context: Context) -> Matrix6:

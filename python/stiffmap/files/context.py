@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NoReturn
@@ -62,17 +63,23 @@ class Context:
         if field_name:
             self.note(number.note, field_name)
             if number.u is not None:
-                u = self.units.to_si(number.u, dimension)
+                u = self._converted(number.u, dimension)
                 self.gathered.uncertainty[f"{self.full}/{field_name}"] = u
-        return self.units.to_si(number.value, dimension)
+        return self._converted(number.value, dimension)
+
+    def _converted(self, value: float, dimension: Dimension) -> float:
+        try:
+            return self.units.to_si(value, dimension)
+        except OverflowError:
+            self.fail(f"the number is too large: {value}")
 
     def inverse(self, number: Number, dimension: Dimension, field_name: str) -> float:
         """SI value of 1/number (a stiffness from a compliance); the uncertainty follows to first order."""
-        value = self.units.to_si(number.value, dimension)
-        if value <= 0.0:
+        value = self._converted(number.value, dimension)
+        if value <= 0.0 or math.isinf(1.0 / value):
             self.fail(f"a compliance must be positive (use rigid: true for none); found {number.value}")
         self.note(number.note, field_name)
         if number.u is not None:
-            u = self.units.to_si(number.u, dimension)
+            u = self._converted(number.u, dimension)
             self.gathered.uncertainty[f"{self.full}/{field_name}"] = u / value**2
         return 1.0 / value

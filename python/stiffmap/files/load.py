@@ -55,3 +55,5 @@ def validate(document: Document, file: str) -> MachineFile:
         return MachineFile.model_validate(data)
     except ValidationError as error:
         raise file_error(error, document, file) from error
+    except OverflowError as error:
+        raise FileError("a number is too large", file=file) from error

@@ -167,3 +167,24 @@ def test_effects_without_their_module(monkeypatch: pytest.MonkeyPatch) -> None:
     text = changed((("effects",), [{"kind": "dead_zone", "element": "drive"}]))
     with pytest.raises(MissingPartError, match=r"stiffmap\.effects"):
         description(text)
+
+
+def test_law_on_a_coupled_direction() -> None:
+    entries = {f"k{i}{i}": 1e-4 for i in range(1, 7)} | {"k26": 1e-5}
+    spring = {"spring": "s", "compliance": entries, "laws": {"ty": {"stiffness": 1.0}}}
+    told = message(with_element(spring))
+    assert "laws.ty" in told
+    assert "couples" in told
+
+
+@pytest.mark.parametrize("mass", [10**400, {"value": 10**400}])
+def test_numbers_beyond_double(mass: object) -> None:
+    message(with_element({"body": "b", "mass": mass}))
+
+
+def test_numbers_that_units_carry_beyond_double() -> None:
+    assert "too large" in message(with_element({"spring": "s", "compliance": [1, 1, 1, 1e308, 1, 1]}))
+
+
+def test_leg_called_base() -> None:
+    assert "cannot be a leg's name" in message(BASE.replace("  a:\n", "  base:\n"))
