@@ -17,14 +17,14 @@ void read(const BatchInput& in, Index i, PoseInput& pose) {
   pose.commanded.p = Eigen::Map<const Vec3>(in.position + 3 * i);
   pose.commanded.R = Eigen::Map<const RowMajor3>(in.rotation + 9 * i);
   for (std::size_t k = 0; k < in.load_points.size(); ++k)
-    pose.wrenches[k] = Eigen::Map<const Vec6>(in.wrench + 6 * (i * static_cast<Index>(in.load_points.size()) + static_cast<Index>(k)));
+    pose.wrenches[k] =
+        Eigen::Map<const Vec6>(in.wrench + 6 * (i * static_cast<Index>(in.load_points.size()) + static_cast<Index>(k)));
 }
 
 void write(const Mechanism& m, Index i, const PoseResult& r, const BatchOutput& out) {
   const Index reads = static_cast<Index>(r.displacement.size());
   if (out.displacement)
-    for (Index k = 0; k < reads; ++k)
-      Eigen::Map<Vec6>(out.displacement + 6 * (i * reads + k)) = r.displacement[at(k)];
+    for (Index k = 0; k < reads; ++k) Eigen::Map<Vec6>(out.displacement + 6 * (i * reads + k)) = r.displacement[at(k)];
   if (out.stiffness) Eigen::Map<RowMajor6>(out.stiffness + 36 * i) = r.point.stiffness;
   if (out.compliance) Eigen::Map<RowMajor6>(out.compliance + 36 * i) = r.point.compliance;
   if (out.free_twists) Eigen::Map<RowMajor6>(out.free_twists + 36 * i) = r.point.free_twists;

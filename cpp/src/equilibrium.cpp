@@ -120,8 +120,8 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
   return Outcome::failed;
 }
 
-Outcome equal_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, int steps,
-                    EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
+Outcome equal_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, int steps, EquilibriumWorkspace& ws,
+                    State& state, EquilibriumResult& out) {
   double sign = unloaded_sign(m, p, ws, state);
   for (int k = 1; k <= steps; ++k) {
     p.factor = static_cast<double>(k) / steps;

@@ -17,8 +17,7 @@ Law::Law(double stiffness, double cubic, std::vector<std::pair<double, double>> 
   for (std::size_t i = 0; i < knots_.size(); ++i) {
     if (i) {
       const double da = knots_[i].first - knots_[i - 1].first, dt = knots_[i].second - knots_[i - 1].second;
-      require(da >= 0 && dt >= 0 && da + dt > 0, "law.knots", "points that rise in deflection and force",
-              i);
+      require(da >= 0 && dt >= 0 && da + dt > 0, "law.knots", "points that rise in deflection and force", i);
     }
     z_.push_back(knots_[i].first + knots_[i].second / stiffness_);
   }

@@ -17,7 +17,9 @@ struct Overload : Ts... {
 template <class... Ts>
 Overload(Ts...) -> Overload<Ts...>;
 
-std::string join(const std::string& prefix, const std::string& name) { return prefix.empty() ? name : prefix + "." + name; }
+std::string join(const std::string& prefix, const std::string& name) {
+  return prefix.empty() ? name : prefix + "." + name;
+}
 
 }  // namespace
 
@@ -59,7 +61,8 @@ Index Mechanism::add_coordinate(Index parent, const std::string& name, Role role
 Index Mechanism::add_joint(const Joint& joint, Index node, const std::string& prefix) {
   const std::string name = join(prefix, joint.name);
   require(std::abs(joint.axis.norm() - 1) < 1e-9, name + ".axis", "a unit vector", joint.axis.norm());
-  node = add_coordinate(node, name, joint.actuated ? Role::actuator : Role::passive, joint.type, joint.axis, joint.home);
+  node =
+      add_coordinate(node, name, joint.actuated ? Role::actuator : Role::passive, joint.type, joint.axis, joint.home);
   Coordinate& c = coordinates.back();
   c.lower = joint.lower;
   c.upper = joint.upper;
@@ -70,8 +73,7 @@ Index Mechanism::add_joint(const Joint& joint, Index node, const std::string& pr
   if (joint.actuated) {
     c.actuator = static_cast<Index>(drives.size());
     c.locked = !joint.law;
-    drives.push_back({name, size() - 1, joint.home, joint.compliance_slope, joint.command_errors,
-                      joint.force_limit});
+    drives.push_back({name, size() - 1, joint.home, joint.compliance_slope, joint.command_errors, joint.force_limit});
   }
   return node;
 }

@@ -24,7 +24,8 @@ Coefficients coefficients(double t) {
   const double s = std::sin(t), half = std::sin(0.5 * t);
   const double b = 2 * half * half / t2;
   const double c = t < 0.1 ? 1.0 / 6 - t2 / 120 * (1 - t2 / 42 * (1 - t2 / 72 * (1 - t2 / 110))) : (t - s) / (t2 * t);
-  const double db = t < 0.1 ? -1.0 / 12 + t2 / 180 * (1 - t2 / 37.333333333333336 * (1 - t2 / 67.5)) : (s / t - 2 * b) / t2;
+  const double db =
+      t < 0.1 ? -1.0 / 12 + t2 / 180 * (1 - t2 / 37.333333333333336 * (1 - t2 / 67.5)) : (s / t - 2 * b) / t2;
   const double dc = t < 0.1 ? -1.0 / 60 + t2 / 1260 * (1 - t2 / 48 * (1 - t2 / 82.5)) : (b - 3 * c) / t2;
   return {s / t, b, c, db, dc};
 }

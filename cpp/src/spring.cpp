@@ -21,8 +21,8 @@ void check_symmetric_psd(const Mat6& M, const std::string& name) {
   for (int i = 0; i < 6; ++i) require(M(i, i) >= 0, name, "a positive semidefinite 6x6 matrix", M(i, i));
   const Vec6 s = unit_diagonal(M);
   const Mat6 N = s.asDiagonal() * M * s.asDiagonal();
-  require((N - N.transpose()).cwiseAbs().maxCoeff() < 1e-9, name,
-          "a symmetric 6x6 matrix; max |M - M^T| must vanish", (M - M.transpose()).cwiseAbs().maxCoeff());
+  require((N - N.transpose()).cwiseAbs().maxCoeff() < 1e-9, name, "a symmetric 6x6 matrix; max |M - M^T| must vanish",
+          (M - M.transpose()).cwiseAbs().maxCoeff());
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j)
       require(M(i, j) == 0 || (s[i] > 0 && s[j] > 0), name, "a positive semidefinite 6x6 matrix",

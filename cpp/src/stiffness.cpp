@@ -85,10 +85,10 @@ StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, co
   }
   for (Index b = 0; b < nq; ++b)
     for (Index a = 0; a < nt; ++a) ws.Hq(a, b) = -A(ws.theta[at(a)], ws.q[at(b)]);
-  ws.lu_theta.compute(ws.K);                                      // k_theta^F = (K_theta - H_thetatheta)^-1
+  ws.lu_theta.compute(ws.K);  // k_theta^F = (K_theta - H_thetatheta)^-1
   ws.B.resize(nt, rows + nq);
   ws.B << ws.Jt, ws.Hq;
-  ws.X.noalias() = ws.lu_theta.solve(ws.B);                       // k_theta^F [J_theta^T, H_thetaq]
+  ws.X.noalias() = ws.lu_theta.solve(ws.B);  // k_theta^F [J_theta^T, H_thetaq]
   ws.M.resize(rows + nq, rows + nq);
   ws.M.topLeftCorner(rows, rows).noalias() = ws.Jt.transpose() * ws.X.leftCols(rows);
   ws.M.topRightCorner(rows, nq).noalias() = ws.Jt.transpose() * ws.X.rightCols(nq);

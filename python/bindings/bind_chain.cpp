@@ -23,8 +23,8 @@ Pose make_pose(const Array& p, const Array& R) {
 void bind_chain(py::module_& m) {
   using namespace py::literals;
   py::class_<Pose>(m, "Pose").def(py::init(&make_pose), "translation"_a, "rotation"_a);
-  py::class_<Law>(m, "Law").def(
-      py::init<double, double, std::vector<std::pair<double, double>>>(), "stiffness"_a, "cubic"_a, "knots"_a);
+  py::class_<Law>(m, "Law").def(py::init<double, double, std::vector<std::pair<double, double>>>(), "stiffness"_a,
+                                "cubic"_a, "knots"_a);
   py::class_<CommandError>(m, "CommandError")
       .def(py::init([](double offset, double slope, double amplitude, double period, double phase, double reference) {
              return CommandError{offset, slope, amplitude, period, phase, reference};
@@ -32,40 +32,51 @@ void bind_chain(py::module_& m) {
            "offset"_a, "slope"_a, "amplitude"_a, "period"_a, "phase"_a, "reference"_a);
   py::class_<Chain>(m, "Chain")
       .def(py::init<>())
-      .def("offset",
-           [](Chain& c, const std::string& name, const Pose& nominal, const Pose& actual) {
-             c.elements.emplace_back(Offset{name, nominal, actual});
-           }, "name"_a, "nominal"_a, "actual"_a)
-      .def("joint",
-           [](Chain& c, const std::string& name, bool prismatic, const Array& axis, bool actuated, double home,
-              const std::optional<Law>& law, double compliance_slope, const std::vector<CommandError>& errors,
-              double lower, double upper, double force_limit) {
-             c.elements.emplace_back(Joint{name, prismatic ? JointType::prismatic : JointType::revolute,
-                                           vec3(axis, "axis"), actuated, home, law, compliance_slope, errors, lower,
-                                           upper, force_limit});
-           },
-           "name"_a, "prismatic"_a, "axis"_a, "actuated"_a, "home"_a, "law"_a, "compliance_slope"_a, "errors"_a,
-           "lower"_a, "upper"_a, "force_limit"_a)
-      .def("spring",
-           [](Chain& c, const std::string& name, const Array& matrix, bool compliance, const Array& rest,
-              const std::vector<std::pair<int, Law>>& laws) {
-             const Mat6 M = mat6(matrix, "spring");
-             c.elements.emplace_back(Spring{name, compliance ? spring_from_compliance(M, name) : spring_from_stiffness(M, name),
-                                            Eigen::Map<const Vec6>(data(rest, {6}, "rest")), laws});
-           },
-           "name"_a, "matrix"_a, "compliance"_a, "rest"_a, "laws"_a)
-      .def("body",
-           [](Chain& c, const std::string& name, double mass, const Array& com) {
-             c.elements.emplace_back(Body{name, mass, vec3(com, "com")});
-           }, "name"_a, "mass"_a, "com"_a)
-      .def("point",
-           [](Chain& c, const std::string& name, const Array& offset) {
-             c.elements.emplace_back(Point{name, vec3(offset, "offset")});
-           }, "name"_a, "offset"_a)
-      .def("block",
-           [](Chain& c, const std::string& name, const std::vector<std::pair<std::string, Chain>>& branches) {
-             c.elements.emplace_back(Block{name, branches});
-           }, "name"_a, "branches"_a);
+      .def(
+          "offset",
+          [](Chain& c, const std::string& name, const Pose& nominal, const Pose& actual) {
+            c.elements.emplace_back(Offset{name, nominal, actual});
+          },
+          "name"_a, "nominal"_a, "actual"_a)
+      .def(
+          "joint",
+          [](Chain& c, const std::string& name, bool prismatic, const Array& axis, bool actuated, double home,
+             const std::optional<Law>& law, double compliance_slope, const std::vector<CommandError>& errors,
+             double lower, double upper, double force_limit) {
+            c.elements.emplace_back(Joint{name, prismatic ? JointType::prismatic : JointType::revolute,
+                                          vec3(axis, "axis"), actuated, home, law, compliance_slope, errors, lower,
+                                          upper, force_limit});
+          },
+          "name"_a, "prismatic"_a, "axis"_a, "actuated"_a, "home"_a, "law"_a, "compliance_slope"_a, "errors"_a,
+          "lower"_a, "upper"_a, "force_limit"_a)
+      .def(
+          "spring",
+          [](Chain& c, const std::string& name, const Array& matrix, bool compliance, const Array& rest,
+             const std::vector<std::pair<int, Law>>& laws) {
+            const Mat6 M = mat6(matrix, "spring");
+            c.elements.emplace_back(
+                Spring{name, compliance ? spring_from_compliance(M, name) : spring_from_stiffness(M, name),
+                       Eigen::Map<const Vec6>(data(rest, {6}, "rest")), laws});
+          },
+          "name"_a, "matrix"_a, "compliance"_a, "rest"_a, "laws"_a)
+      .def(
+          "body",
+          [](Chain& c, const std::string& name, double mass, const Array& com) {
+            c.elements.emplace_back(Body{name, mass, vec3(com, "com")});
+          },
+          "name"_a, "mass"_a, "com"_a)
+      .def(
+          "point",
+          [](Chain& c, const std::string& name, const Array& offset) {
+            c.elements.emplace_back(Point{name, vec3(offset, "offset")});
+          },
+          "name"_a, "offset"_a)
+      .def(
+          "block",
+          [](Chain& c, const std::string& name, const std::vector<std::pair<std::string, Chain>>& branches) {
+            c.elements.emplace_back(Block{name, branches});
+          },
+          "name"_a, "branches"_a);
   py::class_<ExternalSpring>(m, "ExternalSpring")
       .def(py::init([](const std::string& name, const std::string& point, const Array& anchor, double stiffness,
                        double length, bool tension_only) {

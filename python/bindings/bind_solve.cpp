@@ -46,8 +46,8 @@ py::dict solve(const Mechanism& m, const Array& position, const Array& rotation,
   py::array_t<std::uint8_t> indeterminate(Shape{n, m.size()}), status(n);
   py::array_t<std::uint32_t> flags(n);
   py::array_t<std::int32_t> iterations(n);
-  const BatchOutput out{displacement.mutable_data(), stiffness.mutable_data(),   compliance.mutable_data(),
-                        free_twists.mutable_data(),  effort.mutable_data(),      leg_wrench.mutable_data(),
+  const BatchOutput out{displacement.mutable_data(), stiffness.mutable_data(),     compliance.mutable_data(),
+                        free_twists.mutable_data(),  effort.mutable_data(),        leg_wrench.mutable_data(),
                         coordinates.mutable_data(),  indeterminate.mutable_data(), status.mutable_data(),
                         flags.mutable_data(),        iterations.mutable_data()};
   SolveOptions options;
@@ -97,8 +97,9 @@ py::tuple closure(const Mechanism& m, const Array& given, const Array& rotation,
       VecX x = VecX::Zero(m.size());
       for (long i = begin; i < end; ++i) {
         const ClosureResult r =
-            inverse ? inverse_closure(m, {Eigen::Map<const Vec3>(values + 3 * i), Eigen::Map<const Row3>(R + 9 * i)}, ws, x)
-                    : forward_closure(m, Eigen::Map<const VecX>(values + drives * i, drives), ws, x);
+            inverse
+                ? inverse_closure(m, {Eigen::Map<const Vec3>(values + 3 * i), Eigen::Map<const Row3>(R + 9 * i)}, ws, x)
+                : forward_closure(m, Eigen::Map<const VecX>(values + drives * i, drives), ws, x);
         const bool ok = r.status == Status::converged;
         const double nan = std::numeric_limits<double>::quiet_NaN();
         Eigen::Map<VecX>(x_out + m.size() * i, m.size()) = ok ? x : VecX(VecX::Constant(m.size(), nan));
@@ -120,7 +121,8 @@ py::tuple frames(const Mechanism& m, const Array& x) {
   auto p = empty({n, 3}), R = empty({n, 3, 3});
   for (py::ssize_t i = 0; i < n; ++i) {
     Eigen::Map<Vec3>(p.mutable_data() + 3 * i) = f.pose[static_cast<std::size_t>(i)].p;
-    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(R.mutable_data() + 9 * i) = f.pose[static_cast<std::size_t>(i)].R;
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(R.mutable_data() + 9 * i) =
+        f.pose[static_cast<std::size_t>(i)].R;
   }
   return py::make_tuple(p, R);
 }
@@ -131,47 +133,56 @@ void bind_solve(py::module_& m) {
   using namespace py::literals;
   py::class_<Mechanism>(m, "Mechanism")
       .def(py::init(&assemble), "root"_a, "home"_a, "springs"_a)
-      .def_property_readonly("coordinates",
-                             [](const Mechanism& k) { return names(k.coordinates, [](const Coordinate& c) { return c.name; }); })
-      .def_property_readonly("roles", [](const Mechanism& k) {
-        std::vector<int> out;
-        for (const Coordinate& c : k.coordinates) out.push_back(static_cast<int>(c.role));
-        return out;
-      })
-      .def_property_readonly("locked", [](const Mechanism& k) {
-        std::vector<bool> out;
-        for (const Coordinate& c : k.coordinates) out.push_back(c.locked);
-        return out;
-      })
-      .def_property_readonly("springs", [](const Mechanism& k) {
-        std::vector<std::pair<std::string, Index>> out;
-        for (const SpringGroup& g : k.groups) out.emplace_back(g.name, g.first);
-        return out;
-      })
-      .def_property_readonly("actuators", [](const Mechanism& k) {
-        std::vector<std::pair<std::string, Index>> out;
-        for (const Drive& d : k.drives) out.emplace_back(d.name, d.coordinate);
-        return out;
-      })
-      .def_property_readonly("nodes", [](const Mechanism& k) {
-        std::vector<std::pair<Index, Index>> out;  // parent, coordinate
-        for (const Node& n : k.nodes) out.emplace_back(n.parent, n.coordinate);
-        return out;
-      })
-      .def_property_readonly("loops", [](const Mechanism& k) {
-        std::vector<std::tuple<std::string, std::string, Index, Index>> out;
-        for (const Loop& l : k.loops) out.emplace_back(l.block, l.branch, l.primary, l.end);
-        return out;
-      })
-      .def_property_readonly("points", [](const Mechanism& k) { return names(k.points, [](const NodePoint& p) { return p.name; }); })
+      .def_property_readonly(
+          "coordinates",
+          [](const Mechanism& k) { return names(k.coordinates, [](const Coordinate& c) { return c.name; }); })
+      .def_property_readonly("roles",
+                             [](const Mechanism& k) {
+                               std::vector<int> out;
+                               for (const Coordinate& c : k.coordinates) out.push_back(static_cast<int>(c.role));
+                               return out;
+                             })
+      .def_property_readonly("locked",
+                             [](const Mechanism& k) {
+                               std::vector<bool> out;
+                               for (const Coordinate& c : k.coordinates) out.push_back(c.locked);
+                               return out;
+                             })
+      .def_property_readonly("springs",
+                             [](const Mechanism& k) {
+                               std::vector<std::pair<std::string, Index>> out;
+                               for (const SpringGroup& g : k.groups) out.emplace_back(g.name, g.first);
+                               return out;
+                             })
+      .def_property_readonly("actuators",
+                             [](const Mechanism& k) {
+                               std::vector<std::pair<std::string, Index>> out;
+                               for (const Drive& d : k.drives) out.emplace_back(d.name, d.coordinate);
+                               return out;
+                             })
+      .def_property_readonly("nodes",
+                             [](const Mechanism& k) {
+                               std::vector<std::pair<Index, Index>> out;  // parent, coordinate
+                               for (const Node& n : k.nodes) out.emplace_back(n.parent, n.coordinate);
+                               return out;
+                             })
+      .def_property_readonly("loops",
+                             [](const Mechanism& k) {
+                               std::vector<std::tuple<std::string, std::string, Index, Index>> out;
+                               for (const Loop& l : k.loops) out.emplace_back(l.block, l.branch, l.primary, l.end);
+                               return out;
+                             })
+      .def_property_readonly(
+          "points", [](const Mechanism& k) { return names(k.points, [](const NodePoint& p) { return p.name; }); })
       .def_property_readonly("legs", [](const Mechanism& k) { return k.legs; })
       .def_readonly("length", &Mechanism::length)
       .def_readonly("stiffness", &Mechanism::stiffness)
-      .def("home_coordinates", [](const Mechanism& k) {
-        py::array_t<double> out(k.size());
-        Eigen::Map<VecX>(out.mutable_data(), k.size()) = k.home_coordinates;
-        return out;
-      })
+      .def("home_coordinates",
+           [](const Mechanism& k) {
+             py::array_t<double> out(k.size());
+             Eigen::Map<VecX>(out.mutable_data(), k.size()) = k.home_coordinates;
+             return out;
+           })
       .def("solve", &solve, "position"_a, "rotation"_a, "wrench"_a, "load_points"_a, "load_types"_a, "read_points"_a,
            "gravity"_a, "load_steps"_a, "threads"_a)
       .def("closure", &closure, "given"_a, "rotation"_a, "inverse"_a, "threads"_a)

@@ -19,13 +19,13 @@ struct BatchInput {
 
 /// Row-major outputs; null pointers are not written.
 struct BatchOutput {
-  double* displacement = nullptr;  ///< count x read points x 6
-  double* stiffness = nullptr;     ///< count x 36
-  double* compliance = nullptr;    ///< count x 36
-  double* free_twists = nullptr;   ///< count x 36
-  double* effort = nullptr;        ///< count x drives
-  double* leg_wrench = nullptr;    ///< count x legs x 6
-  double* coordinates = nullptr;   ///< count x coordinates
+  double* displacement = nullptr;         ///< count x read points x 6
+  double* stiffness = nullptr;            ///< count x 36
+  double* compliance = nullptr;           ///< count x 36
+  double* free_twists = nullptr;          ///< count x 36
+  double* effort = nullptr;               ///< count x drives
+  double* leg_wrench = nullptr;           ///< count x legs x 6
+  double* coordinates = nullptr;          ///< count x coordinates
   std::uint8_t* indeterminate = nullptr;  ///< count x coordinates
   std::uint8_t* status = nullptr;
   std::uint32_t* flags = nullptr;

@@ -7,9 +7,9 @@
 namespace stiffmap {
 
 struct EquilibriumOptions {
-  int load_steps = 0;          ///< 0: adaptive continuation; n: n equal steps
-  int max_iterations = 40;     ///< per load step
-  double tolerance = 1e-10;    ///< last Newton step, in multiples of the mechanism's length
+  int load_steps = 0;        ///< 0: adaptive continuation; n: n equal steps
+  int max_iterations = 40;   ///< per load step
+  double tolerance = 1e-10;  ///< last Newton step, in multiples of the mechanism's length
 };
 
 struct EquilibriumResult {

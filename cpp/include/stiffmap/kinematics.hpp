@@ -10,8 +10,7 @@ enum class Geometry : std::uint8_t { nominal, actual };
 
 /// Frames of all nodes, and axis and origin of all coordinates, in base axes.
 struct Frames {
-  explicit Frames(const Mechanism& m)
-      : pose(m.nodes.size()), axis(3, m.size()), origin(3, m.size()) {}
+  explicit Frames(const Mechanism& m) : pose(m.nodes.size()), axis(3, m.size()), origin(3, m.size()) {}
   std::vector<Pose> pose;
   Mat3X axis, origin;
 

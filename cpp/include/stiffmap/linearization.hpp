@@ -12,8 +12,7 @@ namespace stiffmap {
 
 /// Everything that is given: commanded drives, gravity, wrenches (base axes, N and N·m).
 struct Problem {
-  explicit Problem(const Mechanism& m)
-      : base(VecX::Zero(m.size())), drive_scale(VecX::Ones(m.size())) {}
+  explicit Problem(const Mechanism& m) : base(VecX::Zero(m.size())), drive_scale(VecX::Ones(m.size())) {}
   VecX base;         ///< value of each coordinate at zero deflection
   VecX drive_scale;  ///< factor on the compliance of each law
   Vec3 gravity = Vec3::Zero();
@@ -37,13 +36,13 @@ struct Linearization {
   explicit Linearization(const Mechanism& m);
 
   Frames frames;
-  VecX x;                ///< coordinates
-  VecX tau;              ///< spring, drive and joint reactions
-  VecX da, dtau;         ///< tangent of each law with respect to z (1 and 0 without a law)
-  VecX r, e;             ///< force balance per coordinate, closure error per loop
-  MatX K;                ///< spring stiffness, in x
-  MatX H;                ///< Hessian d(J^T F)/dx of all loads, in x
-  MatX J;                ///< closures by coordinates: loop end minus primary
+  VecX x;         ///< coordinates
+  VecX tau;       ///< spring, drive and joint reactions
+  VecX da, dtau;  ///< tangent of each law with respect to z (1 and 0 without a law)
+  VecX r, e;      ///< force balance per coordinate, closure error per loop
+  MatX K;         ///< spring stiffness, in x
+  MatX H;         ///< Hessian d(J^T F)/dx of all loads, in x
+  MatX J;         ///< closures by coordinates: loop end minus primary
   std::vector<Kind> kind;
 
   /// Jacobian of point `offset` of `node`: 6 x coordinates.

@@ -91,13 +91,13 @@ class Mechanism {
   std::vector<NodePoint> points;  ///< the first is "tcp"
   std::vector<NodeBody> bodies;
   std::vector<NodeSpring> external_springs;
-  std::vector<std::string> legs;       ///< names of the branches of the legs' block
-  std::vector<bool> beyond_legs;       ///< per node: on the platform's side of the legs' block
+  std::vector<std::string> legs;         ///< names of the branches of the legs' block
+  std::vector<bool> beyond_legs;         ///< per node: on the platform's side of the legs' block
   std::vector<std::vector<Index>> path;  ///< per node: its coordinates from the base outwards
-  Pose home;                           ///< tip pose of the home configuration
-  VecX home_coordinates;               ///< closed exactly at home
-  double length = 1;     ///< characteristic length: turns angles into lengths in every norm
-  double stiffness = 1;  ///< characteristic stiffness, N/m: turns forces into lengths
+  Pose home;                             ///< tip pose of the home configuration
+  VecX home_coordinates;                 ///< closed exactly at home
+  double length = 1;                     ///< characteristic length: turns angles into lengths in every norm
+  double stiffness = 1;                  ///< characteristic stiffness, N/m: turns forces into lengths
   Index tip = -1;
 
   Index size() const { return static_cast<Index>(coordinates.size()); }
@@ -105,7 +105,9 @@ class Mechanism {
   Index point(const std::string& name) const;  ///< throws with the names that exist
 
   /// Length that a unit of coordinate j stands for.
-  double unit(Index j) const { return coordinates[static_cast<std::size_t>(j)].type == JointType::revolute ? length : 1.0; }
+  double unit(Index j) const {
+    return coordinates[static_cast<std::size_t>(j)].type == JointType::revolute ? length : 1.0;
+  }
 
  private:
   Index add_node(Index parent, const Pose& nominal, const Pose& actual);

@@ -22,8 +22,7 @@ void parallel_chunks(long count, long chunk, int threads, Work&& work) {
   std::mutex guard;
   const auto run = [&](int thread) {
     try {
-      for (long c = next++; c < chunks; c = next++)
-        work(thread, c * chunk, std::min(count, (c + 1) * chunk));
+      for (long c = next++; c < chunks; c = next++) work(thread, c * chunk, std::min(count, (c + 1) * chunk));
     } catch (...) {
       const std::lock_guard<std::mutex> lock(guard);
       if (!error) error = std::current_exception();

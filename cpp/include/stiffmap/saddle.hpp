@@ -38,7 +38,7 @@ class SaddleSystem {
   /// Columns of a Jacobian by coordinates to columns by scaled unknowns, in place.
   void to_unknowns(const Linearization& lin, Eigen::Ref<MatX> J) const;
   const MatX& matrix() const { return A_; }
-  const VecX& scale() const { return s_; }  ///< z = scale * unknown
+  const VecX& scale() const { return s_; }                 ///< z = scale * unknown
   const std::vector<Kind>& kind() const { return kind_; }  ///< per unknown of the coordinates
   bool regular() const { return regular_; }
   double determinant_sign() const { return sign_; }

@@ -10,10 +10,10 @@ namespace stiffmap {
 
 /// What one pose asks.
 struct PoseInput {
-  Pose commanded;              ///< tip, base axes
+  Pose commanded;  ///< tip, base axes
   Vec3 gravity = Vec3::Zero();
   std::vector<LoadPoint> load_points;
-  std::vector<Vec6> wrenches;  ///< one per load point
+  std::vector<Vec6> wrenches;      ///< one per load point
   std::vector<Index> read_points;  ///< indices into Mechanism::points; the first defines stiffness
 };
 
@@ -28,10 +28,10 @@ struct PoseResult {
   int iterations = 0;
   std::vector<Vec6> displacement;  ///< per read point: translation, rotation vector
   StiffnessResult point;
-  VecX effort;                     ///< per drive
+  VecX effort;  ///< per drive
   Eigen::Matrix<double, 6, Eigen::Dynamic> leg_wrench;
-  VecX x;                          ///< coordinates at equilibrium
-  std::vector<bool> indeterminate; ///< passive coordinates that the pose leaves open
+  VecX x;                           ///< coordinates at equilibrium
+  std::vector<bool> indeterminate;  ///< passive coordinates that the pose leaves open
 };
 
 /// Everything one thread needs; allocated once per mechanism.

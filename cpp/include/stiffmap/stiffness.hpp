@@ -10,11 +10,11 @@
 namespace stiffmap {
 
 struct StiffnessResult {
-  Mat6 stiffness, compliance;      ///< compliance is NaN where a twist is free
-  Mat6 free_twists;                ///< columns; NaN beyond the last
-  int free = 0;                    ///< number of free twists
-  Index positive = 0;              ///< positive eigenvalues of the reduced closure block, for stability
-  bool elastic_definite = true;    ///< K_theta - H_thetatheta is positive definite
+  Mat6 stiffness, compliance;    ///< compliance is NaN where a twist is free
+  Mat6 free_twists;              ///< columns; NaN beyond the last
+  int free = 0;                  ///< number of free twists
+  Index positive = 0;            ///< positive eigenvalues of the reduced closure block, for stability
+  bool elastic_definite = true;  ///< K_theta - H_thetatheta is positive definite
   std::uint32_t flags = 0;
 };
 
