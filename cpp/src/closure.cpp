@@ -56,6 +56,7 @@ double newton_step(const Mechanism& m, const Target& target, ClosureWorkspace& w
   }
   const Index n = static_cast<Index>(ws.unknown.size());
   ws.A.resize(ws.J.rows(), n);
+  if (n == 0) return 0;  // no joint at all: a structure
   for (Index k = 0; k < n; ++k) {
     const Index j = ws.unknown[at(k)];
     ws.A.col(k) = ws.J.col(j) / m.unit(j);
@@ -151,9 +152,10 @@ void lock_spins(Mechanism& m, ClosureWorkspace& ws) {
     select_unknowns(m, false, ws);
     residual(m, m.home_coordinates, target, ws);
     newton_step(m, target, ws);
+    if (ws.unknown.empty()) return;
     const Eigen::BDCSVD<MatX> svd(ws.A, Eigen::ComputeFullV);
     const Index n = ws.A.cols(), rank = (svd.singularValues().array() > rank_threshold).count();
-    if (n == 0 || rank == n) return;
+    if (rank == n) return;
     const VecX spin = svd.matrixV().col(n - 1);
     VecX turned = m.home_coordinates;
     for (Index k = 0; k < n; ++k) turned[ws.unknown[at(k)]] += 0.3 * spin[k];

@@ -174,7 +174,9 @@ void Mechanism::set_scales() {
   mean /= static_cast<double>(std::max<std::size_t>(1, nodes.size() - 1));
   double radius = 0;
   for (std::size_t i = 1; i < nodes.size(); ++i) radius = std::max(radius, (at[i].p - mean).norm());
-  if (radius > 0) length = radius;
+  // A single link has all its frames in one place: then the reach from the base counts.
+  if (radius > 1e-9 * mean.norm()) length = radius;
+  else if (mean.norm() > 0) length = mean.norm();
 
   // Stiffness: geometric mean over all elastic directions, angles as arcs at that length.
   double sum = 0;
