@@ -120,7 +120,8 @@ def _fit_exponential(points: Floats, residuals: Floats) -> tuple[float, float]:
 
     starts = [(np.log(s), g) for s in np.geomspace(spacing, extent, 5) for g in (-3.0, 0.0)]
     best = min(starts, key=lambda s: cost(np.array(s)))
-    bounds = [(np.log(spacing / 5), np.log(5 * extent)), (-9.0, 6.0)]
+    # A length beyond the region cannot be seen in residuals, from which the rigid motion was taken.
+    bounds = [(np.log(spacing / 5), np.log(extent)), (-9.0, 6.0)]
     found = minimize(cost, best, method="Nelder-Mead", bounds=bounds, options={"maxiter": 60}).x
     return float(np.exp(found[0])), float(1 / (1 + np.exp(-found[1])))
 

@@ -1,0 +1,64 @@
+"""Mesh refinement: observed order and Richardson estimate of a compliance with an error bar."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from stiffmap.errors import StiffmapError
+from stiffmap.link.arrays import Floats
+
+PLAUSIBLE = (0.5, 5.0)  # an order outside is not believed; the error is then the whole spread
+
+
+class Refinement(NamedTuple):
+    """Extrapolation of a (6, 6) compliance over three or more meshes."""
+
+    sizes: Floats  # (meshes,) m, coarse to fine
+    order: float  # observed order of the trace of the scaled compliance; NaN when not monotone
+    estimate: Floats  # (6, 6) extrapolated to size zero
+    error: Floats  # (6, 6) standard uncertainty of the finest mesh's compliance against size zero
+
+
+def observed_order(sizes: Floats, values: Floats) -> float:
+    """Order p in ``v = v0 + c h^p`` through the three finest meshes, link (14); NaN when not monotone.
+
+    Args:
+        sizes: (m >= 3,) m, coarse to fine; values: (m,).
+    """
+    h, v = sizes[-3:], values[-3:]
+    first, second = v[1] - v[0], v[2] - v[1]
+    if first * second <= 0:
+        return float("nan")
+
+    def gap(p: float) -> float:
+        return float((h[0] ** p - h[1] ** p) / (h[1] ** p - h[2] ** p) - first / second)
+
+    low, high = 1e-3, 20.0
+    return float(brentq(gap, low, high)) if gap(low) * gap(high) < 0 else float("nan")
+
+
+def richardson(sizes: Floats, compliances: Floats) -> Refinement:
+    """Extrapolate compliances (m, 6, 6) over meshes of these sizes (m,) m, coarse to fine.
+
+    One order is taken from the trace scaled by the finest diagonal, since single small entries are
+    not monotone. The error is the extrapolated step; where the order is not plausible, three times
+    the change between the two finest meshes.
+
+    Raises:
+        StiffmapError: fewer than three meshes, or sizes that do not fall.
+    """
+    if len(sizes) < 3 or np.any(np.diff(sizes) >= 0):
+        raise StiffmapError(
+            f"refinement: expected at least three falling mesh sizes, got {np.asarray(sizes)}"
+        )
+    scale = np.diag(compliances[-1])
+    trace = np.array([np.sum(np.diag(C) / scale) for C in compliances])
+    p = observed_order(sizes, trace)
+    change = compliances[-1] - compliances[-2]
+    if not PLAUSIBLE[0] <= p <= PLAUSIBLE[1]:
+        return Refinement(sizes, p, compliances[-1], 3 * np.abs(change))
+    step = change / ((sizes[-2] / sizes[-1]) ** p - 1)
+    return Refinement(sizes, p, compliances[-1] + step, np.abs(step))
