@@ -1,0 +1,20 @@
+"""Effects: whatever a real machine has beyond the declared one. One kind is one file in `kinds`."""
+
+from stiffmap.effects.apply import add_effect, apply_records, place_text
+from stiffmap.effects.parse import effect_text, parse_effect
+from stiffmap.effects.registry import get, kinds
+from stiffmap.effects.types import EffectType, Option, Parameter, Placed
+
+__all__ = [
+    "EffectType",
+    "Option",
+    "Parameter",
+    "Placed",
+    "add_effect",
+    "apply_records",
+    "effect_text",
+    "get",
+    "kinds",
+    "parse_effect",
+    "place_text",
+]

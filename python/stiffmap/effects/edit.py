@@ -1,0 +1,82 @@
+"""Editing the sequences of a machine: pure functions on its description."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from stiffmap.description import Block, Element, MachineDescription, Offset, Pose
+
+Elements = tuple[Element, ...]
+Sites = Callable[[Elements], dict[str, tuple[int, ...]]]
+Edit = Callable[[Elements], Elements]
+Change = Callable[[Element], Elements]
+
+
+def sequences(elements: Elements) -> Iterator[Elements]:
+    """A sequence and those of the branches in it."""
+    yield elements
+    for element in elements:
+        if isinstance(element, Block):
+            for branch in element.branches:
+                yield from sequences(branch.elements)
+
+
+def edit_sequences(elements: Elements, edit: Edit) -> Elements:
+    """The sequence with ``edit`` applied to it and to those of the branches in it."""
+
+    def inside(element: Element) -> Element:
+        if not isinstance(element, Block):
+            return element
+        branches = tuple(replace(b, elements=edit_sequences(b.elements, edit)) for b in element.branches)
+        return replace(element, branches=branches)
+
+    return edit(tuple(inside(element) for element in elements))
+
+
+def edit_legs(description: MachineDescription, legs: tuple[str, ...], edit: Edit) -> MachineDescription:
+    """``edit`` on every sequence of the legs named; without legs on those of base and platform."""
+    if not legs:
+        base, platform = (edit_sequences(e, edit) for e in (description.base, description.platform))
+        return replace(description, base=base, platform=platform)
+    changed = tuple(
+        replace(leg, elements=edit_sequences(leg.elements, edit)) if leg.name in legs else leg
+        for leg in description.legs
+    )
+    return replace(description, legs=changed)
+
+
+def change_sites(
+    description: MachineDescription, legs: tuple[str, ...], element: str, sites: Sites, change: Change
+) -> MachineDescription:
+    """Each element that ``sites`` finds under the name becomes the elements that ``change`` gives."""
+
+    def edit(elements: Elements) -> Elements:
+        found = sites(elements).get(element, ())
+        out = elements
+        for i in reversed(found):
+            out = splice(out, i, change(elements[i]))
+        return out
+
+    return edit_legs(description, legs, edit)
+
+
+def splice(elements: Elements, i: int, piece: Elements) -> Elements:
+    """``piece`` in the place of element ``i``; what is new in it gets names that are free."""
+    out = list(elements[:i] + elements[i + 1 :])
+    for k, e in enumerate(piece):
+        kept = e.name == elements[i].name
+        out.insert(i + k, e if kept else replace(e, name=fresh(e.name, tuple(out) + (elements[i],))))
+    return tuple(out)
+
+
+def fresh(name: str, elements: Elements) -> str:
+    """``name``, with a number after it where the sequence has that name already."""
+    taken = {e.name for e in elements}
+    numbered = (f"{name}_{i}" for i in range(2, len(taken) + 3))
+    return name if name not in taken else next(n for n in numbered if n not in taken)
+
+
+def built(name: str, pose: Pose) -> Offset:
+    """An error of the machine as built: nothing to the controller, ``pose`` in truth."""
+    return Offset(name, Pose(), pose)

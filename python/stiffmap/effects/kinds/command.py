@@ -1,0 +1,23 @@
+"""What the errors of a commanded coordinate share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from stiffmap.description import CommandError, Element, Joint, MachineDescription
+from stiffmap.effects.edit import Elements, change_sites
+from stiffmap.effects.sites import drives
+from stiffmap.effects.types import Placed
+
+
+def add_command_error(
+    description: MachineDescription, placed: Placed, error: Callable[[float], CommandError]
+) -> MachineDescription:
+    """One more error on each drive of the place, computed from its home coordinate."""
+
+    def change(e: Element) -> Elements:
+        assert isinstance(e, Joint)
+        return (replace(e, command_errors=(*e.command_errors, error(e.home[0]))),)
+
+    return change_sites(description, placed.legs, placed.element, drives, change)

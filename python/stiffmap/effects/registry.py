@@ -1,0 +1,30 @@
+"""All kinds of effects that are known, by name."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from functools import cache
+
+from stiffmap.effects.types import EffectType
+from stiffmap.errors import StiffmapError
+
+
+@cache
+def _known() -> dict[str, EffectType]:
+    from stiffmap.effects.kinds import EFFECTS
+
+    return {effect.kind: effect for effect in EFFECTS}
+
+
+def kinds() -> tuple[str, ...]:
+    """Names of all kinds, those of the machine first, those of the measurement last."""
+    return tuple(_known())
+
+
+def get(kind: str) -> EffectType:
+    """The kind of that name; StiffmapError lists those that exist."""
+    if kind not in _known():
+        near = get_close_matches(str(kind), kinds(), 1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        raise StiffmapError(f"no effect {kind!r}{hint}; there are: {', '.join(kinds())}")
+    return _known()[kind]
