@@ -107,7 +107,7 @@ Index Mechanism::add_block(const Block& block, Index start, const std::string& p
   Index primary = -1;
   for (const auto& [branch, chain] : block.branches) {
     // A leg's elements are named after the leg alone: "x.foot", not "legs.x.foot".
-    const Index end = add_chain(chain, start, is_legs ? branch : join(name, branch), false);
+    const Index end = add_chain(chain, start, join(is_legs ? "" : prefix, branch), false);
     if (is_legs) legs.push_back(branch);
     if (primary < 0) primary = end;
     else loops.push_back({name, branch, primary, end, is_legs});
