@@ -1,0 +1,102 @@
+"""Prediction of every reading, solving each different (pose, wrench) once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stiffmap import effects
+from stiffmap.description import AppliedEffect
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.measurement import LOAD_SIDE, SENSOR_SIDE, readings, true_wrench
+from stiffmap.experiment.solving import motions
+from stiffmap.experiment.temperature import at_temperatures, uses_temperature
+from stiffmap.machine import Machine
+
+Terms = tuple[AppliedEffect, ...]
+
+
+class Predictor:
+    """Readings of one plan for any set of effects; remembers what it has solved.
+
+    machine
+        The declared machine; `terms` of a call come on top of the effects that it already has.
+    """
+
+    def __init__(self, machine: Machine, experiment: Experiment, *, threads: int | None = None) -> None:
+        check_points(machine, experiment)
+        self.machine, self.experiment, self.threads = machine, experiment, threads
+        self.solved = 0
+        self._memory: dict[tuple[Terms, Terms], Floats] = {}
+
+    def __call__(self, terms: Sequence[AppliedEffect] = ()) -> Floats:
+        """(n, 6) m, rad predicted readings; NaN where a pose fails."""
+        mechanical = tuple(t for t in terms if t.kind not in LOAD_SIDE + SENSOR_SIDE)
+        load = tuple(t for t in terms if t.kind in LOAD_SIDE)
+        key = (mechanical, load)
+        if key not in self._memory:
+            if len(self._memory) > 2000:
+                self._memory.clear()
+            self._memory[key] = self._motion(mechanical, load)
+        return readings(self.experiment, self._memory[key], [t for t in terms if t.kind in SENSOR_SIDE])
+
+    def with_terms(self, terms: Sequence[AppliedEffect]) -> Machine:
+        """The machine with the mechanical terms added."""
+        machine = self.machine
+        for t in terms:
+            if t.kind not in LOAD_SIDE + SENSOR_SIDE:
+                given = {**dict(t.parameters), **dict(t.options)}
+                machine = machine.with_effect(t.kind, element=t.element, legs=t.legs or None, **given)
+        return machine
+
+    def _motion(self, mechanical: Terms, load: Terms) -> Floats:
+        plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
+        if any(uses_temperature(t.kind) for t in mechanical):
+            return at_temperatures(plan, mechanical, self._branches)
+        return self._branches(plan, mechanical)
+
+    def _branches(self, plan: Experiment, terms: Terms) -> Floats:
+        if not any(_has_branch(t) for t in terms):
+            return self._solve(plan, terms)
+        out = np.full((len(plan), 6), np.nan)
+        branch = np.array(plan.branch or ("loading",) * len(plan))
+        branch = np.where(branch == "", "loading", branch)
+        for name in np.unique(branch):
+            here = np.flatnonzero(branch == name)
+            out[here] = self._solve(plan.rows(here), tuple(_on_branch(t, str(name)) for t in terms))
+        return out
+
+    def _solve(self, plan: Experiment, terms: Terms) -> Floats:
+        out, count = motions(self.with_terms(terms), plan, self.threads)
+        self.solved += count
+        return out
+
+
+def predict(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEffect] = ()) -> Floats:
+    """(n, 6) m, rad: what the instrument would show of a machine with `terms` added.
+
+    Raises StiffmapError for an unknown point or effect.
+    """
+    return Predictor(machine, experiment)(terms)
+
+
+def check_points(machine: Machine, experiment: Experiment) -> None:
+    """Raises StiffmapError where the experiment names a point that the machine does not have."""
+    for name in (experiment.point, experiment.load_point):
+        if name not in machine.points:
+            raise StiffmapError(
+                f"{experiment.name}: machine {machine.name} has no point '{name}'; it has {', '.join(machine.points)}"
+            )
+
+
+def _has_branch(term: AppliedEffect) -> bool:
+    return any(o.name == "branch" for o in effects.get(term.kind).options)
+
+
+def _on_branch(term: AppliedEffect, branch: str) -> AppliedEffect:
+    if not _has_branch(term):
+        return term
+    return replace(term, options=tuple({**dict(term.options), "branch": branch}.items()))

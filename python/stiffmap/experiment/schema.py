@@ -1,0 +1,66 @@
+"""The keys of ``experiment.yaml``; docs/diagnosis.md explains each."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from stiffmap.files.schema.base import FileModel
+
+Positive = Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False, strict=False)]
+
+
+class UnitsModel(FileModel):
+    """Units of data.csv, of the noise and of the frame; angle only where there are rotations."""
+
+    length: Literal["m", "cm", "mm", "um", "in"]
+    force: Literal["N", "kN", "MN"] | None = None
+    angle: Literal["rad", "deg"] | None = None
+
+
+class NoiseModel(FileModel):
+    """One standard deviation per reading axis, in the units of the file."""
+
+    dx: Positive | None = None
+    dy: Positive | None = None
+    dz: Positive | None = None
+    rx: Positive | None = None
+    ry: Positive | None = None
+    rz: Positive | None = None
+
+
+class LoopModel(FileModel):
+    """The metrology loop: what the instrument stands on, what carries the target, where the force reacts.
+
+    On or against the ``base`` its compliance closes inside the loop and cannot be seen; on the
+    ``floor`` it can. A target on the ``platform`` cannot see the tool holder, one on the ``tool`` can.
+    """
+
+    instrument_on: Literal["floor", "base"] = "floor"
+    target_on: Literal["tool", "platform"] = "tool"
+    force_against: Literal["floor", "base"] = "floor"
+
+
+class ExperimentFile(FileModel):
+    """One experiment."""
+
+    machine: str
+    quantity: Literal["deflection", "position"]
+    units: UnitsModel
+    title: str = ""
+    data: str = "data.csv"
+    point: str = "tcp"
+    load_point: str | None = None
+    axes: Literal["base"] = "base"
+    noise: NoiseModel = NoiseModel()
+    zero_noise: NoiseModel = NoiseModel()
+    unloaded: Literal["centre", "unknown"] = "centre"
+    frame: Literal["known", "offset_unknown", "unknown"] = "known"
+    load_frame: Literal["known", "unknown"] = "known"
+    gravity: Annotated[list[Finite], Field(min_length=3, max_length=3)] | None = None
+    reference_temperature: Finite | None = None
+    metrology: LoopModel = LoopModel()
+    columns: dict[str, str] = {}
+    notes: str = ""

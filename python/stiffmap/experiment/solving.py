@@ -1,0 +1,42 @@
+"""Motions of the reading point at every row of a plan."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.machine import Machine
+
+
+def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> tuple[Floats, int]:
+    """(n, 6) m, rad of every row, and how many equilibria were solved.
+
+    Deflection: the loaded minus the unloaded equilibrium of the same commanded pose.
+    """
+    motion, count = _unique(machine, plan, plan.wrench, threads)
+    if plan.quantity == "deflection" and _moves_unloaded(machine, plan):
+        rest, more = _unique(machine, plan, np.zeros_like(plan.wrench), threads)
+        return motion - rest, count + more
+    return motion, count
+
+
+def _moves_unloaded(machine: Machine, plan: Experiment) -> bool:
+    """A declared machine without load stays where it is commanded; one with effects may not."""
+    d = machine.description
+    return bool(d.effects or plan.gravity or d.gravity or d.external_springs)
+
+
+def _unique(machine: Machine, plan: Experiment, wrench: Floats, threads: int | None) -> tuple[Floats, int]:
+    key = np.hstack([plan.groups[:, None], wrench])
+    _, first, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    solution = machine.solve(
+        plan.position[first],
+        wrench[first],
+        rotation=None if plan.rotation is None else plan.rotation[first],
+        point=plan.load_point,
+        read_points=[plan.point],
+        gravity=plan.gravity,
+        threads=threads,
+    )
+    out = np.where(solution.ok[:, None], solution.readings[:, 1], np.nan)
+    return out[back.reshape(-1)], len(first)
