@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
     from stiffmap.link import identify_link
     from stiffmap.machine import Machine, load_machine
+    from stiffmap.maps import error_map, polar, sweep
     from stiffmap.solution import Solution
 
 try:
@@ -25,10 +26,13 @@ _HOME = {
     "Kinematics": "stiffmap.kinematics",
     "Machine": "stiffmap.machine",
     "Solution": "stiffmap.solution",
+    "error_map": "stiffmap.maps",
     "forward_kinematics": "stiffmap.kinematics",
     "identify_link": "stiffmap.link",
     "inverse_kinematics": "stiffmap.kinematics",
     "load_machine": "stiffmap.machine",
+    "polar": "stiffmap.maps",
+    "sweep": "stiffmap.maps",
 }
 
 __all__ = [
@@ -39,10 +43,13 @@ __all__ = [
     "Status",
     "StiffmapError",
     "__version__",
+    "error_map",
     "forward_kinematics",
     "identify_link",
     "inverse_kinematics",
     "load_machine",
+    "polar",
+    "sweep",
 ]
 
 

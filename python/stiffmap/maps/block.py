@@ -1,0 +1,60 @@
+"""One block of a map's rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from stiffmap.broadcasting import Floats
+from stiffmap.maps.extremes import find_extreme
+from stiffmap.maps.fan import Fan, even_fan
+from stiffmap.maps.limit import force_limit
+from stiffmap.maps.loading import without_failed
+from stiffmap.maps.plan import MapPlan
+from stiffmap.maps.sums import norm
+
+ALL = (0, 1, 2)
+
+
+def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
+    """Every variable of some rows, shaped (poses, ...)."""
+    position = plan.positions(rows)
+    out = _loads(plan, position)
+    if plan.turning:
+        fan = even_fan(plan.loading, position, plan.force, plan.axes, plan.directions)
+        out["direction_status"] = fan.status.max(axis=1)
+        for suffix, parts in (("", ALL), (f"_{plan.shown_plane}", plan.axes)):
+            out |= _extremes(plan, position, fan, parts, suffix)
+    return out
+
+
+def _loads(plan: MapPlan, position: Floats) -> dict[str, Any]:
+    s = plan.loading.solve(position[:, None], plan.wrenches)
+    d = without_failed(s.displacement, s.status)
+    out: dict[str, Any] = {
+        "displacement": d,
+        "deflection": norm(d[..., :3]),
+        f"deflection_{plan.shown_plane}": norm(d[..., plan.axes]),
+        "status": s.status,
+        "flags": s.flags,
+    }
+    if plan.compliance:
+        out["compliance"] = without_failed(s.compliance, s.status)
+    return out
+
+
+def _extremes(
+    plan: MapPlan, position: Floats, fan: Fan, parts: tuple[int, ...], suffix: str
+) -> dict[str, Floats]:
+    worst, best = (
+        find_extreme(plan.loading, position, plan.force, plan.axes, fan, parts, sign) for sign in (1, -1)
+    )
+    limit = force_limit(plan.loading, position, plan.force, plan.axes, worst, parts, plan.tolerance)
+    return {
+        f"worst_deflection{suffix}": worst.value,
+        f"worst_direction{suffix}": worst.angle,
+        f"best_deflection{suffix}": best.value,
+        f"best_direction{suffix}": best.angle,
+        f"force_limit{suffix}": np.where(np.isnan(worst.value), np.nan, limit),
+    }

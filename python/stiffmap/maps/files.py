@@ -1,0 +1,62 @@
+"""Maps on the disk: NetCDF, or Zarr where the name ends in .zarr."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import xarray as xr
+
+from stiffmap.errors import FileError, MissingPartError
+
+
+def is_zarr(path: Path) -> bool:
+    """Whether a name asks for Zarr."""
+    return path.suffix == ".zarr"
+
+
+def write_dataset(ds: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write a Dataset; what was at `path` is replaced only when the new file is complete.
+
+    Raises FileError where `path` cannot be written.
+    """
+    target = Path(path)
+    fresh = target.with_name(f"{target.name}.writing")
+    try:
+        _write(ds, fresh, is_zarr(target))
+        if target.is_dir() and is_zarr(target):
+            shutil.rmtree(target)
+        os.replace(fresh, target)
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror or error}", file=str(target)) from error
+    return target
+
+
+def _write(ds: xr.Dataset, path: Path, zarr: bool) -> None:
+    if not zarr:
+        ds.to_netcdf(path, engine="netcdf4")
+        return
+    try:
+        # Format 2, since strings have no agreed form in format 3 yet.
+        ds.to_zarr(path, mode="w", zarr_format=2)
+    except ImportError as error:
+        raise MissingPartError("writing Zarr needs the package zarr: pip install 'stiffmap[zarr]'") from error
+
+
+def read_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Open a written Dataset; values are read when they are used."""
+    target = Path(path)
+    return xr.open_zarr(target) if is_zarr(target) else xr.open_dataset(target, engine="netcdf4")
+
+
+def partial_folder(path: Path) -> Path:
+    """Folder beside `path` in which an unfinished map grows; made where it is missing."""
+    folder = path.with_name(f"{path.name}.partial")
+    if path.is_dir() and not is_zarr(path):
+        raise FileError("cannot be written: it is a folder", file=str(path))
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
+    return folder

@@ -1,0 +1,118 @@
+"""What a map consists of, before anything is solved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiffmap.broadcasting import Floats
+from stiffmap.maps.inputs import plane_axes
+from stiffmap.maps.loading import Loading
+from stiffmap.maps.provenance import describe
+from stiffmap.maps.variables import COMPONENTS, WRENCH, Variable, extreme_variables, load_variables, meaning
+
+EXTREMES = (
+    "loaded equilibria in {} directions and at the extremum of the trigonometric polynomial through "
+    "their values and slopes; the most extreme one is reported"
+)
+
+
+@dataclass(frozen=True)
+class MapPlan:
+    """Grid, loads and options of one map."""
+
+    loading: Loading
+    x: Floats
+    y: Floats
+    z: Floats
+    wrenches: Floats
+    """(cases, 6)."""
+    cases: tuple[str, ...] | None
+    """None: a single wrench without a name, the map has no case axis."""
+    shown_plane: str
+    turning: bool
+    """Whether the force is turned in the plane."""
+    force: float
+    directions: int
+    tolerance: float
+    compliance: bool
+
+    @property
+    def axes(self) -> tuple[int, int]:
+        """Base axes of the plane."""
+        return plane_axes(self.shown_plane)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(z, y, x)."""
+        return (self.z.size, self.y.size, self.x.size)
+
+    @property
+    def rows(self) -> int:
+        """Rows of the grid, each of all x at one z and y."""
+        return self.z.size * self.y.size
+
+    def positions(self, rows: slice) -> Floats:
+        """TCP positions (rows * x, 3) of some rows."""
+        z, y, x = np.meshgrid(self.z, self.y, self.x, indexing="ij")
+        grid = np.stack([x, y, z], axis=-1).reshape(self.rows, self.x.size, 3)
+        return np.ascontiguousarray(grid[rows].reshape(-1, 3))
+
+    @cached_property
+    def variables(self) -> list[Variable]:
+        """The variables that the map will hold."""
+        case = () if self.cases is None else ("case",)
+        out = load_variables(case, self.shown_plane, self.compliance)
+        return out + (extreme_variables(self.shown_plane, self.tolerance) if self.turning else [])
+
+    @cached_property
+    def coords(self) -> dict[str, Any]:
+        """Coordinates of the Dataset."""
+        out: dict[str, Any] = {
+            n: (n, getattr(self, n), meaning("m", f"commanded tcp, base {n} axis")) for n in ("z", "y", "x")
+        }
+        out["component"] = ("component", np.array(COMPONENTS))
+        out["wrench_component"] = ("wrench_component", np.array(WRENCH))
+        dims: tuple[str, ...] = ("wrench_component",)
+        if self.cases is not None:
+            out["case"], dims = ("case", np.array(self.cases)), ("case", *dims)
+        w = self.wrenches.reshape([out[d][1].size for d in dims])
+        out["wrench"] = (dims, w, meaning("N (fx, fy, fz), N m (mx, my, mz)", "external wrench"))
+        return out
+
+    @cached_property
+    def attrs(self) -> dict[str, Any]:
+        """Attributes of the Dataset."""
+        call = {n: getattr(self, n) for n in ("x", "y", "z", "compliance")}
+        call |= {"function": "error_map", "wrench": self.wrenches, "cases": self.cases}
+        call |= {"plane": self.shown_plane if self.turning else None, "tolerance": self.tolerance}
+        if not self.turning:
+            return describe(self.loading, "error map", call)
+        call |= {"force": self.force, "directions": self.directions}
+        out = describe(self.loading, "error map", call)
+        return out | {
+            "turning_force_N": self.force,
+            "turning_force": f"pure forces in the {self.shown_plane} plane at the reference point",
+            "extremes_method": EXTREMES.format(self.directions),
+            "force_limit_method": "Newton's method on loaded equilibria in the worst direction",
+        }
+
+    def dims(self, v: Variable) -> tuple[str, ...]:
+        """All dimensions of a variable."""
+        return ("z", "y", "x", *v.dims)
+
+    def tail(self, v: Variable) -> tuple[int, ...]:
+        """Lengths of a variable's own dimensions."""
+        return tuple(self.coords[d][1].size for d in v.dims)
+
+    def dataset(self, arrays: dict[str, Any]) -> xr.Dataset:
+        """Label arrays of shape (rows, x, ...)."""
+        data = {
+            v.name: (self.dims(v), arrays[v.name].reshape(self.shape + self.tail(v)), v.attrs)
+            for v in self.variables
+        }
+        return xr.Dataset(data, self.coords, self.attrs)

@@ -1,0 +1,60 @@
+"""What a result says about itself."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Any
+
+import numpy as np
+
+from stiffmap.machine import Machine
+from stiffmap.maps.loading import Loading
+
+
+def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, Any]:
+    """Attributes of a Dataset: conventions, machine, version and the call that made it.
+
+    The call leaves out what cannot change the numbers: threads, chunks, output path, time of day.
+    """
+    import stiffmap
+
+    machine = loading.machine
+    return {
+        "title": f"{title}: {machine.name}",
+        "machine": machine.name,
+        "machine_title": machine.description.title,
+        "machine_digest": digest(machine),
+        "effects": json.dumps([plain_effect(e) for e in machine.description.effects]),
+        "stiffmap_version": stiffmap.__version__,
+        "call": json.dumps(plain(call) | loading.options(), ensure_ascii=False),
+        "units": "SI: m, rad, N, N m",
+        "axes": "base axes of the machine, right-handed; positions are those of the commanded tcp",
+        "reference_point": loading.point,
+        "wrench_order": "fx fy fz mx my mz, acting on the machine at the reference point",
+        "displacement_order": "dx dy dz rx ry rz, against the commanded pose; rotation vector, base axes",
+        "load_type": loading.load_type,
+        "gravity": json.dumps(loading.acting_gravity()),
+        "failed_poses": "NaN, with their status",
+    }
+
+
+def digest(machine: Machine) -> str:
+    """Fingerprint of everything that a machine is made of."""
+    return hashlib.sha256(repr(machine.description).encode()).hexdigest()[:16]
+
+
+def plain(call: dict[str, Any]) -> dict[str, Any]:
+    """Arguments as plain data."""
+    return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in call.items()}
+
+
+def plain_effect(effect: Any) -> dict[str, Any]:
+    """An applied effect as plain data."""
+    return {
+        "kind": effect.kind,
+        "element": effect.element,
+        "legs": list(effect.legs),
+        "parameters": dict(effect.parameters),
+        "options": dict(effect.options),
+    }

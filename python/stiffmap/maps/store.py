@@ -1,0 +1,76 @@
+"""Where a map grows: in memory, or in a folder of plain arrays that an interrupted run leaves behind."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib.format import open_memmap
+from numpy.typing import NDArray
+
+from stiffmap.errors import StiffmapError
+from stiffmap.maps.plan import MapPlan
+
+FILL = {"u1": 255, "u4": 0, "f8": np.nan}
+
+
+class Store:
+    """Arrays (rows, x, ...) of all variables, and which rows are done."""
+
+    def __init__(self, arrays: dict[str, Any], done: NDArray[np.bool_]) -> None:
+        self.arrays, self.done = arrays, done
+
+    def put(self, rows: slice, block: dict[str, Any]) -> None:
+        """Keep a block; its rows count as done once they are on the disk."""
+        for name, values in block.items():
+            target = self.arrays[name][rows]
+            target[...] = values.reshape(target.shape)
+        for array in self.arrays.values():
+            flush(array)
+        self.done[rows] = True
+        flush(self.done)
+
+
+def flush(array: Any) -> None:
+    """Write a mapped array back; plain ones have nothing to write."""
+    if isinstance(array, np.memmap):
+        array.flush()
+
+
+def memory_store(plan: MapPlan) -> Store:
+    """A map that lives in memory."""
+    arrays = {
+        v.name: np.full((plan.rows, plan.x.size, *plan.tail(v)), FILL[v.dtype], v.dtype)
+        for v in plan.variables
+    }
+    return Store(arrays, np.zeros(plan.rows, dtype=bool))
+
+
+def folder_store(plan: MapPlan, folder: Path, resume: bool) -> Store:
+    """A map that lives in a folder; taken up again where an earlier run of the same call left it."""
+    key = json.dumps(plan.attrs, sort_keys=True, default=lambda v: v.tolist())
+    if not (resume and (folder / "key.json").exists()):
+        return _new(plan, folder, key)
+    if (folder / "key.json").read_text(encoding="utf-8") != key:
+        raise StiffmapError(f"{folder}: holds part of another map (another machine, grid, load or option, "
+                            "or another version of stiffmap); delete it, or choose another file")  # fmt: skip
+    return _mapped(plan, folder, "r+")
+
+
+def _new(plan: MapPlan, folder: Path, key: str) -> Store:
+    (folder / "key.json").unlink(missing_ok=True)
+    store = _mapped(plan, folder, "w+")
+    (folder / "key.json").write_text(key, encoding="utf-8")
+    return store
+
+
+def _mapped(plan: MapPlan, folder: Path, mode: Any) -> Store:
+    def array(name: str, dtype: str, shape: tuple[int, ...]) -> Any:
+        if mode == "w+":
+            return open_memmap(folder / f"{name}.npy", mode, np.dtype(dtype), shape)
+        return open_memmap(folder / f"{name}.npy", mode)
+
+    arrays = {v.name: array(v.name, v.dtype, (plan.rows, plan.x.size, *plan.tail(v))) for v in plan.variables}
+    return Store(arrays, array("done", "?", (plan.rows,)))

@@ -1,0 +1,73 @@
+"""`stiffmap.sweep`."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from stiffmap.machine import Machine
+from stiffmap.maps.inputs import force_list, place, unit
+from stiffmap.maps.loading import Loading, without_failed
+from stiffmap.maps.provenance import describe
+from stiffmap.maps.sums import dot, norm
+from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
+
+
+def sweep(
+    machine: Machine,
+    position: ArrayLike,
+    direction: ArrayLike,
+    forces: ArrayLike,
+    *,
+    point: str = "tcp",
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    load_type: str = "dead",
+    method: str = "fast",
+    load_steps: int | str = "auto",
+    threads: int | None = None,
+) -> xr.Dataset:
+    """Deflection against the size of a force of one direction, at one position.
+
+    position (3,) m; direction (3,), any length; forces (n,) N, negative ones act against it. Each
+    force is reached from the unloaded machine. Other options as in `Machine.solve`.
+
+    Returns a Dataset with dimension ``force``: displacement, deflection, deflection_xy,
+    deflection_along (component along the force), compliance_along (of a little more force, m/N),
+    status, flags. Unstable equilibria keep their values (status 3); unreachable and not converged
+    ones hold NaN. Raises StiffmapError for bad input.
+    """
+    loading = Loading(machine, point, rotation, gravity, load_type, method, load_steps, threads)
+    p, u, f = place(position), unit(direction), force_list(forces)
+    wrench = np.concatenate([f[:, None] * u, np.zeros((f.size, 3))], axis=1)
+    s = loading.solve(p, wrench)
+    d = without_failed(s.displacement, s.status, keep_unstable=True)
+    c = without_failed(s.compliance, s.status, keep_unstable=True)
+    along = dot(dot(c[:, :3, :3], u), u)
+    data = {
+        "displacement": (
+            ("force", "component"),
+            d,
+            meaning(TWIST_UNITS, "displacement of the reference point"),
+        ),
+        "deflection": ("force", norm(d[:, :3]), meaning("m", "norm of the translation")),
+        "deflection_xy": ("force", norm(d[:, :2]), meaning("m", "norm of the translation in the xy plane")),
+        "deflection_along": ("force", dot(d[:, :3], u), meaning("m", "translation along the force")),
+        "compliance_along": ("force", along, meaning("m/N", "loaded compliance along the force")),
+        "status": ("force", s.status, status_attrs("the equilibrium")),
+        "flags": ("force", s.flags, flag_attrs()),
+    }
+    xyz = np.array(["x", "y", "z"])
+    coords = {
+        "force": ("force", f, meaning("N", "magnitude of the force")),
+        "component": ("component", np.array(COMPONENTS)),
+        "axis": ("axis", xyz),
+        "position": ("axis", p, meaning("m", "commanded tcp")),
+        "direction": ("axis", u, meaning("1", "direction of the force, base axes")),
+    }
+    call = {"function": "sweep", "position": p, "direction": u, "forces": f}
+    attrs = describe(loading, "force sweep", call) | {
+        "failed_poses": "NaN, with their status; unstable ones kept"
+    }
+    return xr.Dataset(data, coords, attrs)

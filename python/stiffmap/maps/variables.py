@@ -1,0 +1,81 @@
+"""The variables of a map: dimensions, types, units, meaning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stiffmap.status import Flag, Status
+
+COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+TWIST_UNITS = "m (dx, dy, dz), rad (rx, ry, rz)"
+COMPLIANCE_UNITS = "m/N, m/(N m), rad/N, rad/(N m): component per wrench_component"
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Name, dimensions after those of the grid, type and attributes of one variable."""
+
+    name: str
+    dims: tuple[str, ...]
+    attrs: dict[str, Any]
+    dtype: str = "f8"
+
+
+def meaning(units: str, long_name: str, **more: Any) -> dict[str, Any]:
+    """Attributes of a variable."""
+    return {"units": units, "long_name": long_name, **more}
+
+
+def status_attrs(of: str) -> dict[str, Any]:
+    """Attributes of a variable of `Status` codes."""
+    return meaning(
+        "1",
+        f"status of {of}",
+        flag_values=np.array([int(s) for s in Status], dtype=np.uint8),
+        flag_meanings=" ".join(s.name for s in Status),
+    )
+
+
+def flag_attrs() -> dict[str, Any]:
+    """Attributes of a variable of `Flag` bits."""
+    return meaning(
+        "1",
+        "bits beside the status",
+        flag_masks=np.array([int(f) for f in Flag], dtype=np.uint32),
+        flag_meanings=" ".join(str(f.name) for f in Flag),
+    )
+
+
+def load_variables(case: tuple[str, ...], plane: str, compliance: bool) -> list[Variable]:
+    """Variables that each load case has."""
+    out = [
+        Variable(
+            "displacement", (*case, "component"), meaning(TWIST_UNITS, "displacement of the reference point")
+        ),
+        Variable("deflection", case, meaning("m", "norm of the translation")),
+        Variable(f"deflection_{plane}", case, meaning("m", f"norm of the translation in the {plane} plane")),
+        Variable("status", case, status_attrs("the pose under its load"), "u1"),
+        Variable("flags", case, flag_attrs(), "u4"),
+    ]
+    if compliance:
+        dims = (*case, "component", "wrench_component")
+        out.append(Variable("compliance", dims, meaning(COMPLIANCE_UNITS, "loaded compliance")))
+    return out
+
+
+def extreme_variables(plane: str, tolerance: float) -> list[Variable]:
+    """Variables over the force directions of a plane; the suffix says which components count."""
+    out = [Variable("direction_status", (), status_attrs("the worst of all force directions solved"), "u1")]
+    angle = f"direction of that force, from {plane[0]} towards {plane[1]}"
+    for suffix, what in (("", "translation"), (f"_{plane}", f"translation in the {plane} plane")):
+        for word, size in (("worst", "largest"), ("best", "smallest")):
+            text = f"{size} norm of the {what} over the force directions of the {plane} plane"
+            out.append(Variable(f"{word}_deflection{suffix}", (), meaning("m", text)))
+            out.append(Variable(f"{word}_direction{suffix}", (), meaning("rad", angle)))
+        text = f"force in the worst direction at which the norm of the {what} reaches the tolerance"
+        out.append(Variable(f"force_limit{suffix}", (), meaning("N", text, tolerance_m=tolerance)))
+    return out
