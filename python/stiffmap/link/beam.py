@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stiffmap.link.arrays import Floats
+from stiffmap.link.transport import twist_transport
 
 
 class Section(NamedTuple):
@@ -44,3 +45,45 @@ def cantilever(section: Section, length: float, young: float, shear: float) -> F
     C[2, 2], C[4, 4], C[2, 4] = L**3 / (3 * EIy), L / EIy, -(L**2) / (2 * EIy)
     C[5, 1], C[4, 2] = C[1, 5], C[2, 4]
     return C
+
+
+def fork(length: float, prong: float, height: float, gap: float, young: float, shear: float) -> Floats:
+    """(6, 6) compliance over two parallel prongs along x, ``gap`` apart along y, joined at both ends.
+
+    Each prong is a cantilever; their stiffnesses add at the middle of the joined end.
+    """
+    K = np.zeros((6, 6))
+    one = np.linalg.inv(cantilever(rectangle(prong, height), length, young, shear))
+    for side in (-1.0, 1.0):
+        T = twist_transport(np.array([0.0, side * (gap + prong) / 2, 0.0]))
+        K += T.T @ one @ T
+    return np.asarray(np.linalg.inv(K))
+
+
+def series(parts: list[tuple[Floats, float]]) -> Floats:
+    """(6, 6) compliance at the end of parts in a row, each with its length in m along x."""
+    C, rest = np.zeros((6, 6)), 0.0
+    for part, length in reversed(parts):
+        T = twist_transport(np.array([rest, 0.0, 0.0]))
+        C += T @ part @ T.T
+        rest += length
+    return C
+
+
+def fork_bar(
+    length: float,
+    width: float,
+    height: float,
+    wall: float,
+    arm: float,
+    prong: float,
+    gap: float,
+    young: float,
+    shear: float,
+) -> Floats:
+    """(6, 6) compliance between the pins of a tube with a fork of length ``arm`` at both ends: beams only."""
+    end = fork(arm, prong, height, gap, young, shear)
+    middle = length - 2 * arm
+    return series(
+        [(end, arm), (cantilever(tube(width, height, wall), middle, young, shear), middle), (end, arm)]
+    )

@@ -133,6 +133,7 @@ def _factorised(K: Any) -> Any:
 
     def solve(f: Floats) -> Floats:
         u = lu.solve(np.ascontiguousarray(f))
+        u = u + lu.solve(np.ascontiguousarray(f - K @ u))  # one refinement: a slender part is ill-conditioned
         left = float(np.abs(K @ u - f).max() / max(float(np.abs(f).max()), 1e-300))
         if not np.isfinite(left) or left > RESIDUAL:
             raise StiffmapError(

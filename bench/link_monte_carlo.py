@@ -1,0 +1,66 @@
+"""Monte Carlo of the link identification under independent noise: the numbers behind docs/link.md §5.
+
+python bench/link_monte_carlo.py [--runs 4000]
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+
+from stiffmap.link import identify_link
+from stiffmap.link.zeros import miss_probability
+
+L, EIZ, EIY, EA, GJ = 0.31, 43.0, 205.0, 6.8e6, 10.8
+REFERENCE = np.array([L, 0.0, 0.0])
+WRENCHES = np.diag([1000.0, 10.0, 10.0, 1.0, 1.0, 1.0])
+
+
+def main() -> None:
+    """Print variance of the z-scores, coverage, and both error rates of the zero test."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=4000)
+    parser.add_argument("--seed", type=int, default=2024)
+    arguments = parser.parse_args()
+    runs, rng = arguments.runs, np.random.default_rng(arguments.seed)
+    C = np.diag([L / EA, L**3 / (3 * EIZ), L**3 / (3 * EIY), L / GJ, L / EIY, L / EIZ])
+    C[1, 5] = C[5, 1] = L**2 / (2 * EIZ)
+    C[2, 4] = C[4, 2] = -(L**2) / (2 * EIY)
+    points = np.array([0.3, 0, 0]) + rng.uniform(-1, 1, (24, 3)) * [0.01, 0.012, 0.02]
+    noise = 2e-8
+    error = identify_link(
+        points, _field(C, points), WRENCHES, reference=REFERENCE, noise=noise
+    ).standard_error
+    small = C.copy()
+    small[0, 1] = small[1, 0] = 3 * error[0, 1]  # one entry of three standard errors: how often is it missed
+    clean = _field(small, points)
+    z, covered, wrong, missed = [], [], 0, 0
+    for _ in range(runs):
+        u = clean + noise * rng.standard_normal(clean.shape)
+        link = identify_link(points, u, WRENCHES, reference=REFERENCE, noise="independent", outliers=False)
+        z.append((link.compliance - small) / link.standard_error)
+        interval = link.interval()
+        covered.append((interval[..., 0] <= small) & (small <= interval[..., 1]))
+        wrong += bool(np.any(~link.insignificant & (small == 0)))
+        missed += bool(link.insignificant[0, 1])
+    variance = np.var(z, axis=0)[np.triu_indices(6)]
+    coverage = np.mean(covered, axis=0)[np.triu_indices(6)]
+    predicted = float(miss_probability(3.0, 1.0, 6 * (3 * 24 - 6), 0.05, 21))
+    print(f"{runs} runs, 24 nodes, 6 cases")
+    print(f"variance of the z-scores of 21 entries: {variance.min():.3f} to {variance.max():.3f} (1)")
+    print(
+        f"coverage of 95 %: {coverage.min():.4f} to {coverage.max():.4f}, mean {coverage.mean():.4f}"
+    )
+    print(
+        f"a true zero taken for non-zero, per matrix: {wrong / runs:.4f} (at most 0.0286)"
+    )
+    print(f"an entry of 3 standard errors called zero: {missed / runs:.4f} (predicted {predicted:.4f})")
+
+
+def _field(C: np.ndarray, points: np.ndarray) -> np.ndarray:
+    return np.array([x[:3] + np.cross(x[3:], points - REFERENCE) for x in WRENCHES @ C.T])
+
+
+if __name__ == "__main__":
+    main()
