@@ -37,21 +37,31 @@ void add_wrench(const Mechanism& mech, const PointWrench& w, Linearization& out)
   }
 }
 
+/// Adds to H what a moment does that changes by D w when its body turns by w.
+void add_turning_moment(const Mechanism& m, Index node, const Mat3& D, Linearization& out) {
+  const auto revolute = [&](Index j) { return m.coordinates[at(j)].type == JointType::revolute; };
+  for (Index b : m.path[at(node)])
+    for (Index a : m.path[at(node)])
+      if (revolute(a) && revolute(b)) out.H(b, a) += out.frames.axis.col(b).dot(D * out.frames.axis.col(a));
+}
+
+/// Derivative of a semitangential moment m with respect to the rotation of its body: theory (E6).
+Mat3 semitangential_derivative(const Vec3& m, const Mat3& R) {
+  const Vec3 trace(R(1, 2) - R(2, 1), R(2, 0) - R(0, 2), R(0, 1) - R(1, 0));  // d tr(R) = trace . w
+  return 0.5 * (m * trace.transpose() - R.transpose() * skew(m));
+}
+
 void add_loads(const Mechanism& m, const Problem& p, Linearization& out) {
   for (std::size_t i = 0; i < p.load_points.size(); ++i) {
-    const LoadPoint& at_point = p.load_points[i];
-    const Pose& T = out.frames.at(at_point.node);
-    PointWrench w{at_point.node, T * at_point.offset, p.factor * p.wrenches[i].head<3>(),
-                  p.factor * p.wrenches[i].tail<3>()};
-    if (at_point.type == LoadType::follower) {
-      w.f = T.R * w.f;
-      w.m = T.R * w.m;
-      w.turn_force = w.turn_moment = 1;
-    } else if (at_point.type == LoadType::semitangential) {
-      w.turn_moment = 0.5;
-    }
-    if (w.f.isZero(0) && w.m.isZero(0)) continue;
-    add_wrench(m, w, out);
+    if (p.wrenches[i].isZero(0)) continue;
+    const LoadPoint& load = p.load_points[i];
+    const Pose& T = out.frames.at(load.node);
+    const Vec6 now = p.factor * p.wrench_at(i, T.R);
+    const double follows = load.type == LoadType::follower ? 1 : 0;
+    add_wrench(m, {load.node, T * load.offset, now.head<3>(), now.tail<3>(), follows, follows}, out);
+    if (load.type == LoadType::semitangential)
+      add_turning_moment(m, load.node, semitangential_derivative(p.factor * p.wrenches[i].tail<3>(), p.turn(i, T.R)),
+                         out);
   }
   if (!p.gravity.isZero(0))
     for (const NodeBody& b : m.bodies)
@@ -135,6 +145,20 @@ bool Problem::has_dead_moment() const {
     if (load_points[i].type == LoadType::dead && !wrenches[i].tail<3>().isZero(0)) return true;
   }
   return false;
+}
+
+Mat3 Problem::turn(std::size_t i, const Mat3& R) const {
+  return i < load_frames.size() ? Mat3(R * load_frames[i].transpose()) : R;
+}
+
+Vec6 Problem::wrench_at(std::size_t i, const Mat3& R) const {
+  const LoadType type = load_points[i].type;
+  Vec6 w = wrenches[i];
+  if (type == LoadType::dead) return w;
+  const Mat3 by = turn(i, R);
+  if (type == LoadType::follower) w << by * w.head<3>(), by * w.tail<3>();
+  else w.tail<3>() = 0.5 * (by.trace() * w.tail<3>() - by.transpose() * w.tail<3>());
+  return w;
 }
 
 Linearization::Linearization(const Mechanism& m)

@@ -50,8 +50,8 @@ void leg_wrenches(const Mechanism& m, const PoseInput& in, const SolveWorkspace&
   for (std::size_t i = 0; i < in.load_points.size(); ++i) {
     const LoadPoint& l = in.load_points[i];
     if (!m.beyond_legs[at(l.node)]) continue;
-    const Mat3 turn = l.type == LoadType::follower ? f.at(l.node).R : Mat3::Identity();
-    add(left, turn * in.wrenches[i].head<3>(), turn * in.wrenches[i].tail<3>(), f.point(l.node, l.offset), -1);
+    const Vec6 w = ws.problem.wrench_at(i, f.at(l.node).R);
+    add(left, w.head<3>(), w.tail<3>(), f.point(l.node, l.offset), -1);
   }
   for (const NodeBody& b : m.bodies)
     if (m.beyond_legs[at(b.node)]) add(left, b.mass * in.gravity, Vec3::Zero(), f.point(b.node, b.com), -1);
@@ -245,6 +245,8 @@ void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& opt
   ws.problem.gravity = in.gravity;
   ws.problem.load_points = in.load_points;
   ws.problem.wrenches = in.wrenches;
+  ws.problem.load_frames.clear();
+  for (const LoadPoint& l : in.load_points) ws.problem.load_frames.push_back(ws.nominal.at(l.node).R);
   if (!examine_unloaded(m, in, ws, out)) return;
 
   const EquilibriumResult eq = solve_equilibrium(m, ws.problem, options.equilibrium, ws.equilibrium, ws.state);

@@ -18,9 +18,14 @@ struct Problem {
   Vec3 gravity = Vec3::Zero();
   std::vector<LoadPoint> load_points;
   std::vector<Vec6> wrenches;
-  double factor = 1;         ///< of wrenches and gravity: the load step
-  bool secant_laws = false;  ///< take every law as linear: the first iteration of a cold start
+  std::vector<Mat3> load_frames;  ///< per load point: its body at the command; where missing: base axes
+  double factor = 1;              ///< of wrenches and gravity: the load step
+  bool secant_laws = false;       ///< take every law as linear: the first iteration of a cold start
   bool has_dead_moment() const;
+  /// Rotation since the command of the body of load i, which is now at R.
+  Mat3 turn(std::size_t i, const Mat3& R) const;
+  /// Wrench i (base axes, full load) as it acts on its body, which is now at R.
+  Vec6 wrench_at(std::size_t i, const Mat3& R) const;
 };
 
 /// Unknowns: law parameters or plain coordinates z, and the wrenches of the loops.

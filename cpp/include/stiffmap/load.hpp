@@ -8,8 +8,9 @@
 
 namespace stiffmap {
 
-/// How a wrench follows the body that it acts on (theory E6): dead keeps its base axes, follower
-/// turns with the body, semitangential takes half of the moment's rotation (forces stay dead).
+/// How a wrench follows the rotation R of its body since the command (theory E6): dead keeps its base
+/// axes, follower becomes R F; semitangential keeps the force and has the conservative moment
+/// (tr(R) I - R^T) m / 2, which takes half of a small rotation.
 enum class LoadType : std::uint8_t { dead, follower, semitangential };
 
 /// Where a wrench acts: a point fixed in the frame of a node.
