@@ -49,12 +49,8 @@ def main() -> None:
     predicted = float(miss_probability(3.0, 1.0, 6 * (3 * 24 - 6), 0.05, 21))
     print(f"{runs} runs, 24 nodes, 6 cases")
     print(f"variance of the z-scores of 21 entries: {variance.min():.3f} to {variance.max():.3f} (1)")
-    print(
-        f"coverage of 95 %: {coverage.min():.4f} to {coverage.max():.4f}, mean {coverage.mean():.4f}"
-    )
-    print(
-        f"a true zero taken for non-zero, per matrix: {wrong / runs:.4f} (at most 0.0286)"
-    )
+    print(f"coverage of 95 %: {coverage.min():.4f} to {coverage.max():.4f}, mean {coverage.mean():.4f}")
+    print(f"a true zero taken for non-zero, per matrix: {wrong / runs:.4f} (at most 0.0286)")
     print(f"an entry of 3 standard errors called zero: {missed / runs:.4f} (predicted {predicted:.4f})")
 
 

@@ -138,6 +138,7 @@ def main() -> None:
     for name, (length, _) in TABLE.items():
         for weight in arguments.weights:
             design, _ = nearest(name, material, weight, arguments.evaluations)
+            print(f"\n{name}, weight {weight:g}: {design}", flush=True)
             # Finer than in the search, so that two coarser meshes exist for the mesh's share.
             part = solve(design, length, material, study=True, size=0.6 * design.shape(length).default_size())
             words = ", ".join(f"{k} {1e3 * v:.2f}" for k, v in design._asdict().items())

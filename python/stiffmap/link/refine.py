@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Floats
 
-PLAUSIBLE = (0.5, 5.0)  # an order outside is not believed; the error is then the whole spread
+PLAUSIBLE = (0.5, 5.0)  # an order outside is not believed; order one is then assumed
 
 
 class Refinement(NamedTuple):
@@ -44,21 +44,19 @@ def richardson(sizes: Floats, compliances: Floats) -> Refinement:
     """Extrapolate compliances (m, 6, 6) over meshes of these sizes (m,) m, coarse to fine.
 
     One order is taken from the trace scaled by the finest diagonal, since single small entries are
-    not monotone. The error is the extrapolated step; where the order is not plausible, three times
-    the change between the two finest meshes.
+    not monotone. The error is the extrapolated step; with two meshes only, or where the order is not
+    plausible, the step that order one would give, and no extrapolation.
 
     Raises:
-        StiffmapError: fewer than three meshes, or sizes that do not fall.
+        StiffmapError: fewer than two meshes, or sizes that do not fall.
     """
-    if len(sizes) < 3 or np.any(np.diff(sizes) >= 0):
-        raise StiffmapError(
-            f"refinement: expected at least three falling mesh sizes, got {np.asarray(sizes)}"
-        )
+    if len(sizes) < 2 or np.any(np.diff(sizes) >= 0):
+        raise StiffmapError(f"refinement: expected at least two falling mesh sizes, got {np.asarray(sizes)}")
     scale = np.diag(compliances[-1])
     trace = np.array([np.sum(np.diag(C) / scale) for C in compliances])
-    p = observed_order(sizes, trace)
+    p = observed_order(sizes, trace) if len(sizes) > 2 else float("nan")
     change = compliances[-1] - compliances[-2]
     if not PLAUSIBLE[0] <= p <= PLAUSIBLE[1]:
-        return Refinement(sizes, p, compliances[-1], 3 * np.abs(change))
+        return Refinement(sizes, p, compliances[-1], np.abs(change) / (sizes[-2] / sizes[-1] - 1))
     step = change / ((sizes[-2] / sizes[-1]) ** p - 1)
     return Refinement(sizes, p, compliances[-1] + step, np.abs(step))

@@ -122,8 +122,11 @@ def test_refinement_recovers_order_and_limit():
     assert found.estimate == pytest.approx(C0, abs=1e-9)
     assert found.error == pytest.approx(0.01 * D * 0.5**1.7, rel=1e-6)
     assert np.isnan(observed_order(sizes, np.array([1.0, 0.9, 1.1, 1.0])))
-    with pytest.raises(StiffmapError, match="at least three falling mesh sizes"):
-        richardson(sizes[:2], np.zeros((2, 6, 6)))
+    two = richardson(sizes[-2:], np.array([C0 - 0.01 * D * h for h in sizes[-2:]]))
+    assert two.error == pytest.approx(0.01 * D * 0.5)  # order one assumed: right when it is one
+    assert np.array_equal(two.estimate, C0 - 0.01 * D * 0.5)
+    with pytest.raises(StiffmapError, match="at least two falling mesh sizes"):
+        richardson(sizes[:1], np.zeros((1, 6, 6)))
 
 
 def test_richardson_error_covers_the_finer_mesh():
