@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/batch.hpp"
 
+#include <cmath>
+#include <limits>
 #include <memory>
 
+#include "../kernels/dispatch.hpp"
 #include "stiffmap/parallel.hpp"
 
 namespace stiffmap {
@@ -11,20 +14,23 @@ namespace {
 using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using RowMajor6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 
+constexpr long reference_chunk = 16;
+constexpr long fast_chunk = 256;
+
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 void read(const BatchInput& in, Index i, PoseInput& pose) {
   pose.commanded.p = Eigen::Map<const Vec3>(in.position + 3 * i);
   pose.commanded.R = Eigen::Map<const RowMajor3>(in.rotation + 9 * i);
-  for (std::size_t k = 0; k < in.load_points.size(); ++k)
-    pose.wrenches[k] =
-        Eigen::Map<const Vec6>(in.wrench + 6 * (i * static_cast<Index>(in.load_points.size()) + static_cast<Index>(k)));
+  const Index loads = static_cast<Index>(in.load_points.size());
+  for (Index k = 0; k < loads; ++k) pose.wrenches[at(k)] = Eigen::Map<const Vec6>(in.wrench + 6 * (i * loads + k));
 }
 
 void write(const Mechanism& m, Index i, const PoseResult& r, const BatchOutput& out) {
   const Index reads = static_cast<Index>(r.displacement.size());
   if (out.displacement)
-    for (Index k = 0; k < reads; ++k) Eigen::Map<Vec6>(out.displacement + 6 * (i * reads + k)) = r.displacement[at(k)];
+    for (Index k = 0; k < reads; ++k)
+      Eigen::Map<Vec6>(out.displacement + 6 * (i * reads + k)) = r.displacement[at(k)];
   if (out.stiffness) Eigen::Map<RowMajor6>(out.stiffness + 36 * i) = r.point.stiffness;
   if (out.compliance) Eigen::Map<RowMajor6>(out.compliance + 36 * i) = r.point.compliance;
   if (out.free_twists) Eigen::Map<RowMajor6>(out.free_twists + 36 * i) = r.point.free_twists;
@@ -40,29 +46,123 @@ void write(const Mechanism& m, Index i, const PoseResult& r, const BatchOutput& 
   if (out.iterations) out.iterations[i] = r.iterations;
 }
 
+/// The dense path and its scratch, made when first needed.
+class Reference {
+ public:
+  void solve(const Mechanism& m, const BatchInput& in, const SolveOptions& options, Index i, const BatchOutput& out) {
+    if (!ws_) {
+      ws_ = std::make_unique<SolveWorkspace>(m);
+      pose_.load_points = in.load_points;
+      pose_.read_points = in.read_points;
+      pose_.wrenches.assign(in.load_points.size(), Vec6::Zero());
+      pose_.gravity = in.gravity;
+    }
+    read(in, i, pose_);
+    solve_pose(m, pose_, options, *ws_, result_);
+    write(m, i, result_, out);
+  }
+
+  /// Closed coordinates for the kernels; NaN where the pose is out of reach.
+  void close(const Mechanism& m, const BatchInput& in, Index i, double* x) {
+    if (!closure_) closure_ = std::make_unique<ClosureWorkspace>(m);
+    const Pose pose{Eigen::Map<const Vec3>(in.position + 3 * i), Eigen::Map<const RowMajor3>(in.rotation + 9 * i)};
+    VecX found(m.size());
+    const ClosureResult r = inverse_closure(m, pose, *closure_, found);
+    // A doubtful branch keeps its flag: the whole pose then takes the reference path.
+    if (r.status != Status::converged || r.flags & flag::branch_unverified) found[0] = std::nan("");
+    Eigen::Map<VecX>(x, m.size()) = found;
+  }
+
+ private:
+  std::unique_ptr<SolveWorkspace> ws_;
+  std::unique_ptr<ClosureWorkspace> closure_;
+  PoseInput pose_;
+  PoseResult result_;
+};
+
+/// What the kernels do not do is left to the reference path as a whole.
+bool takes(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const SolveOptions& options) {
+  if (!plan.available() || options.equilibrium.load_steps > 0) return false;
+  if (in.load_points.size() != 1 || in.read_points.size() != 1) return false;
+  const LoadPoint& load = in.load_points.front();
+  const NodePoint& reading = m.points[at(in.read_points.front())];
+  if (load.type != LoadType::dead || load.node != m.tip || reading.node != m.tip) return false;
+  if (load.offset != reading.offset) return false;
+  return in.gravity.isZero(0) || plan.program().exact_weights || !options.stiffness;
+}
+
+KernelInput kernel_input(const Mechanism& m, const BatchInput& in, const SolveOptions& options) {
+  KernelInput k{};
+  k.count = in.count;
+  k.position = in.position;
+  k.rotation = in.rotation;
+  k.wrench = in.wrench;
+  for (int i = 0; i < 3; ++i) {
+    k.gravity[i] = in.gravity[i];
+    k.point[i] = m.points[at(in.read_points.front())].offset[i];
+  }
+  k.want_stiffness = options.stiffness;
+  k.max_iterations = 16;
+  k.tolerance = options.equilibrium.tolerance;
+  return k;
+}
+
+/// Fills what the kernels leave out for the poses that they did.
+void complete(const Mechanism& m, Index i, const BatchOutput& out) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  if (out.status) out.status[i] = static_cast<std::uint8_t>(Status::converged);
+  if (out.free_twists) Eigen::Map<VecX>(out.free_twists + 36 * i, 36).setConstant(nan);
+  if (out.indeterminate)
+    for (Index j = 0; j < m.size(); ++j) {
+      const Coordinate& c = m.coordinates[at(j)];
+      out.indeterminate[m.size() * i + j] = c.locked && c.role == Role::passive;
+    }
+}
+
 }  // namespace
 
-void solve_batch(const Mechanism& m, const BatchInput& in, const SolveOptions& options, int threads,
-                 const BatchOutput& out) {
+void solve_reference(const Mechanism& m, const BatchInput& in, const SolveOptions& options, int threads,
+                     const BatchOutput& out) {
+  std::vector<Reference> scratch(at(std::max(1, threads)));
+  parallel_chunks(in.count, reference_chunk, threads, [&](int thread, long begin, long end) {
+    for (long i = begin; i < end; ++i) scratch[static_cast<std::size_t>(thread)].solve(m, in, options, i, out);
+  });
+}
+
+void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const SolveOptions& options,
+                int threads, const BatchOutput& out) {
+  if (!takes(m, plan, in, options)) return solve_reference(m, in, options, threads, out);
+  const KernelTable& table = kernel();
+  const Program& program = plan.program();
+  std::vector<std::uint8_t> done(at(in.count), 0);
+  std::vector<std::uint32_t> flags(at(in.count), 0);
+  const KernelOutput answer{out.displacement, options.stiffness ? out.stiffness : nullptr,
+                            options.stiffness ? out.compliance : nullptr, out.effort, out.leg_wrench, out.coordinates,
+                            done.data(), flags.data(), out.iterations};
   struct Scratch {
-    std::unique_ptr<SolveWorkspace> ws;
-    PoseInput pose;
-    PoseResult result;
+    std::vector<char> memory;
+    std::vector<double> start;
+    Reference reference;
   };
   std::vector<Scratch> scratch(at(std::max(1, threads)));
-  parallel_chunks(in.count, 16, threads, [&](int thread, long begin, long end) {
+  parallel_chunks(in.count, fast_chunk, threads, [&](int thread, long begin, long end) {
     Scratch& s = scratch[static_cast<std::size_t>(thread)];
-    if (!s.ws) {
-      s.ws = std::make_unique<SolveWorkspace>(m);
-      s.pose.load_points = in.load_points;
-      s.pose.read_points = in.read_points;
-      s.pose.wrenches.assign(in.load_points.size(), Vec6::Zero());
-      s.pose.gravity = in.gravity;
+    if (s.memory.empty()) s.memory.resize(static_cast<std::size_t>(table.scratch_size(&program)));
+    KernelInput input = kernel_input(m, in, options);
+    if (!program.closes) {
+      s.start.resize(at(m.size()) * static_cast<std::size_t>(fast_chunk));
+      for (long i = begin; i < end; ++i) s.reference.close(m, in, i, s.start.data() + m.size() * (i - begin));
+      input.start = s.start.data() - m.size() * begin;
     }
+    table.run(&program, &input, &answer, begin, end, s.memory.data());
     for (long i = begin; i < end; ++i) {
-      read(in, i, s.pose);
-      solve_pose(m, s.pose, options, *s.ws, s.result);
-      write(m, i, s.result, out);
+      if (!done[static_cast<std::size_t>(i)]) {
+        s.reference.solve(m, in, options, i, out);
+        continue;
+      }
+      complete(m, i, out);
+      const bool moment = !Eigen::Map<const Vec3>(in.wrench + 6 * i + 3).isZero(0);
+      if (out.flags) out.flags[i] = flags[static_cast<std::size_t>(i)] | (moment ? flag::nonconservative : 0u);
     }
   });
 }

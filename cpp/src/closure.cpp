@@ -20,6 +20,16 @@ std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 /// What is to be closed: the loops, and the tip where its pose is given.
 struct Target {
   const Pose* tip = nullptr;
+  Task task = full_task;
+
+  /// Zero in the components of a tip error (or its Jacobian) that are not commanded.
+  template <class Rows>
+  void mask(Rows&& rows) const {
+    if (task == full_task) return;
+    rows.template bottomRows<3>() = (tip->R.transpose() * rows.template bottomRows<3>()).eval();
+    for (int i = 0; i < 6; ++i)
+      if (!task[static_cast<std::size_t>(i)]) rows.row(i).setZero();
+  }
 };
 
 void select_unknowns(const Mechanism& m, bool actuators, ClosureWorkspace& ws) {
@@ -35,7 +45,10 @@ void select_unknowns(const Mechanism& m, bool actuators, ClosureWorkspace& ws) {
 double residual(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws) {
   forward(m, Geometry::nominal, x, ws.frames);
   ws.e.setZero();
-  if (target.tip) ws.e.head<6>() = -frame_error(ws.frames.at(m.tip), *target.tip);
+  if (target.tip) {
+    ws.e.head<6>() = -frame_error(ws.frames.at(m.tip), *target.tip);
+    target.mask(ws.e.head<6>());
+  }
   for (std::size_t i = 0; i < m.loops.size(); ++i)
     ws.e.segment<6>(6 + 6 * static_cast<Index>(i)) =
         frame_error(ws.frames.at(m.loops[i].primary), ws.frames.at(m.loops[i].end));
@@ -47,7 +60,10 @@ double residual(const Mechanism& m, const VecX& x, const Target& target, Closure
 /// Gauss-Newton step of least norm over the unknowns, at the frames of the last residual.
 double newton_step(const Mechanism& m, const Target& target, ClosureWorkspace& ws) {
   ws.J.setZero();
-  if (target.tip) add_jacobian(m, ws.frames, m.tip, ws.frames.at(m.tip).p, 1.0, ws.J.topRows<6>());
+  if (target.tip) {
+    add_jacobian(m, ws.frames, m.tip, ws.frames.at(m.tip).p, 1.0, ws.J.topRows<6>());
+    target.mask(ws.J.topRows<6>());
+  }
   for (std::size_t i = 0; i < m.loops.size(); ++i) {
     const Index row = 6 + 6 * static_cast<Index>(i);
     const Loop& loop = m.loops[i];
@@ -179,13 +195,18 @@ ClosureWorkspace::ClosureWorkspace(const Mechanism& m)
       start(VecX::Zero(m.size())) {}
 
 ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x) {
+  return inverse_closure(m, pose, ws, x, m.home_coordinates, m.home);
+}
+
+ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x, const VecX& from,
+                              const Pose& at_pose) {
   ClosureResult out;
   if (!pose.p.allFinite() || !pose.R.allFinite()) return out;
   select_unknowns(m, true, ws);
-  x = m.home_coordinates;
+  x = from;
   Pose way;
-  const Target target{&way};
-  const auto set = [&](double s, VecX&) { way = on_the_way(m.home, pose, s); };
+  const Target target{&way, m.task};
+  const auto set = [&](double s, VecX&) { way = on_the_way(at_pose, pose, s); };
   bool ok = continuation(m, target, set, ws, x, out);
   if (!ok) {  // the straight way may leave the workspace although its end lies inside
     x = m.home_coordinates;

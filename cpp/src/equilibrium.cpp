@@ -14,16 +14,6 @@ constexpr int patient_steps = 8;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-/// Right-hand side of the force balance; a stuck coordinate follows its own law alone.
-void balance(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, VecX& force) {
-  for (Index j = 0; j < m.size(); ++j) {
-    force[j] = -lin.da[j] * lin.r[j];
-    if (lin.kind[at(j)] != Kind::fixed) continue;
-    const bool stuck = lin.dtau[j] > 0 && !m.coordinates[at(j)].locked;
-    force[j] = stuck ? -lin.r[j] / (lin.dtau[j] * saddle.scale()[j] * saddle.scale()[j]) : 0.0;
-  }
-}
-
 bool has_knots(const Mechanism& m) {
   return std::any_of(m.laws.begin(), m.laws.end(), [](const Law& law) { return law.has_knots(); });
 }
@@ -80,7 +70,7 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
   for (int k = 0; k < opt.max_iterations; ++k) {
     ws.saddle.assemble(m, ws.lin);
     ws.saddle.factorize();
-    balance(m, ws.lin, ws.saddle, ws.force);
+    force_balance(m, ws.lin, ws.saddle, ws.force);
     ws.saddle.solve(ws.force, ws.lin.e, ws.dz, ws.dlambda);
     ++out.iterations;
     const double norm = ws.saddle.step_norm(m, ws.dz);
@@ -152,6 +142,15 @@ Outcome adaptive_steps(const Mechanism& m, Problem& p, const EquilibriumOptions&
 }
 
 }  // namespace
+
+void force_balance(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, VecX& force) {
+  for (Index j = 0; j < m.size(); ++j) {
+    force[j] = -lin.da[j] * lin.r[j];
+    if (lin.kind[at(j)] != Kind::fixed) continue;
+    const bool stuck = lin.dtau[j] > 0 && !m.coordinates[at(j)].locked;
+    force[j] = stuck ? -lin.r[j] / (lin.dtau[j] * saddle.scale()[j] * saddle.scale()[j]) : 0.0;
+  }
+}
 
 EquilibriumWorkspace::EquilibriumWorkspace(const Mechanism& m)
     : lin(m),

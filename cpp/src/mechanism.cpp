@@ -24,7 +24,7 @@ std::string join(const std::string& prefix, const std::string& name) {
 }  // namespace
 
 Mechanism::Mechanism(const Chain& root, const Pose& home_pose, const std::vector<ExternalSpring>& springs)
-    : home(home_pose) {
+    : home(home_pose), description(root) {
   nodes.push_back({});  // the base
   path.push_back({});
   beyond_legs.push_back(false);

@@ -146,9 +146,7 @@ void SaddleSystem::factorize() {
 void SaddleSystem::solve(const VecX& force, const VecX& closure, VecX& dz, VecX& dlambda) {
   rhs_.head(n_) = force;
   rhs_.tail(nl_) = closure;
-  for (const auto& [first, spring] : rotated_)
-    rhs_.segment<6>(first) = (spring.basis.transpose() * rhs_.segment<6>(first)).eval();
-  rhs_.array() *= s_.array();
+  to_forces(rhs_);
   if (well_conditioned_) sol_.noalias() = lu_.solve(rhs_);
   else sol_ = cod_.solve(rhs_);
   to_coordinates(sol_);
@@ -159,6 +157,12 @@ void SaddleSystem::solve(const VecX& force, const VecX& closure, VecX& dz, VecX&
 void SaddleSystem::to_coordinates(VecX& v) const {
   v.array() *= s_.array();
   for (const auto& [first, spring] : rotated_) v.segment<6>(first) = (spring.basis * v.segment<6>(first)).eval();
+}
+
+void SaddleSystem::to_forces(VecX& v) const {
+  for (const auto& [first, spring] : rotated_)
+    v.segment<6>(first) = (spring.basis.transpose() * v.segment<6>(first)).eval();
+  v.array() *= s_.array();
 }
 
 MatX SaddleSystem::null_space() const {

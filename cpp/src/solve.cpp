@@ -74,15 +74,10 @@ void leg_wrenches(const Mechanism& m, const PoseInput& in, const SolveWorkspace&
   out.leg_wrench.col(0) = left;
 }
 
-void fail(const Mechanism& m, const PoseInput& in, Status status, PoseResult& out) {
-  out.status = status;
-  out.displacement.assign(in.read_points.size(), Vec6::Constant(nan));
-  out.point.stiffness.setConstant(nan);
-  out.point.compliance.setConstant(nan);
-  out.point.free_twists.setConstant(nan);
-  out.effort.setConstant(static_cast<Index>(m.drives.size()), nan);
-  out.leg_wrench.setConstant(6, static_cast<Index>(m.legs.size()), nan);
-  out.x.setConstant(m.size(), nan);
+void reset(const Mechanism& m, std::uint32_t flags, PoseResult& out) {
+  out.flags = flags;
+  out.point.free = 0;
+  out.indeterminate.assign(static_cast<std::size_t>(m.size()), false);
 }
 
 /// A free motion of passive coordinates at a pose: does it leave the stiffness as it is? Moves along
@@ -98,7 +93,7 @@ bool configuration_undetermined(const Mechanism& m, const PoseInput& in, const V
   for (Index j = 0; j < m.size(); ++j)
     if (m.coordinates[at(j)].role == Role::passive) x[j] += stride / size * motion[j];
   const VecX moved = x;
-  if (close_passive(m, in.commanded, ws.closure, x) > 1e-9) return false;
+  if (close_passive(m, ws.reached, ws.closure, x) > 1e-9) return false;
   double kept = 0;
   for (Index j = 0; j < m.size(); ++j) kept = std::max(kept, std::abs(x[j] - ws.x[j]) * m.unit(j) / m.length);
   if (kept < 0.5 * stride) return false;  // came back: only an infinitesimal freedom
@@ -159,7 +154,7 @@ bool examine_unloaded(const Mechanism& m, const PoseInput& in, SolveWorkspace& w
   if (k.free > 0) out.flags |= flag::platform_singular;
   if (!(out.flags & (flag::platform_singular | flag::configuration_undetermined))) return true;
   const std::uint32_t flags = out.flags;
-  fail(m, in, Status::singular, out);
+  fail_pose(m, in, Status::singular, out);
   out.flags = flags;
   if (!(flags & flag::configuration_undetermined)) {
     out.point.stiffness = k.stiffness;
@@ -187,7 +182,7 @@ void report(const Mechanism& m, const PoseInput& in, const SolveWorkspace& ws, P
   out.displacement.resize(in.read_points.size());
   for (std::size_t i = 0; i < in.read_points.size(); ++i) {
     const NodePoint& p = m.points[at(in.read_points[i])];
-    const Pose &now = lin.frames.at(p.node), &then = p.node == m.tip ? in.commanded : ws.nominal.at(p.node);
+    const Pose &now = lin.frames.at(p.node), &then = p.node == m.tip ? ws.reached : ws.nominal.at(p.node);
     out.displacement[i] << now * p.offset - then * p.offset, log_so3(now.R * then.R.transpose());
   }
   out.effort.resize(static_cast<Index>(m.drives.size()));
@@ -230,15 +225,10 @@ void hide_undetermined(const Mechanism& m, const SolveWorkspace& ws, PoseResult&
 SolveWorkspace::SolveWorkspace(const Mechanism& m)
     : closure(m), equilibrium(m), stiffness(m), problem(m), state(m), nominal(m), x(VecX::Zero(m.size())) {}
 
-void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& options, SolveWorkspace& ws,
-                PoseResult& out) {
-  out.flags = 0;
-  out.iterations = 0;
-  out.point.free = 0;
-  out.indeterminate.assign(static_cast<std::size_t>(m.size()), false);
+ClosureResult prepare_pose(const Mechanism& m, const PoseInput& in, SolveWorkspace& ws) {
   const ClosureResult closure = inverse_closure(m, in.commanded, ws.closure, ws.x);
-  if (closure.status != Status::converged) return fail(m, in, Status::unreachable, out);
-  out.flags = closure.flags;
+  if (closure.status != Status::converged) return closure;
+  ws.reached = m.task == full_task ? in.commanded : closure.tip;
   forward(m, Geometry::nominal, ws.x, ws.nominal);
   command(m, ws.x, ws.problem);
   start_state(m, ws.x, ws.state);
@@ -247,12 +237,36 @@ void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& opt
   ws.problem.wrenches = in.wrenches;
   ws.problem.load_frames.clear();
   for (const LoadPoint& l : in.load_points) ws.problem.load_frames.push_back(ws.nominal.at(l.node).R);
+  return closure;
+}
+
+void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& options, SolveWorkspace& ws,
+                PoseResult& out) {
+  out.iterations = 0;
+  const ClosureResult closure = prepare_pose(m, in, ws);
+  reset(m, closure.flags, out);
+  if (closure.status != Status::converged) return fail_pose(m, in, Status::unreachable, out);
   if (!examine_unloaded(m, in, ws, out)) return;
 
   const EquilibriumResult eq = solve_equilibrium(m, ws.problem, options.equilibrium, ws.equilibrium, ws.state);
   out.iterations = eq.iterations;
   out.flags |= eq.flags;
-  if (eq.status != Status::converged) return fail(m, in, eq.status, out);
+  if (eq.status != Status::converged) return fail_pose(m, in, eq.status, out);
+  conclude_pose(m, in, eq.sign_changes, ws, out);
+}
+
+void fail_pose(const Mechanism& m, const PoseInput& in, Status status, PoseResult& out) {
+  out.status = status;
+  out.displacement.assign(in.read_points.size(), Vec6::Constant(nan));
+  out.point.stiffness.setConstant(nan);
+  out.point.compliance.setConstant(nan);
+  out.point.free_twists.setConstant(nan);
+  out.effort.setConstant(static_cast<Index>(m.drives.size()), nan);
+  out.leg_wrench.setConstant(6, static_cast<Index>(m.legs.size()), nan);
+  out.x.setConstant(m.size(), nan);
+}
+
+void conclude_pose(const Mechanism& m, const PoseInput& in, int sign_changes, SolveWorkspace& ws, PoseResult& out) {
   out.status = Status::converged;
   report(m, in, ws, out);
 
@@ -263,7 +277,7 @@ void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& opt
   if (out.flags & flag::rigid_direction) out.point.compliance = compliance_of(m, p, ws.equilibrium);
   if (ws.problem.has_dead_moment()) {
     out.flags |= flag::nonconservative;
-    if (eq.sign_changes > 0) out.status = Status::unstable;
+    if (sign_changes > 0) out.status = Status::unstable;
   } else if (!is_stable(done.saddle, out.point)) {
     out.status = Status::unstable;
   }
@@ -277,8 +291,9 @@ void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& opt
   hide_undetermined(m, ws, out);
 }
 
-Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs) {
+Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs, const Task& task) {
   Mechanism m(root, home, springs);
+  m.task = task;
   close_home(m);
   return m;
 }

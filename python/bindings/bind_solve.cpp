@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <pybind11/stl.h>
 
+#include "../../cpp/kernels/dispatch.hpp"
 #include "arrays.hpp"
 #include "stiffmap/batch.hpp"
 #include "stiffmap/parallel.hpp"
@@ -18,18 +19,64 @@ std::vector<Index> point_indices(const Mechanism& m, const std::vector<std::stri
   return out;
 }
 
-/// One call over all poses; every array has the pose as its leading axis.
-py::dict solve(const Mechanism& m, const Array& position, const Array& rotation, const Array& wrench,
-               const std::vector<std::string>& load_points, const std::vector<int>& load_types,
-               const std::vector<std::string>& read_points, const Array& gravity, int load_steps, int threads) {
+/// Arrays of one call; every array has the pose as its leading axis.
+struct Answer {
+  Answer(const Mechanism& m, py::ssize_t n, py::ssize_t reads, bool full)
+      : displacement(Shape{n, reads, 6}), status(n), flags(n), iterations(n) {
+    const py::ssize_t legs = static_cast<py::ssize_t>(m.legs.size()), k = full ? n : 0;
+    for (py::array_t<double>* a : {&stiffness, &compliance, &free_twists}) *a = empty({k, 6, 6});
+    effort = empty({k, static_cast<py::ssize_t>(m.drives.size())});
+    leg_wrench = empty({k, legs, 6});
+    coordinates = empty({k, m.size()});
+    indeterminate = py::array_t<std::uint8_t>(Shape{k, m.size()});
+    out.displacement = displacement.mutable_data();
+    out.status = status.mutable_data();
+    out.flags = flags.mutable_data();
+    out.iterations = iterations.mutable_data();
+    if (!full) return;
+    out.stiffness = stiffness.mutable_data();
+    out.compliance = compliance.mutable_data();
+    out.free_twists = free_twists.mutable_data();
+    out.effort = effort.mutable_data();
+    out.leg_wrench = leg_wrench.mutable_data();
+    out.coordinates = coordinates.mutable_data();
+    out.indeterminate = indeterminate.mutable_data();
+  }
+
+  py::dict dict() const {
+    py::dict d;
+    d["displacement"] = displacement;
+    d["stiffness"] = stiffness;
+    d["compliance"] = compliance;
+    d["free_twists"] = free_twists;
+    d["actuator_effort"] = effort;
+    d["leg_wrench"] = leg_wrench;
+    d["coordinates"] = coordinates;
+    d["indeterminate"] = indeterminate;
+    d["status"] = status;
+    d["flags"] = flags;
+    d["iterations"] = iterations;
+    return d;
+  }
+
+  py::array_t<double> displacement, stiffness, compliance, free_twists, effort, leg_wrench, coordinates;
+  py::array_t<std::uint8_t> indeterminate, status;
+  py::array_t<std::uint32_t> flags;
+  py::array_t<std::int32_t> iterations;
+  BatchOutput out;
+};
+
+/// All poses in one call: by the kernels where a plan is given, else by the reference path.
+py::dict solve(const Mechanism& m, const FastPlan* plan, const Array& position, const Array& rotation,
+               const Array& wrench, const std::vector<std::string>& load_points, const std::vector<int>& load_types,
+               const std::vector<std::string>& read_points, const Array& gravity, int load_steps, int threads,
+               bool full) {
   const py::ssize_t n = position.ndim() ? position.shape(0) : 0;
-  const py::ssize_t loads = static_cast<py::ssize_t>(load_points.size());
-  const py::ssize_t reads = static_cast<py::ssize_t>(read_points.size());
   BatchInput in;
   in.count = n;
   in.position = data(position, {n, 3}, "position");
   in.rotation = data(rotation, {n, 3, 3}, "rotation");
-  in.wrench = data(wrench, {n, loads, 6}, "wrench");
+  in.wrench = data(wrench, {n, static_cast<py::ssize_t>(load_points.size()), 6}, "wrench");
   in.gravity = Eigen::Map<const Vec3>(data(gravity, {3}, "gravity"));
   in.read_points = point_indices(m, read_points);
   require(!in.read_points.empty(), "read_points", "at least one point", 0);
@@ -39,36 +86,16 @@ py::dict solve(const Mechanism& m, const Array& position, const Array& rotation,
     const NodePoint& p = m.points[static_cast<std::size_t>(at[i])];
     in.load_points.push_back({p.node, p.offset, static_cast<LoadType>(load_types[i])});
   }
-  const py::ssize_t legs = static_cast<py::ssize_t>(m.legs.size()), drives = static_cast<py::ssize_t>(m.drives.size());
-  auto displacement = empty({n, reads, 6}), stiffness = empty({n, 6, 6}), compliance = empty({n, 6, 6});
-  auto free_twists = empty({n, 6, 6}), effort = empty({n, drives}), leg_wrench = empty({n, legs, 6});
-  auto coordinates = empty({n, m.size()});
-  py::array_t<std::uint8_t> indeterminate(Shape{n, m.size()}), status(n);
-  py::array_t<std::uint32_t> flags(n);
-  py::array_t<std::int32_t> iterations(n);
-  const BatchOutput out{displacement.mutable_data(), stiffness.mutable_data(),     compliance.mutable_data(),
-                        free_twists.mutable_data(),  effort.mutable_data(),        leg_wrench.mutable_data(),
-                        coordinates.mutable_data(),  indeterminate.mutable_data(), status.mutable_data(),
-                        flags.mutable_data(),        iterations.mutable_data()};
+  Answer answer(m, n, static_cast<py::ssize_t>(read_points.size()), full);
   SolveOptions options;
   options.equilibrium.load_steps = load_steps;
+  options.stiffness = full;
   {
     py::gil_scoped_release free;
-    solve_batch(m, in, options, threads, out);
+    if (plan) solve_fast(m, *plan, in, options, threads, answer.out);
+    else solve_reference(m, in, options, threads, answer.out);
   }
-  py::dict d;
-  d["displacement"] = displacement;
-  d["stiffness"] = stiffness;
-  d["compliance"] = compliance;
-  d["free_twists"] = free_twists;
-  d["actuator_effort"] = effort;
-  d["leg_wrench"] = leg_wrench;
-  d["coordinates"] = coordinates;
-  d["indeterminate"] = indeterminate;
-  d["status"] = status;
-  d["flags"] = flags;
-  d["iterations"] = iterations;
-  return d;
+  return answer.dict();
 }
 
 template <class T, class Get>
@@ -131,8 +158,19 @@ py::tuple frames(const Mechanism& m, const Array& x) {
 
 void bind_solve(py::module_& m) {
   using namespace py::literals;
+  m.def("kernel_levels", &kernel_levels);
+  m.def("kernel_level", [] { return std::string(kernel().level); });
+  py::class_<FastPlan>(m, "FastPlan")
+      .def(py::init([](const Mechanism& k, const Array& low, const Array& high) {
+             const Vec3 a = Eigen::Map<const Vec3>(data(low, {3}, "low")), b = Eigen::Map<const Vec3>(data(high, {3}, "high"));
+             py::gil_scoped_release free;
+             return std::make_unique<FastPlan>(k, a, b);
+           }),
+           "mechanism"_a, "low"_a, "high"_a)
+      .def_property_readonly("available", &FastPlan::available)
+      .def_property_readonly("missing", &FastPlan::missing);
   py::class_<Mechanism>(m, "Mechanism")
-      .def(py::init(&assemble), "root"_a, "home"_a, "springs"_a)
+      .def(py::init(&assemble), "root"_a, "home"_a, "springs"_a, "task"_a = full_task)
       .def_property_readonly(
           "coordinates",
           [](const Mechanism& k) { return names(k.coordinates, [](const Coordinate& c) { return c.name; }); })
@@ -183,8 +221,8 @@ void bind_solve(py::module_& m) {
              Eigen::Map<VecX>(out.mutable_data(), k.size()) = k.home_coordinates;
              return out;
            })
-      .def("solve", &solve, "position"_a, "rotation"_a, "wrench"_a, "load_points"_a, "load_types"_a, "read_points"_a,
-           "gravity"_a, "load_steps"_a, "threads"_a)
+      .def("solve", &solve, "plan"_a.none(true), "position"_a, "rotation"_a, "wrench"_a, "load_points"_a, "load_types"_a, "read_points"_a,
+           "gravity"_a, "load_steps"_a, "threads"_a, "full"_a)
       .def("closure", &closure, "given"_a, "rotation"_a, "inverse"_a, "threads"_a)
       .def("frames", &frames, "coordinates"_a);
 }

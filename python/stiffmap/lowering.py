@@ -8,6 +8,7 @@ import numpy as np
 
 from stiffmap import _core
 from stiffmap.description import (
+    TASK,
     Block,
     Body,
     Element,
@@ -37,7 +38,9 @@ def build_mechanism(machine: MachineDescription) -> _core.Mechanism:
             )
             for s in machine.external_springs
         ]
-        return _core.Mechanism(root, pose(machine.home), springs)
+        if machine.task == TASK:
+            return _core.Mechanism(root, pose(machine.home), springs)
+        return _core.Mechanism(root, pose(machine.home), springs, [c in machine.task for c in TASK])
     except ValueError as problem:
         raise StiffmapError(f"{machine.name}: {problem}") from None
 

@@ -44,6 +44,17 @@ class Machine:
     def _core(self) -> _core.Mechanism:
         return build_mechanism(self._description)
 
+    @cached_property
+    def _plan(self) -> _core.FastPlan:
+        box = self._description.workspace
+        low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))
+        return _core.FastPlan(self._core, np.array(low), np.array(high))
+
+    @property
+    def fast(self) -> str:
+        """Empty if the fast path takes this machine, else what it lacks for it."""
+        return self._plan.missing
+
     @property
     def actuators(self) -> tuple[str, ...]:
         """Full names of the actuators."""
@@ -135,6 +146,7 @@ class Machine:
                 raise StiffmapError(f"point: expected one of {', '.join(self.points)}, got {name!r}")
         loads = np.stack([rows(v, shape, (6,)) for v in (w, *extra.values())], axis=1)
         answer = self._core.solve(
+            self._plan if method == "fast" else None,
             rows(p, shape, (3,)),
             rows(r, shape, (3, 3)),
             np.ascontiguousarray(loads),
@@ -144,6 +156,7 @@ class Machine:
             self._gravity(gravity),
             self._steps(load_steps),
             thread_count(threads),
+            True,
         )
         return self._solution(answer, shape, point)
 

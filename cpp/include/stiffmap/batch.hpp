@@ -2,6 +2,7 @@
 // Many poses at once: plain arrays in, plain arrays out, on all threads.
 #pragma once
 
+#include "stiffmap/fast_plan.hpp"
 #include "stiffmap/solve.hpp"
 
 namespace stiffmap {
@@ -33,7 +34,12 @@ struct BatchOutput {
 };
 
 /// The dense reference path for every pose.
-void solve_batch(const Mechanism& m, const BatchInput& in, const SolveOptions& options, int threads,
-                 const BatchOutput& out);
+void solve_reference(const Mechanism& m, const BatchInput& in, const SolveOptions& options, int threads,
+                     const BatchOutput& out);
+
+/// The SIMD kernels for every pose that they can do, the reference path for the rest; the result of a
+/// pose depends on nothing but the pose.
+void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const SolveOptions& options,
+                int threads, const BatchOutput& out);
 
 }  // namespace stiffmap

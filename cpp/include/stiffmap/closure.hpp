@@ -30,6 +30,10 @@ struct ClosureResult {
 /// Coordinates `x` at which the tip has the pose (nominal geometry, springs zero).
 ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x);
 
+/// The same, continued from the coordinates `from` of another pose `at` instead of from home.
+ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x, const VecX& from,
+                              const Pose& at);
+
 /// Coordinates `x` and tip pose for given actuator coordinates.
 ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x);
 

@@ -29,6 +29,9 @@ struct EquilibriumWorkspace {
   VecX dz, dlambda, force;
 };
 
+/// Right-hand side of the force balance; a stuck coordinate follows its own law alone.
+void force_balance(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, VecX& force);
+
 /// From `state` (usually the commanded configuration, all zero) to the equilibrium under `problem`.
 /// On success `ws.lin` and `ws.saddle` hold the linearisation there. Status is converged or
 /// not_converged; stability is judged by `judge_stability` in stiffness.hpp.

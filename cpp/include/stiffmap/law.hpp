@@ -29,6 +29,7 @@ class Law {
   bool has_knots() const { return !knots_.empty(); }
   double stiffness() const { return stiffness_; }
   double cubic() const { return cubic_; }
+  const std::vector<std::pair<double, double>>& knots() const { return knots_; }
 
  private:
   double stiffness_, cubic_;

@@ -3,6 +3,7 @@
 // elementary coordinate each, and six closure equations per extra branch (theory C1-C3).
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -77,6 +78,11 @@ struct NodeSpring {
   bool tension_only = false;
 };
 
+/// Which of the six pose components are commanded: translations along base axes, rotations about the
+/// axes of the commanded TCP frame. The closure of the machine decides the others.
+using Task = std::array<bool, 6>;
+inline constexpr Task full_task{true, true, true, true, true, true};
+
 /// The legs' block is the first block of `root` whose name is "legs".
 class Mechanism {
  public:
@@ -94,11 +100,13 @@ class Mechanism {
   std::vector<std::string> legs;         ///< names of the branches of the legs' block
   std::vector<bool> beyond_legs;         ///< per node: on the platform's side of the legs' block
   std::vector<std::vector<Index>> path;  ///< per node: its coordinates from the base outwards
+  Task task = full_task;                 ///< commanded pose components
   Pose home;                             ///< tip pose of the home configuration
   VecX home_coordinates;                 ///< closed exactly at home
   double length = 1;                     ///< characteristic length: turns angles into lengths in every norm
   double stiffness = 1;                  ///< characteristic stiffness, N/m: turns forces into lengths
   Index tip = -1;
+  Chain description;                             ///< what it was made from
 
   Index size() const { return static_cast<Index>(coordinates.size()); }
   Index closures() const { return 6 * static_cast<Index>(loops.size()); }

@@ -35,6 +35,8 @@ class SaddleSystem {
 
   /// From scaled unknowns to (z, lambda), in place.
   void to_coordinates(VecX& v) const;
+  /// From forces and closure errors to the right-hand side of the scaled system, in place.
+  void to_forces(VecX& v) const;
   /// Columns of a Jacobian by coordinates to columns by scaled unknowns, in place.
   void to_unknowns(const Linearization& lin, Eigen::Ref<MatX> J) const;
   const MatX& matrix() const { return A_; }

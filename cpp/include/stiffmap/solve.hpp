@@ -44,13 +44,26 @@ struct SolveWorkspace {
   State state;
   Frames nominal;
   VecX x;
+  Pose reached;  ///< nominal tip pose: the commanded one, completed where the task leaves it open
 };
 
 /// Never throws for a pose: see PoseResult::status.
 void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& options, SolveWorkspace& ws,
                 PoseResult& out);
 
+/// The parts of it that other problems share. Closure and command: fills x, reached, nominal, problem
+/// and the unloaded state.
+ClosureResult prepare_pose(const Mechanism& m, const PoseInput& in, SolveWorkspace& ws);
+
+/// Everything reported of an equilibrium whose state and linearisation are in `ws`; `sign_changes` of
+/// the tangent's determinant on the way to it.
+void conclude_pose(const Mechanism& m, const PoseInput& in, int sign_changes, SolveWorkspace& ws, PoseResult& out);
+
+/// NaN and the status.
+void fail_pose(const Mechanism& m, const PoseInput& in, Status status, PoseResult& out);
+
 /// Mechanism closed at home, spins locked: ready to solve.
-Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs = {});
+Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs = {},
+                   const Task& task = full_task);
 
 }  // namespace stiffmap

@@ -13,6 +13,7 @@ from stiffmap.description.elements import (
 )
 from stiffmap.description.laws import CommandError, Law
 from stiffmap.description.machine import (
+    TASK,
     AppliedEffect,
     ExternalSpring,
     Leg,
@@ -21,6 +22,7 @@ from stiffmap.description.machine import (
 from stiffmap.description.pose import Pose
 
 __all__ = [
+    "TASK",
     "AppliedEffect",
     "Block",
     "Body",

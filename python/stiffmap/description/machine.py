@@ -44,12 +44,17 @@ class AppliedEffect:
     options: tuple[tuple[str, str], ...] = ()
 
 
+TASK = ("x", "y", "z", "rx", "ry", "rz")
+
+
 @dataclass(frozen=True)
 class MachineDescription:
     """Base elements, then legs in parallel, then platform elements; the last frame is the TCP.
 
     A serial arm has one leg. ``home`` is the TCP pose of the home configuration, in which every
     joint has its ``home`` coordinate. ``workspace`` is an axis-aligned box of TCP positions.
+    ``task`` names the pose components that are commanded, translations along base axes, rotations about
+    the axes of the commanded TCP frame; the machine's closure decides the others.
     ``gravity`` (m/s², base axes) applies unless a call says otherwise; ``None`` is none.
     ``uncertainty`` holds a standard uncertainty (SI) beside any number, keyed by
     ``full.element.name/field``; ``notes`` says where numbers come from, by the same keys.
@@ -66,6 +71,7 @@ class MachineDescription:
     gravity: Vector | None = None
     external_springs: tuple[ExternalSpring, ...] = ()
     effects: tuple[AppliedEffect, ...] = ()
+    task: tuple[str, ...] = TASK
     title: str = ""
     source: str = ""
     uncertainty: tuple[tuple[str, float], ...] = ()

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from stiffmap.description import (
+    TASK,
     AppliedEffect,
     ExternalSpring,
     MachineDescription,
@@ -34,6 +35,7 @@ def build(
     units = UnitSystem(**model.units.model_dump())
     context = Context(file, document, folder, units, model.materials, Gathered())
     description = MachineDescription(
+        task=tuple(c for c in TASK if c in model.task),
         name=model.name,
         legs=tuple(build_leg(name, leg, model.templates, context) for name, leg in model.legs.items()),
         base=build_elements(model.base, context.at("base").inside("base")),

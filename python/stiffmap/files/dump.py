@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from stiffmap.description import (
+    TASK,
     AppliedEffect,
     Block,
     Branch,
@@ -42,6 +43,7 @@ def dump(description: MachineDescription) -> Plain:
         "units": dict(UNITS),
         "gravity": None if declared.gravity is None else floats(declared.gravity),
         "home": dump_pose(declared.home),
+        "task": None if declared.task == TASK else list(declared.task),
         "workspace": None if declared.workspace is None else _box(declared.workspace),
         **_legs(declared.legs),
         "base": dump_elements(declared.base),

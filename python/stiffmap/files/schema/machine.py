@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from stiffmap.description import TASK
 from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Vector3
 from stiffmap.files.schema.elements import ElementModel
 from stiffmap.files.schema.geometry import Box, Frame
@@ -75,6 +76,14 @@ class MachineFile(FileModel):
     units: UnitsModel
     gravity: Annotated[Vector3, Field(description="m/s², base axes; left out: none.")] | None = None
     home: Annotated[Frame, Field(description="TCP pose of the home configuration.")] | None = None
+    task: Annotated[
+        list[Literal["x", "y", "z", "rx", "ry", "rz"]],
+        Field(
+            min_length=1,
+            description="Pose components that are commanded; left out: all. Translations along base axes, "
+            "rotations about the axes of the commanded TCP frame.",
+        ),
+    ] = Field(default_factory=lambda: list(TASK))
     workspace: Box | None = None
     materials: dict[Name, Material] = Field(default_factory=dict)
     templates: dict[Name, list[ElementModel]] = Field(default_factory=dict)

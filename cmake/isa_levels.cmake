@@ -1,0 +1,28 @@
+# Builds the kernels once per instruction-set level, each a private shared library with one exported
+# symbol: objects of one source for several levels must not meet in one link.
+include(CheckCXXCompilerFlag)
+
+function(stiffmap_kernel level lanes)
+  set(target stiffmap_kernel_${level})
+  add_library(${target} SHARED ${PROJECT_SOURCE_DIR}/cpp/kernels/kernel.cpp)
+  target_compile_definitions(${target} PRIVATE
+    STIFFMAP_LANES=${lanes} STIFFMAP_LEVEL="${level}" STIFFMAP_ENTRY=stiffmap_kernel_${level})
+  target_compile_options(${target} PRIVATE -fno-math-errno -fno-trapping-math -ffp-contract=fast -fno-semantic-interposition
+    $<$<CONFIG:Release>:-O3> ${ARGN})
+  stiffmap_compile_options(${target})
+  set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden)
+  if(SKBUILD)
+    install(TARGETS ${target} LIBRARY DESTINATION . COMPONENT python)
+  endif()
+endfunction()
+
+set(STIFFMAP_KERNELS stiffmap_kernel_base)
+stiffmap_kernel(base 2)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  check_cxx_compiler_flag(-march=x86-64-v4 STIFFMAP_HAS_LEVELS)
+  if(STIFFMAP_HAS_LEVELS)
+    stiffmap_kernel(v3 4 -march=x86-64-v3)
+    stiffmap_kernel(v4 8 -march=x86-64-v4 -mprefer-vector-width=512)
+    list(APPEND STIFFMAP_KERNELS stiffmap_kernel_v3 stiffmap_kernel_v4)
+  endif()
+endif()

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// A mechanism compiled to the plain program that the SIMD kernels run (docs/fast_path.md).
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stiffmap/closure.hpp"
+
+namespace stiffmap {
+
+struct Program;
+struct FastPlanData;
+
+/// Immutable and shared by all threads. `missing` says why a mechanism has to take the reference path.
+class FastPlan {
+ public:
+  /// `low`, `high`: box of tip positions where poses are expected; empty: none is known.
+  FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high);
+  ~FastPlan();
+  FastPlan(const FastPlan&) = delete;
+  FastPlan& operator=(const FastPlan&) = delete;
+
+  bool available() const { return missing_.empty(); }
+  const std::string& missing() const { return missing_; }
+  const Program& program() const;
+
+ private:
+  std::unique_ptr<FastPlanData> data_;
+  std::string missing_;
+};
+
+}  // namespace stiffmap

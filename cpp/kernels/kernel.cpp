@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: MIT
+// Compiled once per instruction-set level into a private library with one exported symbol.
+// No globals, no streams, no exceptions, no Eigen: docs/fast_path.md.
+#include <cstddef>
+#include <initializer_list>
+
+#include "closing.hpp"
+#include "newton.hpp"
+
+#ifndef STIFFMAP_LEVEL
+#define STIFFMAP_LEVEL "base"
+#endif
+
+namespace stiffmap::kernel {
+namespace {
+
+template <class T>
+T* take(char*& at, std::int64_t count) {
+  T* out = reinterpret_cast<T*>(at);
+  at += (static_cast<std::int64_t>(sizeof(T)) * count + 63) / 64 * 64;
+  return out;
+}
+
+Scratch lay_out(const Program& P, void* memory, std::int64_t* bytes) {
+  char* at = reinterpret_cast<char*>((reinterpret_cast<std::uintptr_t>(memory) + 63) / 64 * 64);
+  char* const begin = at;
+  Scratch s;
+  s.joints = take<JointSlot>(at, P.joint_slots);
+  s.stiff = take<StiffSlot>(at, P.stiff_slots);
+  s.branches = take<BranchSlot>(at, P.chain_count);
+  const int n = P.coordinate_count;
+  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed}) *v = take<V>(at, n);
+  if (bytes) *bytes = at - begin + 64;
+  return s;
+}
+
+std::int64_t scratch_size(const Program* P) {
+  std::int64_t bytes = 0;
+  lay_out(*P, nullptr, &bytes);
+  return bytes;
+}
+
+/// One block of W poses; lanes beyond `count` repeat the last pose and are not written.
+struct Block {
+  const Program& P;
+  const KernelInput& in;
+  const KernelOutput& out;
+  Scratch& s;
+  std::int64_t first;
+  int count;
+  Frame command;
+  V6 load;
+
+  std::int64_t pose(int lane) const { return first + (lane < count ? lane : count - 1); }
+
+  static void set(V3& v, int lane, const double* a, int stride = 1) {
+    v.x[lane] = a[0];
+    v.y[lane] = a[stride];
+    v.z[lane] = a[2 * stride];
+  }
+
+  M read() {
+    M usable{};
+    for (int i = 0; i < W; ++i) {
+      const std::int64_t k = pose(i);
+      set(command.p, i, in.position + 3 * k);
+      for (int c = 0; c < 3; ++c) set(command.R.c[c], i, in.rotation + 9 * k + c, 3);
+      set(load.a, i, in.wrench + 6 * k);
+      set(load.b, i, in.wrench + 6 * k + 3);
+      usable[i] = start(k, i) ? -1 : 0;
+    }
+    return usable;
+  }
+
+  bool start(std::int64_t k, int lane) {
+    for (int q = 0; q < P.coordinate_count; ++q) s.x[q][lane] = P.coordinates[q].role == 2 ? 0 : P.coordinates[q].home;
+    if (!in.start) return P.grid && Closing{P, s}.start(in.position + 3 * k, lane);
+    const double* x = in.start + P.coordinate_count * k;
+    bool finite = true;
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      s.x[q][lane] = x[q];
+      finite = finite && x[q] == x[q];
+    }
+    return finite;
+  }
+
+  /// Drives with their errors; every coordinate's value at zero deflection (theory G1, G2).
+  void set_base() {
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      const CoordinateProgram& k = P.coordinates[q];
+      const bool sprung = k.role == 1 && k.law >= 0;
+      s.closed[q] = s.x[q];
+      s.a_base[q] = k.role == 2 ? splat(0) : sprung ? splat(k.home) : s.x[q];
+      s.z[q] = sprung ? s.x[q] - k.home : splat(0);
+      s.scale[q] = s.da[q] = splat(1);
+      s.tau[q] = s.dtau[q] = splat(0);
+    }
+    for (int d = 0; d < P.drive_count; ++d) {
+      const DriveProgram& k = P.drives[d];
+      if (k.compliance_slope != 0) s.scale[k.coordinate] = 1.0 + k.compliance_slope * (s.x[k.coordinate] - k.home);
+    }
+    for (int i = 0; i < P.error_count; ++i) {
+      const CommandErrorProgram& k = P.errors[i];
+      const V u = s.x[k.coordinate] - k.reference;
+      V wave = splat(0), unused;
+      if (k.amplitude != 0) sincos(u * (2 * 3.14159265358979323846 / k.period) + k.phase, wave, unused);
+      s.a_base[k.coordinate] += k.offset + k.slope * u + k.amplitude * wave;
+    }
+  }
+
+  void run() {
+    M usable = read();
+    if (!in.start) usable &= Closing{P, s}.close(command);
+    set_base();
+    for (int k = 0; k < P.chain_count; ++k) s.branches[k].F = V6{};
+    const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
+    Elimination e{P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
+    Newton newton{P, in, s, e, load, {}, {}, {}, {}};
+    V iterations = splat(0);
+    M done = newton.solve(usable, P.has_knots, iterations);
+    newton.evaluate(false);
+    newton.linearize();
+    V K[6][6], C[6][6];
+    newton.dense(K);
+    newton.dense(C);
+    newton.invert(C);
+    done &= e.lowest > Newton::pivot_floor;
+    write(done, newton, K, C, iterations);
+  }
+
+  void write(M done, const Newton& newton, const V (&K)[6][6], const V (&C)[6][6], V iterations) {
+    const V3 offset{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
+    const V6 d{newton.point - (command.p + command.R * offset), rotation_between(command.R, newton.tip.R)};
+    V moved[6];
+    put(d, moved);
+    for (int i = 0; i < count; ++i) {
+      const std::int64_t k = first + i;
+      out.done[k] = done[i] ? 1 : 0;
+      if (!done[i]) continue;
+      for (int r = 0; r < 6; ++r) out.displacement[6 * k + r] = moved[r][i];
+      if (out.stiffness)
+        for (int r = 0; r < 6; ++r)
+          for (int c = 0; c < 6; ++c) out.stiffness[36 * k + 6 * r + c] = K[r][c][i];
+      if (out.compliance)
+        for (int r = 0; r < 6; ++r)
+          for (int c = 0; c < 6; ++c) out.compliance[36 * k + 6 * r + c] = C[r][c][i];
+      if (out.iterations) out.iterations[k] = static_cast<std::int32_t>(iterations[i]);
+      if (out.coordinates)
+        for (int q = 0; q < P.coordinate_count; ++q) out.coordinates[P.coordinate_count * k + q] = s.x[q][i];
+    }
+    write_efforts(done, newton);
+  }
+
+  void write_efforts(M done, const Newton& newton) {
+    V high = splat(0), range = splat(0), limit = splat(0);
+    for (int d = 0; d < P.drive_count; ++d) {
+      const DriveProgram& k = P.drives[d];
+      const JointSlot& j = s.joints[k.slot];
+      const V effort = P.coordinates[k.coordinate].locked ? -dot(j.w, k.prismatic ? j.F.a : j.F.b) : -s.tau[k.coordinate];
+      high = select(absolute(effort) > k.force_limit, splat(1), high);
+      if (out.effort)
+        for (int i = 0; i < count; ++i)
+          if (done[i]) out.effort[P.drive_count * (first + i) + d] = effort[i];
+    }
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      const CoordinateProgram& k = P.coordinates[q];
+      const M off = (s.closed[q] < k.lower) | (s.closed[q] > k.upper);
+      if (k.role == 0) range = select(off, splat(1), range);
+      if (k.role == 1) limit = select(off, splat(1), limit);
+    }
+    for (int i = 0; i < count; ++i)
+      if (done[i])
+        out.flags[first + i] = (high[i] > 0 ? P.flag_force : 0u) | (range[i] > 0 ? P.flag_range : 0u) |
+                               (limit[i] > 0 ? P.flag_limit : 0u) | P.flag_always;
+    if (!out.leg_wrench || P.legs_op < 0) return;
+    const Op& block = P.ops[P.legs_op];
+    for (int b = 0; b < block.count; ++b) {
+      const BranchSlot& branch = s.branches[block.first + b];
+      const V3 m = branch.F.b + cross(branch.end.p - newton.point, branch.F.a);
+      const V w[6] = {-branch.F.a.x, -branch.F.a.y, -branch.F.a.z, -m.x, -m.y, -m.z};
+      for (int i = 0; i < count; ++i)
+        if (done[i])
+          for (int r = 0; r < 6; ++r) out.leg_wrench[6 * (block.count * (first + i) + b) + r] = w[r][i];
+    }
+  }
+};
+
+void run(const Program* P, const KernelInput* in, const KernelOutput* out, std::int64_t begin, std::int64_t end,
+         void* scratch) {
+  Scratch s = lay_out(*P, scratch, nullptr);
+  for (std::int64_t i = begin; i < end; i += W) {
+    const int count = static_cast<int>(end - i < W ? end - i : W);
+    Block block{*P, *in, *out, s, i, count, {}, {}};
+    block.run();
+  }
+}
+
+}  // namespace
+}  // namespace stiffmap::kernel
+
+extern "C" __attribute__((visibility("default"))) void STIFFMAP_ENTRY(stiffmap::KernelTable* table) {
+  *table = {STIFFMAP_LEVEL, stiffmap::kernel::W, &stiffmap::kernel::scratch_size, &stiffmap::kernel::run};
+}

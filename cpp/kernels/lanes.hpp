@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+// One number for each of W poses at once. GCC's vector types compile to SSE2, AVX2, AVX-512 or NEON;
+// W follows the level that this file is compiled for (docs/fast_path.md).
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#ifndef STIFFMAP_LANES
+#define STIFFMAP_LANES 2
+#endif
+
+namespace stiffmap::kernel {
+
+inline constexpr int W = STIFFMAP_LANES;
+using V = double __attribute__((vector_size(8 * W)));
+using M = std::int64_t __attribute__((vector_size(8 * W)));  // lane masks: all bits set or none
+
+inline V splat(double x) { return V{} + x; }
+inline V select(M m, V a, V b) { return m ? a : b; }
+inline V absolute(V x) { return x < 0.0 ? -x : x; }
+inline V larger(V a, V b) { return a > b ? a : b; }
+inline bool any(M m) {
+  std::int64_t out = 0;
+  for (int i = 0; i < W; ++i) out |= m[i];
+  return out != 0;
+}
+inline bool all(M m) {
+  std::int64_t out = -1;
+  for (int i = 0; i < W; ++i) out &= m[i];
+  return out != 0;
+}
+inline V root(V x) {
+  V out{};
+  for (int i = 0; i < W; ++i) out[i] = __builtin_sqrt(x[i]);
+  return out;
+}
+
+/// Sine and cosine: reduction to |r| <= pi/4 in three parts, then the Taylor-like minimax polynomials
+/// of degree 13 and 14; error below 2 ulp for |x| < 1e4.
+inline void sincos(V x, V& s, V& c) {
+  constexpr double two_over_pi = 0.63661977236758134308;
+  constexpr double a = 1.57079632673412561417e+00, b = 6.07710050630396597660e-11, d = 2.02226624879595063154e-21;
+  constexpr double shift = 6755399441055744.0;  // 1.5 * 2^52: rounds to the nearest whole number
+  const V k = (x * two_over_pi + shift) - shift;
+  const V r = ((x - k * a) - k * b) - k * d;
+  const V z = r * r;
+  const V ps = r + r * z * (-1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 + z * (-1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
+  const V pc = 1.0 - 0.5 * z + z * z * (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * (2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 + z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
+  const M q = __builtin_convertvector(k, M);
+  const M swap = (q & 1) != 0, negs = (q & 2) != 0, negc = ((q + 1) & 2) != 0;
+  const V s0 = swap ? pc : ps, c0 = swap ? ps : pc;
+  s = negs ? -s0 : s0;
+  c = negc ? -c0 : c0;
+}
+
+struct V3 {
+  V x, y, z;
+};
+inline V3 operator+(const V3& a, const V3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline V3 operator-(const V3& a, const V3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline V3 operator*(V s, const V3& a) { return {s * a.x, s * a.y, s * a.z}; }
+inline V dot(const V3& a, const V3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline V3 cross(const V3& a, const V3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline V3 select(M m, const V3& a, const V3& b) { return {select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)}; }
+
+/// Three columns.
+struct M3 {
+  V3 c[3];
+};
+inline V3 operator*(const M3& R, const V3& a) { return a.x * R.c[0] + a.y * R.c[1] + a.z * R.c[2]; }
+inline M3 operator*(const M3& A, const M3& B) { return {{A * B.c[0], A * B.c[1], A * B.c[2]}}; }
+/// Transposed times a vector.
+inline V3 operator%(const M3& R, const V3& a) { return {dot(R.c[0], a), dot(R.c[1], a), dot(R.c[2], a)}; }
+
+struct Frame {
+  V3 p;
+  M3 R;
+};
+
+/// Wrench (f, m) or twist (v, w): linear first.
+struct V6 {
+  V3 a, b;
+};
+inline V6 operator+(const V6& x, const V6& y) { return {x.a + y.a, x.b + y.b}; }
+inline V6 operator-(const V6& x, const V6& y) { return {x.a - y.a, x.b - y.b}; }
+inline V6 operator*(V s, const V6& x) { return {s * x.a, s * x.b}; }
+inline V dot(const V6& x, const V6& y) { return dot(x.a, y.a) + dot(x.b, y.b); }
+
+}  // namespace stiffmap::kernel

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MIT
+// Equilibrium of a block of poses: laws, Newton by the elimination, trust test per lane.
+#pragma once
+
+#include "elimination.hpp"
+
+namespace stiffmap::kernel {
+
+struct Newton {
+  const Program& P;
+  const KernelInput& in;
+  Scratch& s;
+  Elimination& e;
+  V6 load;            ///< external wrench at the point, base axes
+  Frame tip;          ///< frame of the tip; the point is tip.p + tip.R point
+  V3 point;
+  Sym6 K;             ///< symmetric tangent at the point
+  V6 c;
+
+  // ---- laws -----------------------------------------------------------------------------------
+  void law_at(const LawProgram& law, int q) {
+    const V k = law.stiffness / s.scale[q], z = s.z[q];
+    if (law.count == 0) {
+      s.tau[q] = (k + law.cubic * z * z) * z;
+      s.da[q] = splat(1);
+      s.dtau[q] = k + 3 * law.cubic * z * z;
+      s.x[q] = s.a_base[q] + z;
+      return;
+    }
+    const double* n = P.knots + 3 * law.first;
+    const double* last = n + 3 * (law.count - 1);
+    // Beyond the ends with the drive's own slope, then the pieces between.
+    const V beyond = s.scale[q] / (1.0 + s.scale[q]);
+    const M low = z <= n[2];
+    const V a0 = select(low, splat(n[0]), splat(last[0])), t0 = select(low, splat(n[1]), splat(last[1]));
+    const V z0 = select(low, splat(n[2]), splat(last[2]));
+    V a = a0 + beyond * (z - z0), tau = t0 + k * beyond * (z - z0), da = beyond, dtau = k * beyond;
+    for (int i = 1; i < law.count; ++i) {
+      const double* u = n + 3 * (i - 1);
+      const double width = u[5] - u[2];
+      const M inside = (z > u[2]) & (z < u[5]);
+      const M edge = (i > 1) ? (z == u[2]) : (z != z);
+      const M here = inside | edge;
+      const V share = (z - u[2]) * (1 / width);
+      a = select(here, u[0] + share * (u[3] - u[0]), a);
+      tau = select(here, u[1] + share * (u[4] - u[1]), tau);
+      da = select(here, splat((u[3] - u[0]) / width), da);
+      dtau = select(here, splat((u[4] - u[1]) / width), dtau);
+    }
+    s.tau[q] = tau;
+    s.da[q] = da;
+    s.dtau[q] = dtau;
+    s.x[q] = s.a_base[q] + a;
+  }
+
+  /// Where the law carries the force that the linear start found: middle of a gap.
+  double from_force(const LawProgram& law, double tau, double scale) const {
+    const double* n = P.knots + 3 * law.first;
+    const double* last = n + 3 * (law.count - 1);
+    const double k = law.stiffness / scale;
+    const double* end = tau <= n[1] ? n : tau > last[1] ? last : nullptr;
+    if (end) return end[2] + (tau - end[1]) / k + (tau - end[1]) / law.stiffness;
+    double lo = n[2], hi = last[2];
+    for (int i = 1; i < law.count; ++i) {
+      const double *u = n + 3 * (i - 1), *v = u + 3;
+      if (v[1] < tau) lo = v[2];
+      else if (v[1] > u[1] && u[1] < tau) lo = u[2] + (tau - u[1]) / (v[1] - u[1]) * (v[2] - u[2]);
+    }
+    for (int i = law.count; i-- > 1;) {
+      const double *u = n + 3 * (i - 1), *v = u + 3;
+      if (u[1] > tau) hi = u[2];
+      else if (v[1] > u[1] && v[1] > tau) hi = u[2] + (tau - u[1]) / (v[1] - u[1]) * (v[2] - u[2]);
+    }
+    return 0.5 * (lo + hi);
+  }
+
+  void evaluate(bool secant) {
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      const CoordinateProgram& k = P.coordinates[q];
+      if (k.law < 0 || k.locked) {
+        s.x[q] = s.a_base[q] + s.z[q];
+        continue;
+      }
+      const LawProgram& law = P.laws[k.law];
+      if (!secant) {
+        law_at(law, q);
+        continue;
+      }
+      s.x[q] = s.a_base[q];
+      s.tau[q] = splat(0);
+      s.da[q] = splat(1);
+      s.dtau[q] = law.stiffness / s.scale[q];
+    }
+  }
+
+  void start_laws(M active) {
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      const CoordinateProgram& k = P.coordinates[q];
+      if (k.law < 0 || k.locked) continue;
+      const LawProgram& law = P.laws[k.law];
+      if (law.count == 0) continue;
+      for (int i = 0; i < W; ++i)
+        if (active[i]) s.z[q][i] = from_force(law, law.stiffness / s.scale[q][i] * s.z[q][i], s.scale[q][i]);
+    }
+  }
+
+  // ---- one linearisation ----------------------------------------------------------------------
+  void linearize() {
+    tip = {{splat(0), splat(0), splat(0)}, {{{splat(1), splat(0), splat(0)}, {splat(0), splat(1), splat(0)}, {splat(0), splat(0), splat(1)}}}};
+    walk<Build::actual>(P, P.chains[P.root], s.x, tip, s);
+    point = tip.p;
+    if (in.point[0] != 0 || in.point[1] != 0 || in.point[2] != 0)
+      point = point + tip.R * V3{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
+    V6 F = load;
+    V3 at = point;
+    e.wrenches(P.chains[P.root], F, at);
+    e.lowest = splat(1e300);
+    e.tangent(P.chains[P.root], load, point, K, c);
+  }
+
+  /// Tangent of a small extra dead wrench at the point, K - S(m)/2 in the rotational block.
+  void dense(V (&m)[6][6]) const {
+    unpack(K, m);
+    const V3 h = splat(0.5) * load.b;
+    m[3][4] += h.z; m[3][5] -= h.y; m[4][3] -= h.z; m[4][5] += h.x; m[5][3] += h.y; m[5][4] -= h.x;
+  }
+
+  /// Inverse without pivoting: the symmetric part is positive definite where it is used.
+  void invert(V (&m)[6][6]) {
+    V x[6][6];
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j) x[i][j] = splat(i == j ? 1 : 0);
+    for (int k = 0; k < 6; ++k) {
+      const V relative = m[k][k] * (1 / (e.scale[k] * e.scale[k]));
+      e.lowest = e.lowest < relative ? e.lowest : relative;
+      const V inverse = 1.0 / m[k][k];
+      for (int j = 0; j < 6; ++j) {
+        if (j > k) m[k][j] *= inverse;
+        if (j <= k) x[k][j] *= inverse;
+      }
+      for (int i = 0; i < 6; ++i) {
+        if (i == k) continue;
+        const V f = m[i][k];
+        for (int j = 0; j < 6; ++j) {
+          if (j > k) m[i][j] -= f * m[k][j];
+          if (j <= k) x[i][j] -= f * x[k][j];
+        }
+      }
+    }
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j) m[i][j] = x[i][j];
+  }
+
+  V step_norm() const {
+    V worst = splat(0);
+    for (int q = 0; q < P.coordinate_count; ++q) worst = larger(worst, absolute(s.dz[q]) * P.coordinates[q].unit);
+    return worst * (1 / P.length);
+  }
+
+  /// Iterates until every lane converged or is left to the reference path; lanes never wait for
+  /// the answer of others, only for their time.
+  M solve(M usable, bool knots, V& iterations) {
+    M done = ~usable & usable, failed = ~usable;
+    V previous = splat(0);
+    for (int k = 0; k < in.max_iterations; ++k) {
+      const bool secant = knots && k == 0;
+      evaluate(secant);
+      linearize();
+      V m[6][6];
+      dense(m);
+      invert(m);
+      failed |= ~done & ~(e.lowest > pivot_floor);
+      V rhs[6], eta[6];
+      put(c, rhs);
+      for (int i = 0; i < 6; ++i) {
+        eta[i] = splat(0);
+        for (int j = 0; j < 6; ++j) eta[i] -= m[i][j] * rhs[j];
+      }
+      const M active = ~done & ~failed;
+      for (int q = 0; q < P.coordinate_count; ++q) s.dz[q] = splat(0);
+      e.back(P.chains[P.root], get(eta), point, V3{}, active);
+      const V norm = step_norm();
+      failed |= active & ~(norm < 1e6);
+      for (int q = 0; q < P.coordinate_count; ++q) s.z[q] = select(active, s.z[q] + s.dz[q], s.z[q]);
+      iterations = select(active, iterations + 1.0, iterations);
+      if (secant) {
+        start_laws(active);
+        continue;
+      }
+      done |= active & (norm < in.tolerance);
+      if (!knots) {
+        failed |= active & ~done & ~(norm <= 0.2);
+        if (k > 0) failed |= active & ~done & ~((norm <= 0.2 * previous) | (norm <= 1e-7));
+      }
+      previous = norm;
+      if (all(done | failed)) break;
+    }
+    return done & ~failed;
+  }
+
+  static constexpr double pivot_floor = 1e-5;
+};
+
+}  // namespace stiffmap::kernel

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: MIT
+// A mechanism as plain data that every instruction-set level can read: no Eigen, no templates, no
+// code. Chains are lists of operations; a block operation names the chains of its branches.
+#pragma once
+
+#include <cstdint>
+
+namespace stiffmap {
+
+enum class OpKind : std::int32_t { revolute, prismatic, spring, block, load };
+
+/// Constant transform before an operation.
+struct Constant {
+  double p[3], R[9];  ///< R by columns
+  std::int32_t has_rotation, has_translation;
+};
+
+struct Op {
+  OpKind kind;
+  std::int32_t coordinate;  ///< first coordinate of a joint or spring; -1 otherwise
+  std::int32_t eliminated;  ///< 0: the coordinate is held (rigid drive, locked spin)
+  std::int32_t axis;        ///< 0, 1, 2: unit axis; 3: `direction`
+  std::int32_t law;         ///< index into laws, -1: none
+  std::int32_t first, count;  ///< block: its chains are first .. first+count-1
+  std::int32_t wrench;      ///< block: index of the wrench of its second branch
+  std::int32_t start_moves; ///< block: its start frame is not fixed to the base
+  std::int32_t slot;        ///< place of its intermediate results
+  double direction[3];
+  double K[36], rest[6];    ///< spring
+  double mass, com[3];      ///< load: a body's weight
+  Constant nominal, actual; ///< before the operation
+};
+
+struct ChainProgram {
+  std::int32_t first, count;  ///< operations
+  std::int32_t first_stiff;   ///< the first spring or block: what comes before starts from rigid
+  Constant nominal, actual;   ///< after the last operation
+};
+
+/// Polyline in (a, tau) by knots, or linear with a cubic term: see Law.
+struct LawProgram {
+  double stiffness, cubic;
+  std::int32_t first, count;  ///< knots
+};
+
+struct CommandErrorProgram {
+  std::int32_t coordinate;
+  double offset, slope, amplitude, period, phase, reference;
+};
+
+struct DriveProgram {
+  std::int32_t coordinate, slot, prismatic;
+  double home, compliance_slope, force_limit;
+};
+
+struct CoordinateProgram {
+  double home, lower, upper, unit;
+  std::int32_t role, locked, law;
+};
+
+/// One closure equation set of a leg: the leg's end or a loop inside it.
+struct ClosureTerm {
+  std::int32_t unknown;  ///< local to the leg
+  std::int32_t slot;     ///< of the joint's operation
+  std::int32_t prismatic;
+  double sign;           ///< +1 moves the end, -1 the loop's primary
+};
+struct ClosureEquation {
+  std::int32_t chain, primary;  ///< chains whose ends meet; primary < 0: the commanded frame
+  std::int32_t first, count;    ///< terms
+};
+struct LegClosure {
+  std::int32_t first_equation, equations;
+  std::int32_t first_unknown, unknowns;  ///< into unknown coordinates
+};
+
+struct Program {
+  const Op* ops;
+  const ChainProgram* chains;
+  const LawProgram* laws;
+  const double* knots;  ///< (a, tau, z) triples
+  const CommandErrorProgram* errors;
+  const DriveProgram* drives;
+  const CoordinateProgram* coordinates;
+  const LegClosure* legs;
+  const ClosureEquation* equations;
+  const ClosureTerm* terms;
+  const std::int32_t* unknowns;
+  const double* grid;      ///< closure starts: nodes x unknowns of all legs, NaN where unreachable
+  std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count;
+  std::int32_t root, legs_op;  ///< root chain; the legs' block operation
+  std::int32_t joint_slots, stiff_slots;
+  std::int32_t closes;         ///< the legs can be closed one by one from the grid
+  std::int32_t exact_weights;  ///< the tangent is exact with the bodies' weight too
+  std::int32_t has_knots;
+  std::uint32_t flag_force, flag_range, flag_limit, flag_always;
+  std::int32_t grid_n[3];
+  double grid_low[3], grid_step[3];
+  double length, stiffness;
+  double home_R[9];
+};
+
+/// What each pose asks, row-major.
+struct KernelInput {
+  std::int64_t count;
+  const double* position;   ///< count x 3
+  const double* rotation;   ///< count x 9
+  const double* wrench;     ///< count x 6 at the point
+  const double* start;      ///< count x coordinates: closed configurations; null: interpolate the grid
+  double gravity[3];
+  double point[3];          ///< reference point in the tip frame
+  std::int32_t want_stiffness, max_iterations;
+  double tolerance;
+};
+
+/// Row-major answers; null: not wanted. `done` is 0 where the pose needs the reference path.
+struct KernelOutput {
+  double *displacement, *stiffness, *compliance, *effort, *leg_wrench, *coordinates;
+  std::uint8_t* done;
+  std::uint32_t* flags;
+  std::int32_t* iterations;
+};
+
+/// The one symbol that each level exports. Poses begin .. end-1; `scratch` of scratch_size() bytes.
+struct KernelTable {
+  const char* level;
+  std::int32_t lanes;
+  std::int64_t (*scratch_size)(const Program*);
+  void (*run)(const Program*, const KernelInput*, const KernelOutput*, std::int64_t begin, std::int64_t end, void* scratch);
+};
+
+}  // namespace stiffmap

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+// Intermediate results of one block of poses, kept between the passes.
+#pragma once
+
+#include "program.hpp"
+#include "sym6.hpp"
+
+namespace stiffmap::kernel {
+
+struct JointSlot {
+  V3 w, o;   ///< axis and origin, base axes
+  V6 F;      ///< transmitted wrench at o
+  V6 J, u;   ///< column and row of the rank-one step at its node
+  V inverse, y;
+};
+
+struct StiffSlot {  // a spring or a block: six relative coordinates between two frames
+  Frame start;      ///< frame before it
+  M3 Z;             ///< spring: moments by its own coordinates
+  V3 p;             ///< point behind it
+  V6 F;             ///< transmitted wrench at p
+  V L[6][6], inverse[6], X[6][6], y[6];  ///< elimination of its relative twist
+};
+
+struct BranchSlot {
+  Frame end;
+  V6 F;      ///< wrench that acts on its end
+  V6 error;  ///< twist from its end to the end of the block's first branch
+  Sym6 K;
+  V6 c;
+};
+
+/// All scratch of a thread, laid out once in one piece of memory.
+struct Scratch {
+  JointSlot* joints;
+  StiffSlot* stiff;
+  BranchSlot* branches;  ///< per chain
+  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed;
+};
+
+}  // namespace stiffmap::kernel
