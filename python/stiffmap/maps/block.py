@@ -25,7 +25,9 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
         fan = even_fan(plan.loading, position, plan.force, plan.axes, plan.directions)
         out["direction_status"] = fan.status.max(axis=1)
         for suffix, parts in (("", ALL), (f"_{plan.shown_plane}", plan.axes)):
-            out |= _extremes(plan, position, fan, parts, suffix)
+            values, status = _extremes(plan, position, fan, parts, suffix)
+            out |= values
+            out["direction_status"] = np.maximum(out["direction_status"], status)
     return out
 
 
@@ -46,15 +48,16 @@ def _loads(plan: MapPlan, position: Floats) -> dict[str, Any]:
 
 def _extremes(
     plan: MapPlan, position: Floats, fan: Fan, parts: tuple[int, ...], suffix: str
-) -> dict[str, Floats]:
+) -> tuple[dict[str, Floats], Any]:
     worst, best = (
         find_extreme(plan.loading, position, plan.force, plan.axes, fan, parts, sign) for sign in (1, -1)
     )
     limit = force_limit(plan.loading, position, plan.force, plan.axes, worst, parts, plan.tolerance)
-    return {
+    values = {
         f"worst_deflection{suffix}": worst.value,
         f"worst_direction{suffix}": worst.angle,
         f"best_deflection{suffix}": best.value,
         f"best_direction{suffix}": best.angle,
         f"force_limit{suffix}": np.where(np.isnan(worst.value), np.nan, limit),
     }
+    return values, np.maximum(worst.status, best.status)

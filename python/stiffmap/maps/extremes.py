@@ -34,6 +34,8 @@ class Extreme:
     """Norm of the components looked at, m."""
     growth: Floats
     """Change of the value with the force, m/N."""
+    status: NDArray[np.uint8]
+    """Highest status among all directions solved."""
 
 
 def find_extreme(
@@ -60,7 +62,8 @@ def most_extreme(fan: Fan, parts: tuple[int, ...], sign: int) -> Extreme:
     size = norm(best.translation[..., parts])[:, 0]
     growth = value_growth(best.translation[..., parts], best.growing[..., parts])[:, 0]
     angle = np.mod(best.angle[:, 0] + np.pi, 2 * np.pi) - np.pi
-    return Extreme(*(np.where(failed, np.nan, a) for a in (angle, size, growth)))
+    angle, size, growth = (np.where(failed, np.nan, a) for a in (angle, size, growth))
+    return Extreme(angle, size, growth, fan.status.max(axis=1))
 
 
 def value_growth(d: Floats, growing: Floats) -> Floats:

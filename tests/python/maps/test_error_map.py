@@ -143,3 +143,13 @@ def test_the_call_makes_the_map_again(machine: sm.Machine, ds: xr.Dataset) -> No
     call = json.loads(ds.attrs["call"])
     assert call.pop("function") == "error_map"
     assert sm.error_map(machine, **call).identical(ds)
+
+
+def test_every_value_that_is_missing_has_a_status(machine: sm.Machine) -> None:
+    x = np.linspace(-0.9, 0.9, 9)
+    ds = sm.error_map(machine, x=x, y=x, z=0.0, wrench=[2000.0, 0, 0, 0, 0, 0])
+    assert set(np.unique(ds.direction_status)) >= {0, 1, 3}
+    for suffix in ("", "_xy"):
+        np.testing.assert_array_equal(np.isfinite(ds[f"worst_deflection{suffix}"]), ds.direction_status == 0)
+        np.testing.assert_array_equal(np.isfinite(ds[f"best_deflection{suffix}"]), ds.direction_status == 0)
+    np.testing.assert_array_equal(np.isfinite(ds.deflection), ds.status == 0)

@@ -1,0 +1,14 @@
+"""Pictures for papers and screens: functions that return a matplotlib Figure, and `save`.
+
+Lengths in mm, angles in deg; colours that a colour-blind reader can tell apart; failed poses hatched,
+never shown as a value. No display is needed.
+"""
+
+from stiffmap.plot.ellipses import ellipse_figure
+from stiffmap.plot.error_maps import map_figure
+from stiffmap.plot.machines import machine_figure
+from stiffmap.plot.polars import polar_figure
+from stiffmap.plot.style import save
+from stiffmap.plot.sweeps import sweep_figure
+
+__all__ = ["ellipse_figure", "machine_figure", "map_figure", "polar_figure", "save", "sweep_figure"]

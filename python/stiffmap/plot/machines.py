@@ -1,0 +1,79 @@
+"""A machine in three dimensions."""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from stiffmap.broadcasting import Floats
+from stiffmap.errors import StiffmapError
+from stiffmap.kinematics import inverse_kinematics
+from stiffmap.machine import Machine
+from stiffmap.plot.skeleton import Skeleton, skeleton
+from stiffmap.plot.style import BLACK, CYCLE, MM, new_figure, paper_style
+from stiffmap.status import Status
+
+
+def machine_figure(
+    machine: Machine,
+    position: ArrayLike | None = None,
+    *,
+    rotation: ArrayLike | None = None,
+    view: tuple[float, float] = (22.0, 35.0),
+) -> Figure:
+    """The machine at a commanded TCP pose (m, base axes; None: home), springs at rest.
+
+    `view`: elevation and azimuth in deg. Raises StiffmapError where the pose cannot be reached.
+    """
+    p = machine.description.home.p if position is None else np.asarray(position, dtype=float)
+    k = inverse_kinematics(machine, p, rotation)
+    if int(k.status) != Status.CONVERGED:
+        where = ", ".join(f"{MM * v:g}" for v in p)
+        raise StiffmapError(
+            f"position: {machine.name} cannot be drawn at ({where}) mm: {Status(int(k.status)).name}"
+        )
+    with paper_style():
+        figure = new_figure(5.6, 5.2)
+        ax: Any = figure.add_subplot(projection="3d")
+        draw_skeleton(ax, skeleton(machine, k.coordinates), machine.legs)
+        if machine.description.workspace is not None:
+            draw_box(ax, machine.workspace)
+        ax.set_aspect("equal")
+        ax.view_init(*view)
+        ax.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
+        ax.set_title(f"{machine.name} at ({', '.join(f'{MM * v:g}' for v in p)}) mm", fontsize=10)
+        figure.legend(loc="outside lower center", ncols=4)
+    return figure
+
+
+def draw_skeleton(ax: Any, s: Skeleton, legs: tuple[str, ...]) -> None:
+    """Guides, links, joints, TCP."""
+    colours = {leg: CYCLE[i % len(CYCLE)] for i, leg in enumerate(legs)} | {"": BLACK}
+    for _, ends in s.guides:
+        ax.plot(*(MM * ends.T), color="0.75", lw=5, solid_capstyle="butt", zorder=1)
+    named: set[str] = set()
+    for leg, ends in s.links:
+        label = None if leg in named or not leg else f"leg {leg}"
+        named.add(leg)
+        ax.plot(*(MM * ends.T), color=colours[leg], lw=2, label=label)
+    if s.guides:
+        ax.plot([], [], color="0.75", lw=5, label="travel of a drive")
+    ax.scatter(*(MM * s.actuators.T), marker="s", s=32, color=BLACK, label="actuator", depthshade=False)
+    ax.scatter(*(MM * s.passive.T), marker="o", s=12, facecolor="white", edgecolor=BLACK, linewidth=0.8,
+               label="passive joint", depthshade=False)  # fmt: skip
+    ax.scatter(*(MM * s.tcp), marker="*", s=110, color=CYCLE[4], edgecolor=BLACK, linewidth=0.5, label="TCP",
+               depthshade=False)  # fmt: skip
+
+
+def draw_box(ax: Any, box: Floats) -> None:
+    """Edges of the workspace box (2, 3) m."""
+    corners = list(product(*(MM * box.T)))
+    label: str | None = "workspace"
+    for a, b in combinations(corners, 2):
+        if sum(u != v for u, v in zip(a, b, strict=True)) == 1:
+            ax.plot(*zip(a, b, strict=True), color="0.5", lw=0.8, ls="--", label=label)
+            label = None

@@ -1,0 +1,88 @@
+"""The lines and joints of a machine at a configuration, from its mechanism's frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stiffmap.broadcasting import Floats
+from stiffmap.description import Block, Element, Joint
+from stiffmap.machine import Machine
+
+ACTUATOR, PASSIVE = 0, 1
+COINCIDENT = 1e-9
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Polylines and points in base axes, m."""
+
+    links: list[tuple[str, Floats]]
+    """Leg ("" for base and platform) and the two ends (2, 3) of each rigid piece."""
+    guides: list[tuple[str, Floats]]
+    """Leg and travel (2, 3) of each prismatic actuator."""
+    actuators: Floats
+    """(n, 3)."""
+    passive: Floats
+    """(n, 3)."""
+    tcp: Floats
+    """(3,)."""
+
+
+def skeleton(machine: Machine, coordinates: Floats) -> Skeleton:
+    """Geometry to draw at coordinates (springs at rest, or deflected)."""
+    core = machine._core
+    position, rotation = core.frames(coordinates)
+    owner = owners(core)
+    joints = dict(named_joints(machine))
+    links, guides, marks = [], [], {ACTUATOR: [], PASSIVE: []}  # type: ignore[var-annotated]
+    for i, (parent, c) in enumerate(core.nodes):
+        role = core.roles[c] if c >= 0 else None
+        if role in marks:
+            marks[role].append(position[i])
+        joint = joints.get(core.coordinates[c]) if c >= 0 else None
+        if joint is not None and joint.kind == "prismatic":
+            guides.append((owner[i], travel(joint, float(coordinates[c]), position[i], rotation[i])))
+        elif parent >= 0 and np.linalg.norm(position[i] - position[parent]) > COINCIDENT and parent != 0:
+            links.append((owner[i], position[[parent, i]]))
+    empty = np.zeros((0, 3))
+    return Skeleton(
+        links, guides, np.array(marks[ACTUATOR]).reshape(-1, 3) if marks[ACTUATOR] else empty,
+        np.array(marks[PASSIVE]).reshape(-1, 3) if marks[PASSIVE] else empty, position[-1],
+    )  # fmt: skip
+
+
+def owners(core: Any) -> list[str]:
+    """Leg that each node belongs to: that of its own coordinate, else its parent's."""
+    out: list[str] = []
+    last = max((end for block, _, _, end in core.loops if block == "legs"), default=len(core.nodes))
+    for i, (parent, c) in enumerate(core.nodes):
+        own = core.coordinates[c].split(".")[0] if c >= 0 else ""
+        inherited = out[parent] if parent >= 0 and i <= last else ""
+        out.append(own if own in core.legs else inherited)
+    return out
+
+
+def named_joints(machine: Machine) -> Iterator[tuple[str, Joint]]:
+    """Full names and joints of all legs."""
+    for leg in machine.description.legs:
+        yield from _joints(leg.elements, leg.name)
+
+
+def _joints(elements: tuple[Element, ...], prefix: str) -> Iterator[tuple[str, Joint]]:
+    for e in elements:
+        if isinstance(e, Joint):
+            yield f"{prefix}.{e.name}", e
+        elif isinstance(e, Block):
+            for branch in e.branches:
+                yield from _joints(branch.elements, f"{prefix}.{branch.name}")
+
+
+def travel(joint: Joint, value: float, position: Floats, rotation: Floats) -> Floats:
+    """Ends (2, 3) of a prismatic joint's range; where none is declared, from its zero to where it is."""
+    low, high = (joint.drive.range if joint.drive else None) or joint.limits or (0.0, value)
+    axis = rotation @ np.array(joint.axes[0])
+    return np.stack([position + axis * (low - value), position + axis * (high - value)])

@@ -1,0 +1,69 @@
+"""What all pictures share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from stiffmap.errors import FileError, StiffmapError
+
+MM = 1e3
+# Okabe and Ito's palette: eight colours that the common colour blindnesses keep apart.
+BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION, BLACK = (
+    "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000",
+)  # fmt: skip
+CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
+TOLERANCE = VERMILLION
+COLOURS = "cividis"
+
+SETTINGS: dict[str, Any] = {
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 9,
+    "legend.fontsize": 8,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "axes.linewidth": 0.6,
+    "hatch.linewidth": 0.6,
+    "legend.frameon": False,
+}
+
+
+@contextmanager
+def paper_style() -> Iterator[None]:
+    """Settings of a picture while it is drawn; the caller's own settings come back."""
+    with matplotlib.rc_context(dict[Any, Any](SETTINGS)):
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure (inches) that belongs to no window system."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def panel(index: int) -> str:
+    """(a), (b), (c) …"""
+    return f"({chr(ord('a') + index)})"
+
+
+def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> Path:
+    """Write a picture in the format that the file's name says.
+
+    Raises FileError where the file cannot be written, StiffmapError for an unknown format.
+    """
+    target = Path(path)
+    try:
+        with paper_style():
+            figure.savefig(target, dpi=dpi, metadata={"Software": None} if target.suffix == ".png" else None)
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror or error}", file=str(target)) from error
+    except ValueError as error:
+        raise StiffmapError(f"{target}: {error}") from error
+    return target
