@@ -19,9 +19,9 @@ from stiffmap.maps.fan import Fan, even_angles, solve_fan
 from stiffmap.maps.loading import Loading
 from stiffmap.maps.sums import dot, norm
 
-SCAN = 360
+SCAN = 72
 MAX_DEGREE = 11
-NEWTON_STEPS = 3
+NEWTON_STEPS = 5
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.maps.inputs import force_list, place, unit
+from stiffmap.maps.load_path import check_control, load_path
 from stiffmap.maps.loading import Loading, without_failed
 from stiffmap.maps.provenance import describe
 from stiffmap.maps.sums import dot, norm
@@ -18,8 +20,11 @@ def sweep(
     machine: Machine,
     position: ArrayLike,
     direction: ArrayLike,
-    forces: ArrayLike,
+    forces: ArrayLike | None = None,
     *,
+    control: str = "force",
+    limit: float | None = None,
+    steps: int = 40,
     point: str = "tcp",
     rotation: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
@@ -30,16 +35,33 @@ def sweep(
 ) -> xr.Dataset:
     """Deflection against the size of a force of one direction, at one position.
 
-    position (3,) m; direction (3,), any length; forces (n,) N, negative ones act against it. Each
-    force is reached from the unloaded machine. Other options as in `Machine.solve`.
+    With `forces` (control ``force``), each force is reached from the unloaded machine. With a `limit`,
+    one path of equilibria is followed from the unloaded machine, and what happens on the way is
+    reported: control ``force`` to a force `limit` (N), ``displacement`` to a displacement `limit` (m)
+    along the direction, which passes limit points (snap-through), ``arc`` by arc length to that
+    displacement, which passes turning points of either.
+
+    position (3,) m; direction (3,), any length; forces (n,) N, negative ones act against it;
+    limit of either sign; steps to the limit. Other options as in `Machine.solve`.
 
     Returns a Dataset with dimension ``force``: displacement, deflection, deflection_xy,
     deflection_along (component along the force), compliance_along (of a little more force, m/N),
     status, flags. Unstable equilibria keep their values (status 3); unreachable and not converged
-    ones hold NaN. Raises StiffmapError for bad input.
+    ones hold NaN. A path has the dimension ``step`` with the coordinate force, also unstable_modes
+    (number of directions in which the energy falls), and the dimension ``critical``: critical_force,
+    critical_kind (``limit`` or ``bifurcation``: there the path goes on along the branch it came on, and
+    another one crosses), mode over ``coordinate``, mode_leg and mode_joint (what moves most in it);
+    the attribute ``end`` says why it ended. Raises StiffmapError for bad input.
     """
     loading = Loading(machine, point, rotation, gravity, load_type, method, load_steps, threads)
-    p, u, f = place(position), unit(direction), force_list(forces)
+    p, u = place(position), unit(direction)
+    if forces is None or control != "force":
+        if forces is not None:
+            raise StiffmapError(f"forces: not with control {control!r}, which finds them; give a limit (m)")
+        return load_path(loading, p, u, control, check_control(control, limit, steps, load_type), steps)
+    if limit is not None:
+        raise StiffmapError("limit: not together with forces")
+    f = force_list(forces)
     wrench = np.concatenate([f[:, None] * u, np.zeros((f.size, 3))], axis=1)
     s = loading.solve(p, wrench)
     d = without_failed(s.displacement, s.status, keep_unstable=True)

@@ -1,0 +1,72 @@
+"""Critical points of a load path: kind, load and mode, with the leg and the joint that move most."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from stiffmap.broadcasting import Floats
+from stiffmap.machine import Machine
+from stiffmap.maps.variables import meaning
+
+SPRING = 2
+
+
+def critical_variables(
+    machine: Machine, critical: list[dict[str, Any]]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables and coordinates over the dimensions ``critical`` and ``coordinate``."""
+    names = list(machine._core.coordinates)
+    modes = np.array([c["mode"] for c in critical]).reshape(-1, len(names))
+    sizes = np.abs(modes) * _units(machine)
+    over = {
+        "critical_force": _floats(critical, "load", "N", "force at the critical point"),
+        "critical_deflection": _floats(critical, "along", "m", "translation along the force there"),
+        "critical_kind": (
+            "critical",
+            np.array(["limit" if c["limit"] else "bifurcation" for c in critical], dtype=object).astype(str),
+            meaning("", "limit: the force has an extremum; bifurcation: branches cross"),
+        ),
+        "unstable_before": ("critical", np.array([c["before"] for c in critical], dtype=int)),
+        "unstable_after": ("critical", np.array([c["after"] for c in critical], dtype=int)),
+        "mode_leg": ("critical", np.array([_leg(machine, names, s) for s in sizes]).astype(str)),
+        "mode_joint": ("critical", np.array([_joint(machine, names, s) for s in sizes]).astype(str)),
+        "mode": (
+            ("critical", "coordinate"),
+            modes,
+            meaning("m or rad", "buckling mode; the largest motion, angles as arcs, is 1"),
+        ),
+        "critical_coordinates": (
+            ("critical", "coordinate"),
+            np.array([c["coordinates"] for c in critical]).reshape(-1, len(names)),
+            meaning("m or rad", "coordinates at the critical point"),
+        ),
+    }
+    return over, {"coordinate": ("coordinate", np.array(names))}
+
+
+def _floats(critical: list[dict[str, Any]], key: str, units: str, what: str) -> tuple[Any, ...]:
+    return ("critical", np.array([c[key] for c in critical], dtype=float), meaning(units, what))
+
+
+def _units(machine: Machine) -> Floats:
+    """Length that a unit of each coordinate stands for."""
+    prismatic = np.array(machine._core.prismatic)
+    return np.where(prismatic, 1.0, machine._core.length)
+
+
+def _leg(machine: Machine, names: list[str], sizes: Floats) -> str:
+    """Leg with the largest motion, as the sum of squares over its coordinates; '' where none moves."""
+    of = {leg: sum(s * s for n, s in zip(names, sizes, strict=True) if n.split(".")[0] == leg)
+          for leg in machine.legs}  # fmt: skip
+    best = max(of, key=lambda leg: of[leg])
+    return best if of[best] > 0 else ""
+
+
+def _joint(machine: Machine, names: list[str], sizes: Floats) -> str:
+    """Joint, drive or spring coordinate that moves most; joints go before springs."""
+    roles = np.array(machine._core.roles)
+    joints = np.where(roles != SPRING, sizes, 0.0)
+    pick = joints if joints.max(initial=0.0) > 0.1 * sizes.max() else sizes
+    return names[int(np.argmax(pick))]

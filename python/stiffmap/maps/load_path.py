@@ -1,0 +1,108 @@
+"""The path of equilibria under a growing force, past limit points, with buckling loads and modes."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiffmap import _core
+from stiffmap.broadcasting import Floats
+from stiffmap.errors import StiffmapError
+from stiffmap.maps.critical import critical_variables
+from stiffmap.maps.loading import Loading
+from stiffmap.maps.provenance import describe
+from stiffmap.maps.sums import norm
+from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, meaning, status_attrs
+from stiffmap.status import Status
+
+CONTROLS = ("force", "displacement", "arc")
+UNITS = {"force": "N", "displacement": "m", "arc": "m"}
+ENDS = {
+    Status.CONVERGED: "the limit was reached",
+    Status.UNREACHABLE: "the commanded pose is out of reach",
+    Status.NOT_CONVERGED: "no further equilibrium was found",
+    Status.SINGULAR: "singular without load",
+}
+
+
+def load_path(
+    loading: Loading, position: Floats, direction: Floats, control: str, limit: float, steps: int
+) -> xr.Dataset:
+    """See `sweep`: what it does with a `limit`."""
+    machine = loading.machine
+    turned = machine.description.home.r if loading.rotation is None else loading.rotation
+    status, flags, points, critical = _core.path(
+        machine._core,
+        position,
+        np.ascontiguousarray(turned, dtype=float),
+        direction,
+        loading.point,
+        np.array(loading.acting_gravity()),
+        CONTROLS.index(control),
+        limit,
+        steps,
+    )
+    call = {"function": "sweep", "position": position, "direction": direction, "control": control,
+            "limit": limit, "steps": steps}  # fmt: skip
+    attrs = describe(loading, f"load path by {control}", call) | {
+        "end": ENDS[Status(status)],
+        "flags": int(flags),
+        "critical_points": json.dumps([_summary(c) for c in critical]),
+    }
+    data, coords = _variables(points)
+    modes, mode_coords = critical_variables(machine, critical)
+    coords |= mode_coords | {
+        "axis": ("axis", np.array(["x", "y", "z"])),
+        "position": ("axis", position, meaning("m", "commanded tcp")),
+        "direction": ("axis", direction, meaning("1", "direction of the force, base axes")),
+    }
+    return xr.Dataset(data | modes, coords, attrs)
+
+
+def check_control(control: str, limit: float | None, steps: int, load_type: str) -> float:
+    """The limit as a number; StiffmapError where the options do not fit together."""
+    if control not in CONTROLS:
+        raise StiffmapError(f"control: expected one of {', '.join(CONTROLS)}, got {control!r}")
+    if limit is None or not np.isfinite(limit) or limit == 0:
+        raise StiffmapError(
+            f"limit: expected a number other than 0 ({UNITS[control]} for control {control!r}), got {limit!r}"
+        )
+    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
+        raise StiffmapError(f"steps: expected a positive number, got {steps!r}")
+    if load_type != "dead":
+        raise StiffmapError(f"load_type: a path needs a conservative force, 'dead'; got {load_type!r}")
+    return float(limit)
+
+
+def _variables(points: list[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, Any]]:
+    displacement = np.array([p["displacement"] for p in points]).reshape(-1, 6)
+    force = np.array([p["load"] for p in points])
+    unstable = np.array([p["unstable"] for p in points], dtype=int)
+    status = np.where(unstable > 0, Status.UNSTABLE, Status.CONVERGED).astype(np.uint8)
+    return {
+        "displacement": (
+            ("step", "component"),
+            displacement,
+            meaning(TWIST_UNITS, "displacement of the reference point"),
+        ),
+        "deflection": ("step", norm(displacement[:, :3]), meaning("m", "norm of the translation")),
+        "deflection_xy": ("step", norm(displacement[:, :2]), meaning("m", "norm in the xy plane")),
+        "deflection_along": (
+            "step",
+            np.array([p["along"] for p in points]),
+            meaning("m", "translation along the force"),
+        ),
+        "unstable_modes": ("step", unstable, meaning("1", "directions in which the energy falls")),
+        "status": ("step", status, status_attrs("the equilibrium")),
+    }, {
+        "force": ("step", force, meaning("N", "force along the direction")),
+        "component": ("component", np.array(COMPONENTS)),
+    }
+
+
+def _summary(c: dict[str, Any]) -> dict[str, Any]:
+    kind = "limit" if c["limit"] else "bifurcation"
+    return {"kind": kind, "force": c["load"], "deflection_along": c["along"]}

@@ -1,0 +1,46 @@
+"""One quantitative statement of the paper, our number, and a verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from decimal import Decimal
+from enum import StrEnum
+
+
+class Verdict(StrEnum):
+    """How a statement fares."""
+
+    AGREES = "agrees"
+    DIFFERS = "differs"
+    NOT_CHECKED = "cannot be checked"
+
+
+@dataclass(frozen=True)
+class Statement:
+    """The paper's words beside our number."""
+
+    section: str
+    words: str
+    ours: str
+    """Our number in words, with its unit."""
+    verdict: Verdict
+    because: str
+    numbers: dict[str, float] = field(default_factory=dict)
+    """The numbers behind `ours`, by name; the unit is part of the name."""
+
+
+def rounds_to(ours: float, printed: str) -> bool:
+    """Whether a number, rounded to the last digit that the paper prints, is what it prints.
+
+    A whole number without a decimal point counts as given to its leading digits: "600" stands for
+    550 … 650, "20" for 15 … 25.
+    """
+    value = Decimal(printed)
+    digits = value.normalize().as_tuple()
+    last = Decimal(1).scaleb(int(digits.exponent) if "." not in printed else int(value.as_tuple().exponent))
+    return abs(Decimal(ours) - value) <= last / 2
+
+
+def judge(holds: bool) -> Verdict:
+    """Agrees or differs."""
+    return Verdict.AGREES if holds else Verdict.DIFFERS
