@@ -133,9 +133,11 @@ def main() -> None:
     parser.add_argument("--material", default="aluminium", choices=sorted(MATERIALS))
     parser.add_argument("--evaluations", type=int, default=5, help="steps of the search (each 7 solutions)")
     parser.add_argument("--weights", type=float, nargs="+", default=[0.0, 1.0], help="of k44 in the search")
+    parser.add_argument("--bars", nargs="+", default=list(TABLE), choices=list(TABLE))
     arguments = parser.parse_args()
     material = Material(*MATERIALS[arguments.material], arguments.material)
-    for name, (length, _) in TABLE.items():
+    for name in arguments.bars:
+        length = TABLE[name][0]
         for weight in arguments.weights:
             design, _ = nearest(name, material, weight, arguments.evaluations)
             print(f"\n{name}, weight {weight:g}: {design}", flush=True)
