@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+#include <atomic>
+#include <boost/test/unit_test.hpp>
+#include <cstring>
+#include <stdexcept>
+#include <vector>
+
+#include "machines.hpp"
+#include "numeric.hpp"
+#include "stiffmap/batch.hpp"
+#include "stiffmap/parallel.hpp"
+
+using namespace stiffmap;
+using namespace stiffmap::test;
+
+namespace {
+
+struct Answer {
+  std::vector<double> displacement, stiffness, compliance, effort, leg_wrench;
+  std::vector<std::uint8_t> status;
+};
+
+Answer run(const Mechanism& m, const std::vector<double>& position, int threads) {
+  const std::size_t n = position.size() / 3;
+  std::vector<double> rotation(9 * n), wrench(6 * n);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (int k = 0; k < 3; ++k) rotation[9 * i + static_cast<std::size_t>(4 * k)] = 1;
+    wrench[6 * i] = 300;
+    wrench[6 * i + 4] = 10;
+  }
+  BatchInput in;
+  in.count = static_cast<Index>(n);
+  in.position = position.data();
+  in.rotation = rotation.data();
+  in.wrench = wrench.data();
+  in.load_points = {{m.tip, Vec3::Zero(), LoadType::dead}};
+  in.read_points = {0};
+  Answer a{std::vector<double>(6 * n), std::vector<double>(36 * n), std::vector<double>(36 * n),
+           std::vector<double>(3 * n), std::vector<double>(18 * n), std::vector<std::uint8_t>(n)};
+  BatchOutput out;
+  out.displacement = a.displacement.data();
+  out.stiffness = a.stiffness.data();
+  out.compliance = a.compliance.data();
+  out.effort = a.effort.data();
+  out.leg_wrench = a.leg_wrench.data();
+  out.status = a.status.data();
+  solve_batch(m, in, {}, threads, out);
+  return a;
+}
+
+bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_SUITE(batch)
+
+BOOST_AUTO_TEST_CASE(threads_do_not_change_a_bit) {
+  const Mechanism m = Orthoglide().build();
+  Random random(1);
+  std::vector<double> position(3 * 131);
+  for (double& p : position) p = random.uniform(-0.3, 0.6);  // some out of reach
+  const Answer one = run(m, position, 1), seven = run(m, position, 7);
+  BOOST_TEST(one.status == seven.status, boost::test_tools::per_element());
+  BOOST_TEST(same_bits(one.displacement, seven.displacement));
+  BOOST_TEST(same_bits(one.stiffness, seven.stiffness));
+  BOOST_TEST(same_bits(one.compliance, seven.compliance));
+  BOOST_TEST(same_bits(one.effort, seven.effort));
+  BOOST_TEST(same_bits(one.leg_wrench, seven.leg_wrench));
+}
+
+BOOST_AUTO_TEST_CASE(earlier_poses_leave_no_trace) {
+  const Mechanism m = Orthoglide().build();
+  Random random(2);
+  std::vector<double> position(3 * 20), backwards;
+  for (double& p : position) p = random.uniform(-0.3, 0.6);
+  for (std::size_t i = 20; i-- > 0;) backwards.insert(backwards.end(), &position[3 * i], &position[3 * i] + 3);
+  const Answer a = run(m, position, 1), b = run(m, backwards, 1);
+  for (std::size_t i = 0; i < 20; ++i)
+    BOOST_TEST(std::memcmp(&a.stiffness[36 * i], &b.stiffness[36 * (19 - i)], 36 * sizeof(double)) == 0);
+}
+
+BOOST_AUTO_TEST_CASE(no_pose_is_an_empty_answer) {
+  const Mechanism m = Orthoglide().build();
+  BOOST_TEST(run(m, {}, 3).displacement.empty());
+}
+
+BOOST_AUTO_TEST_CASE(every_item_is_visited_once) {
+  for (int threads : {1, 2, 7}) {
+    std::vector<std::atomic<int>> visits(101);
+    parallel_chunks(101, 4, threads, [&](int, long begin, long end) {
+      for (long i = begin; i < end; ++i) ++visits[static_cast<std::size_t>(i)];
+    });
+    for (const auto& v : visits) BOOST_TEST(v == 1);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(an_exception_in_a_thread_reaches_the_caller) {
+  const auto work = [](int, long begin, long) {
+    if (begin == 8) throw std::runtime_error("chunk 8");
+  };
+  BOOST_CHECK_THROW(parallel_chunks(40, 4, 3, work), std::runtime_error);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+#include <Eigen/Eigenvalues>
+#include <boost/test/unit_test.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "numeric.hpp"
+#include "stiffmap/spring.hpp"
+
+using namespace stiffmap;
+using test::Random;
+
+namespace {
+
+Mat6 random_spd(unsigned seed, int rank = 6) {
+  Random random(seed);
+  Mat6 M = Mat6::Zero();
+  for (int i = 0; i < rank; ++i) {
+    const Vec6 v = random.vector<6>();
+    M += v * v.transpose();
+  }
+  return M;
+}
+
+/// Message of the exception that `f` throws.
+template <class F>
+std::string message(F&& f) {
+  try {
+    f();
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+  return "nothing thrown";
+}
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+}  // namespace
+
+BOOST_AUTO_TEST_SUITE(spring)
+
+BOOST_AUTO_TEST_CASE(beam_has_its_closed_form) {
+  const double L = 0.6;
+  const BeamSection s{2e8, 3e4, 5e4, 2e4};
+  const Mat6 K = beam_compliance(L, s).inverse();
+  BOOST_TEST(std::abs(K(0, 0) / (s.EA / L) - 1) < 1e-12);
+  BOOST_TEST(std::abs(K(1, 1) / (12 * s.EIz / (L * L * L)) - 1) < 1e-12);
+  BOOST_TEST(std::abs(K(2, 2) / (12 * s.EIy / (L * L * L)) - 1) < 1e-12);
+  BOOST_TEST(std::abs(K(3, 3) / (s.GJ / L) - 1) < 1e-12);
+  BOOST_TEST(std::abs(K(4, 4) / (4 * s.EIy / L) - 1) < 1e-12);
+  BOOST_TEST(std::abs(K(5, 5) / (4 * s.EIz / L) - 1) < 1e-12);
+  BOOST_TEST(std::abs(K(1, 5) / (-6 * s.EIz / (L * L)) - 1) < 1e-12);
+  BOOST_TEST(std::abs(K(2, 4) / (6 * s.EIy / (L * L)) - 1) < 1e-12);
+}
+
+BOOST_AUTO_TEST_CASE(two_half_beams_make_one) {
+  // Series connection through the lever arm of the second half.
+  const double L = 0.6;
+  const BeamSection s{2e8, 3e4, 5e4, 2e4};
+  Mat6 lever = Mat6::Identity();  // twist of a point L/2 further along x
+  lever(1, 5) = L / 2;
+  lever(2, 4) = -L / 2;
+  const Mat6 half = beam_compliance(L / 2, s);
+  const Mat6 whole = lever * half * lever.transpose() + half;
+  BOOST_TEST((whole - beam_compliance(L, s)).cwiseAbs().maxCoeff() < 1e-12 * whole.cwiseAbs().maxCoeff());
+}
+
+BOOST_AUTO_TEST_CASE(compliance_is_inverted) {
+  const Mat6 C = random_spd(1);
+  const SpringMatrix s = spring_from_compliance(C, "link");
+  BOOST_TEST(!s.rotated);
+  BOOST_TEST(!s.rigid.any());
+  BOOST_TEST((s.stiffness * C - Mat6::Identity()).norm() < 1e-9);
+}
+
+BOOST_AUTO_TEST_CASE(zero_diagonal_of_a_compliance_is_rigid) {
+  Mat6 C = Vec6(1e-6, 0, 2e-6, 0, 1e-5, 3e-5).asDiagonal();
+  C(0, 2) = C(2, 0) = 5e-7;
+  const SpringMatrix s = spring_from_compliance(C, "link");
+  BOOST_TEST(!s.rotated);
+  BOOST_TEST((s.rigid[1] && s.rigid[3] && !s.rigid[0] && !s.rigid[2] && !s.rigid[4] && !s.rigid[5]));
+  BOOST_TEST(std::abs(s.stiffness(0, 0) - C(2, 2) / (C(0, 0) * C(2, 2) - C(0, 2) * C(0, 2))) < 1e-3);
+}
+
+BOOST_AUTO_TEST_CASE(hidden_rank_defect_of_a_compliance_is_found) {
+  const Mat6 C = random_spd(2, 4);
+  const SpringMatrix s = spring_from_compliance(C, "link");
+  BOOST_TEST(s.rotated);
+  BOOST_TEST(s.rigid.count() == 2);
+  const Mat6 K = s.basis * s.stiffness * s.basis.transpose();
+  BOOST_TEST((C * K * C - C).norm() < 1e-9 * C.norm());  // the pseudo-inverse
+}
+
+BOOST_AUTO_TEST_CASE(stiffness_may_lack_rank) {
+  const Mat6 K = random_spd(3, 3);
+  BOOST_TEST((spring_from_stiffness(K, "link").stiffness - K).norm() < 1e-14);
+}
+
+BOOST_AUTO_TEST_CASE(asymmetry_is_refused_with_its_size) {
+  Mat6 K = Mat6::Identity() * 100;
+  K(0, 1) = 32;
+  const std::string text = message([&] { spring_from_stiffness(K, "leg.bar"); });
+  BOOST_TEST(contains(text, "leg.bar"));
+  BOOST_TEST(contains(text, "symmetric"));
+  BOOST_TEST(contains(text, "32"));
+}
+
+BOOST_AUTO_TEST_CASE(indefinite_matrices_are_refused) {
+  Mat6 K = Mat6::Identity();
+  K(0, 1) = K(1, 0) = 2;
+  BOOST_TEST(contains(message([&] { spring_from_compliance(K, "bar"); }), "-1"));
+  K = Mat6::Identity();
+  K(3, 3) = -5;
+  BOOST_TEST(contains(message([&] { spring_from_stiffness(K, "bar"); }), "-5"));
+  K = Mat6::Identity();
+  K(2, 2) = 0;
+  K(2, 3) = K(3, 2) = 0.1;
+  BOOST_TEST(contains(message([&] { spring_from_stiffness(K, "bar"); }), "coupling"));
+}
+
+BOOST_AUTO_TEST_CASE(nan_is_refused) {
+  Mat6 K = Mat6::Identity();
+  K(4, 4) = std::nan("");
+  BOOST_TEST(contains(message([&] { spring_from_stiffness(K, "bar"); }), "finite"));
+}
+
+BOOST_AUTO_TEST_CASE(rank_decisions_do_not_depend_on_units) {
+  // The same beam in millimetres and newtons, and in metres: no rank is lost in either.
+  const Mat6 C = beam_compliance(0.25, {2e8, 2e4, 2e4, 1.5e4});
+  const Vec6 mm(1e3, 1e3, 1e3, 1, 1, 1);
+  const Mat6 in_mm = mm.asDiagonal() * C * mm.asDiagonal() * 1e-6;
+  BOOST_TEST(!spring_from_compliance(C, "m").rotated);
+  BOOST_TEST(!spring_from_compliance(in_mm, "mm").rotated);
+}
+
+BOOST_AUTO_TEST_CASE(beams_without_length_or_section_are_refused) {
+  BOOST_TEST(contains(message([] { beam_compliance(0, {1, 1, 1, 1}); }), "positive length"));
+  BOOST_TEST(contains(message([] { beam_compliance(1, {1, 0, 1, 1}); }), "rigidities"));
+}
+
+BOOST_AUTO_TEST_SUITE_END()
