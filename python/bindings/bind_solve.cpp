@@ -180,6 +180,12 @@ void bind_solve(py::module_& m) {
                                for (const Coordinate& c : k.coordinates) out.push_back(static_cast<int>(c.role));
                                return out;
                              })
+      .def_property_readonly("prismatic",
+                             [](const Mechanism& k) {
+                               std::vector<bool> out;
+                               for (const Coordinate& c : k.coordinates) out.push_back(c.type == JointType::prismatic);
+                               return out;
+                             })
       .def_property_readonly("locked",
                              [](const Mechanism& k) {
                                std::vector<bool> out;

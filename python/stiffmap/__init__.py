@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from stiffmap.machine import Machine, load_machine
     from stiffmap.maps import error_map, polar, sweep
     from stiffmap.solution import Solution
+    from stiffmap.stress import assembly_stress
 
 try:
     __version__ = version("stiffmap")
@@ -26,6 +27,7 @@ _HOME = {
     "Kinematics": "stiffmap.kinematics",
     "Machine": "stiffmap.machine",
     "Solution": "stiffmap.solution",
+    "assembly_stress": "stiffmap.stress",
     "error_map": "stiffmap.maps",
     "forward_kinematics": "stiffmap.kinematics",
     "identify_link": "stiffmap.link",
@@ -43,6 +45,7 @@ __all__ = [
     "Status",
     "StiffmapError",
     "__version__",
+    "assembly_stress",
     "error_map",
     "forward_kinematics",
     "identify_link",

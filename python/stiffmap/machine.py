@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,9 @@ from stiffmap.description import MachineDescription
 from stiffmap.errors import StiffmapError
 from stiffmap.lowering import build_mechanism
 from stiffmap.solution import Solution
+
+if TYPE_CHECKING:
+    from stiffmap.inverse import HeldMachine
 
 LOAD_TYPES = {"dead": 0, "follower": 1, "semitangential": 2}
 
@@ -215,6 +218,15 @@ class Machine:
             joint_index=joints,
             indeterminate_mask=out("indeterminate"),
         )
+
+    def wrench(self, position: ArrayLike, displacement: ArrayLike, **options: Any) -> HeldMachine:
+        """Wrenches that hold the machine at a `displacement` (..., 6) from the commanded pose, eq. (10).
+
+        Options: rotation, point, gravity, threads, as in `stiffmap.inverse.imposed_displacement`.
+        """
+        from stiffmap.inverse import imposed_displacement
+
+        return imposed_displacement(self, position, displacement, **options)
 
     def with_effect(
         self, kind: str, *, element: str | None = None, legs: Sequence[str] | None = None, **parameters: Any

@@ -1,0 +1,99 @@
+"""Internal wrenches: what geometric errors and preload do inside a machine that carries nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap import _core
+from stiffmap.broadcasting import Floats, rows, thread_count
+from stiffmap.machine import Machine
+
+
+@dataclass(frozen=True, eq=False)
+class InternalWrenches:
+    """Wrenches inside a machine, leading batch axes (...); NaN for failed poses, with their status."""
+
+    springs: dict[str, Floats]
+    """Full name of each link spring -> (..., 6) N, N·m in the spring's axes: force and moment that
+    the elastic part carries, positive where they stretch (or turn) it forwards."""
+    joints: dict[str, Floats]
+    """Full name of each drive and elastic joint -> (...) N or N·m along its coordinate."""
+    legs: dict[str, Floats]
+    """Leg -> (..., 6) N, N·m: leg on platform, about `point`, base axes."""
+    displacement: Floats
+    """(..., 6) m, rad: of the point against the commanded pose."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+    point: str
+
+    def largest(self) -> tuple[str, float]:
+        """The spring with the largest force, and that force (N)."""
+        sizes = {n: float(np.nanmax(np.linalg.norm(w[..., :3], axis=-1))) for n, w in self.springs.items()}
+        name = max(sizes, key=lambda n: sizes[n])
+        return name, sizes[name]
+
+
+def assembly_stress(
+    machine: Machine,
+    position: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    point: str = "tcp",
+    gravity: ArrayLike | None = (0.0, 0.0, 0.0),
+    threads: int | None = None,
+) -> InternalWrenches:
+    """Internal wrenches at commanded poses, by default without any load.
+
+    They come from `actual` geometry that differs from the nominal one where legs are over-constrained
+    (assembly stress), and from springs with a `rest` deflection (preload). Statically determinate legs
+    carry none.
+
+    position (..., 3) m; wrench (..., 6) at `point`, None: none; gravity (3,) m/s², None: what the
+    machine file says. Raises StiffmapError for bad input.
+    """
+    s = machine.solve(
+        position,
+        wrench,
+        rotation=rotation,
+        point=point,
+        gravity=gravity,
+        threads=threads,
+        method="reference",
+    )
+    shape = s.status.shape
+    load = np.zeros(6) if wrench is None else np.asarray(wrench, dtype=float)
+    turned = machine.description.home.r if rotation is None else np.asarray(rotation, dtype=float)
+    (force,) = _core.reactions(
+        machine._core,
+        rows(np.asarray(position, dtype=float), shape, (3,)),
+        rows(turned, shape, (3, 3)),
+        rows(load, shape, (6,)),
+        point,
+        machine._gravity(gravity),
+        thread_count(threads),
+    )
+    force = force.reshape((*shape, force.shape[-1]))
+    elastic = {n: i for n, i in s.joint_index.items() if n in machine.actuators or _has_law(machine, n)}
+    return InternalWrenches(
+        springs={n: force[..., i : i + 6] for n, i in s.spring_index.items()},
+        joints={n: force[..., i] for n, i in elastic.items()},
+        legs={leg: s.leg_wrench[..., i, :] for i, leg in enumerate(machine.legs)},
+        displacement=s.displacement,
+        status=s.status,
+        flags=s.flags,
+        point=point,
+    )
+
+
+def _has_law(machine: Machine, name: str) -> bool:
+    from stiffmap.description import Joint
+    from stiffmap.files.names import all_elements
+
+    return any(
+        isinstance(e, Joint) and e.law is not None and (name == n or name.rpartition(".")[0] == n)
+        for n, e in all_elements(machine.description)
+    )
