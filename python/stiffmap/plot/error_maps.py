@@ -48,7 +48,7 @@ def map_figure(
         for i, ax in enumerate(axes):
             mesh = draw_plane(ax, ds, values.isel(z=i), variable, case, norm, tolerance, entries)
             if directions:
-                draw_directions(ax, ds, variable, i)
+                draw_directions(ax, ds, variable, i, entries)
             ax.set_title(f"{panel(i)} z = {MM * float(values.z[i]):g} mm")
         axes[0].set_ylabel("y, mm")
         figure.colorbar(mesh, ax=list(axes), label=colour_label(values), shrink=0.85)
@@ -117,7 +117,7 @@ def halo(width: float, colour: str) -> list[patheffects.AbstractPathEffect]:
     return [patheffects.withStroke(linewidth=width, foreground=colour)]
 
 
-def draw_directions(ax: Axes, ds: xr.Dataset, variable: str, index: int) -> None:
+def draw_directions(ax: Axes, ds: xr.Dataset, variable: str, index: int, entries: dict[str, Any]) -> None:
     """Short lines along the force of each direction that a worst or best deflection belongs to."""
     name = variable.replace("_deflection", "_direction")
     if name == variable or name not in ds or not variable.endswith(("deflection", "_xy")):
@@ -134,6 +134,8 @@ def draw_directions(ax: Axes, ds: xr.Dataset, variable: str, index: int) -> None
     }
     arrows = ax.quiver(x, y, np.cos(angle), np.sin(angle), color="white", scale=18, **look)
     arrows.set_path_effects(halo(1.8, "#444444"))
+    line = Line2D([], [], color="white", label="direction of the force", path_effects=halo(2.5, "#444444"))
+    entries["direction"] = line
 
 
 def _spread(count: int, most: int = 9) -> Any:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stiffmap.plot.polars import in_words, position_text
-from stiffmap.plot.style import CYCLE, DASHES, MM, TOLERANCE, new_figure, panel, paper_style
+from stiffmap.plot.style import BLACK, CYCLE, DASHES, MM, new_figure, panel, paper_style
 from stiffmap.status import Status
 
 
@@ -70,7 +70,7 @@ def draw_sweeps(ax: Axes, lines: Mapping[str, xr.Dataset], variable: str, tolera
                 label=f"{label}: no equilibrium",
             )
     if tolerance is not None:
-        ax.axhline(MM * tolerance, color=TOLERANCE, lw=1, ls=":", label=f"tolerance {MM * tolerance:g} mm")
+        ax.axhline(MM * tolerance, color=BLACK, lw=1, ls=":", label=f"tolerance {MM * tolerance:g} mm")
     ax.set_xlabel("force, N")
     ax.set_ylim(0 if min(float(s[variable].min()) for s in lines.values()) >= 0 else None, None)
     ax.margins(x=0)
