@@ -1,6 +1,6 @@
 """Labelled results over a workspace: error maps, polar diagrams, force sweeps (xarray, SI)."""
 
-from stiffmap.maps.error_map import error_map
+from stiffmap.maps.grid_map import error_map
 from stiffmap.maps.polar_diagram import polar
 from stiffmap.maps.sweep_line import sweep
 

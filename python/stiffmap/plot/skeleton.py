@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from stiffmap.broadcasting import Floats
-from stiffmap.description import Block, Element, Joint
+from stiffmap.description import Joint
+from stiffmap.files.names import all_elements
 from stiffmap.machine import Machine
 
 ACTUATOR, PASSIVE = 0, 1
@@ -37,7 +37,7 @@ def skeleton(machine: Machine, coordinates: Floats) -> Skeleton:
     core = machine._core
     position, rotation = core.frames(coordinates)
     owner = owners(core)
-    joints = dict(named_joints(machine))
+    joints = {n: e for n, e in all_elements(machine.description) if isinstance(e, Joint)}
     links, guides, marks = [], [], {ACTUATOR: [], PASSIVE: []}  # type: ignore[var-annotated]
     for i, (parent, c) in enumerate(core.nodes):
         role = core.roles[c] if c >= 0 else None
@@ -64,21 +64,6 @@ def owners(core: Any) -> list[str]:
         inherited = out[parent] if parent >= 0 and i <= last else ""
         out.append(own if own in core.legs else inherited)
     return out
-
-
-def named_joints(machine: Machine) -> Iterator[tuple[str, Joint]]:
-    """Full names and joints of all legs."""
-    for leg in machine.description.legs:
-        yield from _joints(leg.elements, leg.name)
-
-
-def _joints(elements: tuple[Element, ...], prefix: str) -> Iterator[tuple[str, Joint]]:
-    for e in elements:
-        if isinstance(e, Joint):
-            yield f"{prefix}.{e.name}", e
-        elif isinstance(e, Block):
-            for branch in e.branches:
-                yield from _joints(branch.elements, f"{prefix}.{branch.name}")
 
 
 def travel(joint: Joint, value: float, position: Floats, rotation: Floats) -> Floats:

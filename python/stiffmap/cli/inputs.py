@@ -1,0 +1,121 @@
+"""Options that several commands share: mm, N, N·mm and deg become SI here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from stiffmap.broadcasting import Floats
+from stiffmap.errors import FileError, StiffmapError
+
+if TYPE_CHECKING:
+    from stiffmap.machine import Machine
+
+MM = 1e-3
+
+MachineArgument = Annotated[str, typer.Argument(help="Shipped name (stiffmap machines) or machine file.")]
+EffectsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--effect", help="Add an effect, e.g. 'dead_zone of actuator, leg y: half_width 12 um'; repeatable."
+    ),
+]
+GravityOption = Annotated[
+    str | None,
+    typer.Option(
+        "--gravity", help="Gravity in m/s², base axes, e.g. 0,0,-9.81; default: the machine file's."
+    ),
+]
+MethodOption = Annotated[str, typer.Option(help="fast or reference.")]
+ThreadsOption = Annotated[int | None, typer.Option(help="Threads; default: all cores.")]
+ToleranceOption = Annotated[float, typer.Option(help="Tolerated deflection, mm.")]
+PlaneOption = Annotated[str, typer.Option(help="Plane in which the force turns: xy, xz or yz.")]
+FolderOption = Annotated[Path | None, typer.Option("-o", "--output", help="Folder for files and pictures.")]
+RotationOption = Annotated[
+    str | None,
+    typer.Option(
+        "--rotation", help="Commanded orientation as a rotation vector in deg, base axes, e.g. 0,0,30."
+    ),
+]
+
+
+def numbers(text: str, name: str, count: int | None = None) -> Floats:
+    """Comma-separated finite numbers."""
+    try:
+        out = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        raise StiffmapError(f"--{name}: expected numbers separated by commas, got '{text}'") from None
+    if count is not None and out.size != count:
+        raise StiffmapError(f"--{name}: expected {count} numbers separated by commas, got '{text}'")
+    if not np.isfinite(out).all():
+        raise StiffmapError(f"--{name}: expected finite numbers, got '{text}'")
+    return out
+
+
+def position(text: str | None, machine: Machine, name: str = "at") -> Floats:
+    """A TCP position given in mm, in m; the home position where none is given."""
+    return machine.description.home.p if text is None else MM * numbers(text, name, 3)
+
+
+def rotation(text: str | None) -> Any:
+    """A rotation matrix from a rotation vector in deg, or None."""
+    if text is None:
+        return None
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(numbers(text, "rotation", 3), degrees=True).as_matrix()
+
+
+def gravity(text: str | None) -> Any:
+    """Gravity as given, or None."""
+    return None if text is None else numbers(text, "gravity", 3)
+
+
+def wrench(force: str, moment: str) -> Floats:
+    """Wrench (6,) in N, N·m from N and N·mm."""
+    return np.concatenate([numbers(force, "force", 3), MM * numbers(moment, "moment", 3)])
+
+
+def machine_with(name: str, effects: Sequence[str] | None) -> Machine:
+    """A machine with effects added."""
+    from stiffmap.machine import Machine, load_machine
+
+    machine = load_machine(name)
+    if not effects:
+        return machine
+    from stiffmap.effects import apply_records, parse_effect
+
+    return Machine(apply_records(machine.description, [parse_effect(text) for text in effects]))
+
+
+def folder(path: Path) -> Path:
+    """The folder for results, made where it is missing."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
+    return path
+
+
+def plain(value: Any) -> Any:
+    """Data for JSON: arrays as lists, numbers that are not finite as null."""
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def finish(found: bool) -> None:
+    """Exit with 1 where there is something to find."""
+    if found:
+        raise typer.Exit(1)

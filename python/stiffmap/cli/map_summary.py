@@ -1,0 +1,55 @@
+"""The numbers of an error map in a few rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from rich import box
+from rich.table import Table
+
+from stiffmap.status import Status
+
+
+def summary(ds: xr.Dataset, plane: str, tolerance: float) -> list[dict[str, Any]]:
+    """Per z-plane and reading of the force's direction: least, median, largest deflection in the plane "
+    "(m), share of
+    the poses within the tolerance; failed poses do not count as within."""
+    ds = ds.load()
+    readings = {w: ds[f"{w}_deflection_{plane}"] for w in ("worst", "best")}
+    readings |= {str(c): ds[f"deflection_{plane}"].sel(case=c) for c in ds.case.values}
+    return [
+        {"z": float(z), "force": name} | _row(values.sel(z=z).values, tolerance)
+        for z in ds.z.values
+        for name, values in readings.items()
+    ]
+
+
+def _row(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]], tolerance: float) -> dict[str, float]:
+    good = values[np.isfinite(values)]
+    least, median, most = (good.min(), np.median(good), good.max()) if good.size else (np.nan,) * 3
+    share = float((good <= tolerance).sum() / values.size)
+    return {"min": float(least), "median": float(median), "max": float(most), "share_within": share}
+
+
+def failures(ds: xr.Dataset) -> dict[str, int]:
+    """Number of poses per status in which some load or direction failed."""
+    status = np.maximum(ds.direction_status.values, ds.status.max("case").values)
+    return {s.name: int((status == s).sum()) for s in Status if s and (status == s).any()}
+
+
+def as_table(ds: xr.Dataset, rows: list[dict[str, Any]], plane: str, tolerance: float) -> Table:
+    """For the terminal, mm."""
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        title=f"{ds.attrs['machine']}: deflection in the {plane} plane, mm, under "
+        f"{ds.attrs['turning_force_N']:g} N",
+    )
+    for head in ("z, mm", "force", "min", "median", "max", f"within {tolerance:g} mm"):
+        table.add_column(head, justify="left" if head == "force" else "right")
+    for r in rows:
+        sizes = (f"{1e3 * r[k]:.3f}" if np.isfinite(r[k]) else "–" for k in ("min", "median", "max"))
+        name = f"{r['force']} direction" if r["force"] in ("worst", "best") else r["force"]
+        table.add_row(f"{1e3 * r['z']:g}", name, *sizes, f"{100 * r['share_within']:.1f} %")
+    return table

@@ -1,0 +1,74 @@
+"""``stiffmap paper``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from stiffmap.cli.inputs import ThreadsOption, folder, plain
+from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.errors import FileError
+
+if TYPE_CHECKING:
+    from stiffmap.paper import Results, Statement
+
+
+def paper(
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for figures and tables.")
+    ] = None,
+    points: Annotated[int, typer.Option(help="Positions along x and y of the error maps.")] = 101,
+    figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 7 (with -o).")] = True,
+    threads: ThreadsOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Reproduce the paper's application: Figures 5a–h, 6, 7 and every quantitative statement of §5.2 and "
+    "§5.3.
+
+    The table has the paper's words, our number and a verdict: agrees, differs because …, or cannot be
+    checked because …. With -o: the figures (PNG) and the table (CSV, Markdown).
+
+    Exit codes: 0 done (whatever the verdicts), 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap paper -o results[/cyan]
+
+      [cyan]stiffmap paper --json[/cyan]
+
+      [cyan]stiffmap paper --points 31 --no-figures -o results[/cyan]
+    """
+    from stiffmap.paper import all_statements, compute
+    from stiffmap.paper.table import as_plain, as_rich, count
+
+    target = folder(output) if output else None
+    results = compute(points, threads=threads, progress=False if as_json else None)
+    statements = all_statements(results)
+    files = [str(f) for f in write(results, statements, target, figures)] if target else []
+    if as_json:
+        print_json(plain({"statements": as_plain(statements), "count": count(statements), "files": files}))
+        return
+    console = Console(highlight=False)
+    console.print(as_rich(statements))
+    console.print("; ".join(f"{n} {verdict}" for verdict, n in count(statements).items()))
+    if files:
+        console.print(f"wrote {', '.join(files)}", soft_wrap=True)
+
+
+def write(results: Results, statements: list[Statement], target: Path, figures: bool) -> list[Path]:
+    """Figures and tables."""
+    from stiffmap.paper.figures import save_all
+    from stiffmap.paper.table import as_csv, as_markdown
+
+    out = save_all(results, target) if figures else []
+    for name, text in (("statements.csv", as_csv(statements)), ("statements.md", as_markdown(statements))):
+        file = target / name
+        try:
+            file.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise FileError(f"cannot be written: {error.strerror}", file=str(file)) from error
+        out.append(file)
+    return out

@@ -1,0 +1,158 @@
+"""``stiffmap show``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.tree import Tree
+
+from stiffmap.cli.inputs import (
+    MachineArgument,
+    RotationOption,
+    machine_with,
+    numbers,
+    plain,
+    position,
+    rotation,
+)
+from stiffmap.cli.mobility import Mobility, mobility
+from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.description import Block, Body, Element, Joint, Offset, Point, Spring
+from stiffmap.errors import StiffmapError
+from stiffmap.kinematics import inverse_kinematics
+from stiffmap.machine import Machine
+from stiffmap.status import Status
+
+
+def show(
+    machine: MachineArgument,
+    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    turned: RotationOption = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Picture to write. [default: MACHINE.png]")
+    ] = None,
+    view: Annotated[str, typer.Option(help="Elevation and azimuth of the view, deg.")] = "22,35",
+    picture: Annotated[bool, typer.Option(help="Draw the machine.")] = True,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw a machine in 3-D at a pose and print what it is made of.
+
+    Elements from base to platform; degrees of freedom, over-constraint (closure equations that follow
+    from the others) and free spins, counted at the pose.
+
+    Examples:
+
+      [cyan]stiffmap show orthoglide-revised[/cyan]
+
+      [cyan]stiffmap show tripteron --at 300,400,500 -o tripteron.png --view 15,-60[/cyan]
+    """
+    m = machine_with(machine, None)
+    p, r = position(at, m), rotation(turned)
+    k = inverse_kinematics(m, p, r)
+    if int(k.status) != Status.CONVERGED:
+        raise StiffmapError(f"{m.name} cannot take this pose: {Status(int(k.status)).name.lower()}")
+    counts = mobility(m, k.coordinates)
+    file = _draw(m, p, r, output or Path(f"{m.name}.png"), view) if picture else None
+    if as_json:
+        print_json(as_plain(m, counts, file))
+    else:
+        show_text(Console(highlight=False, soft_wrap=True), m, counts, file)
+
+
+def _draw(m: Machine, p: Any, r: Any, path: Path, view: str) -> Path:
+    from stiffmap.plot import machine_figure, save
+
+    elevation, azimuth = numbers(view, "view", 2)
+    return save(machine_figure(m, p, rotation=r, view=(float(elevation), float(azimuth))), path)
+
+
+def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:
+    """JSON data."""
+    return plain(
+        {
+            "machine": m.name,
+            "legs": {leg.name: [describe(e) for e in leg.elements] for leg in m.description.legs},
+            "base": [describe(e) for e in m.description.base],
+            "platform": [describe(e) for e in m.description.platform],
+            "actuators": list(m.actuators),
+            "points": list(m.points),
+            "degrees_of_freedom": counts.total,
+            "platform_freedom": counts.platform,
+            "internal_freedom": counts.internal,
+            "over_constraint": counts.overconstraint,
+            "closure_equations": counts.equations,
+            "joint_coordinates": counts.joints,
+            "free_spins": list(m.free_spins),
+            "picture": None if file is None else str(file),
+        }
+    )
+
+
+def show_text(console: Console, m: Machine, counts: Mobility, file: Path | None) -> None:
+    """For the terminal."""
+    d = m.description
+    tree = Tree(f"[bold]{m.name}[/bold]  {escape(d.title)}")
+    for name, elements in _sequences(m):
+        branch = tree.add(name)
+        for e in elements:
+            _grow(branch, e)
+    console.print(tree)
+    console.print(f"platform: {counts.platform} degrees of freedom, {len(m.actuators)} actuators")
+    console.print(
+        f"mechanism: {counts.joints} joint coordinates, {counts.equations} closure equations of rank "
+        f"{counts.independent}: {counts.total} degrees of freedom, {counts.internal} of them internal"
+    )
+    console.print(f"over-constraint: {counts.overconstraint}")
+    console.print(f"free spins: {', '.join(m.free_spins) or 'none'}")
+    if file is not None:
+        console.print(f"wrote {escape(str(file))}")
+
+
+def _sequences(m: Machine) -> Iterator[tuple[str, tuple[Element, ...]]]:
+    d = m.description
+    yield from ((n, e) for n, e in (("base", d.base),) if e)
+    yield from ((f"leg {leg.name}", leg.elements) for leg in d.legs)
+    yield from ((n, e) for n, e in (("platform", d.platform),) if e)
+
+
+def _grow(tree: Tree, e: Element) -> None:
+    node = tree.add(escape(describe(e)))
+    for branch in e.branches if isinstance(e, Block) else ():
+        inner = node.add(f"branch {branch.name}")
+        for part in branch.elements:
+            _grow(inner, part)
+
+
+def describe(e: Element) -> str:
+    """An element in a few words, mm and kg."""
+    match e:
+        case Offset():
+            return f"{e.name}: offset ({', '.join(f'{1e3 * v:g}' for v in e.nominal.translation)}) mm"
+        case Joint():
+            return f"{e.name}: {_joint(e)}"
+        case Spring():
+            return f"{e.name}: link spring, by {'compliance' if e.compliance is not None else 'stiffness'}"
+        case Body():
+            return f"{e.name}: body of {e.mass:g} kg"
+        case Point():
+            return f"{e.name}: point"
+        case Block():
+            return f"{e.name}: parallel block of {len(e.branches)} branches"
+
+
+def _joint(e: Joint) -> str:
+    if not e.actuated:
+        return f"passive {e.kind} joint" + (" with a spring" if e.law else "")
+    if e.law is None:
+        return f"{e.kind} actuator, rigid"
+    unit, scale = ("mm/N", 1e3) if e.kind == "prismatic" else ("rad/(N m)", 1.0)
+    return (
+        f"{e.kind} actuator, {scale / e.law.stiffness:.3g} {unit}"
+        if e.law.stiffness
+        else f"{e.kind} actuator"
+    )

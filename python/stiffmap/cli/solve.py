@@ -1,0 +1,118 @@
+"""``stiffmap solve``."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from stiffmap.cli.inputs import (
+    EffectsOption,
+    GravityOption,
+    MachineArgument,
+    MethodOption,
+    RotationOption,
+    finish,
+    gravity,
+    machine_with,
+    plain,
+    position,
+    rotation,
+    wrench,
+)
+from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.solution import Solution
+from stiffmap.status import Flag, Status
+
+SCALE = np.array([1e3] * 3 + [1.0] * 3)
+"""m to mm, rad stays: a compliance then is in mm/N, rad/N, mm/(N mm), rad/(N mm)."""
+
+
+def solve(
+    machine: MachineArgument,
+    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    force: Annotated[str, typer.Option(help="Force in N, base axes.")] = "0,0,0",
+    moment: Annotated[str, typer.Option(help="Moment about the point in N mm, base axes.")] = "0,0,0",
+    turned: RotationOption = None,
+    point: Annotated[str, typer.Option(help="Named point where the wrench acts.")] = "tcp",
+    effect: EffectsOption = None,
+    gravity_: GravityOption = None,
+    method: MethodOption = "fast",
+    as_json: JsonOption = False,
+) -> None:
+    """Deflection and compliance at one pose under one wrench.
+
+    Exit codes: 0 converged, 1 any other status, 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap solve orthoglide-revised --at -200,-200,-200 --force 300,0,0[/cyan]
+
+      [cyan]stiffmap solve tripteron --at 300,400,500 --force 0,0,100 --json[/cyan]
+
+      [cyan]stiffmap solve orthoglide-revised --force 0,0,-50 --moment 0,2000,0 --gravity 0,0,-9.81[/cyan]
+    """
+    m = machine_with(machine, effect)
+    load = wrench(force, moment)
+    s = m.solve(
+        position(at, m),
+        load,
+        rotation=rotation(turned),
+        point=point,
+        gravity=gravity(gravity_),
+        method=method,
+    )
+    if as_json:
+        print_json(as_plain(m.name, s, load))
+    else:
+        show(Console(highlight=False), s)
+    finish(int(s.status) != Status.CONVERGED)
+
+
+def as_plain(name: str, s: Solution, load: Any) -> Any:
+    """A solution as JSON data (SI)."""
+    return plain(
+        {
+            "machine": name,
+            "point": s.point,
+            "wrench": load,
+            "status": Status(int(s.status)).name,
+            "flags": [f.name for f in Flag(int(s.flags))],
+            "displacement": s.displacement,
+            "stiffness": s.stiffness,
+            "compliance": s.compliance,
+            "actuator_effort": dict(zip(s.actuators, s.actuator_effort.tolist(), strict=True)),
+            "leg_wrench": dict(zip(s.legs, s.leg_wrench.tolist(), strict=True)),
+            "joint_coordinates": s.joint_coordinates,
+            "spring_deflection": s.spring_deflection,
+            "indeterminate": list(s.indeterminate),
+        }
+    )
+
+
+def show(console: Console, s: Solution) -> None:
+    """For the terminal: mm, deg, N."""
+    flags = ", ".join(str(f.name) for f in Flag(int(s.flags)))
+    console.print(f"status {Status(int(s.status)).name.lower()}" + (f"; flags {flags}" if flags else ""))
+    d = s.displacement
+    shift = ", ".join(f"{v:.6f}" for v in 1e3 * d[:3])
+    console.print(f"displacement of {s.point}: ({shift}) mm, norm {1e3 * np.linalg.norm(d[:3]):.6f} mm")
+    console.print(f"rotation: ({', '.join(f'{v:.6f}' for v in np.rad2deg(d[3:]))}) deg")
+    for name, effort in zip(s.actuators, s.actuator_effort, strict=True):
+        console.print(f"drive {name}: {effort:.4f} (N, or N m for a revolute one)")
+    console.print(
+        _matrix("loaded compliance: mm and rad per N and N mm", s.compliance * np.outer(SCALE, SCALE) / 1e3)
+    )
+
+
+def _matrix(title: str, values: Any) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, title=title, padding=0, pad_edge=False, collapse_padding=True)
+    for head in ("", "fx", "fy", "fz", "mx", "my", "mz"):
+        table.add_column(head, justify="right")
+    for name, row in zip(("dx", "dy", "dz", "rx", "ry", "rz"), values, strict=True):
+        table.add_row(name, *(f"{v:11.3e}" for v in row))
+    return table
