@@ -181,6 +181,7 @@ void SaddleSystem::to_unknowns(const Linearization& lin, Eigen::Ref<MatX> J) con
 }
 
 Index SaddleSystem::closure_rank() const {
+  if (nl_ == 0) return 0;
   Eigen::ColPivHouseholderQR<MatX> qr(A_.topRightCorner(n_, nl_));
   qr.setThreshold(rank_threshold);
   return qr.rank();

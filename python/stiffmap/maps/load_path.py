@@ -33,6 +33,8 @@ def load_path(
 ) -> xr.Dataset:
     """See `sweep`: what it does with a `limit`."""
     machine = loading.machine
+    if loading.point not in machine.points:
+        raise StiffmapError(f"point: expected one of {', '.join(machine.points)}, got {loading.point!r}")
     turned = machine.description.home.r if loading.rotation is None else loading.rotation
     status, flags, points, critical = _core.path(
         machine._core,
