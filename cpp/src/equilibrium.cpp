@@ -14,18 +14,42 @@ constexpr int patient_steps = 8;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
+/// Laws with corners or with dry friction: Newton starts from the solution with all laws linear.
 bool has_knots(const Mechanism& m) {
-  return std::any_of(m.laws.begin(), m.laws.end(), [](const Law& law) { return law.has_knots(); });
+  return std::any_of(m.laws.begin(), m.laws.end(),
+                     [](const Law& law) { return law.has_knots() || law.friction() != 0; });
 }
 
-/// After an iteration with all laws linear: put each law where it carries the force just found.
-void start_laws(const Mechanism& m, const Problem& p, State& state) {
+/// A linear deflection below this share of the length is closure noise: the coordinate bears nothing.
+constexpr double unloaded = 1e-11;
+
+/// After an iteration with all laws linear: put each law where it carries the force just found. One
+/// that bears nothing stays at its centre, friction opposes the deflection just found.
+void start_laws(const Mechanism& m, Problem& p, State& state) {
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
     if (c.law < 0 || c.locked) continue;
     const Law& law = m.laws[at(c.law)];
-    state.z[j] = law.from_force(law.stiffness() / p.drive_scale[j] * state.z[j], p.drive_scale[j]);
+    const bool bears = std::abs(state.z[j]) * m.unit(j) > unloaded * m.length;
+    const double tau = bears ? law.stiffness() / p.drive_scale[j] * state.z[j] : 0.0;
+    p.friction_sign[j] = tau > 0 ? 1 : tau < 0 ? -1 : 0;
+    const double in_spring = tau - law.friction() * p.friction_sign[j];
+    state.z[j] = bears ? law.from_force(in_spring, p.drive_scale[j]) : 0.0;
   }
+}
+
+/// A coordinate inside a gap that has to bear force after all goes to the end of the gap.
+bool leave_gaps(const Mechanism& m, const Problem& p, const Linearization& lin, State& state) {
+  bool left = false;
+  for (Index j = 0; j < m.size(); ++j) {
+    const Coordinate& c = m.coordinates[at(j)];
+    if (c.law < 0 || c.locked || lin.kind[at(j)] != Kind::free) continue;
+    const Law& law = m.laws[at(c.law)];
+    if (std::abs(lin.r[j]) * m.unit(j) <= unloaded * m.length * law.stiffness()) continue;
+    state.z[j] = law.from_force(lin.tau[j] - law.friction() * p.friction_sign[j] - lin.r[j], p.drive_scale[j]);
+    left = true;
+  }
+  return left;
 }
 
 enum class Outcome { converged, failed, distrusted };
@@ -85,6 +109,10 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
       continue;
     }
     if (norm < opt.tolerance) {
+      if (knots && !ws.saddle.regular() && leave_gaps(m, p, ws.lin, state)) {
+        linearize(m, p, state, ws.lin);
+        continue;
+      }
       state.z += ws.dz;
       state.lambda += ws.dlambda;
       return Outcome::converged;

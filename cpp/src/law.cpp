@@ -8,10 +8,11 @@
 
 namespace stiffmap {
 
-Law::Law(double stiffness, double cubic, std::vector<std::pair<double, double>> knots)
-    : stiffness_(stiffness), cubic_(cubic), knots_(std::move(knots)) {
+Law::Law(double stiffness, double cubic, std::vector<std::pair<double, double>> knots, double friction)
+    : stiffness_(stiffness), cubic_(cubic), friction_(friction), knots_(std::move(knots)) {
   require(std::isfinite(stiffness) && stiffness > 0, "law.stiffness", "a positive finite number", stiffness);
   require(cubic >= 0, "law.cubic", "a number >= 0", cubic);
+  require(std::isfinite(friction) && friction >= 0, "law.friction", "a finite number >= 0", friction);
   require(knots_.empty() || cubic == 0, "law", "either knots or a cubic term", "both");
   require(knots_.size() != 1, "law.knots", "two or more points", knots_.size());
   for (std::size_t i = 0; i < knots_.size(); ++i) {

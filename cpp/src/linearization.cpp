@@ -113,7 +113,7 @@ void evaluate_laws(const Mechanism& m, const Problem& p, const State& state, Lin
       const double k = law.stiffness() / p.drive_scale[j];
       const LawPoint q = p.secant_laws ? LawPoint{0, 0, 1, k} : law.at(state.z[j], p.drive_scale[j]);
       a = q.a;
-      out.tau[j] = q.tau;
+      out.tau[j] = q.tau + law.friction() * p.friction_sign[j];
       out.da[j] = q.da;
       out.dtau[j] = q.dtau;
       out.kind[at(j)] = q.da == 0 ? Kind::fixed : q.dtau == 0 ? Kind::free : Kind::elastic;

@@ -14,6 +14,7 @@ std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// Drive coordinates with their errors, and the drive compliance at that stroke (theory G1, G2).
 void command(const Mechanism& m, const VecX& x, Problem& p) {
+  p.friction_sign.setZero();
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
     p.base[j] = c.role == Role::spring ? 0.0 : c.role == Role::passive && c.law >= 0 ? m.home_coordinates[j] : x[j];

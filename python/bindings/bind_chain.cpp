@@ -23,8 +23,8 @@ Pose make_pose(const Array& p, const Array& R) {
 void bind_chain(py::module_& m) {
   using namespace py::literals;
   py::class_<Pose>(m, "Pose").def(py::init(&make_pose), "translation"_a, "rotation"_a);
-  py::class_<Law>(m, "Law").def(py::init<double, double, std::vector<std::pair<double, double>>>(), "stiffness"_a,
-                                "cubic"_a, "knots"_a);
+  py::class_<Law>(m, "Law").def(py::init<double, double, std::vector<std::pair<double, double>>, double>(),
+                                "stiffness"_a, "cubic"_a, "knots"_a, "friction"_a = 0.0);
   py::class_<CommandError>(m, "CommandError")
       .def(py::init([](double offset, double slope, double amplitude, double period, double phase, double reference) {
              return CommandError{offset, slope, amplitude, period, phase, reference};

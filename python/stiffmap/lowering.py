@@ -57,7 +57,8 @@ def pose(p: Pose) -> _core.Pose:
 
 def law(of: Law) -> _core.Law:
     """Compiled force law."""
-    return _core.Law(of.stiffness, of.cubic, list(of.knots))
+    friction = (of.friction,) if of.friction else ()
+    return _core.Law(of.stiffness, of.cubic, list(of.knots), *friction)
 
 
 def chain(elements: Sequence[Element]) -> _core.Chain:

@@ -17,7 +17,8 @@ struct LawPoint {
 /// theory L1: both coordinates are then Lipschitz in z, so steps of either are ordinary points).
 class Law {
  public:
-  explicit Law(double stiffness, double cubic = 0.0, std::vector<std::pair<double, double>> knots = {});
+  explicit Law(double stiffness, double cubic = 0.0, std::vector<std::pair<double, double>> knots = {},
+               double friction = 0.0);
 
   /// The point at z for a drive whose compliance is `scale` times the declared one.
   LawPoint at(double z, double scale = 1.0) const;
@@ -25,14 +26,16 @@ class Law {
   /// Parameter of the point that carries force tau: the start of a Newton iteration.
   double from_force(double tau, double scale = 1.0) const;
 
-  bool linear() const { return cubic_ == 0.0 && knots_.empty(); }
+  bool linear() const { return cubic_ == 0.0 && knots_.empty() && friction_ == 0.0; }
   bool has_knots() const { return !knots_.empty(); }
   double stiffness() const { return stiffness_; }
   double cubic() const { return cubic_; }
+  /// Constant force against the deflection that the load would give without it, theory (L3).
+  double friction() const { return friction_; }
   const std::vector<std::pair<double, double>>& knots() const { return knots_; }
 
  private:
-  double stiffness_, cubic_;
+  double stiffness_, cubic_, friction_;
   std::vector<std::pair<double, double>> knots_;  // (a, tau)
   std::vector<double> z_;
 };

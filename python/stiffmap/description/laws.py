@@ -16,12 +16,15 @@ class Law:
     points (deflection, force), which may contain steps in either coordinate (a dead zone is a
     piece of zero force, a stuck friction contact a piece of zero deflection); beyond the first and
     last knot it goes on with slope ``stiffness``. The two do not combine.
+    With ``friction`` a force of that size stands against the deflection that the load would give
+    without it (dry friction on the loading branch; docs/effects.md says where this holds).
     A free coordinate has no law at all (``None``), a rigid one none either but is actuated.
     """
 
     stiffness: float
     cubic: float = 0.0
     knots: tuple[Knot, ...] = ()
+    friction: float = 0.0
 
 
 @dataclass(frozen=True)
