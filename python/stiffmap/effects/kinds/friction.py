@@ -20,15 +20,17 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     if ("torque" in placed.values) != turns:
         raise StiffmapError(f"give torque (N·m) for a revolute drive and force (N) for a prismatic one")
     level = placed.values["torque" if turns else "force"]
-    loading = placed.options["branch"] == "loading"
-    return change_law(description, placed, lambda old: _law(old, level, loading))
+    branch = placed.options["branch"]
+    return change_law(description, placed, lambda old: _law(old, level, branch))
 
 
-def _law(old: Law, level: float, loading: bool) -> Law:
+def _law(old: Law, level: float, branch: str) -> Law:
     half = _gap(old)
     if level == 0.0:
         return old
-    if not loading:  # a = c (F + level sign F)
+    if branch == "loading":
+        return replace(old, friction=level)
+    if branch == "unloading":  # a = c (F + level sign F), as a dead zone
         reach = half + level / old.stiffness
         return Law(old.stiffness, knots=((-reach, 0.0), (reach, 0.0)))
     stuck = ((-half, -level), (-half, 0.0), (half, 0.0), (half, level))
@@ -54,14 +56,16 @@ EFFECT = EffectType(
     doc=(
         "Coulomb friction between the drive's spring and its guide, against the spring's motion from its "
         "unloaded state, with the deflection a and the force F of the drive, level L and compliance c: on the "
-        "branch `loading` (from zero load) a = 0 up to |F| = L and c·(F - L·sign F) beyond; on the branch "
-        "`unloading` (from a larger load, friction fully reversed) a = c·(F + L·sign F)."
+        "branch `loading` (from zero load) a = c·(F - L·sign F); on the branch `unloading` (from a larger load, "
+        "friction fully reversed) a = c·(F + L·sign F). `loading` takes the full level also where |F| < L, with "
+        "the sign that F has in the machine without friction; a drive that really sticks there, a = 0, is "
+        "`loading_stuck`. Both agree where |F| > L."
     ),
     parameters=(FORCE, TORQUE),
     places=at_sites(elastic_drives),
     apply=apply,
     frame="the drive's coordinate",
-    options=(Option("branch", ("loading", "unloading"), "how the load was reached"),),
+    options=(Option("branch", ("loading", "unloading", "loading_stuck"), "how the load was reached"),),
     one_of=("force", "torque"),
     excludes=("friction", "hardening", "position_dependent_compliance"),
     stage=20,
