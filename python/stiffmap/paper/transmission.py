@@ -40,7 +40,7 @@ def diagonal_limits(machine: Machine, low: float, high: float, reach: float) -> 
     return low_end, high_end
 
 
-def box_factors(machine: Machine, box: Floats, count: int = 9) -> tuple[float, float]:
+def box_factors(machine: Machine, box: Floats, count: int = 5) -> tuple[float, float]:
     """Least and largest factor over a grid of count³ positions in a box (2, 3), corners included."""
     axes = [np.linspace(box[0, i], box[1, i], count) for i in range(3)]
     f = factors(machine, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
