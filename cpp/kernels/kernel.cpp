@@ -29,7 +29,7 @@ Scratch lay_out(const Program& P, void* memory, std::int64_t* bytes) {
   s.stiff = take<StiffSlot>(at, P.stiff_slots);
   s.branches = take<BranchSlot>(at, P.chain_count);
   const int n = P.coordinate_count;
-  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed}) *v = take<V>(at, n);
+  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.rubs}) *v = take<V>(at, n);
   if (bytes) *bytes = at - begin + 64;
   return s;
 }
@@ -74,7 +74,7 @@ struct Block {
 
   bool start(std::int64_t k, int lane) {
     for (int q = 0; q < P.coordinate_count; ++q) s.x[q][lane] = P.coordinates[q].role == 2 ? 0 : P.coordinates[q].home;
-    if (!in.start) return P.grid && Closing{P, s}.start(in.position + 3 * k, lane);
+    if (!in.start) return P.grid && Closing{P, s}.interpolate(in.position + 3 * k, lane);
     const double* x = in.start + P.coordinate_count * k;
     bool finite = true;
     for (int q = 0; q < P.coordinate_count; ++q) {
@@ -93,7 +93,7 @@ struct Block {
       s.a_base[q] = k.role == 2 ? splat(0) : sprung ? splat(k.home) : s.x[q];
       s.z[q] = sprung ? s.x[q] - k.home : splat(0);
       s.scale[q] = s.da[q] = splat(1);
-      s.tau[q] = s.dtau[q] = splat(0);
+      s.tau[q] = s.dtau[q] = s.rubs[q] = splat(0);
     }
     for (int d = 0; d < P.drive_count; ++d) {
       const DriveProgram& k = P.drives[d];
@@ -110,16 +110,22 @@ struct Block {
 
   void run() {
     M usable = read();
-    if (!in.start) usable &= Closing{P, s}.close(command);
+    if (!in.start) {
+      std::int64_t poses[W];
+      for (int i = 0; i < W; ++i) poses[i] = pose(i);
+      usable = Closing{P, s}.close(command, usable, poses, in.position);
+    }
     set_base();
     for (int k = 0; k < P.chain_count; ++k) s.branches[k].F = V6{};
     const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
     Elimination e{P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
     Newton newton{P, in, s, e, load, {}, {}, {}, {}};
     V iterations = splat(0);
-    M done = newton.solve(usable, P.has_knots, iterations);
-    newton.evaluate(false);
-    newton.linearize();
+    M done = newton.solve(usable, P.starts_linear, iterations);
+    if (!newton.fresh) {
+      newton.evaluate(false);
+      newton.linearize();
+    }
     V K[6][6], C[6][6];
     newton.dense(K);
     newton.dense(C);

@@ -21,7 +21,7 @@ struct Newton {
   void law_at(const LawProgram& law, int q) {
     const V k = law.stiffness / s.scale[q], z = s.z[q];
     if (law.count == 0) {
-      s.tau[q] = (k + law.cubic * z * z) * z;
+      s.tau[q] = (k + law.cubic * z * z) * z + law.friction * s.rubs[q];
       s.da[q] = splat(1);
       s.dtau[q] = k + 3 * law.cubic * z * z;
       s.x[q] = s.a_base[q] + z;
@@ -47,7 +47,7 @@ struct Newton {
       da = select(here, splat((u[3] - u[0]) / width), da);
       dtau = select(here, splat((u[4] - u[1]) / width), dtau);
     }
-    s.tau[q] = tau;
+    s.tau[q] = tau + law.friction * s.rubs[q];
     s.da[q] = da;
     s.dtau[q] = dtau;
     s.x[q] = s.a_base[q] + a;
@@ -55,9 +55,10 @@ struct Newton {
 
   /// Where the law carries the force that the linear start found: middle of a gap.
   double from_force(const LawProgram& law, double tau, double scale) const {
+    const double k = law.stiffness / scale;
+    if (law.count == 0) return tau / (k + law.cubic * (tau / k) * (tau / k));
     const double* n = P.knots + 3 * law.first;
     const double* last = n + 3 * (law.count - 1);
-    const double k = law.stiffness / scale;
     const double* end = tau <= n[1] ? n : tau > last[1] ? last : nullptr;
     if (end) return end[2] + (tau - end[1]) / k + (tau - end[1]) / law.stiffness;
     double lo = n[2], hi = last[2];
@@ -79,6 +80,10 @@ struct Newton {
       const CoordinateProgram& k = P.coordinates[q];
       if (k.law < 0 || k.locked) {
         s.x[q] = s.a_base[q] + s.z[q];
+        if (k.stiffness > 0) {
+          s.tau[q] = k.stiffness * (s.x[q] - k.rest);
+          s.dtau[q] = splat(k.stiffness);
+        }
         continue;
       }
       const LawProgram& law = P.laws[k.law];
@@ -93,14 +98,21 @@ struct Newton {
     }
   }
 
+  /// As the reference: what bears nothing stays at its centre, friction opposes the deflection.
   void start_laws(M active) {
     for (int q = 0; q < P.coordinate_count; ++q) {
       const CoordinateProgram& k = P.coordinates[q];
       if (k.law < 0 || k.locked) continue;
       const LawProgram& law = P.laws[k.law];
-      if (law.count == 0) continue;
-      for (int i = 0; i < W; ++i)
-        if (active[i]) s.z[q][i] = from_force(law, law.stiffness / s.scale[q][i] * s.z[q][i], s.scale[q][i]);
+      for (int i = 0; i < W; ++i) {
+        if (!active[i]) continue;
+        const double linear = s.z[q][i];
+        const bool bears = __builtin_fabs(linear) * k.unit > unloaded * P.length;
+        const double tau = bears ? law.stiffness / s.scale[q][i] * linear : 0.0;
+        const double sign = tau > 0 ? 1 : tau < 0 ? -1 : 0;
+        s.rubs[q][i] = sign;
+        s.z[q][i] = bears ? from_force(law, tau - law.friction * sign, s.scale[q][i]) : 0.0;
+      }
     }
   }
 
@@ -159,11 +171,11 @@ struct Newton {
 
   /// Iterates until every lane converged or is left to the reference path; lanes never wait for
   /// the answer of others, only for their time.
-  M solve(M usable, bool knots, V& iterations) {
+  M solve(M usable, bool corners, V& iterations) {
     M done = ~usable & usable, failed = ~usable;
     V previous = splat(0);
     for (int k = 0; k < in.max_iterations; ++k) {
-      const bool secant = knots && k == 0;
+      const bool secant = corners && k == 0;
       evaluate(secant);
       linearize();
       V m[6][6];
@@ -176,19 +188,24 @@ struct Newton {
         eta[i] = splat(0);
         for (int j = 0; j < 6; ++j) eta[i] -= m[i][j] * rhs[j];
       }
-      const M active = ~done & ~failed;
+      M active = ~done & ~failed;
       for (int q = 0; q < P.coordinate_count; ++q) s.dz[q] = splat(0);
       e.back(P.chains[P.root], get(eta), point, V3{}, active);
       const V norm = step_norm();
       failed |= active & ~(norm < 1e6);
-      for (int q = 0; q < P.coordinate_count; ++q) s.z[q] = select(active, s.z[q] + s.dz[q], s.z[q]);
+      // Nothing left to gain from the step: keep the state, and with it this linearisation.
+      const M still = active & (norm < nothing);
+      done |= still;
+      fresh = all(done | failed) && all(still == active);
       iterations = select(active, iterations + 1.0, iterations);
+      active &= ~still;
+      for (int q = 0; q < P.coordinate_count; ++q) s.z[q] = select(active, s.z[q] + s.dz[q], s.z[q]);
       if (secant) {
         start_laws(active);
         continue;
       }
       done |= active & (norm < in.tolerance);
-      if (!knots) {
+      if (!corners) {
         failed |= active & ~done & ~(norm <= 0.2);
         if (k > 0) failed |= active & ~done & ~((norm <= 0.2 * previous) | (norm <= 1e-7));
       }
@@ -199,6 +216,9 @@ struct Newton {
   }
 
   static constexpr double pivot_floor = 1e-5;
+  static constexpr double nothing = 1e-14;
+  static constexpr double unloaded = 1e-11;
+  bool fresh = false;  ///< the last linearisation is the one at the answer
 };
 
 }  // namespace stiffmap::kernel

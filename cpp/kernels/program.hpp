@@ -39,7 +39,7 @@ struct ChainProgram {
 
 /// Polyline in (a, tau) by knots, or linear with a cubic term: see Law.
 struct LawProgram {
-  double stiffness, cubic;
+  double stiffness, cubic, friction;
   std::int32_t first, count;  ///< knots
 };
 
@@ -55,6 +55,7 @@ struct DriveProgram {
 
 struct CoordinateProgram {
   double home, lower, upper, unit;
+  double stiffness, rest;  ///< of a link spring's direction that is a joint of its own
   std::int32_t role, locked, law;
 };
 
@@ -92,7 +93,7 @@ struct Program {
   std::int32_t joint_slots, stiff_slots;
   std::int32_t closes;         ///< the legs can be closed one by one from the grid
   std::int32_t exact_weights;  ///< the tangent is exact with the bodies' weight too
-  std::int32_t has_knots;
+  std::int32_t starts_linear;  ///< a law with knots or friction: Newton starts with all laws linear
   std::uint32_t flag_force, flag_range, flag_limit, flag_always;
   std::int32_t grid_n[3];
   double grid_low[3], grid_step[3];

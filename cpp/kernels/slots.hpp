@@ -35,7 +35,7 @@ struct Scratch {
   JointSlot* joints;
   StiffSlot* stiff;
   BranchSlot* branches;  ///< per chain
-  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed;
+  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *rubs;  ///< rubs: sign of dry friction
 };
 
 }  // namespace stiffmap::kernel

@@ -125,6 +125,19 @@ void Clamp::leg_stiffness(ClampResult& out) {
     if (!out.pose.leg_wrench.col(static_cast<Index>(i)).allFinite()) out.leg_stiffness[i].setConstant(nan);
 }
 
+/// What rigid parts carry between the clamp and the base is not a number.
+void Clamp::hide_undetermined(ClampResult& out) {
+  const MatX null = eq_.saddle.null_space();
+  const Index n = held_.size(), clamp = held_.closures() - 6;
+  for (Index c = 0; c < null.cols(); ++c)
+    for (int k = 0; k < 6; ++k)
+      if (std::abs(null(n + clamp + k, c)) > 1e-6) out.wrench[k] = nan;
+  if (out.wrench.allFinite()) return;
+  out.flags |= flag::internal_wrench_undetermined | flag::rigid_direction;
+  out.pose.leg_wrench.setConstant(nan);
+  out.leg_stiffness.assign(machine_.legs.size(), Mat6::Constant(nan));
+}
+
 void Clamp::solve(PoseInput in, const Vec6& displacement, ClampResult& out) {
   const auto fail = [&](Status status) {
     fail_pose(machine_, in, status, out.pose);
@@ -157,6 +170,7 @@ void Clamp::solve(PoseInput in, const Vec6& displacement, ClampResult& out) {
   out.flags = out.pose.flags;
   out.status = is_minimum(eq_.saddle) ? Status::converged : Status::unstable;
   leg_stiffness(out);
+  hide_undetermined(out);
 }
 
 }  // namespace stiffmap

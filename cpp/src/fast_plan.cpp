@@ -129,28 +129,53 @@ class Compiler {
     }
   }
 
+  /// A spring that is full and regular is one operation; one with uncoupled directions, some of them
+  /// rigid, free or with a law of their own, is a sequence of elastic joints.
   void spring(const Spring& s, Way& way, std::vector<Op>& ops) {
+    Mat6 K = s.matrix.stiffness, whole = K;
+    bool corners = false;
+    for (const auto& [i, law] : s.laws) {
+      corners = corners || law.has_knots() || law.friction() != 0;
+      K(i, i) = 0;
+      whole(i, i) = law.stiffness();
+    }
+    const Vec6 d = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    const bool deficient =
+        s.matrix.rotated || s.matrix.rigid.any() ||
+        Eigen::SelfAdjointEigenSolver<Mat6>(d.asDiagonal() * whole * d.asDiagonal()).eigenvalues()[0] < 1e-9;
+    if (deficient || corners) {
+      if (s.matrix.rotated || !Mat6(K.diagonal().asDiagonal()).isApprox(K, 1e-14))
+        missing_ = "a coupled link spring with rigid or free directions or with gaps";
+      elastic_joints(s, K, way, ops);
+      return;
+    }
     Op& op = push(OpKind::spring, way, ops);
     op.coordinate = next_;
     op.slot = out_.program.stiff_slots++;
     next_ += 6;
-    Mat6 K = s.matrix.stiffness;
-    for (const auto& [i, law] : s.laws) {
-      if (law.has_knots()) missing_ = "a law with gaps inside a link spring";
-      K(i, i) = 0;
-    }
-    Mat6 whole = K;
-    for (const auto& [i, law] : s.laws) whole(i, i) = law.stiffness();
-    const Vec6 d = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    if (s.matrix.rotated || s.matrix.rigid.any() ||
-        Eigen::SelfAdjointEigenSolver<Mat6>(d.asDiagonal() * whole * d.asDiagonal()).eigenvalues()[0] < 1e-9)
-      missing_ = "a link spring with rigid or free directions";
     for (int i = 0; i < 6; ++i) {
       op.rest[i] = s.rest[i];
       for (int k = 0; k < 6; ++k) op.K[6 * i + k] = K(i, k);
     }
     way.rigid = false;
     way.moves = true;
+  }
+
+  void elastic_joints(const Spring& s, const Mat6& K, Way& way, std::vector<Op>& ops) {
+    for (int i = 0; i < 6; ++i, ++next_) {
+      if (s.matrix.rigid[i]) continue;
+      Op& op = push(i < 3 ? OpKind::prismatic : OpKind::revolute, way, ops);
+      op.coordinate = next_;
+      op.eliminated = 1;
+      op.slot = out_.program.joint_slots++;
+      op.axis = i % 3;
+      op.direction[i % 3] = 1;
+      op.law = i32(m_.coordinates[static_cast<std::size_t>(next_)].law);
+      elastic_.push_back({next_, K(i, i), s.rest[i]});
+      if (way.rigid && ++way.prefix > most_prefix) missing_ = "more joints before the first link spring than are supported";
+      way.moves = true;
+      way.turned = way.turned || i >= 3;
+    }
   }
 
   void body(const Body& b, Way& way, std::vector<Op>& ops) {
@@ -196,6 +221,11 @@ class Compiler {
     std::int32_t coordinate, slot, prismatic;
   };
   std::vector<DriveSlot> slots_;
+  struct Elastic {
+    std::int32_t coordinate;
+    double stiffness, rest;
+  };
+  std::vector<Elastic> elastic_;  ///< link springs taken apart
 };
 
 /// Closure equations of each leg: its end against the command, and each loop inside it.
@@ -216,7 +246,7 @@ class ClosureCompiler {
       add_equation(chain, -1, way);
       leg.equations = i32(out_.equations.size()) - leg.first_equation;
       leg.unknowns = i32(local_.size());
-      if (leg.unknowns > most_leg_unknowns) return false;
+      if (leg.unknowns > most_leg_unknowns || leg.equations > most_leg_unknowns || out_.unknowns.size() > 8 * most_leg_unknowns) return false;
       out_.legs.push_back(leg);
     }
     return true;
@@ -243,7 +273,7 @@ class ClosureCompiler {
         way.insert(way.end(), primary.begin(), primary.end());
       } else if (op.kind <= OpKind::prismatic) {
         const Coordinate& k = m_.coordinates[static_cast<std::size_t>(op.coordinate)];
-        if (k.role != Role::actuator && k.locked) continue;
+        if (k.role == Role::spring || (k.role == Role::passive && k.locked)) continue;
         way.push_back({local(op.coordinate), op.slot, op.kind == OpKind::prismatic, 1.0});
       }
     }
@@ -288,6 +318,13 @@ std::string grid_key(const Mechanism& m, const FastPlanData& d) {
   return key;
 }
 
+/// At a folded or stretched leg Newton starts badly: such a node is no start for its neighbours.
+bool nearly_singular(ClosureWorkspace& ws) {
+  ws.qr.setThreshold(0.02);
+  ws.qr.compute(ws.A);
+  return ws.qr.rank() < static_cast<Index>(ws.unknown.size());
+}
+
 std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const FastPlanData& d) {
   const Program& p = d.program;
   const auto nodes = static_cast<std::size_t>(p.grid_n[0]) * static_cast<std::size_t>(p.grid_n[1]) * static_cast<std::size_t>(p.grid_n[2]);
@@ -317,6 +354,7 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
         if (from && (r.status != Status::converged || r.flags & flag::branch_unverified)) r = inverse_closure(m, pose, ws, found);
         if (r.status != Status::converged || r.flags & flag::branch_unverified) continue;
         x[node] = found;
+        if (nearly_singular(ws)) continue;
         for (std::size_t u = 0; u < d.unknowns.size(); ++u) (*grid)[node * d.unknowns.size() + u] = found[d.unknowns[u]];
       }
   return grid;
@@ -357,14 +395,15 @@ void place_grid(const Mechanism& m, const Vec3& low, const Vec3& high, FastPlanD
 
 void fill_tables(const Mechanism& m, const std::vector<Compiler::DriveSlot>& slots, FastPlanData& d) {
   for (const Law& law : m.laws) {
-    d.laws.push_back({law.stiffness(), law.cubic(), i32(d.knots.size() / 3), i32(law.knots().size())});
+    d.laws.push_back({law.stiffness(), law.cubic(), law.friction(), i32(d.knots.size() / 3), i32(law.knots().size())});
     for (const auto& [a, tau] : law.knots())
       for (double v : {a, tau, a + tau / law.stiffness()}) d.knots.push_back(v);
-    d.program.has_knots |= law.has_knots();
+    d.program.starts_linear |= law.has_knots() || law.friction() != 0;
   }
   for (const Coordinate& c : m.coordinates) {
     const Index j = static_cast<Index>(&c - m.coordinates.data());
-    d.coordinates.push_back({m.home_coordinates[j], c.lower, c.upper, m.unit(j), static_cast<std::int32_t>(c.role), c.locked, i32(c.law)});
+    d.coordinates.push_back({m.home_coordinates[j], c.lower, c.upper, m.unit(j), 0.0, 0.0,
+                             static_cast<std::int32_t>(c.role), c.locked, i32(c.law)});
     if (c.role == Role::passive && c.locked) d.program.flag_always |= flag::free_spin;
   }
   for (std::size_t i = 0; i < m.drives.size(); ++i) {
@@ -376,11 +415,14 @@ void fill_tables(const Mechanism& m, const std::vector<Compiler::DriveSlot>& slo
 }
 
 /// Legs close one by one only where nothing before or behind their block moves.
-bool only_legs_have_joints(const FastPlanData& d) {
+bool only_legs_have_joints(const Mechanism& m, const FastPlanData& d) {
   const ChainProgram& root = d.chains[0];
   for (int i = root.first; i < root.first + root.count; ++i) {
     const OpKind kind = d.ops[static_cast<std::size_t>(i)].kind;
-    if (kind <= OpKind::prismatic || (kind == OpKind::block && i != d.program.legs_op)) return false;
+    if (kind == OpKind::block && i != d.program.legs_op) return false;
+    if (kind > OpKind::prismatic) continue;
+    const std::int32_t j = d.ops[static_cast<std::size_t>(i)].coordinate;
+    if (m.coordinates[static_cast<std::size_t>(j)].role != Role::spring) return false;
   }
   return true;
 }
@@ -422,8 +464,13 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high) : data
   if (data_->program.legs_op < 0) missing_ = "no legs";
   if (!missing_.empty()) return;
   fill_tables(m, compiler.slots_, *data_);
+  for (const Compiler::Elastic& e : compiler.elastic_) {
+    CoordinateProgram& c = data_->coordinates[static_cast<std::size_t>(e.coordinate)];
+    c.stiffness = e.stiffness;
+    c.rest = e.rest;
+  }
   const bool box = (high - low).minCoeff() >= 0 && high.allFinite();
-  data_->program.closes = box && only_legs_have_joints(*data_) && ClosureCompiler(m, *data_).run();
+  data_->program.closes = box && only_legs_have_joints(m, *data_) && ClosureCompiler(m, *data_).run();
   link(m, *data_);
   if (data_->program.closes) place_grid(m, low, high, *data_);
 }

@@ -99,6 +99,7 @@ class Machine:
         gravity: ArrayLike | None = None,
         method: str = "fast",
         load_steps: int | str = "auto",
+        stiffness: bool = True,
         threads: int | None = None,
     ) -> Solution:
         """Equilibrium, stiffness and compliance at commanded poses under external wrenches.
@@ -127,6 +128,9 @@ class Machine:
             ``fast`` or ``reference``.
         load_steps
             ``auto`` (adaptive continuation) or the number of equal steps.
+        stiffness
+            False: displacements, status, flags and iterations only; everything else is NaN. Quicker,
+            above all under gravity.
         threads
             None: all cores that this process may use.
 
@@ -147,6 +151,7 @@ class Machine:
         for name in (point, *extra, *read_points):
             if name not in self.points:
                 raise StiffmapError(f"point: expected one of {', '.join(self.points)}, got {name!r}")
+        read = [point, *dict.fromkeys(r for r in read_points if r != point)]
         loads = np.stack([rows(v, shape, (6,)) for v in (w, *extra.values())], axis=1)
         answer = self._core.solve(
             self._plan if method == "fast" else None,
@@ -155,12 +160,14 @@ class Machine:
             np.ascontiguousarray(loads),
             [point, *extra],
             [LOAD_TYPES[load_type]] + [0] * len(extra),
-            [point, *read_points],
+            read,
             self._gravity(gravity),
             self._steps(load_steps),
             thread_count(threads),
-            True,
+            stiffness,
         )
+        order = [0, *(read.index(r) for r in read_points)]
+        answer["displacement"] = answer["displacement"][:, order]
         return self._solution(answer, shape, point)
 
     @staticmethod
@@ -190,8 +197,14 @@ class Machine:
         return load_steps
 
     def _solution(self, a: dict[str, Any], shape: tuple[int, ...], point: str) -> Solution:
+        count = a["status"].shape[0]
+
         def out(key: str) -> Any:
-            return a[key].reshape(shape + a[key].shape[1:])
+            value = a[key]
+            if value.shape[0] != count:  # not asked for
+                fill = np.nan if value.dtype.kind == "f" else 0
+                return np.broadcast_to(np.asarray(fill, value.dtype), shape + value.shape[1:])
+            return value.reshape(shape + value.shape[1:])
 
         c = self._core
         readings = out("displacement")

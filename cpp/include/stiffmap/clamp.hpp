@@ -11,7 +11,8 @@ namespace stiffmap {
 struct ClampResult {
   Status status = Status::unreachable;  ///< with the point held
   std::uint32_t flags = 0;
-  Vec6 wrench;                      ///< that holds the machine at the point, base axes
+  Vec6 wrench;                      ///< that holds the machine at the point, base axes; NaN where rigid
+                                    ///< parts leave a component open
   std::vector<Mat6> leg_stiffness;  ///< imposed twist of the point to minus the leg's wrench there
   PoseResult pose;                  ///< the same equilibrium under that wrench as a dead load
 };
@@ -37,6 +38,7 @@ class Clamp {
   bool hold(const Pose& pose, Problem& problem);
   bool follow(const Vec6& displacement, Problem& problem);
   void leg_stiffness(ClampResult& out);
+  void hide_undetermined(ClampResult& out);
 };
 
 }  // namespace stiffmap

@@ -36,6 +36,7 @@ def _unique(machine: Machine, plan: Experiment, wrench: Floats, threads: int | N
         point=plan.load_point,
         read_points=[plan.point],
         gravity=plan.gravity,
+        stiffness=False,
         threads=threads,
     )
     out = np.where(solution.ok[:, None], solution.readings[:, 1], np.nan)
