@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stiffmap.description.strain import rests_at_command
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.machine import Machine
 
@@ -13,6 +14,8 @@ def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> t
 
     Deflection: the loaded minus the unloaded equilibrium of the same commanded pose.
     """
+    if not plan.wrench.any() and not _moves_unloaded(machine, plan):
+        return np.zeros((len(plan.position), 6)), 0
     motion, count = _unique(machine, plan, plan.wrench, threads)
     if plan.quantity == "deflection" and _moves_unloaded(machine, plan):
         rest, more = _unique(machine, plan, np.zeros_like(plan.wrench), threads)
@@ -21,9 +24,9 @@ def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> t
 
 
 def _moves_unloaded(machine: Machine, plan: Experiment) -> bool:
-    """A declared machine without load stays where it is commanded; one with effects may not."""
+    """Without load only errors, preload or weight move a machine from its command."""
     d = machine.description
-    return bool(d.effects or plan.gravity or d.gravity or d.external_springs)
+    return bool(plan.gravity or d.gravity) or not rests_at_command(d)
 
 
 def _unique(machine: Machine, plan: Experiment, wrench: Floats, threads: int | None) -> tuple[Floats, int]:
