@@ -22,7 +22,8 @@ class HeldMachine:
     """
 
     wrench: Floats
-    """(..., 6) that holds the machine there: what a dead load at the point would have to be."""
+    """(..., 6) that holds the machine there: what a dead load at the point would have to be.
+    Components that rigid parts leave open are NaN (flag RIGID_DIRECTION), and so are the legs' then."""
     leg_wrench: Floats
     """(..., legs, 6) leg on platform, about the point."""
     stiffness: Floats

@@ -30,6 +30,9 @@ COMMANDS = (
     Command("solve", "stiffmap.cli.solve", "solve", "Deflection and stiffness at one pose under one wrench."),
     Command("map", "stiffmap.cli.map", "map_command", "Error maps of z-planes under a force."),
     Command("polar", "stiffmap.cli.polar", "polar", "Deflection against the direction of a force."),
+    Command("wrench", "stiffmap.cli.wrench", "wrench", "Wrench that holds a machine at a displacement."),
+    Command("stress", "stiffmap.cli.stress", "stress", "Internal wrenches without load: errors, preload."),
+    Command("import", "stiffmap.cli.importing", "import_urdf", "Machine file from a URDF."),
     Command("sweep", "stiffmap.cli.sweep", "sweep", "Deflection against the size of a force."),
     Command("paper", "stiffmap.cli.paper", "paper", "Reproduce the figures and statements of the paper."),
 )

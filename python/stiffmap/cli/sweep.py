@@ -28,6 +28,7 @@ from stiffmap.cli.inputs import (
     position,
 )
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.cli.path import path
 from stiffmap.status import Status
 
 
@@ -39,7 +40,14 @@ def sweep(
     from_: Annotated[
         float, typer.Option("--from", help="Smallest force, N; negative: against the direction.")
     ] = 0.0,
-    points: Annotated[int, typer.Option(help="Number of forces.")] = 21,
+    points: Annotated[int, typer.Option(help="Number of forces, or of steps to the limit.")] = 21,
+    control: Annotated[
+        str, typer.Option(help="With --limit: force, displacement (past limit points) or arc.")
+    ] = "force",
+    limit: Annotated[
+        float | None,
+        typer.Option(help="Follow one path of equilibria to this force (N) or displacement (mm)."),
+    ] = None,
     tolerance: ToleranceOption = 0.25,
     effect: EffectsOption = None,
     gravity_: GravityOption = None,
@@ -49,9 +57,10 @@ def sweep(
 ) -> None:
     """Deflection against the size of a force of one direction.
 
-    Unstable equilibria are kept and named; a force without any equilibrium has no value.
+    Unstable equilibria are kept and named; a force without any equilibrium has no value. With --limit,
+    one path of equilibria is followed instead, with its buckling loads and modes.
 
-    With -o: a picture (PNG) and the data (NetCDF).
+    With -o: pictures (PNG) and the data (NetCDF).
 
     Exit codes: 0 done, 1 some equilibria are unstable or were not found, 2 bad input.
 
@@ -60,10 +69,26 @@ def sweep(
       [cyan]stiffmap sweep orthoglide-revised --at -200,-200,-200 --direction 1,1,0 -o results[/cyan]
 
       [cyan]stiffmap sweep orthoglide-revised --from 0 --to 8000 --points 41[/cyan]
+
+      [cyan]stiffmap sweep linear-delta --direction 0,0,-1 --control displacement --limit 20 -o out[/cyan]
     """
     import stiffmap
 
     m = machine_with(machine, effect)
+    if limit is not None or control != "force":
+        reach = limit if limit is None or control == "force" else MM * limit
+        path(
+            m,
+            position(at, m),
+            numbers(direction, "direction", 3),
+            control,
+            reach,
+            points,
+            gravity(gravity_),
+            output,
+            as_json,
+        )
+        return
     forces = np.linspace(from_, to, max(points, 0))
     place, u = position(at, m), numbers(direction, "direction", 3)
     ds = stiffmap.sweep(m, place, u, forces, gravity=gravity(gravity_), method=method)

@@ -7,8 +7,20 @@ never shown as a value. No display is needed.
 from stiffmap.plot.ellipses import ellipse_figure
 from stiffmap.plot.error_maps import map_figure
 from stiffmap.plot.machines import machine_figure
+from stiffmap.plot.paths import mode_figure, path_figure
 from stiffmap.plot.polars import polar_figure
+from stiffmap.plot.stresses import stress_figure
 from stiffmap.plot.style import save
 from stiffmap.plot.sweeps import sweep_figure
 
-__all__ = ["ellipse_figure", "machine_figure", "map_figure", "polar_figure", "save", "sweep_figure"]
+__all__ = [
+    "ellipse_figure",
+    "machine_figure",
+    "map_figure",
+    "mode_figure",
+    "path_figure",
+    "polar_figure",
+    "save",
+    "stress_figure",
+    "sweep_figure",
+]

@@ -19,12 +19,16 @@ def bar(side: int, hinged: bool) -> tuple[object, ...]:
         b.revolute("foot", "z", angle),
         Joint("length", "prismatic", ((1.0, 0.0, 0.0),), home=(length,), law=Law(SPRING)),
     ]
-    return (*elements, b.revolute("apex", "z", -angle)) if hinged else (*elements, Offset("back", Pose.of((0, 0, 0), b.rotation((0, 0, 1), -angle))))
+    return (
+        (*elements, b.revolute("apex", "z", -angle))
+        if hinged
+        else (*elements, Offset("back", Pose.of((0, 0, 0), b.rotation((0, 0, 1), -angle))))
+    )
 
 
-def truss() -> sm.Machine:
-    """Two bars that stretch and nothing else; the platform rides on the left one."""
-    return b.parallel(bar(-1, False), bar(1, True), home=Pose.of((0, RISE, 0)))
+def truss(loose: bool = False) -> sm.Machine:
+    """Two bars that stretch and nothing else; the platform rides on the left one (loose: on a pin)."""
+    return b.parallel(bar(-1, loose), bar(1, True), home=Pose.of((0, RISE, 0)))
 
 
 def truss_force(drop: np.ndarray) -> np.ndarray:
@@ -38,7 +42,10 @@ def column(links: int, stiffness: float = 100.0, link: float = 0.2) -> sm.Machin
     """Cantilever column along x: rigid links on rotational springs about z, clamped at the foot."""
     elements = []
     for i in range(links):
-        elements += [b.revolute(f"hinge_{i + 1}", "z", law=Law(stiffness)), b.shift(f"link_{i + 1}", (link, 0, 0))]
+        elements += [
+            b.revolute(f"hinge_{i + 1}", "z", law=Law(stiffness)),
+            b.shift(f"link_{i + 1}", (link, 0, 0)),
+        ]
     return b.serial(*elements, home=Pose.of((links * link, 0, 0)))
 
 

@@ -79,9 +79,11 @@ def test_where_forces_have_no_answer() -> None:
 
 def test_rigid_parts_forbid_a_displacement() -> None:
     machine = b.serial(b.motor("drive", law=b.Law(1e3)), b.shift("arm", (1, 0, 0)), home=Pose.of((1, 0, 0)))
-    turned = machine.wrench((1, 0, 0), [0, 0, 0, 0, 0, 0])
-    assert turned.ok
-    np.testing.assert_allclose(turned.wrench, 0, atol=1e-9)
+    a = 0.01
+    turned = machine.wrench((1, 0, 0), [np.cos(a) - 1, np.sin(a), 0, 0, 0, a])
+    assert turned.ok and int(turned.flags) & sm.Flag.RIGID_DIRECTION
+    np.testing.assert_allclose(turned.actuator_effort, -1e3 * a, rtol=1e-9)
+    assert np.isnan(turned.wrench).all()  # a force and a moment may share the drive's torque at will
     stretched = machine.wrench((1, 0, 0), [1e-3, 0, 0, 0, 0, 0])
     assert stretched.status == sm.Status.NOT_CONVERGED
     assert np.isnan(stretched.wrench).all()

@@ -1,0 +1,84 @@
+"""``stiffmap sweep --limit``: one path of equilibria."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from stiffmap.broadcasting import Floats
+from stiffmap.cli.inputs import finish, folder, plain
+from stiffmap.cli.output import print_json
+from stiffmap.machine import Machine
+from stiffmap.status import Status
+
+SHOWN = 20
+
+
+def path(
+    machine: Machine,
+    at: Floats,
+    direction: Floats,
+    control: str,
+    limit: float | None,
+    steps: int,
+    gravity: Any,
+    output: Path | None,
+    as_json: bool,
+) -> None:
+    """Follow the path, print it, write it; exit with 1 where it ends early or is unstable somewhere."""
+    import stiffmap
+
+    ds = stiffmap.sweep(machine, at, direction, control=control, limit=limit, steps=steps, gravity=gravity)
+    files = write(machine, ds, folder(output)) if output else []
+    if as_json:
+        names = ("force", "deflection", "deflection_along", "unstable_modes", "status", "critical_force",
+                 "critical_deflection", "critical_kind", "mode_leg", "mode_joint")  # fmt: skip
+        print_json(plain({"machine": machine.name, "end": ds.attrs["end"]}
+                         | {n: ds[n].values for n in names} | {"files": files}))  # fmt: skip
+    else:
+        show(Console(highlight=False), ds)
+        if files:
+            print(f"wrote {', '.join(files)}")
+    reached = ds.attrs["end"] == "the limit was reached"
+    finish(not reached or bool((ds.status != Status.CONVERGED).any()))
+
+
+def write(machine: Machine, ds: xr.Dataset, output: Path) -> list[str]:
+    """Data, the path, and one picture per critical point."""
+    from stiffmap.maps.files import write_dataset
+    from stiffmap.plot import mode_figure, path_figure, save
+
+    files = [write_dataset(ds, output / "path.nc"), save(path_figure(ds), output / "path.png")]
+    for i in range(ds.sizes["critical"]):
+        files.append(save(mode_figure(machine, ds, i), output / f"mode_{i + 1}.png"))
+    return [str(f) for f in files]
+
+
+def show(console: Console, ds: xr.Dataset) -> None:
+    """Some points of the path, and what happened on it."""
+    place = ", ".join(f"{1e3 * v:g}" for v in ds.position.values)
+    table = Table(box=box.SIMPLE_HEAD, title=f"{ds.attrs['machine']} at ({place}) mm")
+    for head in ("force, N", "along the force, mm", "deflection, mm", "status"):
+        table.add_column(head, justify="left" if head == "status" else "right")
+    for i in np.unique(np.linspace(0, ds.sizes["step"] - 1, SHOWN).astype(int)):
+        values = [float(ds.force[i]), 1e3 * float(ds.deflection_along[i]), 1e3 * float(ds.deflection[i])]
+        table.add_row(*(f"{v:.4f}" for v in values), Status(int(ds.status[i])).name.lower())
+    console.print(table)
+    for i in range(ds.sizes["critical"]):
+        leg = str(ds.mode_leg.values[i])
+        more = abs(int(ds.unstable_after[i]) - int(ds.unstable_before[i]))
+        console.print(
+            f"{ds.critical_kind.values[i]} point at {float(ds.critical_force[i]):.6g} N, "
+            f"{1e3 * float(ds.critical_deflection[i]):.6g} mm; mode: "
+            + (f"leg {leg}, " if leg else "")
+            + f"most in {ds.mode_joint.values[i]}"
+            + (f"; {more} modes within one step" if more > 1 else ""),
+            soft_wrap=True,
+        )
+    console.print(f"end: {ds.attrs['end']}")
