@@ -10,6 +10,8 @@ from stiffmap.errors import StiffmapError
 from stiffmap.status import Flag, Status
 
 if TYPE_CHECKING:
+    from stiffmap.diagnosis import Diagnosis, diagnose
+    from stiffmap.experiment import Experiment, load_experiment
     from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
     from stiffmap.link import identify_link
     from stiffmap.machine import Machine, load_machine
@@ -24,6 +26,10 @@ except PackageNotFoundError:  # a source tree that is not installed
 
 # Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
 _HOME = {
+    "Diagnosis": "stiffmap.diagnosis",
+    "Experiment": "stiffmap.experiment",
+    "diagnose": "stiffmap.diagnosis",
+    "load_experiment": "stiffmap.experiment",
     "Kinematics": "stiffmap.kinematics",
     "Machine": "stiffmap.machine",
     "Solution": "stiffmap.solution",
@@ -38,6 +44,8 @@ _HOME = {
 }
 
 __all__ = [
+    "Diagnosis",
+    "Experiment",
     "Flag",
     "Kinematics",
     "Machine",
@@ -46,10 +54,12 @@ __all__ = [
     "StiffmapError",
     "__version__",
     "assembly_stress",
+    "diagnose",
     "error_map",
     "forward_kinematics",
     "identify_link",
     "inverse_kinematics",
+    "load_experiment",
     "load_machine",
     "polar",
     "sweep",

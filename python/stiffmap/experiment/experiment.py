@@ -60,7 +60,6 @@ class Experiment:
     """(6,) standard deviation of the zero that the readings of one pose share."""
     unloaded: str = "centre"
     frame: str = "known"
-    load_frame: str = "known"
     loop: Loop = Loop()
     title: str = ""
     source: str = ""
@@ -81,7 +80,11 @@ class Experiment:
     @cached_property
     def groups(self) -> Integers:
         """(n,) number of the commanded pose of each row."""
-        key = self.position if self.rotation is None else np.hstack([self.position, self.rotation.reshape(-1, 9)])
+        key = (
+            self.position
+            if self.rotation is None
+            else np.hstack([self.position, self.rotation.reshape(-1, 9)])
+        )
         return np.unique(np.round(key, 12), axis=0, return_inverse=True)[1].reshape(-1)
 
     @cached_property

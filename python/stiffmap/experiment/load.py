@@ -31,7 +31,9 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
     place = Path(path)
     file = place / "experiment.yaml" if place.is_dir() else place
     if not file.is_file():
-        raise FileError("there is no such experiment (expected a folder with experiment.yaml)", file=str(place))
+        raise FileError(
+            "there is no such experiment (expected a folder with experiment.yaml)", file=str(place)
+        )
     document = read(file)
     model = _validate(document, str(file))
     scales = Scales.of(model, str(file))
@@ -95,7 +97,6 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
         zero_sigma=np.nan_to_num(_declared(model.zero_noise, scales)),
         unloaded=model.unloaded,
         frame=model.frame,
-        load_frame=model.load_frame,
         loop=Loop(**model.metrology.model_dump()),
         title=model.title,
         source=str(file),
@@ -149,7 +150,9 @@ def _whole(table: Table, column: str) -> Integers | None:
     values = table.numbers(column)
     wrong = np.flatnonzero(values != np.round(values))
     if wrong.size:
-        raise FileError(f"column '{column}': expected whole numbers", file=table.file, line=table.lines[wrong[0]])
+        raise FileError(
+            f"column '{column}': expected whole numbers", file=table.file, line=table.lines[wrong[0]]
+        )
     return values.astype(np.intp)
 
 

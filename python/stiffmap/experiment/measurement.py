@@ -71,7 +71,9 @@ def frame_offset(experiment: Experiment, parameters: Mapping[str, float]) -> Flo
     """(n, 6) of a position: the instrument's frame is offset, and turned about the base origin."""
     turn = np.array([parameters.get(f"angle_{a}", 0.0) for a in "xyz"])
     shift = np.array([parameters.get(a, 0.0) for a in "xyz"])
-    return np.hstack([shift + np.cross(turn, experiment.position), np.broadcast_to(turn, (len(experiment), 3))])
+    return np.hstack(
+        [shift + np.cross(turn, experiment.position), np.broadcast_to(turn, (len(experiment), 3))]
+    )
 
 
 def drift(experiment: Experiment, parameters: Mapping[str, float]) -> Floats:

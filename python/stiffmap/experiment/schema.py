@@ -58,7 +58,6 @@ class ExperimentFile(FileModel):
     zero_noise: NoiseModel = NoiseModel()
     unloaded: Literal["centre", "unknown"] = "centre"
     frame: Literal["known", "offset_unknown", "unknown"] = "known"
-    load_frame: Literal["known", "unknown"] = "known"
     gravity: Annotated[list[Finite], Field(min_length=3, max_length=3)] | None = None
     reference_temperature: Finite | None = None
     metrology: LoopModel = LoopModel()

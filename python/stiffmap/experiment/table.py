@@ -33,7 +33,9 @@ class Table:
         """Cells of a column; raises `FileError` where there is none."""
         if column not in self.header:
             near = suggestion(column, list(self.header))
-            raise FileError(f"missing column '{column}'{near}; found {', '.join(self.header)}", file=self.file)
+            raise FileError(
+                f"missing column '{column}'{near}; found {', '.join(self.header)}", file=self.file
+            )
         i = self.header.index(column)
         return [row[i].strip() for row in self.rows]
 
@@ -49,9 +51,13 @@ class Table:
             value = float(cell)
         except ValueError:
             found = "an empty cell" if not cell else repr(cell)
-            raise FileError(f"column '{column}': expected a number; found {found}", file=self.file, line=line) from None
+            raise FileError(
+                f"column '{column}': expected a number; found {found}", file=self.file, line=line
+            ) from None
         if not math.isfinite(value):
-            raise FileError(f"column '{column}': expected a finite number; found {cell}", file=self.file, line=line)
+            raise FileError(
+                f"column '{column}': expected a finite number; found {cell}", file=self.file, line=line
+            )
         return value
 
 

@@ -33,7 +33,9 @@ class Scales:
     def angle(self, column: str) -> float:
         """Factor of a rotation column; raises `FileError` where no unit is declared."""
         if self.radian is None:
-            raise FileError(f"units: the unit 'angle' is not declared (column '{column}' needs it)", file=self.file)
+            raise FileError(
+                f"units: the unit 'angle' is not declared (column '{column}' needs it)", file=self.file
+            )
         return self.radian
 
     @property
@@ -45,6 +47,8 @@ class Scales:
     def wrench(self, columns: list[str]) -> Floats:
         """(6,) factors of [fx fy fz mx my mz]; raises `FileError` where no unit is declared."""
         if columns and self.force is None:
-            raise FileError(f"units: the unit 'force' is not declared (column '{columns[0]}' needs it)", file=self.file)
+            raise FileError(
+                f"units: the unit 'force' is not declared (column '{columns[0]}' needs it)", file=self.file
+            )
         force = 1.0 if self.force is None else self.force
         return np.array([force if c.startswith("f") else force * self.length for c in WRENCH])

@@ -1,0 +1,6 @@
+"""Which physical effect a declared machine lacks, from measured data."""
+
+from stiffmap.diagnosis.result import Diagnosis, Effect
+from stiffmap.diagnosis.verdict import diagnose
+
+__all__ = ["Diagnosis", "Effect", "diagnose"]

@@ -1,0 +1,99 @@
+"""Candidates: every effect of the registry at every place of the machine, as far as the data allow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from stiffmap import effects
+from stiffmap.description import AppliedEffect, MachineDescription
+from stiffmap.effects import EffectType, Parameter, registry
+from stiffmap.experiment.experiment import Experiment
+
+Names = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect at a place with the parameters that a fit may move.
+
+    ``options`` are words that make a kind of their own (never the branch of friction, which is a
+    column of the data).
+    """
+
+    kind: str
+    element: str
+    legs: Names
+    parameters: tuple[Parameter, ...]
+    options: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def place(self) -> tuple[str, str, Names]:
+        """Kind, element, legs: what a verdict names."""
+        return (self.kind, self.element, self.legs)
+
+    @property
+    def linear(self) -> tuple[Parameter, ...]:
+        """Parameters that have a null value: those whose sensitivity at the null exists."""
+        return tuple(p for p in self.parameters if p.null is not None)
+
+    @property
+    def shape(self) -> tuple[Parameter, ...]:
+        """Parameters without a null value (a period, a phase): unidentified without the effect."""
+        return tuple(p for p in self.parameters if p.null is None)
+
+    def term(self, values: Sequence[float]) -> AppliedEffect:
+        """The effect with these values (SI), in the order of `parameters`."""
+        given = tuple((p.name, float(v)) for p, v in zip(self.parameters, values, strict=True))
+        return AppliedEffect(self.kind, self.element, self.legs, given, self.options)
+
+    def __str__(self) -> str:
+        legs = f", leg{'s' if len(self.legs) > 1 else ''} {', '.join(self.legs)}" if self.legs else ""
+        return f"{self.kind} of {self.element}{legs}"
+
+
+def candidates(description: MachineDescription, experiment: Experiment) -> list[Candidate]:
+    """All candidates that the data can speak of at all."""
+    found = []
+    for kind in registry.kinds():
+        effect = effects.get(kind)
+        if recorded(effect, experiment):
+            found += [c for c in of_kind(effect, description) if in_loop(c, experiment)]
+    return found
+
+
+def of_kind(effect: EffectType, description: MachineDescription) -> list[Candidate]:
+    """One candidate per place and meaning."""
+    out = []
+    for element, legs in effect.places(description):
+        parameters = tuple(p for p in effect.parameters_at(description, element, legs) if p.fitted)
+        parameters = tuple(p for p in parameters if not _later_alternative(effect, p, parameters))
+        if parameters and any(p.null is not None for p in parameters):
+            out.append(Candidate(effect.kind, element, legs, parameters))
+    return out
+
+
+def _later_alternative(effect: EffectType, p: Parameter, among: Sequence[Parameter]) -> bool:
+    alternatives = [q.name for q in among if q.name in effect.one_of]
+    return p.name in alternatives[1:]
+
+
+def recorded(effect: EffectType, experiment: Experiment) -> bool:
+    """Whether the data hold what the effect needs. Without a branch column every load counts as
+    approached from zero; then friction is still a candidate."""
+    have = {"temperature": experiment.temperature is not None, "order": experiment.order is not None}
+    return all(have.get(need, True) for need in effect.needs)
+
+
+def in_loop(candidate: Candidate, experiment: Experiment) -> bool:
+    """Whether the metrology loop lets the effect be seen."""
+    loop = experiment.loop
+    if candidate.kind == "base_compliance" and "base" in (loop.instrument_on, loop.force_against):
+        return False
+    if candidate.kind == "tool_compliance" and loop.target_on == "platform":
+        return False
+    nuisance = {
+        "frame_offset": experiment.frame != "known",
+        "sensor_axes": experiment.frame == "unknown",
+    }
+    return not nuisance.get(candidate.kind, False)

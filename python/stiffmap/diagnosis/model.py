@@ -1,0 +1,79 @@
+"""A set of effects with their values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stiffmap.description import AppliedEffect
+from stiffmap.diagnosis.candidates import Candidate
+from stiffmap.diagnosis.problem import basis
+from stiffmap.experiment.experiment import Floats
+
+STEP = 1e-3  # of a parameter's scale, for tangents
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Candidates and the values of all their parameters, one after the other (in scales)."""
+
+    candidates: tuple[Candidate, ...] = ()
+    values: Floats = field(default_factory=lambda: np.zeros(0))
+    chi2: float = np.inf
+    jacobian: Floats | None = None
+    """(N, k) whitened, at `values`."""
+    residual: Floats | None = None
+    """(N,) whitened."""
+
+    @property
+    def scales(self) -> Floats:
+        """(k,) SI size of one unit of each value."""
+        return np.array([p.scale for c in self.candidates for p in c.parameters])
+
+    @property
+    def si(self) -> Floats:
+        """(k,) values in SI."""
+        return self.values * self.scales
+
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Bounds of the values, in scales."""
+        parameters = [p for c in self.candidates for p in c.parameters]
+        return (
+            np.array([p.lower / p.scale for p in parameters]),
+            np.array([p.upper / p.scale for p in parameters]),
+        )
+
+    def terms(self, values: Floats | None = None) -> tuple[AppliedEffect, ...]:
+        """The effects with these values (in scales)."""
+        si = (self.values if values is None else values) * self.scales
+        out, at = [], 0
+        for c in self.candidates:
+            out.append(c.term(si[at : at + len(c.parameters)]))
+            at += len(c.parameters)
+        return tuple(out)
+
+    def parts(self) -> list[slice]:
+        """Where each candidate's values stand."""
+        ends = np.cumsum([len(c.parameters) for c in self.candidates])
+        return [slice(int(e) - len(c.parameters), int(e)) for c, e in zip(self.candidates, ends, strict=True)]
+
+    def without(self, i: int) -> Model:
+        """The model less one candidate, its other values as they are."""
+        keep = np.ones(len(self.values), bool)
+        keep[self.parts()[i]] = False
+        return Model(self.candidates[:i] + self.candidates[i + 1 :], self.values[keep])
+
+    def plus(self, candidate: Candidate, values: Sequence[float] | Floats) -> Model:
+        """The model and one candidate more, its values in scales."""
+        return Model((*self.candidates, candidate), np.append(self.values, values))
+
+    def tangent(self) -> Floats:
+        """(N, r) orthonormal basis of the fitted effects' directions."""
+        return np.zeros((0, 0)) if self.jacobian is None else basis(self.jacobian)
+
+
+def tangent_step(values: Floats, i: int, upper: float) -> float:
+    """Difference step of value i: away from its upper bound."""
+    return -STEP if values[i] + STEP > upper else STEP

@@ -1,0 +1,100 @@
+"""The readings of an experiment as one whitened vector, nuisances projected out.
+
+Generalised least squares: with the covariance V = L Lᵀ of the readings (independent noise, plus the
+zero that the readings of one pose share) everything is multiplied by L⁻¹, and the nuisances (unknown
+frame, unknown zero of a pose) are projected out once and for all. What is left is unit white noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.diagnosis.nuisance import nuisance_columns
+from stiffmap.experiment.experiment import Experiment, Floats
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Kept readings, in the order of rows and axes; N of them."""
+
+    experiment: Experiment
+    sigma: Floats
+    """(n, 6) noise floor of each reading."""
+    keep: Mask
+    """(n,) rows in use."""
+    index: tuple[NDArray[np.intp], NDArray[np.intp]]
+    """Row and axis of each of the N readings."""
+    nuisance: Floats
+    """(N, q) orthonormal basis of the whitened nuisances."""
+    blocks: tuple[tuple[NDArray[np.intp], Floats], ...]
+    """Readings that share a zero, and the inverse Cholesky factor of their covariance."""
+
+    @staticmethod
+    def of(experiment: Experiment, sigma: Floats, base: Floats, keep: Mask | None = None) -> Problem:
+        """Problem of the rows in `keep`; `base` (n, 6) is the declared machine's prediction."""
+        rows = np.ones(len(experiment), bool) if keep is None else keep
+        used = experiment.read & rows[:, None] & np.isfinite(base)
+        index = np.nonzero(used)
+        bare = Problem(
+            experiment, sigma, rows, index, np.zeros((len(index[0]), 0)), _blocks(experiment, sigma, index)
+        )
+        columns = nuisance_columns(experiment, base)
+        if not columns.shape[-1]:
+            return bare
+        q = basis(np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])]))
+        return Problem(experiment, sigma, rows, index, q, bare.blocks)
+
+    def __len__(self) -> int:
+        return len(self.index[0])
+
+    @property
+    def freedom(self) -> int:
+        """Readings minus nuisances."""
+        return len(self) - self.nuisance.shape[1]
+
+    @property
+    def groups(self) -> NDArray[np.intp]:
+        """(N,) pose number of each reading."""
+        return self.experiment.groups[self.index[0]]
+
+    def white(self, values: Floats) -> Floats:
+        """(n, 6) -> (N,): whitened, nuisances projected out."""
+        out = values[self.index] / self.sigma[self.index]
+        for where, inverse in self.blocks:
+            out[where] = inverse @ values[self.index][where]
+        return np.asarray(out - self.nuisance @ (self.nuisance.T @ out))
+
+    def residual(self, prediction: Floats) -> Floats:
+        """(N,) whitened reading minus prediction; a failed pose counts as a huge residual."""
+        return self.white(np.nan_to_num(self.experiment.reading - prediction, nan=1.0))
+
+
+def basis(columns: Floats, tolerance: float = 1e-9) -> Floats:
+    """Orthonormal basis of the span of columns (N, p), p ≥ rank."""
+    if not columns.shape[1]:
+        return columns
+    norms = np.linalg.norm(columns, axis=0)
+    u, s, _ = np.linalg.svd(columns / np.where(norms > 0, norms, 1.0), full_matrices=False)
+    return np.asarray(u[:, s > tolerance])
+
+
+def _blocks(
+    experiment: Experiment, sigma: Floats, index: tuple[NDArray[np.intp], NDArray[np.intp]]
+) -> tuple[tuple[NDArray[np.intp], Floats], ...]:
+    zero = experiment.zero_sigma
+    if experiment.quantity != "deflection" or not zero.any():
+        return ()
+    out = []
+    key = experiment.groups[index[0]] * 6 + index[1]
+    for k in np.unique(key):
+        where = np.flatnonzero(key == k)
+        s = zero[k % 6]
+        if s > 0:
+            v = np.diag(sigma[index][where] ** 2) + s**2
+            out.append((where, np.linalg.inv(np.linalg.cholesky(v))))
+    return tuple(out)

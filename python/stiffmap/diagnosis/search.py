@@ -1,0 +1,162 @@
+"""Selection of effects: forward, exchange, backward; significance over the whole search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stiffmap.diagnosis.candidates import Candidate
+from stiffmap.diagnosis.fit import evaluate, fit
+from stiffmap.diagnosis.model import Model
+from stiffmap.diagnosis.periodic import is_periodic
+from stiffmap.diagnosis.problem import Problem
+from stiffmap.diagnosis.screen import Screen, log_surprise
+from stiffmap.diagnosis.sensitivity import Variant
+from stiffmap.diagnosis.significance import ALPHA, needed
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.predict import Predictor
+
+MOST_EFFECTS = 4
+MARGIN, CLOSE = 15.0, 0.05
+"""What linear screening may be wrong by: candidates this near the best get a full fit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What a selection works with."""
+
+    predictor: Predictor
+    problem: Problem
+    screen: Screen
+    """Representatives of the alias classes only, beside an empty model."""
+    searches: float
+    """Number of independent tests that the search is worth."""
+    finalists: int = 5
+    alpha: float = ALPHA
+
+    @property
+    def threshold(self) -> float:
+        """Surprise that an effect must have."""
+        return needed(self.searches, self.alpha)
+
+
+@dataclass(frozen=True, eq=False)
+class Finalist:
+    """A candidate tried through the full equilibrium beside the effects in the model."""
+
+    model: Model
+    drop: float
+    surprise: float
+    """-ln of the chance of such a drop under the model without it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The model chosen, and what was tried on the way."""
+
+    model: Model
+    null: Model
+    steps: tuple[str, ...] = field(default=())
+
+
+def select(search: Search) -> Selection:
+    """Effects that the readings demand, one after the other."""
+    null = evaluate(Model(), search.predictor, search.problem)
+    model, steps = null, []
+    for _ in range(MOST_EFFECTS):
+        best = best_addition(search, model)
+        if best is None or best.surprise < search.threshold:
+            break
+        model = backward(search, exchange(search, best.model))
+        steps.append(" + ".join(map(str, model.candidates)))
+        if steps.count(steps[-1]) > 1:
+            break
+    return Selection(model, null, tuple(steps))
+
+
+def best_addition(search: Search, model: Model) -> Finalist | None:
+    """The candidate that explains most beside the model, judged by full fits of the best few."""
+    found = [f for f in additions(search, model, search.finalists) if np.isfinite(f.model.chi2)]
+    return max(found, key=lambda f: f.surprise, default=None)
+
+
+def additions(search: Search, model: Model, number: int, margin: float = MARGIN) -> list[Finalist]:
+    """Full fits of the candidates that screening puts first (within `margin`, or `CLOSE` of it, of the best surprise)."""
+    assert model.residual is not None
+    screen = search.screen.beside(model.tangent())
+    surprise = screen.surprise(screen.drops(model.residual[:, None])[:, 0])
+    best_of: dict[Candidate, int] = {}
+    for i in np.argsort(-surprise):
+        v = screen.variants[i]
+        if v.candidate not in model.candidates and surprise[i] > 0:
+            best_of.setdefault(v.candidate, int(i))
+    top = max(surprise, default=0.0)
+    picked = [i for i in best_of.values() if surprise[i] > top - max(margin, CLOSE * top)]
+    return [_finalist(search, model, screen, i) for i in picked[:number]]
+
+
+def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
+    assert model.residual is not None
+    variant = screen.variants[i]
+    estimate = screen.estimate(i, model.residual)
+    starts = start_values(variant, estimate)
+    fits = [fit(model.plus(variant.candidate, s), search.predictor, search.problem) for s in starts]
+    best = min(fits, key=lambda m: m.chi2)
+    drop = model.chi2 - best.chi2
+    freedom = len(variant.candidate.parameters)
+    return Finalist(best, drop, surprise_of(drop, freedom))
+
+
+def surprise_of(drop: float, freedom: int) -> float:
+    """-ln of the chance of such a drop of chi-square."""
+    if not np.isfinite(drop):
+        return 0.0
+    return float(log_surprise(np.array(max(drop, 0.0)), np.array(freedom, dtype=np.intp)))
+
+
+def start_values(variant: Variant, estimate: Floats) -> list[Floats]:
+    """Values of all parameters (in scales) to start a fit from: null plus the linear estimate."""
+    c = variant.candidate
+    if is_periodic(c):
+        sine, cosine = estimate
+        amplitude, phase = float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
+        given = {"amplitude": amplitude * c.parameters[0].scale, "phase": phase, **dict(variant.shape)}
+        return [np.array([given[p.name] / p.scale for p in c.parameters])]
+    null = np.array([float(p.null or 0.0) / p.scale for p in c.parameters])
+    return [null + estimate]
+
+
+def backward(search: Search, model: Model) -> Model:
+    """Drop effects that the others make unnecessary, the least necessary first."""
+    while len(model.candidates) > 1:
+        trials = [
+            fit(model.without(i), search.predictor, search.problem) for i in range(len(model.candidates))
+        ]
+        sizes = [len(c.parameters) for c in model.candidates]
+        surprise = [surprise_of(t.chi2 - model.chi2, n) for t, n in zip(trials, sizes, strict=True)]
+        worst = int(np.argmin(surprise))
+        if surprise[worst] > search.threshold:
+            return model
+        model = trials[worst]
+    return model
+
+
+def exchange(search: Search, model: Model) -> Model:
+    """Replace single effects by others while that explains clearly more."""
+    for _ in range(3 if len(model.candidates) > 1 else 0):
+        better = model
+        for i in range(len(model.candidates)):
+            reduced = fit(model.without(i), search.predictor, search.problem)
+            found = best_addition(search, reduced)
+            if found and score(found.model, search.problem) > score(better, search.problem) + 1.0:
+                better = found.model
+        if better is model:
+            return model
+        model = better
+    return model
+
+
+def score(model: Model, problem: Problem) -> float:
+    """Log-likelihood less Schwarz's penalty for the number of parameters."""
+    return -0.5 * model.chi2 - 0.5 * len(model.values) * float(np.log(max(len(problem), 2)))

@@ -1,0 +1,118 @@
+"""One pass of finding effects in some rows of an experiment, outliers included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stiffmap.description import MachineDescription
+from stiffmap.diagnosis.alias import AliasClass, alias_classes
+from stiffmap.diagnosis.fit import evaluate
+from stiffmap.diagnosis.model import Model
+from stiffmap.diagnosis.problem import Problem
+from stiffmap.diagnosis.screen import Screen
+from stiffmap.diagnosis.search import Search, Selection, select
+from stiffmap.diagnosis.sensitivity import Plan, plan_of
+from stiffmap.diagnosis.significance import number_of_searches
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.noise import Mask, Noise, noise_of
+from stiffmap.experiment.outliers import outliers, suspects
+from stiffmap.experiment.predict import Predictor
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What all passes over an experiment share: plan, noise, alias classes, the worth of a search."""
+
+    predictor: Predictor
+    plan: Plan
+    noise: Noise
+    classes: tuple[AliasClass, ...]
+    searches: float
+
+    @property
+    def experiment(self) -> Experiment:
+        """The experiment."""
+        return self.predictor.experiment
+
+    @property
+    def description(self) -> MachineDescription:
+        """The declared machine."""
+        return self.predictor.machine.description
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """Result of a pass: the selection, the search behind it, and the rows set aside."""
+
+    selection: Selection
+    search: Search
+    outliers: Mask
+
+    @property
+    def model(self) -> Model:
+        """The effects found."""
+        return self.selection.model
+
+
+_SEARCHES: dict[tuple[int, int, int], float] = {}
+
+
+def study(predictor: Predictor, seed: int) -> Study:
+    """Prepare: sensitivities, noise floor without suspects, alias classes, null search."""
+    plan = plan_of(predictor)
+    e = predictor.experiment
+    rough = noise_of(e)
+    first = noise_of(e, ~suspects(e, e.reading - plan.base, rough.sigma))
+    problem = Problem.of(e, first.sigma, plan.base)
+    screen = Screen.of(problem, plan.variants)
+    classes = tuple(alias_classes(screen, predictor.machine.description))
+    key = (id(plan), seed, len(problem))
+    if key not in _SEARCHES:
+        _SEARCHES[key] = number_of_searches(_representatives(screen, classes), seed)
+    return Study(predictor, plan, first, classes, _SEARCHES[key])
+
+
+def find(study: Study, rows: Mask | None = None, *, finalists: int = 5) -> Finding:
+    """Effects in the rows; outliers are judged against the model and re-admitted where it explains them."""
+    e = study.experiment
+    allowed = np.ones(len(e), bool) if rows is None else rows
+    out = suspects(e, e.reading - study.plan.base, study.noise.sigma) & allowed
+    for _ in range(3):
+        search = _search(study, allowed & ~out, finalists)
+        selection = select(search)
+        residual = e.reading - study.predictor(selection.model.terms())
+        again = outliers(e, _held(residual, allowed), study.noise.sigma) & allowed
+        if np.array_equal(again, out):
+            break
+        out = again
+    search = _search(study, allowed & ~out, finalists)
+    return Finding(_again(selection, search), search, out)
+
+
+def _again(selection: Selection, search: Search) -> Selection:
+    """The selection's residuals on the rows of this search."""
+    if selection.model.residual is not None and len(selection.model.residual) == len(search.problem):
+        return selection
+    return select(search)
+
+
+def _held(residual: Floats, allowed: Mask) -> Floats:
+    return np.where(allowed[:, None], residual, np.nan)
+
+
+def _search(study: Study, keep: Mask, finalists: int) -> Search:
+    problem = Problem.of(study.experiment, study.noise.sigma, study.plan.base, keep)
+    screen = _representatives(Screen.of(problem, study.plan.variants), study.classes)
+    return Search(study.predictor, problem, screen, study.searches, finalists)
+
+
+def _representatives(screen: Screen, classes: tuple[AliasClass, ...]) -> Screen:
+    named = {c.representative for c in classes}
+    return screen.only([i for i, v in enumerate(screen.variants) if v.candidate in named])
+
+
+def null_model(finding: Finding) -> Model:
+    """The declared machine on the finding's rows."""
+    return evaluate(Model(), finding.search.predictor, finding.search.problem)

@@ -1,0 +1,214 @@
+"""`diagnose`: from readings to a verdict."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from os import PathLike
+
+import numpy as np
+from scipy.stats import chi2
+
+from stiffmap.diagnosis.crossval import HeldOut, held_out
+from stiffmap.diagnosis.describe import aliases_of, named_effects
+from stiffmap.diagnosis.detect import detectable
+from stiffmap.diagnosis.empirical import empirical
+from stiffmap.diagnosis.limits import limitations, refuse
+from stiffmap.diagnosis.model import Model
+from stiffmap.diagnosis.result import Detectability, Diagnosis, NoiseReport
+from stiffmap.diagnosis.rivals import rivals
+from stiffmap.diagnosis.separate import separation
+from stiffmap.diagnosis.stability import SHARE, explained, steady
+from stiffmap.diagnosis.structure import Pattern, patterns
+from stiffmap.diagnosis.study import Finding, Study, find, study
+from stiffmap.experiment.checks import Check, checks
+from stiffmap.experiment.experiment import AXES, Experiment, Floats
+from stiffmap.experiment.load import load_experiment
+from stiffmap.experiment.predict import Predictor
+from stiffmap.experiment.summary import Summary, summary
+from stiffmap.machine import Machine, load_machine
+
+VIOLATED = 1e-6
+"""Chance below which a model-free check, applied to what the effects leave, refuses the verdict."""
+
+
+def diagnose(
+    machine: Machine | str | PathLike[str],
+    experiment: Experiment | str | PathLike[str],
+    *,
+    seed: int = 0,
+    threads: int | None = None,
+    cross_validate: bool = True,
+) -> Diagnosis:
+    """Which physical effect the declared machine lacks, where, how large, and how sure that is.
+
+    Parameters
+    ----------
+    machine
+        Declared machine, the name of a shipped one, or a machine file.
+    experiment
+        An experiment, its folder or its YAML file.
+    seed
+        Of the simulated noise and of the folds; the same seed gives the same answer.
+    threads
+        None: all cores that this process may use.
+    cross_validate
+        False leaves out the nested cross-validation: `before` and `after` are then not held out.
+
+    Raises StiffmapError for files that cannot be used, poses out of reach, and noise that is unknown.
+    docs/diagnosis.md tells the method.
+    """
+    machine = machine if isinstance(machine, Machine) else load_machine(machine)
+    data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
+    clock = [time.perf_counter()]
+    predictor = Predictor(machine, data, threads=threads)
+    refuse(data, predictor())
+    s = study(predictor, seed)
+    clock.append(time.perf_counter())
+    finding = find(s)
+    left = unexplained(s, finding)
+    finding, verdict = judge(s, finding, left)
+    clock.append(time.perf_counter())
+    held = held_out(s, finding.outliers, seed) if cross_validate else None
+    clock.append(time.perf_counter())
+    seconds = dict(
+        zip(("plan and null search", "search", "cross-validation"), np.diff(clock).tolist(), strict=True)
+    )
+    return _assemble(s, finding, verdict, left, held, seed, seconds)
+
+
+def unexplained(s: Study, finding: Finding) -> list[Pattern]:
+    """Patterns and violated checks in what the effects leave."""
+    model = finding.model
+    assert model.residual is not None
+    found = patterns(finding.search.problem, model.residual, model.tangent())
+    for check in after_checks(s, finding):
+        if check.contrasts and check.p < VIOLATED:
+            found.append(Pattern("all axes", f"{check.name} violated ({check.meaning})", check.p, np.nan))
+    return found
+
+
+def after_checks(s: Study, finding: Finding) -> list[Check]:
+    """Model-free checks of the residual."""
+    residual = s.experiment.reading - s.predictor(finding.model.terms())
+    return checks(s.experiment, residual, s.noise.sigma, ~finding.outliers)
+
+
+def judge(s: Study, finding: Finding, left: list[Pattern]) -> tuple[Finding, str]:
+    """Verdict; effects that a rest makes untrustworthy are withdrawn."""
+    model = finding.model
+    if not left:
+        return finding, "effects" if model.candidates else "none"
+    if model.candidates:
+        share = explained(finding.selection.null, model, finding.search.problem.freedom)
+        if share >= SHARE and all(steady(finding.search.problem, model)):
+            return finding, "effects+unattributed"
+    selection = replace(finding.selection, model=finding.selection.null)
+    return replace(finding, selection=selection), "unattributed"
+
+
+def _assemble(
+    s: Study,
+    finding: Finding,
+    verdict: str,
+    left: list[Pattern],
+    held: HeldOut | None,
+    seed: int,
+    seconds: dict[str, float],
+) -> Diagnosis:
+    e, model, search = s.experiment, finding.model, finding.search
+    before = e.reading - s.plan.base
+    after = e.reading - s.predictor(model.terms())
+    other = rivals(search, model, s.classes) if model.candidates else []
+    if other and verdict == "effects":
+        verdict = "ambiguous"
+    inflation = max(1.0, float(np.sqrt(model.chi2 / max(search.problem.freedom, 1)))) if left else 1.0
+    keep = ~finding.outliers
+    sizes = detectable(search.screen.beside(model.tangent()), search.threshold)
+    sums = _summaries(held if verdict in ("effects", "ambiguous", "none") else None, before, after, s, keep)
+    return Diagnosis(
+        verdict=verdict,
+        effects=named_effects(s, search, model, inflation),
+        alternatives=[named_effects(s, search, r.model, inflation) for r in other],
+        separations=[separation(s, model, r.model, seed) for r in other],
+        before=sums[0],
+        after=sums[1],
+        held_out=held,
+        noise=_noise(s, finding),
+        detectable=[
+            Detectability(
+                d.candidate.kind,
+                d.candidate.element,
+                d.candidate.legs,
+                d.sizes,
+                aliases_of(s.classes, d.candidate),
+            )
+            for d in sizes
+            if any(v is not None for v in d.sizes.values())
+        ],
+        unobservable=_unobservable(s, finding),
+        outliers=[e.ids[i] for i in np.flatnonzero(finding.outliers)],
+        checks_before=checks(e, e.reading, s.noise.sigma, keep),
+        checks_after=after_checks(s, finding),
+        unexplained=left,
+        limitations=limitations(s),
+        significance={"searches": s.searches, "alpha": search.alpha, "needed_minus_ln_p": search.threshold},
+        machine=predicted_machine(s, model),
+        declared=s.predictor.machine,
+        experiment=e,
+        residual_before=before,
+        residual_after=after,
+        set_aside=finding.outliers,
+        empirical=empirical(e, np.where(keep[:, None], after, np.nan), s.noise.sigma, seed) if left else None,
+        seconds=seconds,
+    )
+
+
+def predicted_machine(s: Study, model: Model) -> Machine:
+    """The corrected machine, with a note that says from which experiment each effect comes."""
+    machine = s.predictor.with_terms(model.terms())
+    if machine is s.predictor.machine:
+        return machine
+    d = machine.description
+    notes = tuple(
+        (f"effect {i + 1}", f"{c}, from experiment {s.experiment.name}")
+        for i, c in enumerate(model.candidates)
+    )
+    declared = d.declared
+    assert declared is not None
+    extra = (*declared.extra, ("diagnosis", {k: v for k, v in notes}))
+    return Machine(replace(d, extra=extra, declared=replace(declared, extra=extra)))
+
+
+def _summaries(
+    held: HeldOut | None, before: Floats, after: Floats, s: Study, keep: Floats
+) -> tuple[Summary, Summary]:
+    if held:
+        return held.before, held.after
+    rows = keep[:, None]
+    return tuple(summary(np.where(rows, r, np.nan), s.noise.sigma) for r in (before, after))  # type: ignore[return-value]
+
+
+def _noise(s: Study, finding: Finding) -> NoiseReport:
+    problem, n = finding.search.problem, s.noise
+
+    def per_axis(values: Floats) -> dict[str, float]:
+        return {a: float(v) for a, v, r in zip(AXES, values, s.experiment.read.any(axis=0), strict=True) if r}
+
+    before = float(chi2.sf(finding.selection.null.chi2, problem.freedom))
+    after = float(chi2.sf(finding.model.chi2, max(1, problem.freedom - len(finding.model.values))))
+    return NoiseReport(
+        per_axis(n.floor),
+        per_axis(n.repeats),
+        per_axis(n.declared),
+        per_axis(n.consistency),
+        before,
+        after,
+        n.rms,
+    )
+
+
+def _unobservable(s: Study, finding: Finding) -> list[str]:
+    seen = {c.representative for c in s.classes} | {m for c in s.classes for m in c.members}
+    all_ = dict.fromkeys(v.candidate for v in s.plan.variants)
+    return [str(c) for c in all_ if c not in seen] + [f"{c} ({why})" for c, why in s.plan.failed]

@@ -1,0 +1,92 @@
+"""The noise floor: the larger of what repeats show and what the instrument declares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment.experiment import AXES, Experiment, Floats
+
+Mask = NDArray[np.bool_]
+CONTRADICTION = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Per axis (6,), m or rad; NaN where the axis was not read or nothing is known."""
+
+    declared: Floats
+    """Root mean square of the declared standard deviations."""
+    repeats: Floats
+    """From readings of the same condition."""
+    freedom: NDArray[np.intp]
+    """Degrees of freedom of `repeats`."""
+    consistency: Floats
+    """Chance of repeats that differ at least this much from the declaration (two-sided chi-square)."""
+    floor: Floats
+    """The larger of the two."""
+    sigma: Floats
+    """(n, 6) standard deviation of every reading, at the floor."""
+
+    @property
+    def rms(self) -> float:
+        """Floor of the linear axes together, m."""
+        return float(np.sqrt(np.nanmean(self.floor[:3] ** 2)))
+
+    def contradictions(self) -> list[str]:
+        """Axes whose repeats scatter more than the declaration allows, told in words."""
+        return [
+            f"{a}: repeats scatter by {s:.3g}, {d:.3g} declared (SI, chance {p:.1g})"
+            for a, s, d, p in zip(AXES, self.repeats, self.declared, self.consistency, strict=True)
+            if p < CONTRADICTION and s > d
+        ]
+
+
+def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
+    """Noise floor from the rows in `keep`; raises StiffmapError where nothing tells the noise."""
+    rows = np.ones(len(experiment), bool) if keep is None else keep
+    squares, freedom = _within(experiment, rows)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        repeats = np.sqrt(squares / freedom)
+        declared = np.sqrt(_mean(experiment.sigma**2))
+        ratio = squares / declared**2
+        lower = chi2.cdf(ratio, np.maximum(freedom, 1))
+    p = np.where((freedom > 0) & (declared > 0), 2 * np.minimum(lower, 1 - lower), np.nan)
+    floor = np.fmax(declared, np.where(freedom >= 5, repeats, np.nan))
+    _check(experiment, floor)
+    factor = np.where(declared > 0, floor / np.where(declared > 0, declared, 1.0), np.nan)
+    sigma = np.where(experiment.sigma > 0, experiment.sigma * factor, floor)
+    return Noise(declared, repeats, freedom, p, floor, np.where(experiment.read, sigma, np.nan))
+
+
+def _mean(values: Floats) -> Floats:
+    count = np.isfinite(values).sum(axis=0)
+    return np.asarray(np.where(count > 0, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan))
+
+
+def _within(experiment: Experiment, rows: Mask) -> tuple[Floats, NDArray[np.intp]]:
+    """Sum of squares within conditions, and its degrees of freedom, per axis."""
+    condition = experiment.conditions
+    number = int(condition.max()) + 1
+    read = experiment.read & rows[:, None]
+    values = np.where(read, experiment.reading, 0.0)
+    count = np.stack([np.bincount(condition, read[:, a], number) for a in range(6)], axis=1)
+    total = np.stack([np.bincount(condition, values[:, a], number) for a in range(6)], axis=1)
+    mean = total / np.maximum(count, 1)
+    squares = np.where(read, (values - mean[condition]) ** 2, 0.0).sum(axis=0)
+    return squares, np.maximum(count - 1, 0).sum(axis=0).astype(np.intp)
+
+
+def _check(experiment: Experiment, floor: Floats) -> None:
+    wrong = [
+        a for a, f, any_ in zip(AXES, floor, experiment.read.any(axis=0), strict=True) if any_ and not f > 0
+    ]
+    if wrong:
+        raise StiffmapError(
+            f"{experiment.name}: the noise of {', '.join(wrong)} is zero or unknown; declare it (noise: in "
+            "experiment.yaml) or repeat readings at 5 or more conditions"
+        )

@@ -1,0 +1,93 @@
+"""Readings that stand alone: found robustly, listed, never a whole pose or branch."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from stiffmap.experiment.experiment import Experiment, Floats
+
+Mask = NDArray[np.bool_]
+FALSE = 0.01
+"""Chance of listing any row of a clean experiment."""
+GROSS = 8.0
+"""Robust standard deviations beyond which a reading is set aside before any effect is known."""
+
+
+def row_scores(residual: Floats, sigma: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """(n,) squared length of each row's residual in standard deviations, and its readings."""
+    z = residual / sigma
+    count = np.isfinite(z).sum(axis=1)
+    return np.nansum(z**2, axis=1), count
+
+
+def outliers(experiment: Experiment, residual: Floats, sigma: Floats) -> Mask:
+    """(n,) rows whose residual (n, 6) to a model that fits is too long for noise.
+
+    A pose, or a branch, of which half or more would go is no outlier: it stays whole.
+    """
+    score, count = row_scores(residual, sigma)
+    chance = chi2.sf(score, np.maximum(count, 1))
+    found = (chance < FALSE / max(len(experiment), 1)) & (count > 0)
+    return whole_stays(experiment, found)
+
+
+def suspects(experiment: Experiment, residual: Floats, sigma: Floats) -> Mask:
+    """(n,) rows to set aside before any effect is known, when residuals are structured.
+
+    Repeats that contradict each other, the one farther from its condition's or the model's middle;
+    and rows beyond `GROSS` robust standard deviations of all residuals of their axis.
+    """
+    residual, sigma = residual[:, experiment.read.any(axis=0)], sigma[:, experiment.read.any(axis=0)]
+    away = np.abs(residual - np.nanmedian(residual, axis=0))
+    gross = (away > GROSS * np.fmax(1.4826 * np.nanmedian(away, axis=0), sigma)).any(axis=1)
+    lonely = _lonely(experiment, residual, sigma, gross)
+    return whole_stays(experiment, _contradicting(experiment, residual, sigma) | lonely)
+
+
+def _lonely(experiment: Experiment, residual: Floats, sigma: Floats, gross: Mask) -> Mask:
+    """Gross rows that no other reading of their condition confirms."""
+    out = gross.copy()
+    for i in np.flatnonzero(gross):
+        same = np.flatnonzero(experiment.conditions == experiment.conditions[i])
+        near = (np.abs(residual[same] - residual[i]) < 6.0 * sigma[same]) | ~np.isfinite(residual[same])
+        out[i] = near.all(axis=1).sum() < 2
+    return out
+
+
+def _contradicting(experiment: Experiment, residual: Floats, sigma: Floats) -> Mask:
+    """In each condition whose repeats scatter too much, the row farthest from the others or from zero."""
+    out = np.zeros(len(experiment), bool)
+    condition = experiment.conditions
+    number = int(condition.max()) + 1
+    order = np.argsort(condition, kind="stable")
+    for rows in np.split(order, np.cumsum(np.bincount(condition, minlength=number))[:-1]):
+        if len(rows) > 1:
+            out[_worst(rows, residual / sigma)] = True
+    return out
+
+
+def _worst(rows: NDArray[np.intp], z: Floats) -> NDArray[np.intp]:
+    middle = np.nanmedian(z[rows], axis=0)
+    score = np.nansum((z[rows] - middle) ** 2, axis=1)
+    freedom = max(1, int(np.isfinite(z[rows]).sum() - np.isfinite(middle).sum()))
+    if chi2.sf(float(score.sum()), freedom) > 1e-5:
+        return rows[:0]
+    if len(rows) == 2:  # two that disagree: the one farther from the model
+        score = np.nansum(z[rows] ** 2, axis=1)
+    return rows[[int(np.argmax(score))]]
+
+
+def whole_stays(experiment: Experiment, found: Mask) -> Mask:
+    """`found` without the rows of poses and branches that would lose half or more of their rows."""
+    out = found.copy()
+    labels = [experiment.groups]
+    if experiment.branch:
+        labels.append(np.unique(experiment.branch, return_inverse=True)[1])
+    for label in labels:
+        total = np.bincount(label)
+        share = np.bincount(label, found, len(total)) / total
+        limit = np.where(total > 2, 0.5, 0.51)  # of two readings one may go
+        out &= share[label] < limit[label]
+    return out
