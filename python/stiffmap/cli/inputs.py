@@ -21,9 +21,7 @@ MM = 1e-3
 MachineArgument = Annotated[str, typer.Argument(help="Shipped name (stiffmap machines) or machine file.")]
 EffectsOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--effect", help="Add an effect, e.g. 'dead_zone of actuator, leg y: half_width 12 um'; repeatable."
-    ),
+    typer.Option("--effect", help="Add an effect, e.g. 'dead_zone actuator y half_width=12um'; repeatable."),
 ]
 GravityOption = Annotated[
     str | None,

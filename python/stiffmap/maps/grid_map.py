@@ -126,9 +126,12 @@ def fill(plan: MapPlan, store: Store, chunk: int | None, progress: bool | None) 
         raise StiffmapError(f"chunk: expected 1 or more, got {chunk}")
     step = max(1, poses // plan.x.size)
     blocks = [slice(i, min(i + step, plan.rows)) for i in range(0, plan.rows, step)]
-    for rows in track(blocks, len(blocks), "map", progress):
-        if not store.done[rows].all():
-            store.put(rows, solve_block(plan, rows))
+    try:
+        for rows in track(blocks, len(blocks), "map", progress):
+            if not store.done[rows].all():
+                store.put(rows, solve_block(plan, rows))
+    finally:
+        store.flush()
 
 
 def _on_disk(plan: MapPlan, out: Path, resume: bool, chunk: int | None, progress: bool | None) -> xr.Dataset:

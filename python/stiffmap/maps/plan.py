@@ -58,9 +58,12 @@ class MapPlan:
 
     def positions(self, rows: slice) -> Floats:
         """TCP positions (rows * x, 3) of some rows."""
-        z, y, x = np.meshgrid(self.z, self.y, self.x, indexing="ij")
-        grid = np.stack([x, y, z], axis=-1).reshape(self.rows, self.x.size, 3)
-        return np.ascontiguousarray(grid[rows].reshape(-1, 3))
+        iz, iy = np.divmod(np.arange(rows.start, rows.stop), self.y.size)
+        out = np.empty((iz.size, self.x.size, 3))
+        out[..., 0] = self.x
+        out[..., 1] = self.y[iy, None]
+        out[..., 2] = self.z[iz, None]
+        return out.reshape(-1, 3)
 
     @cached_property
     def variables(self) -> list[Variable]:

@@ -218,3 +218,23 @@ def test_solving_does_not_import_matplotlib() -> None:
         "sys.exit('matplotlib' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", script], capture_output=True, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("command", ["map", "polar", "sweep", "solve"])
+def test_effects_reach_the_machine(
+    command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    options = {
+        "map": ["--points", "2", "--z", "0", "--no-pictures"],
+        "polar": ["--directions", "4"],
+        "sweep": ["--points", "2"],
+        "solve": ["--force", "0,300,0"],
+    }[command]
+    _, plain = run_json(capsys, command, NAME, *options)
+    code, softer = run_json(capsys, command, NAME, *options, "--effect", "compliance actuator scale=3")
+    assert code == 0
+    assert softer != plain
+    code, _, err = run(capsys, command, NAME, *options, "--effect", "rust actuator y")
+    assert code == 2
+    assert err.count("\n") == 1
