@@ -148,25 +148,26 @@ struct Elimination {
     eliminate(op, j, dot(j.J, KJ) + d, t);
   }
 
-  /// Relative tangent K, c at k.p of a spring, its start held (F5).
-  void spring_tangent(const Op& op, const StiffSlot& k, Sym6& K, V6& c) {
+  /// Wrench at k.p with which a spring holds its end.
+  V6 spring_wrench(const Op& op, const StiffSlot& k) const {
     const V* x = s.x + op.coordinate;
-    V tau[6];
-    V d[6];
+    V d[6], tau[6];
     for (int i = 0; i < 6; ++i) {
       d[i] = x[i] - op.rest[i];
-      tau[i] = splat(0);
+      tau[i] = P.coordinates[op.coordinate + i].law >= 0 ? s.tau[op.coordinate + i] : splat(0);
     }
     for (int i = 0; i < 6; ++i)
       for (int q = 0; q < 6; ++q)
         if (op.K[6 * i + q] != 0) tau[i] += op.K[6 * i + q] * d[q];
+    return {k.start.R * V3{tau[0], tau[1], tau[2]}, k.Z * V3{tau[3], tau[4], tau[5]}};
+  }
+
+  /// Relative tangent K, c at k.p of a spring, its start held (F5).
+  void spring_tangent(const Op& op, const StiffSlot& k, Sym6& K, V6& c) {
     V diagonal[6];
     for (int i = 0; i < 6; ++i) {
       diagonal[i] = splat(op.K[7 * i]);
-      if (P.coordinates[op.coordinate + i].law >= 0) {
-        diagonal[i] += s.dtau[op.coordinate + i];
-        tau[i] += s.tau[op.coordinate + i];
-      }
+      if (P.coordinates[op.coordinate + i].law >= 0) diagonal[i] += s.dtau[op.coordinate + i];
     }
     const M3& R = k.start.R;
     const M3& Z = k.Z;
@@ -188,7 +189,7 @@ struct Elimination {
         K.B.c[1] = K.B.c[1] + Z.c[q].y * f;
         K.B.c[2] = K.B.c[2] + Z.c[q].z * f;
       }
-    c = V6{R * V3{tau[0], tau[1], tau[2]}, Z * V3{tau[3], tau[4], tau[5]}} - k.F;
+    c = spring_wrench(op, k) - k.F;
   }
 
   /// S += sum_ij k_ij c_i c_j^T for a symmetric k, zero entries skipped; h adds to (01), (02), (12).
@@ -320,6 +321,70 @@ struct Elimination {
     move(t, end, F);
     K = t.K;
     c = t.c;
+  }
+
+  // ---- residual of a perturbed program with the factors of the last tangent (F10) -------------
+  void joint_residual(const Op& op, V6& c) {
+    const JointSlot& j = s.joints[op.slot];
+    const int q = op.coordinate;
+    const V rho = s.tau[q] - dot(j.w, op.kind == OpKind::prismatic ? j.F.a : j.F.b);
+    c = c - (s.da[q] * ((dot(j.J, c) - rho) * j.inverse)) * j.u;
+  }
+
+  V6 stiff_residual(const Op& op) {
+    const StiffSlot& k = s.stiff[op.slot];
+    if (op.kind == OpKind::spring) return spring_wrench(op, k) - k.F;
+    V6 sum{};
+    for (int b = 0; b < op.count; ++b) {
+      BranchSlot& branch = s.branches[op.first + b];
+      V6 c = residual(P.chains[op.first + b], branch.end.p);
+      if (b > 0) c = c + dead(branch.K, branch.F.b, frame_error(branch.end, s.branches[op.first].end));
+      sum = sum + c;
+    }
+    return sum;
+  }
+
+  static void series_residual(const StiffSlot& k, const V6& inner, V6& c) {
+    V y[6];
+    put(c - inner, y);
+    for (int i = 1; i < 6; ++i)
+      for (int q = 0; q < i; ++q) y[i] -= k.L[i][q] * y[q];
+    V sum[6];
+    for (int col = 0; col < 6; ++col) sum[col] = splat(0);
+    for (int i = 0; i < 6; ++i) {
+      const V d = k.inverse[i] * y[i];
+      for (int col = 0; col < 6; ++col) sum[col] += k.X[i][col] * d;
+    }
+    c = c - get(sum);
+  }
+
+  /// Out-of-balance wrench at the end of a chain, at the frames and wrenches of the last passes.
+  V6 residual(const ChainProgram& chain, const V3& end) {
+    V6 c{};
+    V3 p{};
+    const auto move_to = [&](const V3& to) {
+      c.b = c.b - cross(to - p, c.a);
+      p = to;
+    };
+    for (int i = chain.first_stiff; i < chain.first + chain.count; ++i) {
+      const Op& op = P.ops[i];
+      if (op.kind == OpKind::load || (op.kind <= OpKind::prismatic && !op.eliminated)) continue;
+      if (op.kind <= OpKind::prismatic) {
+        move_to(s.joints[op.slot].o);
+        joint_residual(op, c);
+      } else if (i > chain.first_stiff) {
+        const StiffSlot& k = s.stiff[op.slot];
+        move_to(k.p);
+        series_residual(k, stiff_residual(op), c);
+      } else {
+        c = stiff_residual(op);
+        p = s.stiff[op.slot].p;
+        for (int q = i - 1; q >= chain.first; --q)
+          if (P.ops[q].kind <= OpKind::prismatic && P.ops[q].eliminated) joint_residual(P.ops[q], c);
+      }
+    }
+    move_to(end);
+    return c;
   }
 
   // ---- steps ----------------------------------------------------------------------------------

@@ -85,26 +85,70 @@ struct Block {
   }
 
   /// Drives with their errors; every coordinate's value at zero deflection (theory G1, G2).
-  void set_base() {
-    for (int q = 0; q < P.coordinate_count; ++q) {
-      const CoordinateProgram& k = P.coordinates[q];
+  void set_base(const Program& of) {
+    for (int q = 0; q < of.coordinate_count; ++q) {
+      const CoordinateProgram& k = of.coordinates[q];
       const bool sprung = k.role == 1 && k.law >= 0;
-      s.closed[q] = s.x[q];
-      s.a_base[q] = k.role == 2 ? splat(0) : sprung ? splat(k.home) : s.x[q];
-      s.z[q] = sprung ? s.x[q] - k.home : splat(0);
-      s.scale[q] = s.da[q] = splat(1);
-      s.tau[q] = s.dtau[q] = s.rubs[q] = splat(0);
+      s.a_base[q] = k.role == 2 ? splat(0) : sprung ? splat(k.home) : s.closed[q];
+      s.scale[q] = splat(1);
     }
-    for (int d = 0; d < P.drive_count; ++d) {
-      const DriveProgram& k = P.drives[d];
-      if (k.compliance_slope != 0) s.scale[k.coordinate] = 1.0 + k.compliance_slope * (s.x[k.coordinate] - k.home);
+    for (int d = 0; d < of.drive_count; ++d) {
+      const DriveProgram& k = of.drives[d];
+      if (k.compliance_slope != 0) s.scale[k.coordinate] = 1.0 + k.compliance_slope * (s.closed[k.coordinate] - k.home);
     }
-    for (int i = 0; i < P.error_count; ++i) {
-      const CommandErrorProgram& k = P.errors[i];
-      const V u = s.x[k.coordinate] - k.reference;
+    for (int i = 0; i < of.error_count; ++i) {
+      const CommandErrorProgram& k = of.errors[i];
+      const V u = s.closed[k.coordinate] - k.reference;
       V wave = splat(0), unused;
       if (k.amplitude != 0) sincos(u * (2 * 3.14159265358979323846 / k.period) + k.phase, wave, unused);
       s.a_base[k.coordinate] += k.offset + k.slope * u + k.amplitude * wave;
+    }
+  }
+
+  void set_start() {
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      const CoordinateProgram& k = P.coordinates[q];
+      s.closed[q] = s.x[q];
+      s.z[q] = k.role == 1 && k.law >= 0 ? s.x[q] - k.home : splat(0);
+      s.da[q] = splat(1);
+      s.tau[q] = s.dtau[q] = s.rubs[q] = splat(0);
+    }
+    set_base(P);
+  }
+
+  /// Displacement of each variant after one step from here, with the factors of the base (F10).
+  void vary(M done, const Newton& base, const V (&C)[6][6]) {
+    const V3 offset{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
+    for (int v = 0; v < in.perturbed_count; ++v) {
+      const Program& Q = *in.perturbed[v];
+      Elimination e{Q, s, base.e.gravity, splat(0), {}};
+      Newton at{Q, in, s, e, load, {}, {}, {}, {}};
+      set_base(Q);
+      at.evaluate(false);
+      at.frames_and_wrenches();
+      V c[6], eta[6];
+      put(e.residual(Q.chains[Q.root], at.point), c);
+      for (int i = 0; i < 6; ++i) {
+        eta[i] = splat(0);
+        for (int q = 0; q < 6; ++q) eta[i] -= C[i][q] * c[q];
+      }
+      const V6 step = get(eta);
+      // Rotation vectors add to first order only: turn the frame by the step, then compare.
+      M3 R = at.tip.R;
+      const V angle = root(dot(step.b, step.b));
+      const V safe = select(angle > 0.0, angle, splat(1));
+      V sn, cs;
+      sincos(angle, sn, cs);
+      const V3 u = (1.0 / safe) * step.b;
+      for (int k = 0; k < 3; ++k) {
+        const V3 w = at.tip.R.c[k];
+        R.c[k] = cs * w + sn * cross(u, w) + ((1.0 - cs) * dot(u, w)) * u;
+      }
+      const V6 d{at.point + step.a - (command.p + command.R * offset), rotation_between(command.R, R)};
+      put(d, c);
+      for (int i = 0; i < count; ++i)
+        if (done[i])
+          for (int r = 0; r < 6; ++r) out.perturbed[6 * (in.perturbed_count * (first + i) + v) + r] = c[r][i];
     }
   }
 
@@ -115,7 +159,7 @@ struct Block {
       for (int i = 0; i < W; ++i) poses[i] = pose(i);
       usable = Closing{P, s}.close(command, usable, poses, in.position);
     }
-    set_base();
+    set_start();
     for (int k = 0; k < P.chain_count; ++k) s.branches[k].F = V6{};
     const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
     Elimination e{P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
@@ -132,6 +176,7 @@ struct Block {
     newton.invert(C);
     done &= e.lowest > Newton::pivot_floor;
     write(done, newton, K, C, iterations);
+    if (in.perturbed_count) vary(done, newton, C);
   }
 
   void write(M done, const Newton& newton, const V (&K)[6][6], const V (&C)[6][6], V iterations) {

@@ -117,7 +117,7 @@ struct Newton {
   }
 
   // ---- one linearisation ----------------------------------------------------------------------
-  void linearize() {
+  void frames_and_wrenches() {
     tip = {{splat(0), splat(0), splat(0)}, {{{splat(1), splat(0), splat(0)}, {splat(0), splat(1), splat(0)}, {splat(0), splat(0), splat(1)}}}};
     walk<Build::actual>(P, P.chains[P.root], s.x, tip, s);
     point = tip.p;
@@ -126,6 +126,10 @@ struct Newton {
     V6 F = load;
     V3 at = point;
     e.wrenches(P.chains[P.root], F, at);
+  }
+
+  void linearize() {
+    frames_and_wrenches();
     e.lowest = splat(1e300);
     e.tangent(P.chains[P.root], load, point, K, c);
   }

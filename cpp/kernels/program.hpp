@@ -112,11 +112,14 @@ struct KernelInput {
   double point[3];          ///< reference point in the tip frame
   std::int32_t want_stiffness, max_iterations;
   double tolerance;
+  const Program* const* perturbed;  ///< variants of the program with the same operations
+  std::int32_t perturbed_count;
 };
 
 /// Row-major answers; null: not wanted. `done` is 0 where the pose needs the reference path.
 struct KernelOutput {
   double *displacement, *stiffness, *compliance, *effort, *leg_wrench, *coordinates;
+  double* perturbed;  ///< count x variants x 6: displacement after one step from the base's answer
   std::uint8_t* done;
   std::uint32_t* flags;
   std::int32_t* iterations;

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "../kernels/dispatch.hpp"
+#include "stiffmap/check.hpp"
 #include "stiffmap/parallel.hpp"
 
 namespace stiffmap {
@@ -131,13 +132,24 @@ void solve_reference(const Mechanism& m, const BatchInput& in, const SolveOption
 
 void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const SolveOptions& options,
                 int threads, const BatchOutput& out) {
-  if (!takes(m, plan, in, options)) return solve_reference(m, in, options, threads, out);
+  if (!takes(m, plan, in, options)) {
+    const Index n = in.count * 6 * static_cast<Index>(in.variants.size());
+    if (out.variants) Eigen::Map<VecX>(out.variants, n).setConstant(std::nan(""));
+    return solve_reference(m, in, options, threads, out);
+  }
   const KernelTable& table = kernel();
   const Program& program = plan.program();
+  std::vector<const Program*> variants;
+  for (const FastPlan* v : in.variants) {
+    require(v->available() && v->program().op_count == program.op_count &&
+                v->program().coordinate_count == program.coordinate_count,
+            "variants", "plans of the same elements", v->missing());
+    variants.push_back(&v->program());
+  }
   std::vector<std::uint8_t> done(at(in.count), 0);
   std::vector<std::uint32_t> flags(at(in.count), 0);
   const KernelOutput answer{out.displacement, options.stiffness ? out.stiffness : nullptr,
-                            options.stiffness ? out.compliance : nullptr, out.effort, out.leg_wrench, out.coordinates,
+                            options.stiffness ? out.compliance : nullptr, out.effort, out.leg_wrench, out.coordinates, out.variants,
                             done.data(), flags.data(), out.iterations};
   struct Scratch {
     std::vector<char> memory;
@@ -149,6 +161,8 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
     Scratch& s = scratch[static_cast<std::size_t>(thread)];
     if (s.memory.empty()) s.memory.resize(static_cast<std::size_t>(table.scratch_size(&program)));
     KernelInput input = kernel_input(m, in, options);
+    input.perturbed = variants.data();
+    input.perturbed_count = out.variants ? static_cast<std::int32_t>(variants.size()) : 0;
     if (!program.closes) {
       s.start.resize(at(m.size()) * static_cast<std::size_t>(fast_chunk));
       for (long i = begin; i < end; ++i) s.reference.close(m, in, i, s.start.data() + m.size() * (i - begin));
@@ -158,6 +172,10 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
     for (long i = begin; i < end; ++i) {
       if (!done[static_cast<std::size_t>(i)]) {
         s.reference.solve(m, in, options, i, out);
+        if (out.variants) {
+          const Index n = 6 * static_cast<Index>(variants.size());
+          Eigen::Map<VecX>(out.variants + n * i, n).setConstant(std::nan(""));
+        }
         continue;
       }
       complete(m, i, out);

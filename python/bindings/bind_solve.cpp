@@ -70,7 +70,7 @@ struct Answer {
 py::dict solve(const Mechanism& m, const FastPlan* plan, const Array& position, const Array& rotation,
                const Array& wrench, const std::vector<std::string>& load_points, const std::vector<int>& load_types,
                const std::vector<std::string>& read_points, const Array& gravity, int load_steps, int threads,
-               bool full) {
+               bool full, const std::vector<const FastPlan*>& variants) {
   const py::ssize_t n = position.ndim() ? position.shape(0) : 0;
   BatchInput in;
   in.count = n;
@@ -87,6 +87,13 @@ py::dict solve(const Mechanism& m, const FastPlan* plan, const Array& position, 
     in.load_points.push_back({p.node, p.offset, static_cast<LoadType>(load_types[i])});
   }
   Answer answer(m, n, static_cast<py::ssize_t>(read_points.size()), full);
+  const py::ssize_t moved = static_cast<py::ssize_t>(variants.size());
+  auto varied = empty({moved ? n : 0, moved, 6});
+  if (moved) {
+    in.variants = variants;
+    answer.out.variants = varied.mutable_data();
+    if (!plan) std::fill(varied.mutable_data(), varied.mutable_data() + varied.size(), std::nan(""));
+  }
   SolveOptions options;
   options.equilibrium.load_steps = load_steps;
   options.stiffness = full;
@@ -95,7 +102,9 @@ py::dict solve(const Mechanism& m, const FastPlan* plan, const Array& position, 
     if (plan) solve_fast(m, *plan, in, options, threads, answer.out);
     else solve_reference(m, in, options, threads, answer.out);
   }
-  return answer.dict();
+  py::dict d = answer.dict();
+  d["variants"] = varied;
+  return d;
 }
 
 template <class T, class Get>
@@ -228,7 +237,7 @@ void bind_solve(py::module_& m) {
              return out;
            })
       .def("solve", &solve, "plan"_a.none(true), "position"_a, "rotation"_a, "wrench"_a, "load_points"_a, "load_types"_a, "read_points"_a,
-           "gravity"_a, "load_steps"_a, "threads"_a, "full"_a)
+           "gravity"_a, "load_steps"_a, "threads"_a, "full"_a, "variants"_a = std::vector<const FastPlan*>{})
       .def("closure", &closure, "given"_a, "rotation"_a, "inverse"_a, "threads"_a)
       .def("frames", &frames, "coordinates"_a);
 }

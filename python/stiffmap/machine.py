@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap import _core
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing, wrench_array
+from stiffmap.derivatives import Request, base_and_variations, combine
 from stiffmap.description import MachineDescription
 from stiffmap.errors import StiffmapError
 from stiffmap.lowering import build_mechanism
@@ -100,6 +102,7 @@ class Machine:
         method: str = "fast",
         load_steps: int | str = "auto",
         stiffness: bool = True,
+        derivatives: Sequence[Request] = (),
         threads: int | None = None,
     ) -> Solution:
         """Equilibrium, stiffness and compliance at commanded poses under external wrenches.
@@ -131,15 +134,94 @@ class Machine:
         stiffness
             False: displacements, status, flags and iterations only; everything else is NaN. Quicker,
             above all under gravity.
+        derivatives
+            Effects ``(kind, {"element": ..., "legs": [...], parameter: value, ...})``: the machine is
+            solved with all of them, and `Solution.derivatives` maps each parameter's name to the
+            derivative of `displacement` (..., 6) at its value (docs/fast_path.md F10). A null value
+            (`stiffmap effects`) differentiates at the machine as it is.
         threads
             None: all cores that this process may use.
 
         Poses never raise: see `Solution.status`. Raises StiffmapError for bad input.
         """
+        if derivatives:
+            return self._differentiated(
+                derivatives,
+                position=position,
+                wrench=wrench,
+                rotation=rotation,
+                point=point,
+                wrenches=wrenches,
+                load_type=load_type,
+                read_points=read_points,
+                gravity=gravity,
+                method=method,
+                load_steps=load_steps,
+                stiffness=stiffness,
+                threads=threads,
+            )
+        return self._solve(
+            (),
+            position,
+            wrench,
+            rotation,
+            point,
+            wrenches,
+            load_type,
+            read_points,
+            gravity,
+            method,
+            load_steps,
+            stiffness,
+            threads,
+        )[0]
+
+    def _differentiated(self, requests: Sequence[Request], **call: Any) -> Solution:
+        base, variations = base_and_variations(self._description, requests)
+        machine = Machine(base)
+        moved = [Machine(d) for v in variations for d in v.descriptions]
+        solution, varied = machine._solve(tuple(moved), **call)
+        self._fill(varied, solution, moved, call)
+        out, i = {}, 0
+        for v in variations:
+            n = len(v.descriptions)
+            out[v.name] = combine(v, solution.displacement, varied[..., i : i + n, :])
+            i += n
+        return replace(solution, derivatives=out)
+
+    @staticmethod
+    def _fill(varied: Floats, solution: Solution, moved: Sequence[Machine], call: dict[str, Any]) -> None:
+        """Poses of the reference path: solve each variant in full."""
+        if not np.isnan(varied[solution.ok]).any():
+            return
+        for i, m in enumerate(moved):
+            full = m._solve((), **{**call, "stiffness": False})[0].displacement
+            hole = np.isnan(varied[..., i, :])
+            varied[..., i, :][hole] = full[hole]
+
+    def _solve(
+        self,
+        variants: tuple[Machine, ...],
+        position: ArrayLike,
+        wrench: ArrayLike | None,
+        rotation: ArrayLike | None,
+        point: str,
+        wrenches: Mapping[str, ArrayLike] | None,
+        load_type: str,
+        read_points: Sequence[str],
+        gravity: ArrayLike | None,
+        method: str,
+        load_steps: int | str,
+        stiffness: bool,
+        threads: int | None,
+    ) -> tuple[Solution, Floats]:
         p = trailing(position, (3,), "position", "positions (m)")
         w = wrench_array(wrench)
         r = trailing(
-            self._description.home.r if rotation is None else rotation, (3, 3), "rotation", "rotation matrices"
+            self._description.home.r if rotation is None else rotation,
+            (3, 3),
+            "rotation",
+            "rotation matrices",
         )
         self._check_rotation(r)
         extra = {n: wrench_array(v, f"wrenches[{n!r}]") for n, v in (wrenches or {}).items()}
@@ -165,10 +247,14 @@ class Machine:
             self._steps(load_steps),
             thread_count(threads),
             stiffness,
+            [m._plan for m in variants],
         )
         order = [0, *(read.index(r) for r in read_points)]
         answer["displacement"] = answer["displacement"][:, order]
-        return self._solution(answer, shape, point)
+        varied = answer.pop("variants")
+        return self._solution(answer, shape, point), varied.reshape(
+            (*shape, -1, 6) if len(variants) else (0,)
+        )
 
     @staticmethod
     def _check_rotation(r: Floats) -> None:
@@ -208,9 +294,7 @@ class Machine:
 
         c = self._core
         readings = out("displacement")
-        joints = {
-            n: i for i, (n, role) in enumerate(zip(c.coordinates, c.roles, strict=True)) if role != 2
-        }
+        joints = {n: i for i, (n, role) in enumerate(zip(c.coordinates, c.roles, strict=True)) if role != 2}
         return Solution(
             displacement=np.ascontiguousarray(readings[..., 0, :]),
             stiffness=out("stiffness"),

@@ -16,6 +16,7 @@ struct BatchInput {
   std::vector<LoadPoint> load_points;
   std::vector<Index> read_points;
   Vec3 gravity = Vec3::Zero();
+  std::vector<const FastPlan*> variants;  ///< plans of the same machine with a parameter moved
 };
 
 /// Row-major outputs; null pointers are not written.
@@ -31,6 +32,7 @@ struct BatchOutput {
   std::uint8_t* status = nullptr;
   std::uint32_t* flags = nullptr;
   std::int32_t* iterations = nullptr;
+  double* variants = nullptr;  ///< count x variants x 6; NaN where the reference path was taken
 };
 
 /// The dense reference path for every pose.
