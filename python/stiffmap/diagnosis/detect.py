@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq
@@ -39,6 +40,7 @@ def detectable(screen: Screen, threshold: float) -> list[Detectable]:
     return [Detectable(c, _middle(sizes)) for c, sizes in out.items()]
 
 
+@cache
 def _needed(threshold: float, freedom: int) -> float:
     """Length of the whitened effect that passes the threshold with 95 % power."""
     critical = float(chi2.isf(np.exp(-threshold), freedom))
