@@ -58,7 +58,9 @@ def test_three_legs_that_just_do_carry_nothing() -> None:
     """A statically determinate hexapod takes a wrong strut without any stress."""
     description = sm.load_machine("hexapod").description
     first, *others = description.legs
-    moved = Offset("frame", first.elements[0].nominal, Pose.of([0.501, 0.002, -0.001]))  # type: ignore[union-attr]
+    frame = first.elements[0]
+    assert isinstance(frame, Offset)
+    moved = replace(frame, actual=Pose.of(frame.nominal.p + [1e-3, 2e-3, -1e-3]))
     wrong = (moved, *first.elements[1:])
     machine = sm.Machine(replace(description, legs=(replace(first, elements=wrong), *others)))
     stress = sm.assembly_stress(machine, [0.05, 0, 0.7])
