@@ -51,9 +51,7 @@ def add_effect(
     return _with_record(description, record)
 
 
-def apply_records(
-    description: MachineDescription, records: Sequence[AppliedEffect]
-) -> MachineDescription:
+def apply_records(description: MachineDescription, records: Sequence[AppliedEffect]) -> MachineDescription:
     """The machine with the effects of these records added one after the other."""
     for r in records:
         given = {**dict(r.parameters), **dict(r.options)}

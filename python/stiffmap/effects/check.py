@@ -24,9 +24,7 @@ def split(effect: EffectType, given: Mapping[str, Any]) -> tuple[Numbers, Words]
             near = get_close_matches(name, known, 1)
             hint = f" (did you mean {near[0]!r}?)" if near else ""
             raise StiffmapError(f"{effect.kind}: unknown parameter {name!r}{hint}; known: {', '.join(known)}")
-    numbers = tuple(
-        (p.name, _number(effect, p, given[p.name])) for p in effect.parameters if p.name in given
-    )
+    numbers = tuple((p.name, _number(effect, p, given[p.name])) for p in effect.parameters if p.name in given)
     words = tuple((o.name, str(given[o.name])) for o in effect.options if o.name in given)
     for option in effect.options:
         word = dict(words).get(option.name, option.choices[0])
@@ -76,7 +74,9 @@ def _element(effect: EffectType, names: list[str], element: str | None) -> str:
     if element not in names:
         near = get_close_matches(element, names, 1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
-        raise StiffmapError(f"{effect.kind}: no element {element!r} that it can act on{hint}; there are: {there}")
+        raise StiffmapError(
+            f"{effect.kind}: no element {element!r} that it can act on{hint}; there are: {there}"
+        )
     return element
 
 

@@ -17,7 +17,7 @@ class Parameter:
     ``null`` is the value at which the effect vanishes (``None``: there is no fixed one), ``scale`` a
     typical size for steps and plots, ``default`` the value of a parameter that is left out (``None``:
     it must be given). A parameter that is not ``fitted`` says how the effect is meant (a pivot, a
-    recorded temperature) and is known beforehand.
+    recorded temperature) and is known beforehand. ``angular`` is the unit on a joint that turns.
     """
 
     name: str
@@ -29,6 +29,7 @@ class Parameter:
     doc: str
     default: float | None = None
     fitted: bool = True
+    angular: str = ""
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,11 @@ class EffectType:
     ) -> tuple[Parameter, ...]:
         """Parameters with the units and bounds that hold at this place."""
         return self.at(description, element, legs) if self.at else self.parameters
+
+    def units_of(self, name: str) -> tuple[str, ...]:
+        """The unit of a parameter, and the one that it has on a joint that turns."""
+        p = self.parameter(name)
+        return (p.unit, p.angular) if p.angular else (p.unit,)
 
     @property
     def fitted(self) -> tuple[Parameter, ...]:

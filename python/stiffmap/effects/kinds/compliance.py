@@ -14,19 +14,23 @@ from stiffmap.errors import StiffmapError
 
 SCALE = Parameter("scale", "1", 1e-3, 1e3, 1.0, 0.1, "factor on the declared compliance")
 VALUE = Parameter(
-    "value", "m/N", 1e-15, 1.0, None, 1e-8, "the new total, for a drive or elastic joint", fitted=False
+    "value",
+    "m/N",
+    1e-15,
+    1.0,
+    None,
+    1e-8,
+    "the new total, for a drive or elastic joint",
+    fitted=False,
+    angular="rad/(N·m)",
 )
 
 
 def sites(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Elastic joints, link springs, and single entries of these by names such as ``foot.k11``."""
-    elastic = {
-        n: at for n, at in joints(elements).items() if any(_law(elements[i]) is not None for i in at)
-    }
+    elastic = {n: at for n, at in joints(elements).items() if any(_law(elements[i]) is not None for i in at)}
     whole = springs(elements)
-    entries = {
-        f"{n}.k{i}{i}": at for n, at in whole.items() for i in range(1, 7) if _has(elements[at[0]], i)
-    }
+    entries = {f"{n}.k{i}{i}": at for n, at in whole.items() for i in range(1, 7) if _has(elements[at[0]], i)}
     return {**elastic, **whole, **entries}
 
 
@@ -101,18 +105,19 @@ def lowest_scale(e: Spring, i: int) -> float:
     return float(unit[i, coupled] @ np.linalg.pinv(rest) @ unit[coupled, i])
 
 
-def at(
-    description: MachineDescription, element: str, legs: tuple[str, ...]
-) -> tuple[Parameter, ...]:
+def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
     """rad/(N·m) for a revolute joint; the bound of a single entry; no value for a 6x6 spring."""
     found = [
-        (seq[i]) for leg in description.legs if leg.name in legs or not legs
-        for seq in sequences(leg.elements) for i in sites(seq).get(element, ())
+        (seq[i])
+        for leg in description.legs
+        if leg.name in legs or not legs
+        for seq in sequences(leg.elements)
+        for i in sites(seq).get(element, ())
     ]
     name, _, entry = element.partition(".")
     first = found[0] if found else None
     if isinstance(first, Joint):
-        return (SCALE, VALUE if first.kind == "prismatic" else replace(VALUE, unit="rad/(N·m)"))
+        return (SCALE, VALUE if first.kind == "prismatic" else replace(VALUE, unit=VALUE.angular))
     if not entry:
         return (SCALE, VALUE)
     # a hair above the limit, where the matrix would have a rigid direction

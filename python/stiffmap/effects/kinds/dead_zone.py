@@ -8,7 +8,14 @@ from stiffmap.effects.sites import at_sites, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter, Placed
 
 HALF_WIDTH = Parameter(
-    "half_width", "m", 0.0, 0.01, 0.0, 1e-5, "deflection without force to each side of the centre"
+    "half_width",
+    "m",
+    0.0,
+    0.01,
+    0.0,
+    1e-5,
+    "deflection without force to each side of the centre",
+    angular="rad",
 )
 
 
@@ -35,5 +42,5 @@ EFFECT = EffectType(
     frame="the drive's coordinate",
     excludes=("dead_zone", "hardening"),
     stage=10,
-    at=in_unit_of_joint(HALF_WIDTH, angular={"half_width": "rad"}),
+    at=in_unit_of_joint(HALF_WIDTH),
 )

@@ -8,7 +8,7 @@ from dataclasses import replace
 from stiffmap.description import Element, Joint, Law, MachineDescription
 from stiffmap.effects.edit import Elements, change_sites, sequences
 from stiffmap.effects.sites import elastic_drives
-from stiffmap.effects.types import Parameter, Placed
+from stiffmap.effects.types import Parameter, ParametersAt, Placed
 from stiffmap.errors import StiffmapError
 
 
@@ -34,20 +34,21 @@ def linear(law: Law) -> Law:
 def is_revolute(description: MachineDescription, element: str) -> bool:
     """Whether the joint of that name turns."""
     found = [
-        e for leg in description.legs for seq in sequences(leg.elements) for e in seq
+        e
+        for leg in description.legs
+        for seq in sequences(leg.elements)
+        for e in seq
         if isinstance(e, Joint) and e.name == element
     ]
     return bool(found) and found[0].kind != "prismatic"
 
 
-def in_unit_of_joint(
-    *parameters: Parameter, angular: dict[str, str]
-) -> Callable[[MachineDescription, str, tuple[str, ...]], tuple[Parameter, ...]]:
+def in_unit_of_joint(*parameters: Parameter) -> ParametersAt:
     """Parameters whose units become the angular ones where the joint turns."""
 
     def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
         if not is_revolute(description, element):
             return parameters
-        return tuple(replace(p, unit=angular.get(p.name, p.unit)) for p in parameters)
+        return tuple(replace(p, unit=p.angular or p.unit) for p in parameters)
 
     return at

@@ -18,7 +18,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     """One branch of the friction loop as a monotone polyline, a dead zone in series included."""
     turns = is_revolute(description, placed.element)
     if ("torque" in placed.values) != turns:
-        raise StiffmapError(f"give torque (N·m) for a revolute drive and force (N) for a prismatic one")
+        raise StiffmapError("give torque (N·m) for a revolute drive and force (N) for a prismatic one")
     level = placed.values["torque" if turns else "force"]
     branch = placed.options["branch"]
     return change_law(description, placed, lambda old: _law(old, level, branch))

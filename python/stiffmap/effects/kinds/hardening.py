@@ -7,7 +7,9 @@ from stiffmap.effects.kinds.drive_law import change_law, in_unit_of_joint, linea
 from stiffmap.effects.sites import at_sites, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter, Placed
 
-CUBIC = Parameter("cubic", "N/m^3", 0.0, 1e20, 0.0, 1e14, "coefficient of the third power of the deflection")
+CUBIC = Parameter(
+    "cubic", "N/m^3", 0.0, 1e20, 0.0, 1e14, "coefficient of the deflection's third power", angular="N·m/rad^3"
+)
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
@@ -29,5 +31,5 @@ EFFECT = EffectType(
     frame="the drive's coordinate",
     excludes=("hardening", "dead_zone", "friction", "position_dependent_compliance"),
     stage=10,
-    at=in_unit_of_joint(CUBIC, angular={"cubic": "N·m/rad^3"}),
+    at=in_unit_of_joint(CUBIC),
 )

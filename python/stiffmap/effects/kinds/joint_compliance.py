@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from stiffmap.description import Element, Joint, MachineDescription, Spring
-from stiffmap.effects.edit import Elements, edit_legs, fresh
+from collections.abc import Callable
+from dataclasses import replace
+
+from stiffmap.description import Joint, MachineDescription, Spring
+from stiffmap.effects.edit import Elements, edit_legs, splice
 from stiffmap.effects.kinds.spring import PARAMETERS, isotropic
 from stiffmap.effects.sites import at_sites, passive_joints, springs
 from stiffmap.effects.types import EffectType, Placed
@@ -14,7 +17,9 @@ def pins(elements: Elements) -> dict[str, tuple[int, ...]]:
     single = passive_joints(elements)
     out = dict(single)
     for name, at in springs(elements).items():
-        around = tuple(i for k in at for i in (_next(elements, k, -1), _next(elements, k, 1)) if i is not None)
+        around = tuple(
+            i for k in at for i in (_next(elements, k, -1), _next(elements, k, 1)) if i is not None
+        )
         out.update({name: around} if len(around) == 2 * len(at) and name not in single else {})
     return out
 
@@ -31,31 +36,25 @@ def _next(elements: Elements, k: int, way: int) -> int | None:
     return None
 
 
-def insert(elements: Elements, element: str, new: Element) -> Elements:
-    """``new`` on the link's side of each pin: behind the pin where the link follows it."""
+def insert_at(elements: Elements, element: str, piece: Callable[[Joint], Elements]) -> Elements:
+    """``piece`` on the link's side of each pin: behind the pin unless the link comes before it."""
     found = pins(elements).get(element, ())
     link = [i for i, e in enumerate(elements) if isinstance(e, Spring) and e.name == element]
-    out: list[Element] = []
-    for i, e in enumerate(elements):
-        if i not in found:
-            out.append(e)
-            continue
-        before = bool(link) and i > min(link)
-        named = _named(new, f"{e.name}_{new.name}", elements)
-        out += [named, e] if before else [e, named]
-    return tuple(out)
-
-
-def _named(new: Element, name: str, elements: Elements) -> Element:
-    from dataclasses import replace
-
-    return replace(new, name=fresh(name, elements))
+    out = elements
+    for i in reversed(found):
+        pin = elements[i]
+        assert isinstance(pin, Joint)
+        new = tuple(replace(e, name=f"{pin.name}_{e.name}") for e in piece(pin))
+        out = splice(out, i, (*new, pin) if link and i > link[0] else (pin, *new))
+    return out
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """An isotropic spring at each pin."""
     spring = Spring("compliance", compliance=isotropic(placed))
-    return edit_legs(description, placed.legs, lambda seq: insert(seq, placed.element, spring))
+    return edit_legs(
+        description, placed.legs, lambda seq: insert_at(seq, placed.element, lambda pin: (spring,))
+    )
 
 
 EFFECT = EffectType(

@@ -11,9 +11,7 @@ from stiffmap.effects.types import EffectType, Parameter, Placed
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """A command error that grows from the home coordinate."""
     slope = placed.values["slope"]
-    return add_command_error(
-        description, placed, lambda home: CommandError(slope=slope, reference=home)
-    )
+    return add_command_error(description, placed, lambda home: CommandError(slope=slope, reference=home))
 
 
 EFFECT = EffectType(
@@ -21,7 +19,9 @@ EFFECT = EffectType(
     title="lead error of a drive",
     doc="The drive travels `slope` more per unit of commanded travel; no error at its home coordinate.",
     parameters=(
-        Parameter("slope", "m/m", -0.1, 0.1, 0.0, 1e-4, "error per commanded travel from home (rad/rad if it turns)"),
+        Parameter(
+            "slope", "m/m", -0.1, 0.1, 0.0, 1e-4, "error per commanded travel from home", angular="rad/rad"
+        ),
     ),
     places=at_sites(drives),
     apply=apply,

@@ -11,10 +11,17 @@ from stiffmap.effects.sites import at_sites, drives
 from stiffmap.effects.types import EffectType, Parameter, Placed
 
 PARAMETERS = (
-    Parameter("amplitude", "m", 0.0, 0.01, 0.0, 1e-5, "half of peak to peak"),
-    Parameter("period", "m", 1e-5, 10.0, None, 0.01, "travel after which the error repeats"),
+    Parameter("amplitude", "m", 0.0, 0.01, 0.0, 1e-5, "half of peak to peak", angular="rad"),
+    Parameter("period", "m", 1e-5, 10.0, None, 0.01, "travel after which the error repeats", angular="rad"),
     Parameter(
-        "phase", "rad", -2 * math.pi, 2 * math.pi, None, 1.0, "of the sine at the home coordinate", default=0.0
+        "phase",
+        "rad",
+        -2 * math.pi,
+        2 * math.pi,
+        None,
+        1.0,
+        "of the sine at the home coordinate",
+        default=0.0,
     ),
 )
 
@@ -42,5 +49,5 @@ EFFECT = EffectType(
     pivot="the drive's home coordinate",
     frame="the drive's axis",
     moves="all that the drive carries",
-    at=in_unit_of_joint(*PARAMETERS, angular={"amplitude": "rad", "period": "rad"}),
+    at=in_unit_of_joint(*PARAMETERS),
 )

@@ -11,7 +11,9 @@ from stiffmap.effects.sites import at_sites, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter, Placed
 from stiffmap.errors import StiffmapError
 
-SLOPE = Parameter("slope", "1/m", -100.0, 100.0, 0.0, 0.1, "relative change of the compliance per travel")
+SLOPE = Parameter(
+    "slope", "1/m", -100.0, 100.0, 0.0, 0.1, "relative change of the compliance per travel", angular="1/rad"
+)
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
@@ -38,5 +40,5 @@ EFFECT = EffectType(
     pivot="the drive's home coordinate",
     frame="the drive's coordinate",
     excludes=("hardening", "friction"),
-    at=in_unit_of_joint(SLOPE, angular={"slope": "1/rad"}),
+    at=in_unit_of_joint(SLOPE),
 )

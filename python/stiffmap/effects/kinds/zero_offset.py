@@ -8,7 +8,7 @@ from stiffmap.effects.kinds.drive_law import in_unit_of_joint
 from stiffmap.effects.sites import at_sites, drives
 from stiffmap.effects.types import EffectType, Parameter, Placed
 
-ERROR = Parameter("error", "m", -0.1, 0.1, 0.0, 1e-4, "added to the commanded coordinate")
+ERROR = Parameter("error", "m", -0.1, 0.1, 0.0, 1e-4, "added to the commanded coordinate", angular="rad")
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
@@ -26,5 +26,5 @@ EFFECT = EffectType(
     apply=apply,
     frame="the drive's axis",
     moves="all that the drive carries",
-    at=in_unit_of_joint(ERROR, angular={"error": "rad"}),
+    at=in_unit_of_joint(ERROR),
 )
