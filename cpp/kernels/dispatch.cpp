@@ -18,6 +18,7 @@ namespace {
 KernelTable table_of(void (*entry)(KernelTable*)) {
   KernelTable t{};
   entry(&t);
+  require(t.layout == program_layout, "kernel library " + std::string(t.level), "the layout of this build", t.layout);
   return t;
 }
 

@@ -250,5 +250,5 @@ void run(const Program* P, const KernelInput* in, const KernelOutput* out, std::
 }  // namespace stiffmap::kernel
 
 extern "C" __attribute__((visibility("default"))) void STIFFMAP_ENTRY(stiffmap::KernelTable* table) {
-  *table = {STIFFMAP_LEVEL, stiffmap::kernel::W, &stiffmap::kernel::scratch_size, &stiffmap::kernel::run};
+  *table = {STIFFMAP_LEVEL, stiffmap::kernel::W, stiffmap::program_layout, &stiffmap::kernel::scratch_size, &stiffmap::kernel::run};
 }

@@ -125,10 +125,16 @@ struct KernelOutput {
   std::int32_t* iterations;
 };
 
+/// Layout that both sides of the border were compiled with: a stale kernel library is refused.
+inline constexpr std::int64_t program_layout = sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) +
+                                               41 * sizeof(Op) + 43 * sizeof(CoordinateProgram) + 47 * sizeof(DriveProgram) +
+                                               53 * sizeof(LawProgram) + 59 * sizeof(ClosureTerm);
+
 /// The one symbol that each level exports. Poses begin .. end-1; `scratch` of scratch_size() bytes.
 struct KernelTable {
   const char* level;
   std::int32_t lanes;
+  std::int64_t layout;
   std::int64_t (*scratch_size)(const Program*);
   void (*run)(const Program*, const KernelInput*, const KernelOutput*, std::int64_t begin, std::int64_t end, void* scratch);
 };
