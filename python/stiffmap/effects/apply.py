@@ -41,7 +41,7 @@ def add_effect(
     effect = registry.get(kind)
     if effect.measurement:
         raise StiffmapError(
-            f"{kind}: this effect lives in the measurement, not in the machine; a diagnosis applies it to readings"
+            f"{kind}: lives in the measurement, not in the machine; a diagnosis applies it to readings"
         )
     numbers, options = split(effect, parameters)
     place = place_of(effect, _declared(description), element, legs)

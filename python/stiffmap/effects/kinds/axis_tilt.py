@@ -27,8 +27,9 @@ EFFECT = EffectType(
     kind="axis_tilt",
     title="direction of a guide or joint axis alone",
     doc=(
-        "The axis of a guide or joint is turned, and nothing else: at its zero (a guide: at the carriage's home "
-        "position) whatever the joint carries stands as declared. A rotation about the axis itself does nothing."
+        "The axis of a guide or joint is turned, and nothing else: at its zero (a guide: at the carriage's "
+        "home position) whatever the joint carries stands as declared. A rotation about the axis itself "
+        "does nothing."
     ),
     parameters=PARAMETERS,
     places=at_sites(joints),

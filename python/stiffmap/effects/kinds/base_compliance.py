@@ -21,8 +21,8 @@ EFFECT = EffectType(
     kind="base_compliance",
     title="compliance of the base",
     doc=(
-        "An isotropic spring in translation and rotation between the ground, from which readings are taken, and "
-        "the machine's base."
+        "An isotropic spring in translation and rotation between the ground, from which readings are taken, "
+        "and the machine's base."
     ),
     parameters=(*PARAMETERS, *PIVOT),
     places=at("base"),

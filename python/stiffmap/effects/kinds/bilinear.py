@@ -28,8 +28,8 @@ EFFECT = EffectType(
     kind="bilinear",
     title="drive whose stiffness changes at a force",
     doc=(
-        "The declared compliance up to the force `knee` in both directions, `ratio` times it for the force beyond "
-        "(a preloaded screw that opens, a stop that closes)."
+        "The declared compliance up to the force `knee` in both directions, `ratio` times it for the force "
+        "beyond (a preloaded screw that opens, a stop that closes)."
     ),
     parameters=PARAMETERS,
     places=at_sites(elastic_drives),

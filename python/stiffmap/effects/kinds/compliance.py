@@ -44,7 +44,7 @@ def _has(e: Element, i: int) -> bool:
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """Scales the law, the matrix or one entry of it."""
-    name, _, entry = placed.element.partition(".")
+    entry = placed.element.partition(".")[2]
 
     def change(e: Element) -> Elements:
         if isinstance(e, Joint):
@@ -84,7 +84,7 @@ def _entry(e: Spring, i: int, scale: float) -> Spring:
     assert e.compliance is not None
     if scale < lowest_scale(e, i):
         raise StiffmapError(
-            f"{e.name}.k{i + 1}{i + 1}: below scale {lowest_scale(e, i):.6g} its couplings make the matrix indefinite"
+            f"{e.name}.k{i + 1}{i + 1}: below scale {lowest_scale(e, i):.6g} the matrix is indefinite"
         )
     rows = [list(row) for row in e.compliance]
     rows[i][i] *= scale
@@ -114,7 +114,7 @@ def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> 
         for seq in sequences(leg.elements)
         for i in sites(seq).get(element, ())
     ]
-    name, _, entry = element.partition(".")
+    entry = element.partition(".")[2]
     first = found[0] if found else None
     if isinstance(first, Joint):
         return (SCALE, VALUE if first.kind == "prismatic" else replace(VALUE, unit=VALUE.angular))

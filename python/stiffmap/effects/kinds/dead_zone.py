@@ -33,8 +33,8 @@ EFFECT = EffectType(
     kind="dead_zone",
     title="backlash of a drive",
     doc=(
-        "A gap in series with the drive's spring: no force while the deflection is within the half width about "
-        "the centre, the declared stiffness beyond. Unloaded, the drive stands in the centre."
+        "A gap in series with the drive's spring: no force while the deflection is within the half width "
+        "about the centre, the declared stiffness beyond. Unloaded, the drive stands in the centre."
     ),
     parameters=(HALF_WIDTH,),
     places=at_sites(elastic_drives),

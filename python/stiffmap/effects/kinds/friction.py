@@ -55,11 +55,11 @@ EFFECT = EffectType(
     title="dry friction of a drive",
     doc=(
         "Coulomb friction between the drive's spring and its guide, against the spring's motion from its "
-        "unloaded state, with the deflection a and the force F of the drive, level L and compliance c: on the "
-        "branch `loading` (from zero load) a = c·(F - L·sign F); on the branch `unloading` (from a larger load, "
-        "friction fully reversed) a = c·(F + L·sign F). `loading` takes the full level also where |F| < L, with "
-        "the sign that F has in the machine without friction; a drive that really sticks there, a = 0, is "
-        "`loading_stuck`. Both agree where |F| > L."
+        "unloaded state, with the deflection a and the force F of the drive, level L and compliance c: on "
+        "the branch `loading` (from zero load) a = c·(F - L·sign F); on the branch `unloading` (from a "
+        "larger load, friction fully reversed) a = c·(F + L·sign F). `loading` takes the full level also "
+        "where |F| < L, with the sign that F has in the machine without friction; a drive that really "
+        "sticks there, a = 0, is `loading_stuck`. Both agree where |F| > L."
     ),
     parameters=(FORCE, TORQUE),
     places=at_sites(elastic_drives),

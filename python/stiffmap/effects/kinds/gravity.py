@@ -59,8 +59,9 @@ EFFECT = EffectType(
     kind="gravity",
     title="weight of the machine's bodies",
     doc=(
-        "The bodies weigh: 9.81 m/s² along base -z. On `machine` all declared masses times `scale`; on a body "
-        "of a machine that declares no masses, or that has gravity already, `mass` is the mass of each such body."
+        "The bodies weigh: 9.81 m/s² along base -z. On `machine` all declared masses times `scale`; on a "
+        "body of a machine that declares no masses, or that has gravity already, `mass` is the mass of each "
+        "such body."
     ),
     parameters=(SCALE, MASS),
     places=find,

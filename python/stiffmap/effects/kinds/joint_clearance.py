@@ -60,10 +60,10 @@ EFFECT = EffectType(
     kind="joint_clearance",
     title="clearance of pins",
     doc=(
-        "Radial play of revolute joints: a gap of ± `radius` in each of the two directions across the axis (a "
-        "square, not a circle: at 45° it is 41 % wider). A centring force that rises to 1 N at the ends of the "
-        "gap keeps unloaded pins determinate; the contact behind yields 1e-12 m/N. A link's name stands for the "
-        "pins at both of its ends."
+        "Radial play of revolute joints: a gap of ± `radius` in each of the two directions across the axis "
+        "(a square, not a circle: at 45° it is 41 % wider). A centring force that rises to 1 N at the ends "
+        "of the gap keeps unloaded pins determinate; the contact behind yields 1e-12 m/N. A link's name "
+        "stands for the pins at both of its ends."
     ),
     parameters=(Parameter("radius", "m", 0.0, 0.01, 0.0, 1e-5, "radial play"),),
     places=at_sites(revolute_pins),

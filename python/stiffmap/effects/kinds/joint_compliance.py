@@ -61,8 +61,9 @@ EFFECT = EffectType(
     kind="joint_compliance",
     title="compliance of passive joints (pins, bearings)",
     doc=(
-        "An isotropic spring in translation and rotation between a passive joint and the link that it carries. "
-        "A link's name stands for the pins at both of its ends, a joint's name for that joint alone."
+        "An isotropic spring in translation and rotation between a passive joint and the link that it "
+        "carries. A link's name stands for the pins at both of its ends, a joint's name for that joint "
+        "alone."
     ),
     parameters=PARAMETERS,
     places=at_sites(pins),

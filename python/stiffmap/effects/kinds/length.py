@@ -33,8 +33,9 @@ EFFECT = EffectType(
     kind="length",
     title="length of a link",
     doc=(
-        "The link is built `error` longer than declared (both bars of a parallelogram alike); the controller "
-        "computes with the declared length. The link is named by its spring or by the offset that is its length."
+        "The link is built `error` longer than declared (both bars of a parallelogram alike); the "
+        "controller computes with the declared length. The link is named by its spring or by the offset "
+        "that is its length."
     ),
     parameters=(Parameter("error", "m", -0.1, 0.1, 0.0, 1e-4, "added to the declared length"),),
     places=at_sites(lengths),

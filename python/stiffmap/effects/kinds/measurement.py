@@ -97,8 +97,8 @@ FRAME_OFFSET = measured(
     "frame_offset",
     "position and orientation of the instrument's frame",
     (
-        "The instrument's frame is not where it is believed: a measured position p reads as shift + Rx·Ry·Rz p, "
-        "so that an error of position gains shift + (Rx·Ry·Rz - 1) p."
+        "The instrument's frame is not where it is believed: a measured position p reads as shift + "
+        "Rx·Ry·Rz p, so that an error of position gains shift + (Rx·Ry·Rz - 1) p."
     ),
     "sensor",
     _SHIFTS,

@@ -37,8 +37,8 @@ EFFECT = EffectType(
     kind="parallelogram_parallelism",
     title="parallelism of a parallelogram's pins",
     doc=(
-        "The axes of the two pins at one `end` are not parallel: the second branch's pin is turned by half of "
-        "the angles, the first one's by minus half. The directions of the axes alone change."
+        "The axes of the two pins at one `end` are not parallel: the second branch's pin is turned by half "
+        "of the angles, the first one's by minus half. The directions of the axes alone change."
     ),
     parameters=PARAMETERS,
     places=at_sites(spread_blocks),

@@ -39,8 +39,8 @@ EFFECT = EffectType(
     kind="parallelogram_width",
     title="width of a parallelogram",
     doc=(
-        "The two pins at one `end` of a parallelogram (proximal: nearer the base) stand `error` further apart "
-        "than declared, half of it on each side; with `both` the bars stay parallel."
+        "The two pins at one `end` of a parallelogram (proximal: nearer the base) stand `error` further "
+        "apart than declared, half of it on each side; with `both` the bars stay parallel."
     ),
     parameters=(Parameter("error", "m", -0.1, 0.1, 0.0, 1e-4, "added to the declared width"),),
     places=at_sites(spread_blocks),

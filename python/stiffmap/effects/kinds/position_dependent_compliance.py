@@ -33,7 +33,10 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 EFFECT = EffectType(
     kind="position_dependent_compliance",
     title="drive compliance that depends on the stroke",
-    doc="Drive compliance times 1 + slope·(u - u_home) at the commanded coordinate u (a screw that yields more the longer it is).",
+    doc=(
+        "Drive compliance times 1 + slope·(u - u_home) at the commanded coordinate u (a screw that yields more "
+        "the longer it is)."
+    ),
     parameters=(SLOPE,),
     places=at_sites(elastic_drives),
     apply=apply,

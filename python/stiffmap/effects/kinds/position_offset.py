@@ -55,7 +55,8 @@ EFFECT = EffectType(
     doc=(
         "A joint (guide) stands displaced on the part that carries it. On `base` the leg's beginning stands "
         "displaced in base axes; on `platform` the point where the leg holds the platform is displaced in "
-        "platform axes. Along a prismatic drive it is its zero offset; with `tilt` it is the line of the axis."
+        "platform axes. Along a prismatic drive it is its zero offset; with `tilt` it is the line of the "
+        "axis."
     ),
     parameters=PARAMETERS,
     places=find,

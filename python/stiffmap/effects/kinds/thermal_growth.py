@@ -17,7 +17,7 @@ PARAMETERS = (
         200.0,
         None,
         1.0,
-        "link's temperature above that of the declared length; left out, the coefficient is the strain of 1 K",
+        "temperature above that of the declared length; left out, the coefficient is the strain",
         default=1.0,
         fitted=False,
     ),

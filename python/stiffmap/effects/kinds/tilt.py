@@ -25,8 +25,8 @@ EFFECT = EffectType(
     kind="tilt",
     title="tilt of a guide or joint with what it carries",
     doc=(
-        "Guide tilt: the guide, its carriage and the joint axes that the carriage carries turn together about "
-        "the carriage's home position. The same for any joint about its own frame."
+        "Guide tilt: the guide, its carriage and the joint axes that the carriage carries turn together "
+        "about the carriage's home position. The same for any joint about its own frame."
     ),
     parameters=PARAMETERS,
     places=at_sites(joints),

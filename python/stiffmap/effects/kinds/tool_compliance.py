@@ -21,8 +21,8 @@ EFFECT = EffectType(
     kind="tool_compliance",
     title="compliance of tool and holder",
     doc=(
-        "An isotropic spring in translation and rotation between the platform and the tool, on which the load "
-        "acts and the reading is taken."
+        "An isotropic spring in translation and rotation between the platform and the tool, on which the "
+        "load acts and the reading is taken."
     ),
     parameters=(*PARAMETERS, *PIVOT),
     places=at("platform"),
