@@ -44,7 +44,7 @@ def skeleton(machine: Machine, coordinates: Floats) -> Skeleton:
         if role in marks:
             marks[role].append(position[i])
         joint = joints.get(core.coordinates[c]) if c >= 0 else None
-        if joint is not None and joint.kind == "prismatic":
+        if joint is not None and joint.kind == "prismatic" and not _moves(core, parent):
             guides.append((owner[i], travel(joint, float(coordinates[c]), position[i], rotation[i])))
         elif parent >= 0 and np.linalg.norm(position[i] - position[parent]) > COINCIDENT and parent != 0:
             links.append((owner[i], position[[parent, i]]))
@@ -53,6 +53,16 @@ def skeleton(machine: Machine, coordinates: Floats) -> Skeleton:
         links, guides, np.array(marks[ACTUATOR]).reshape(-1, 3) if marks[ACTUATOR] else empty,
         np.array(marks[PASSIVE]).reshape(-1, 3) if marks[PASSIVE] else empty, position[-1],
     )  # fmt: skip
+
+
+def _moves(core: Any, node: int) -> bool:
+    """Whether a joint lies below a node: a prismatic one above it is a strut, not a guide."""
+    while node >= 0:
+        parent, c = core.nodes[node]
+        if c >= 0 and core.roles[c] in (ACTUATOR, PASSIVE):
+            return True
+        node = parent
+    return False
 
 
 def owners(core: Any) -> list[str]:
