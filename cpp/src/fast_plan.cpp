@@ -301,23 +301,61 @@ class ClosureCompiler {
 constexpr int grid_nodes = 8;
 constexpr std::size_t cached_grids = 32;
 
-/// Everything that the nominal closure depends on, as a key.
-std::string grid_key(const Mechanism& m, const FastPlanData& d) {
-  const Program& p = d.program;
-  std::string key;
-  const auto add = [&](const void* from, std::size_t n) { key.append(static_cast<const char*>(from), n); };
-  for (const Op& op : d.ops) {
-    add(&op.kind, sizeof op.kind);
-    add(op.direction, sizeof op.direction);
-    add(&op.nominal, sizeof op.nominal);
+/// Everything that the nominal closure depends on, as a key: joints and the constant transforms between
+/// them. Springs, weights and errors are left out, so that variants of one machine share their grid.
+class GridKey {
+ public:
+  GridKey(const Mechanism& m, const FastPlanData& d) : m_(m), d_(d) {
+    chain(d.program.root);
+    add(d.program.grid_n);
+    add(d.program.grid_low);
+    add(d.program.grid_step);
+    add(m.home.p);
+    add(m.home.R);
   }
-  for (const ChainProgram& c : d.chains) add(&c.nominal, sizeof c.nominal);
-  for (std::int32_t u : d.unknowns) add(&m.home_coordinates[u], sizeof(double));
-  add(p.grid_n, sizeof p.grid_n);
-  add(p.grid_low, sizeof p.grid_low);
-  add(p.grid_step, sizeof p.grid_step);
-  return key;
-}
+
+  std::string text;
+
+ private:
+  template <class T>
+  void add(const T& value) {
+    text.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+
+  static Pose pose(const Constant& c) {
+    return {Vec3(c.p[0], c.p[1], c.p[2]), Mat3(Eigen::Map<const Mat3>(c.R))};
+  }
+
+  void chain(std::int32_t index) {
+    const ChainProgram& c = d_.chains[static_cast<std::size_t>(index)];
+    Pose way;
+    const auto flush = [&] {
+      add(way.p);
+      add(way.R);
+      way = Pose{};
+    };
+    for (int i = c.first; i < c.first + c.count; ++i) {
+      const Op& op = d_.ops[static_cast<std::size_t>(i)];
+      way = way * pose(op.nominal);
+      if (op.kind == OpKind::block) {
+        flush();
+        add(op.count);
+        for (int b = 0; b < op.count; ++b) chain(op.first + b);
+      } else if (op.kind <= OpKind::prismatic && m_.coordinates[static_cast<std::size_t>(op.coordinate)].role != Role::spring) {
+        flush();
+        add(op.kind);
+        add(op.direction);
+        add(m_.coordinates[static_cast<std::size_t>(op.coordinate)].role);
+        add(m_.coordinates[static_cast<std::size_t>(op.coordinate)].home);
+      }
+    }
+    way = way * pose(c.nominal);
+    flush();
+  }
+
+  const Mechanism& m_;
+  const FastPlanData& d_;
+};
 
 /// At a folded or stretched leg Newton starts badly: such a node is no start for its neighbours.
 bool nearly_singular(ClosureWorkspace& ws) {
@@ -365,7 +403,7 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
 std::shared_ptr<const std::vector<double>> grid_of(const Mechanism& m, const FastPlanData& d) {
   static std::mutex guard;
   static std::list<std::pair<std::string, std::shared_ptr<const std::vector<double>>>> cache;
-  const std::string key = grid_key(m, d);
+  const std::string key = GridKey(m, d).text;
   {
     const std::lock_guard<std::mutex> lock(guard);
     for (auto it = cache.begin(); it != cache.end(); ++it)
