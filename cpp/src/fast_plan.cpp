@@ -514,6 +514,25 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high) : data
   if (data_->program.closes) place_grid(m, low, high, *data_);
 }
 
+bool FastPlan::nearest_start(const Mechanism& m, const Vec3& position, VecX& x, Pose& at) const {
+  const Program& p = data_->program;
+  if (!p.grid) return false;
+  std::size_t node = 0, stride = 1;
+  at = m.home;
+  for (int k = 0; k < 3; ++k) {
+    const double u = (position[k] - p.grid_low[k]) / p.grid_step[k];
+    if (!(u >= -1e-9 && u <= p.grid_n[k] - 1 + 1e-9)) return false;
+    const double i = std::round(u);
+    node += static_cast<std::size_t>(i) * stride;
+    stride *= static_cast<std::size_t>(p.grid_n[k]);
+    at.p[k] = p.grid_low[k] + i * p.grid_step[k];
+  }
+  x = m.home_coordinates;
+  const double* g = p.grid + node * data_->unknowns.size();
+  for (std::size_t j = 0; j < data_->unknowns.size(); ++j) x[data_->unknowns[j]] = g[j];
+  return x.allFinite();
+}
+
 FastPlan::~FastPlan() = default;
 
 const Program& FastPlan::program() const { return data_->program; }

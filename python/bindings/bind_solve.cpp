@@ -115,7 +115,7 @@ std::vector<std::string> names(const std::vector<T>& items, Get get) {
 }
 
 /// Coordinates and tip poses by closure: from poses, or from actuators.
-py::tuple closure(const Mechanism& m, const Array& given, const Array& rotation, bool inverse, int threads) {
+py::tuple closure(const Mechanism& m, const FastPlan* plan, const Array& given, const Array& rotation, bool inverse, int threads) {
   const py::ssize_t n = given.shape(0), drives = static_cast<py::ssize_t>(m.drives.size());
   const double* values = data(given, {n, inverse ? 3 : drives}, inverse ? "position" : "actuators");
   const double* R = inverse ? data(rotation, {n, 3, 3}, "rotation") : nullptr;
@@ -128,14 +128,17 @@ py::tuple closure(const Mechanism& m, const Array& given, const Array& rotation,
   using Row3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   {
     py::gil_scoped_release free;
-    parallel_chunks(n, 16, threads, [&](int, long begin, long end) {
+    parallel_chunks(n, 64, threads, [&](int, long begin, long end) {
       ClosureWorkspace ws(m);
-      VecX x = VecX::Zero(m.size());
+      VecX x = VecX::Zero(m.size()), from = x;
+      Pose at;
       for (long i = begin; i < end; ++i) {
-        const ClosureResult r =
-            inverse
-                ? inverse_closure(m, {Eigen::Map<const Vec3>(values + 3 * i), Eigen::Map<const Row3>(R + 9 * i)}, ws, x)
-                : forward_closure(m, Eigen::Map<const VecX>(values + drives * i, drives), ws, x);
+        const Vec3 p = inverse ? Vec3(Eigen::Map<const Vec3>(values + 3 * i)) : Vec3::Zero();
+        ClosureResult r;
+        if (!inverse) r = forward_closure(m, Eigen::Map<const VecX>(values + drives * i, drives), ws, x);
+        else if (plan && plan->nearest_start(m, p, from, at)) r = inverse_closure(m, {p, Eigen::Map<const Row3>(R + 9 * i)}, ws, x, from, at);
+        if (inverse && (r.status != Status::converged || r.flags & flag::branch_unverified))
+          r = inverse_closure(m, {p, Eigen::Map<const Row3>(R + 9 * i)}, ws, x);
         const bool ok = r.status == Status::converged;
         const double nan = std::numeric_limits<double>::quiet_NaN();
         Eigen::Map<VecX>(x_out + m.size() * i, m.size()) = ok ? x : VecX(VecX::Constant(m.size(), nan));
@@ -238,7 +241,7 @@ void bind_solve(py::module_& m) {
            })
       .def("solve", &solve, "plan"_a.none(true), "position"_a, "rotation"_a, "wrench"_a, "load_points"_a, "load_types"_a, "read_points"_a,
            "gravity"_a, "load_steps"_a, "threads"_a, "full"_a, "variants"_a = std::vector<const FastPlan*>{})
-      .def("closure", &closure, "given"_a, "rotation"_a, "inverse"_a, "threads"_a)
+      .def("closure", &closure, "plan"_a.none(true), "given"_a, "rotation"_a, "inverse"_a, "threads"_a)
       .def("frames", &frames, "coordinates"_a);
 }
 

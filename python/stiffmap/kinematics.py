@@ -41,7 +41,9 @@ def inverse_kinematics(
     home = machine.description.home.r
     r = trailing(home if rotation is None else rotation, (3, 3), "rotation", "rotation matrices")
     shape = batch(p.shape[:-1], r.shape[:-2])
-    out = machine._core.closure(rows(p, shape, (3,)), rows(r, shape, (3, 3)), True, thread_count(threads))
+    out = machine._core.closure(
+        machine._plan, rows(p, shape, (3,)), rows(r, shape, (3, 3)), True, thread_count(threads)
+    )
     return _kinematics(machine, out, shape)
 
 
@@ -50,7 +52,7 @@ def forward_kinematics(machine: Machine, actuators: ArrayLike, *, threads: int |
     n = len(machine.actuators)
     a = trailing(actuators, (n,), "actuators", f"{n} actuator coordinates")
     shape = a.shape[:-1]
-    out = machine._core.closure(rows(a, shape, (n,)), np.zeros((0, 3, 3)), False, thread_count(threads))
+    out = machine._core.closure(None, rows(a, shape, (n,)), np.zeros((0, 3, 3)), False, thread_count(threads))
     return _kinematics(machine, out, shape)
 
 

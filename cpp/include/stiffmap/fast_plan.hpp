@@ -26,6 +26,10 @@ class FastPlan {
   const std::string& missing() const { return missing_; }
   const Program& program() const;
 
+  /// Coordinates of the nearest node of the grid of closure starts and the tip pose there; false
+  /// outside the box or where no node is within reach.
+  bool nearest_start(const Mechanism& m, const Vec3& position, VecX& x, Pose& at) const;
+
  private:
   std::unique_ptr<FastPlanData> data_;
   std::string missing_;
