@@ -22,7 +22,7 @@ from stiffmap.diagnosis.search import Search, additions, score
 from stiffmap.experiment.experiment import Floats
 
 LEVEL = 0.01
-ODDS = 100.0
+ODDS, RATIO = 100.0, 1e6
 MARGIN = 30.0
 """Rivals whose surprise is this much below the chosen effect's are refused without a full fit."""
 
@@ -51,10 +51,19 @@ def rivals(search: Search, model: Model, classes: Sequence[AliasClass], number: 
             new = f.model.candidates[-1]
             if new == replaced or new in longer.get(replaced, set()) or not np.isfinite(f.model.chi2):
                 continue
+            if overwhelmed(search, model, f.model):
+                continue
             p = worse_p(search.problem, model, f.model)
             if p > LEVEL and f.surprise > search.threshold and not too_long(search, model, f.model):
                 found.append(Rival(f.model, i, p))
     return sorted(found, key=lambda r: -r.p)
+
+
+def overwhelmed(search: Search, chosen: Model, other: Model) -> bool:
+    """Whether the score is beyond what the truth could lose by chance: were `other` true, a likelihood
+    ratio of r against it would have a chance of at most 1/r. Divided by what is left unexplained."""
+    lost = score(chosen, search.problem) - score(other, search.problem)
+    return lost / max(1.0, chosen.chi2 / max(search.problem.freedom, 1)) > np.log(RATIO)
 
 
 def too_long(search: Search, chosen: Model, other: Model) -> bool:

@@ -165,19 +165,15 @@ def _assemble(
 
 
 def predicted_machine(s: Study, model: Model) -> Machine:
-    """The corrected machine, with a note that says from which experiment each effect comes."""
+    """The corrected machine, whose source says from which experiment each effect comes."""
     machine = s.predictor.with_terms(model.terms())
     if machine is s.predictor.machine:
         return machine
     d = machine.description
-    notes = tuple(
-        (f"effect {i + 1}", f"{c}, from experiment {s.experiment.name}")
-        for i, c in enumerate(model.candidates)
-    )
-    declared = d.declared
-    assert declared is not None
-    extra = (*declared.extra, ("diagnosis", {k: v for k, v in notes}))
-    return Machine(replace(d, extra=extra, declared=replace(declared, extra=extra)))
+    assert d.declared is not None
+    added = "; ".join(f"{c}, from experiment {s.experiment.name}" for c in model.candidates)
+    source = f"{d.source} Effects added by a diagnosis: {added}.".strip()
+    return Machine(replace(d, source=source, declared=replace(d.declared, source=source)))
 
 
 def _summaries(

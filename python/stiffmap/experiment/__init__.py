@@ -3,5 +3,19 @@
 from stiffmap.experiment.experiment import Experiment, Loop
 from stiffmap.experiment.load import load_experiment
 from stiffmap.experiment.predict import Predictor, predict
+from stiffmap.experiment.residual import Residual, residual
+from stiffmap.experiment.save import save_experiment
+from stiffmap.experiment.simulate import random_plan, simulate
 
-__all__ = ["Experiment", "Loop", "Predictor", "load_experiment", "predict"]
+__all__ = [
+    "Experiment",
+    "Loop",
+    "Predictor",
+    "Residual",
+    "load_experiment",
+    "predict",
+    "random_plan",
+    "residual",
+    "save_experiment",
+    "simulate",
+]

@@ -1,0 +1,54 @@
+"""``stiffmap diagnose``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from stiffmap.cli.output import JsonOption
+from stiffmap.diagnosis import Diagnosis, diagnose
+from stiffmap.errors import FileError
+
+
+def diagnose_command(
+    machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
+    data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for report and files.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of folds and simulated noise.")] = 0,
+    threads: Annotated[int | None, typer.Option(help="Threads; default: all cores.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Which physical effect a machine lacks, where it sits, how large it is, and how sure that is.
+
+    With -o: diagnosis.json (SI), report.html (all inside), machine.yaml (corrected), pictures.
+    Exit codes: 0 verdict none, 1 verdict with findings, 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap diagnose orthoglide-revised experiments/servo -o result[/cyan]
+    """
+    result = diagnose(machine, data, seed=seed, threads=threads)
+    if output is not None:
+        write(result, output)
+    print(result.to_json() if as_json else result)
+    if result.verdict != "none":
+        raise typer.Exit(1)
+
+
+def write(result: Diagnosis, folder: Path) -> None:
+    """All files of a diagnosis; raises `FileError` where the folder cannot be written."""
+    from stiffmap.diagnosis.pictures import figures
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "diagnosis.json").write_text(result.to_json(), encoding="utf-8")
+        for name, figure in figures(result).items():
+            figure.savefig(folder / f"{name}.png", dpi=130)
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror}", file=str(folder)) from error
+    result.report(folder / "report.html")
+    result.machine.save(folder / "machine.yaml")
