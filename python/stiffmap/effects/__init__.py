@@ -1,4 +1,4 @@
-"""Effects: whatever a real machine has beyond the declared one. One kind is one file in `kinds`."""
+"""Effects: whatever a real machine has beyond the declared one. One kind is one file in `library`."""
 
 from stiffmap.effects.apply import add_effect, apply_records, place_text
 from stiffmap.effects.parse import effect_text, parse_effect

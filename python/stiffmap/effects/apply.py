@@ -26,7 +26,7 @@ def add_effect(
     Parameters
     ----------
     kind
-        One of `stiffmap.effects.kinds()`; docs/effects.md tells them all.
+        One of `stiffmap.effects.library()`; docs/effects.md tells them all.
     element
         Name of the element in the machine file (``actuator``, ``bar`` …), or ``machine``, ``base``,
         ``platform``; may be left out where only one is possible.

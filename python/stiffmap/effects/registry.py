@@ -11,7 +11,7 @@ from stiffmap.errors import StiffmapError
 
 @cache
 def _known() -> dict[str, EffectType]:
-    from stiffmap.effects.kinds import EFFECTS
+    from stiffmap.effects.library import EFFECTS
 
     return {effect.kind: effect for effect in EFFECTS}
 

@@ -1,0 +1,41 @@
+"""A drive whose stiffness changes at a force."""
+
+from __future__ import annotations
+
+from stiffmap.description import Law, MachineDescription
+from stiffmap.effects.library.drive_law import change_law, in_unit_of_joint, linear
+from stiffmap.effects.sites import at_sites, elastic_drives
+from stiffmap.effects.types import EffectType, Parameter, Placed
+
+PARAMETERS = (
+    Parameter("ratio", "1", 1e-3, 1e3, 1.0, 0.1, "compliance beyond the knee over the declared one"),
+    Parameter("knee", "N", 1e-3, 1e6, None, 100.0, "force at which the compliance changes", angular="N·m"),
+)
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """A polyline through the knees, continued with the other slope; plain at ratio 1."""
+    ratio, knee = placed.values["ratio"], placed.values["knee"]
+
+    def law(old: Law) -> Law:
+        a = knee / linear(old).stiffness
+        return old if ratio == 1.0 else Law(old.stiffness / ratio, knots=((-a, -knee), (a, knee)))
+
+    return change_law(description, placed, law)
+
+
+EFFECT = EffectType(
+    kind="bilinear",
+    title="drive whose stiffness changes at a force",
+    doc=(
+        "The declared compliance up to the force `knee` in both directions, `ratio` times it for the force "
+        "beyond (a preloaded screw that opens, a stop that closes)."
+    ),
+    parameters=PARAMETERS,
+    places=at_sites(elastic_drives),
+    apply=apply,
+    frame="the drive's coordinate",
+    excludes=("bilinear", "dead_zone", "hardening", "friction", "position_dependent_compliance"),
+    stage=10,
+    at=in_unit_of_joint(*PARAMETERS),
+)

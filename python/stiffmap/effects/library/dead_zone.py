@@ -1,0 +1,46 @@
+"""Backlash of a drive."""
+
+from __future__ import annotations
+
+from stiffmap.description import Law, MachineDescription
+from stiffmap.effects.library.drive_law import change_law, in_unit_of_joint, linear
+from stiffmap.effects.sites import at_sites, elastic_drives
+from stiffmap.effects.types import EffectType, Parameter, Placed
+
+HALF_WIDTH = Parameter(
+    "half_width",
+    "m",
+    0.0,
+    0.01,
+    0.0,
+    1e-5,
+    "deflection without force to each side of the centre",
+    angular="rad",
+)
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """A polyline law with a piece of zero force; plain at zero width."""
+    half = placed.values["half_width"]
+
+    def law(old: Law) -> Law:
+        return Law(linear(old).stiffness, knots=((-half, 0.0), (half, 0.0))) if half > 0.0 else linear(old)
+
+    return change_law(description, placed, law)
+
+
+EFFECT = EffectType(
+    kind="dead_zone",
+    title="backlash of a drive",
+    doc=(
+        "A gap in series with the drive's spring: no force while the deflection is within the half width "
+        "about the centre, the declared stiffness beyond. Unloaded, the drive stands in the centre."
+    ),
+    parameters=(HALF_WIDTH,),
+    places=at_sites(elastic_drives),
+    apply=apply,
+    frame="the drive's coordinate",
+    excludes=("dead_zone", "hardening"),
+    stage=10,
+    at=in_unit_of_joint(HALF_WIDTH),
+)

@@ -1,0 +1,74 @@
+"""Dry friction of a drive."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from stiffmap.description import Law, MachineDescription
+from stiffmap.effects.library.drive_law import change_law, is_revolute
+from stiffmap.effects.sites import at_sites, elastic_drives
+from stiffmap.effects.types import EffectType, Option, Parameter, Placed
+from stiffmap.errors import StiffmapError
+
+FORCE = Parameter("force", "N", 0.0, 1e5, 0.0, 10.0, "Coulomb level of each prismatic drive")
+TORQUE = Parameter("torque", "N·m", 0.0, 1e5, 0.0, 1.0, "Coulomb level of each revolute drive")
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """One branch of the friction loop as a monotone polyline, a dead zone in series included."""
+    turns = is_revolute(description, placed.element)
+    if ("torque" in placed.values) != turns:
+        raise StiffmapError("give torque (N·m) for a revolute drive and force (N) for a prismatic one")
+    level = placed.values["torque" if turns else "force"]
+    branch = placed.options["branch"]
+    return change_law(description, placed, lambda old: _law(old, level, branch))
+
+
+def _law(old: Law, level: float, branch: str) -> Law:
+    half = _gap(old)
+    if level == 0.0:
+        return old
+    if branch == "loading":
+        return replace(old, friction=level)
+    if branch == "unloading":  # a = c (F + level sign F), as a dead zone
+        reach = half + level / old.stiffness
+        return Law(old.stiffness, knots=((-reach, 0.0), (reach, 0.0)))
+    stuck = ((-half, -level), (-half, 0.0), (half, 0.0), (half, level))
+    return Law(old.stiffness, knots=stuck if half > 0.0 else (stuck[0], stuck[3]))
+
+
+def _gap(law: Law) -> float:
+    """Half width of the dead zone that the law has, 0 for a linear one."""
+    if law.cubic or (law.knots and (len(law.knots) != 2 or law.knots[0][1] != 0.0 or law.knots[1][1] != 0.0)):
+        raise StiffmapError("the drive has a declared nonlinear law already, which this effect cannot join")
+    return law.knots[1][0] if law.knots else 0.0
+
+
+def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
+    """Force for a prismatic drive, torque for a revolute one: the other is not to be fitted."""
+    turns = is_revolute(description, element)
+    return (replace(FORCE, fitted=not turns), replace(TORQUE, fitted=turns))
+
+
+EFFECT = EffectType(
+    kind="friction",
+    title="dry friction of a drive",
+    doc=(
+        "Coulomb friction between the drive's spring and its guide, against the spring's motion from its "
+        "unloaded state, with the deflection a and the force F of the drive, level L and compliance c: on "
+        "the branch `loading` (from zero load) a = c·(F - L·sign F); on the branch `unloading` (from a "
+        "larger load, friction fully reversed) a = c·(F + L·sign F). `loading` takes the full level also "
+        "where |F| < L, with the sign that F has in the machine without friction; a drive that really "
+        "sticks there, a = 0, is `loading_stuck`. Both agree where |F| > L."
+    ),
+    parameters=(FORCE, TORQUE),
+    places=at_sites(elastic_drives),
+    apply=apply,
+    frame="the drive's coordinate",
+    options=(Option("branch", ("loading", "unloading", "loading_stuck"), "how the load was reached"),),
+    one_of=("force", "torque"),
+    excludes=("friction", "hardening", "position_dependent_compliance"),
+    stage=20,
+    needs=("branch",),
+    at=at,
+)

@@ -1,0 +1,35 @@
+"""A drive that stiffens with load."""
+
+from __future__ import annotations
+
+from stiffmap.description import Law, MachineDescription
+from stiffmap.effects.library.drive_law import change_law, in_unit_of_joint, linear
+from stiffmap.effects.sites import at_sites, elastic_drives
+from stiffmap.effects.types import EffectType, Parameter, Placed
+
+CUBIC = Parameter(
+    "cubic", "N/m^3", 0.0, 1e20, 0.0, 1e14, "coefficient of the deflection's third power", angular="N·m/rad^3"
+)
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """force = a/c + cubic a^3."""
+
+    def law(old: Law) -> Law:
+        return Law(linear(old).stiffness, cubic=placed.values["cubic"])
+
+    return change_law(description, placed, law)
+
+
+EFFECT = EffectType(
+    kind="hardening",
+    title="drive that stiffens with load",
+    doc="Force of the drive = a/c + cubic·a³ at the deflection a, with the declared compliance c.",
+    parameters=(CUBIC,),
+    places=at_sites(elastic_drives),
+    apply=apply,
+    frame="the drive's coordinate",
+    excludes=("hardening", "dead_zone", "friction", "position_dependent_compliance"),
+    stage=10,
+    at=in_unit_of_joint(CUBIC),
+)
