@@ -96,7 +96,7 @@ class Machine:
         rotation: ArrayLike | None = None,
         point: str = "tcp",
         wrenches: Mapping[str, ArrayLike] | None = None,
-        load_type: str = "dead",
+        load_type: str | Mapping[str, str] = "dead",
         read_points: Sequence[str] = (),
         gravity: ArrayLike | None = None,
         method: str = "fast",
@@ -122,7 +122,7 @@ class Machine:
             More wrenches: point name -> (..., 6).
         load_type
             How `wrench` follows its body: ``dead``, ``follower`` or ``semitangential``
-            (docs/conventions.md).
+            (docs/conventions.md). A mapping says it for each loaded point; the others are dead.
         read_points
             Further points whose displacement is wanted: `Solution.readings` holds `point` first.
         gravity
@@ -226,8 +226,13 @@ class Machine:
         self._check_rotation(r)
         extra = {n: wrench_array(v, f"wrenches[{n!r}]") for n, v in (wrenches or {}).items()}
         shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2], *(v.shape[:-1] for v in extra.values()))
-        if load_type not in LOAD_TYPES:
-            raise StiffmapError(f"load_type: expected one of {', '.join(LOAD_TYPES)}, got {load_type!r}")
+        types = {point: load_type} if isinstance(load_type, str) else dict(load_type)
+        for name, kind in types.items():
+            if kind not in LOAD_TYPES:
+                raise StiffmapError(f"load_type: expected one of {', '.join(LOAD_TYPES)}, got {kind!r}")
+            if name not in (point, *extra):
+                loaded = ", ".join((point, *extra))
+                raise StiffmapError(f"load_type: no wrench acts at {name!r}, only at {loaded}")
         if method not in ("fast", "reference"):
             raise StiffmapError(f"method: expected 'fast' or 'reference', got {method!r}")
         for name in (point, *extra, *read_points):
@@ -241,7 +246,7 @@ class Machine:
             rows(r, shape, (3, 3)),
             np.ascontiguousarray(loads),
             [point, *extra],
-            [LOAD_TYPES[load_type]] + [0] * len(extra),
+            [LOAD_TYPES[types.get(name, "dead")] for name in (point, *extra)],
             read,
             self._gravity(gravity),
             self._steps(load_steps),
