@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+// Compiled against a copy of cpp/kernels in which lanes.hpp is the counting one.
+#include "count.hpp"
+
+#include <vector>
+
+#include "kernel.cpp"
+
+namespace stiffmap::kernel {
+namespace {
+
+template <class Work>
+double counted(Work&& work) {
+  const long before = operations;
+  work();
+  return static_cast<double>(operations - before);
+}
+
+void count_pose(const Program& P, Block& b, Scratch& s, double* out) {
+  std::int64_t pose[1] = {b.first};
+  out[bench::closure] += counted([&] {
+    const M usable = b.read();
+    Closing{P, s}.close(b.command, usable, pose, b.in.position);
+  });
+  out[bench::block] += counted([&] { b.run(); });
+  const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
+  Elimination e{P, s, {}, splat(1e300), {f, f, f, g, g, g}};
+  Newton n{P, b.in, s, e, b.load, {}, {}, {}, {}};
+  Frame tip = Closing::base_frame();
+  V3 at;
+  V6 F = b.load, c;
+  Sym6 K;
+  V C[6][6], zero[6];
+  out[bench::laws] += counted([&] { n.evaluate(false); });
+  out[bench::frames] += counted([&] { walk<Build::actual>(P, P.chains[P.root], s.x, tip, s); });
+  at = tip.p;
+  out[bench::wrenches] += counted([&] { e.wrenches(P.chains[P.root], F, at); });
+  for (int i = 0; i < P.op_count; ++i)
+    if (P.ops[i].kind == OpKind::spring)
+      out[bench::elements] += counted([&] { e.spring_tangent(P.ops[i], s.stiff[P.ops[i].slot], K, c); });
+  out[bench::elimination] += counted([&] { e.tangent(P.chains[P.root], b.load, tip.p, n.K, n.c); });
+  out[bench::platform] += counted([&] {
+    n.dense(C);
+    n.invert(C);
+  });
+  out[bench::back] += counted([&] { e.back(P.chains[P.root], get(zero), tip.p, V3{}, M{}); });
+  n.tip = tip;
+  n.point = tip.p;
+  out[bench::output] += counted([&] { b.write(M{-1}, n, C, C, splat(1)); });
+}
+
+}  // namespace
+}  // namespace stiffmap::kernel
+
+stiffmap::bench::Counts stiffmap::bench::count_operations(const Program& P, const KernelInput& in, const KernelOutput& out) {
+  using namespace stiffmap::kernel;
+  std::vector<char> scratch(static_cast<std::size_t>(scratch_size(&P)));
+  Scratch s = lay_out(P, scratch.data(), nullptr);
+  Counts counts{};
+  for (std::int64_t i = 0; i < in.count; ++i) {
+    kernel::Block b{P, in, out, s, i, 1, {}, {}};
+    count_pose(P, b, s, counts.operations);
+  }
+  for (double& n : counts.operations) n /= static_cast<double>(in.count);
+  counts.operations[elimination] -= counts.operations[elements];
+  for (Pass p : {laws, frames, bench::wrenches, elements, elimination, platform, back}) counts.operations[iteration] += counts.operations[p];
+  return counts;
+}

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+// The kernel's own translation unit with two more functions: its passes timed one by one, and the
+// peak rate of the same vector type. Built once per instruction-set level, as the kernels are.
+#include "passes.hpp"
+
+#include "../cpp/kernels/kernel.cpp"
+#include "statistics.hpp"
+
+#ifndef STIFFMAP_PASSES
+#define STIFFMAP_PASSES stiffmap_passes_base
+#endif
+
+namespace stiffmap::kernel {
+namespace {
+
+struct Timer {
+  int repeats, lanes;
+  double* out;
+  template <class Work>
+  void operator()(bench::Pass pass, Work&& work) {
+    out[pass] += bench::seconds([&] {
+                   for (int i = 0; i < repeats; ++i) {
+                     work();
+                     asm volatile("" : : : "memory");
+                   }
+                 }) / (repeats * lanes);
+  }
+};
+
+void time_elements(const Program& P, Scratch& s, Elimination& e) {
+  for (int i = 0; i < P.op_count; ++i) {
+    const Op& op = P.ops[i];
+    if (op.kind != OpKind::spring) continue;
+    Sym6 K;
+    V6 c;
+    e.spring_tangent(op, s.stiff[op.slot], K, c);
+    bench::keep(K);
+    bench::keep(c);
+  }
+}
+
+/// At the equilibrium that `b.run()` has left in the scratch.
+void time_block(Block& b, const M usable, Timer& time) {
+  const Program& P = b.P;
+  Scratch& s = b.s;
+  const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
+  Elimination e{P, s, {}, splat(1e300), {f, f, f, g, g, g}};
+  Newton n{P, b.in, s, e, b.load, {}, {}, {}, {}};
+  time(bench::laws, [&] { n.evaluate(false); });
+  Frame tip;
+  time(bench::frames, [&] {
+    tip = Closing::base_frame();
+    walk<Build::actual>(P, P.chains[P.root], s.x, tip, s);
+  });
+  V6 F;
+  V3 at;
+  time(bench::wrenches, [&] {
+    F = b.load;
+    at = tip.p;
+    e.wrenches(P.chains[P.root], F, at);
+  });
+  time(bench::elements, [&] { time_elements(P, s, e); });
+  time(bench::elimination, [&] { e.tangent(P.chains[P.root], b.load, tip.p, n.K, n.c); });
+  V K[6][6], C[6][6], x[6] = {};
+  time(bench::platform, [&] {
+    n.dense(C);
+    n.invert(C);
+    bench::keep(C);
+  });
+  n.dense(K);
+  n.tip = tip;
+  n.point = tip.p;
+  time(bench::back, [&] { e.back(P.chains[P.root], get(x), tip.p, V3{}, M{}); });
+  time(bench::output, [&] { b.write(usable, n, K, C, splat(1)); });
+  time(bench::iteration, [&] {
+    n.evaluate(false);
+    n.linearize();
+    n.dense(C);
+    n.invert(C);
+    bench::keep(C);
+    e.back(P.chains[P.root], get(x), tip.p, V3{}, M{});
+  });
+}
+
+void measure(const Program* P, const KernelInput* in, const KernelOutput* out, void* scratch, int repeats, double* seconds) {
+  Scratch s = lay_out(*P, scratch, nullptr);
+  std::int64_t blocks = 0;
+  for (std::int64_t i = 0; i + W <= in->count; i += W, ++blocks) {
+    Block b{*P, *in, *out, s, i, W, {}, {}};
+    Timer time{repeats, W, seconds};
+    std::int64_t poses[W];
+    for (int k = 0; k < W; ++k) poses[k] = b.pose(k);
+    M closed{};
+    time(bench::closure, [&] {
+      const M usable = b.read();
+      closed = Closing{*P, s}.close(b.command, usable, poses, in->position);
+    });
+    time(bench::block, [&] { b.run(); });
+    time_block(b, closed, time);
+  }
+  for (int k = 0; k < bench::pass_count; ++k) seconds[k] /= static_cast<double>(blocks);
+  seconds[bench::elimination] -= seconds[bench::elements];
+}
+
+double peak() {
+  constexpr int chains = 10, times = 2000000;
+  V x[chains];
+  for (int k = 0; k < chains; ++k) x[k] = splat(0.1 * k);
+  V a = splat(0.999), b = splat(0.001);
+  asm volatile("" : "+m"(a), "+m"(b));
+  const double t = bench::seconds([&] {
+    for (int i = 0; i < times; ++i)
+#pragma GCC unroll 10
+      for (int k = 0; k < chains; ++k) x[k] = x[k] * a + b;
+  });
+  bench::keep(x);
+  return 2.0 * chains * times * W / t;
+}
+
+}  // namespace
+}  // namespace stiffmap::kernel
+
+extern "C" __attribute__((visibility("default"))) void STIFFMAP_PASSES(stiffmap::bench::PassTable* table) {
+  *table = {STIFFMAP_LEVEL, stiffmap::kernel::W, &stiffmap::kernel::scratch_size, &stiffmap::kernel::measure,
+            &stiffmap::kernel::peak};
+}

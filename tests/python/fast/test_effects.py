@@ -1,0 +1,68 @@
+"""Both paths agree on machines with effects, and on each of their branches."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from agreement import TOLERANCE, draw, gap
+
+import stiffmap as sm
+
+Effect = tuple[str, dict[str, Any]]
+EFFECTS: dict[str, list[Effect]] = {
+    "dead_zone": [("dead_zone", {"element": "actuator", "legs": ["y"], "half_width": 12e-6})],
+    "friction_loading": [("friction", {"element": "actuator", "force": 30.0, "branch": "loading"})],
+    "friction_unloading": [("friction", {"element": "actuator", "force": 30.0, "branch": "unloading"})],
+    "hardening": [("hardening", {"element": "actuator", "cubic": 1e13})],
+    "joint_compliance": [
+        ("joint_compliance", {"element": "bar", "translation": 1e-9, "rotation": 1e-7, "legs": ["x"]})
+    ],
+    "tilt": [("tilt", {"element": "actuator", "legs": ["z"], "angle_x": 1e-3, "angle_y": -5e-4})],
+    "length": [("length", {"element": "bar", "legs": ["y"], "error": 5e-5})],
+    "several": [
+        ("dead_zone", {"element": "actuator", "legs": ["x"], "half_width": 5e-6}),
+        ("friction", {"element": "actuator", "force": 20.0, "branch": "loading", "legs": ["y", "z"]}),
+        ("length", {"element": "bar", "legs": ["z"], "error": 3e-5}),
+    ],
+}
+
+
+def with_effects(effects: list[Effect]) -> sm.Machine:
+    machine = sm.load_machine("orthoglide-revised")
+    for kind, values in effects:
+        machine = machine.with_effect(kind, **values)
+    return machine
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_agreement(name: str) -> None:
+    machine = with_effects(EFFECTS[name])
+    position, wrench = draw(machine, 40, seed=21)
+    found = gap(machine, position, wrench)
+    assert found.statuses == 0
+    assert found.poses == 40
+    assert found.worst() < TOLERANCE
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_the_effect_is_not_ignored(name: str) -> None:
+    machine = with_effects(EFFECTS[name])
+    position, wrench = draw(machine, 10, seed=22)
+    plain = sm.load_machine("orthoglide-revised").solve(position, wrench).displacement
+    changed = machine.solve(position, wrench).displacement
+    assert np.abs(changed - plain).max() > 1e-6 * np.abs(plain).max()
+
+
+@pytest.mark.parametrize("effects", [[], EFFECTS["dead_zone"]])
+def test_displacements_alone_under_gravity(effects: list[Effect]) -> None:
+    machine = with_effects(effects)
+    position, wrench = draw(machine, 40, seed=23)
+    options = {"gravity": (0.0, 0.0, -9.81), "stiffness": False}
+    fast = machine.solve(position, wrench, **options)
+    reference = machine.solve(position, wrench, method="reference", **options)
+    np.testing.assert_array_equal(fast.status, reference.status)
+    size = np.abs(reference.displacement).max(axis=1, keepdims=True)
+    assert np.abs(fast.displacement - reference.displacement).max() < TOLERANCE * size.max()
+    assert np.isnan(fast.stiffness).all()
