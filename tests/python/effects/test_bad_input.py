@@ -11,6 +11,7 @@ import stiffmap as sm
 from stiffmap.errors import StiffmapError
 
 DRIVE = {"element": "actuator", "legs": ["y"]}
+GAP = {"kind": "dead_zone", **DRIVE}
 BAD = {
     "no effect 'backlash'; there are: compliance, dead_zone": {"kind": "backlash"},
     "did you mean 'hardening'": {"kind": "hardning"},
@@ -21,11 +22,11 @@ BAD = {
     "no leg 'w' has it; legs that do: x, y, z": {
         "kind": "dead_zone", "element": "actuator", "legs": ["w"], "half_width": 1e-5,
     },
-    "expected a list of leg names": {"kind": "dead_zone", "element": "actuator", "legs": "y", "half_width": 1e-5},
+    "expected a list of leg names": {**GAP, "legs": "y", "half_width": 1e-5},
     "half_width: expected 0 to 0.01 m, got -1e-05": {"kind": "dead_zone", **DRIVE, "half_width": -1e-5},
     "half_width: expected 0 to 0.01 m, got 12": {"kind": "dead_zone", **DRIVE, "half_width": 12},
-    "half_width: expected a finite number in m, got nan": {"kind": "dead_zone", **DRIVE, "half_width": np.nan},
-    "half_width: expected a finite number in m, got '12um'": {"kind": "dead_zone", **DRIVE, "half_width": "12um"},
+    "half_width: expected a finite number in m, got nan": {**GAP, "half_width": np.nan},
+    "half_width: expected a finite number in m, got '12um'": {**GAP, "half_width": "12um"},
     "half_width is missing": {"kind": "dead_zone", **DRIVE},
     "unknown parameter 'width'": {"kind": "dead_zone", **DRIVE, "width": 1e-5},
     "give exactly one of scale, value": {"kind": "compliance", **DRIVE, "scale": 2.0, "value": 1e-7},

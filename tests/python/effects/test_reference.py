@@ -56,3 +56,15 @@ def test_case(orthoglide, case, method):
     assert error[3:].max() <= case["tolerance_mm"]  # over arms of a metre: rad as mm is generous to none
     free_play = case["effect"] == "dead zone" and not force.any()
     assert solution.status == (sm.Status.SINGULAR if free_play else sm.Status.CONVERGED)
+
+
+def test_sticking_differs_in_one_case_of_the_loading_branch(orthoglide):
+    """Leg z bears 6.6 N of a level of 20 N in one case: there a contact sticks, the reference does not."""
+    machine = orthoglide.with_effect("friction", element="actuator", force=20.0, branch="loading_stuck")
+    apart = []
+    for case in (c for c in CASES if c.get("branch") == "loading"):
+        solution = machine.solve(np.array(case["pose_mm"]) * 1e-3, [*case["force_N"], 0, 0, 0])
+        apart.append(np.abs(solution.displacement[:3] - np.array(case["displacement"][:3]) * 1e-3).max())
+        lowest = np.abs(solution.actuator_effort).min()
+        assert (lowest < 20.0) == (apart[-1] > 1e-12)
+    assert sorted(apart)[-1] == pytest.approx(1.92e-6, rel=0.01) and sorted(apart)[-2] < 1e-12

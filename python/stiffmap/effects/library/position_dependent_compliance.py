@@ -24,7 +24,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
         slope = e.compliance_slope + placed.values["slope"]
         for end in (e.drive.range or ()) if e.drive else ():
             if 1.0 + slope * (end - e.home[0]) <= 0.0:
-                raise StiffmapError(f"slope {slope:g}: no compliance is left at {end:g} of the drive's range")
+                raise StiffmapError(f"slope {slope:g}: no compliance is left at {end:g}")
         return (replace(e, compliance_slope=slope),)
 
     return change_sites(description, placed.legs, placed.element, elastic_drives, change)
@@ -34,8 +34,8 @@ EFFECT = EffectType(
     kind="position_dependent_compliance",
     title="drive compliance that depends on the stroke",
     doc=(
-        "Drive compliance times 1 + slope·(u - u_home) at the commanded coordinate u (a screw that yields more "
-        "the longer it is)."
+        "Drive compliance times 1 + slope·(u - u_home) at the commanded coordinate u (a screw that yields "
+        "more the longer it is)."
     ),
     parameters=(SLOPE,),
     places=at_sites(elastic_drives),
