@@ -36,7 +36,8 @@ Vec6 loop_wrench(const State& state, Index loop) { return state.lambda.segment<6
 bool is_minimum(const SaddleSystem& saddle) {
   MatX A = saddle.matrix();
   A = (0.5 * (A + A.transpose())).eval();
-  return symmetric_inertia(A, rank_threshold).negative <= (saddle.regular() ? saddle.closures() : saddle.closure_rank());
+  return symmetric_inertia(A, rank_threshold).negative <=
+         (saddle.regular() ? saddle.closures() : saddle.closure_rank());
 }
 
 }  // namespace

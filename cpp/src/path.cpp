@@ -8,8 +8,8 @@
 namespace stiffmap {
 namespace {
 
-constexpr double tolerance = 1e-10;      // last Newton step, in multiples of the mechanism's length
-constexpr double trusted_step = 0.1;     // of a Newton step: further may be another branch
+constexpr double tolerance = 1e-10;   // last Newton step, in multiples of the mechanism's length
+constexpr double trusted_step = 0.1;  // of a Newton step: further may be another branch
 constexpr double trusted_shrinking = 0.3;
 constexpr int most_iterations = 15;
 constexpr int bisections = 36;
