@@ -76,7 +76,7 @@ def _same_way(screen: Screen, i: int, j: int) -> bool:
     a, b = screen.variants[i], screen.variants[j]
     if a.sign.size != 1 or b.sign.size != 1 or not (a.sign[0] and b.sign[0]):
         return True
-    return float(screen.columns(i)[:, 0] @ screen.columns(j)[:, 0]) * a.sign[0] * b.sign[0] > 0
+    return bool(float(screen.columns(i)[:, 0] @ screen.columns(j)[:, 0]) * a.sign[0] * b.sign[0] > 0)
 
 
 def coarseness(candidate: Candidate, rank: int, description: MachineDescription) -> tuple[int, int, int]:

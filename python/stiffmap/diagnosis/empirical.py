@@ -12,7 +12,7 @@ import numpy as np
 
 from stiffmap.diagnosis.crossval import folds
 from stiffmap.diagnosis.structure import unit
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.summary import rms
 
 LENGTHS = (0.5, 1.0, 2.0)
@@ -41,7 +41,7 @@ def empirical(experiment: Experiment, residual: Floats, sigma: Floats, seed: int
     return Empirical(rms(residual[:, :3]), rms((residual - field)[:, :3]), length, field)
 
 
-def _held(e: Experiment, residual: Floats, sigma: Floats, label: Floats, length: float) -> Floats:
+def _held(e: Experiment, residual: Floats, sigma: Floats, label: Integers, length: float) -> Floats:
     kernel = covariance(e, length)
     out = np.full_like(residual, np.nan)
     for axis in np.flatnonzero(np.isfinite(residual).any(axis=0)):

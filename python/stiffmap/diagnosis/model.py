@@ -50,7 +50,7 @@ class Model:
         si = (self.values if values is None else values) * self.scales
         out, at = [], 0
         for c in self.candidates:
-            out.append(c.term(si[at : at + len(c.parameters)]))
+            out.append(c.term(si[at : at + len(c.parameters)].tolist()))
             at += len(c.parameters)
         return tuple(out)
 

@@ -44,7 +44,7 @@ def _turns(here: Floats, experiment: Experiment, base: Floats) -> Iterator[Float
 
 
 def _per_axis(pattern: Floats, experiment: Experiment) -> Iterator[Floats]:
-    for axis in np.flatnonzero(experiment.read.any(axis=0)):
+    for axis in np.flatnonzero(experiment.axis_read):
         column = np.zeros((len(experiment), 6))
         column[:, axis] = pattern
         yield column

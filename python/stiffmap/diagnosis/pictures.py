@@ -35,7 +35,7 @@ def vectors(d: Diagnosis) -> Figure:
     for i, (name, r, colour) in enumerate((("before", before, BEFORE), ("after", after, AFTER))):
         axes = figure.add_subplot(1, 2, i + 1, projection="3d")
         v = np.nan_to_num(r[:, :3]) * scale
-        axes.quiver(*at.T, *v.T, color=colour, linewidth=1.2)  # type: ignore[attr-defined]
+        axes.quiver(*at.T, *v.T, color=colour, linewidth=1.2)
         axes.scatter(*at.T, s=6, color="0.4")
         axes.set(
             xlabel="x / mm", ylabel="y / mm", zlabel="z / mm", title=f"{name}: mean residual of each pose"
@@ -90,7 +90,9 @@ def histogram(d: Diagnosis) -> Figure:
     width = min(12.0, max(4.0, float(np.nanpercentile(np.abs(both[0]), 99))))
     bins = np.linspace(-width, width, 61)
     for z, colour, label in zip(both, (BEFORE, AFTER), ("before", "after"), strict=True):
-        ax.hist(z[np.isfinite(z)], bins, density=True, histtype="step", color=colour, label=label, lw=1.5)
+        ax.hist(
+            z[np.isfinite(z)], bins.tolist(), density=True, histtype="step", color=colour, label=label, lw=1.5
+        )
     ax.plot(bins, np.exp(-(bins**2) / 2) / np.sqrt(2 * np.pi), color="0.4", ls="--", label="noise alone")
     ax.set(xlabel="residual / noise floor (standard deviations)", ylabel="density")
     ax.legend()

@@ -39,7 +39,8 @@ class Problem:
         """Problem of the rows in `keep`; `base` (n, 6) is the declared machine's prediction."""
         rows = np.ones(len(experiment), bool) if keep is None else keep
         used = experiment.read & rows[:, None] & np.isfinite(base)
-        index = np.nonzero(used)
+        at, axis = np.nonzero(used)
+        index = (at.astype(np.intp), axis.astype(np.intp))
         bare = Problem(
             experiment, sigma, rows, index, np.zeros((len(index[0]), 0)), _blocks(experiment, sigma, index)
         )
@@ -55,7 +56,7 @@ class Problem:
     @property
     def freedom(self) -> int:
         """Readings minus nuisances."""
-        return len(self) - self.nuisance.shape[1]
+        return len(self) - int(self.nuisance.shape[1])
 
     @property
     def groups(self) -> NDArray[np.intp]:

@@ -63,13 +63,13 @@ def overwhelmed(search: Search, chosen: Model, other: Model) -> bool:
     """Whether the score is beyond what the truth could lose by chance: were `other` true, a likelihood
     ratio of r against it would have a chance of at most 1/r. Divided by what is left unexplained."""
     lost = score(chosen, search.problem) - score(other, search.problem)
-    return lost / max(1.0, chosen.chi2 / max(search.problem.freedom, 1)) > np.log(RATIO)
+    return bool(lost / max(1.0, chosen.chi2 / max(search.problem.freedom, 1)) > np.log(RATIO))
 
 
 def too_long(search: Search, chosen: Model, other: Model) -> bool:
     """Whether a model with more parameters has Schwarz odds against it beyond `ODDS`."""
     odds = score(chosen, search.problem) - score(other, search.problem)
-    return len(other.values) > len(chosen.values) and odds > np.log(ODDS)
+    return bool(len(other.values) > len(chosen.values) and odds > np.log(ODDS))
 
 
 def worse_p(problem: Problem, chosen: Model, other: Model) -> float:

@@ -42,7 +42,7 @@ class Screen:
         """Screen of the variants beside an empty model."""
         sizes = np.array([v.columns.shape[-1] for v in variants], dtype=np.intp)
         members = tuple(np.flatnonzero(sizes == p) for p in np.unique(sizes))
-        white = tuple(np.stack([_white(problem, variants[i].columns) for i in m]) for m in members)
+        white = tuple(np.stack([_white(problem, variants[int(i)].columns) for i in m]) for m in members)
         seen = tuple(np.where(np.linalg.norm(w, axis=1, keepdims=True) > VISIBLE, w, 0.0) for w in white)
         return _screen(tuple(variants), seen, members)
 

@@ -107,9 +107,9 @@ def variants(candidate: Candidate, predictor: Predictor, base: Floats) -> Iterat
         for columns, shape in periodic_variants(candidate, predictor, base):
             yield Variant(candidate, columns, np.zeros(columns.shape[-1]), shape)
         return
-    columns = [difference(candidate, i, predictor, base) for i in range(len(candidate.parameters))]
+    single = [difference(candidate, i, predictor, base) for i in range(len(candidate.parameters))]
     sign = np.array([side(candidate, i) for i in range(len(candidate.parameters))])
-    yield Variant(candidate, np.stack(columns, axis=-1), sign)
+    yield Variant(candidate, np.stack(single, axis=-1), sign)
 
 
 def side(candidate: Candidate, i: int) -> int:

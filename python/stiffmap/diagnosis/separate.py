@@ -64,7 +64,7 @@ def _loaded(e: Experiment, poses: Floats) -> Experiment:
         loads = np.vstack([loads, 0.25 * loads])
     n = len(poses) * len(loads)
     position = np.repeat(poses, len(loads), axis=0)
-    read = np.where(e.read.any(axis=0), 0.0, np.nan)
+    read = np.where(e.axis_read, 0.0, np.nan)
     return Experiment(
         name="trial",
         machine=e.machine,

@@ -9,7 +9,7 @@ import numpy as np
 
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.problem import Problem
-from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.experiment import Integers
 
 STEADY = 0.35
 """Largest relative change of an effect between halves of the data beside an unexplained rest."""
@@ -31,7 +31,7 @@ def steady(problem: Problem, model: Model) -> list[bool]:
     return [bool(np.linalg.norm(change[s]) <= STEADY * np.linalg.norm(size[s])) for s in model.parts()]
 
 
-def halves(problem: Problem) -> Iterator[Floats]:
+def halves(problem: Problem) -> Iterator[Integers]:
     """Readings of each half of the workspace along each coordinate, and of each sign of each force."""
     e, rows = problem.experiment, problem.index[0]
     for a in range(3):

@@ -24,6 +24,7 @@ from stiffmap.diagnosis.study import Finding, Study, find, study
 from stiffmap.experiment.checks import Check, checks
 from stiffmap.experiment.experiment import AXES, Experiment, Floats
 from stiffmap.experiment.load import load_experiment
+from stiffmap.experiment.noise import Mask
 from stiffmap.experiment.predict import Predictor
 from stiffmap.experiment.summary import Summary, summary
 from stiffmap.machine import Machine, load_machine
@@ -177,7 +178,7 @@ def predicted_machine(s: Study, model: Model) -> Machine:
 
 
 def _summaries(
-    held: HeldOut | None, before: Floats, after: Floats, s: Study, keep: Floats
+    held: HeldOut | None, before: Floats, after: Floats, s: Study, keep: Mask
 ) -> tuple[Summary, Summary]:
     if held:
         return held.before, held.after
@@ -189,7 +190,7 @@ def _noise(s: Study, finding: Finding) -> NoiseReport:
     problem, n = finding.search.problem, s.noise
 
     def per_axis(values: Floats) -> dict[str, float]:
-        return {a: float(v) for a, v, r in zip(AXES, values, s.experiment.read.any(axis=0), strict=True) if r}
+        return {a: float(v) for a, v, r in zip(AXES, values, s.experiment.axis_read, strict=True) if r}
 
     before = float(chi2.sf(finding.selection.null.chi2, problem.freedom))
     after = float(chi2.sf(finding.model.chi2, max(1, problem.freedom - len(finding.model.values))))

@@ -6,13 +6,15 @@ machine and true sensors. Their chi-square says whether noise explains them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise import Mask
 
 Contrast = tuple[list[tuple[int, int]], list[float]]
@@ -88,7 +90,7 @@ class Conditions:
             branch[first] == "unloading",
         )
 
-    def poses(self) -> Iterator[Floats]:
+    def poses(self) -> Iterator[Integers]:
         """Condition numbers of each pose and branch."""
         for g in np.unique(self.group):
             for branch in (False, True):
@@ -112,12 +114,12 @@ def linearity(t: Conditions) -> Iterator[Contrast]:
     """Neighbouring sizes of the same force direction."""
     for here in t.poses():
         for line in _lines(t, here):
-            for i, j in zip(line[:-1], line[1:], strict=True):
-                si, sj = np.linalg.norm(t.wrench[i]), np.linalg.norm(t.wrench[j])
+            for i, j in pairwise(line):
+                si, sj = float(np.linalg.norm(t.wrench[i])), float(np.linalg.norm(t.wrench[j]))
                 yield from (([(i, a), (j, a)], [1 / si, -1 / sj]) for a in range(6))
 
 
-def _lines(t: Conditions, here: Floats) -> Iterator[list[int]]:
+def _lines(t: Conditions, here: Integers) -> Iterator[list[int]]:
     size = np.linalg.norm(t.wrench[here], axis=1)
     loaded = here[size > 0]
     direction = np.round(t.wrench[loaded] / np.linalg.norm(t.wrench[loaded], axis=1, keepdims=True), 6)
@@ -134,7 +136,7 @@ def reversal(t: Conditions) -> Iterator[Contrast]:
                 yield from (([(i, a), (j, a)], [1.0, 1.0]) for a in range(6))
 
 
-def _matching(t: Conditions, here: Floats, change) -> Iterator[tuple[int, int]]:  # type: ignore[no-untyped-def]
+def _matching(t: Conditions, here: Integers, change: Callable[[Floats], Floats]) -> Iterator[tuple[int, int]]:
     known = {tuple(np.round(t.wrench[i], 6) + 0.0): int(i) for i in here}
     for i in here:
         j = known.get(tuple(np.round(change(t.wrench[i]), 6) + 0.0))
@@ -146,7 +148,7 @@ def superposition(t: Conditions) -> Iterator[Contrast]:
     """Two forces along different lines and their sum."""
     for here in t.poses():
         for i in here:
-            for j, k in _matching(t, here, lambda w, i=i: w + t.wrench[i]):
+            for j, k in _matching(t, here, partial(np.add, t.wrench[i])):
                 if i < j and np.linalg.matrix_rank(t.wrench[[i, j]]) == 2:
                     yield from (([(int(i), a), (j, a), (k, a)], [1.0, 1.0, -1.0]) for a in range(6))
 

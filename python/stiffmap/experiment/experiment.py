@@ -64,6 +64,11 @@ class Experiment:
     title: str = ""
     source: str = ""
 
+    @property
+    def axis_read(self) -> NDArray[np.bool_]:
+        """(6,) which axes were read at all."""
+        return np.asarray(np.any(self.read, axis=0))
+
     def __len__(self) -> int:
         return len(self.ids)
 
@@ -75,7 +80,7 @@ class Experiment:
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the axes that were read at all."""
-        return tuple(a for a, any_ in zip(AXES, self.read.any(axis=0), strict=True) if any_)
+        return tuple(a for a, any_ in zip(AXES, self.axis_read, strict=True) if any_)
 
     @cached_property
     def groups(self) -> Integers:

@@ -114,12 +114,12 @@ def _wrench(model: ExperimentFile, table: Table, scales: Scales) -> Floats:
     given = [c for c in WRENCH if c in table]
     if model.quantity == "deflection" and not given:
         raise FileError("missing column: a deflection needs a load (fx, fy, fz, mx, my, mz)", file=table.file)
-    return scales.wrench(given) * _block(table, WRENCH, blank=False, missing=0.0)
+    return np.asarray(scales.wrench(given) * _block(table, WRENCH, blank=False, missing=0.0))
 
 
 def _declared(noise: NoiseModel, scales: Scales) -> Floats:
     values = [getattr(noise, a) for a in AXES]
-    return scales.motion * np.array([np.nan if v is None else v for v in values])
+    return np.asarray(scales.motion * np.array([np.nan if v is None else v for v in values]))
 
 
 def _sigma(model: ExperimentFile, table: Table, scales: Scales, reading: Floats) -> Floats:

@@ -82,4 +82,4 @@ def drift(experiment: Experiment, parameters: Mapping[str, float]) -> Floats:
         return np.zeros((len(experiment), 6))
     elapsed = experiment.order - experiment.order.min()
     rate = np.array([parameters.get(a, 0.0) for a in "xyz"] + [0.0] * 3)
-    return elapsed[:, None] * rate
+    return np.asarray(elapsed[:, None] * rate)

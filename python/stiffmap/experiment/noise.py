@@ -82,9 +82,7 @@ def _within(experiment: Experiment, rows: Mask) -> tuple[Floats, NDArray[np.intp
 
 
 def _check(experiment: Experiment, floor: Floats) -> None:
-    wrong = [
-        a for a, f, any_ in zip(AXES, floor, experiment.read.any(axis=0), strict=True) if any_ and not f > 0
-    ]
+    wrong = [a for a, f, any_ in zip(AXES, floor, experiment.axis_read, strict=True) if any_ and not f > 0]
     if wrong:
         raise StiffmapError(
             f"{experiment.name}: the noise of {', '.join(wrong)} is zero or unknown; declare it (noise: in "

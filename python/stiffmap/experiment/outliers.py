@@ -39,9 +39,9 @@ def suspects(experiment: Experiment, residual: Floats, sigma: Floats) -> Mask:
     Repeats that contradict each other, the one farther from its condition's or the model's middle;
     and rows beyond `GROSS` robust standard deviations of all residuals of their axis.
     """
-    residual, sigma = residual[:, experiment.read.any(axis=0)], sigma[:, experiment.read.any(axis=0)]
+    residual, sigma = residual[:, experiment.axis_read], sigma[:, experiment.axis_read]
     away = np.abs(residual - np.nanmedian(residual, axis=0))
-    gross = (away > GROSS * np.fmax(1.4826 * np.nanmedian(away, axis=0), sigma)).any(axis=1)
+    gross = np.asarray(np.any(away > GROSS * np.fmax(1.4826 * np.nanmedian(away, axis=0), sigma), axis=1))
     lonely = _lonely(experiment, residual, sigma, gross)
     return whole_stays(experiment, _contradicting(experiment, residual, sigma) | lonely)
 

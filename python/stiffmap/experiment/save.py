@@ -41,7 +41,7 @@ def _head(e: Experiment, title: str) -> dict[str, Any]:
     }
     head |= {"load_point": e.load_point} if e.load_point != e.point else {}
     head |= {"units": {"length": "mm", "force": "N", "angle": "rad"}}
-    declared = np.sqrt(np.nanmean(e.sigma[:, e.read.any(axis=0)] ** 2, axis=0)) * _scale(e)
+    declared = np.sqrt(np.nanmean(e.sigma[:, e.axis_read] ** 2, axis=0)) * _scale(e)
     head["noise"] = {a: float(f"{s:.6g}") for a, s in zip(e.axes, declared, strict=True) if s > 0}
     if e.gravity is not None:
         head["gravity"] = list(e.gravity)

@@ -61,5 +61,5 @@ class ExperimentFile(FileModel):
     gravity: Annotated[list[Finite], Field(min_length=3, max_length=3)] | None = None
     reference_temperature: Finite | None = None
     metrology: LoopModel = LoopModel()
-    columns: dict[str, str] = {}
+    columns: dict[str, str] = Field(default_factory=dict)
     notes: str = ""

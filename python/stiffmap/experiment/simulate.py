@@ -30,7 +30,7 @@ def simulate(
     Raises StiffmapError where no noise is declared or the machine cannot be solved.
     """
     exact = predict(machine, plan, tuple(effects))
-    read = plan.read.any(axis=0)
+    read = plan.axis_read
     if np.isnan(plan.sigma[plan.read]).any():
         raise StiffmapError(f"{plan.name}: a virtual experiment needs a declared noise for every axis read")
     if np.isnan(exact[plan.read]).any():
@@ -92,5 +92,5 @@ def random_plan(
         reading=np.where(np.isfinite(sigma), 0.0, np.nan),
         sigma=sigma,
         repeat=np.tile(np.arange(repeats) + 1, len(position)),
-        order=np.arange(n) + 1.0,
+        order=np.arange(1, n + 1, dtype=float),
     )

@@ -6,7 +6,9 @@ import numpy as np
 
 from stiffmap.description.strain import rests_at_command
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
+from stiffmap.status import Status
 
 
 def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> tuple[Floats, int]:
@@ -15,12 +17,18 @@ def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> t
     Deflection: the loaded minus the unloaded equilibrium of the same commanded pose.
     """
     if not plan.wrench.any() and not _moves_unloaded(machine, plan):
-        return np.zeros((len(plan.position), 6)), 0
+        return _at_command(machine, plan), 0
     motion, count = _unique(machine, plan, plan.wrench, threads)
     if plan.quantity == "deflection" and _moves_unloaded(machine, plan):
         rest, more = _unique(machine, plan, np.zeros_like(plan.wrench), threads)
         return motion - rest, count + more
     return motion, count
+
+
+def _at_command(machine: Machine, plan: Experiment) -> Floats:
+    """(n, 6) zero where the pose can be reached, else NaN."""
+    status = inverse_kinematics(machine, plan.position, plan.rotation).status
+    return np.where((status == Status.CONVERGED)[:, None], np.zeros((len(plan), 6)), np.nan)
 
 
 def _moves_unloaded(machine: Machine, plan: Experiment) -> bool:

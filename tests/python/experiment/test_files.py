@@ -1,0 +1,73 @@
+"""Experiments as files: what is read, and one clear error for each thing that is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.experiment import random_plan, save_experiment, simulate
+
+HEAD = (
+    "machine: orthoglide-revised\nquantity: deflection\nunits: {length: mm, force: N}\nnoise: {dx: 0.003}\n"
+)
+ROWS = "id,x,y,z,fx,fy,fz,dx\n1,0,0,0,100,0,0,0.05\n2,0,0,0,-100,0,0,-0.05\n3,10,0,0,100,0,0,\n"
+
+
+def write(folder: Path, head: str = HEAD, rows: str = ROWS) -> Path:
+    (folder / "experiment.yaml").write_text(head)
+    (folder / "data.csv").write_text(rows)
+    return folder
+
+
+def test_values_become_si(tmp_path: Path) -> None:
+    e = sm.load_experiment(write(tmp_path))
+    assert e.quantity == "deflection" and e.ids == ("1", "2", "3") and e.axes == ("dx",)
+    assert e.reading[0, 0] == pytest.approx(5e-5, rel=1e-12)
+    assert e.position[2, 0] == pytest.approx(0.01, rel=1e-12)
+    assert e.wrench[1].tolist() == [-100, 0, 0, 0, 0, 0]
+    assert np.isnan(e.reading[2]).all()
+    assert e.groups[0] == e.groups[1] != e.groups[2]
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "words"),
+    [
+        (HEAD, ROWS.replace("id,x,", "id,u,"), ["data.csv", "'u'"]),
+        (HEAD, "id,y,z,fx,dx\n1,0,0,100,0.05\n", ["data.csv", "missing column 'x'"]),
+        (HEAD.replace(", force: N", ""), ROWS, ["'force' is not declared"]),
+        (HEAD.replace("units: {length: mm, force: N}\n", ""), ROWS, ["units"]),
+        (HEAD, ROWS.replace("2,0,0", "1,0,0"), ["data.csv, line 3", "'id'", "twice"]),
+        (HEAD, ROWS.replace("-0.05", "oops"), ["data.csv, line 3", "'dx'", "oops"]),
+        (HEAD, ROWS.replace("-100,0,0", "nan,0,0"), ["data.csv, line 3", "'fx'", "finite"]),
+        (HEAD, ROWS.replace(",dx\n", ",rx\n"), ["'angle' is not declared"]),
+        (HEAD, ROWS.replace("3,10,0,0,100,0,0,\n", "3,10,0\n"), ["line 4", "expected 8 cells"]),
+        (HEAD.replace("deflection", "distance"), ROWS, ["quantity"]),
+        (HEAD, "id,x,y,z,dx\n1,0,0,0,0.1\n", ["needs a load"]),
+        (HEAD + "colour: red\n", ROWS, ["unknown key 'colour'"]),
+    ],
+)
+def test_bad_input_is_one_clear_error(tmp_path: Path, head: str, rows: str, words: list[str]) -> None:
+    with pytest.raises(sm.StiffmapError) as caught:
+        sm.load_experiment(write(tmp_path, head, rows))
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_no_folder(tmp_path: Path) -> None:
+    with pytest.raises(sm.StiffmapError, match="no such experiment"):
+        sm.load_experiment(tmp_path / "nowhere")
+
+
+def test_a_virtual_experiment_survives_its_file(tmp_path: Path) -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    twin = simulate(machine, random_plan(machine, "deflection", poses=3, loads=2), seed=3)
+    save_experiment(twin, tmp_path)
+    back = sm.load_experiment(tmp_path)
+    assert back.ids == twin.ids and back.quantity == twin.quantity
+    np.testing.assert_allclose(back.position, twin.position, atol=1e-12)
+    np.testing.assert_allclose(back.wrench, twin.wrench, atol=1e-12)
+    np.testing.assert_allclose(back.reading, twin.reading, rtol=1e-8)
+    np.testing.assert_allclose(back.sigma, twin.sigma, rtol=1e-5)

@@ -1,0 +1,105 @@
+"""Prediction of readings, noise, outliers and model-free checks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.description import AppliedEffect
+from stiffmap.experiment import Predictor, predict, random_plan, simulate
+from stiffmap.experiment.checks import checks
+from stiffmap.experiment.measurement import readings, true_wrench
+from stiffmap.experiment.noise import noise_of
+from stiffmap.experiment.outliers import outliers, suspects
+
+
+@pytest.fixture(scope="module")
+def machine() -> sm.Machine:
+    return sm.load_machine("orthoglide-revised")
+
+
+@pytest.fixture(scope="module")
+def plan(machine: sm.Machine) -> sm.Experiment:
+    return random_plan(machine, "deflection", poses=8, loads=6, seed=2)
+
+
+def test_prediction_is_the_machine_row_by_row(machine: sm.Machine, plan: sm.Experiment) -> None:
+    got = predict(machine, plan)
+    for i in (0, 17, 60):
+        alone = machine.solve(plan.position[i], plan.wrench[i]).displacement
+        np.testing.assert_allclose(got[i], alone, atol=1e-12)
+
+
+def test_repeats_are_solved_once(machine: sm.Machine, plan: sm.Experiment) -> None:
+    predictor = Predictor(machine, plan)
+    predictor()
+    assert predictor.solved == len(np.unique(plan.conditions)) == len(plan) // 2
+
+
+def test_deflection_subtracts_the_unloaded_state(machine: sm.Machine, plan: sm.Experiment) -> None:
+    term = AppliedEffect("length", "bar", ("x",), (("error", 1e-4),))
+    moved = predict(machine, plan, (term,)) - predict(machine, plan)
+    assert np.abs(moved[:, :3]).max() < 1e-6  # the length itself cancels, only its geometry is left
+    still = replace(plan, quantity="position", wrench=np.zeros_like(plan.wrench))
+    assert np.abs(predict(machine, still, (term,))[:, 0]).min() > 5e-5
+
+
+def test_measurement_effects_act_on_loads_and_readings(plan: sm.Experiment) -> None:
+    gain = AppliedEffect("load_gain", "load", (), (("gain", 1.1),))
+    np.testing.assert_allclose(true_wrench(plan, [gain]), 1.1 * plan.wrench)
+    turn = AppliedEffect("load_direction", "load", (), (("angle_z", np.pi / 2),))
+    np.testing.assert_allclose(true_wrench(plan, [turn])[:, 1], plan.wrench[:, 0], atol=1e-12)
+    motion = np.full((len(plan), 6), 1e-5)
+    sensor = AppliedEffect("sensor_gain", "sensor", (), (("gain_x", 1.2),))
+    np.testing.assert_allclose(readings(plan, motion, [sensor])[:, 0], 1.2e-5)
+    drift = AppliedEffect("drift", "sensor", (), (("x", 1e-8),))
+    assert readings(plan, motion, [drift])[-1, 0] == pytest.approx(1e-5 + 1e-8 * (len(plan) - 1))
+
+
+def test_noise_floor_is_the_larger_and_contradictions_are_told(
+    machine: sm.Machine, plan: sm.Experiment
+) -> None:
+    twin = simulate(machine, plan, seed=1)
+    honest = noise_of(twin)
+    assert not honest.contradictions()
+    assert honest.floor[0] == pytest.approx(3e-6, rel=0.25)
+    assert (honest.floor[:3] >= honest.declared[:3]).all()
+    bold = noise_of(replace(twin, sigma=twin.sigma / 10))
+    assert len(bold.contradictions()) == 3
+    np.testing.assert_allclose(bold.floor[:3], honest.repeats[:3])
+
+
+def test_unknown_noise_is_an_error(machine: sm.Machine, plan: sm.Experiment) -> None:
+    twin = simulate(machine, plan, seed=1)
+    single = replace(twin, sigma=np.zeros_like(twin.sigma)).rows(np.arange(0, len(twin), 2))
+    with pytest.raises(sm.StiffmapError, match="noise of dx, dy, dz is zero or unknown"):
+        noise_of(single)
+
+
+def test_outliers_are_found_and_never_a_whole_pose(machine: sm.Machine, plan: sm.Experiment) -> None:
+    twin = simulate(machine, plan, seed=4)
+    reading = twin.reading.copy()
+    reading[[5, 40]] += 4e-5
+    reading[twin.groups == twin.groups[70]] += 4e-5
+    residual = reading - predict(machine, plan)
+    found = outliers(twin, residual, twin.sigma)
+    assert np.flatnonzero(found).tolist() == [5, 40]
+    assert set(np.flatnonzero(suspects(twin.with_readings(reading), residual, twin.sigma))) >= {5, 40}
+
+
+def test_model_free_checks_see_what_they_should(machine: sm.Machine, plan: sm.Experiment) -> None:
+    keep = np.ones(len(plan), bool)
+
+    def chances(*terms: AppliedEffect) -> dict[str, float]:
+        twin = simulate(machine, plan, terms, seed=5)
+        return {c.name: c.p for c in checks(twin, twin.reading, twin.sigma, keep) if c.contrasts}
+
+    clean = chances()
+    assert min(clean.values()) > 1e-3
+    slack = chances(AppliedEffect("dead_zone", "actuator", ("y",), (("half_width", 1.2e-5),)))
+    assert slack["linearity"] < 1e-6 and slack["sign reversal"] > 1e-3
+    turned = chances(AppliedEffect("load_direction", "load", (), (("angle_z", 0.1),)))
+    assert turned["reciprocity"] < 1e-6 and turned["linearity"] > 1e-3
