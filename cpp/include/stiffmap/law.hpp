@@ -30,7 +30,7 @@ class Law {
   bool has_knots() const { return !knots_.empty(); }
   double stiffness() const { return stiffness_; }
   double cubic() const { return cubic_; }
-  /// Constant force against the deflection that the load would give without it, theory (L3).
+  /// Constant force against the deflection that the load would give without it: docs/effects.md.
   double friction() const { return friction_; }
   const std::vector<std::pair<double, double>>& knots() const { return knots_; }
 

@@ -86,6 +86,15 @@ def names(elements: Elements, sites: Sites) -> list[str]:
     return list(dict.fromkeys(name for seq in sequences(elements) for name in sites(seq)))
 
 
+def found(
+    description: MachineDescription, legs: tuple[str, ...], element: str, sites: Sites
+) -> list[Element]:
+    """The elements that a name stands for in these legs; without legs in base and platform."""
+    trunk = (*description.base, *description.platform)
+    chains = [leg.elements for leg in description.legs if leg.name in legs] if legs else [trunk]
+    return [seq[i] for c in chains for seq in sequences(c) for i in sites(seq).get(element, ())]
+
+
 def places(description: MachineDescription, sites: Sites) -> list[Place]:
     """Each name in each leg alone, then in all legs that have it; then those of base and platform."""
     having: dict[str, list[str]] = {}

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import stiffmap as sm
 from stiffmap.description import Joint, Law, Leg, MachineDescription, Offset, Pose, Spring
+from stiffmap.effects import get
 
 C = 2e-8  # m/N, drive
 LINK = 5e-8  # m/N, link along the guide
@@ -222,3 +225,32 @@ def test_clearance_of_pins_is_play_of_the_tool(orthoglide):
     wrench = [300.0, 0, 0, 0, 0, 0]
     gain = machine.solve([0, 0, 0], wrench).displacement - orthoglide.solve([0, 0, 0], wrench).displacement
     assert gain[0] == pytest.approx(2e-5, rel=1e-3)
+
+
+def test_elements_of_base_and_platform_have_no_leg(orthoglide):
+    """A spring in the base, and one entry of it."""
+    d = orthoglide.description
+    compliance = tuple(tuple(1e-8 if i == j else 0.0 for j in range(6)) for i in range(6))
+    machine = sm.Machine(replace(d, base=(Spring("floor", compliance=compliance), *d.base)))
+    wrench = [100.0, 0, 0, 0, 0, 0]
+    plain = machine.solve([0, 0, 0], wrench).displacement[0]
+    for element in ("floor", "floor.k11"):
+        changed = machine.with_effect("compliance", element=element, scale=3.0)
+        assert changed.description.effects[0].legs == ()
+        gain = changed.solve([0, 0, 0], wrench).displacement[0] - plain
+        assert gain == pytest.approx(2 * 1e-8 * 100.0, rel=1e-6)
+
+
+def test_angles_on_a_drive_that_turns():
+    """A robot arm of one joint: its numbers are in rad and rad/(N·m)."""
+    joint = Joint("hip", "revolute", ((0.0, 0.0, 1.0),), actuated=True, law=Law(1e5))
+    arm = (joint, Offset("arm", Pose.of([0.5, 0.0, 0.0])))
+    task = {"task": ("y",)} if "task" in MachineDescription.__dataclass_fields__ else {}
+    machine = sm.Machine(MachineDescription("arm", (Leg("a", arm),), home=Pose.of([0.5, 0, 0]), **task))
+    units = {p.name: p.unit for p in get("dead_zone").parameters_at(machine.description, "hip", ("a",))}
+    assert units == {"half_width": "rad"}
+    wrench = [0, 100.0, 0, 0, 0, 0]
+    plain = machine.solve([0.5, 0, 0], wrench).displacement[5]
+    changed = machine.with_effect("compliance", element="hip", value=3e-5)
+    assert plain == pytest.approx(1e-5 * 50.0, rel=1e-3)
+    assert changed.solve([0.5, 0, 0], wrench).displacement[5] == pytest.approx(3e-5 * 50.0, rel=1e-3)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from stiffmap.description import Element, Joint, Law, MachineDescription, Spring
-from stiffmap.effects.edit import Elements, change_sites, sequences
-from stiffmap.effects.sites import at_sites, joints, springs
+from stiffmap.effects.edit import Elements, change_sites
+from stiffmap.effects.sites import at_sites, found, joints, springs
 from stiffmap.effects.types import EffectType, Parameter, Placed
 from stiffmap.errors import StiffmapError
 
@@ -107,21 +107,15 @@ def lowest_scale(e: Spring, i: int) -> float:
 
 def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
     """rad/(N·m) for a revolute joint; the bound of a single entry; no value for a 6x6 spring."""
-    found = [
-        (seq[i])
-        for leg in description.legs
-        if leg.name in legs or not legs
-        for seq in sequences(leg.elements)
-        for i in sites(seq).get(element, ())
-    ]
+    there = found(description, legs, element, sites)
     entry = element.partition(".")[2]
-    first = found[0] if found else None
+    first = there[0] if there else None
     if isinstance(first, Joint):
         return (SCALE, VALUE if first.kind == "prismatic" else replace(VALUE, unit=VALUE.angular))
     if not entry:
         return (SCALE, VALUE)
     # a hair above the limit, where the matrix would have a rigid direction
-    lowest = max(lowest_scale(e, int(entry[1]) - 1) for e in found if isinstance(e, Spring)) + 1e-3
+    lowest = max(lowest_scale(e, int(entry[1]) - 1) for e in there if isinstance(e, Spring)) + 1e-3
     return (replace(SCALE, lower=max(SCALE.lower, lowest)), VALUE)
 
 
@@ -129,12 +123,9 @@ def derived(description: MachineDescription, placed: Placed) -> dict[str, float]
     """The new total of a drive, m/N or rad/(N·m)."""
     if "value" in placed.values:
         return {}
-    for leg in description.legs:
-        for seq in sequences(leg.elements) if leg.name in placed.legs else ():
-            for i in sites(seq).get(placed.element, ()):
-                if (law := _law(seq[i])) is not None:
-                    return {"value": placed.values["scale"] / law.stiffness}
-    return {}
+    elements = found(description, placed.legs, placed.element, sites)
+    laws = [law for e in elements if (law := _law(e)) is not None]
+    return {"value": placed.values["scale"] / laws[0].stiffness} if laws else {}
 
 
 EFFECT = EffectType(

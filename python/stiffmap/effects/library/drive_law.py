@@ -33,14 +33,9 @@ def linear(law: Law) -> Law:
 
 def is_revolute(description: MachineDescription, element: str) -> bool:
     """Whether the joint of that name turns."""
-    found = [
-        e
-        for leg in description.legs
-        for seq in sequences(leg.elements)
-        for e in seq
-        if isinstance(e, Joint) and e.name == element
-    ]
-    return bool(found) and found[0].kind != "prismatic"
+    chains = [description.base, description.platform, *(leg.elements for leg in description.legs)]
+    named = [e for c in chains for seq in sequences(c) for e in seq if e.name == element]
+    return any(isinstance(e, Joint) and e.kind != "prismatic" for e in named)
 
 
 def in_unit_of_joint(*parameters: Parameter) -> ParametersAt:
