@@ -12,9 +12,11 @@ from stiffmap.effects import get, kinds
 
 NEW = ("hexapod", "linear-delta", "rotary-delta", "hybrid", "ur10", "five-bar", "swing-table")
 
+ASKS = ("bilinear", "periodic_error", "external_spring")  # for a number that only the caller knows
+
 
 def small(kind: str) -> dict[str, float]:
-    """A small value of each parameter that a caller has to give; one of them where they exclude each other."""
+    """A small value of each parameter that a caller has to give; one of those that exclude each other."""
     effect = get(kind)
     names = [p for p in effect.parameters if p.fitted and p.null is not None]
     if effect.one_of:
@@ -37,11 +39,11 @@ def test_effects(name: str, tmp_path: Path) -> None:
         if not places or effect.needs:
             continue
         element, legs = places[0]
-        try:
-            other = machine.with_effect(kind, element=element, legs=list(legs), **small(kind))
-        except sm.StiffmapError as refused:
-            assert "is missing" in str(refused), f"{kind}: {refused}"  # a number that only the caller knows
+        if kind in ASKS:
+            with pytest.raises(sm.StiffmapError, match="is missing"):
+                machine.with_effect(kind, element=element, legs=list(legs), **small(kind))
             continue
+        other = machine.with_effect(kind, element=element, legs=list(legs), **small(kind))
         s = other.solve(p, wrench, gravity=[0, 0, -9.81])
         assert s.ok, f"{kind} of {element}: {sm.Status(int(s.status)).name}"
         if np.abs(s.displacement - before).max() > 1e-12:

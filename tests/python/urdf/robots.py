@@ -45,7 +45,8 @@ def link(name: str) -> str:
 def pin(name: str, parent: str, child: str, xyz: str) -> str:
     return (
         f'<joint name="{name}" type="revolute"><origin xyz="{xyz}"/><axis xyz="0 0 1"/>'
-        f'<parent link="{parent}"/><child link="{child}"/><limit lower="-3" upper="3" effort="50" velocity="3"/></joint>'
+        f'<parent link="{parent}"/><child link="{child}"/>'
+        '<limit lower="-3" upper="3" effort="50" velocity="3"/></joint>'
     )
 
 

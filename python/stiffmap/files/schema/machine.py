@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from stiffmap.description import TASK
 from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Vector3
 from stiffmap.files.schema.elements import ElementModel
 from stiffmap.files.schema.geometry import Box, Frame
 from stiffmap.files.schema.springs import Material
+
+Component = Literal["x", "y", "z", "rx", "ry", "rz"]
 
 
 class UnitsModel(FileModel):
@@ -77,13 +78,13 @@ class MachineFile(FileModel):
     gravity: Annotated[Vector3, Field(description="m/s², base axes; left out: none.")] | None = None
     home: Annotated[Frame, Field(description="TCP pose of the home configuration.")] | None = None
     task: Annotated[
-        list[Literal["x", "y", "z", "rx", "ry", "rz"]],
+        list[Component],
         Field(
             min_length=1,
             description="Pose components that are commanded; left out: all. Translations along base axes, "
             "rotations about the axes of the commanded TCP frame.",
         ),
-    ] = Field(default_factory=lambda: list(TASK))
+    ] = Field(default_factory=lambda: list(get_args(Component)))
     workspace: Box | None = None
     materials: dict[Name, Material] = Field(default_factory=dict)
     templates: dict[Name, list[ElementModel]] = Field(default_factory=dict)
