@@ -211,8 +211,12 @@ struct Elimination {
       }
   }
   static void add_outer(S3& S, const V3& a, const V3& b) {
-    S.xx += a.x * b.x; S.yy += a.y * b.y; S.zz += a.z * b.z;
-    S.xy += a.x * b.y; S.xz += a.x * b.z; S.yz += a.y * b.z;
+    S.xx += a.x * b.x;
+    S.yy += a.y * b.y;
+    S.zz += a.z * b.z;
+    S.xy += a.x * b.y;
+    S.xz += a.x * b.z;
+    S.yz += a.y * b.z;
   }
 
   /// Relative tangent of a block: sum over its branches, closed to its first one (F8).
@@ -257,9 +261,19 @@ struct Elimination {
     ldlt(k.L, k.inverse, lowest, scale);
     // X = V^T = K + [0, S(f); 0, S(m)/2], then X := L^-1 X.
     unpack(t.K, k.X);
-    k.X[0][4] -= f.z; k.X[0][5] += f.y; k.X[1][3] += f.z; k.X[1][5] -= f.x; k.X[2][3] -= f.y; k.X[2][4] += f.x;
+    k.X[0][4] -= f.z;
+    k.X[0][5] += f.y;
+    k.X[1][3] += f.z;
+    k.X[1][5] -= f.x;
+    k.X[2][3] -= f.y;
+    k.X[2][4] += f.x;
     const V3 h = splat(0.5) * m;
-    k.X[3][4] -= h.z; k.X[3][5] += h.y; k.X[4][3] += h.z; k.X[4][5] -= h.x; k.X[5][3] -= h.y; k.X[5][4] += h.x;
+    k.X[3][4] -= h.z;
+    k.X[3][5] += h.y;
+    k.X[4][3] += h.z;
+    k.X[4][5] -= h.x;
+    k.X[5][3] -= h.y;
+    k.X[5][4] += h.x;
     put(t.c - ce, k.y);
     for (int i = 1; i < 6; ++i)
       for (int q = 0; q < i; ++q) {
@@ -275,15 +289,23 @@ struct Elimination {
       for (int i = 1; i < 6; ++i) sum += row[i][a] * k.X[i][b];
       return sum;
     };
-    t.K.A.xx -= product(0, 0); t.K.A.yy -= product(1, 1); t.K.A.zz -= product(2, 2);
-    t.K.A.xy -= product(0, 1); t.K.A.xz -= product(0, 2); t.K.A.yz -= product(1, 2);
+    t.K.A.xx -= product(0, 0);
+    t.K.A.yy -= product(1, 1);
+    t.K.A.zz -= product(2, 2);
+    t.K.A.xy -= product(0, 1);
+    t.K.A.xz -= product(0, 2);
+    t.K.A.yz -= product(1, 2);
     for (int q = 0; q < 3; ++q) {
       t.K.B.c[q].x -= product(0, 3 + q);
       t.K.B.c[q].y -= product(1, 3 + q);
       t.K.B.c[q].z -= product(2, 3 + q);
     }
-    t.K.E.xx -= product(3, 3); t.K.E.yy -= product(4, 4); t.K.E.zz -= product(5, 5);
-    t.K.E.xy -= product(3, 4); t.K.E.xz -= product(3, 5); t.K.E.yz -= product(4, 5);
+    t.K.E.xx -= product(3, 3);
+    t.K.E.yy -= product(4, 4);
+    t.K.E.zz -= product(5, 5);
+    t.K.E.xy -= product(3, 4);
+    t.K.E.xz -= product(3, 5);
+    t.K.E.yz -= product(4, 5);
     for (int col = 0; col < 6; ++col) {
       full[col] = row[0][col] * k.y[0];
       for (int i = 1; i < 6; ++i) full[col] += row[i][col] * k.y[i];
@@ -419,14 +441,20 @@ struct Elimination {
     if (op.kind == OpKind::spring) {
       V* dz = s.dz + op.coordinate;
       const V3 t = k.start.R % zeta.a, r = k.Z % zeta.b;
-      dz[0] = t.x; dz[1] = t.y; dz[2] = t.z; dz[3] = r.x; dz[4] = r.y; dz[5] = r.z;
+      dz[0] = t.x;
+      dz[1] = t.y;
+      dz[2] = t.z;
+      dz[3] = r.x;
+      dz[4] = r.y;
+      dz[5] = r.z;
       return;
     }
     for (int b = 0; b < op.count; ++b) {
       BranchSlot& branch = s.branches[op.first + b];
       const V6 own = zeta + branch.error;
       if (b > 0) {
-        const V6 step = dead(branch.K, branch.F.b, own) + branch.c + V6{cross(turn, branch.F.a), cross(turn, branch.F.b)};
+        const V6 step =
+            dead(branch.K, branch.F.b, own) + branch.c + V6{cross(turn, branch.F.a), cross(turn, branch.F.b)};
         branch.F = {select(active, branch.F.a + step.a, branch.F.a), select(active, branch.F.b + step.b, branch.F.b)};
       }
       back(P.chains[op.first + b], own, branch.end.p, turn, active);

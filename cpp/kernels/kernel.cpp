@@ -29,7 +29,8 @@ Scratch lay_out(const Program& P, void* memory, std::int64_t* bytes) {
   s.stiff = take<StiffSlot>(at, P.stiff_slots);
   s.branches = take<BranchSlot>(at, P.chain_count);
   const int n = P.coordinate_count;
-  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.rubs}) *v = take<V>(at, n);
+  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.rubs})
+    *v = take<V>(at, n);
   if (bytes) *bytes = at - begin + 64;
   return s;
 }
@@ -162,7 +163,8 @@ struct Block {
     set_start();
     for (int k = 0; k < P.chain_count; ++k) s.branches[k].F = V6{};
     const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
-    Elimination e{P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
+    Elimination e{
+        P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
     Newton newton{P, in, s, e, load, {}, {}, {}, {}};
     V iterations = splat(0);
     M done = newton.solve(usable, P.starts_linear, iterations);
@@ -207,7 +209,8 @@ struct Block {
     for (int d = 0; d < P.drive_count; ++d) {
       const DriveProgram& k = P.drives[d];
       const JointSlot& j = s.joints[k.slot];
-      const V effort = P.coordinates[k.coordinate].locked ? -dot(j.w, k.prismatic ? j.F.a : j.F.b) : -s.tau[k.coordinate];
+      const V effort =
+          P.coordinates[k.coordinate].locked ? -dot(j.w, k.prismatic ? j.F.a : j.F.b) : -s.tau[k.coordinate];
       high = select(absolute(effort) > k.force_limit, splat(1), high);
       if (out.effort)
         for (int i = 0; i < count; ++i)
@@ -250,5 +253,6 @@ void run(const Program* P, const KernelInput* in, const KernelOutput* out, std::
 }  // namespace stiffmap::kernel
 
 extern "C" __attribute__((visibility("default"))) void STIFFMAP_ENTRY(stiffmap::KernelTable* table) {
-  *table = {STIFFMAP_LEVEL, stiffmap::kernel::W, stiffmap::program_layout, &stiffmap::kernel::scratch_size, &stiffmap::kernel::run};
+  *table = {STIFFMAP_LEVEL, stiffmap::kernel::W, stiffmap::program_layout, &stiffmap::kernel::scratch_size,
+            &stiffmap::kernel::run};
 }

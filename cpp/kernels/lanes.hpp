@@ -45,8 +45,19 @@ inline void sincos(V x, V& s, V& c) {
   const V k = (x * two_over_pi + shift) - shift;
   const V r = ((x - k * a) - k * b) - k * d;
   const V z = r * r;
-  const V ps = r + r * z * (-1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 + z * (-1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
-  const V pc = 1.0 - 0.5 * z + z * z * (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * (2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 + z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
+  const V ps = r + r * z *
+                       (-1.66666666666666324348e-01 +
+                        z * (8.33333333332248946124e-03 +
+                             z * (-1.98412698298579493134e-04 +
+                                  z * (2.75573137070700676789e-06 +
+                                       z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
+  const V pc = 1.0 - 0.5 * z +
+               z * z *
+                   (4.16666666666666019037e-02 +
+                    z * (-1.38888888888741095749e-03 +
+                         z * (2.48015872894767294178e-05 +
+                              z * (-2.75573143513906633035e-07 +
+                                   z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
   const M q = __builtin_convertvector(k, M);
   const M swap = (q & 1) != 0, negs = (q & 2) != 0, negc = ((q + 1) & 2) != 0;
   const V s0 = swap ? pc : ps, c0 = swap ? ps : pc;
@@ -64,7 +75,9 @@ inline V dot(const V3& a, const V3& b) { return a.x * b.x + a.y * b.y + a.z * b.
 inline V3 cross(const V3& a, const V3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-inline V3 select(M m, const V3& a, const V3& b) { return {select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)}; }
+inline V3 select(M m, const V3& a, const V3& b) {
+  return {select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)};
+}
 
 /// Three columns.
 struct M3 {

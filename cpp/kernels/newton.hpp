@@ -11,10 +11,10 @@ struct Newton {
   const KernelInput& in;
   Scratch& s;
   Elimination& e;
-  V6 load;            ///< external wrench at the point, base axes
-  Frame tip;          ///< frame of the tip; the point is tip.p + tip.R point
+  V6 load;    ///< external wrench at the point, base axes
+  Frame tip;  ///< frame of the tip; the point is tip.p + tip.R point
   V3 point;
-  Sym6 K;             ///< symmetric tangent at the point
+  Sym6 K;  ///< symmetric tangent at the point
   V6 c;
 
   // ---- laws -----------------------------------------------------------------------------------
@@ -118,7 +118,8 @@ struct Newton {
 
   // ---- one linearisation ----------------------------------------------------------------------
   void frames_and_wrenches() {
-    tip = {{splat(0), splat(0), splat(0)}, {{{splat(1), splat(0), splat(0)}, {splat(0), splat(1), splat(0)}, {splat(0), splat(0), splat(1)}}}};
+    tip = {{splat(0), splat(0), splat(0)},
+           {{{splat(1), splat(0), splat(0)}, {splat(0), splat(1), splat(0)}, {splat(0), splat(0), splat(1)}}}};
     walk<Build::actual>(P, P.chains[P.root], s.x, tip, s);
     point = tip.p;
     if (in.point[0] != 0 || in.point[1] != 0 || in.point[2] != 0)
@@ -138,7 +139,12 @@ struct Newton {
   void dense(V (&m)[6][6]) const {
     unpack(K, m);
     const V3 h = splat(0.5) * load.b;
-    m[3][4] += h.z; m[3][5] -= h.y; m[4][3] -= h.z; m[4][5] += h.x; m[5][3] += h.y; m[5][4] -= h.x;
+    m[3][4] += h.z;
+    m[3][5] -= h.y;
+    m[4][3] -= h.z;
+    m[4][5] += h.x;
+    m[5][3] += h.y;
+    m[5][4] -= h.x;
   }
 
   /// Inverse without pivoting: the symmetric part is positive definite where it is used.

@@ -17,18 +17,18 @@ struct Constant {
 
 struct Op {
   OpKind kind;
-  std::int32_t coordinate;  ///< first coordinate of a joint or spring; -1 otherwise
-  std::int32_t eliminated;  ///< 0: the coordinate is held (rigid drive, locked spin)
-  std::int32_t axis;        ///< 0, 1, 2: unit axis; 3: `direction`
-  std::int32_t law;         ///< index into laws, -1: none
+  std::int32_t coordinate;    ///< first coordinate of a joint or spring; -1 otherwise
+  std::int32_t eliminated;    ///< 0: the coordinate is held (rigid drive, locked spin)
+  std::int32_t axis;          ///< 0, 1, 2: unit axis; 3: `direction`
+  std::int32_t law;           ///< index into laws, -1: none
   std::int32_t first, count;  ///< block: its chains are first .. first+count-1
-  std::int32_t wrench;      ///< block: index of the wrench of its second branch
-  std::int32_t start_moves; ///< block: its start frame is not fixed to the base
-  std::int32_t slot;        ///< place of its intermediate results
+  std::int32_t wrench;        ///< block: index of the wrench of its second branch
+  std::int32_t start_moves;   ///< block: its start frame is not fixed to the base
+  std::int32_t slot;          ///< place of its intermediate results
   double direction[3];
-  double K[36], rest[6];    ///< spring
-  double mass, com[3];      ///< load: a body's weight
-  Constant nominal, actual; ///< before the operation
+  double K[36], rest[6];     ///< spring
+  double mass, com[3];       ///< load: a body's weight
+  Constant nominal, actual;  ///< before the operation
 };
 
 struct ChainProgram {
@@ -64,7 +64,7 @@ struct ClosureTerm {
   std::int32_t unknown;  ///< local to the leg
   std::int32_t slot;     ///< of the joint's operation
   std::int32_t prismatic;
-  double sign;           ///< +1 moves the end, -1 the loop's primary
+  double sign;  ///< +1 moves the end, -1 the loop's primary
 };
 struct ClosureEquation {
   std::int32_t chain, primary;  ///< chains whose ends meet; primary < 0: the commanded frame
@@ -87,7 +87,7 @@ struct Program {
   const ClosureEquation* equations;
   const ClosureTerm* terms;
   const std::int32_t* unknowns;
-  const double* grid;      ///< closure starts: nodes x unknowns of all legs, NaN where unreachable
+  const double* grid;  ///< closure starts: nodes x unknowns of all legs, NaN where unreachable
   std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count;
   std::int32_t root, legs_op;  ///< root chain; the legs' block operation
   std::int32_t joint_slots, stiff_slots;
@@ -104,12 +104,12 @@ struct Program {
 /// What each pose asks, row-major.
 struct KernelInput {
   std::int64_t count;
-  const double* position;   ///< count x 3
-  const double* rotation;   ///< count x 9
-  const double* wrench;     ///< count x 6 at the point
-  const double* start;      ///< count x coordinates: closed configurations; null: interpolate the grid
+  const double* position;  ///< count x 3
+  const double* rotation;  ///< count x 9
+  const double* wrench;    ///< count x 6 at the point
+  const double* start;     ///< count x coordinates: closed configurations; null: interpolate the grid
   double gravity[3];
-  double point[3];          ///< reference point in the tip frame
+  double point[3];  ///< reference point in the tip frame
   std::int32_t want_stiffness, max_iterations;
   double tolerance;
   const Program* const* perturbed;  ///< variants of the program with the same operations
@@ -126,9 +126,9 @@ struct KernelOutput {
 };
 
 /// Layout that both sides of the border were compiled with: a stale kernel library is refused.
-inline constexpr std::int64_t program_layout = sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) +
-                                               41 * sizeof(Op) + 43 * sizeof(CoordinateProgram) + 47 * sizeof(DriveProgram) +
-                                               53 * sizeof(LawProgram) + 59 * sizeof(ClosureTerm);
+inline constexpr std::int64_t program_layout =
+    sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) + 41 * sizeof(Op) +
+    43 * sizeof(CoordinateProgram) + 47 * sizeof(DriveProgram) + 53 * sizeof(LawProgram) + 59 * sizeof(ClosureTerm);
 
 /// The one symbol that each level exports. Poses begin .. end-1; `scratch` of scratch_size() bytes.
 struct KernelTable {
@@ -136,7 +136,8 @@ struct KernelTable {
   std::int32_t lanes;
   std::int64_t layout;
   std::int64_t (*scratch_size)(const Program*);
-  void (*run)(const Program*, const KernelInput*, const KernelOutput*, std::int64_t begin, std::int64_t end, void* scratch);
+  void (*run)(const Program*, const KernelInput*, const KernelOutput*, std::int64_t begin, std::int64_t end,
+              void* scratch);
 };
 
 }  // namespace stiffmap

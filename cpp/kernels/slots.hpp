@@ -8,17 +8,17 @@
 namespace stiffmap::kernel {
 
 struct JointSlot {
-  V3 w, o;   ///< axis and origin, base axes
-  V6 F;      ///< transmitted wrench at o
-  V6 J, u;   ///< column and row of the rank-one step at its node
+  V3 w, o;  ///< axis and origin, base axes
+  V6 F;     ///< transmitted wrench at o
+  V6 J, u;  ///< column and row of the rank-one step at its node
   V inverse, y;
 };
 
-struct StiffSlot {  // a spring or a block: six relative coordinates between two frames
-  Frame start;      ///< frame before it
-  M3 Z;             ///< spring: moments by its own coordinates
-  V3 p;             ///< point behind it
-  V6 F;             ///< transmitted wrench at p
+struct StiffSlot {                       // a spring or a block: six relative coordinates between two frames
+  Frame start;                           ///< frame before it
+  M3 Z;                                  ///< spring: moments by its own coordinates
+  V3 p;                                  ///< point behind it
+  V6 F;                                  ///< transmitted wrench at p
   V L[6][6], inverse[6], X[6][6], y[6];  ///< elimination of its relative twist
 };
 
@@ -34,7 +34,7 @@ struct BranchSlot {
 struct Scratch {
   JointSlot* joints;
   StiffSlot* stiff;
-  BranchSlot* branches;  ///< per chain
+  BranchSlot* branches;                                              ///< per chain
   V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *rubs;  ///< rubs: sign of dry friction
 };
 

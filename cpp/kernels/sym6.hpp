@@ -15,7 +15,8 @@ inline S3 operator+(const S3& a, const S3& b) {
   return {a.xx + b.xx, a.yy + b.yy, a.zz + b.zz, a.xy + b.xy, a.xz + b.xz, a.yz + b.yz};
 }
 inline V3 operator*(const S3& A, const V3& v) {
-  return {A.xx * v.x + A.xy * v.y + A.xz * v.z, A.xy * v.x + A.yy * v.y + A.yz * v.z, A.xz * v.x + A.yz * v.y + A.zz * v.z};
+  return {A.xx * v.x + A.xy * v.y + A.xz * v.z, A.xy * v.x + A.yy * v.y + A.yz * v.z,
+          A.xz * v.x + A.yz * v.y + A.zz * v.z};
 }
 
 struct Sym6 {
@@ -39,18 +40,32 @@ inline V6 dead(const Sym6& K, const V3& m, const V6& t) {
 /// K -= u u^T s.
 inline void downdate(Sym6& K, const V6& u, V s) {
   const V3 a = s * u.a, b = s * u.b;
-  K.A.xx -= a.x * u.a.x; K.A.yy -= a.y * u.a.y; K.A.zz -= a.z * u.a.z;
-  K.A.xy -= a.x * u.a.y; K.A.xz -= a.x * u.a.z; K.A.yz -= a.y * u.a.z;
-  K.B.c[0] = K.B.c[0] - b.x * u.a; K.B.c[1] = K.B.c[1] - b.y * u.a; K.B.c[2] = K.B.c[2] - b.z * u.a;
-  K.E.xx -= b.x * u.b.x; K.E.yy -= b.y * u.b.y; K.E.zz -= b.z * u.b.z;
-  K.E.xy -= b.x * u.b.y; K.E.xz -= b.x * u.b.z; K.E.yz -= b.y * u.b.z;
+  K.A.xx -= a.x * u.a.x;
+  K.A.yy -= a.y * u.a.y;
+  K.A.zz -= a.z * u.a.z;
+  K.A.xy -= a.x * u.a.y;
+  K.A.xz -= a.x * u.a.z;
+  K.A.yz -= a.y * u.a.z;
+  K.B.c[0] = K.B.c[0] - b.x * u.a;
+  K.B.c[1] = K.B.c[1] - b.y * u.a;
+  K.B.c[2] = K.B.c[2] - b.z * u.a;
+  K.E.xx -= b.x * u.b.x;
+  K.E.yy -= b.y * u.b.y;
+  K.E.zz -= b.z * u.b.z;
+  K.E.xy -= b.x * u.b.y;
+  K.E.xz -= b.x * u.b.z;
+  K.E.yz -= b.y * u.b.z;
 }
 
 /// E += s (sym(r f^T) - (f·r) I): the lever arm of a dead force (F3).
 inline void add_lever(S3& E, V s, const V3& f, const V3& r) {
   const V h = 0.5 * s, d = s * dot(f, r);
-  E.xx += s * r.x * f.x - d; E.yy += s * r.y * f.y - d; E.zz += s * r.z * f.z - d;
-  E.xy += h * (r.x * f.y + r.y * f.x); E.xz += h * (r.x * f.z + r.z * f.x); E.yz += h * (r.y * f.z + r.z * f.y);
+  E.xx += s * r.x * f.x - d;
+  E.yy += s * r.y * f.y - d;
+  E.zz += s * r.z * f.z - d;
+  E.xy += h * (r.x * f.y + r.y * f.x);
+  E.xz += h * (r.x * f.z + r.z * f.x);
+  E.yz += h * (r.y * f.z + r.z * f.y);
 }
 
 /// Moves the reference point by r, rigidly, under the transmitted force f (F2):
@@ -78,19 +93,32 @@ inline void transport(Sym6& K, V6& c, const V3& r, const V3& f) {
 
 /// Full matrix, row by row, for the dense steps.
 inline void unpack(const Sym6& K, V (&m)[6][6]) {
-  m[0][0] = K.A.xx; m[1][1] = K.A.yy; m[2][2] = K.A.zz;
-  m[0][1] = m[1][0] = K.A.xy; m[0][2] = m[2][0] = K.A.xz; m[1][2] = m[2][1] = K.A.yz;
+  m[0][0] = K.A.xx;
+  m[1][1] = K.A.yy;
+  m[2][2] = K.A.zz;
+  m[0][1] = m[1][0] = K.A.xy;
+  m[0][2] = m[2][0] = K.A.xz;
+  m[1][2] = m[2][1] = K.A.yz;
   for (int k = 0; k < 3; ++k) {
     m[0][3 + k] = m[3 + k][0] = K.B.c[k].x;
     m[1][3 + k] = m[3 + k][1] = K.B.c[k].y;
     m[2][3 + k] = m[3 + k][2] = K.B.c[k].z;
   }
-  m[3][3] = K.E.xx; m[4][4] = K.E.yy; m[5][5] = K.E.zz;
-  m[3][4] = m[4][3] = K.E.xy; m[3][5] = m[5][3] = K.E.xz; m[4][5] = m[5][4] = K.E.yz;
+  m[3][3] = K.E.xx;
+  m[4][4] = K.E.yy;
+  m[5][5] = K.E.zz;
+  m[3][4] = m[4][3] = K.E.xy;
+  m[3][5] = m[5][3] = K.E.xz;
+  m[4][5] = m[5][4] = K.E.yz;
 }
 
 inline void put(const V6& v, V (&out)[6]) {
-  out[0] = v.a.x; out[1] = v.a.y; out[2] = v.a.z; out[3] = v.b.x; out[4] = v.b.y; out[5] = v.b.z;
+  out[0] = v.a.x;
+  out[1] = v.a.y;
+  out[2] = v.a.z;
+  out[3] = v.b.x;
+  out[4] = v.b.y;
+  out[5] = v.b.z;
 }
 inline V6 get(const V (&v)[6]) { return {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}}; }
 

@@ -30,8 +30,7 @@ void read(const BatchInput& in, Index i, PoseInput& pose) {
 void write(const Mechanism& m, Index i, const PoseResult& r, const BatchOutput& out) {
   const Index reads = static_cast<Index>(r.displacement.size());
   if (out.displacement)
-    for (Index k = 0; k < reads; ++k)
-      Eigen::Map<Vec6>(out.displacement + 6 * (i * reads + k)) = r.displacement[at(k)];
+    for (Index k = 0; k < reads; ++k) Eigen::Map<Vec6>(out.displacement + 6 * (i * reads + k)) = r.displacement[at(k)];
   if (out.stiffness) Eigen::Map<RowMajor6>(out.stiffness + 36 * i) = r.point.stiffness;
   if (out.compliance) Eigen::Map<RowMajor6>(out.compliance + 36 * i) = r.point.compliance;
   if (out.free_twists) Eigen::Map<RowMajor6>(out.free_twists + 36 * i) = r.point.free_twists;
@@ -148,9 +147,16 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
   }
   std::vector<std::uint8_t> done(at(in.count), 0);
   std::vector<std::uint32_t> flags(at(in.count), 0);
-  const KernelOutput answer{out.displacement, options.stiffness ? out.stiffness : nullptr,
-                            options.stiffness ? out.compliance : nullptr, out.effort, out.leg_wrench, out.coordinates, out.variants,
-                            done.data(), flags.data(), out.iterations};
+  const KernelOutput answer{out.displacement,
+                            options.stiffness ? out.stiffness : nullptr,
+                            options.stiffness ? out.compliance : nullptr,
+                            out.effort,
+                            out.leg_wrench,
+                            out.coordinates,
+                            out.variants,
+                            done.data(),
+                            flags.data(),
+                            out.iterations};
   struct Scratch {
     std::vector<char> memory;
     std::vector<double> start;

@@ -122,7 +122,8 @@ class Compiler {
       if (j.axis[i] == 1) op.axis = i;
     }
     if (j.actuated) slots_.push_back({op.coordinate, op.slot, j.type == JointType::prismatic});
-    if (op.eliminated && way.rigid && ++way.prefix > most_prefix) missing_ = "more joints before the first link spring than are supported";
+    if (op.eliminated && way.rigid && ++way.prefix > most_prefix)
+      missing_ = "more joints before the first link spring than are supported";
     if (op.eliminated) {
       way.moves = true;
       way.turned = way.turned || j.type == JointType::revolute;
@@ -173,7 +174,8 @@ class Compiler {
       op.direction[i % 3] = 1;
       op.law = i32(law);
       elastic_.push_back({next_, K(i, i), s.rest[i]});
-      if (way.rigid && ++way.prefix > most_prefix) missing_ = "more joints before the first link spring than are supported";
+      if (way.rigid && ++way.prefix > most_prefix)
+        missing_ = "more joints before the first link spring than are supported";
       way.moves = true;
       way.turned = way.turned || i >= 3;
     }
@@ -247,7 +249,9 @@ class ClosureCompiler {
       add_equation(chain, -1, way);
       leg.equations = i32(out_.equations.size()) - leg.first_equation;
       leg.unknowns = i32(local_.size());
-      if (leg.unknowns > most_leg_unknowns || leg.equations > most_leg_unknowns || out_.unknowns.size() > 8 * most_leg_unknowns) return false;
+      if (leg.unknowns > most_leg_unknowns || leg.equations > most_leg_unknowns ||
+          out_.unknowns.size() > 8 * most_leg_unknowns)
+        return false;
       out_.legs.push_back(leg);
     }
     return true;
@@ -322,9 +326,7 @@ class GridKey {
     text.append(reinterpret_cast<const char*>(&value), sizeof value);
   }
 
-  static Pose pose(const Constant& c) {
-    return {Vec3(c.p[0], c.p[1], c.p[2]), Mat3(Eigen::Map<const Mat3>(c.R))};
-  }
+  static Pose pose(const Constant& c) { return {Vec3(c.p[0], c.p[1], c.p[2]), Mat3(Eigen::Map<const Mat3>(c.R))}; }
 
   void chain(std::int32_t index) {
     const ChainProgram& c = d_.chains[static_cast<std::size_t>(index)];
@@ -341,7 +343,8 @@ class GridKey {
         flush();
         add(op.count);
         for (int b = 0; b < op.count; ++b) chain(op.first + b);
-      } else if (op.kind <= OpKind::prismatic && m_.coordinates[static_cast<std::size_t>(op.coordinate)].role != Role::spring) {
+      } else if (op.kind <= OpKind::prismatic &&
+                 m_.coordinates[static_cast<std::size_t>(op.coordinate)].role != Role::spring) {
         flush();
         add(op.kind);
         add(op.direction);
@@ -366,7 +369,8 @@ bool nearly_singular(ClosureWorkspace& ws) {
 
 std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const FastPlanData& d) {
   const Program& p = d.program;
-  const auto nodes = static_cast<std::size_t>(p.grid_n[0]) * static_cast<std::size_t>(p.grid_n[1]) * static_cast<std::size_t>(p.grid_n[2]);
+  const auto nodes = static_cast<std::size_t>(p.grid_n[0]) * static_cast<std::size_t>(p.grid_n[1]) *
+                     static_cast<std::size_t>(p.grid_n[2]);
   auto grid = std::make_shared<std::vector<double>>(nodes * d.unknowns.size(), std::nan(""));
   std::vector<VecX> x(nodes);
   ClosureWorkspace ws(m);
@@ -389,12 +393,15 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
           start.p[c] -= p.grid_step[c];
         }
         VecX found = VecX::Zero(m.size());
-        ClosureResult r = from ? inverse_closure(m, pose, ws, found, *from, start) : inverse_closure(m, pose, ws, found);
-        if (from && (r.status != Status::converged || r.flags & flag::branch_unverified)) r = inverse_closure(m, pose, ws, found);
+        ClosureResult r =
+            from ? inverse_closure(m, pose, ws, found, *from, start) : inverse_closure(m, pose, ws, found);
+        if (from && (r.status != Status::converged || r.flags & flag::branch_unverified))
+          r = inverse_closure(m, pose, ws, found);
         if (r.status != Status::converged || r.flags & flag::branch_unverified) continue;
         x[node] = found;
         if (nearly_singular(ws)) continue;
-        for (std::size_t u = 0; u < d.unknowns.size(); ++u) (*grid)[node * d.unknowns.size() + u] = found[d.unknowns[u]];
+        for (std::size_t u = 0; u < d.unknowns.size(); ++u)
+          (*grid)[node * d.unknowns.size() + u] = found[d.unknowns[u]];
       }
   return grid;
 }
@@ -449,7 +456,8 @@ void fill_tables(const Mechanism& m, const std::vector<Compiler::DriveSlot>& slo
     const Drive& k = m.drives[i];
     for (const CommandError& e : k.errors)
       d.errors.push_back({i32(k.coordinate), e.offset, e.slope, e.amplitude, e.period, e.phase, e.reference});
-    d.drives.push_back({slots[i].coordinate, slots[i].slot, slots[i].prismatic, k.home, k.compliance_slope, k.force_limit});
+    d.drives.push_back(
+        {slots[i].coordinate, slots[i].slot, slots[i].prismatic, k.home, k.compliance_slope, k.force_limit});
   }
 }
 

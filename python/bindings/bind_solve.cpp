@@ -115,7 +115,8 @@ std::vector<std::string> names(const std::vector<T>& items, Get get) {
 }
 
 /// Coordinates and tip poses by closure: from poses, or from actuators.
-py::tuple closure(const Mechanism& m, const FastPlan* plan, const Array& given, const Array& rotation, bool inverse, int threads) {
+py::tuple closure(const Mechanism& m, const FastPlan* plan, const Array& given, const Array& rotation, bool inverse,
+                  int threads) {
   const py::ssize_t n = given.shape(0), drives = static_cast<py::ssize_t>(m.drives.size());
   const double* values = data(given, {n, inverse ? 3 : drives}, inverse ? "position" : "actuators");
   const double* R = inverse ? data(rotation, {n, 3, 3}, "rotation") : nullptr;
@@ -136,7 +137,8 @@ py::tuple closure(const Mechanism& m, const FastPlan* plan, const Array& given, 
         const Vec3 p = inverse ? Vec3(Eigen::Map<const Vec3>(values + 3 * i)) : Vec3::Zero();
         ClosureResult r;
         if (!inverse) r = forward_closure(m, Eigen::Map<const VecX>(values + drives * i, drives), ws, x);
-        else if (plan && plan->nearest_start(m, p, from, at)) r = inverse_closure(m, {p, Eigen::Map<const Row3>(R + 9 * i)}, ws, x, from, at);
+        else if (plan && plan->nearest_start(m, p, from, at))
+          r = inverse_closure(m, {p, Eigen::Map<const Row3>(R + 9 * i)}, ws, x, from, at);
         if (inverse && (r.status != Status::converged || r.flags & flag::branch_unverified))
           r = inverse_closure(m, {p, Eigen::Map<const Row3>(R + 9 * i)}, ws, x);
         const bool ok = r.status == Status::converged;
@@ -172,17 +174,18 @@ void bind_solve(py::module_& m) {
   using namespace py::literals;
   m.def("kernel_levels", &kernel_levels);
   m.def("kernel_level", [] { return std::string(kernel().level); });
+  py::class_<Mechanism> mechanism(m, "Mechanism");  // before the signatures that name it
   py::class_<FastPlan>(m, "FastPlan")
       .def(py::init([](const Mechanism& k, const Array& low, const Array& high) {
-             const Vec3 a = Eigen::Map<const Vec3>(data(low, {3}, "low")), b = Eigen::Map<const Vec3>(data(high, {3}, "high"));
+             const Vec3 a = Eigen::Map<const Vec3>(data(low, {3}, "low")),
+                        b = Eigen::Map<const Vec3>(data(high, {3}, "high"));
              py::gil_scoped_release free;
              return std::make_unique<FastPlan>(k, a, b);
            }),
            "mechanism"_a, "low"_a, "high"_a)
       .def_property_readonly("available", &FastPlan::available)
       .def_property_readonly("missing", &FastPlan::missing);
-  py::class_<Mechanism>(m, "Mechanism")
-      .def(py::init(&assemble), "root"_a, "home"_a, "springs"_a, "task"_a = full_task)
+  mechanism.def(py::init(&assemble), "root"_a, "home"_a, "springs"_a, "task"_a = full_task)
       .def_property_readonly(
           "coordinates",
           [](const Mechanism& k) { return names(k.coordinates, [](const Coordinate& c) { return c.name; }); })
@@ -239,8 +242,9 @@ void bind_solve(py::module_& m) {
              Eigen::Map<VecX>(out.mutable_data(), k.size()) = k.home_coordinates;
              return out;
            })
-      .def("solve", &solve, "plan"_a.none(true), "position"_a, "rotation"_a, "wrench"_a, "load_points"_a, "load_types"_a, "read_points"_a,
-           "gravity"_a, "load_steps"_a, "threads"_a, "full"_a, "variants"_a = std::vector<const FastPlan*>{})
+      .def("solve", &solve, "plan"_a.none(true), "position"_a, "rotation"_a, "wrench"_a, "load_points"_a,
+           "load_types"_a, "read_points"_a, "gravity"_a, "load_steps"_a, "threads"_a, "full"_a,
+           "variants"_a = std::vector<const FastPlan*>{})
       .def("closure", &closure, "plan"_a.none(true), "given"_a, "rotation"_a, "inverse"_a, "threads"_a)
       .def("frames", &frames, "coordinates"_a);
 }

@@ -142,6 +142,8 @@ class Machine:
         threads
             None: all cores that this process may use.
 
+        Notes
+        -----
         Poses never raise: see `Solution.status`. Raises StiffmapError for bad input.
         """
         if derivatives:
@@ -207,7 +209,7 @@ class Machine:
         rotation: ArrayLike | None,
         point: str,
         wrenches: Mapping[str, ArrayLike] | None,
-        load_type: str,
+        load_type: str | Mapping[str, str],
         read_points: Sequence[str],
         gravity: ArrayLike | None,
         method: str,
@@ -241,7 +243,7 @@ class Machine:
         read = [point, *dict.fromkeys(r for r in read_points if r != point)]
         loads = np.stack([rows(v, shape, (6,)) for v in (w, *extra.values())], axis=1)
         answer = self._core.solve(
-            self._plan if method == "fast" else None,
+            self._plan if method == "fast" else None,  # type: ignore[arg-type]  # None: reference path
             rows(p, shape, (3,)),
             rows(r, shape, (3, 3)),
             np.ascontiguousarray(loads),
@@ -268,7 +270,7 @@ class Machine:
         bad = finite & ((off > 1e-9) | (np.linalg.det(np.where(finite[..., None, None], r, np.eye(3))) < 0))
         if np.any(bad):
             raise StiffmapError(
-                f"rotation: expected rotation matrices, got one with |R^T R - I| = {np.max(off[bad]):.1e}"
+                f"rotation: expected rotation matrices, got one with |R^T R - I| = {np.max(np.where(bad, off, 0)):.1e}"
             )
 
     def _gravity(self, gravity: ArrayLike | None) -> Floats:

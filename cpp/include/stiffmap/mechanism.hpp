@@ -106,7 +106,7 @@ class Mechanism {
   double length = 1;                     ///< characteristic length: turns angles into lengths in every norm
   double stiffness = 1;                  ///< characteristic stiffness, N/m: turns forces into lengths
   Index tip = -1;
-  Chain description;                             ///< what it was made from
+  Chain description;  ///< what it was made from
 
   Index size() const { return static_cast<Index>(coordinates.size()); }
   Index closures() const { return 6 * static_cast<Index>(loops.size()); }
