@@ -131,7 +131,7 @@ def _lines(t: Conditions, here: Integers) -> Iterator[list[int]]:
 def reversal(t: Conditions) -> Iterator[Contrast]:
     """Opposite forces."""
     for here in t.poses():
-        for i, j in _matching(t, here, lambda w: -w):
+        for i, j in _matching(t, here, np.negative):
             if i < j:
                 yield from (([(i, a), (j, a)], [1.0, 1.0]) for a in range(6))
 
