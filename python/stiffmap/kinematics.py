@@ -52,9 +52,9 @@ def forward_kinematics(machine: Machine, actuators: ArrayLike, *, threads: int |
     n = len(machine.actuators)
     a = trailing(actuators, (n,), "actuators", f"{n} actuator coordinates")
     shape = a.shape[:-1]
-    out = machine._core.closure(  # type: ignore[arg-type]  # None: from home
-        None, rows(a, shape, (n,)), np.zeros((0, 3, 3)), False, thread_count(threads)
-    )
+    none = np.zeros((0, 3, 3))
+    # No plan: forward closure always continues from home.
+    out = machine._core.closure(None, rows(a, shape, (n,)), none, False, thread_count(threads))  # type: ignore[arg-type]
     return _kinematics(machine, out, shape)
 
 

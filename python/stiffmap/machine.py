@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap import _core
+from stiffmap._core import FastPlan, Mechanism
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing, wrench_array
 from stiffmap.derivatives import Request, base_and_variations, combine
 from stiffmap.description import MachineDescription
@@ -46,14 +46,14 @@ class Machine:
         return self._description.name
 
     @cached_property
-    def _core(self) -> _core.Mechanism:
+    def _core(self) -> Mechanism:
         return build_mechanism(self._description)
 
     @cached_property
-    def _plan(self) -> _core.FastPlan:
+    def _plan(self) -> FastPlan:
         box = self._description.workspace
         low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))
-        return _core.FastPlan(self._core, np.array(low), np.array(high))
+        return FastPlan(self._core, np.array(low), np.array(high))
 
     @property
     def fast(self) -> str:
@@ -265,12 +265,14 @@ class Machine:
 
     @staticmethod
     def _check_rotation(r: Floats) -> None:
-        finite = np.isfinite(r).all(axis=(-2, -1))
+        finite = np.asarray(np.isfinite(r).all(axis=(-2, -1)))
         off = np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(axis=(-2, -1), initial=0)
-        bad = finite & ((off > 1e-9) | (np.linalg.det(np.where(finite[..., None, None], r, np.eye(3))) < 0))
+        mirrored = np.linalg.det(np.where(finite[..., None, None], r, np.eye(3))) < 0
+        bad = np.where(finite & ((off > 1e-9) | mirrored), np.maximum(off, 1e-300), 0.0)
         if np.any(bad):
             raise StiffmapError(
-                f"rotation: expected rotation matrices, got one with |R^T R - I| = {np.max(np.where(bad, off, 0)):.1e}"
+                f"rotation: expected rotation matrices, got one with |R^T R - I| = {np.max(bad):.1e}"
+                f"{' and det < 0' if np.any(mirrored) else ''}"
             )
 
     def _gravity(self, gravity: ArrayLike | None) -> Floats:
