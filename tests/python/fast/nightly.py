@@ -1,4 +1,4 @@
-"""A million solves on both paths: python tests/python/fast/nightly.py [--solves 1000000] [--seed 1] [--threads 2]
+"""A million solves on both paths: python tests/python/fast/nightly.py [--solves N] [--seed N] [--threads N]
 
 Every shipped machine, every instruction-set level in turn, random poses and loads. Exit code 1 on the first
 batch whose statuses differ or whose numbers differ by more than the tolerance (agreement.py).
@@ -9,8 +9,9 @@ from __future__ import annotations
 import argparse
 import os
 
-import stiffmap as sm
 from agreement import LOADS, TOLERANCE, compare, draw
+
+import stiffmap as sm
 from stiffmap import _core
 
 BATCH = 2000
