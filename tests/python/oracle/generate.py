@@ -1,0 +1,117 @@
+"""Random machines that close at home: legs, nested blocks, springs, laws, bodies, errors, preload."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.description import (
+    Block,
+    Body,
+    Branch,
+    Element,
+    Joint,
+    Law,
+    Leg,
+    MachineDescription,
+    Offset,
+    Pose,
+    Spring,
+)
+
+
+class Generator:
+    """Every number is drawn from one seeded stream, so that a seed names a machine."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+
+    def machine(self) -> MachineDescription:
+        """Two or three legs, all ending in one random platform pose."""
+        home = self._pose(0.6)
+        legs = tuple(Leg(f"leg{i}", self._leg(home)) for i in range(self.rng.integers(2, 4)))
+        platform: tuple[Element, ...] = (Body("platform", float(self.rng.uniform(1, 8)), self._vector(0.1)),)
+        if self.rng.random() < 0.4:
+            platform = (self._spring("tool"), *platform)
+        return MachineDescription("random", legs, platform=platform, home=home)
+
+    def _vector(self, size: float) -> tuple[float, float, float]:
+        x, y, z = self.rng.uniform(-size, size, 3)
+        return (float(x), float(y), float(z))
+
+    def _axis(self) -> tuple[float, float, float]:
+        v = self.rng.normal(size=3)
+        x, y, z = v / np.linalg.norm(v)
+        return (float(x), float(y), float(z))
+
+    def _pose(self, size: float) -> Pose:
+        return Pose.of(self._vector(size), Rotation.random(random_state=self.rng).as_matrix())
+
+    def _offset(self, name: str) -> Offset:
+        nominal = self._pose(0.3)
+        if self.rng.random() < 0.3:
+            small = Rotation.from_rotvec(self.rng.normal(scale=2e-4, size=3)).as_matrix()
+            return Offset(name, nominal, nominal @ Pose.of(self.rng.normal(scale=5e-5, size=3), small))
+        return Offset(name, nominal)
+
+    def _spring(self, name: str) -> Spring:
+        size = np.r_[[1e3] * 3, [150.0] * 3] * self.rng.uniform(0.5, 2)
+        a = self.rng.normal(size=(6, 6))
+        k = size[:, None] * (a @ a.T / 6 + 0.3 * np.eye(6)) * size
+        rest = self.rng.normal(scale=2e-5, size=6) if self.rng.random() < 0.2 else np.zeros(6)
+        k = (k + k.T) / 2
+        return Spring(name, stiffness=tuple(map(tuple, k.tolist())), rest=tuple(rest.tolist()))
+
+    def _joint(self, name: str) -> Joint:
+        kind = "revolute" if self.rng.random() < 0.75 else "prismatic"
+        return Joint(name, kind, (self._axis(),), (float(self.rng.uniform(-0.4, 0.4)),))
+
+    def _drive(self, name: str) -> Joint:
+        cubic = 1e14 if self.rng.random() < 0.3 else 0.0
+        law = Law(float(self.rng.uniform(2e6, 2e7)), cubic)
+        return Joint(name, "prismatic", (self._axis(),), (0.2,), actuated=True, law=law)
+
+    def _leg(self, target: Pose) -> tuple[Element, ...]:
+        out: list[Element] = [self._offset("start")]
+        parts = ["drive", "spring", *["joint"] * int(self.rng.integers(1, 4))]
+        parts += ["spring"] if self.rng.random() < 0.5 else []
+        parts += ["block"] if self.rng.random() < 0.5 else []
+        parts += ["body"] if self.rng.random() < 0.5 else []
+        for i, part in enumerate(self.rng.permutation(parts)):
+            out += [self._element(str(part), f"{part}{i}"), self._offset(f"link{i}")]
+        return (*out, Offset("attach", end_of(out).inverse() @ target))
+
+    def _element(self, part: str, name: str) -> Element:
+        if part == "body":
+            return Body(name, float(self.rng.uniform(0.5, 4)), self._vector(0.1))
+        if part == "block":
+            return self._block(name)
+        return {"drive": self._drive, "spring": self._spring, "joint": self._joint}[part](name)
+
+    def _block(self, name: str) -> Block:
+        end = self._pose(0.3)
+        branches = []
+        for i in range(2):
+            inner: list[Element] = [self._offset("in"), self._spring("bar")]
+            if self.rng.random() < 0.6:
+                inner.insert(1, self._joint("pin"))
+            inner.append(Offset("out", end_of(inner).inverse() @ end))
+            branches.append(Branch(f"{name}_{i}", tuple(inner)))
+        return Block(name, tuple(branches))
+
+
+def end_of(elements: list[Element]) -> Pose:
+    """Nominal frame behind a sequence at home, springs at rest."""
+    at = Pose()
+    for e in elements:
+        if isinstance(e, Offset):
+            at = at @ e.nominal
+        elif isinstance(e, Joint):
+            for axis, q in zip(e.axes, e.home, strict=True):
+                if e.kind == "prismatic":
+                    at = at @ Pose.of(q * np.array(axis))
+                else:
+                    at = at @ Pose.of((0, 0, 0), Rotation.from_rotvec(q * np.array(axis)).as_matrix())
+        elif isinstance(e, Block):
+            at = at @ end_of(list(e.branches[0].elements))
+    return at
