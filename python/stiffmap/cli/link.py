@@ -1,0 +1,5 @@
+"""`stiffmap link`: the command lives beside what it does; this module keeps ``--help`` quick."""
+
+from stiffmap.link.command import link_command
+
+__all__ = ["link_command"]
