@@ -31,8 +31,7 @@ MatX random_saddle(Random& random, Index n, Index k) {
 Inertia by_eigenvalues(const MatX& A, double threshold) {
   Inertia out;
   const Eigen::SelfAdjointEigenSolver<MatX> solver(A, Eigen::EigenvaluesOnly);
-  for (double v : solver.eigenvalues())
-    (std::abs(v) < threshold ? out.zero : v > 0 ? out.positive : out.negative) += 1;
+  for (double v : solver.eigenvalues()) (std::abs(v) < threshold ? out.zero : v > 0 ? out.positive : out.negative) += 1;
   return out;
 }
 
