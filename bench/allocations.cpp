@@ -16,9 +16,13 @@ void* __libc_calloc(std::size_t, std::size_t);
 void* __libc_realloc(void*, std::size_t);
 void* __libc_memalign(std::size_t, std::size_t);
 __attribute__((visibility("default"))) void* malloc(std::size_t n) { return ++calls, __libc_malloc(n); }
-__attribute__((visibility("default"))) void* calloc(std::size_t k, std::size_t n) { return ++calls, __libc_calloc(k, n); }
+__attribute__((visibility("default"))) void* calloc(std::size_t k, std::size_t n) {
+  return ++calls, __libc_calloc(k, n);
+}
 __attribute__((visibility("default"))) void* realloc(void* p, std::size_t n) { return ++calls, __libc_realloc(p, n); }
-__attribute__((visibility("default"))) void* aligned_alloc(std::size_t a, std::size_t n) { return ++calls, __libc_memalign(a, n); }
+__attribute__((visibility("default"))) void* aligned_alloc(std::size_t a, std::size_t n) {
+  return ++calls, __libc_memalign(a, n);
+}
 }
 
 long stiffmap::bench::allocations() { return calls; }

@@ -52,7 +52,8 @@ void count_pose(const Program& P, Block& b, Scratch& s, double* out) {
 }  // namespace
 }  // namespace stiffmap::kernel
 
-stiffmap::bench::Counts stiffmap::bench::count_operations(const Program& P, const KernelInput& in, const KernelOutput& out) {
+stiffmap::bench::Counts stiffmap::bench::count_operations(const Program& P, const KernelInput& in,
+                                                          const KernelOutput& out) {
   using namespace stiffmap::kernel;
   std::vector<char> scratch(static_cast<std::size_t>(scratch_size(&P)));
   Scratch s = lay_out(P, scratch.data(), nullptr);
@@ -63,6 +64,7 @@ stiffmap::bench::Counts stiffmap::bench::count_operations(const Program& P, cons
   }
   for (double& n : counts.operations) n /= static_cast<double>(in.count);
   counts.operations[elimination] -= counts.operations[elements];
-  for (Pass p : {laws, frames, bench::wrenches, elements, elimination, platform, back}) counts.operations[iteration] += counts.operations[p];
+  for (Pass p : {laws, frames, bench::wrenches, elements, elimination, platform, back})
+    counts.operations[iteration] += counts.operations[p];
   return counts;
 }

@@ -100,12 +100,10 @@ inline Case orthoglide() {
   const auto leg = [&](const Mat3& R) {
     return Chain{{offset("frame", Vec3::Zero(), R), slider("actuator", X, -r - L, 1 / 1.4e-7),
                   link("foot", orthoglide_foot()), joint("proximal", JointType::revolute, Z),
-                  Block{"parallelogram", {{"low", bar(-1)}, {"high", bar(1)}}},
-                  joint("distal", JointType::revolute, Z), offset("flange", r * X),
-                  offset("platform", Vec3::Zero(), R.transpose())}};
+                  Block{"parallelogram", {{"low", bar(-1)}, {"high", bar(1)}}}, joint("distal", JointType::revolute, Z),
+                  offset("flange", r * X), offset("platform", Vec3::Zero(), R.transpose())}};
   };
-  const Block legs{"legs",
-                   {{"x", leg(columns(X, Y, Z))}, {"y", leg(columns(Y, Z, X))}, {"z", leg(columns(Z, X, Y))}}};
+  const Block legs{"legs", {{"x", leg(columns(X, Y, Z))}, {"y", leg(columns(Y, Z, X))}, {"z", leg(columns(Z, X, Y))}}};
   return {assemble({{legs}}, {}), Vec3::Constant(-0.2), Vec3::Constant(0.3)};
 }
 

@@ -14,8 +14,8 @@ double number(const std::string& name, const std::string& text, double low, doub
   } catch (const std::exception&) {
   }
   if (used == 0 || used != text.size() || !(value >= low && value <= high))
-    throw std::invalid_argument(name + ": expected a number from " + std::to_string(low) + " to " + std::to_string(high) +
-                                ", got '" + text + "'");
+    throw std::invalid_argument(name + ": expected a number from " + std::to_string(low) + " to " +
+                                std::to_string(high) + ", got '" + text + "'");
   return value;
 }
 

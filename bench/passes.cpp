@@ -88,7 +88,8 @@ void time_block(Block& b, const M usable, Timer& time) {
   });
 }
 
-void measure(const Program* P, const KernelInput* in, const KernelOutput* out, void* scratch, int repeats, double* seconds) {
+void measure(const Program* P, const KernelInput* in, const KernelOutput* out, void* scratch, int repeats,
+             double* seconds) {
   Scratch s = lay_out(*P, scratch, nullptr);
   std::int64_t blocks = 0;
   for (std::int64_t i = 0; i + W <= in->count; i += W, ++blocks) {

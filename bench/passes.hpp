@@ -8,11 +8,24 @@ namespace stiffmap::bench {
 
 /// Parts of the work on a block of poses. `elements` are tangents of the springs alone, `elimination`
 /// the rest of the base-to-tip pass, `iteration` one Newton step as a whole, `block` everything.
-enum Pass { closure, laws, frames, wrenches, elements, elimination, platform, back, output, iteration, block, pass_count };
+enum Pass {
+  closure,
+  laws,
+  frames,
+  wrenches,
+  elements,
+  elimination,
+  platform,
+  back,
+  output,
+  iteration,
+  block,
+  pass_count
+};
 
-inline constexpr const char* pass_names[pass_count] = {"closure",  "laws",     "frames",            "wrenches",
-                                                       "elements", "elimination", "platform_inverse", "back_substitution",
-                                                       "output",   "iteration", "block"};
+inline constexpr const char* pass_names[pass_count] = {
+    "closure",           "laws",   "frames",    "wrenches", "elements", "elimination", "platform_inverse",
+    "back_substitution", "output", "iteration", "block"};
 
 struct PassTable {
   const char* level;

@@ -16,8 +16,8 @@ class Report {
   void text(const std::string& name, const std::string& value) { lines_.emplace_back(name, '"' + value + '"'); }
   void number(const std::string& name, double value) { lines_.emplace_back(name, format(value)); }
   void timing(const std::string& name, const Summary& s) {
-    lines_.emplace_back(name, "{\"median\": " + format(s.median) + ", \"min\": " + format(s.min) +
-                                  ", \"max\": " + format(s.max) + "}");
+    lines_.emplace_back(
+        name, "{\"median\": " + format(s.median) + ", \"min\": " + format(s.min) + ", \"max\": " + format(s.max) + "}");
   }
   void print(bool json) const {
     if (json) std::printf("{");

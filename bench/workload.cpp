@@ -6,7 +6,8 @@
 namespace stiffmap::bench {
 
 Workload::Workload(Case machine, int n, double force)
-    : case_(std::move(machine)), plan_(std::make_unique<FastPlan>(case_.mechanism, case_.low, case_.high)),
+    : case_(std::move(machine)),
+      plan_(std::make_unique<FastPlan>(case_.mechanism, case_.low, case_.high)),
       count_(static_cast<Index>(n) * n * n) {
   // As in the published comparisons: 1/18 of the box away from its faces.
   const auto coordinate = [&](int axis, int i) {
