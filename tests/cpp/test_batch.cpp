@@ -44,7 +44,7 @@ Answer run(const Mechanism& m, const std::vector<double>& position, int threads)
   out.effort = a.effort.data();
   out.leg_wrench = a.leg_wrench.data();
   out.status = a.status.data();
-  solve_batch(m, in, {}, threads, out);
+  solve_reference(m, in, {}, threads, out);
   return a;
 }
 
