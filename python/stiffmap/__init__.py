@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
     from stiffmap.link import identify_link
     from stiffmap.machine import Machine, load_machine
-    from stiffmap.maps import error_map, polar, sweep
+    from stiffmap.maps import error_map, polar, sweep, uncertainty_ranking
     from stiffmap.solution import Solution
     from stiffmap.stress import assembly_stress
 
@@ -41,6 +41,7 @@ _HOME = {
     "load_machine": "stiffmap.machine",
     "polar": "stiffmap.maps",
     "sweep": "stiffmap.maps",
+    "uncertainty_ranking": "stiffmap.maps",
 }
 
 __all__ = [
@@ -63,6 +64,7 @@ __all__ = [
     "load_machine",
     "polar",
     "sweep",
+    "uncertainty_ranking",
 ]
 
 

@@ -25,6 +25,7 @@ from stiffmap.cli.inputs import (
     plain,
 )
 from stiffmap.cli.map_summary import as_table, failures, summary
+from stiffmap.cli.map_uncertainty import draw_deviations, print_uncertainty, uncertainty_data
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.machine import Machine
 
@@ -54,6 +55,10 @@ def map_command(
     effect: EffectsOption = None,
     gravity_: GravityOption = None,
     compliance: Annotated[bool, typer.Option(help="Keep the 6x6 compliance of every pose.")] = False,
+    uncertainty: Annotated[
+        bool,
+        typer.Option("--uncertainty", help="Standard deviation of the map, from links and `u` of the file."),
+    ] = False,
     zarr: Annotated[bool, typer.Option("--zarr", help="Write Zarr instead of NetCDF.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Take up an interrupted run.")] = False,
     pictures: Annotated[bool, typer.Option(help="Draw the maps.")] = True,
@@ -73,6 +78,8 @@ def map_command(
 
       [cyan]stiffmap map orthoglide-revised -o results[/cyan]
 
+      [cyan]stiffmap map my_machine.yaml --uncertainty --points 21[/cyan]
+
       [cyan]stiffmap map tripteron --force 100 --points 41 --z 300 --z 500[/cyan]
 
       [cyan]stiffmap map orthoglide-revised --gravity 0,0,-9.81 --tolerance 0.1 --json[/cyan]
@@ -90,6 +97,7 @@ def map_command(
         tolerance=MM * tolerance,
         gravity=gravity(gravity_),
         compliance=compliance,
+        uncertainty=uncertainty,
         method=method,
         threads=threads,
         progress=False if as_json else None,
@@ -97,14 +105,17 @@ def map_command(
         resume=resume,
     )
     files = [target, *(draw(ds, output, plane, MM * tolerance) if pictures else [])]
+    band = uncertainty_data(ds, plane) if uncertainty else None
+    files += draw_deviations(ds, output, plane) if uncertainty and pictures else []
     rows = summary(ds, plane, MM * tolerance)
     if as_json:
-        print_json(
-            plain({"machine": m.name, "rows": rows, "failed": failures(ds), "files": list(map(str, files))})
-        )
+        data = {"machine": m.name, "rows": rows, "failed": failures(ds), "files": list(map(str, files))}
+        print_json(plain(data if band is None else data | {"uncertainty": band}))
     else:
         console = Console(highlight=False)
         console.print(as_table(ds, rows, plane, tolerance))
+        if band is not None:
+            print_uncertainty(console, band, plane)
         for name, count in failures(ds).items():
             console.print(f"[yellow]{count} poses: {name}[/yellow]")
         console.print(f"wrote {', '.join(map(str, files))}", soft_wrap=True)

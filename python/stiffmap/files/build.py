@@ -56,8 +56,15 @@ def build(
     return replace(
         description,
         uncertainty=tuple({**gathered.uncertainty, **model.uncertainty}.items()),
+        extra=description.extra + _links(gathered),
         notes=tuple({**gathered.notes, **model.notes}.items()),
     )
+
+
+def _links(gathered: Gathered) -> tuple[tuple[str, Any], ...]:
+    """Covariances of the link files, for `error_map(..., uncertainty=True)`."""
+    uses = tuple((file, tuple(use.springs), use.covariance) for file, use in gathered.links.items())
+    return (("link_covariance", uses),) if uses else ()
 
 
 def _check_points(description: MachineDescription, context: Context) -> None:

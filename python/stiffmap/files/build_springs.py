@@ -11,7 +11,7 @@ from stiffmap.description import Law, Spring
 from stiffmap.description.elements import Matrix6
 from stiffmap.files import sections
 from stiffmap.files.cantilever import cantilever_compliance
-from stiffmap.files.context import Context
+from stiffmap.files.context import Context, LinkUse
 from stiffmap.files.matrix_checks import asymmetry, lowest_eigenvalue
 from stiffmap.files.schema.base import Number
 from stiffmap.files.schema.elements import SpringModel
@@ -171,7 +171,17 @@ def load_link(name: str, context: Context) -> Matrix6:
     matrix = np.asarray(link.compliance, dtype=float)
     _check(matrix, "compliance", context)
     context.note(name, "link")
+    _keep_covariance(name, np.asarray(link.covariance, dtype=float), context)
     return as_rows(matrix)
+
+
+def _keep_covariance(name: str, covariance: NDArray[np.float64], context: Context) -> None:
+    """Springs of one link file share its error, so its covariance is kept once."""
+    upper = np.ravel_multi_index(np.triu_indices(6), (6, 6))
+    rows = covariance[np.ix_(upper, upper)]
+    if np.any(rows):
+        use = LinkUse(tuple(tuple(float(v) for v in row) for row in rows))
+        context.gathered.links.setdefault(name, use).springs.append(context.full)
 
 
 def as_rows(matrix: ArrayLike) -> Matrix6:

@@ -16,11 +16,20 @@ from stiffmap.files.yaml_text import Document, KeyPath
 
 
 @dataclass
+class LinkUse:
+    """A link file: (21, 21) covariance of the upper entries k11, k12 … k66 (SI), and the springs it gives."""
+
+    covariance: tuple[tuple[float, ...], ...]
+    springs: list[str] = field(default_factory=list)
+
+
+@dataclass
 class Gathered:
     """What belongs to the whole machine, in the order of the file, keyed ``full.name/field``."""
 
     uncertainty: dict[str, float] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
+    links: dict[str, LinkUse] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

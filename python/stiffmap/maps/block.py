@@ -13,6 +13,7 @@ from stiffmap.maps.limit import force_limit
 from stiffmap.maps.loading import without_failed
 from stiffmap.maps.plan import MapPlan
 from stiffmap.maps.sums import norm
+from stiffmap.maps.uncertainty_block import load_deviations, worst_deviations
 
 ALL = (0, 1, 2)
 
@@ -21,6 +22,8 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
     """Every variable of some rows, shaped (poses, ...)."""
     position = plan.positions(rows)
     out = _loads(plan, position)
+    if plan.uncertain is not None:
+        out |= load_deviations(plan, plan.uncertain, position)
     if plan.turning:
         fan = even_fan(plan.loading, position, plan.force, plan.axes, plan.directions)
         out["direction_status"] = fan.status.max(axis=1)
@@ -28,6 +31,8 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
             values, status = _extremes(plan, position, fan, parts, suffix)
             out |= values
             out["direction_status"] = np.maximum(out["direction_status"], status)
+        if plan.uncertain is not None:
+            out |= worst_deviations(plan, plan.uncertain, position, out)
     return out
 
 

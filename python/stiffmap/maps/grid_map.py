@@ -19,6 +19,7 @@ from stiffmap.maps.loading import Loading
 from stiffmap.maps.plan import MapPlan
 from stiffmap.maps.progress import track
 from stiffmap.maps.store import Store, folder_store, memory_store
+from stiffmap.maps.uncertainty import uncertain_numbers
 
 POSES_AT_ONCE = 1024
 
@@ -36,6 +37,7 @@ def error_map(
     directions: int = 4,
     tolerance: float = 0.25e-3,
     compliance: bool = False,
+    uncertainty: bool = False,
     point: str = "tcp",
     rotation: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
@@ -71,6 +73,11 @@ def error_map(
         Deflection (m) that defines the force limit.
     compliance
         Whether to keep the loaded compliance, (…, 6, 6).
+    uncertainty
+        Add standard deviations, from the covariance of identified links and the uncertainties ``u`` in
+        the machine file, to first order: displacement_std, deflection_std and deflection_xy_std per load
+        case, worst_deflection_std and worst_deflection_xy_std, and variance_share (…, parameter), the
+        share of each number in the variance of the deflection (`stiffmap.uncertainty_ranking`).
     point, rotation, gravity, load_type, method, load_steps, threads
         As in `Machine.solve`; `rotation` is one (3, 3) matrix for the whole map.
     chunk
@@ -111,6 +118,7 @@ def error_map(
         directions=directions,
         tolerance=magnitude(tolerance, "tolerance", "m"),
         compliance=compliance,
+        uncertain=uncertain_numbers(machine) if uncertainty else None,
     )
     if out is None:
         store = memory_store(plan)

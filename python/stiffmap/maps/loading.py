@@ -41,6 +41,22 @@ class Loading:
             threads=self.threads,
         )
 
+    def solve_varied(
+        self, position: Floats, wrench: Floats, variants: tuple[Machine, ...]
+    ) -> tuple[Solution, Floats]:
+        """Also the displacements (..., variants, 6) of machines near this one, exact to first order."""
+        options = {"point": self.point, "load_type": self.load_type, "load_steps": self.load_steps}
+        call: dict[str, Any] = {**options, "rotation": self.rotation, "gravity": self.gravity}
+        call |= {"wrenches": None, "read_points": (), "stiffness": False, "threads": self.threads}
+        s, varied = self.machine._solve(variants, position, wrench, method=self.method, **call)
+        p, w = (np.broadcast_to(a, (*s.status.shape, a.shape[-1])) for a in (position, wrench))
+        for i, machine in enumerate(variants):
+            hole = s.ok & np.isnan(varied[..., i, :]).any(axis=-1)  # poses of the reference path
+            if hole.any():
+                full = machine._solve((), p[hole], w[hole], method=self.method, **call)[0]
+                varied[hole, i] = full.displacement
+        return s, varied
+
     def options(self) -> dict[str, Any]:
         """What changes the numbers, as plain data; threads do not."""
         plain = {k: getattr(self, k) for k in ("point", "load_type", "method", "load_steps")}

@@ -13,7 +13,16 @@ from stiffmap.broadcasting import Floats
 from stiffmap.maps.inputs import plane_axes
 from stiffmap.maps.loading import Loading
 from stiffmap.maps.provenance import describe
-from stiffmap.maps.variables import COMPONENTS, WRENCH, Variable, extreme_variables, load_variables, meaning
+from stiffmap.maps.uncertainty import METHOD, Uncertain
+from stiffmap.maps.variables import (
+    COMPONENTS,
+    WRENCH,
+    Variable,
+    deviation_variables,
+    extreme_variables,
+    load_variables,
+    meaning,
+)
 
 EXTREMES = (
     "loaded equilibria in {} directions and at the extremum of the trigonometric polynomial through "
@@ -40,6 +49,7 @@ class MapPlan:
     directions: int
     tolerance: float
     compliance: bool
+    uncertain: Uncertain | None = None
 
     @property
     def axes(self) -> tuple[int, int]:
@@ -70,6 +80,8 @@ class MapPlan:
         """The variables that the map will hold."""
         case = () if self.cases is None else ("case",)
         out = load_variables(case, self.shown_plane, self.compliance)
+        if self.uncertain is not None:
+            out += deviation_variables(case, self.shown_plane, self.turning)
         return out + (extreme_variables(self.shown_plane, self.tolerance) if self.turning else [])
 
     @cached_property
@@ -80,6 +92,8 @@ class MapPlan:
         }
         out["component"] = ("component", np.array(COMPONENTS))
         out["wrench_component"] = ("wrench_component", np.array(WRENCH))
+        if self.uncertain is not None:
+            out["parameter"] = ("parameter", np.array(self.uncertain.names))
         dims: tuple[str, ...] = ("wrench_component",)
         if self.cases is not None:
             out["case"], dims = ("case", np.array(self.cases)), ("case", *dims)
@@ -93,6 +107,14 @@ class MapPlan:
         call = {n: getattr(self, n) for n in ("x", "y", "z", "compliance")}
         call |= {"function": "error_map", "wrench": self.wrenches, "cases": self.cases}
         call |= {"plane": self.shown_plane if self.turning else None, "tolerance": self.tolerance}
+        if self.uncertain is not None:
+            return self._turning_attrs(call | {"uncertainty": True}) | {
+                "uncertainty_method": METHOD,
+                "uncertainty_left_out": ", ".join(self.uncertain.left_out),
+            }
+        return self._turning_attrs(call)
+
+    def _turning_attrs(self, call: dict[str, Any]) -> dict[str, Any]:
         if not self.turning:
             return describe(self.loading, "error map", call)
         call |= {"force": self.force, "directions": self.directions}

@@ -67,6 +67,22 @@ def load_variables(case: tuple[str, ...], plane: str, compliance: bool) -> list[
     return out
 
 
+def deviation_variables(case: tuple[str, ...], plane: str, turning: bool) -> list[Variable]:
+    """Standard deviations of the load cases and of the worst direction."""
+    what = "standard deviation of "
+    loads = ("deflection", f"deflection_{plane}")
+    out = [
+        Variable("displacement_std", (*case, "component"), meaning(TWIST_UNITS, f"{what}displacement")),
+        *(Variable(f"{n}_std", case, meaning("m", f"{what}{n}")) for n in loads),
+        Variable(
+            "variance_share",
+            (*case, "parameter"),
+            meaning("1", "share of a number in the variance of the deflection"),
+        ),
+    ]
+    return out + [Variable(f"worst_{n}_std", (), meaning("m", f"{what}worst_{n}")) for n in loads if turning]
+
+
 def extreme_variables(plane: str, tolerance: float) -> list[Variable]:
     """Variables over the force directions of a plane; the suffix says which components count."""
     out = [Variable("direction_status", (), status_attrs("the worst of all force directions solved"), "u1")]

@@ -164,7 +164,8 @@ def test_link_files_give_their_compliance(tmp_path: object, monkeypatch: pytest.
     from stiffmap.files import load_description
 
     module = ModuleType("stiffmap.link")
-    module.load_link = lambda path: SimpleNamespace(compliance=np.eye(6) * 1e-6)  # type: ignore[attr-defined]
+    link = SimpleNamespace(compliance=np.eye(6) * 1e-6, covariance=np.zeros((36, 36)))
+    module.load_link = lambda path: link  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "stiffmap.link", module)
     folder = Path(str(tmp_path))
     (folder / "bar.yaml").write_text("{}", encoding="utf-8")

@@ -1,0 +1,168 @@
+"""One number of a machine moved, by its full name and field (docs/machine_files.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from stiffmap.description import Block, Body, Element, Joint, MachineDescription, Offset, Point, Spring
+from stiffmap.description.elements import Matrix6
+from stiffmap.description.pose import Pose, Vector
+
+Change = Callable[[Element], Element | None]
+"""None: the element has no such number."""
+TOOL_ENDS = ("base", "platform")
+
+
+def moved(description: MachineDescription, key: str, delta: float) -> MachineDescription | None:
+    """The machine with the number ``full.name/field`` moved by `delta` (SI).
+
+    A length of an offset moves the machine as built; the controller keeps the nominal one. None: this
+    machine has no such number, or none that its description keeps apart (sections of a beam, angles).
+    """
+    full, _, field = key.partition("/")
+    sequence, *path = full.split(".")
+    if not path:
+        return _moved_external(description, sequence, field, delta)
+
+    def change(element: Element) -> Element | None:
+        return _moved_number(element, field, delta)
+
+    if sequence in TOOL_ENDS:
+        found = _edit(getattr(description, sequence), path, change)
+        if found is None:
+            return None
+        return (
+            replace(description, base=found) if sequence == "base" else replace(description, platform=found)
+        )
+    legs, hit = [], False
+    for leg in description.legs:
+        found = _edit(leg.elements, path, change) if leg.name == sequence else None
+        hit = hit or found is not None
+        legs.append(leg if found is None else replace(leg, elements=found))
+    return replace(description, legs=tuple(legs)) if hit else None
+
+
+def number(description: MachineDescription, key: str) -> float | None:
+    """The number (SI) under ``full.name/field``; None as in `moved`."""
+    seen: list[float] = []
+    full, _, field = key.partition("/")
+    sequence, *path = full.split(".")
+
+    def look(element: Element) -> Element | None:
+        value = _value(element, field)
+        if value is not None:
+            seen.append(value)
+        return None
+
+    pools = [getattr(description, sequence)] if sequence in TOOL_ENDS else []
+    pools += [leg.elements for leg in description.legs if leg.name == sequence]
+    for pool in pools:
+        if path:
+            _edit(pool, path, look)
+    seen += [getattr(s, field) for s in description.external_springs
+             if not path and s.name == sequence and field in ("stiffness", "length")]  # fmt: skip
+    return seen[0] if seen else None
+
+
+def _edit(elements: tuple[Element, ...], path: list[str], change: Change) -> tuple[Element, ...] | None:
+    out, hit = list(elements), False
+    for i, element in enumerate(elements):
+        new: Element | None = None
+        if len(path) == 1 and element.name == path[0]:
+            new = change(element)
+        elif isinstance(element, Block):
+            new = _edit_block(element, path, change)
+        if new is not None:
+            out[i], hit = new, True
+    return tuple(out) if hit else None
+
+
+def _edit_block(block: Block, path: list[str], change: Change) -> Element | None:
+    """A full name holds the branch, not the block."""
+    for i, branch in enumerate(block.branches):
+        found = _edit(branch.elements, path[1:], change) if branch.name == path[0] and path[1:] else None
+        if found is not None:
+            branches = list(block.branches)
+            branches[i] = replace(branch, elements=found)
+            return replace(block, branches=tuple(branches))
+    return None
+
+
+def _moved_number(element: Element, field: str, delta: float) -> Element | None:
+    if _value(element, field) is None:
+        return None
+    name, _, part = field.rpartition(".")
+    match element:
+        case Spring():
+            matrix = element.compliance if name == "compliance" else element.stiffness
+            assert matrix is not None
+            entries = _moved_entry(matrix, part, delta)
+            if name == "compliance":
+                return replace(element, compliance=entries)
+            return replace(element, stiffness=entries)
+        case Joint() if field == "compliance_slope":
+            return replace(element, compliance_slope=element.compliance_slope + delta)
+        case Joint():
+            assert element.law is not None
+            return replace(element, law=replace(element.law, **{part: getattr(element.law, part) + delta}))
+        case Body():
+            if field == "mass":
+                return replace(element, mass=element.mass + delta)
+            return replace(element, com=_moved_vector(element.com, part, delta))
+        case Point():
+            return replace(element, offset=_moved_vector(element.offset, part, delta))
+        case Offset():
+            real = element.actual or element.nominal
+            return replace(element, actual=Pose(_moved_vector(real.translation, part, delta), real.rotation))
+    return None
+
+
+def _value(element: Element, field: str) -> float | None:
+    name, _, part = field.rpartition(".")
+    match element:
+        case Spring() if name in ("compliance", "stiffness") and getattr(element, name) is not None:
+            i, j = int(part[1]) - 1, int(part[2]) - 1
+            return float(getattr(element, name)[i][j])
+        case Joint() if field == "compliance_slope":
+            return element.compliance_slope
+        case Joint() if element.law is not None and field in ("stiffness", "law.stiffness", "law.cubic"):
+            return float(getattr(element.law, part))
+        case Body() if field == "mass":
+            return element.mass
+        case Body() if name == "com":
+            return element.com["xyz".index(part)]
+        case Point() if name == "at":
+            return element.offset["xyz".index(part)]
+        case Offset() if name == "translation" and element.actual is None:
+            return element.nominal.translation["xyz".index(part)]
+        case Offset() if name == "actual.translation" and element.actual is not None:
+            return element.actual.translation["xyz".index(part)]
+    return None
+
+
+def _moved_entry(matrix: Matrix6, entry: str, delta: float) -> Matrix6:
+    i, j = int(entry[1]) - 1, int(entry[2]) - 1
+    rows = [list(row) for row in matrix]
+    rows[i][j] += delta
+    if i != j:
+        rows[j][i] += delta
+    return tuple(tuple(row) for row in rows)
+
+
+def _moved_vector(v: Vector, part: str, delta: float) -> Vector:
+    out = list(v)
+    out["xyz".index(part)] += delta
+    return (out[0], out[1], out[2])
+
+
+def _moved_external(
+    description: MachineDescription, name: str, field: str, delta: float
+) -> MachineDescription | None:
+    if field not in ("stiffness", "length") or name not in [s.name for s in description.external_springs]:
+        return None
+    springs = tuple(
+        replace(s, **{field: getattr(s, field) + delta}) if s.name == name else s
+        for s in description.external_springs
+    )
+    return replace(description, external_springs=springs)
