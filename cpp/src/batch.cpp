@@ -158,14 +158,15 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
                             flags.data(),
                             out.iterations};
   struct Scratch {
-    std::vector<char> memory;
+    std::unique_ptr<char[]> memory;
     std::vector<double> start;
     Reference reference;
   };
   std::vector<Scratch> scratch(at(std::max(1, threads)));
   parallel_chunks(in.count, fast_chunk, threads, [&](int thread, long begin, long end) {
     Scratch& s = scratch[static_cast<std::size_t>(thread)];
-    if (s.memory.empty()) s.memory.resize(static_cast<std::size_t>(table.scratch_size(&program)));
+    if (!s.memory)
+      s.memory = std::make_unique_for_overwrite<char[]>(static_cast<std::size_t>(table.scratch_size(&program)));
     KernelInput input = kernel_input(m, in, options);
     input.perturbed = variants.data();
     input.perturbed_count = out.variants ? static_cast<std::int32_t>(variants.size()) : 0;
@@ -174,7 +175,7 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
       for (long i = begin; i < end; ++i) s.reference.close(m, in, i, s.start.data() + m.size() * (i - begin));
       input.start = s.start.data() - m.size() * begin;
     }
-    table.run(&program, &input, &answer, begin, end, s.memory.data());
+    table.run(&program, &input, &answer, begin, end, s.memory.get());
     for (long i = begin; i < end; ++i) {
       if (!done[static_cast<std::size_t>(i)]) {
         s.reference.solve(m, in, options, i, out);

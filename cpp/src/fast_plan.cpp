@@ -5,9 +5,9 @@
 #include <cmath>
 #include <list>
 #include <map>
-#include <mutex>
 
 #include "../kernels/program.hpp"
+#include "stiffmap/parallel.hpp"
 
 namespace stiffmap {
 
@@ -408,22 +408,8 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
 
 /// Machines that differ in springs and errors only share one grid.
 std::shared_ptr<const std::vector<double>> grid_of(const Mechanism& m, const FastPlanData& d) {
-  static std::mutex guard;
-  static std::list<std::pair<std::string, std::shared_ptr<const std::vector<double>>>> cache;
-  const std::string key = GridKey(m, d).text;
-  {
-    const std::lock_guard<std::mutex> lock(guard);
-    for (auto it = cache.begin(); it != cache.end(); ++it)
-      if (it->first == key) {
-        cache.splice(cache.begin(), cache, it);
-        return cache.front().second;
-      }
-  }
-  auto grid = make_grid(m, d);
-  const std::lock_guard<std::mutex> lock(guard);
-  cache.emplace_front(key, grid);
-  if (cache.size() > cached_grids) cache.pop_back();
-  return grid;
+  static RecentValues<std::shared_ptr<const std::vector<double>>> grids(cached_grids);
+  return grids.get(GridKey(m, d).text, [&] { return make_grid(m, d); });
 }
 
 void place_grid(const Mechanism& m, const Vec3& low, const Vec3& high, FastPlanData& d) {

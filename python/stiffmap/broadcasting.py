@@ -45,9 +45,7 @@ def batch(*shapes: tuple[int, ...]) -> tuple[int, ...]:
     try:
         return np.broadcast_shapes(*shapes)
     except ValueError:
-        raise StiffmapError(
-            f"batch axes do not broadcast together: {', '.join(map(str, shapes))}"
-        ) from None
+        raise StiffmapError(f"batch axes do not broadcast together: {', '.join(map(str, shapes))}") from None
 
 
 def rows(values: Floats, shape: tuple[int, ...], tail: tuple[int, ...]) -> Floats:

@@ -17,6 +17,7 @@ from stiffmap.derivatives import Request, base_and_variations, combine
 from stiffmap.description import MachineDescription
 from stiffmap.errors import StiffmapError
 from stiffmap.lowering import build_mechanism
+from stiffmap.names import Names, names_of
 from stiffmap.solution import Solution
 
 if TYPE_CHECKING:
@@ -50,6 +51,14 @@ class Machine:
         return build_mechanism(self._description)
 
     @cached_property
+    def _names(self) -> Names:
+        return names_of(self._core)
+
+    @cached_property
+    def _home_rotation(self) -> Floats:
+        return self._description.home.r
+
+    @cached_property
     def _plan(self) -> FastPlan:
         box = self._description.workspace
         low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))
@@ -63,23 +72,22 @@ class Machine:
     @property
     def actuators(self) -> tuple[str, ...]:
         """Full names of the actuators."""
-        return tuple(n for n, _ in self._core.actuators)
+        return self._names.actuators
 
     @property
     def legs(self) -> tuple[str, ...]:
         """Names of the legs."""
-        return tuple(self._core.legs)
+        return self._names.legs
 
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the points that wrenches and readings may refer to."""
-        return tuple(self._core.points)
+        return self._names.points
 
     @property
     def free_spins(self) -> tuple[str, ...]:
         """Passive coordinates that turn without any effect, held at their home value."""
-        c = self._core
-        return tuple(n for n, k, r in zip(c.coordinates, c.locked, c.roles, strict=True) if k and r == 1)
+        return self._names.free_spins
 
     @property
     def workspace(self) -> Floats:
@@ -219,13 +227,10 @@ class Machine:
     ) -> tuple[Solution, Floats]:
         p = trailing(position, (3,), "position", "positions (m)")
         w = wrench_array(wrench)
-        r = trailing(
-            self._description.home.r if rotation is None else rotation,
-            (3, 3),
-            "rotation",
-            "rotation matrices",
-        )
-        self._check_rotation(r)
+        r = self._home_rotation
+        if rotation is not None:
+            r = trailing(rotation, (3, 3), "rotation", "rotation matrices")
+            self._check_rotation(r)
         extra = {n: wrench_array(v, f"wrenches[{n!r}]") for n, v in (wrenches or {}).items()}
         shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2], *(v.shape[:-1] for v in extra.values()))
         types = {point: load_type} if isinstance(load_type, str) else dict(load_type)
@@ -241,7 +246,9 @@ class Machine:
             if name not in self.points:
                 raise StiffmapError(f"point: expected one of {', '.join(self.points)}, got {name!r}")
         read = [point, *dict.fromkeys(r for r in read_points if r != point)]
-        loads = np.stack([rows(v, shape, (6,)) for v in (w, *extra.values())], axis=1)
+        loads = rows(w, shape, (6,))[:, None]
+        if extra:
+            loads = np.stack([rows(v, shape, (6,)) for v in (w, *extra.values())], axis=1)
         answer = self._core.solve(
             self._plan if method == "fast" else None,  # type: ignore[arg-type]  # None: reference path
             rows(p, shape, (3,)),
@@ -256,8 +263,9 @@ class Machine:
             stiffness,
             [m._plan for m in variants],
         )
-        order = [0, *(read.index(r) for r in read_points)]
-        answer["displacement"] = answer["displacement"][:, order]
+        if read_points:
+            order = [0, *(read.index(r) for r in read_points)]
+            answer["displacement"] = answer["displacement"][:, order]
         varied = answer.pop("variants")
         return self._solution(answer, shape, point), varied.reshape(
             (*shape, -1, 6) if len(variants) else (0,)
@@ -301,9 +309,8 @@ class Machine:
                 return np.broadcast_to(np.asarray(fill, value.dtype), shape + value.shape[1:])
             return value.reshape(shape + value.shape[1:])
 
-        c = self._core
+        names = self._names
         readings = out("displacement")
-        joints = {n: i for i, (n, role) in enumerate(zip(c.coordinates, c.roles, strict=True)) if role != 2}
         return Solution(
             displacement=np.ascontiguousarray(readings[..., 0, :]),
             stiffness=out("stiffness"),
@@ -316,12 +323,12 @@ class Machine:
             leg_wrench=out("leg_wrench"),
             readings=readings,
             point=point,
-            actuators=self.actuators,
-            legs=self.legs,
+            actuators=names.actuators,
+            legs=names.legs,
             coordinates=out("coordinates"),
-            coordinate_names=tuple(c.coordinates),
-            spring_index=dict(c.springs),
-            joint_index=joints,
+            coordinate_names=names.coordinates,
+            spring_index=names.springs,
+            joint_index=names.joints,
             indeterminate_mask=out("indeterminate"),
         )
 

@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <list>
 #include <mutex>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace stiffmap {
@@ -35,5 +38,34 @@ void parallel_chunks(long count, long chunk, int threads, Work&& work) {
   pool.clear();
   if (error) std::rethrow_exception(error);
 }
+
+/// The last few values made, shared by all threads; `make` runs without the lock.
+template <class Value>
+class RecentValues {
+ public:
+  explicit RecentValues(std::size_t most) : most_(most) {}
+
+  template <class Make>
+  Value get(const std::string& key, Make&& make) {
+    {
+      const std::lock_guard<std::mutex> lock(guard_);
+      for (auto it = values_.begin(); it != values_.end(); ++it)
+        if (it->first == key) {
+          values_.splice(values_.begin(), values_, it);
+          return values_.front().second;
+        }
+    }
+    Value made = make();
+    const std::lock_guard<std::mutex> lock(guard_);
+    values_.emplace_front(key, made);
+    if (values_.size() > most_) values_.pop_back();
+    return made;
+  }
+
+ private:
+  std::size_t most_;
+  std::mutex guard_;
+  std::list<std::pair<std::string, Value>> values_;
+};
 
 }  // namespace stiffmap
