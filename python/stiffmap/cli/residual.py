@@ -59,10 +59,12 @@ def _print(r: Residual, rows: int) -> None:
         )
     )
     print(
-        f"  noise floor {1e3 * r.noise.rms:.4f}; rms / floor {s.ratio:.2f}; chance of this fit {r.lack_of_fit:.2g}"
+        f"  noise floor {1e3 * r.noise.rms:.4f}; rms / floor {s.ratio:.2f}; "
+        f"chance of this fit {r.lack_of_fit:.2g}"
     )
     print(
-        f"  poses beyond noise: {r.groups_off} of {int(r.experiment.groups.max()) + 1}; rows set aside: {int(r.set_aside.sum())}"
+        f"  poses beyond noise: {r.groups_off} of {int(r.experiment.groups.max()) + 1}; "
+        f"rows set aside: {int(r.set_aside.sum())}"
     )
     for c in r.checks:
         told = f"rms/noise {c.rms:.2f}, chance {c.p:.2g}" if c.contrasts else "the plan does not allow it"

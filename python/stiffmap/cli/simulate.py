@@ -39,7 +39,7 @@ def simulate(
 
     Examples:
 
-      [cyan]stiffmap simulate orthoglide-revised --effect 'length bar x error=0.1mm' --plan position -o twin[/cyan]
+      [cyan]stiffmap simulate orthoglide-revised --effect 'length bar x error=0.1mm' -o twin[/cyan]
     """
     chosen = load_machine(machine)
     scale = None if noise is None else noise * 1e-3

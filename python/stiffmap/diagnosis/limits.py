@@ -18,13 +18,15 @@ def refuse(experiment: Experiment, base: Floats) -> None:
         rows = ", ".join(experiment.ids[i] for i in failed[:5]) + (" ..." if failed.size > 5 else "")
         where = ", ".join(f"{1e3 * v:.1f}" for v in experiment.position[failed[0]])
         raise StiffmapError(
-            f"{experiment.name}: the machine has no equilibrium at {failed.size} rows (id {rows}; first at ({where}) mm): "
+            f"{experiment.name}: the machine has no equilibrium at {failed.size} rows "
+            f"(id {rows}; first at ({where}) mm): "
             "out of reach, or units are wrong"
         )
     number = int(experiment.read.sum())
     if number < FEWEST:
         raise StiffmapError(
-            f"{experiment.name}: {number} readings are fewer than the parameters of an effect and its test need ({FEWEST})"
+            f"{experiment.name}: {number} readings are fewer than the parameters of an effect "
+            f"and its test need ({FEWEST})"
         )
 
 

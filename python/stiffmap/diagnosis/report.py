@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
 table{border-collapse:collapse;margin:.5rem 0}td,th{border:1px solid #ccc;padding:.2rem .6rem;text-align:left}
-th{background:#f3f3f3}img{max-width:100%}.verdict{background:#eef4f8;border-left:4px solid #2a6f97;padding:.6rem 1rem}
+th{background:#f3f3f3}img{max-width:100%}
+.verdict{background:#eef4f8;border-left:4px solid #2a6f97;padding:.6rem 1rem}
 small{color:#555}"""
 
 
@@ -52,7 +53,8 @@ def html(d: Diagnosis) -> str:
         "<h2>What this experiment could have seen</h2>" + _detectable(d),
         "<h2>Limits</h2>" + _list(d.limitations or ["none known"]),
     ]
-    return f"<!doctype html><html lang='en'><meta charset='utf-8'><title>stiffmap diagnosis</title><style>{STYLE}</style>{''.join(parts)}</html>"
+    head = f"<meta charset='utf-8'><title>stiffmap diagnosis</title><style>{STYLE}</style>"
+    return f"<!doctype html><html lang='en'>{head}{''.join(parts)}</html>"
 
 
 def inline(figure: Figure) -> str:
@@ -78,7 +80,8 @@ def _effects(d: Diagnosis) -> str:
         return "<p>No effect is named.</p>"
     out = "".join(_effect(e) for e in d.effects)
     for other, s in zip(d.alternatives, d.separations, strict=True):
-        out += f"<p><b>Or instead:</b> {escape('; '.join(map(effect_text, other)))}. To decide: {escape(separation_text(s))}.</p>"
+        named = escape("; ".join(map(effect_text, other)))
+        out += f"<p><b>Or instead:</b> {named}. To decide: {escape(separation_text(s))}.</p>"
     return out
 
 
@@ -91,8 +94,8 @@ def _effect(e: Effect) -> str:
         f"<h3>{escape(f'{e.kind} of {e.element}{legs}')}</h3>"
         + table(("parameter", "value", "95 % from", "to"), rows)
         + alias
-        + f"<p><small>{escape(e.definition)} Drop of chi-square {e.evidence['chi2_drop']:.0f}; chance over the whole "
-        f"search {e.evidence['p_global']:.2g}.</small></p>"
+        + f"<p><small>{escape(e.definition)} Drop of chi-square {e.evidence['chi2_drop']:.0f}; "
+        f"chance over the whole search {e.evidence['p_global']:.2g}.</small></p>"
     )
 
 
@@ -119,8 +122,8 @@ def _noise(d: Diagnosis) -> str:
     listed = ", ".join(d.outliers) or "none"
     return (
         table(("axis", "floor / m (rad)", "from repeats", "declared", "chance of the difference"), rows)
-        + f"<p>Lack of fit: p = {n.lack_of_fit_before:.2g} before, {n.lack_of_fit_after:.2g} after. Outliers listed "
-        f"(rows): {escape(listed)}.</p>"
+        + f"<p>Lack of fit: p = {n.lack_of_fit_before:.2g} before, {n.lack_of_fit_after:.2g} after. "
+        f"Outliers listed (rows): {escape(listed)}.</p>"
     )
 
 
@@ -145,8 +148,9 @@ def _left(d: Diagnosis) -> str:
     out = table(("axis", "pattern", "chance"), [(p.axis, p.what, f"{p.p:.2g}") for p in d.unexplained[:12]])
     if d.empirical:
         out += (
-            f"<p>An <b>empirical</b> correction (Gaussian process, no physical cause claimed) would bring held-out "
-            f"readings from {1e3 * d.empirical.before:.4f} mm to {1e3 * d.empirical.after:.4f} mm rms.</p>"
+            "<p>An <b>empirical</b> correction (Gaussian process, no physical cause claimed) would bring "
+            f"held-out readings from {1e3 * d.empirical.before:.4f} mm "
+            f"to {1e3 * d.empirical.after:.4f} mm rms.</p>"
         )
     return out
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.diagnosis.candidates import Candidate
 from stiffmap.diagnosis.fit import evaluate, fit
@@ -18,6 +19,8 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.predict import Predictor
 
 MOST_EFFECTS = 4
+LARGE = 10.0
+"""Scales beyond which parameters without a slope at the null get starts of their own."""
 MARGIN, CLOSE = 15.0, 0.05
 """What linear screening may be wrong by: candidates this near the best get a full fit."""
 
@@ -82,7 +85,7 @@ def best_addition(search: Search, model: Model) -> Finalist | None:
 
 
 def additions(search: Search, model: Model, number: int, margin: float = MARGIN) -> list[Finalist]:
-    """Full fits of the candidates that screening puts first (within `margin`, or `CLOSE` of it, of the best surprise)."""
+    """Full fits of what screening puts first: within `margin` (or `CLOSE`) of the best."""
     assert model.residual is not None
     screen = search.screen.beside(model.tangent())
     surprise = screen.surprise(screen.drops(model.residual[:, None])[:, 0])
@@ -100,7 +103,8 @@ def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
     assert model.residual is not None
     variant = screen.variants[i]
     estimate = screen.estimate(i, model.residual)
-    starts = start_values(variant, estimate)
+    flat = ~np.any(screen.columns(i) != 0.0, axis=0)
+    starts = start_values(variant, estimate, flat)
     fits = [fit(model.plus(variant.candidate, s), search.predictor, search.problem) for s in starts]
     best = min(fits, key=lambda m: m.chi2)
     drop = model.chi2 - best.chi2
@@ -115,8 +119,12 @@ def surprise_of(drop: float, freedom: int) -> float:
     return float(log_surprise(np.array(max(drop, 0.0)), np.array(freedom, dtype=np.intp)))
 
 
-def start_values(variant: Variant, estimate: Floats) -> list[Floats]:
-    """Values of all parameters (in scales) to start a fit from: null plus the linear estimate."""
+def start_values(variant: Variant, estimate: Floats, flat: NDArray[np.bool_]) -> list[Floats]:
+    """Values of all parameters (in scales) to start fits from: null plus the linear estimate.
+
+    `flat` (p,) are parameters that the readings do not feel at the null; beside large values of the
+    others they may, to second order, and to either side.
+    """
     c = variant.candidate
     if is_periodic(c):
         sine, cosine = estimate
@@ -124,7 +132,9 @@ def start_values(variant: Variant, estimate: Floats) -> list[Floats]:
         given = {"amplitude": amplitude * c.parameters[0].scale, "phase": phase, **dict(variant.shape)}
         return [np.array([given[p.name] / p.scale for p in c.parameters])]
     null = np.array([float(p.null or 0.0) / p.scale for p in c.parameters])
-    return [null + estimate]
+    size = float(np.abs(estimate).max(initial=0.0))
+    aside = [sign * 0.3 * size * flat for sign in (1.0, -1.0)] if flat.any() and size > LARGE else []
+    return [null + estimate, *(null + estimate + a for a in aside)]
 
 
 def backward(search: Search, model: Model) -> Model:

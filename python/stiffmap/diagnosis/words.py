@@ -57,7 +57,8 @@ def separation_text(s: Separation) -> str:
         if s.readings
         else "no sensible number of readings"
     )
-    return f"read {s.axis} at ({where}) mm under force ({load}) N: they differ by {1e3 * s.difference:.4f} mm, {many}"
+    gap = f"{1e3 * s.difference:.4f} mm"
+    return f"read {s.axis} at ({where}) mm under force ({load}) N: they differ by {gap}, {many}"
 
 
 def _others(d: Diagnosis) -> str:

@@ -88,7 +88,8 @@ def check_points(machine: Machine, experiment: Experiment) -> None:
     for name in (experiment.point, experiment.load_point):
         if name not in machine.points:
             raise StiffmapError(
-                f"{experiment.name}: machine {machine.name} has no point '{name}'; it has {', '.join(machine.points)}"
+                f"{experiment.name}: machine {machine.name} has no point '{name}'; "
+                f"it has {', '.join(machine.points)}"
             )
 
 
