@@ -56,10 +56,15 @@ struct Newton {
   /// Where the law carries the force that the linear start found: middle of a gap.
   double from_force(const LawProgram& law, double tau, double scale) const {
     const double k = law.stiffness / scale;
-    if (law.count == 0) return tau / (k + law.cubic * (tau / k) * (tau / k));
+    if (law.count == 0) {
+      double a = tau / k;
+      for (int i = 0; i < 60 && law.cubic > 0; ++i)
+        a -= (k * a + law.cubic * a * a * a - tau) / (k + 3 * law.cubic * a * a);
+      return a;
+    }
     const double* n = P.knots + 3 * law.first;
     const double* last = n + 3 * (law.count - 1);
-    const double* end = tau <= n[1] ? n : tau > last[1] ? last : nullptr;
+    const double* end = tau < n[1] ? n : tau > last[1] ? last : nullptr;
     if (end) return end[2] + (tau - end[1]) / k + (tau - end[1]) / law.stiffness;
     double lo = n[2], hi = last[2];
     for (int i = 1; i < law.count; ++i) {

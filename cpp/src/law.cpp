@@ -42,8 +42,12 @@ LawPoint Law::at(double z, double scale) const {
 
 double Law::from_force(double tau, double scale) const {
   const double k = stiffness_ / scale;
-  if (knots_.empty()) return tau / (k + cubic_ * (tau / k) * (tau / k));
-  if (tau <= knots_.front().second) {
+  if (knots_.empty()) {  // Newton on a convex branch falls to the root from above
+    double a = tau / k;
+    for (int i = 0; i < 60 && cubic_ > 0; ++i) a -= (k * a + cubic_ * a * a * a - tau) / (k + 3 * cubic_ * a * a);
+    return a;
+  }
+  if (tau < knots_.front().second) {
     const double a = knots_.front().first + (tau - knots_.front().second) / k;
     return z_.front() + (a - knots_.front().first) + (tau - knots_.front().second) / stiffness_;
   }

@@ -80,7 +80,7 @@ inline Mechanism arm() {
   home = home * Pose{Vec3::Zero(), rotation_about(Vec3::UnitY(), q3)} * Pose{Vec3(0.6, 0.05, 0), Mat3::Identity()};
   ExternalSpring counterbalance;
   counterbalance.name = "counterbalance";
-  counterbalance.point = "hook";
+  counterbalance.point = "arm.hook";
   counterbalance.anchor = Vec3(0, 0, 2);
   counterbalance.stiffness = 500;
   counterbalance.length = 0.5;
