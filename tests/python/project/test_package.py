@@ -1,0 +1,35 @@
+"""One version, and every documentation page is in reach of the index."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+
+import stiffmap as sm
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_one_version() -> None:
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert sm.__version__ in (declared, "0")
+    if sm.__version__ != "0":
+        assert version("stiffmap") == declared
+    cmake = re.search(r"project\(stiffmap VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())
+    assert cmake is not None and cmake.group(1) == declared
+    assert f"version: {declared}" in (ROOT / "CITATION.cff").read_text().replace('"', "")
+    assert re.search(rf"## \[?{re.escape(declared)}", (ROOT / "CHANGELOG.md").read_text())
+
+
+def test_every_public_name_is_there() -> None:
+    for name in sm.__all__:
+        assert getattr(sm, name) is not None
+
+
+def test_local_links_lead_somewhere() -> None:
+    for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")]:
+        for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
+            if not target.startswith(("http", "mailto")):
+                assert (page.parent / target).exists(), f"{page.name} -> {target}"

@@ -1,0 +1,51 @@
+"""Code cites docs/theory.md by labels that exist there, and the page names tests that exist."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
+THEORY = (ROOT / "docs/theory.md").read_text(encoding="utf-8")
+CITATION = re.compile(r"theory(?:\.md)? \(?([A-Z]\d+(?:(?:-|, )[A-Z]\d+)*)")
+
+
+def defined() -> set[str]:
+    return set(re.findall(r"(?m)^\| ([A-Z]\d+) \|", THEORY)) | set(
+        re.findall(r"\*\*([A-Z]\d+)[^*]*\*\*", THEORY)
+    )
+
+
+def cited() -> dict[str, str]:
+    found = {}
+    for folder in ("cpp", "python"):
+        for path in (ROOT / folder).rglob("*"):
+            if path.suffix not in (".hpp", ".cpp", ".py"):
+                continue
+            for group in CITATION.findall(path.read_text(encoding="utf-8")):
+                for label in re.split(r"-|, ", group):
+                    found[label] = path.name
+    return found
+
+
+def test_cited_labels_are_defined() -> None:
+    labels = cited()
+    assert len(labels) > 25
+    assert {k: v for k, v in labels.items() if k not in defined()} == {}
+
+
+def test_named_checks_exist() -> None:
+    sources = {
+        p.name: p.read_text(encoding="utf-8")
+        for p in (ROOT / "tests").rglob("*")
+        if p.suffix in (".py", ".cpp")
+    }
+    for name in re.findall(r"`(?:tests/\S*/)?(test_\w+\.(?:py|cpp))`", THEORY):
+        assert name in sources, name
+    everything = "\n".join(sources.values())
+    for table in re.findall(r"(?m)^\| R\d+ \|.*\| (.*) \|$", THEORY):
+        for case in re.findall(r"\b[a-z]+(?:_[a-z]+){2,}\b", table):
+            assert case in everything, case
+    for note in re.findall(r"\(`test_\w+\.(?:cpp|py)`[: ]([^)]*)\)", THEORY):
+        for case in re.findall(r"\b[a-z]+(?:_[a-zA-Z]+){2,}\b", note):
+            assert case in everything, case
