@@ -69,7 +69,9 @@ inline V dot(const V3& a, const V3& b) { return a.x * b.x + a.y * b.y + a.z * b.
 inline V3 cross(const V3& a, const V3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-inline V3 select(M m, const V3& a, const V3& b) { return {select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)}; }
+inline V3 select(M m, const V3& a, const V3& b) {
+  return {select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)};
+}
 
 /// Three columns.
 struct M3 {
