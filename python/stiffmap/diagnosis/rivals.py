@@ -22,7 +22,7 @@ from stiffmap.diagnosis.search import Search, additions, score
 from stiffmap.experiment.experiment import Floats
 
 LEVEL = 0.01
-ODDS, RATIO = 100.0, 1e6
+ODDS, RATIO = 100.0, 1e3
 MARGIN = 30.0
 """Rivals whose surprise is this much below the chosen effect's are refused without a full fit."""
 

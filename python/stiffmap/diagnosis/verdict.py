@@ -9,6 +9,7 @@ from os import PathLike
 import numpy as np
 from scipy.stats import chi2
 
+from stiffmap.diagnosis.alias import coarseness
 from stiffmap.diagnosis.crossval import HeldOut, held_out
 from stiffmap.diagnosis.describe import aliases_of, named_effects
 from stiffmap.diagnosis.detect import detectable
@@ -17,6 +18,7 @@ from stiffmap.diagnosis.limits import limitations, refuse
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.result import Detectability, Diagnosis, NoiseReport
 from stiffmap.diagnosis.rivals import rivals
+from stiffmap.diagnosis.search import Search, score
 from stiffmap.diagnosis.separate import separation
 from stiffmap.diagnosis.stability import SHARE, explained, steady
 from stiffmap.diagnosis.structure import Pattern, patterns
@@ -29,6 +31,8 @@ from stiffmap.experiment.predict import Predictor
 from stiffmap.experiment.summary import Summary, summary
 from stiffmap.machine import Machine, load_machine
 
+EQUAL = 2.0
+"""Difference of scores (ln) within which explanations count as equally good."""
 VIOLATED = 1e-6
 """Chance below which a model-free check, applied to what the effects leave, refuses the verdict."""
 
@@ -117,10 +121,11 @@ def _assemble(
     seed: int,
     seconds: dict[str, float],
 ) -> Diagnosis:
-    e, model, search = s.experiment, finding.model, finding.search
+    e, search = s.experiment, finding.search
+    model, other = coarsest_first(s, search, finding.model)
+    finding = replace(finding, selection=replace(finding.selection, model=model))
     before = e.reading - s.plan.base
     after = e.reading - s.predictor(model.terms())
-    other = rivals(search, model, s.classes) if model.candidates else []
     if other and verdict == "effects":
         verdict = "ambiguous"
     inflation = max(1.0, float(np.sqrt(model.chi2 / max(search.problem.freedom, 1)))) if left else 1.0
@@ -130,8 +135,8 @@ def _assemble(
     return Diagnosis(
         verdict=verdict,
         effects=named_effects(s, search, model, inflation),
-        alternatives=[named_effects(s, search, r.model, inflation) for r in other],
-        separations=[separation(s, model, r.model, seed) for r in other],
+        alternatives=[named_effects(s, search, m, inflation) for m in other],
+        separations=[separation(s, model, m, seed) for m in other],
         before=sums[0],
         after=sums[1],
         held_out=held,
@@ -163,6 +168,23 @@ def _assemble(
         empirical=empirical(e, np.where(keep[:, None], after, np.nan), s.noise.sigma, seed) if left else None,
         seconds=seconds,
     )
+
+
+def coarsest_first(s: Study, search: Search, model: Model) -> tuple[Model, list[Model]]:
+    """The explanation that leads, and the rivals that stay.
+
+    Of those that the readings find equally good (scores within `EQUAL`) the coarsest physical part
+    leads, by the rule of representatives; else the best does.
+    """
+    other = [r.model for r in rivals(search, model, s.classes)]
+    top = score(model, search.problem)
+    equal = [m for m in other if top - score(m, search.problem) < EQUAL]
+
+    def key(m: Model) -> tuple[int, list[tuple[int, int, int]]]:
+        return len(m.values), sorted(coarseness(c, len(c.parameters), s.description) for c in m.candidates)
+
+    first = min([model, *equal], key=key)
+    return first, [m for m in (model, *other) if m is not first]
 
 
 def predicted_machine(s: Study, model: Model) -> Machine:
