@@ -71,7 +71,9 @@ def test_known_deflection_sets(
     if place is None:
         assert d.verdict == "none" and not d.effects and not d.unexplained
         return
-    assert d.verdict == "effects" and only(d) == place
+    # Play of a drive and clearance of the joint behind it may be told apart by nothing in the plan:
+    # the truth must lead, and a rival may only make the verdict "ambiguous".
+    assert d.verdict in ("effects", "ambiguous") and only(d) == place
     assert holds(d, parameter, truth)
     assert d.after.ratio <= 1.05
 
