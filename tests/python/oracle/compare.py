@@ -9,10 +9,8 @@ from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
 
-from .energy import Oracle
 from .generate import Generator
-
-GRAVITY = (0.0, 0.0, -9.81)
+from .minimise import Oracle
 
 
 @dataclass(frozen=True)
@@ -24,26 +22,43 @@ class Comparison:
     rotation: float
     compliance: float
     residual: float
+    stable: bool
+    """Of the minimiser: a minimum of the energy."""
+
+    @property
+    def gap(self) -> float:
+        """The largest of the differences."""
+        return max(self.translation, self.rotation, self.compliance)
 
 
 def compare(seed: int, methods: tuple[str, ...] = ("reference", "fast")) -> list[Comparison]:
-    """Machine, force and gravity of `seed`: solved by each method and by energy minimisation."""
-    description = Generator(seed).machine()
-    rng = np.random.default_rng(10_000 + seed)
-    force = rng.normal(size=3) * 300
-    gravity = GRAVITY if rng.random() < 0.5 else (0.0, 0.0, 0.0)
+    """Machine and loads of `seed`: solved by each method and by energy minimisation."""
+    generator = Generator(seed)
+    description = generator.machine()
+    loads = generator.loads(description)
     machine = sm.Machine(description)
-    truth = Oracle(description, gravity).solve(force)
+    truth = Oracle(description, loads).solve()
     moved = truth.position - description.home.p
     turned = Rotation.from_matrix(truth.rotation @ description.home.r.T).as_rotvec()
     out = []
     for method in methods:
-        wrench = [*force, 0, 0, 0]
-        s = machine.solve(description.home.p, wrench, gravity=gravity, method=method, threads=1)
-        scale = np.sqrt(np.diag(s.compliance))
+        s = machine.solve(
+            description.home.p,
+            [*loads.force, *loads.moment],
+            load_type="semitangential" if loads.moment.any() else "dead",
+            wrenches={n: [*f, 0, 0, 0] for n, f in loads.at_points.items()},
+            gravity=loads.gravity,
+            method=method,
+            threads=1,
+        )
+        scale = np.sqrt(np.abs(np.diag(s.compliance)))
         gap = np.abs(s.compliance[:, :3] - truth.compliance) / np.outer(scale, scale[:3])
         translation = np.abs(s.displacement[:3] - moved).max() / np.abs(moved).max()
         rotation = np.abs(s.displacement[3:] - turned).max() / np.abs(turned).max()
         status = sm.Status(int(s.status))
-        out.append(Comparison(status, float(translation), float(rotation), float(gap.max()), truth.residual))
+        out.append(
+            Comparison(
+                status, float(translation), float(rotation), float(gap.max()), truth.residual, truth.stable
+            )
+        )
     return out

@@ -1,4 +1,5 @@
-"""Random machines that close at home: legs, nested blocks, springs, laws, bodies, errors, preload."""
+"""Random machines that close at home: legs, nested blocks, joints of every kind, springs, laws, bodies,
+points, errors, preload; and random loads on them."""
 
 from __future__ import annotations
 
@@ -15,9 +16,16 @@ from stiffmap.description import (
     Leg,
     MachineDescription,
     Offset,
+    Point,
     Pose,
     Spring,
 )
+from stiffmap.files.names import point_names
+
+from .energy import Loads
+
+AXES = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 3}
+GRAVITY = np.array([0.0, 0.0, -9.81])
 
 
 class Generator:
@@ -62,9 +70,30 @@ class Generator:
         k = (k + k.T) / 2
         return Spring(name, stiffness=tuple(map(tuple, k.tolist())), rest=tuple(rest.tolist()))
 
-    def _joint(self, name: str) -> Joint:
-        kind = "revolute" if self.rng.random() < 0.75 else "prismatic"
-        return Joint(name, kind, (self._axis(),), (float(self.rng.uniform(-0.4, 0.4)),))
+    def loads(self, description: MachineDescription) -> Loads:
+        """Force at the tip, forces at most points; in half of the cases gravity, in a third a semitangential
+        moment (which the fast path leaves to the reference path)."""
+        force, moment = self.rng.normal(size=3) * 300, self.rng.normal(size=3) * 15
+        moment = moment if self.rng.random() < 1 / 3 else np.zeros(3)
+        gravity = GRAVITY if self.rng.random() < 0.5 else np.zeros(3)
+        named = [n for n in point_names(description) if self.rng.random() < 0.7]
+        return Loads(force, moment, gravity, {n: self.rng.normal(size=3) * 100 for n in named})
+
+    def _joint(self, name: str, kind: str) -> Joint:
+        n = AXES[kind]
+        axes = [np.array(self._axis()) for _ in range(n)]
+        if n > 1:  # consecutive axes at right angles, the third away from the first
+            axes = list(Rotation.random(random_state=self.rng).as_matrix()[:n])
+        home = tuple(float(v) for v in self.rng.uniform(-0.4, 0.4, n))
+        return Joint(name, kind, tuple((float(a[0]), float(a[1]), float(a[2])) for a in axes), home)
+
+    def _joints(self, freedoms: int) -> list[str]:
+        """Kinds of passive joints with so many freedoms together."""
+        if freedoms == 3 and self.rng.random() < 0.3:
+            return ["spherical"]
+        if freedoms >= 2 and self.rng.random() < 0.3:
+            return ["universal", *self._joints(freedoms - 2)]
+        return ["revolute" if self.rng.random() < 0.75 else "prismatic" for _ in range(freedoms)]
 
     def _drive(self, name: str) -> Joint:
         cubic = 1e14 if self.rng.random() < 0.3 else 0.0
@@ -73,10 +102,11 @@ class Generator:
 
     def _leg(self, target: Pose) -> tuple[Element, ...]:
         out: list[Element] = [self._offset("start")]
-        parts = ["drive", "spring", *["joint"] * int(self.rng.integers(1, 4))]
+        parts = ["drive", "spring", *self._joints(int(self.rng.integers(1, 4)))]
         parts += ["spring"] if self.rng.random() < 0.5 else []
         parts += ["block"] if self.rng.random() < 0.5 else []
         parts += ["body"] if self.rng.random() < 0.5 else []
+        parts += ["point"] if self.rng.random() < 0.4 else []
         for i, part in enumerate(self.rng.permutation(parts)):
             out += [self._element(str(part), f"{part}{i}"), self._offset(f"link{i}")]
         return (*out, Offset("attach", end_of(out).inverse() @ target))
@@ -84,9 +114,11 @@ class Generator:
     def _element(self, part: str, name: str) -> Element:
         if part == "body":
             return Body(name, float(self.rng.uniform(0.5, 4)), self._vector(0.1))
-        if part == "block":
-            return self._block(name)
-        return {"drive": self._drive, "spring": self._spring, "joint": self._joint}[part](name)
+        if part == "point":
+            return Point(name, self._vector(0.1))
+        if part in AXES:
+            return self._joint(name, part)
+        return {"drive": self._drive, "spring": self._spring, "block": self._block}[part](name)
 
     def _block(self, name: str) -> Block:
         end = self._pose(0.3)
@@ -94,7 +126,7 @@ class Generator:
         for i in range(2):
             inner: list[Element] = [self._offset("in"), self._spring("bar")]
             if self.rng.random() < 0.6:
-                inner.insert(1, self._joint("pin"))
+                inner.insert(1, self._joint("pin", "revolute"))
             inner.append(Offset("out", end_of(inner).inverse() @ end))
             branches.append(Branch(f"{name}_{i}", tuple(inner)))
         return Block(name, tuple(branches))
