@@ -19,12 +19,12 @@ import numpy as np
 
 import stiffmap as sm
 from stiffmap.diagnosis.candidates import Candidate
-from stiffmap.diagnosis.problem import Problem
 from stiffmap.diagnosis.rivals import rivals
 from stiffmap.diagnosis.screen import Screen
 from stiffmap.diagnosis.study import Study, find, study
 from stiffmap.diagnosis.verdict import judge, unexplained
 from stiffmap.experiment import Experiment, Predictor, random_plan, simulate
+from stiffmap.experiment.problem import Problem
 
 SIZES = (1.0, 3.0, 10.0)
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from stiffmap.diagnosis.model import Model, tangent_step
-from stiffmap.diagnosis.problem import Problem
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.predict import Predictor
+from stiffmap.experiment.problem import Problem
 
 PAYS = 1e-3
 """Change of chi-square that is not worth another step."""

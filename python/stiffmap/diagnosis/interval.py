@@ -9,9 +9,9 @@ from scipy.stats import chi2
 
 from stiffmap.diagnosis.fit import fit
 from stiffmap.diagnosis.model import Model
-from stiffmap.diagnosis.problem import Problem
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.predict import Predictor
+from stiffmap.experiment.problem import Problem
 
 RISE = float(chi2.isf(0.05, 1))
 

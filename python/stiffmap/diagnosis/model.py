@@ -9,8 +9,8 @@ import numpy as np
 
 from stiffmap.description import AppliedEffect
 from stiffmap.diagnosis.candidates import Candidate
-from stiffmap.diagnosis.problem import basis
 from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.problem import basis
 
 STEP = 1e-3  # of a parameter's scale, for tangents
 

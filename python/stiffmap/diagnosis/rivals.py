@@ -17,9 +17,9 @@ from scipy.stats import t as student
 from stiffmap.diagnosis.alias import AliasClass
 from stiffmap.diagnosis.fit import fit
 from stiffmap.diagnosis.model import Model
-from stiffmap.diagnosis.problem import Problem
 from stiffmap.diagnosis.search import Search, additions, score
 from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.problem import Problem
 
 LEVEL = 0.01
 ODDS, RATIO = 100.0, 1e3

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 from scipy.stats import chi2
 
-from stiffmap.diagnosis.problem import Problem
 from stiffmap.diagnosis.sensitivity import Variant
 from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.problem import Problem
 
 VISIBLE = 0.03
 """Whitened length per scale below which a parameter is not seen: 100 scales would make 3 sigma."""

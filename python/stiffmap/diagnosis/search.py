@@ -11,12 +11,12 @@ from stiffmap.diagnosis.candidates import Candidate
 from stiffmap.diagnosis.fit import evaluate, fit
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.periodic import is_periodic
-from stiffmap.diagnosis.problem import Problem
 from stiffmap.diagnosis.screen import Screen, log_surprise
 from stiffmap.diagnosis.sensitivity import Variant
 from stiffmap.diagnosis.significance import ALPHA, needed
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.predict import Predictor
+from stiffmap.experiment.problem import Problem
 
 MOST_EFFECTS = 4
 LARGE = 10.0

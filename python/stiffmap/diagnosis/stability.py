@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from stiffmap.diagnosis.model import Model
-from stiffmap.diagnosis.problem import Problem
 from stiffmap.experiment.experiment import Integers
+from stiffmap.experiment.problem import Problem
 
 STEADY = 0.35
 """Largest relative change of an effect between halves of the data beside an unexplained rest."""

@@ -13,9 +13,9 @@ from itertools import combinations_with_replacement
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.diagnosis.problem import Problem, basis
 from stiffmap.diagnosis.significance import ALPHA
 from stiffmap.experiment.experiment import AXES, Floats
+from stiffmap.experiment.problem import Problem, basis
 
 Features = list[tuple[str, Floats]]
 

@@ -10,7 +10,6 @@ from stiffmap.description import MachineDescription
 from stiffmap.diagnosis.alias import AliasClass, alias_classes
 from stiffmap.diagnosis.fit import evaluate
 from stiffmap.diagnosis.model import Model
-from stiffmap.diagnosis.problem import Problem
 from stiffmap.diagnosis.screen import Screen
 from stiffmap.diagnosis.search import Search, Selection, select
 from stiffmap.diagnosis.sensitivity import Plan, plan_of
@@ -19,6 +18,7 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise import Mask, Noise, noise_of
 from stiffmap.experiment.outliers import outliers, suspects
 from stiffmap.experiment.predict import Predictor
+from stiffmap.experiment.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)

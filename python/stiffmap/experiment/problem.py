@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.diagnosis.nuisance import nuisance_columns
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.nuisance import nuisance_columns
 
 Mask = NDArray[np.bool_]
 
