@@ -2,11 +2,13 @@
 # symbol: objects of one source for several levels must not meet in one link.
 include(CheckCXXCompilerFlag)
 
-function(stiffmap_kernel level lanes)
-  set(target stiffmap_kernel_${level})
+# Each wide level has a narrow companion for calls on one or two poses: `name` is the level or the level and _pair.
+function(stiffmap_kernel name lanes)
+  set(target stiffmap_kernel_${name})
+  string(REPLACE "_pair" "" level ${name})
   add_library(${target} SHARED ${PROJECT_SOURCE_DIR}/cpp/kernels/kernel.cpp)
   target_compile_definitions(${target} PRIVATE
-    STIFFMAP_LANES=${lanes} STIFFMAP_LEVEL="${level}" STIFFMAP_ENTRY=stiffmap_kernel_${level})
+    STIFFMAP_LANES=${lanes} STIFFMAP_LEVEL="${level}" STIFFMAP_ENTRY=${target})
   target_compile_options(${target} PRIVATE -fno-math-errno -fno-trapping-math -ffp-contract=fast -fno-semantic-interposition
     $<$<CONFIG:Release>:-O3> ${ARGN})
   stiffmap_compile_options(${target})
@@ -22,7 +24,9 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   check_cxx_compiler_flag(-march=x86-64-v4 STIFFMAP_HAS_LEVELS)
   if(STIFFMAP_HAS_LEVELS)
     stiffmap_kernel(v3 4 -march=x86-64-v3)
+    stiffmap_kernel(v3_pair 2 -march=x86-64-v3)
     stiffmap_kernel(v4 8 -march=x86-64-v4 -mprefer-vector-width=512)
-    list(APPEND STIFFMAP_KERNELS stiffmap_kernel_v3 stiffmap_kernel_v4)
+    stiffmap_kernel(v4_pair 2 -march=x86-64-v4)
+    list(APPEND STIFFMAP_KERNELS stiffmap_kernel_v3 stiffmap_kernel_v3_pair stiffmap_kernel_v4 stiffmap_kernel_v4_pair)
   endif()
 endif()

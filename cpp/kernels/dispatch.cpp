@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "dispatch.hpp"
 
-#include <array>
 #include <cstdlib>
 
 #include "stiffmap/check.hpp"
@@ -9,7 +8,9 @@
 extern "C" void stiffmap_kernel_base(stiffmap::KernelTable*);
 #ifdef STIFFMAP_X86_LEVELS
 extern "C" void stiffmap_kernel_v3(stiffmap::KernelTable*);
+extern "C" void stiffmap_kernel_v3_pair(stiffmap::KernelTable*);
 extern "C" void stiffmap_kernel_v4(stiffmap::KernelTable*);
+extern "C" void stiffmap_kernel_v4_pair(stiffmap::KernelTable*);
 #endif
 
 namespace stiffmap {
@@ -22,37 +23,51 @@ KernelTable table_of(void (*entry)(KernelTable*)) {
   return t;
 }
 
-/// Usable tables, lowest level first. Filling a table runs no vector code.
-const std::vector<KernelTable>& tables() {
-  static const std::vector<KernelTable> all = [] {
-    std::vector<KernelTable> out{table_of(&stiffmap_kernel_base)};
+struct Level {
+  KernelTable wide, pair;
+};
+
+/// Usable levels, lowest first. Filling a table runs no vector code.
+const std::vector<Level>& levels() {
+  static const std::vector<Level> all = [] {
+    const KernelTable base = table_of(&stiffmap_kernel_base);
+    std::vector<Level> out{{base, base}};
 #ifdef STIFFMAP_X86_LEVELS
-    if (__builtin_cpu_supports("x86-64-v3")) out.push_back(table_of(&stiffmap_kernel_v3));
-    if (__builtin_cpu_supports("x86-64-v4")) out.push_back(table_of(&stiffmap_kernel_v4));
+    if (__builtin_cpu_supports("x86-64-v3"))
+      out.push_back({table_of(&stiffmap_kernel_v3), table_of(&stiffmap_kernel_v3_pair)});
+    if (__builtin_cpu_supports("x86-64-v4"))
+      out.push_back({table_of(&stiffmap_kernel_v4), table_of(&stiffmap_kernel_v4_pair)});
 #endif
     return out;
   }();
   return all;
 }
 
+const Level& chosen() {
+  const char* wanted = std::getenv("STIFFMAP_ISA");
+  if (!wanted || !*wanted) return levels().back();
+  std::string known;
+  for (const Level& l : levels()) {
+    if (wanted == std::string(l.wide.level)) return l;
+    known += (known.empty() ? "" : ", ") + std::string(l.wide.level);
+  }
+  require(false, "STIFFMAP_ISA", "a level of this processor (" + known + ")", wanted);
+  return levels().back();
+}
+
 }  // namespace
 
 std::vector<std::string> kernel_levels() {
   std::vector<std::string> out;
-  for (const KernelTable& t : tables()) out.emplace_back(t.level);
+  for (const Level& l : levels()) out.emplace_back(l.wide.level);
   return out;
 }
 
-const KernelTable& kernel() {
-  const char* wanted = std::getenv("STIFFMAP_ISA");
-  if (!wanted || !*wanted) return tables().back();
-  std::string known;
-  for (const KernelTable& t : tables()) {
-    if (wanted == std::string(t.level)) return t;
-    known += (known.empty() ? "" : ", ") + std::string(t.level);
-  }
-  require(false, "STIFFMAP_ISA", "a level of this processor (" + known + ")", wanted);
-  return tables().back();
+const KernelTable& kernel() { return chosen().wide; }
+
+const KernelTable& kernel(std::int64_t count) {
+  const Level& level = chosen();
+  return count <= level.pair.lanes ? level.pair : level.wide;
 }
 
 }  // namespace stiffmap

@@ -16,4 +16,7 @@ std::vector<std::string> kernel_levels();
 /// unknown or that this processor cannot run.
 const KernelTable& kernel();
 
+/// The same for a call on `count` poses: one or two take the level's two-lane build, which gives the same bits.
+const KernelTable& kernel(std::int64_t count);
+
 }  // namespace stiffmap

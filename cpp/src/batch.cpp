@@ -107,6 +107,17 @@ KernelInput kernel_input(const Mechanism& m, const BatchInput& in, const SolveOp
   return k;
 }
 
+/// Memory of the calling thread, kept for its next call: a new piece costs more page faults than a pose.
+void* kernel_scratch(std::int64_t bytes) {
+  thread_local std::unique_ptr<char[]> memory;
+  thread_local std::int64_t size = 0;
+  if (bytes > size) {
+    memory = std::make_unique_for_overwrite<char[]>(static_cast<std::size_t>(bytes));
+    size = bytes;
+  }
+  return memory.get();
+}
+
 /// Fills what the kernels leave out for the poses that they did.
 void complete(const Mechanism& m, Index i, const BatchOutput& out) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -136,7 +147,7 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
     if (out.variants) Eigen::Map<VecX>(out.variants, n).setConstant(std::nan(""));
     return solve_reference(m, in, options, threads, out);
   }
-  const KernelTable& table = kernel();
+  const KernelTable& table = kernel(in.count);
   const Program& program = plan.program();
   std::vector<const Program*> variants;
   for (const FastPlan* v : in.variants) {
@@ -158,15 +169,12 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
                             flags.data(),
                             out.iterations};
   struct Scratch {
-    std::unique_ptr<char[]> memory;
     std::vector<double> start;
     Reference reference;
   };
   std::vector<Scratch> scratch(at(std::max(1, threads)));
   parallel_chunks(in.count, fast_chunk, threads, [&](int thread, long begin, long end) {
     Scratch& s = scratch[static_cast<std::size_t>(thread)];
-    if (!s.memory)
-      s.memory = std::make_unique_for_overwrite<char[]>(static_cast<std::size_t>(table.scratch_size(&program)));
     KernelInput input = kernel_input(m, in, options);
     input.perturbed = variants.data();
     input.perturbed_count = out.variants ? static_cast<std::int32_t>(variants.size()) : 0;
@@ -175,7 +183,7 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
       for (long i = begin; i < end; ++i) s.reference.close(m, in, i, s.start.data() + m.size() * (i - begin));
       input.start = s.start.data() - m.size() * begin;
     }
-    table.run(&program, &input, &answer, begin, end, s.memory.get());
+    table.run(&program, &input, &answer, begin, end, kernel_scratch(table.scratch_size(&program)));
     for (long i = begin; i < end; ++i) {
       if (!done[static_cast<std::size_t>(i)]) {
         s.reference.solve(m, in, options, i, out);

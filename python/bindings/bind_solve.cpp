@@ -2,14 +2,11 @@
 #include <pybind11/stl.h>
 
 #include "../../cpp/kernels/dispatch.hpp"
-#include "arrays.hpp"
-#include "stiffmap/batch.hpp"
+#include "answer.hpp"
 #include "stiffmap/parallel.hpp"
 
 namespace stiffmap::bindings {
 namespace {
-
-using Shape = std::vector<py::ssize_t>;
 
 py::array_t<double> empty(const Shape& shape) { return py::array_t<double>(shape); }
 
@@ -19,58 +16,11 @@ std::vector<Index> point_indices(const Mechanism& m, const std::vector<std::stri
   return out;
 }
 
-/// Arrays of one call; every array has the pose as its leading axis.
-struct Answer {
-  Answer(const Mechanism& m, py::ssize_t n, py::ssize_t reads, bool full)
-      : displacement(Shape{n, reads, 6}), status(n), flags(n), iterations(n) {
-    const py::ssize_t legs = static_cast<py::ssize_t>(m.legs.size()), k = full ? n : 0;
-    for (py::array_t<double>* a : {&stiffness, &compliance, &free_twists}) *a = empty({k, 6, 6});
-    effort = empty({k, static_cast<py::ssize_t>(m.drives.size())});
-    leg_wrench = empty({k, legs, 6});
-    coordinates = empty({k, m.size()});
-    indeterminate = py::array_t<std::uint8_t>(Shape{k, m.size()});
-    out.displacement = displacement.mutable_data();
-    out.status = status.mutable_data();
-    out.flags = flags.mutable_data();
-    out.iterations = iterations.mutable_data();
-    if (!full) return;
-    out.stiffness = stiffness.mutable_data();
-    out.compliance = compliance.mutable_data();
-    out.free_twists = free_twists.mutable_data();
-    out.effort = effort.mutable_data();
-    out.leg_wrench = leg_wrench.mutable_data();
-    out.coordinates = coordinates.mutable_data();
-    out.indeterminate = indeterminate.mutable_data();
-  }
-
-  py::dict dict() const {
-    py::dict d;
-    d["displacement"] = displacement;
-    d["stiffness"] = stiffness;
-    d["compliance"] = compliance;
-    d["free_twists"] = free_twists;
-    d["actuator_effort"] = effort;
-    d["leg_wrench"] = leg_wrench;
-    d["coordinates"] = coordinates;
-    d["indeterminate"] = indeterminate;
-    d["status"] = status;
-    d["flags"] = flags;
-    d["iterations"] = iterations;
-    return d;
-  }
-
-  py::array_t<double> displacement, stiffness, compliance, free_twists, effort, leg_wrench, coordinates;
-  py::array_t<std::uint8_t> indeterminate, status;
-  py::array_t<std::uint32_t> flags;
-  py::array_t<std::int32_t> iterations;
-  BatchOutput out;
-};
-
 /// All poses in one call: by the kernels where a plan is given, else by the reference path.
-py::dict solve(const Mechanism& m, const FastPlan* plan, const Array& position, const Array& rotation,
-               const Array& wrench, const std::vector<std::string>& load_points, const std::vector<int>& load_types,
-               const std::vector<std::string>& read_points, const Array& gravity, int load_steps, int threads,
-               bool full, const std::vector<const FastPlan*>& variants) {
+Answer solve(const Mechanism& m, const FastPlan* plan, const Array& position, const Array& rotation,
+             const Array& wrench, const std::vector<std::string>& load_points, const std::vector<int>& load_types,
+             const std::vector<std::string>& read_points, const Array& gravity, int load_steps, int threads, bool full,
+             const std::vector<const FastPlan*>& variants) {
   const py::ssize_t n = position.ndim() ? position.shape(0) : 0;
   BatchInput in;
   in.count = n;
@@ -86,14 +36,9 @@ py::dict solve(const Mechanism& m, const FastPlan* plan, const Array& position, 
     const NodePoint& p = m.points[static_cast<std::size_t>(at[i])];
     in.load_points.push_back({p.node, p.offset, static_cast<LoadType>(load_types[i])});
   }
-  Answer answer(m, n, static_cast<py::ssize_t>(read_points.size()), full);
-  const py::ssize_t moved = static_cast<py::ssize_t>(variants.size());
-  auto varied = empty({moved ? n : 0, moved, 6});
-  if (moved) {
-    in.variants = variants;
-    answer.out.variants = varied.mutable_data();
-    if (!plan) std::fill(varied.mutable_data(), varied.mutable_data() + varied.size(), std::nan(""));
-  }
+  Answer answer(m, n, static_cast<py::ssize_t>(read_points.size()), static_cast<py::ssize_t>(variants.size()), full);
+  in.variants = variants;
+  if (!plan) std::fill_n(answer.variants.mutable_data(), answer.variants.size(), std::nan(""));
   SolveOptions options;
   options.equilibrium.load_steps = load_steps;
   options.stiffness = full;
@@ -102,16 +47,7 @@ py::dict solve(const Mechanism& m, const FastPlan* plan, const Array& position, 
     if (plan) solve_fast(m, *plan, in, options, threads, answer.out);
     else solve_reference(m, in, options, threads, answer.out);
   }
-  py::dict d = answer.dict();
-  d["variants"] = varied;
-  return d;
-}
-
-template <class T, class Get>
-std::vector<std::string> names(const std::vector<T>& items, Get get) {
-  std::vector<std::string> out;
-  for (const T& item : items) out.push_back(get(item));
-  return out;
+  return answer;
 }
 
 /// Coordinates and tip poses by closure: from poses, or from actuators.
@@ -174,74 +110,20 @@ void bind_solve(py::module_& m) {
   using namespace py::literals;
   m.def("kernel_levels", &kernel_levels);
   m.def("kernel_level", [] { return std::string(kernel().level); });
-  py::class_<Mechanism> mechanism(m, "Mechanism");  // before the signatures that name it
-  py::class_<FastPlan>(m, "FastPlan")
-      .def(py::init([](const Mechanism& k, const Array& low, const Array& high) {
-             const Vec3 a = Eigen::Map<const Vec3>(data(low, {3}, "low")),
-                        b = Eigen::Map<const Vec3>(data(high, {3}, "high"));
-             py::gil_scoped_release free;
-             return std::make_unique<FastPlan>(k, a, b);
-           }),
-           "mechanism"_a, "low"_a, "high"_a)
-      .def_property_readonly("available", &FastPlan::available)
-      .def_property_readonly("missing", &FastPlan::missing);
-  mechanism.def(py::init(&assemble), "root"_a, "home"_a, "springs"_a, "task"_a = full_task)
-      .def_property_readonly(
-          "coordinates",
-          [](const Mechanism& k) { return names(k.coordinates, [](const Coordinate& c) { return c.name; }); })
-      .def_property_readonly("roles",
-                             [](const Mechanism& k) {
-                               std::vector<int> out;
-                               for (const Coordinate& c : k.coordinates) out.push_back(static_cast<int>(c.role));
-                               return out;
-                             })
-      .def_property_readonly("prismatic",
-                             [](const Mechanism& k) {
-                               std::vector<bool> out;
-                               for (const Coordinate& c : k.coordinates) out.push_back(c.type == JointType::prismatic);
-                               return out;
-                             })
-      .def_property_readonly("locked",
-                             [](const Mechanism& k) {
-                               std::vector<bool> out;
-                               for (const Coordinate& c : k.coordinates) out.push_back(c.locked);
-                               return out;
-                             })
-      .def_property_readonly("springs",
-                             [](const Mechanism& k) {
-                               std::vector<std::pair<std::string, Index>> out;
-                               for (const SpringGroup& g : k.groups) out.emplace_back(g.name, g.first);
-                               return out;
-                             })
-      .def_property_readonly("actuators",
-                             [](const Mechanism& k) {
-                               std::vector<std::pair<std::string, Index>> out;
-                               for (const Drive& d : k.drives) out.emplace_back(d.name, d.coordinate);
-                               return out;
-                             })
-      .def_property_readonly("nodes",
-                             [](const Mechanism& k) {
-                               std::vector<std::pair<Index, Index>> out;  // parent, coordinate
-                               for (const Node& n : k.nodes) out.emplace_back(n.parent, n.coordinate);
-                               return out;
-                             })
-      .def_property_readonly("loops",
-                             [](const Mechanism& k) {
-                               std::vector<std::tuple<std::string, std::string, Index, Index>> out;
-                               for (const Loop& l : k.loops) out.emplace_back(l.block, l.branch, l.primary, l.end);
-                               return out;
-                             })
-      .def_property_readonly(
-          "points", [](const Mechanism& k) { return names(k.points, [](const NodePoint& p) { return p.name; }); })
-      .def_property_readonly("legs", [](const Mechanism& k) { return k.legs; })
-      .def_readonly("length", &Mechanism::length)
-      .def_readonly("stiffness", &Mechanism::stiffness)
-      .def("home_coordinates",
-           [](const Mechanism& k) {
-             py::array_t<double> out(k.size());
-             Eigen::Map<VecX>(out.mutable_data(), k.size()) = k.home_coordinates;
-             return out;
-           })
+  py::class_<Answer>(m, "Answer")
+      .def_readonly("displacement", &Answer::displacement)
+      .def_readonly("stiffness", &Answer::stiffness)
+      .def_readonly("compliance", &Answer::compliance)
+      .def_readonly("free_twists", &Answer::free_twists)
+      .def_readonly("actuator_effort", &Answer::effort)
+      .def_readonly("leg_wrench", &Answer::leg_wrench)
+      .def_readonly("coordinates", &Answer::coordinates)
+      .def_readonly("indeterminate", &Answer::indeterminate)
+      .def_readonly("status", &Answer::status)
+      .def_readonly("flags", &Answer::flags)
+      .def_readonly("iterations", &Answer::iterations)
+      .def_readonly("variants", &Answer::variants);
+  py::class_<Mechanism>(m.attr("Mechanism"))
       .def("solve", &solve, "plan"_a.none(true), "position"_a, "rotation"_a, "wrench"_a, "load_points"_a,
            "load_types"_a, "read_points"_a, "gravity"_a, "load_steps"_a, "threads"_a, "full"_a,
            "variants"_a = std::vector<const FastPlan*>{})

@@ -16,7 +16,7 @@ def trailing(values: ArrayLike, shape: tuple[int, ...], name: str, what: str) ->
     """Float array whose last axes have `shape`; StiffmapError otherwise."""
     try:
         out = np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as problem:
+    except (TypeError, ValueError, OverflowError) as problem:
         raise StiffmapError(f"{name}: expected {what}, got {type(values).__name__} ({problem})") from None
     n = len(shape)
     if out.ndim < n or out.shape[out.ndim - n :] != shape:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from stiffmap.broadcasting import Floats
 from stiffmap.description import MachineDescription
 from stiffmap.errors import StiffmapError
+from stiffmap.solution import Solution
+from stiffmap.solving import Call
+from stiffmap.variants import solve_varied
+
+if TYPE_CHECKING:
+    from stiffmap.machine import Machine
 
 Request = tuple[str, Mapping[str, Any]]
 STEP = 2e-3  # of a typical scale: truncation and round-off are both below 1e-7 there
@@ -28,6 +34,44 @@ class Variation:
     weights: tuple[float, ...]
 
 
+@dataclass(frozen=True)
+class Prepared:
+    """A machine with every requested effect, and the machines with one parameter moved."""
+
+    base: Machine
+    variations: tuple[Variation, ...]
+    moved: tuple[Machine, ...]
+
+
+def differentiate(machine: Machine, call: Call, requests: Sequence[Request]) -> Solution:
+    """Answer of the machine with all the effects of `requests`, with its derivatives."""
+    ready = machine._prepared(requests)
+    solution, varied = solve_varied(ready.base, call, ready.moved)
+    out, i = {}, 0
+    for v in ready.variations:
+        n = len(v.descriptions)
+        out[v.name] = combine(v, solution.displacement, varied[..., i : i + n, :])
+        i += n
+    return solution._with_derivatives(out)
+
+
+def prepare(machine: Machine, requests: Sequence[Request]) -> Prepared:
+    """Compiles what the derivatives need; independent of poses and loads."""
+    base, variations = base_and_variations(machine.description, requests)
+    make = type(machine)
+    moved = tuple(make(d) for v in variations for d in v.descriptions)
+    return Prepared(make(base), tuple(variations), moved)
+
+
+def request_key(requests: Sequence[Request]) -> str:
+    """Equal for equal requests."""
+    return repr([(r[0], sorted(r[1].items())) if _well_formed(r) else r for r in requests])
+
+
+def _well_formed(request: Any) -> bool:
+    return len(request) == 2 and isinstance(request[1], Mapping)
+
+
 def base_and_variations(
     description: MachineDescription, requests: Sequence[Request]
 ) -> tuple[MachineDescription, list[Variation]]:
@@ -39,7 +83,7 @@ def base_and_variations(
     from stiffmap.effects import get
 
     for request in requests:
-        if len(request) != 2 or not isinstance(request[1], Mapping):
+        if not _well_formed(request):
             raise StiffmapError(f"derivatives: expected (kind, {{parameter: value, ...}}), got {request!r}")
     base = _with_all(description, requests)
     out = []

@@ -11,6 +11,8 @@ from stiffmap import _core
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
+from stiffmap.rotations import check_rotations
+from stiffmap.solving import gravity_vector
 from stiffmap.status import Status
 
 
@@ -84,7 +86,7 @@ def imposed_displacement(
     d = trailing(displacement, (6,), "displacement", "displacements [dx dy dz rx ry rz] (m, rad)")
     home = machine.description.home.r
     r = trailing(home if rotation is None else rotation, (3, 3), "rotation", "rotation matrices")
-    machine._check_rotation(r)
+    check_rotations(r)
     if point not in machine.points:
         raise StiffmapError(f"point: expected one of {', '.join(machine.points)}, got {point!r}")
     shape = batch(p.shape[:-1], d.shape[:-1], r.shape[:-2])
@@ -94,7 +96,7 @@ def imposed_displacement(
         rows(r, shape, (3, 3)),
         rows(d, shape, (6,)),
         point,
-        machine._gravity(gravity),
+        gravity_vector(machine, gravity),
         thread_count(threads),
     )
     arrays = {name: values.reshape(shape + values.shape[1:]) for name, values in out.items()}

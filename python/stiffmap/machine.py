@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -11,19 +10,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap._core import FastPlan, Mechanism
-from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing, wrench_array
-from stiffmap.derivatives import Request, base_and_variations, combine
+from stiffmap._core import FastPlan, Mechanism, OneCall
+from stiffmap.broadcasting import Floats
+from stiffmap.derivatives import Prepared, Request, differentiate, prepare, request_key
 from stiffmap.description import MachineDescription
 from stiffmap.errors import StiffmapError
 from stiffmap.lowering import build_mechanism
 from stiffmap.names import Names, names_of
+from stiffmap.recent import Recent
 from stiffmap.solution import Solution
+from stiffmap.solving import Call, gravity_vector, solve_call
 
 if TYPE_CHECKING:
     from stiffmap.inverse import HeldMachine
 
-LOAD_TYPES = {"dead": 0, "follower": 1, "semitangential": 2}
+MOST_PREPARED = 4  # sets of derivatives whose machines are kept
 
 
 class Machine:
@@ -63,6 +64,17 @@ class Machine:
         box = self._description.workspace
         low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))
         return FastPlan(self._core, np.array(low), np.array(high))
+
+    @cached_property
+    def _one(self) -> OneCall:
+        return OneCall(self._core, self._plan, self._home_rotation, gravity_vector(self, None))
+
+    @cached_property
+    def _derivable(self) -> Recent[Prepared]:
+        return Recent(MOST_PREPARED)
+
+    def _prepared(self, requests: Sequence[Request]) -> Prepared:
+        return self._derivable.get(request_key(requests), lambda: prepare(self, requests))
 
     @property
     def fast(self) -> str:
@@ -154,24 +166,23 @@ class Machine:
         -----
         Poses never raise: see `Solution.status`. Raises StiffmapError for bad input.
         """
-        if derivatives:
-            return self._differentiated(
-                derivatives,
-                position=position,
-                wrench=wrench,
-                rotation=rotation,
-                point=point,
-                wrenches=wrenches,
-                load_type=load_type,
-                read_points=read_points,
-                gravity=gravity,
-                method=method,
-                load_steps=load_steps,
-                stiffness=stiffness,
-                threads=threads,
-            )
-        return self._solve(
-            (),
+        if (
+            rotation is None
+            and wrenches is None
+            and gravity is None
+            and point == "tcp"
+            and load_type == "dead"
+            and method == "fast"
+            and load_steps == "auto"
+            and stiffness is True
+            and (threads is None or threads == 1)
+            and not read_points
+            and not derivatives
+        ):
+            one = self._one.solve(position, wrench)
+            if one is not None:
+                return Solution(one, (), self._names, point)
+        call = Call(
             position,
             wrench,
             rotation,
@@ -184,153 +195,10 @@ class Machine:
             load_steps,
             stiffness,
             threads,
-        )[0]
-
-    def _differentiated(self, requests: Sequence[Request], **call: Any) -> Solution:
-        base, variations = base_and_variations(self._description, requests)
-        machine = Machine(base)
-        moved = [Machine(d) for v in variations for d in v.descriptions]
-        solution, varied = machine._solve(tuple(moved), **call)
-        self._fill(varied, solution, moved, call)
-        out, i = {}, 0
-        for v in variations:
-            n = len(v.descriptions)
-            out[v.name] = combine(v, solution.displacement, varied[..., i : i + n, :])
-            i += n
-        return replace(solution, derivatives=out)
-
-    @staticmethod
-    def _fill(varied: Floats, solution: Solution, moved: Sequence[Machine], call: dict[str, Any]) -> None:
-        """Poses of the reference path: solve each variant in full."""
-        if not np.isnan(varied[solution.ok]).any():
-            return
-        for i, m in enumerate(moved):
-            full = m._solve((), **{**call, "stiffness": False})[0].displacement
-            hole = np.isnan(varied[..., i, :])
-            varied[..., i, :][hole] = full[hole]
-
-    def _solve(
-        self,
-        variants: tuple[Machine, ...],
-        position: ArrayLike,
-        wrench: ArrayLike | None,
-        rotation: ArrayLike | None,
-        point: str,
-        wrenches: Mapping[str, ArrayLike] | None,
-        load_type: str | Mapping[str, str],
-        read_points: Sequence[str],
-        gravity: ArrayLike | None,
-        method: str,
-        load_steps: int | str,
-        stiffness: bool,
-        threads: int | None,
-    ) -> tuple[Solution, Floats]:
-        p = trailing(position, (3,), "position", "positions (m)")
-        w = wrench_array(wrench)
-        r = self._home_rotation
-        if rotation is not None:
-            r = trailing(rotation, (3, 3), "rotation", "rotation matrices")
-            self._check_rotation(r)
-        extra = {n: wrench_array(v, f"wrenches[{n!r}]") for n, v in (wrenches or {}).items()}
-        shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2], *(v.shape[:-1] for v in extra.values()))
-        types = {point: load_type} if isinstance(load_type, str) else dict(load_type)
-        for name, kind in types.items():
-            if kind not in LOAD_TYPES:
-                raise StiffmapError(f"load_type: expected one of {', '.join(LOAD_TYPES)}, got {kind!r}")
-            if name not in (point, *extra):
-                loaded = ", ".join((point, *extra))
-                raise StiffmapError(f"load_type: no wrench acts at {name!r}, only at {loaded}")
-        if method not in ("fast", "reference"):
-            raise StiffmapError(f"method: expected 'fast' or 'reference', got {method!r}")
-        for name in (point, *extra, *read_points):
-            if name not in self.points:
-                raise StiffmapError(f"point: expected one of {', '.join(self.points)}, got {name!r}")
-        read = [point, *dict.fromkeys(r for r in read_points if r != point)]
-        loads = rows(w, shape, (6,))[:, None]
-        if extra:
-            loads = np.stack([rows(v, shape, (6,)) for v in (w, *extra.values())], axis=1)
-        answer = self._core.solve(
-            self._plan if method == "fast" else None,  # type: ignore[arg-type]  # None: reference path
-            rows(p, shape, (3,)),
-            rows(r, shape, (3, 3)),
-            np.ascontiguousarray(loads),
-            [point, *extra],
-            [LOAD_TYPES[types.get(name, "dead")] for name in (point, *extra)],
-            read,
-            self._gravity(gravity),
-            self._steps(load_steps),
-            thread_count(threads),
-            stiffness,
-            [m._plan for m in variants],
         )
-        if read_points:
-            order = [0, *(read.index(r) for r in read_points)]
-            answer["displacement"] = answer["displacement"][:, order]
-        varied = answer.pop("variants")
-        return self._solution(answer, shape, point), varied.reshape(
-            (*shape, -1, 6) if len(variants) else (0,)
-        )
-
-    @staticmethod
-    def _check_rotation(r: Floats) -> None:
-        finite = np.asarray(np.isfinite(r).all(axis=(-2, -1)))
-        off = np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(axis=(-2, -1), initial=0)
-        mirrored = np.linalg.det(np.where(finite[..., None, None], r, np.eye(3))) < 0
-        bad = np.where(finite & ((off > 1e-9) | mirrored), np.maximum(off, 1e-300), 0.0)
-        if np.any(bad):
-            raise StiffmapError(
-                f"rotation: expected rotation matrices, got one with |R^T R - I| = {np.max(bad):.1e}"
-                f"{' and det < 0' if np.any(mirrored) else ''}"
-            )
-
-    def _gravity(self, gravity: ArrayLike | None) -> Floats:
-        if gravity is None:
-            return np.array(self._description.gravity or (0.0, 0.0, 0.0))
-        g = np.asarray(gravity, dtype=float)
-        if g.shape != (3,) or not np.isfinite(g).all():
-            raise StiffmapError(f"gravity: expected 3 finite numbers (m/s², base axes), got {gravity!r}")
-        return g
-
-    @staticmethod
-    def _steps(load_steps: int | str) -> int:
-        if load_steps == "auto":
-            return 0
-        if isinstance(load_steps, bool) or not isinstance(load_steps, int) or load_steps < 1:
-            raise StiffmapError(f"load_steps: expected 'auto' or a positive number, got {load_steps!r}")
-        return load_steps
-
-    def _solution(self, a: dict[str, Any], shape: tuple[int, ...], point: str) -> Solution:
-        count = a["status"].shape[0]
-
-        def out(key: str) -> Any:
-            value = a[key]
-            if value.shape[0] != count:  # not asked for
-                fill = np.nan if value.dtype.kind == "f" else 0
-                return np.broadcast_to(np.asarray(fill, value.dtype), shape + value.shape[1:])
-            return value.reshape(shape + value.shape[1:])
-
-        names = self._names
-        readings = out("displacement")
-        return Solution(
-            displacement=np.ascontiguousarray(readings[..., 0, :]),
-            stiffness=out("stiffness"),
-            compliance=out("compliance"),
-            status=out("status"),
-            flags=out("flags"),
-            free_twists=out("free_twists"),
-            iterations=out("iterations"),
-            actuator_effort=out("actuator_effort"),
-            leg_wrench=out("leg_wrench"),
-            readings=readings,
-            point=point,
-            actuators=names.actuators,
-            legs=names.legs,
-            coordinates=out("coordinates"),
-            coordinate_names=names.coordinates,
-            spring_index=names.springs,
-            joint_index=names.joints,
-            indeterminate_mask=out("indeterminate"),
-        )
+        if derivatives:
+            return differentiate(self, call, derivatives)
+        return solve_call(self, call)[0]
 
     def wrench(self, position: ArrayLike, displacement: ArrayLike, **options: Any) -> HeldMachine:
         """Wrenches that hold the machine at a `displacement` (..., 6) from the commanded pose, eq. (10).

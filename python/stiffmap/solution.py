@@ -3,54 +3,169 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap._core import Answer, OneAnswer
+from stiffmap.names import Names
 from stiffmap.status import Flag, Status
 
 Floats = NDArray[np.float64]
+FIELDS = (
+    "displacement",
+    "stiffness",
+    "compliance",
+    "status",
+    "flags",
+    "free_twists",
+    "iterations",
+    "actuator_effort",
+    "leg_wrench",
+    "coordinates",
+    "indeterminate",
+)
 
 
-@dataclass(frozen=True, eq=False)
 class Solution:
     """Equilibria of a batch of poses; SI, base axes, linear part first, leading batch axes (...).
 
-    Failed poses hold NaN and their status.
+    Failed poses hold NaN and their status. Arrays are made when they are first asked for.
     """
 
-    displacement: Floats
-    """(..., 6) m, rad: of `point` against the commanded pose, rotation as a rotation vector."""
-    stiffness: Floats
-    """(..., 6, 6) small extra twist to small extra dead wrench, both at `point`."""
-    compliance: Floats
-    """(..., 6, 6) small extra dead wrench to small extra twist, both at `point`."""
-    status: NDArray[np.uint8]
-    """(...) of `Status`."""
-    flags: NDArray[np.uint32]
-    """(...) bits of `Flag`."""
-    free_twists: Floats
-    """(..., 6, 6) columns: twists without stiffness where the platform is singular, else NaN."""
-    iterations: NDArray[np.int32]
-    """(...) Newton iterations."""
-    actuator_effort: Floats
-    """(..., actuators) N or N·m: drive on the leg, positive along the coordinate."""
-    leg_wrench: Floats
-    """(..., legs, 6) leg on platform at `point`."""
-    readings: Floats
-    """(..., read points, 6) displacement of every point asked for."""
+    __slots__ = ("_answer", "_made", "_names", "_order", "_shape", "derivatives", "point")
+
     point: str
-    actuators: tuple[str, ...]
-    legs: tuple[str, ...]
-    coordinates: Floats = field(repr=False)
-    """(..., coordinates) all coordinates, in the order of `coordinate_names`."""
-    coordinate_names: tuple[str, ...] = field(repr=False)
-    spring_index: Mapping[str, int] = field(repr=False)
-    joint_index: Mapping[str, int] = field(repr=False)
-    indeterminate_mask: NDArray[np.uint8] = field(repr=False)
-    derivatives: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    """Point where the wrench acts and displacement, stiffness and compliance are."""
+    derivatives: Mapping[str, Floats]
+    """What `Machine.solve(derivatives=...)` asked for; empty otherwise."""
+
+    def __init__(
+        self,
+        answer: Answer | OneAnswer,
+        shape: tuple[int, ...],
+        names: Names,
+        point: str,
+        order: tuple[int, ...] = (0,),
+        derivatives: Mapping[str, Floats] | None = None,
+    ) -> None:
+        self._answer = answer
+        self._shape = shape
+        self._names = names
+        self._order = order
+        self._made: dict[str, Any] | None = None
+        self.point = point
+        self.derivatives = derivatives or {}
+
+    def _array(self, name: str) -> Any:
+        if self._made is None:
+            self._made = {}
+        made = self._made.get(name)
+        if made is None:
+            made = self._made[name] = self._make(name)
+        return made
+
+    def _make(self, name: str) -> Any:
+        a: Any = getattr(self._answer, name)
+        if a.shape[0] != self._answer.status.shape[0]:  # not asked for
+            fill = np.nan if a.dtype.kind == "f" else 0
+            return np.broadcast_to(np.asarray(fill, a.dtype), self._shape + a.shape[1:])
+        return a.reshape(self._shape + a.shape[1:])
+
+    def _with_derivatives(self, derivatives: Mapping[str, Floats]) -> Solution:
+        return Solution(self._answer, self._shape, self._names, self.point, self._order, derivatives)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        arrays = SimpleNamespace(**{name: getattr(self._answer, name) for name in FIELDS})
+        return Solution, (arrays, self._shape, self._names, self.point, self._order, self.derivatives)
+
+    @property
+    def readings(self) -> Floats:
+        """(..., read points, 6) displacement of every point asked for, `point` first."""
+        read: Floats = self._array("displacement")
+        return read if self._order == tuple(range(read.shape[-2])) else read[..., self._order, :]
+
+    @property
+    def displacement(self) -> Floats:
+        """(..., 6) m, rad: of `point` against the commanded pose, rotation as a rotation vector."""
+        return np.ascontiguousarray(self._array("displacement")[..., 0, :])
+
+    @property
+    def stiffness(self) -> Floats:
+        """(..., 6, 6) small extra twist to small extra dead wrench, both at `point`."""
+        return self._array("stiffness")  # type: ignore[no-any-return]
+
+    @property
+    def compliance(self) -> Floats:
+        """(..., 6, 6) small extra dead wrench to small extra twist, both at `point`."""
+        return self._array("compliance")  # type: ignore[no-any-return]
+
+    @property
+    def status(self) -> NDArray[np.uint8]:
+        """(...) of `Status`."""
+        return self._array("status")  # type: ignore[no-any-return]
+
+    @property
+    def flags(self) -> NDArray[np.uint32]:
+        """(...) bits of `Flag`."""
+        return self._array("flags")  # type: ignore[no-any-return]
+
+    @property
+    def free_twists(self) -> Floats:
+        """(..., 6, 6) columns: twists without stiffness where the platform is singular, else NaN."""
+        return self._array("free_twists")  # type: ignore[no-any-return]
+
+    @property
+    def iterations(self) -> NDArray[np.int32]:
+        """(...) Newton iterations."""
+        return self._array("iterations")  # type: ignore[no-any-return]
+
+    @property
+    def actuator_effort(self) -> Floats:
+        """(..., actuators) N or N·m: drive on the leg, positive along the coordinate."""
+        return self._array("actuator_effort")  # type: ignore[no-any-return]
+
+    @property
+    def leg_wrench(self) -> Floats:
+        """(..., legs, 6) leg on platform at `point`."""
+        return self._array("leg_wrench")  # type: ignore[no-any-return]
+
+    @property
+    def coordinates(self) -> Floats:
+        """(..., coordinates) all coordinates, in the order of `coordinate_names`."""
+        return self._array("coordinates")  # type: ignore[no-any-return]
+
+    @property
+    def indeterminate_mask(self) -> NDArray[np.uint8]:
+        """(..., coordinates) 1 where a pose leaves the coordinate open."""
+        return self._array("indeterminate")  # type: ignore[no-any-return]
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Names along the last axis of `actuator_effort`."""
+        return self._names.actuators
+
+    @property
+    def legs(self) -> tuple[str, ...]:
+        """Names along the legs' axis of `leg_wrench`."""
+        return self._names.legs
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """Names along the last axis of `coordinates`."""
+        return self._names.coordinates
+
+    @property
+    def spring_index(self) -> Mapping[str, int]:
+        """Full name of each link spring -> its first of six coordinates."""
+        return self._names.springs
+
+    @property
+    def joint_index(self) -> Mapping[str, int]:
+        """Full name of each actuator and passive joint -> its coordinate."""
+        return self._names.joints
 
     @property
     def spring_deflection(self) -> dict[str, Floats]:
@@ -86,7 +201,7 @@ class Solution:
             f"largest displacement {top}<table>{rows}</table>"
         )
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         flags = int(np.bitwise_or.reduce(self.flags.ravel())) if self.flags.size else 0
         states = ", ".join(f"{n} {c}" for n, c in self.count().items()) or "no poses"
         return f"Solution of {self.status.size} poses at {self.point}: {states}; flags {Flag(flags)!r}"

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap import _core
 from stiffmap.broadcasting import Floats, rows, thread_count
 from stiffmap.machine import Machine
+from stiffmap.solving import gravity_vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +74,7 @@ def assembly_stress(
         rows(turned, shape, (3, 3)),
         rows(load, shape, (6,)),
         point,
-        machine._gravity(gravity),
+        gravity_vector(machine, gravity),
         thread_count(threads),
     )
     force = force.reshape((*shape, force.shape[-1]))

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from stiffmap.broadcasting import Floats
 from stiffmap.machine import Machine
 from stiffmap.solution import Solution
+from stiffmap.solving import Call
 from stiffmap.status import Status
+from stiffmap.variants import solve_varied
 
 
 @dataclass(frozen=True)
@@ -45,17 +47,19 @@ class Loading:
         self, position: Floats, wrench: Floats, variants: tuple[Machine, ...]
     ) -> tuple[Solution, Floats]:
         """Also the displacements (..., variants, 6) of machines near this one, exact to first order."""
-        options = {"point": self.point, "load_type": self.load_type, "load_steps": self.load_steps}
-        call: dict[str, Any] = {**options, "rotation": self.rotation, "gravity": self.gravity}
-        call |= {"wrenches": None, "read_points": (), "stiffness": False, "threads": self.threads}
-        s, varied = self.machine._solve(variants, position, wrench, method=self.method, **call)
-        p, w = (np.broadcast_to(a, (*s.status.shape, a.shape[-1])) for a in (position, wrench))
-        for i, machine in enumerate(variants):
-            hole = s.ok & np.isnan(varied[..., i, :]).any(axis=-1)  # poses of the reference path
-            if hole.any():
-                full = machine._solve((), p[hole], w[hole], method=self.method, **call)[0]
-                varied[hole, i] = full.displacement
-        return s, varied
+        call = Call(
+            position,
+            wrench,
+            self.rotation,
+            self.point,
+            load_type=self.load_type,
+            gravity=self.gravity,
+            method=self.method,
+            load_steps=self.load_steps,
+            stiffness=False,
+            threads=self.threads,
+        )
+        return solve_varied(self.machine, call, variants)
 
     def options(self) -> dict[str, Any]:
         """What changes the numbers, as plain data; threads do not."""

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+// Compiled mechanisms and plans: making them, and what they are made of.
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "stiffmap/fast_plan.hpp"
+#include "stiffmap/solve.hpp"
+
+namespace stiffmap::bindings {
+namespace {
+
+template <class T, class Get>
+std::vector<std::string> names(const std::vector<T>& items, Get get) {
+  std::vector<std::string> out;
+  for (const T& item : items) out.push_back(get(item));
+  return out;
+}
+
+}  // namespace
+
+void bind_mechanism(py::module_& m) {
+  using namespace py::literals;
+  py::class_<Mechanism> mechanism(m, "Mechanism");  // before the signatures that name it
+  py::class_<FastPlan>(m, "FastPlan")
+      .def(py::init([](const Mechanism& k, const Array& low, const Array& high) {
+             const Vec3 a = Eigen::Map<const Vec3>(data(low, {3}, "low")),
+                        b = Eigen::Map<const Vec3>(data(high, {3}, "high"));
+             py::gil_scoped_release free;
+             return std::make_unique<FastPlan>(k, a, b);
+           }),
+           "mechanism"_a, "low"_a, "high"_a)
+      .def_property_readonly("available", &FastPlan::available)
+      .def_property_readonly("missing", &FastPlan::missing);
+  mechanism.def(py::init(&assemble), "root"_a, "home"_a, "springs"_a, "task"_a = full_task)
+      .def_property_readonly(
+          "coordinates",
+          [](const Mechanism& k) { return names(k.coordinates, [](const Coordinate& c) { return c.name; }); })
+      .def_property_readonly("roles",
+                             [](const Mechanism& k) {
+                               std::vector<int> out;
+                               for (const Coordinate& c : k.coordinates) out.push_back(static_cast<int>(c.role));
+                               return out;
+                             })
+      .def_property_readonly("prismatic",
+                             [](const Mechanism& k) {
+                               std::vector<bool> out;
+                               for (const Coordinate& c : k.coordinates) out.push_back(c.type == JointType::prismatic);
+                               return out;
+                             })
+      .def_property_readonly("locked",
+                             [](const Mechanism& k) {
+                               std::vector<bool> out;
+                               for (const Coordinate& c : k.coordinates) out.push_back(c.locked);
+                               return out;
+                             })
+      .def_property_readonly("springs",
+                             [](const Mechanism& k) {
+                               std::vector<std::pair<std::string, Index>> out;
+                               for (const SpringGroup& g : k.groups) out.emplace_back(g.name, g.first);
+                               return out;
+                             })
+      .def_property_readonly("actuators",
+                             [](const Mechanism& k) {
+                               std::vector<std::pair<std::string, Index>> out;
+                               for (const Drive& d : k.drives) out.emplace_back(d.name, d.coordinate);
+                               return out;
+                             })
+      .def_property_readonly("nodes",
+                             [](const Mechanism& k) {
+                               std::vector<std::pair<Index, Index>> out;  // parent, coordinate
+                               for (const Node& n : k.nodes) out.emplace_back(n.parent, n.coordinate);
+                               return out;
+                             })
+      .def_property_readonly("loops",
+                             [](const Mechanism& k) {
+                               std::vector<std::tuple<std::string, std::string, Index, Index>> out;
+                               for (const Loop& l : k.loops) out.emplace_back(l.block, l.branch, l.primary, l.end);
+                               return out;
+                             })
+      .def_property_readonly(
+          "points", [](const Mechanism& k) { return names(k.points, [](const NodePoint& p) { return p.name; }); })
+      .def_property_readonly("legs", [](const Mechanism& k) { return k.legs; })
+      .def_readonly("length", &Mechanism::length)
+      .def_readonly("stiffness", &Mechanism::stiffness)
+      .def("home_coordinates", [](const Mechanism& k) {
+        py::array_t<double> out(k.size());
+        Eigen::Map<VecX>(out.mutable_data(), k.size()) = k.home_coordinates;
+        return out;
+      });
+}
+
+}  // namespace stiffmap::bindings
