@@ -14,6 +14,7 @@ struct Elimination {
   V3 gravity;
   V lowest;  ///< smallest pivot, dimensionless: at or below zero the pose is not a plain minimum
   double scale[6];
+  V transferred = splat(0);  ///< largest step of a branch's wrench, over stiffness times length
 
   // ---- wrenches -------------------------------------------------------------------------------
   static void shift(V6& F, const V3& from, const V3& to) { F.b = F.b + cross(from - to, F.a); }
@@ -456,6 +457,9 @@ struct Elimination {
         const V6 step =
             dead(branch.K, branch.F.b, own) + branch.c + V6{cross(turn, branch.F.a), cross(turn, branch.F.b)};
         branch.F = {select(active, branch.F.a + step.a, branch.F.a), select(active, branch.F.b + step.b, branch.F.b)};
+        const V force = larger(larger(absolute(step.a.x), absolute(step.a.y)), absolute(step.a.z));
+        const V moment = larger(larger(absolute(step.b.x), absolute(step.b.y)), absolute(step.b.z));
+        transferred = larger(transferred, larger(force * (1 / scale[0]), moment * (1 / scale[3])) * (1 / scale[3]));
       }
       back(P.chains[op.first + b], own, branch.end.p, turn, active);
     }

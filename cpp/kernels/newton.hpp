@@ -205,13 +205,15 @@ struct Newton {
       }
       M active = ~done & ~failed;
       for (int q = 0; q < P.coordinate_count; ++q) s.dz[q] = splat(0);
+      e.transferred = splat(0);
       e.back(P.chains[P.root], get(eta), point, V3{}, active);
       const V norm = step_norm();
       failed |= active & ~(norm < 1e6);
-      // Nothing left to gain from the step: keep the state, and with it this linearisation.
+      // Nothing left to gain from the step: keep the state, and with it this linearisation, unless
+      // the branches shared the load in another way.
       const M still = active & (norm < nothing);
       done |= still;
-      fresh = all(done | failed) && all(still == active);
+      fresh = all(done | failed) && all(still == active) && all((e.transferred < nothing) | ~still);
       iterations = select(active, iterations + 1.0, iterations);
       active &= ~still;
       for (int q = 0; q < P.coordinate_count; ++q) s.z[q] = select(active, s.z[q] + s.dz[q], s.z[q]);

@@ -160,8 +160,11 @@ void SaddleSystem::to_coordinates(VecX& v) const {
 }
 
 void SaddleSystem::to_forces(VecX& v) const {
-  for (const auto& [first, spring] : rotated_)
+  for (const auto& [first, spring] : rotated_) {
     v.segment<6>(first) = (spring.basis.transpose() * v.segment<6>(first)).eval();
+    for (int i = 0; i < 6; ++i)
+      if (spring.rigid[i]) v[first + i] = 0;  // a reaction, not an imbalance
+  }
   v.array() *= s_.array();
 }
 
@@ -197,8 +200,15 @@ double SaddleSystem::merit(const Linearization& lin) const {
   double sum = 0;
   for (Index j = 0; j < n_; ++j)
     if (lin.kind[at(j)] != Kind::fixed) sum += std::pow(lin.r[j] * lin.da[j] * s_[j], 2);
+  for (const auto& [first, spring] : rotated_) {
+    const Vec6 r = spring.basis.transpose() * lin.r.segment<6>(first);
+    for (int i = 0; i < 6; ++i) {
+      if (lin.kind[at(first + i)] != Kind::fixed) sum -= std::pow(lin.r[first + i] * s_[first + i], 2);
+      if (!spring.rigid[i]) sum += std::pow(r[i] * s_[first + i], 2);
+    }
+  }
   for (Index i = 0; i < nl_; ++i) sum += std::pow(lin.e[i] * s_[n_ + i], 2);
-  return std::sqrt(sum);
+  return std::sqrt(std::max(sum, 0.0));
 }
 
 }  // namespace stiffmap
