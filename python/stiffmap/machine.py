@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap._core import FastPlan, Mechanism, OneCall
 from stiffmap.broadcasting import Floats
-from stiffmap.derivatives import Prepared, Request, differentiate, prepare, request_key
+from stiffmap.derivatives import Prepared, Request, Requests, differentiate, prepare, read_requests
 from stiffmap.description import MachineDescription
 from stiffmap.errors import StiffmapError
 from stiffmap.lowering import build_mechanism
@@ -73,8 +73,8 @@ class Machine:
     def _derivable(self) -> Recent[Prepared]:
         return Recent(MOST_PREPARED)
 
-    def _prepared(self, requests: Sequence[Request]) -> Prepared:
-        return self._derivable.get(request_key(requests), lambda: prepare(self, requests))
+    def _prepared(self, requests: Requests) -> Prepared:
+        return self._derivable.get(requests.key, lambda: prepare(self, requests))
 
     @property
     def fast(self) -> str:
@@ -123,6 +123,7 @@ class Machine:
         load_steps: int | str = "auto",
         stiffness: bool = True,
         derivatives: Sequence[Request] = (),
+        derivatives_of: Sequence[str] = ("displacement",),
         threads: int | None = None,
     ) -> Solution:
         """Equilibrium, stiffness and compliance at commanded poses under external wrenches.
@@ -155,10 +156,14 @@ class Machine:
             False: displacements, status, flags and iterations only; everything else is NaN. Quicker,
             above all under gravity.
         derivatives
-            Effects ``(kind, {"element": ..., "legs": [...], parameter: value, ...})``: the machine is
-            solved with all of them, and `Solution.derivatives` maps each parameter's name to the
-            derivative of `displacement` (..., 6) at its value (docs/fast_path.md F10). A null value
-            (`stiffmap effects`) differentiates at the machine as it is.
+            Effects ``(kind, {"element": ..., "legs": [...], parameter: value, ...})``, and inputs
+            ``"position"``, ``"rotation"``, ``"wrench"``. The machine is solved with all these effects, and
+            differentiated at each of their numbers and along each component of the inputs. A null value
+            (`stiffmap effects`) differentiates at the machine as it is. Names and schemes: docs/effects.md.
+        derivatives_of
+            ``displacement``, ``stiffness``, ``compliance``: see `Solution.derivatives`,
+            `Solution.stiffness_derivatives`, `Solution.compliance_derivatives`. Displacement alone costs a few
+            solves for many parameters, the others two solves for each.
         threads
             None: all cores that this process may use.
 
@@ -197,7 +202,7 @@ class Machine:
             threads,
         )
         if derivatives:
-            return differentiate(self, call, derivatives)
+            return differentiate(self, call, read_requests(derivatives, derivatives_of))
         return solve_call(self, call)[0]
 
     def wrench(self, position: ArrayLike, displacement: ArrayLike, **options: Any) -> HeldMachine:

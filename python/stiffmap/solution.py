@@ -14,6 +14,7 @@ from stiffmap.names import Names
 from stiffmap.status import Flag, Status
 
 Floats = NDArray[np.float64]
+Slopes = Mapping[str, Mapping[str, Floats]]  # quantity -> name of the variable -> derivative
 FIELDS = (
     "displacement",
     "stiffness",
@@ -35,12 +36,10 @@ class Solution:
     Failed poses hold NaN and their status. Arrays are made when they are first asked for.
     """
 
-    __slots__ = ("_answer", "_made", "_names", "_order", "_shape", "derivatives", "point")
+    __slots__ = ("_answer", "_made", "_names", "_order", "_shape", "_slopes", "point")
 
     point: str
     """Point where the wrench acts and displacement, stiffness and compliance are."""
-    derivatives: Mapping[str, Floats]
-    """What `Machine.solve(derivatives=...)` asked for; empty otherwise."""
 
     def __init__(
         self,
@@ -49,7 +48,7 @@ class Solution:
         names: Names,
         point: str,
         order: tuple[int, ...] = (0,),
-        derivatives: Mapping[str, Floats] | None = None,
+        slopes: Slopes | None = None,
     ) -> None:
         self._answer = answer
         self._shape = shape
@@ -57,7 +56,7 @@ class Solution:
         self._order = order
         self._made: dict[str, Any] | None = None
         self.point = point
-        self.derivatives = derivatives or {}
+        self._slopes: Slopes = slopes or {}
 
     def _array(self, name: str) -> Any:
         if self._made is None:
@@ -74,12 +73,12 @@ class Solution:
             return np.broadcast_to(np.asarray(fill, a.dtype), self._shape + a.shape[1:])
         return a.reshape(self._shape + a.shape[1:])
 
-    def _with_derivatives(self, derivatives: Mapping[str, Floats]) -> Solution:
-        return Solution(self._answer, self._shape, self._names, self.point, self._order, derivatives)
+    def _with_derivatives(self, slopes: Slopes) -> Solution:
+        return Solution(self._answer, self._shape, self._names, self.point, self._order, slopes)
 
     def __reduce__(self) -> tuple[Any, ...]:
         arrays = SimpleNamespace(**{name: getattr(self._answer, name) for name in FIELDS})
-        return Solution, (arrays, self._shape, self._names, self.point, self._order, self.derivatives)
+        return Solution, (arrays, self._shape, self._names, self.point, self._order, self._slopes)
 
     @property
     def readings(self) -> Floats:
@@ -182,6 +181,21 @@ class Solution:
         """Passive joints that some pose leaves open (free spin, singular leg) -> (...) where."""
         mask = self.indeterminate_mask.astype(bool)
         return {n: mask[..., i] for n, i in self.joint_index.items() if mask[..., i].any()}
+
+    @property
+    def derivatives(self) -> Mapping[str, Floats]:
+        """Name of each variable of `Machine.solve(derivatives=...)` -> (..., 6) slope of `displacement`."""
+        return self._slopes.get("displacement", {})
+
+    @property
+    def stiffness_derivatives(self) -> Mapping[str, Floats]:
+        """The same of `stiffness` (..., 6, 6), where `derivatives_of` names it."""
+        return self._slopes.get("stiffness", {})
+
+    @property
+    def compliance_derivatives(self) -> Mapping[str, Floats]:
+        """The same of `compliance` (..., 6, 6), where `derivatives_of` names it."""
+        return self._slopes.get("compliance", {})
 
     @property
     def ok(self) -> NDArray[np.bool_]:

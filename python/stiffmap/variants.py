@@ -19,12 +19,13 @@ if TYPE_CHECKING:
 def solve_varied(machine: Machine, call: Call, variants: Sequence[Machine]) -> tuple[Solution, Floats]:
     """The answer, and the displacements (..., variants, 6) of machines with a parameter moved a little.
 
-    One step through the factors of the answer, exact to second order in the move (docs/fast_path.md F10);
-    poses of the reference path are solved in full. NaN where a pose failed.
+    One step through the factors of the answer, exact to second order in the move (docs/fast_path.md F10). Poses of
+    the reference path and variants under another gravity are solved in full. NaN where a pose failed.
     """
     solution, varied = solve_call(machine, call, variants)
-    hole = solution.ok & np.isnan(varied).any(axis=(-2, -1))
-    if hole.any():
-        rest = replace(call.only(hole), stiffness=False)
-        varied[hole] = np.stack([solve_call(m, rest)[0].displacement for m in variants], axis=-2)
+    for i, m in enumerate(variants):
+        other = call.gravity is None and m.description.gravity != machine.description.gravity
+        hole = solution.ok & (other | np.isnan(varied[..., i, :]).any(axis=-1))
+        if hole.any():
+            varied[hole, i] = solve_call(m, replace(call.only(hole), stiffness=False))[0].displacement
     return solution, varied

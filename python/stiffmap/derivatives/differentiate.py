@@ -1,0 +1,61 @@
+"""The answer of a call with its derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from stiffmap.broadcasting import Floats
+from stiffmap.derivatives.inputs import along_input
+from stiffmap.derivatives.prepared import Prepared
+from stiffmap.derivatives.requests import Requests
+from stiffmap.solution import Solution
+from stiffmap.solving import Call, solve_call
+from stiffmap.variants import solve_varied
+
+if TYPE_CHECKING:
+    from stiffmap.machine import Machine
+
+Table = dict[str, dict[str, Floats]]  # quantity -> name of the variable -> derivative
+
+
+def differentiate(machine: Machine, call: Call, requests: Requests) -> Solution:
+    """Answer of the machine with all the effects of `requests`, with its derivatives; NaN where a pose failed."""
+    if requests.whole:
+        call = replace(call, stiffness=True)
+    ready = machine._prepared(requests)
+    table: Table = {q: {} for q in requests.of}
+    solution = (_whole if requests.whole else _displacement)(ready, call, table)
+    for name in requests.inputs:
+        for variable, values in along_input(ready.base, call, solution, name, requests.of):
+            for q in requests.of:
+                table[q][variable] = values[q]
+    return solution._with_derivatives(table)
+
+
+def _displacement(ready: Prepared, call: Call, table: Table) -> Solution:
+    """One step of each neighbour through the factors of the base: docs/fast_path.md F10."""
+    machines = [m for p in ready.parameters for m in p.machines]
+    solution, varied = solve_varied(ready.base, call, machines)
+    for i, p in enumerate(ready.parameters):
+        ends = [varied[..., 2 * i + k, :] for k in range(2)]
+        table["displacement"][p.name] = p.stencil.combine(solution.displacement, ends)
+    return solution
+
+
+def _whole(ready: Prepared, call: Call, table: Table) -> Solution:
+    """Every neighbour solved in full."""
+    solution = solve_call(ready.base, call)[0]
+    for p in ready.parameters:
+        ends = [solve_call(m, call)[0] for m in p.machines]
+        for q, column in table.items():
+            column[p.name] = p.stencil.combine(getattr(solution, q), [_good(s, q) for s in ends])
+    return solution
+
+
+def _good(solution: Solution, quantity: str) -> Floats:
+    values: Floats = getattr(solution, quantity)
+    tail = (1,) * (values.ndim - solution.status.ndim)
+    return np.where(solution.ok.reshape(solution.status.shape + tail), values, np.nan)

@@ -1,0 +1,51 @@
+"""The compiled machines that derivatives with respect to effect parameters need."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from stiffmap.derivatives.near import Neighbours
+from stiffmap.derivatives.requests import Requests, parameter_name
+from stiffmap.derivatives.stencil import Stencil, within
+from stiffmap.effects import get
+
+if TYPE_CHECKING:
+    from stiffmap.machine import Machine
+
+# Of a parameter's typical scale. Truncation of a displacement is below 1e-7 at the small step; the larger one keeps
+# the last digits of a stiffness below its change (docs/effects.md).
+STEP, WHOLE_STEP = 2e-3, 0.03
+
+
+@dataclass(frozen=True)
+class Moved:
+    """One parameter: its name, the machines at the offsets of the stencil."""
+
+    name: str
+    stencil: Stencil
+    machines: tuple[Machine, Machine]
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A machine with every requested effect, and its neighbours; independent of poses and loads."""
+
+    base: Machine
+    parameters: tuple[Moved, ...]
+
+
+def prepare(machine: Machine, requests: Requests) -> Prepared:
+    """Compiles the machines; StiffmapError for effects that the machine cannot have."""
+    make = type(machine)
+    near = Neighbours(machine.description, requests.effects)
+    share = WHOLE_STEP if requests.whole else STEP
+    out = []
+    for i, (kind, arguments) in enumerate(requests.effects):
+        for p in get(kind).parameters:
+            if p.name in arguments:
+                value = float(arguments[p.name])
+                stencil = within(value, share * p.scale, p.lower, p.upper)
+                low, high = (make(near.moved(i, p.name, value + h)) for h in stencil.offsets)
+                out.append(Moved(parameter_name(requests.effects[i], p.name), stencil, (low, high)))
+    return Prepared(make(near.base) if requests.effects else machine, tuple(out))
