@@ -180,7 +180,7 @@ def _finish(
         typer.echo("relative standard uncertainty of the diagonal, by source:")
         typer.echo(part.budget.table(link.compliance))
         if part.refinement is not None:
-            typer.echo(f"observed order of the mesh error: {part.refinement.order:.2f}")
+            typer.echo(f"observed order of the mesh error: {part.refinement.words}")
     for path in (out, picture):
         if path is not None:
             typer.echo(f"wrote {path}")
@@ -203,5 +203,7 @@ def as_data(link: Link, part: PartLink | None, file: LinkFile) -> dict[str, Any]
     if part is not None:
         data["solver"] = part.solver
         data["uncertainty"] = {k: part.budget.standard_error(k).tolist() for k in part.budget.parts}
-        data["order"] = None if part.refinement is None else part.refinement.order
+        r = part.refinement
+        data["order"] = None if r is None or r.why else r.order
+        data["order_note"] = "one mesh" if r is None else r.why
     return data

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Floats, Ints
@@ -97,6 +98,16 @@ def face_loads(nodes: Floats, triangles: Ints, reference: Floats) -> tuple[Float
         for local in range(6):
             np.add.at(loads, triangles[:, local], shape[local] * area[:, None, None] * A)
     return loads, gram
+
+
+def face_mass(nodes: Floats, triangles: Ints) -> csr_matrix:
+    """Sparse (n, n) integral of the products of a face's shape functions, m²."""
+    total = csr_matrix((len(nodes), len(nodes)))
+    rows, columns = np.repeat(triangles, 6, axis=1).ravel(), np.tile(triangles, (1, 6)).ravel()
+    for shape, _, area in _face_quadrature(nodes, triangles):
+        values = (area[:, None, None] * np.outer(shape, shape)).ravel()
+        total = total + csr_matrix((values, (rows, columns)), shape=total.shape)
+    return total
 
 
 def face_area_centre(nodes: Floats, triangles: Ints) -> tuple[float, Floats]:

@@ -80,7 +80,7 @@ def link_from_part(
         material, setup: SI; wrenches: (cases, 6) N, N·m at ``setup.reference``.
         size: edge length of the finest mesh in m.
         solver: "auto" takes CalculiX where it is installed.
-        study: solve again with a rigid head and a soft support, for the boundary's share of the uncertainty.
+        study: solve again with a rigid head and on an elastic bed, for the boundary's share of the uncertainty.
         refine: solve two coarser meshes, for the mesh's share.
 
     Raises:
@@ -100,7 +100,7 @@ def link_from_part(
         )
         parts["mesh"] = shift_covariance([shift])
     if study:
-        others = [setup._replace(head="rigid"), setup._replace(support="soft")]
+        others = [setup._replace(head="rigid"), setup._replace(support="bed")]
         shifts = [
             _identify(mesh, nodes, solve_skfem(mesh, material, s, wrenches), s, wrenches).compliance
             - link.compliance

@@ -17,9 +17,15 @@ class Refinement(NamedTuple):
     """Extrapolation of a (6, 6) compliance over three or more meshes."""
 
     sizes: Floats  # (meshes,) m, coarse to fine
-    order: float  # observed order of the trace of the scaled compliance; NaN when not monotone
+    order: float  # observed order of the trace of the scaled compliance; NaN when there is none
     estimate: Floats  # (6, 6) extrapolated to size zero
     error: Floats  # (6, 6) standard uncertainty of the finest mesh's compliance against size zero
+    why: str = ""  # why the order is not believed; empty when it is
+
+    @property
+    def words(self) -> str:
+        """The observed order, or why there is none."""
+        return self.why or f"{self.order:.2f}"
 
 
 def observed_order(sizes: Floats, values: Floats) -> float:
@@ -57,6 +63,19 @@ def richardson(sizes: Floats, compliances: Floats) -> Refinement:
     p = observed_order(sizes, trace) if len(sizes) > 2 else float("nan")
     change = compliances[-1] - compliances[-2]
     if not PLAUSIBLE[0] <= p <= PLAUSIBLE[1]:
-        return Refinement(sizes, p, compliances[-1], np.abs(change) / (sizes[-2] / sizes[-1] - 1))
+        error = np.abs(change) / (sizes[-2] / sizes[-1] - 1)
+        return Refinement(sizes, p, compliances[-1], error, _why(sizes, trace, p))
     step = change / ((sizes[-2] / sizes[-1]) ** p - 1)
     return Refinement(sizes, p, compliances[-1] + step, np.abs(step))
+
+
+def _why(sizes: Floats, trace: Floats, order: float) -> str:
+    """Why the order is not believed, and what is done instead."""
+    if len(sizes) < 3:
+        reason = "only two meshes differ in size"
+    elif np.isnan(order):
+        steps = ", ".join(f"{step:+.1e}" for step in np.diff(trace[-3:]) / trace[-1])
+        reason = f"the meshes' trace changes by {steps} of itself, which no order explains"
+    else:
+        reason = f"{order:.2f} is outside {PLAUSIBLE[0]:g} to {PLAUSIBLE[1]:g}"
+    return f"none ({reason}); order one is assumed"

@@ -190,8 +190,8 @@ class Foot(_Shape):
         return np.array([0.0, -self.height, 0.0])
 
     def default_size(self) -> float:
-        """Half the thinner of plate and upright."""
-        return min(self.upright, self.plate) / 2
+        """Half the smallest of upright, depth and plate."""
+        return min(self.upright, self.depth, self.plate) / 2
 
     def build(self, gmsh: Any) -> Faces:
         """Two boxes; the upright is centred on x = 0, the plate starts at its back."""

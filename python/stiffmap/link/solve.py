@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse import csc_matrix, csr_matrix, kron
+from scipy.sparse import eye as sparse_eye
 from scipy.sparse.linalg import splu
 
 from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Floats, Ints
-from stiffmap.link.mesh import SolidMesh, face_loads
+from stiffmap.link.mesh import SolidMesh, face_area_centre, face_loads, face_mass
 from stiffmap.link.optional import need
 from stiffmap.link.rigidfit import design_matrix
 
@@ -32,7 +33,9 @@ class Setup(NamedTuple):
     loaded: str
     reference: Floats  # (3,) m
     head: Literal["distributed", "rigid"] = "distributed"  # traction linear over the face, or a rigid face
-    support: Literal["clamped", "soft"] = "clamped"  # all nodes held, or only the face's mean motion
+    # All nodes held; on a bed as stiff as the part; or a reaction that is linear over the face. Of the last two
+    # the face's mean motion is taken out.
+    support: Literal["clamped", "bed", "soft"] = "clamped"
 
 
 def nodal_loads(mesh: SolidMesh, face: str, reference: Floats, wrenches: Floats) -> Floats:
@@ -56,6 +59,8 @@ def solve_skfem(mesh: SolidMesh, material: Material, setup: Setup, wrenches: Flo
     K = stiffness_matrix(mesh, material)
     if setup.support == "soft":
         return _solve_soft(mesh, K, setup, wrenches)
+    if setup.support == "bed":
+        return _solve_bed(mesh, K, material, setup, wrenches)
     held = _dofs(mesh.face_nodes(setup.fixed))
     free = np.setdiff1d(np.arange(K.shape[0]), held)
     if setup.head == "rigid":
@@ -93,8 +98,20 @@ def _solve_soft(mesh: SolidMesh, K: Any, setup: Setup, wrenches: Floats) -> Floa
     free = np.setdiff1d(np.arange(len(f)), held)
     u = np.zeros_like(f)
     u[free] = _factorised(K[free][:, free])(f[free])
-    field = _field(u, mesh)
-    motion = mean_motion(mesh, setup.fixed, centre, field)
+    return _less_mean_motion(mesh, setup.fixed, centre, _field(u, mesh))
+
+
+def _solve_bed(mesh: SolidMesh, K: Any, material: Material, setup: Setup, wrenches: Floats) -> Floats:
+    """Springs of E/sqrt(area) under the fixed face, about those of a neighbour of the same material."""
+    face = mesh.face(setup.fixed)
+    area, centre = face_area_centre(mesh.nodes, face)
+    bed = kron(face_mass(mesh.nodes, face), sparse_eye(3)) * (material.young / np.sqrt(area))
+    f = nodal_loads(mesh, setup.loaded, setup.reference, wrenches).reshape(-1, len(wrenches))
+    return _less_mean_motion(mesh, setup.fixed, centre, _field(_factorised(K + bed)(f), mesh))
+
+
+def _less_mean_motion(mesh: SolidMesh, face: str, centre: Floats, field: Floats) -> Floats:
+    motion = mean_motion(mesh, face, centre, field)
     return np.asarray(field - np.einsum("nia,ka->kni", design_matrix(mesh.nodes, centre), motion))
 
 

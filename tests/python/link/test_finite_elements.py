@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -77,9 +79,11 @@ def test_clamped_bar_is_near_euler_bernoulli_and_stiffer_than_soft(mesh):
     clamped = conjugate(mesh, SETUP)
     soft = conjugate(mesh, SETUP._replace(support="soft"))
     rigid = conjugate(mesh, SETUP._replace(head="rigid"))
+    bed = conjugate(mesh, SETUP._replace(support="bed"))
     beam = cantilever(rectangle(0.01, 0.02), 0.12, STEEL.young, STEEL.young / 2.6)
     assert np.diag(clamped) / np.diag(beam) == pytest.approx(np.ones(6), abs=0.05)
-    for stiff, loose in ((clamped, soft), (rigid, clamped)):
+    # A bed without its mean motion holds only the face's own deformation: between held and free.
+    for stiff, loose in ((clamped, bed), (bed, soft), (rigid, clamped)):
         size = np.sqrt(np.outer(np.diag(loose), np.diag(loose)))
         assert np.linalg.eigvalsh((loose - stiff) / size).min() > -1e-9  # in every direction
         assert np.all(np.diag(stiff) < np.diag(loose))
@@ -127,6 +131,22 @@ def test_refinement_recovers_order_and_limit():
     assert np.array_equal(two.estimate, C0 - 0.01 * D * 0.5)
     with pytest.raises(StiffmapError, match="at least two falling mesh sizes"):
         richardson(sizes[:1], np.zeros((1, 6, 6)))
+
+
+@pytest.mark.parametrize(
+    ("sizes", "trace", "words"),
+    [
+        ([4, 2, 1], [1.0, 0.9, 0.95], r"none \(the meshes' trace changes by -1.1e-01, \+5.3e-02 of itself"),
+        ([4, 2, 1], [1.0, 1.0, 1.1], r"none \(the meshes' trace changes by \+0.0e\+00"),
+        ([2, 1], [0.9, 0.95], r"none \(only two meshes differ in size\)"),
+        ([4, 2, 1], [0.0, 0.99, 1.0], r"none \(6.63 is outside 0.5 to 5\)"),
+        ([4, 2, 1], [0.2, 0.8, 0.95], r"2.00"),
+    ],
+)
+def test_a_missing_order_says_why(sizes, trace, words):
+    found = richardson(np.array(sizes, dtype=float), np.array([t * np.eye(6) for t in trace]))
+    assert re.match(words, found.words)
+    assert words == "2.00" or "order one is assumed" in found.words
 
 
 def test_richardson_error_covers_the_finer_mesh():
