@@ -99,9 +99,16 @@ py::dict as_dict(const CriticalPoint& c) {
   return d;
 }
 
-/// One path of equilibria.
+py::tuple as_tuple(const Branch& b) {
+  py::list points, critical;
+  for (const PathPoint& p : b.points) points.append(as_dict(p));
+  for (const CriticalPoint& c : b.critical) critical.append(as_dict(c));
+  return py::make_tuple(static_cast<int>(b.end), points, critical);
+}
+
+/// One path of equilibria, and the branch that crosses it.
 py::tuple path(const Mechanism& m, const Array& position, const Array& rotation, const Array& direction,
-               const std::string& point, const Array& gravity, int control, double limit, int steps) {
+               const std::string& point, const Array& gravity, int control, double limit, int steps, int cross) {
   PoseInput in;
   in.commanded = pose(data(position, {3}, "position"), data(rotation, {3, 3}, "rotation"));
   in.gravity = Eigen::Map<const Vec3>(data(gravity, {3}, "gravity"));
@@ -114,12 +121,10 @@ py::tuple path(const Mechanism& m, const Array& position, const Array& rotation,
     o.control = static_cast<PathControl>(control);
     o.limit = limit;
     o.steps = steps;
+    o.cross = cross;
     r = follow_path(m, in, d, o);
   }
-  py::list points, critical;
-  for (const PathPoint& p : r.points) points.append(as_dict(p));
-  for (const CriticalPoint& c : r.critical) critical.append(as_dict(c));
-  return py::make_tuple(static_cast<int>(r.status), r.flags, points, critical);
+  return py::make_tuple(r.flags, as_tuple(r.path), as_tuple(r.crossing));
 }
 
 /// Generalised forces of all springs, drives and locked coordinates at loaded poses.
@@ -163,7 +168,7 @@ void bind_paths(py::module_& m) {
   m.def("clamp", &clamp, "mechanism"_a, "position"_a, "rotation"_a, "displacement"_a, "point"_a, "gravity"_a,
         "threads"_a);
   m.def("path", &path, "mechanism"_a, "position"_a, "rotation"_a, "direction"_a, "point"_a, "gravity"_a, "control"_a,
-        "limit"_a, "steps"_a);
+        "limit"_a, "steps"_a, "cross"_a);
   m.def("reactions", &reactions, "mechanism"_a, "position"_a, "rotation"_a, "wrench"_a, "point"_a, "gravity"_a,
         "threads"_a);
 }

@@ -27,6 +27,7 @@ def path(
     control: str,
     limit: float | None,
     steps: int,
+    cross: int,
     gravity: Any,
     output: Path | None,
     as_json: bool,
@@ -34,12 +35,14 @@ def path(
     """Follow the path, print it, write it; exit with 1 where it ends early or is unstable somewhere."""
     import stiffmap
 
-    ds = stiffmap.sweep(machine, at, direction, control=control, limit=limit, steps=steps, gravity=gravity)
+    ds = stiffmap.sweep(
+        machine, at, direction, control=control, limit=limit, steps=steps, cross=cross, gravity=gravity
+    )
     files = write(machine, ds, folder(output)) if output else []
     if as_json:
-        names = ("force", "deflection", "deflection_along", "unstable_modes", "status", "critical_force",
+        names = ("force", "deflection", "deflection_along", "unstable_modes", "status", "branch", "critical_force",
                  "critical_deflection", "critical_kind", "mode_leg", "mode_joint")  # fmt: skip
-        print_json(plain({"machine": machine.name, "end": ds.attrs["end"]}
+        print_json(plain({"machine": machine.name, "end": ds.attrs["end"], "crossing_end": ds.attrs["crossing_end"]}
                          | {n: ds[n].values for n in names} | {"files": files}))  # fmt: skip
     else:
         show(Console(highlight=False), ds)
@@ -66,9 +69,12 @@ def show(console: Console, ds: xr.Dataset) -> None:
     table = Table(box=box.SIMPLE_HEAD, title=f"{ds.attrs['machine']} at ({place}) mm")
     for head in ("force, N", "along the force, mm", "deflection, mm", "status"):
         table.add_column(head, justify="left" if head == "status" else "right")
-    for i in np.unique(np.linspace(0, ds.sizes["step"] - 1, SHOWN).astype(int)):
+    branch = ds.branch.values
+    for i in np.concatenate([_some(np.flatnonzero(branch == k)) for k in np.unique(branch)]):
         values = [float(ds.force[i]), 1e3 * float(ds.deflection_along[i]), 1e3 * float(ds.deflection[i])]
         table.add_row(*(f"{v:.4f}" for v in values), Status(int(ds.status[i])).name.lower())
+        if i + 1 < branch.size and branch[i + 1] != branch[i]:
+            table.add_section()
     console.print(table)
     for i in range(ds.sizes["critical"]):
         leg = str(ds.mode_leg.values[i])
@@ -82,3 +88,10 @@ def show(console: Console, ds: xr.Dataset) -> None:
             soft_wrap=True,
         )
     console.print(f"end: {ds.attrs['end']}")
+    if (ds.branch == 1).any():
+        console.print(f"end of the crossing branch: {ds.attrs['crossing_end']}")
+
+
+def _some(steps: Any) -> Any:
+    """At most SHOWN of some steps, the first and the last among them."""
+    return steps[np.unique(np.linspace(0, len(steps) - 1, SHOWN).astype(int))]

@@ -48,6 +48,12 @@ def sweep(
         float | None,
         typer.Option(help="Follow one path of equilibria to this force (N) or displacement (mm)."),
     ] = None,
+    cross: Annotated[
+        int,
+        typer.Option(
+            help="With --limit: follow the branch that crosses at this bifurcation, 1, 2 …; -1: to the other side."
+        ),
+    ] = 0,
     tolerance: ToleranceOption = 0.25,
     effect: EffectsOption = None,
     gravity_: GravityOption = None,
@@ -75,7 +81,7 @@ def sweep(
     import stiffmap
 
     m = machine_with(machine, effect)
-    if limit is not None or control != "force":
+    if limit is not None or control != "force" or cross:
         reach = limit if limit is None or control == "force" else MM * limit
         path(
             m,
@@ -84,6 +90,7 @@ def sweep(
             control,
             reach,
             points,
+            cross,
             gravity(gravity_),
             output,
             as_json,

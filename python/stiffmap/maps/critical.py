@@ -57,11 +57,9 @@ def _units(machine: Machine) -> Floats:
 
 
 def _leg(machine: Machine, names: list[str], sizes: Floats) -> str:
-    """Leg with the largest motion, as the sum of squares over its coordinates; '' where none moves."""
-    of = {leg: sum(s * s for n, s in zip(names, sizes, strict=True) if n.split(".")[0] == leg)
-          for leg in machine.legs}  # fmt: skip
-    best = max(of, key=lambda leg: of[leg])
-    return best if of[best] > 0 else ""
+    """Leg of the joint that moves most; '' where that belongs to the base or the platform."""
+    leg = _joint(machine, names, sizes).split(".")[0]
+    return leg if leg in machine.legs else ""
 
 
 def _joint(machine: Machine, names: list[str], sizes: Floats) -> str:

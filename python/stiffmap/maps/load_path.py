@@ -19,24 +19,29 @@ from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, meaning, status_att
 from stiffmap.status import Status
 
 CONTROLS = ("force", "displacement", "arc")
+BRANCH = meaning("1", "0: the path from rest; 1: the branch that crosses it")
 UNITS = {"force": "N", "displacement": "m", "arc": "m"}
-ENDS = {
-    Status.CONVERGED: "the limit was reached",
-    Status.UNREACHABLE: "the commanded pose is out of reach",
-    Status.NOT_CONVERGED: "no further equilibrium was found",
-    Status.SINGULAR: "singular without load",
-}
+ENDS = (
+    "the limit was reached",
+    "the commanded pose is out of reach",
+    "singular without load",
+    "no further equilibrium was found",
+    "the largest number of points was listed",
+    "the force fell to zero",
+    "not followed",
+)
+"""In the order of the core's reasons why a branch ends."""
 
 
 def load_path(
-    loading: Loading, position: Floats, direction: Floats, control: str, limit: float, steps: int
+    loading: Loading, position: Floats, direction: Floats, control: str, limit: float, steps: int, cross: int
 ) -> xr.Dataset:
     """See `sweep`: what it does with a `limit`."""
     machine = loading.machine
     if loading.point not in machine.points:
         raise StiffmapError(f"point: expected one of {', '.join(machine.points)}, got {loading.point!r}")
     turned = machine.description.home.r if loading.rotation is None else loading.rotation
-    status, flags, points, critical = _core.path(
+    flags, *branches = _core.path(
         machine._core,
         position,
         np.ascontiguousarray(turned, dtype=float),
@@ -46,16 +51,22 @@ def load_path(
         CONTROLS.index(control),
         limit,
         steps,
+        cross,
     )
+    (end, points, critical), (crossing_end, crossing, crossing_critical) = branches
+    _check_cross(cross, critical, str(ENDS[end]))
     call = {"function": "sweep", "position": position, "direction": direction, "control": control,
-            "limit": limit, "steps": steps}  # fmt: skip
+            "limit": limit, "steps": steps, "cross": cross}  # fmt: skip
     attrs = describe(loading, f"load path by {control}", call) | {
-        "end": ENDS[Status(status)],
+        "end": ENDS[end],
+        "crossing_end": _crossing_end(cross, critical, crossing, ENDS[crossing_end]),
         "flags": int(flags),
         "critical_points": json.dumps([_summary(c) for c in critical]),
     }
-    data, coords = _variables(points)
-    modes, mode_coords = critical_variables(machine, critical)
+    data, coords = _variables(points + crossing)
+    data["branch"] = ("step", [0] * len(points) + [1] * len(crossing), BRANCH)
+    modes, mode_coords = critical_variables(machine, critical + crossing_critical)
+    modes["critical_branch"] = ("critical", [0] * len(critical) + [1] * len(crossing_critical), BRANCH)
     coords |= mode_coords | {
         "axis": ("axis", np.array(["x", "y", "z"])),
         "position": ("axis", position, meaning("m", "commanded tcp")),
@@ -64,7 +75,22 @@ def load_path(
     return xr.Dataset(data | modes, coords, attrs)
 
 
-def check_control(control: str, limit: float | None, steps: int, load_type: str) -> float:
+def _crossing_end(cross: int, critical: list[dict[str, Any]], points: list[Any], end: str) -> str:
+    """Why it ended; at its first point, where several modes leave no single branch to follow."""
+    if cross and len(points) == 1:
+        fork = [c for c in critical if not c["limit"]][abs(cross) - 1]
+        if abs(fork["after"] - fork["before"]) > 1:
+            return f"not followed: {abs(fork['after'] - fork['before'])} modes at once, no single branch"
+    return end
+
+
+def _check_cross(cross: int, critical: list[dict[str, Any]], end: str) -> None:
+    forks = sum(not c["limit"] for c in critical)
+    if abs(cross) > forks:
+        raise StiffmapError(f"cross: the path has {forks} bifurcations, got {cross} (end of the path: {end})")
+
+
+def check_control(control: str, limit: float | None, steps: int, load_type: str, cross: int) -> float:
     """The limit as a number; StiffmapError where the options do not fit together."""
     if control not in CONTROLS:
         raise StiffmapError(f"control: expected one of {', '.join(CONTROLS)}, got {control!r}")
@@ -74,6 +100,8 @@ def check_control(control: str, limit: float | None, steps: int, load_type: str)
         )
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise StiffmapError(f"steps: expected a positive number, got {steps!r}")
+    if isinstance(cross, bool) or not isinstance(cross, int):
+        raise StiffmapError(f"cross: expected the number of a bifurcation, 1, -1, 2 …, got {cross!r}")
     if load_type != "dead":
         raise StiffmapError(f"load_type: a path needs a conservative force, 'dead'; got {load_type!r}")
     return float(limit)

@@ -25,6 +25,7 @@ def sweep(
     control: str = "force",
     limit: float | None = None,
     steps: int = 40,
+    cross: int = 0,
     point: str = "tcp",
     rotation: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
@@ -39,7 +40,9 @@ def sweep(
     one path of equilibria is followed from the unloaded machine, and what happens on the way is
     reported: control ``force`` to a force `limit` (N), ``displacement`` to a displacement `limit` (m)
     along the direction, which passes limit points (snap-through), ``arc`` by arc length to that
-    displacement, which passes turning points of either.
+    displacement, which passes turning points of either. `cross` k also follows, by arc length, the branch
+    that crosses the path at its k-th bifurcation, towards the side to which its mode points; -k: to the
+    other side. That branch ends at the `limit`, or where the force falls to zero.
 
     position (3,) m; direction (3,), any length; forces (n,) N, negative ones act against it;
     limit of either sign; steps to the limit. Other options as in `Machine.solve`.
@@ -48,19 +51,21 @@ def sweep(
     deflection_along (component along the force), compliance_along (of a little more force, m/N),
     status, flags. Unstable equilibria keep their values (status 3); unreachable and not converged
     ones hold NaN. A path has the dimension ``step`` with the coordinate force, also unstable_modes
-    (number of directions in which the energy falls), and the dimension ``critical``: critical_force,
-    critical_kind (``limit`` or ``bifurcation``: there the path goes on along the branch it came on, and
-    another one crosses), mode over ``coordinate``, mode_leg and mode_joint (what moves most in it);
-    the attribute ``end`` says why it ended. Raises StiffmapError for bad input.
+    (number of directions in which the energy falls) and branch (1: the crossing one), and the dimension
+    ``critical``: critical_force, critical_kind (``limit`` or ``bifurcation``: there the path goes on along
+    the branch it came on, and another one crosses), critical_branch, mode over ``coordinate``, mode_leg and
+    mode_joint (what moves most in it); the attributes ``end`` and ``crossing_end`` say why they ended.
+    Raises StiffmapError for bad input.
     """
     loading = Loading(machine, point, rotation, gravity, load_type, method, load_steps, threads)
     p, u = place(position), unit(direction)
     if forces is None or control != "force":
         if forces is not None:
             raise StiffmapError(f"forces: not with control {control!r}, which finds them; give a limit (m)")
-        return load_path(loading, p, u, control, check_control(control, limit, steps, load_type), steps)
-    if limit is not None:
-        raise StiffmapError("limit: not together with forces")
+        reach = check_control(control, limit, steps, load_type, cross)
+        return load_path(loading, p, u, control, reach, steps, cross)
+    if limit is not None or cross:
+        raise StiffmapError(f"{'cross' if limit is None else 'limit'}: not together with forces")
     f = force_list(forces)
     wrench = np.concatenate([f[:, None] * u, np.zeros((f.size, 3))], axis=1)
     s = loading.solve(p, wrench)

@@ -22,8 +22,11 @@ class Comparison:
     rotation: float
     compliance: float
     residual: float
+    truth: str
+    """Of the minimiser: found, ends, singular."""
     stable: bool
     """Of the minimiser: a minimum of the energy."""
+    flags: sm.Flag
 
     @property
     def gap(self) -> float:
@@ -55,10 +58,7 @@ def compare(seed: int, methods: tuple[str, ...] = ("reference", "fast")) -> list
         gap = np.abs(s.compliance[:, :3] - truth.compliance) / np.outer(scale, scale[:3])
         translation = np.abs(s.displacement[:3] - moved).max() / np.abs(moved).max()
         rotation = np.abs(s.displacement[3:] - turned).max() / np.abs(turned).max()
-        status = sm.Status(int(s.status))
-        out.append(
-            Comparison(
-                status, float(translation), float(rotation), float(gap.max()), truth.residual, truth.stable
-            )
-        )
+        found = (float(translation), float(rotation), float(gap.max()), truth.residual)
+        flags = sm.Flag(int(s.flags))
+        out.append(Comparison(sm.Status(int(s.status)), *found, truth.kind, truth.stable, flags))
     return out

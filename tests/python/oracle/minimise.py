@@ -26,10 +26,16 @@ class Answer:
     residual: float
     stable: bool
     """The energy is a minimum among the configurations that close."""
+    kind: str = "found"
+    """Or ``ends``: no equilibrium further along the path of loads; ``singular``: free without load."""
 
 
-NOTHING = Answer(np.full(3, np.nan), np.eye(3), np.full((6, 3), np.nan), np.nan, False)
-"""Where the path ends before the load is reached."""
+SINGULAR = 1e-9  # smallest singular value of the scaled system; that of a sound machine is near 0.1
+
+
+def nothing(kind: str) -> Answer:
+    """No equilibrium."""
+    return Answer(np.full(3, np.nan), np.eye(3), np.full((6, 3), np.nan), np.nan, False, kind)
 
 
 class Oracle:
@@ -76,6 +82,8 @@ class Oracle:
         """Along the path from no load to all of it; a Newton solve whose steps do not shrink is not trusted
         as its continuation, and the step of the load is halved."""
         full, done, share = self.loads, 0.0, 1.0
+        if self._free():
+            return nothing("singular")
         start = self._newton(np.zeros(self.size), np.zeros(self.closures), 0.0, full, ITERATIONS)
         while done < 1 and share > SHORTEST and start is not None:
             share = min(share, 1 - done)
@@ -85,7 +93,14 @@ class Oracle:
             else:
                 start, done, share = found, done + share, 2 * share
         self.loads = full
-        return NOTHING if start is None or done < 1 else self._answer(*start)
+        return nothing("ends") if start is None or done < 1 else self._answer(*start)
+
+    def _free(self) -> bool:
+        """Something moves without load."""
+        self.loads, full = self.loads.times(0.0), self.loads
+        *_, system, scale = self._system(np.zeros(self.size), np.zeros(self.closures))
+        self.loads = full
+        return bool(np.linalg.svd(scale[:, None] * system * scale)[1][-1] < SINGULAR)
 
     def _newton(
         self, x: np.ndarray, multipliers: np.ndarray, share: float, full: Loads, free: int = 0

@@ -22,7 +22,8 @@ RANKS = (
     ("saddle", "fast_plan"),
     ("equilibrium", "stiffness"),
     ("solve",),
-    ("batch", "clamp", "path"),
+    ("batch", "clamp", "follower"),
+    ("path",),
 )
 RANK = {name: i for i, names in enumerate(RANKS) for name in names}
 
