@@ -17,11 +17,7 @@ double counted(Work&& work) {
 }
 
 void count_pose(const Program& P, Block& b, Scratch& s, double* out) {
-  std::int64_t pose[1] = {b.first};
-  out[bench::closure] += counted([&] {
-    const M usable = b.read();
-    Closing{P, s}.close(b.command, usable, pose, b.in.position);
-  });
+  out[bench::closure] += counted([&] { b.read(); });
   out[bench::block] += counted([&] { b.run(); });
   const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
   Elimination e{P, s, {}, splat(1e300), {f, f, f, g, g, g}};
@@ -34,16 +30,16 @@ void count_pose(const Program& P, Block& b, Scratch& s, double* out) {
   out[bench::laws] += counted([&] { n.evaluate(false); });
   out[bench::frames] += counted([&] { walk<Build::actual>(P, P.chains[P.root], s.x, tip, s); });
   at = tip.p;
-  out[bench::wrenches] += counted([&] { e.wrenches(P.chains[P.root], F, at); });
+  out[bench::wrenches] += counted([&] { wrenches(e, P.chains[P.root], F, at); });
   for (int i = 0; i < P.op_count; ++i)
     if (P.ops[i].kind == OpKind::spring)
-      out[bench::elements] += counted([&] { e.spring_tangent(P.ops[i], s.stiff[P.ops[i].slot], K, c); });
-  out[bench::elimination] += counted([&] { e.tangent(P.chains[P.root], b.load, tip.p, n.K, n.c); });
+      out[bench::elements] += counted([&] { spring_tangent(e, P.ops[i], s.stiff[P.ops[i].slot], K, c); });
+  out[bench::elimination] += counted([&] { tangent(e, P.chains[P.root], b.load, tip.p, n.K, n.c); });
   out[bench::platform] += counted([&] {
     n.dense(C);
     n.invert(C);
   });
-  out[bench::back] += counted([&] { e.back(P.chains[P.root], get(zero), tip.p, V3{}, M{}); });
+  out[bench::back] += counted([&] { back(e, P.chains[P.root], get(zero), tip.p, V3{}, M{}); });
   n.tip = tip;
   n.point = tip.p;
   out[bench::output] += counted([&] { b.write(M{-1}, n, C, C, splat(1)); });

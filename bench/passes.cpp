@@ -39,7 +39,7 @@ void time_elements(const Program& P, Scratch& s, Elimination& e) {
     if (op.kind != OpKind::spring) continue;
     Sym6 K;
     V6 c;
-    e.spring_tangent(op, s.stiff[op.slot], K, c);
+    spring_tangent(e, op, s.stiff[op.slot], K, c);
     bench::keep(K);
     bench::keep(c);
   }
@@ -63,10 +63,10 @@ void time_block(Block& b, const M usable, Timer& time) {
   time(bench::wrenches, [&] {
     F = b.load;
     at = tip.p;
-    e.wrenches(P.chains[P.root], F, at);
+    wrenches(e, P.chains[P.root], F, at);
   });
   time(bench::elements, [&] { time_elements(P, s, e); });
-  time(bench::elimination, [&] { e.tangent(P.chains[P.root], b.load, tip.p, n.K, n.c); });
+  time(bench::elimination, [&] { tangent(e, P.chains[P.root], b.load, tip.p, n.K, n.c); });
   V K[6][6], C[6][6], x[6] = {};
   time(bench::platform, [&] {
     n.dense(C);
@@ -76,7 +76,7 @@ void time_block(Block& b, const M usable, Timer& time) {
   n.dense(K);
   n.tip = tip;
   n.point = tip.p;
-  time(bench::back, [&] { e.back(P.chains[P.root], get(x), tip.p, V3{}, M{}); });
+  time(bench::back, [&] { back(e, P.chains[P.root], get(x), tip.p, V3{}, M{}); });
   time(bench::output, [&] { b.write(usable, n, K, C, splat(1)); });
   time(bench::iteration, [&] {
     n.evaluate(false);
@@ -84,7 +84,7 @@ void time_block(Block& b, const M usable, Timer& time) {
     n.dense(C);
     n.invert(C);
     bench::keep(C);
-    e.back(P.chains[P.root], get(x), tip.p, V3{}, M{});
+    back(e, P.chains[P.root], get(x), tip.p, V3{}, M{});
   });
 }
 
@@ -95,13 +95,8 @@ void measure(const Program* P, const KernelInput* in, const KernelOutput* out, v
   for (std::int64_t i = 0; i + W <= in->count; i += W, ++blocks) {
     Block b{*P, *in, *out, s, i, W, {}, {}};
     Timer time{repeats, W, seconds};
-    std::int64_t poses[W];
-    for (int k = 0; k < W; ++k) poses[k] = b.pose(k);
     M closed{};
-    time(bench::closure, [&] {
-      const M usable = b.read();
-      closed = Closing{*P, s}.close(b.command, usable, poses, in->position);
-    });
+    time(bench::closure, [&] { closed = b.read(); });
     time(bench::block, [&] { b.run(); });
     time_block(b, closed, time);
   }

@@ -120,21 +120,4 @@ void walk(const Program& P, const ChainProgram& chain, const V* x, Frame& f, Scr
   apply(B == Build::nominal ? chain.nominal : chain.actual, f);
 }
 
-/// Rotation vector that turns a into b.
-inline V3 rotation_between(const M3& a, const M3& b) {
-  // sin(angle) axis = 1/2 sum_k a_k x b_k, cos(angle) = (trace - 1)/2.
-  const V3 n = splat(0.5) * (cross(a.c[0], b.c[0]) + cross(a.c[1], b.c[1]) + cross(a.c[2], b.c[2]));
-  const V c = 0.5 * (dot(a.c[0], b.c[0]) + dot(a.c[1], b.c[1]) + dot(a.c[2], b.c[2]) - 1.0);
-  const V s2 = dot(n, n);
-  V factor{};
-  for (int i = 0; i < W; ++i) {  // angle / sin(angle)
-    const double s = __builtin_sqrt(s2[i]);
-    factor[i] = s < 1e-4 && c[i] > 0 ? 1 + s2[i] * (1.0 / 6 + s2[i] * (3.0 / 40)) : __builtin_atan2(s, c[i]) / s;
-  }
-  return factor * n;
-}
-
-/// Twist from frame a to frame b.
-inline V6 frame_error(const Frame& a, const Frame& b) { return {b.p - a.p, rotation_between(a.R, b.R)}; }
-
 }  // namespace stiffmap::kernel

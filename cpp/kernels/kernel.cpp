@@ -6,6 +6,7 @@
 
 #include "closing.hpp"
 #include "newton.hpp"
+#include "residual.hpp"
 
 #ifndef STIFFMAP_LEVEL
 #define STIFFMAP_LEVEL "base"
@@ -54,35 +55,41 @@ struct Block {
 
   std::int64_t pose(int lane) const { return first + (lane < count ? lane : count - 1); }
 
-  static void set(V3& v, int lane, const double* a, int stride = 1) {
-    v.x[lane] = a[0];
-    v.y[lane] = a[stride];
-    v.z[lane] = a[2 * stride];
-  }
-
+  /// What the poses ask; where they are given, the closed coordinates too: lanes without are not usable.
   M read() {
-    M usable{};
+    V* const lanes[] = {&command.p.x,      &command.p.y,      &command.p.z,      &command.R.c[0].x, &command.R.c[1].x,
+                        &command.R.c[2].x, &command.R.c[0].y, &command.R.c[1].y, &command.R.c[2].y, &command.R.c[0].z,
+                        &command.R.c[1].z, &command.R.c[2].z, &load.a.x,         &load.a.y,         &load.a.z,
+                        &load.b.x,         &load.b.y,         &load.b.z};
+    alignas(64) double value[18][W];
     for (int i = 0; i < W; ++i) {
       const std::int64_t k = pose(i);
-      set(command.p, i, in.position + 3 * k);
-      for (int c = 0; c < 3; ++c) set(command.R.c[c], i, in.rotation + 9 * k + c, 3);
-      set(load.a, i, in.wrench + 6 * k);
-      set(load.b, i, in.wrench + 6 * k + 3);
-      usable[i] = start(k, i) ? -1 : 0;
+      for (int c = 0; c < 3; ++c) value[c][i] = in.position[3 * k + c];
+      for (int c = 0; c < 9; ++c) value[3 + c][i] = in.rotation[9 * k + c];
+      for (int c = 0; c < 6; ++c) value[12 + c][i] = in.wrench[6 * k + c];
+    }
+    for (int c = 0; c < 18; ++c) *lanes[c] = kernel::load(value[c]);
+    return in.start ? given() : close();
+  }
+
+  M given() {
+    M usable{};
+    for (int i = 0; i < W; ++i) {
+      const double* x = in.start + P.coordinate_count * pose(i);
+      bool finite = true;
+      for (int q = 0; q < P.coordinate_count; ++q) {
+        s.x[q][i] = x[q];
+        finite = finite && x[q] == x[q];
+      }
+      usable[i] = finite ? -1 : 0;
     }
     return usable;
   }
 
-  bool start(std::int64_t k, int lane) {
-    for (int q = 0; q < P.coordinate_count; ++q) s.x[q][lane] = P.coordinates[q].role == 2 ? 0 : P.coordinates[q].home;
-    if (!in.start) return P.grid && Closing{P, s}.interpolate(in.position + 3 * k, lane);
-    const double* x = in.start + P.coordinate_count * k;
-    bool finite = true;
-    for (int q = 0; q < P.coordinate_count; ++q) {
-      s.x[q][lane] = x[q];
-      finite = finite && x[q] == x[q];
-    }
-    return finite;
+  M close() {
+    const double* at[W];
+    for (int i = 0; i < W; ++i) at[i] = in.position + 3 * pose(i);
+    return Closing{P, s}.close(command, at);
   }
 
   /// Drives with their errors; every coordinate's value at zero deflection (theory G1, G2).
@@ -128,7 +135,7 @@ struct Block {
       at.evaluate(false);
       at.frames_and_wrenches();
       V c[6], eta[6];
-      put(e.residual(Q.chains[Q.root], at.point), c);
+      put(residual(e, Q.chains[Q.root], at.point), c);
       for (int i = 0; i < 6; ++i) {
         eta[i] = splat(0);
         for (int q = 0; q < 6; ++q) eta[i] -= C[i][q] * c[q];
@@ -154,12 +161,7 @@ struct Block {
   }
 
   void run() {
-    M usable = read();
-    if (!in.start) {
-      std::int64_t poses[W];
-      for (int i = 0; i < W; ++i) poses[i] = pose(i);
-      usable = Closing{P, s}.close(command, usable, poses, in.position);
-    }
+    const M usable = read();
     set_start();
     for (int k = 0; k < P.chain_count; ++k) s.branches[k].F = V6{};
     const double f = __builtin_sqrt(P.stiffness), g = f * P.length;

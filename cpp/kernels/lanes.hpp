@@ -36,6 +36,12 @@ inline V root(V x) {
   return out;
 }
 
+inline V load(const double* x) {
+  V out;
+  __builtin_memcpy(&out, x, sizeof out);
+  return out;
+}
+
 /// Sine and cosine: reduction to |r| <= pi/4 in three parts, then the Taylor-like minimax polynomials
 /// of degree 13 and 14; error below 2 ulp for |x| < 1e4.
 inline void sincos(V x, V& s, V& c) {
@@ -64,42 +70,5 @@ inline void sincos(V x, V& s, V& c) {
   s = negs ? -s0 : s0;
   c = negc ? -c0 : c0;
 }
-
-struct V3 {
-  V x, y, z;
-};
-inline V3 operator+(const V3& a, const V3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline V3 operator-(const V3& a, const V3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline V3 operator*(V s, const V3& a) { return {s * a.x, s * a.y, s * a.z}; }
-inline V dot(const V3& a, const V3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline V3 cross(const V3& a, const V3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-inline V3 select(M m, const V3& a, const V3& b) {
-  return {select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)};
-}
-
-/// Three columns.
-struct M3 {
-  V3 c[3];
-};
-inline V3 operator*(const M3& R, const V3& a) { return a.x * R.c[0] + a.y * R.c[1] + a.z * R.c[2]; }
-inline M3 operator*(const M3& A, const M3& B) { return {{A * B.c[0], A * B.c[1], A * B.c[2]}}; }
-/// Transposed times a vector.
-inline V3 operator%(const M3& R, const V3& a) { return {dot(R.c[0], a), dot(R.c[1], a), dot(R.c[2], a)}; }
-
-struct Frame {
-  V3 p;
-  M3 R;
-};
-
-/// Wrench (f, m) or twist (v, w): linear first.
-struct V6 {
-  V3 a, b;
-};
-inline V6 operator+(const V6& x, const V6& y) { return {x.a + y.a, x.b + y.b}; }
-inline V6 operator-(const V6& x, const V6& y) { return {x.a - y.a, x.b - y.b}; }
-inline V6 operator*(V s, const V6& x) { return {s * x.a, s * x.b}; }
-inline V dot(const V6& x, const V6& y) { return dot(x.a, y.a) + dot(x.b, y.b); }
 
 }  // namespace stiffmap::kernel

@@ -2,7 +2,10 @@
 // Equilibrium of a block of poses: laws, Newton by the elimination, trust test per lane.
 #pragma once
 
-#include "elimination.hpp"
+#include "frames.hpp"
+#include "steps.hpp"
+#include "tangents.hpp"
+#include "wrenches.hpp"
 
 namespace stiffmap::kernel {
 
@@ -131,13 +134,14 @@ struct Newton {
       point = point + tip.R * V3{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
     V6 F = load;
     V3 at = point;
-    e.wrenches(P.chains[P.root], F, at);
+    wrenches(e, P.chains[P.root], F, at);
   }
 
-  void linearize() {
+  /// One copy of the code: two could contract differently, and a pose's last bits would tell which ran.
+  [[gnu::noinline]] void linearize() {
     frames_and_wrenches();
     e.lowest = splat(1e300);
-    e.tangent(P.chains[P.root], load, point, K, c);
+    tangent(e, P.chains[P.root], load, point, K, c);
   }
 
   /// Tangent of a small extra dead wrench at the point, K - S(m)/2 in the rotational block.
@@ -206,14 +210,15 @@ struct Newton {
       M active = ~done & ~failed;
       for (int q = 0; q < P.coordinate_count; ++q) s.dz[q] = splat(0);
       e.transferred = splat(0);
-      e.back(P.chains[P.root], get(eta), point, V3{}, active);
+      back(e, P.chains[P.root], get(eta), point, V3{}, active);
       const V norm = step_norm();
       failed |= active & ~(norm < 1e6);
       // Nothing left to gain from the step: keep the state, and with it this linearisation, unless
       // the branches shared the load in another way.
-      const M still = active & (norm < nothing);
+      const M still = active & (norm < nothing), kept = still & (e.transferred < nothing);
+      if (any(kept)) keep_wrenches(e, kept);
       done |= still;
-      fresh = all(done | failed) && all(still == active) && all((e.transferred < nothing) | ~still);
+      fresh = all(done | failed) && all(kept == active);
       iterations = select(active, iterations + 1.0, iterations);
       active &= ~still;
       for (int q = 0; q < P.coordinate_count; ++q) s.z[q] = select(active, s.z[q] + s.dz[q], s.z[q]);

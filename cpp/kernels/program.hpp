@@ -75,6 +75,21 @@ struct LegClosure {
   std::int32_t first_unknown, unknowns;  ///< into unknown coordinates
 };
 
+/// A leg of three parallel revolutes and a slide along them closes in closed form (docs/fast_path.md,
+/// Closure). Base axes, all relative to home; u, v, w right-handed, u from the first to the third axis.
+struct PlanarLeg {
+  double u[3], v[3], w[3];
+  double first[3];           ///< a point of the first axis
+  double third[3];           ///< a point of the third axis in the legs' end frame
+  double heading[3];         ///< u in the legs' end frame
+  double a[2], b[2];         ///< first to second axis, second to third turned to the sine's zero; along u, v
+  double sum, inverse;       ///< |a|^2 + |b|^2, 1/(2 |a| |b|)
+  double branch;             ///< sign of the sine at home
+  double bend, height;       ///< angle of (cosine, sine) and slide of the third point at home
+  double home[4], sense[4];  ///< revolutes in order, then the slide
+  std::int32_t coordinate[4];
+};
+
 struct Program {
   const Op* ops;
   const ChainProgram* chains;
@@ -87,15 +102,16 @@ struct Program {
   const ClosureEquation* equations;
   const ClosureTerm* terms;
   const std::int32_t* unknowns;
-  const double* grid;  ///< closure starts: nodes x unknowns of all legs, NaN where unreachable
+  const PlanarLeg* planar;  ///< one per leg, or null: the closure starts from the grid
+  const double* grid;       ///< closure starts: nodes x row of unknowns of all legs, NaN where unreachable
   std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count;
   std::int32_t root, legs_op;  ///< root chain; the legs' block operation
   std::int32_t joint_slots, stiff_slots;
-  std::int32_t closes;         ///< the legs can be closed one by one from the grid
+  std::int32_t closes;         ///< the legs can be closed one by one
   std::int32_t exact_weights;  ///< the tangent is exact with the bodies' weight too
   std::int32_t starts_linear;  ///< a law with knots or friction: Newton starts with all laws linear
   std::uint32_t flag_force, flag_range, flag_limit, flag_always;
-  std::int32_t grid_n[3];
+  std::int32_t grid_n[3], grid_row;  ///< nodes along each axis; numbers per node, a multiple of 8
   double grid_low[3], grid_step[3];
   double length, stiffness;
   double home_R[9];
@@ -126,9 +142,10 @@ struct KernelOutput {
 };
 
 /// Layout that both sides of the border were compiled with: a stale kernel library is refused.
-inline constexpr std::int64_t program_layout =
-    sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) + 41 * sizeof(Op) +
-    43 * sizeof(CoordinateProgram) + 47 * sizeof(DriveProgram) + 53 * sizeof(LawProgram) + 59 * sizeof(ClosureTerm);
+inline constexpr std::int64_t program_layout = sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) +
+                                               41 * sizeof(Op) + 43 * sizeof(CoordinateProgram) +
+                                               47 * sizeof(DriveProgram) + 53 * sizeof(LawProgram) +
+                                               59 * sizeof(ClosureTerm) + 61 * sizeof(PlanarLeg);
 
 /// The one symbol that each level exports. Poses begin .. end-1; `scratch` of scratch_size() bytes.
 struct KernelTable {

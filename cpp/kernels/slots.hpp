@@ -24,8 +24,9 @@ struct StiffSlot {                       // a spring or a block: six relative co
 
 struct BranchSlot {
   Frame end;
-  V6 F;      ///< wrench that acts on its end
-  V6 error;  ///< twist from its end to the end of the block's first branch
+  V6 F;       ///< wrench that acts on its end
+  V6 before;  ///< the same before the last step
+  V6 error;   ///< twist from its end to the end of the block's first branch
   Sym6 K;
   V6 c;
 };

@@ -4,7 +4,7 @@
 // dead wrench (f, m) is it minus S(m)/2 in the rotational block (docs/fast_path.md F1).
 #pragma once
 
-#include "lanes.hpp"
+#include "vectors.hpp"
 
 namespace stiffmap::kernel {
 

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+#include "chains.hpp"
+
+#include <Eigen/Eigenvalues>
+
+namespace stiffmap {
+namespace {
+
+constexpr int most_prefix = 16;
+
+Constant constant(const Pose& T) {
+  Constant c{};
+  for (int i = 0; i < 3; ++i) {
+    c.p[i] = T.p[i];
+    for (int k = 0; k < 3; ++k) c.R[3 * k + i] = T.R(i, k);
+  }
+  c.has_rotation = !T.R.isApprox(Mat3::Identity(), 0);
+  c.has_translation = !T.p.isZero(0);
+  return c;
+}
+
+/// Walks the chains in the order in which Mechanism numbered their coordinates.
+class Compiler {
+ public:
+  Compiler(const Mechanism& m, FastPlanData& out) : m_(m), out_(out) {}
+
+  CompiledChains run() {
+    out_.chains.emplace_back();
+    out_.program.root = 0;
+    out_.program.legs_op = -1;
+    out_.program.exact_weights = 1;
+    chain(m_.description, 0, true, false);
+    return std::move(found_);
+  }
+
+ private:
+  struct Way {  // what has been passed since the chain's start
+    Pose nominal, actual;
+    bool rigid = true, turned = false, moves = false;
+    int prefix = 0;
+  };
+
+  /// Operations of a chain are contiguous: those of its branches come before them.
+  void chain(const Chain& c, std::size_t index, bool outermost, bool start_moves) {
+    std::vector<Op> ops;
+    Way way;
+    way.moves = start_moves;
+    for (const auto& element : c.elements) {
+      if (const auto* e = std::get_if<Offset>(&element)) {
+        way.nominal = way.nominal * e->nominal;
+        way.actual = way.actual * e->actual;
+      } else if (const auto* j = std::get_if<Joint>(&element)) {
+        joint(*j, way, ops);
+      } else if (const auto* s = std::get_if<Spring>(&element)) {
+        spring(*s, way, ops);
+      } else if (const auto* b = std::get_if<Body>(&element)) {
+        body(*b, way, ops);
+      } else if (const auto* k = std::get_if<Block>(&element)) {
+        block(*k, way, ops, outermost);
+      }
+    }
+    ChainProgram& p = out_.chains[index];
+    p.first = i32(out_.ops.size());
+    p.count = i32(ops.size());
+    p.nominal = constant(way.nominal);
+    p.actual = constant(way.actual);
+    p.first_stiff = -1;
+    for (std::size_t i = 0; i < ops.size(); ++i)
+      if (p.first_stiff < 0 && (ops[i].kind == OpKind::spring || ops[i].kind == OpKind::block))
+        p.first_stiff = p.first + i32(i);
+    if (p.first_stiff < 0) found_.missing = "a chain without a full link spring";
+    if (outermost && out_.program.legs_op >= 0) out_.program.legs_op += p.first;
+    out_.ops.insert(out_.ops.end(), ops.begin(), ops.end());
+  }
+
+  Op& push(OpKind kind, Way& way, std::vector<Op>& ops) {
+    Op op{};
+    op.kind = kind;
+    op.coordinate = op.law = op.wrench = -1;
+    op.nominal = constant(way.nominal);
+    op.actual = constant(way.actual);
+    way.nominal = way.actual = Pose{};
+    ops.push_back(op);
+    return ops.back();
+  }
+
+  void joint(const Joint& j, Way& way, std::vector<Op>& ops) {
+    const Coordinate& c = m_.coordinates[static_cast<std::size_t>(next_)];
+    Op& op = push(j.type == JointType::revolute ? OpKind::revolute : OpKind::prismatic, way, ops);
+    op.coordinate = next_++;
+    op.eliminated = !c.locked;
+    op.slot = out_.program.joint_slots++;
+    op.law = i32(c.law);
+    op.axis = 3;
+    for (int i = 0; i < 3; ++i) {
+      op.direction[i] = j.axis[i];
+      if (j.axis[i] == 1) op.axis = i;
+    }
+    if (j.actuated) found_.drives.push_back({op.coordinate, op.slot, j.type == JointType::prismatic});
+    if (op.eliminated && way.rigid && ++way.prefix > most_prefix)
+      found_.missing = "more joints before the first link spring than are supported";
+    if (op.eliminated) {
+      way.moves = true;
+      way.turned = way.turned || j.type == JointType::revolute;
+    }
+  }
+
+  /// A spring that is full and regular is one operation; one with uncoupled directions, some of them
+  /// rigid, free or with a law of their own, is a sequence of elastic joints.
+  void spring(const Spring& s, Way& way, std::vector<Op>& ops) {
+    Mat6 K = s.matrix.stiffness, whole = K;
+    bool corners = false;
+    for (const auto& [i, law] : s.laws) {
+      corners = corners || law.has_knots() || law.friction() != 0;
+      K(i, i) = 0;
+      whole(i, i) = law.stiffness();
+    }
+    const Vec6 d = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    const bool deficient =
+        s.matrix.rotated || s.matrix.rigid.any() ||
+        Eigen::SelfAdjointEigenSolver<Mat6>(d.asDiagonal() * whole * d.asDiagonal()).eigenvalues()[0] < 1e-9;
+    if (deficient || corners) {
+      if (s.matrix.rotated || !Mat6(K.diagonal().asDiagonal()).isApprox(K, 1e-14))
+        found_.missing = "a coupled link spring with rigid or free directions or with gaps";
+      elastic_joints(s, K, way, ops);
+      return;
+    }
+    Op& op = push(OpKind::spring, way, ops);
+    op.coordinate = next_;
+    op.slot = out_.program.stiff_slots++;
+    next_ += 6;
+    for (int i = 0; i < 6; ++i) {
+      op.rest[i] = s.rest[i];
+      for (int k = 0; k < 6; ++k) op.K[6 * i + k] = K(i, k);
+    }
+    way.rigid = false;
+    way.moves = true;
+  }
+
+  void elastic_joints(const Spring& s, const Mat6& K, Way& way, std::vector<Op>& ops) {
+    for (int i = 0; i < 6; ++i, ++next_) {
+      const Index law = m_.coordinates[static_cast<std::size_t>(next_)].law;
+      if (s.matrix.rigid[i] && law < 0) continue;  // a law makes a rigid direction yield
+      Op& op = push(i < 3 ? OpKind::prismatic : OpKind::revolute, way, ops);
+      op.coordinate = next_;
+      op.eliminated = 1;
+      op.slot = out_.program.joint_slots++;
+      op.axis = i % 3;
+      op.direction[i % 3] = 1;
+      op.law = i32(law);
+      found_.elastic.push_back({next_, K(i, i), s.rest[i]});
+      if (way.rigid && ++way.prefix > most_prefix)
+        found_.missing = "more joints before the first link spring than are supported";
+      way.moves = true;
+      way.turned = way.turned || i >= 3;
+    }
+  }
+
+  void body(const Body& b, Way& way, std::vector<Op>& ops) {
+    if (b.mass == 0) return;
+    // Behind a joint that starts from rigid, or in a frame that moves, the elimination leaves out how
+    // the weight turns in the relative problem (docs/fast_path.md F9).
+    if ((way.rigid && way.turned) || in_moving_block_) out_.program.exact_weights = 0;
+    Op& op = push(OpKind::load, way, ops);
+    op.slot = out_.program.joint_slots++;
+    op.mass = b.mass;
+    for (int i = 0; i < 3; ++i) op.com[i] = b.com[i];
+  }
+
+  void block(const Block& b, Way& way, std::vector<Op>& ops, bool outermost) {
+    const std::size_t first = out_.chains.size();
+    out_.chains.resize(first + b.branches.size());
+    const bool is_legs = outermost && b.name == "legs" && out_.program.legs_op < 0;
+    const bool outside = in_moving_block_;
+    in_moving_block_ = in_moving_block_ || way.moves;
+    const int here = i32(ops.size());
+    Op& op = push(OpKind::block, way, ops);
+    op.first = i32(first);
+    op.count = i32(b.branches.size());
+    op.slot = out_.program.stiff_slots++;
+    op.start_moves = way.moves;
+    for (std::size_t k = 0; k < b.branches.size(); ++k) chain(b.branches[k].second, first + k, false, way.moves);
+    in_moving_block_ = outside;
+    if (is_legs) {
+      out_.program.legs_op = here;
+    }
+    way.rigid = false;
+    way.moves = true;
+  }
+
+  const Mechanism& m_;
+  FastPlanData& out_;
+  std::int32_t next_ = 0;
+  bool in_moving_block_ = false;
+  CompiledChains found_;
+};
+
+}  // namespace
+
+CompiledChains compile_chains(const Mechanism& m, FastPlanData& out) { return Compiler(m, out).run(); }
+
+}  // namespace stiffmap

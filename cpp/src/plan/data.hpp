@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// What a plan owns: the tables that its Program points into.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "../../kernels/program.hpp"
+#include "stiffmap/mechanism.hpp"
+
+namespace stiffmap {
+
+inline std::int32_t i32(std::size_t n) { return static_cast<std::int32_t>(n); }
+inline std::int32_t i32(Index n) { return static_cast<std::int32_t>(n); }
+
+struct FastPlanData {
+  Program program{};
+  std::vector<Op> ops;
+  std::vector<ChainProgram> chains;
+  std::vector<LawProgram> laws;
+  std::vector<double> knots;
+  std::vector<CommandErrorProgram> errors;
+  std::vector<DriveProgram> drives;
+  std::vector<CoordinateProgram> coordinates;
+  std::vector<LegClosure> legs;
+  std::vector<ClosureEquation> equations;
+  std::vector<ClosureTerm> terms;
+  std::vector<std::int32_t> unknowns;
+  std::vector<PlanarLeg> planar;
+  std::shared_ptr<const std::vector<double>> grid;
+};
+
+}  // namespace stiffmap
