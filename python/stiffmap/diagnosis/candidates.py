@@ -66,11 +66,18 @@ def of_kind(effect: EffectType, description: MachineDescription) -> list[Candida
     """One candidate per place and meaning."""
     out = []
     for element, legs in effect.places(description):
-        parameters = tuple(p for p in effect.parameters_at(description, element, legs) if p.fitted)
+        parameters = tuple(
+            p for p in effect.parameters_at(description, element, legs) if p.fitted or _unknown(p)
+        )
         parameters = tuple(p for p in parameters if not _later_alternative(effect, p, parameters))
         if parameters and any(p.null is not None for p in parameters):
             out.append(Candidate(effect.kind, element, legs, parameters))
     return out
+
+
+def _unknown(p: Parameter) -> bool:
+    """A number that must be given and that nobody gives, as the anchor of a cable: the fit finds it."""
+    return p.null is None and p.default is None
 
 
 def _later_alternative(effect: EffectType, p: Parameter, among: Sequence[Parameter]) -> bool:

@@ -23,6 +23,8 @@ from stiffmap.experiment.problem import Problem
 PAYS = 1e-3
 """Change of chi-square that is not worth another step."""
 STEPS, FRESH = 12, 3
+DAMPING = 0.01
+"""Levenberg's term, per scale: a parameter that the readings hardly feel stays where it is."""
 
 Residual = Callable[[Floats], Floats]
 
@@ -33,7 +35,7 @@ def fit(model: Model, predictor: Predictor, problem: Problem, *, fixed: Sequence
     Its residual and Jacobian belong to these values; chi2 is infinite where the machine cannot be
     solved with it.
     """
-    free = np.array([i for i in range(len(model.values)) if i not in set(fixed)], dtype=np.intp)
+    free = np.array([i for i in range(len(model.values)) if i not in {*fixed, *model.held}], dtype=np.intp)
     try:
         return _descend(model, predictor, problem, free)
     except StiffmapError:
@@ -42,9 +44,10 @@ def fit(model: Model, predictor: Predictor, problem: Problem, *, fixed: Sequence
 
 def evaluate(model: Model, predictor: Predictor, problem: Problem) -> Model:
     """Residual, Jacobian and chi2 of the model as it is."""
-    everything = np.arange(len(model.values))
     r = problem.residual(predictor(model.terms()))
-    j = jacobian(model, model.values, predictor, problem, everything)
+    free = np.array([i for i in range(len(model.values)) if i not in model.held], dtype=np.intp)
+    j = np.zeros((len(r), len(model.values)))
+    j[:, free] = jacobian(model, model.values, predictor, problem, free)
     return replace(model, chi2=float(r @ r), residual=r, jacobian=j)
 
 
@@ -59,6 +62,8 @@ def _descend(model: Model, predictor: Predictor, problem: Problem, free: NDArray
     for _ in range(STEPS if free.size else 0):
         step = np.zeros_like(x)
         step[free] = _bounded(j, r, (low - x)[free], (high - x)[free])
+        if promised(j, r, step[free]) < PAYS:
+            break
         moved, tried = _shorten(residual, x, step, r)
         gain = float(r @ r - tried @ tried)
         if gain > 0:
@@ -79,10 +84,18 @@ def _bounded(j: Floats, r: Floats, low: Floats, high: Floats) -> Floats:
     norm = np.linalg.norm(j, axis=0)
     unit = np.where(norm > 0, norm, 1.0)
     margin = 1e-12 * (1.0 + np.abs(low) + np.abs(high))
+    damped = np.vstack([j / unit, np.diag(DAMPING / unit)])
     found = lsq_linear(
-        j / unit, -r, (np.minimum(low, 0) * unit - margin, np.maximum(high, 0) * unit + margin)
+        damped,
+        -np.append(r, np.zeros(len(norm))),
+        (np.minimum(low, 0) * unit - margin, np.maximum(high, 0) * unit + margin),
     )
     return np.asarray(np.clip(found.x / unit, low, high))
+
+
+def promised(j: Floats, r: Floats, step: Floats) -> float:
+    """Drop of chi-square that the linear model promises of a step."""
+    return float(r @ r - np.sum((r + j @ step) ** 2))
 
 
 def _shorten(residual: Residual, x: Floats, step: Floats, r: Floats) -> tuple[Floats, Floats]:

@@ -11,26 +11,39 @@ from stiffmap.diagnosis.fit import fit
 from stiffmap.diagnosis.model import Model
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.predict import Predictor
-from stiffmap.experiment.problem import Problem
+from stiffmap.experiment.problem import Problem, basis
 
+UNSEEN = 0.25
+"""A parameter whose standard deviation is beyond this share of its range is not determined at all."""
 RISE = float(chi2.isf(0.05, 1))
 
 
 def intervals(model: Model, predictor: Predictor, problem: Problem, inflation: float = 1.0) -> Floats:
     """(k, 2) lower and upper 95 % limits of the values, in scales.
 
-    `inflation` >= 1 widens by the standard deviation of a residual that is not pure noise.
+    `inflation` >= 1 widens by the standard deviation of a residual that is not pure noise. A parameter that
+    the readings do not determine has its whole range.
     """
     assert model.jacobian is not None
-    covariance = np.linalg.pinv(model.jacobian.T @ model.jacobian, rcond=1e-14, hermitian=True)
     low, high = model.bounds()
     out = np.zeros((len(model.values), 2))
     for i, value in enumerate(model.values):
-        step = np.sqrt(RISE * max(covariance[i, i], 0.0)) * inflation
+        alone = seen_alone(model.jacobian, i)
+        if alone * (high[i] - low[i]) * UNSEEN < 1.0:
+            out[i] = low[i], high[i]
+            continue
+        step = np.sqrt(RISE) / alone * inflation
         for side, sign in enumerate((-1.0, 1.0)):
             limit = (low, high)[side][i]
             out[i, side] = _end(model, predictor, problem, i, value, sign * step, limit, RISE * inflation**2)
     return out
+
+
+def seen_alone(jacobian: Floats, i: int) -> float:
+    """Whitened length per scale of what parameter i changes and the others cannot undo."""
+    others = basis(np.delete(jacobian, i, axis=1))
+    own = jacobian[:, i]
+    return float(np.linalg.norm(own - others @ (others.T @ own)))
 
 
 def _end(

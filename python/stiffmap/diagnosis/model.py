@@ -13,6 +13,8 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.problem import basis
 
 STEP = 1e-3  # of a parameter's scale, for tangents
+VISIBLE = 0.03
+"""Whitened length per scale below which a parameter is not seen: 100 scales would make 3 sigma."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +28,8 @@ class Model:
     """(N, k) whitened, at `values`."""
     residual: Floats | None = None
     """(N,) whitened."""
+    held: tuple[int, ...] = ()
+    """Values that no fit moves: the readings do not feel them where the effect begins."""
 
     @property
     def scales(self) -> Floats:
@@ -36,6 +40,18 @@ class Model:
     def si(self) -> Floats:
         """(k,) values in SI."""
         return self.values * self.scales
+
+    @property
+    def freedom(self) -> int:
+        """Number of parameters that the readings feel; one that they do not is no parameter of the fit."""
+        return sum(self.sizes())
+
+    def sizes(self) -> list[int]:
+        """Per candidate the number of its parameters that the readings feel, at least one."""
+        if self.jacobian is None:
+            return [len(c.parameters) for c in self.candidates]
+        felt = np.linalg.norm(self.jacobian, axis=0) > VISIBLE
+        return [max(1, int(felt[part].sum())) for part in self.parts()]
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Bounds of the values, in scales."""
@@ -61,13 +77,16 @@ class Model:
 
     def without(self, i: int) -> Model:
         """The model less one candidate, its other values as they are."""
-        keep = np.ones(len(self.values), bool)
-        keep[self.parts()[i]] = False
-        return Model(self.candidates[:i] + self.candidates[i + 1 :], self.values[keep])
+        part = self.parts()[i]
+        gone = range(part.start, part.stop)
+        values = np.delete(self.values, part)
+        held = tuple(k if k < part.start else k - len(gone) for k in self.held if k not in gone)
+        return Model(self.candidates[:i] + self.candidates[i + 1 :], values, held=held)
 
-    def plus(self, candidate: Candidate, values: Sequence[float] | Floats) -> Model:
-        """The model and one candidate more, its values in scales."""
-        return Model((*self.candidates, candidate), np.append(self.values, values))
+    def plus(self, candidate: Candidate, values: Sequence[float] | Floats, held: Sequence[int] = ()) -> Model:
+        """The model and one candidate more, its values in scales; `held` counts within the candidate."""
+        more = tuple(len(self.values) + int(k) for k in held)
+        return Model((*self.candidates, candidate), np.append(self.values, values), held=(*self.held, *more))
 
     def tangent(self) -> Floats:
         """(N, r) orthonormal basis of the fitted effects' directions."""

@@ -41,6 +41,11 @@ class Effect:
     definition: str = ""
     """Definition, pivot, frame and what moves with it."""
 
+    @property
+    def place(self) -> tuple[str, str, tuple[str, ...]]:
+        """Kind, element, legs."""
+        return (self.kind, self.element, self.legs)
+
     def __str__(self) -> str:
         legs = f", leg{'s' if len(self.legs) > 1 else ''} {', '.join(self.legs)}" if self.legs else ""
         values = "; ".join(
@@ -106,6 +111,7 @@ class Diagnosis:
     set_aside: Mask = field(repr=False)
     empirical: Empirical | None = None
     seconds: dict[str, float] = field(default_factory=dict)
+    """What each step took; ``null bootstrap`` is done once per plan and kept while the process lives."""
 
     def lines(self) -> list[str]:
         """The verdict in five lines."""

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 from scipy.stats import chi2
 
+from stiffmap.diagnosis.model import VISIBLE
 from stiffmap.diagnosis.sensitivity import Variant
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.problem import Problem
 
-VISIBLE = 0.03
-"""Whitened length per scale below which a parameter is not seen: 100 scales would make 3 sigma."""
 RANK = 1e-5
 
 
@@ -136,7 +135,7 @@ def log_surprise(drops: Floats, freedom: NDArray[np.intp]) -> Floats:
 
 
 def _white(problem: Problem, columns: Floats) -> Floats:
-    return np.column_stack([problem.white(columns[..., k]) for k in range(columns.shape[-1])])
+    return problem.white(columns)
 
 
 def _screen(

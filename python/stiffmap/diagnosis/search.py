@@ -21,6 +21,8 @@ from stiffmap.experiment.problem import Problem
 MOST_EFFECTS = 4
 LARGE = 10.0
 """Scales beyond which parameters without a slope at the null get starts of their own."""
+WORTH = 0.5
+"""Share of the surprise demanded that screening must promise before anything is fitted."""
 MARGIN, CLOSE = 15.0, 0.05
 """What linear screening may be wrong by: candidates this near the best get a full fit."""
 
@@ -95,6 +97,8 @@ def additions(search: Search, model: Model, number: int, margin: float = MARGIN)
         if v.candidate not in model.candidates and surprise[i] > 0:
             best_of.setdefault(v.candidate, int(i))
     top = max(surprise, default=0.0)
+    if top < WORTH * search.threshold:
+        return []
     picked = [i for i in best_of.values() if surprise[i] > top - max(margin, CLOSE * top)]
     return [_finalist(search, model, screen, i) for i in picked[:number]]
 
@@ -105,11 +109,12 @@ def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
     estimate = screen.estimate(i, model.residual)
     flat = ~np.any(screen.columns(i) != 0.0, axis=0)
     starts = start_values(variant, estimate, flat)
-    fits = [fit(model.plus(variant.candidate, s), search.predictor, search.problem) for s in starts]
+    held = np.flatnonzero(flat).tolist() if len(starts) == 1 else []
+    begun = [model.plus(variant.candidate, s, held) for s in starts]
+    fits = [fit(b, search.predictor, search.problem) for b in begun]
     best = min(fits, key=lambda m: m.chi2)
     drop = model.chi2 - best.chi2
-    freedom = len(variant.candidate.parameters)
-    return Finalist(best, drop, surprise_of(drop, freedom))
+    return Finalist(best, drop, surprise_of(drop, best.sizes()[-1]))
 
 
 def surprise_of(drop: float, freedom: int) -> float:
@@ -131,10 +136,22 @@ def start_values(variant: Variant, estimate: Floats, flat: NDArray[np.bool_]) ->
         amplitude, phase = float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
         given = {"amplitude": amplitude * c.parameters[0].scale, "phase": phase, **dict(variant.shape)}
         return [np.array([given[p.name] / p.scale for p in c.parameters])]
+    if variant.shape:
+        return [shaped(variant, estimate)]
     null = np.array([float(p.null or 0.0) / p.scale for p in c.parameters])
     size = float(np.abs(estimate).max(initial=0.0))
     aside = [sign * 0.3 * size * flat for sign in (1.0, -1.0)] if flat.any() and size > LARGE else []
     return [null + estimate, *(null + estimate + a for a in aside)]
+
+
+def shaped(variant: Variant, estimate: Floats) -> Floats:
+    """Linear parameters at null plus estimate, the others as the variant has them (in scales)."""
+    given = dict(variant.shape)
+    given |= {
+        p.name: float(p.null or 0.0) + float(v) * p.scale
+        for p, v in zip(variant.candidate.linear, estimate, strict=True)
+    }
+    return np.array([given[p.name] / p.scale for p in variant.candidate.parameters])
 
 
 def backward(search: Search, model: Model) -> Model:
@@ -143,7 +160,7 @@ def backward(search: Search, model: Model) -> Model:
         trials = [
             fit(model.without(i), search.predictor, search.problem) for i in range(len(model.candidates))
         ]
-        sizes = [len(c.parameters) for c in model.candidates]
+        sizes = model.sizes()
         surprise = [surprise_of(t.chi2 - model.chi2, n) for t, n in zip(trials, sizes, strict=True)]
         worst = int(np.argmin(surprise))
         if surprise[worst] > search.threshold:
@@ -169,4 +186,4 @@ def exchange(search: Search, model: Model) -> Model:
 
 def score(model: Model, problem: Problem) -> float:
     """Log-likelihood less Schwarz's penalty for the number of parameters."""
-    return -0.5 * model.chi2 - 0.5 * len(model.values) * float(np.log(max(len(problem), 2)))
+    return -0.5 * model.chi2 - 0.5 * model.freedom * float(np.log(max(len(problem), 2)))

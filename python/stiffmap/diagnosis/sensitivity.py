@@ -5,12 +5,15 @@ from __future__ import annotations
 import hashlib
 from collections import OrderedDict
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stiffmap.diagnosis.cable import cable_variants, is_cable
 from stiffmap.diagnosis.candidates import Candidate, candidates
 from stiffmap.diagnosis.periodic import is_periodic, periodic_variants
+from stiffmap.diagnosis.shapes import Shape, shapes
+from stiffmap.effects import Parameter
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.predict import Predictor
@@ -34,7 +37,7 @@ class Variant:
     candidate: Candidate
     columns: Floats
     sign: Floats
-    shape: tuple[tuple[str, float], ...] = ()
+    shape: Shape = ()
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class Plan:
     """(n, 6) prediction of the declared machine."""
     variants: tuple[Variant, ...]
     failed: tuple[tuple[Candidate, str], ...]
+    digest: str = ""
+    """Of the machine and the plan."""
 
 
 _PLANS: OrderedDict[str, Plan] = OrderedDict()
@@ -54,7 +59,7 @@ def plan_of(predictor: Predictor) -> Plan:
     """Sensitivities of a machine under a plan; the last eight are kept."""
     key = _digest(predictor)
     if key not in _PLANS:
-        _PLANS[key] = _compute(predictor)
+        _PLANS[key] = replace(_compute(predictor), digest=key)
         if len(_PLANS) > 8:
             _PLANS.popitem(last=False)
     _PLANS.move_to_end(key)
@@ -107,22 +112,28 @@ def variants(candidate: Candidate, predictor: Predictor, base: Floats) -> Iterat
         for columns, shape in periodic_variants(candidate, predictor, base):
             yield Variant(candidate, columns, np.zeros(columns.shape[-1]), shape)
         return
-    single = [difference(candidate, i, predictor, base) for i in range(len(candidate.parameters))]
-    sign = np.array([side(candidate, i) for i in range(len(candidate.parameters))])
-    yield Variant(candidate, np.stack(single, axis=-1), sign)
+    if is_cable(candidate, predictor.experiment):
+        for columns, shape in cable_variants(candidate, predictor, base):
+            yield Variant(candidate, columns, np.ones(1), shape)
+        return
+    linear = candidate.linear
+    sign = np.array([side(p) for p in linear])
+    for shape in shapes(candidate, predictor):
+        single = [difference(candidate, p, shape, predictor, base) for p in linear]
+        yield Variant(candidate, np.stack(single, axis=-1), sign, shape)
 
 
-def side(candidate: Candidate, i: int) -> int:
+def side(p: Parameter) -> int:
     """+1 where the parameter can only grow from its null, -1 only fall, 0 both."""
-    p = candidate.parameters[i]
     return int(p.lower == p.null) - int(p.upper == p.null)
 
 
-def difference(candidate: Candidate, i: int, predictor: Predictor, base: Floats) -> Floats:
-    """(n, 6) change of the readings per scale of parameter i, one-sided from the null."""
-    p = candidate.parameters[i]
-    values = [float(q.null or 0.0) for q in candidate.parameters]
-    step = (side(candidate, i) * ONE_SIDED or SMOOTH) * p.scale
-    values[i] += step
+def difference(
+    candidate: Candidate, p: Parameter, shape: Shape, predictor: Predictor, base: Floats
+) -> Floats:
+    """(n, 6) change of the readings per scale of parameter p, one-sided from the null."""
+    step = (side(p) * ONE_SIDED or SMOOTH) * p.scale
+    given = dict(shape) | {p.name: float(p.null or 0.0) + step}
+    values = [given.get(q.name, float(q.null or 0.0)) for q in candidate.parameters]
     raw = predictor([candidate.term(values)]) - base
     return np.asarray(raw / (step / p.scale))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,8 @@ class Study:
     noise: Noise
     classes: tuple[AliasClass, ...]
     searches: float
+    seconds: dict[str, float]
+    """What the sensitivities and the bootstrap of the search took; nothing where they were known."""
 
     @property
     def experiment(self) -> Experiment:
@@ -56,11 +59,12 @@ class Finding:
         return self.selection.model
 
 
-_SEARCHES: dict[tuple[int, int, int], float] = {}
+_SEARCHES: dict[tuple[str, int, bytes], float] = {}
 
 
 def study(predictor: Predictor, seed: int) -> Study:
     """Prepare: sensitivities, noise floor without suspects, alias classes, null search."""
+    start = time.perf_counter()
     plan = plan_of(predictor)
     e = predictor.experiment
     rough = noise_of(e)
@@ -68,10 +72,12 @@ def study(predictor: Predictor, seed: int) -> Study:
     problem = Problem.of(e, first.sigma, plan.base)
     screen = Screen.of(problem, plan.variants)
     classes = tuple(alias_classes(screen, predictor.machine.description))
-    key = (id(plan), seed, len(problem))
+    key = (plan.digest, seed, np.round(np.log(first.sigma), 2).tobytes())
+    prepared = time.perf_counter()
     if key not in _SEARCHES:
         _SEARCHES[key] = number_of_searches(_representatives(screen, classes), seed)
-    return Study(predictor, plan, first, classes, _SEARCHES[key])
+    seconds = {"sensitivities": prepared - start, "null bootstrap": time.perf_counter() - prepared}
+    return Study(predictor, plan, first, classes, _SEARCHES[key], seconds)
 
 
 def find(study: Study, rows: Mask | None = None, *, finalists: int = 5) -> Finding:

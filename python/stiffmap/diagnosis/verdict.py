@@ -9,16 +9,14 @@ from os import PathLike
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.diagnosis.alias import coarseness
 from stiffmap.diagnosis.crossval import HeldOut, held_out
-from stiffmap.diagnosis.describe import aliases_of, named_effects
+from stiffmap.diagnosis.describe import aliases_of, as_place, named_effects
 from stiffmap.diagnosis.detect import detectable
 from stiffmap.diagnosis.empirical import empirical
+from stiffmap.diagnosis.explain import explain
 from stiffmap.diagnosis.limits import limitations, refuse
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.result import Detectability, Diagnosis, NoiseReport
-from stiffmap.diagnosis.rivals import rivals
-from stiffmap.diagnosis.search import Search, score
 from stiffmap.diagnosis.separate import separation
 from stiffmap.diagnosis.stability import SHARE, explained, steady
 from stiffmap.diagnosis.structure import Pattern, patterns
@@ -31,8 +29,6 @@ from stiffmap.experiment.predict import Predictor
 from stiffmap.experiment.summary import Summary, summary
 from stiffmap.machine import Machine, load_machine
 
-EQUAL = 2.0
-"""Difference of scores (ln) within which explanations count as equally good."""
 VIOLATED = 1e-6
 """Chance below which a model-free check, applied to what the effects leave, refuses the verdict."""
 
@@ -65,21 +61,21 @@ def diagnose(
     """
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
-    clock = [time.perf_counter()]
     predictor = Predictor(machine, data, threads=threads)
     refuse(data, predictor())
     s = study(predictor, seed)
-    clock.append(time.perf_counter())
+    clock = [time.perf_counter()]
     finding = find(s)
     left = unexplained(s, finding)
     finding, verdict = judge(s, finding, left)
     clock.append(time.perf_counter())
     held = held_out(s, finding.outliers, seed) if cross_validate else None
     clock.append(time.perf_counter())
-    seconds = dict(
-        zip(("plan and null search", "search", "cross-validation"), np.diff(clock).tolist(), strict=True)
-    )
-    return _assemble(s, finding, verdict, left, held, seed, seconds)
+    answer = _assemble(s, finding, verdict, left, held, seed)
+    clock.append(time.perf_counter())
+    steps = ("search", "cross-validation", "rivals and intervals")
+    answer.seconds.update(s.seconds, **dict(zip(steps, np.diff(clock).tolist(), strict=True)))
+    return answer
 
 
 def unexplained(s: Study, finding: Finding) -> list[Pattern]:
@@ -119,10 +115,10 @@ def _assemble(
     left: list[Pattern],
     held: HeldOut | None,
     seed: int,
-    seconds: dict[str, float],
 ) -> Diagnosis:
     e, search = s.experiment, finding.search
-    model, other = coarsest_first(s, search, finding.model)
+    why = explain(s, search, finding.model)
+    model, other = why.model, why.others
     finding = replace(finding, selection=replace(finding.selection, model=model))
     before = e.reading - s.plan.base
     after = e.reading - s.predictor(model.terms())
@@ -134,7 +130,12 @@ def _assemble(
     sums = _summaries(held if verdict in ("effects", "ambiguous", "none") else None, before, after, s, keep)
     return Diagnosis(
         verdict=verdict,
-        effects=named_effects(s, search, model, inflation),
+        effects=[
+            replace(
+                e, aliases=[*e.aliases, *(as_place(a) for own, a, _ in why.aliases if own.place == e.place)]
+            )
+            for e in named_effects(s, search, model, inflation)
+        ],
         alternatives=[named_effects(s, search, m, inflation) for m in other],
         separations=[separation(s, model, m, seed) for m in other],
         before=sums[0],
@@ -166,25 +167,7 @@ def _assemble(
         residual_after=after,
         set_aside=finding.outliers,
         empirical=empirical(e, np.where(keep[:, None], after, np.nan), s.noise.sigma, seed) if left else None,
-        seconds=seconds,
     )
-
-
-def coarsest_first(s: Study, search: Search, model: Model) -> tuple[Model, list[Model]]:
-    """The explanation that leads, and the rivals that stay.
-
-    Of those that the readings find equally good (scores within `EQUAL`) the coarsest physical part
-    leads, by the rule of representatives; else the best does.
-    """
-    other = [r.model for r in rivals(search, model, s.classes)]
-    top = score(model, search.problem)
-    equal = [m for m in other if top - score(m, search.problem) < EQUAL]
-
-    def key(m: Model) -> tuple[int, list[tuple[int, int, int]]]:
-        return len(m.values), sorted(coarseness(c, len(c.parameters), s.description) for c in m.candidates)
-
-    first = min([model, *equal], key=key)
-    return first, [m for m in (model, *other) if m is not first]
 
 
 def predicted_machine(s: Study, model: Model) -> Machine:
@@ -215,7 +198,7 @@ def _noise(s: Study, finding: Finding) -> NoiseReport:
         return {a: float(v) for a, v, r in zip(AXES, values, s.experiment.axis_read, strict=True) if r}
 
     before = float(chi2.sf(finding.selection.null.chi2, problem.freedom))
-    after = float(chi2.sf(finding.model.chi2, max(1, problem.freedom - len(finding.model.values))))
+    after = float(chi2.sf(finding.model.chi2, max(1, problem.freedom - finding.model.freedom)))
     return NoiseReport(
         per_axis(n.floor),
         per_axis(n.repeats),

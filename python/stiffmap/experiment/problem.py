@@ -64,8 +64,9 @@ class Problem:
         return self.experiment.groups[self.index[0]]
 
     def white(self, values: Floats) -> Floats:
-        """(n, 6) -> (N,): whitened, nuisances projected out."""
-        out = values[self.index] / self.sigma[self.index]
+        """(n, 6, ...) -> (N, ...): whitened, nuisances projected out."""
+        sigma = self.sigma[self.index]
+        out = values[self.index] / sigma.reshape(-1, *(1,) * (values.ndim - 2))
         for where, inverse in self.blocks:
             out[where] = inverse @ values[self.index][where]
         return np.asarray(out - self.nuisance @ (self.nuisance.T @ out))
