@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from stiffmap.cli.inputs import FolderOption, ThreadsOption, plain
 from stiffmap.cli.output import JsonOption, print_json
-from stiffmap.diagnosis.limits import refuse
-from stiffmap.diagnosis.result import plain
 from stiffmap.experiment import Residual, load_experiment
 from stiffmap.experiment import residual as compute
+from stiffmap.experiment.channels import Channel
 from stiffmap.machine import load_machine
 
 
@@ -18,55 +19,105 @@ def residual(
     machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
     data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
     rows: Annotated[int, typer.Option(help="Number of worst rows to print.")] = 5,
+    output: FolderOption = None,
+    threads: ThreadsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Prediction for every reading: rms, per axis, worst rows, noise floor, lack of fit, model-free checks.
 
+    With -o: residual.csv (mm, rad), residual.json (SI) and pictures. Exit codes: 0 the readings are as
+    predicted, 1 they are not (chance below 1e-3), 2 bad input.
+
     Examples:
 
       [cyan]stiffmap residual orthoglide-revised experiments/servo[/cyan]
+
+      [cyan]stiffmap residual orthoglide-revised experiments/servo --rows 20 -o result[/cyan]
     """
-    experiment = load_experiment(data)
-    result = compute(load_machine(machine), experiment)
-    refuse(experiment, result.prediction)
+    result = compute(load_machine(machine), load_experiment(data), threads=threads)
+    if output is not None:
+        _write(result, rows, output)
     if as_json:
         print_json(as_plain(result, rows))
     else:
-        _print(result, rows)
+        print("\n".join(lines(result, rows)))
+    if result.lack_of_fit < 1e-3:
+        raise typer.Exit(1)
+
+
+def _write(r: Residual, rows: int, output: Path) -> None:
+    import json
+
+    from stiffmap.cli.inputs import folder
+    from stiffmap.experiment.pictures import figures
+    from stiffmap.experiment.residual_table import write_table
+
+    place = folder(output)
+    write_table(r, place / "residual.csv")
+    (place / "residual.json").write_text(json.dumps(as_plain(r, rows), indent=2), encoding="utf-8")
+    for name, figure in figures(r).items():
+        figure.savefig(place / f"{name}.png", dpi=130)
 
 
 def as_plain(r: Residual, rows: int) -> dict[str, Any]:
     """JSON data, SI."""
-    ids = [r.experiment.ids[i] for i in r.set_aside.nonzero()[0]]
+    e = r.experiment
     out = {
-        "summary": r.summary,
-        "noise_floor": r.noise.rms,
+        "experiment": e.name,
+        "quantity": e.quantity,
+        "units": "SI (m, rad), base axes",
+        "summary": vars(r.summary),
+        "noise_floor": {
+            c.name: f for c, f in zip(e.channels, r.noise.floor, strict=True) if c.name in e.axes
+        },
+        "contradictory_repeats": r.noise.contradictions(),
         "lack_of_fit": r.lack_of_fit,
+        "nuisances": r.nuisances,
         "poses_off": r.groups_off,
+        "set_aside": [e.ids[i] for i in r.set_aside.nonzero()[0]],
+        "worst": [{"id": i, "channel": c, "residual": v} for i, c, v in r.worst(rows)],
+        "checks": [vars(c) for c in r.checks],
     }
-    out |= {"set_aside": ids, "worst": r.worst(rows), "checks": r.checks}
-    return {k: plain(v) for k, v in out.items()}
+    found: dict[str, Any] = plain(out)
+    return found
 
 
-def _print(r: Residual, rows: int) -> None:
-    s = r.summary
-    print(f"{r.experiment.name}: {s.n} readings of {r.experiment.quantity}; reading minus prediction, mm")
-    print(f"  rms {1e3 * s.rms:.4f}   95 % {1e3 * s.p95:.4f}   largest {1e3 * s.max:.4f}")
-    print(
-        "  "
-        + "   ".join(
-            f"{a} {1e3 * v:.4f}" if a[0] == "d" else f"{a} {v:.3g} rad" for a, v in s.per_axis.items()
-        )
+def lines(r: Residual, rows: int) -> list[str]:
+    """The residual in words."""
+    s, e = r.summary, r.experiment
+    units = {c.name: c for c in e.channels}
+    aside = [e.ids[i] for i in r.set_aside.nonzero()[0]]
+    out = [f"{e.name}: {s.n} readings of {e.quantity} in {len(e)} rows; reading minus prediction"]
+    out.append(f"  all lengths: rms {_mm(s.rms)}, 95 % {_mm(s.p95)}, largest {_mm(s.max)}")
+    out += [
+        f"  {a}: rms {_shown(units[a], v)}, noise floor {_shown(units[a], _floor(r, a))}"
+        for a, v in s.per_axis.items()
+    ]
+    out.append(
+        f"  rms / noise floor {s.ratio:.2f}; chance of this residual under noise {_chance(r.lack_of_fit)}"
     )
-    print(
-        f"  noise floor {1e3 * r.noise.rms:.4f}; rms / floor {s.ratio:.2f}; "
-        f"chance of this fit {r.lack_of_fit:.2g}"
-    )
-    print(
-        f"  poses beyond noise: {r.groups_off} of {int(r.experiment.groups.max()) + 1}; "
-        f"rows set aside: {int(r.set_aside.sum())}"
-    )
+    out += [f"  unknown frames and zeros fitted: {r.nuisances}"] if r.nuisances else []
+    out += [f"  contradictory repeats: {c}" for c in r.noise.contradictions()]
+    out.append(f"  poses beyond noise: {r.groups_off} of {int(e.groups.max()) + 1}")
+    out.append(f"  rows set aside: {', '.join(aside) or 'none'}")
     for c in r.checks:
-        told = f"rms/noise {c.rms:.2f}, chance {c.p:.2g}" if c.contrasts else "the plan does not allow it"
-        print(f"  {c.name} ({c.meaning}): {told}")
-    print("  worst rows: " + ", ".join(f"{i} ({1e3 * v:.4f} mm)" for i, v in r.worst(rows)))
+        told = f"rms/noise {c.rms:.2f}, chance {_chance(c.p)}" if c.contrasts else c.note
+        out.append(f"  {c.name} ({c.meaning}): {told}")
+    worst = [f"{i} ({a} {_shown(units[a], v)})" for i, a, v in r.worst(rows)]
+    return [*out, f"  worst rows: {', '.join(worst) or 'none'}"]
+
+
+def _chance(p: float) -> str:
+    return f"{p:.2g}" if p > 1e-99 else "below 1e-99"
+
+
+def _floor(r: Residual, name: str) -> float:
+    return float(r.noise.floor[[c.name for c in r.experiment.channels].index(name)])
+
+
+def _shown(channel: Channel, value: float) -> str:
+    return _mm(value) if channel.unit == "m" else f"{1e3 * value:.4f} mrad"
+
+
+def _mm(value: float) -> str:
+    return f"{1e3 * value:.4f} mm"

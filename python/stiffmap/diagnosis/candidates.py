@@ -88,7 +88,11 @@ def _later_alternative(effect: EffectType, p: Parameter, among: Sequence[Paramet
 def recorded(effect: EffectType, experiment: Experiment) -> bool:
     """Whether the data hold what the effect needs. Without a branch column every load counts as
     approached from zero; then friction is still a candidate."""
-    have = {"temperature": experiment.temperature is not None, "order": experiment.order is not None}
+    have = {
+        "temperature": experiment.temperature is not None,
+        "order": experiment.order is not None,
+        "motor": any(c.side == "motor" for c in experiment.extra),
+    }
     return all(have.get(need, True) for need in effect.needs)
 
 

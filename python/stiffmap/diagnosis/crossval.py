@@ -52,7 +52,7 @@ def held_out(study: Study, listed: Mask, seed: int) -> HeldOut | None:
     label, by = folds(e, seed)
     if label.max() == 0:
         return None
-    after = np.full((len(e), 6), np.nan)
+    after = np.full_like(e.reading, np.nan)
     chosen: Counter[str] = Counter()
     for fold in range(int(label.max()) + 1):
         test = label == fold
@@ -64,5 +64,10 @@ def held_out(study: Study, listed: Mask, seed: int) -> HeldOut | None:
     before = np.where(np.isfinite(after), e.reading - study.plan.base, np.nan)
     sigma = study.noise.sigma
     return HeldOut(
-        summary(before, sigma), summary(after, sigma), after, dict(chosen), int(label.max()) + 1, by
+        summary(before, sigma, e.channels),
+        summary(after, sigma, e.channels),
+        after,
+        dict(chosen),
+        int(label.max()) + 1,
+        by,
     )

@@ -85,7 +85,7 @@ def histogram(d: Diagnosis) -> Figure:
     """Residuals over the noise floor, beside the normal distribution that noise alone would give."""
     figure = Figure(figsize=(6, 3.4), layout="constrained")
     ax = figure.subplots()
-    floor = np.array([d.noise.floor.get(a, np.nan) for a in AXES])
+    floor = np.array([d.noise.floor.get(c.name, np.nan) for c in d.experiment.channels])
     both = [(_kept(d, r) / floor) for r in (d.residual_before, d.residual_after)]
     width = min(12.0, max(4.0, float(np.nanpercentile(np.abs(both[0]), 99))))
     bins = np.linspace(-width, width, 61)

@@ -78,8 +78,8 @@ def _digest(predictor: Predictor) -> str:
         e.gravity,
         e.loop,
     ]
-    parts += [e.frame, e.reference_temperature]
-    arrays = [e.position, e.wrench, e.rotation, e.order, e.temperature]
+    parts += [e.reference_temperature, e.extra, e.points, e.load_points, e.unloaded]
+    arrays = [e.position, e.wrench, e.rotation, e.other, e.other_rotation, e.approach, e.order, e.temperature]
     raw = repr(parts).encode() + b"".join(
         b"-" if a is None else np.ascontiguousarray(a).tobytes() for a in arrays
     )

@@ -8,7 +8,8 @@ import numpy as np
 
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.study import Study
-from stiffmap.experiment.experiment import AXES, Experiment, Floats
+from stiffmap.experiment.channels import DISTANCE
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.predict import Predictor
 
 WANTED = 5.0
@@ -33,14 +34,16 @@ def separation(study: Study, one: Model, other: Model, seed: int) -> Separation:
     trial = _trial(study, seed)
     predictor = Predictor(study.predictor.machine, trial, threads=study.predictor.threads)
     gap = predictor(one.terms()) - predictor(other.terms())
-    sigma = np.where(np.isfinite(study.noise.floor), study.noise.floor, np.inf)
+    floor = study.noise.floor[_kept(study.experiment)]
+    sigma = np.where(np.isfinite(floor), floor, np.inf)
     clear = np.nan_to_num(np.abs(gap) / sigma)
     row, axis = np.unravel_index(int(np.argmax(clear)), clear.shape)
     top = float(clear[row, axis])
     number = int(np.ceil((WANTED / top) ** 2)) if top > WANTED / 100 else None
     x, y, z = (float(v) for v in trial.position[row])
     fx, fy, fz = (float(v) for v in trial.wrench[row, :3])
-    return Separation((x, y, z), (fx, fy, fz), AXES[int(axis)], float(gap[row, axis]), number)
+    name = trial.channels[int(axis)].name
+    return Separation((x, y, z), (fx, fy, fz), name, float(gap[row, axis]), number)
 
 
 def _trial(study: Study, seed: int) -> Experiment:
@@ -54,6 +57,11 @@ def _trial(study: Study, seed: int) -> Experiment:
     return _loaded(e, np.vstack([middle, random]))
 
 
+def _kept(e: Experiment) -> list[int]:
+    """Channels that a single pose reads: no distances."""
+    return [i for i, c in enumerate(e.channels) if c != DISTANCE]
+
+
 def _loaded(e: Experiment, poses: Floats) -> Experiment:
     loads = np.zeros((1, 6))
     if e.quantity == "deflection":
@@ -64,7 +72,7 @@ def _loaded(e: Experiment, poses: Floats) -> Experiment:
         loads = np.vstack([loads, 0.25 * loads])
     n = len(poses) * len(loads)
     position = np.repeat(poses, len(loads), axis=0)
-    read = np.where(e.axis_read, 0.0, np.nan)
+    read = np.where(e.axis_read, 0.0, np.nan)[_kept(e)]
     return Experiment(
         name="trial",
         machine=e.machine,
@@ -73,7 +81,8 @@ def _loaded(e: Experiment, poses: Floats) -> Experiment:
         position=position,
         wrench=np.tile(loads, (len(poses), 1)),
         reading=np.tile(read, (n, 1)),
-        sigma=np.full((n, 6), np.nan),
+        sigma=np.full((n, len(read)), np.nan),
+        extra=tuple(c for c in e.extra if c.joint),
         order=None if e.order is None else np.linspace(e.order.min(), e.order.max(), n),
         temperature=None if e.temperature is None else np.full(n, float(e.temperature.max())),
         reference_temperature=e.reference_temperature,

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from stiffmap.diagnosis.significance import ALPHA
-from stiffmap.experiment.experiment import AXES, Floats
+from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.problem import Problem, basis
 
 Features = list[tuple[str, Floats]]
@@ -37,12 +37,17 @@ def patterns(problem: Problem, residual: Floats, tangent: Floats) -> list[Patter
     tested = [
         (axis, name, *_drop(problem, residual, tangent, axis, columns))
         for name, columns in features(problem)
-        for axis in range(6)
+        for axis in range(len(problem.experiment.channels))
         if problem.experiment.read[:, axis].any()
     ]
     number = len(tested)
     out = [
-        Pattern(AXES[axis], name, float(min(1.0, number * chi2.sf(drop, max(rank, 1)))), float(drop))
+        Pattern(
+            problem.experiment.channels[axis].name,
+            name,
+            float(min(1.0, number * chi2.sf(drop, max(rank, 1)))),
+            float(drop),
+        )
         for axis, name, drop, rank in tested
     ]
     return sorted((p for p in out if p.p < ALPHA), key=lambda p: (p.p, -p.removed))

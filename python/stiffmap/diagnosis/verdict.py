@@ -14,7 +14,7 @@ from stiffmap.diagnosis.describe import aliases_of, as_place, named_effects
 from stiffmap.diagnosis.detect import detectable
 from stiffmap.diagnosis.empirical import empirical
 from stiffmap.diagnosis.explain import explain
-from stiffmap.diagnosis.limits import limitations, refuse
+from stiffmap.diagnosis.limits import limitations
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.result import Detectability, Diagnosis, NoiseReport
 from stiffmap.diagnosis.separate import separation
@@ -22,7 +22,8 @@ from stiffmap.diagnosis.stability import SHARE, explained, steady
 from stiffmap.diagnosis.structure import Pattern, patterns
 from stiffmap.diagnosis.study import Finding, Study, find, study
 from stiffmap.experiment.checks import Check, checks
-from stiffmap.experiment.experiment import AXES, Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.limits import refuse
 from stiffmap.experiment.load import load_experiment
 from stiffmap.experiment.noise import Mask
 from stiffmap.experiment.predict import Predictor
@@ -62,7 +63,7 @@ def diagnose(
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
     predictor = Predictor(machine, data, threads=threads)
-    refuse(data, predictor())
+    refuse(predictor.experiment, predictor())
     s = study(predictor, seed)
     clock = [time.perf_counter()]
     finding = find(s)
@@ -188,14 +189,17 @@ def _summaries(
     if held:
         return held.before, held.after
     rows = keep[:, None]
-    return tuple(summary(np.where(rows, r, np.nan), s.noise.sigma) for r in (before, after))  # type: ignore[return-value]
+    return tuple(
+        summary(np.where(rows, r, np.nan), s.noise.sigma, s.experiment.channels) for r in (before, after)
+    )  # type: ignore[return-value]
 
 
 def _noise(s: Study, finding: Finding) -> NoiseReport:
     problem, n = finding.search.problem, s.noise
 
     def per_axis(values: Floats) -> dict[str, float]:
-        return {a: float(v) for a, v, r in zip(AXES, values, s.experiment.axis_read, strict=True) if r}
+        read = zip(s.experiment.channels, values, s.experiment.axis_read, strict=True)
+        return {c.name: float(v) for c, v, r in read if r}
 
     before = float(chi2.sf(finding.selection.null.chi2, problem.freedom))
     after = float(chi2.sf(finding.model.chi2, max(1, problem.freedom - finding.model.freedom)))

@@ -4,20 +4,36 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
+
+__all__ = ["AXES", "BRANCHES", "WRENCH", "Channel", "Experiment", "Floats", "Integers", "Loop"]
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
-AXES = ("dx", "dy", "dz", "rx", "ry", "rz")
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 BRANCHES = ("", "loading", "unloading")
+PER_ROW = (
+    *("ids", "position", "wrench", "reading", "sigma", "rotation", "other", "other_rotation", "command"),
+    *("approach", "repeat", "order", "temperature", "branch", "setup", "points", "load_points"),
+)
+"""Fields with one entry per row; None or empty where the experiment has none."""
 
 
 @dataclass(frozen=True)
 class Loop:
-    """Metrology loop: decides whether base, fixture or holder compliance can be seen."""
+    """Metrology loop: decides whether base, fixture or holder compliance can be seen.
+
+    instrument_on, force_against
+        ``floor``, ``base`` or a named point of the body that carries the instrument, or takes the
+        reaction of the force.
+    target_on
+        ``tool`` or ``platform`` (before the tool's holder).
+    """
 
     instrument_on: str = "floor"
     target_on: str = "tool"
@@ -26,10 +42,10 @@ class Loop:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """Rows of one experiment, SI, base axes. n rows; axes as in `AXES`, wrenches as in `WRENCH`.
+    """Rows of one experiment, SI, base axes. n rows, c channels; wrenches as in `WRENCH`.
 
-    ``deflection``: loaded minus unloaded reading at the same commanded pose, the unloaded state being
-    the centre of every dead zone. ``position``: measured minus commanded.
+    ``deflection``: loaded minus unloaded reading at the same commanded pose.
+    ``position``: measured minus commanded.
     """
 
     name: str
@@ -37,15 +53,25 @@ class Experiment:
     quantity: str
     ids: tuple[str, ...]
     position: Floats
-    """(n, 3) m, commanded TCP."""
+    """(n, 3) m, commanded TCP; NaN until `located` where actuator coordinates are commanded."""
     wrench: Floats
-    """(n, 6) N, N·m at `load_point`."""
+    """(n, 6) N, N·m at the load point."""
     reading: Floats
-    """(n, 6) m, rad; NaN where nothing was read."""
+    """(n, c) m, rad; NaN where nothing was read. The six `AXES`, then `extra`."""
     sigma: Floats
-    """(n, 6) declared standard deviation of one reading; NaN where none is declared."""
+    """(n, c) declared standard deviation of one reading; NaN where none is declared."""
+    extra: tuple[Channel, ...] = ()
+    """Channels after the six axes: a distance, joint coordinates."""
     rotation: Floats | None = None
     """(n, 3, 3) commanded orientation; None: as at home."""
+    other: Floats | None = None
+    """(n, 3) m, second commanded pose of a distance; NaN where a row reads none."""
+    other_rotation: Floats | None = None
+    command: Floats | None = None
+    """(n, actuators) m, rad: commanded coordinates instead of poses, in the order of `command_of`."""
+    command_of: tuple[Channel, ...] = ()
+    approach: Floats | None = None
+    """(n, 3) direction of the last travel to the pose, any length; zero where unknown."""
     repeat: Integers | None = None
     order: Floats | None = None
     temperature: Floats | None = None
@@ -53,79 +79,87 @@ class Experiment:
     reference_temperature: float | None = None
     branch: tuple[str, ...] = ()
     setup: tuple[str, ...] = ()
+    """Rows of one set-up were taken without touching the instrument between."""
     point: str = "tcp"
     load_point: str = "tcp"
+    points: tuple[str, ...] = ()
+    """Named point read in each row; empty: `point` in all."""
+    load_points: tuple[str, ...] = ()
     gravity: tuple[float, float, float] | None = None
     zero_sigma: Floats = field(default_factory=lambda: np.zeros(6))
     """(6,) standard deviation of the zero that the readings of one pose share."""
     unloaded: str = "centre"
+    """State without load: ``centre`` of every gap, side of the last ``approach``, or ``unknown``."""
     frame: str = "known"
+    tool: str = "known"
+    """Point on the tool: ``known``, or off by an ``offset_unknown`` in the tool's axes."""
     loop: Loop = Loop()
     title: str = ""
     source: str = ""
-
-    @property
-    def axis_read(self) -> NDArray[np.bool_]:
-        """(6,) which axes were read at all."""
-        return np.asarray(np.any(self.read, axis=0))
 
     def __len__(self) -> int:
         return len(self.ids)
 
     @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The columns of `reading`."""
+        return (*AXIS_CHANNELS, *self.extra)
+
+    @property
+    def axis_read(self) -> NDArray[np.bool_]:
+        """(c,) which channels were read at all."""
+        return np.asarray(np.any(self.read, axis=0))
+
+    @property
     def read(self) -> NDArray[np.bool_]:
-        """(n, 6) which values were read."""
+        """(n, c) which values were read."""
         return np.isfinite(self.reading)
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Names of the axes that were read at all."""
-        return tuple(a for a, any_ in zip(AXES, self.axis_read, strict=True) if any_)
+        """Names of the channels that were read at all."""
+        return tuple(c.name for c, any_ in zip(self.channels, self.axis_read, strict=True) if any_)
+
+    @property
+    def zeros(self) -> Floats:
+        """(c,) `zero_sigma` of every channel; none for joints and distances."""
+        return np.append(self.zero_sigma, np.zeros(len(self.channels) - len(self.zero_sigma)))
 
     @cached_property
     def groups(self) -> Integers:
-        """(n,) number of the commanded pose of each row."""
-        key = (
-            self.position
-            if self.rotation is None
-            else np.hstack([self.position, self.rotation.reshape(-1, 9)])
-        )
-        return np.unique(np.round(key, 12), axis=0, return_inverse=True)[1].reshape(-1)
+        """(n,) number of the commanded pose (or pair of poses) of each row."""
+        return _numbers([self.command if self.command is not None else self.position, *self._turned])
+
+    @property
+    def _turned(self) -> list[Any]:
+        return [self.rotation, self.other, self.other_rotation]
 
     @cached_property
     def conditions(self) -> Integers:
-        """(n,) number of the condition (pose, wrench, branch, temperature, set-up): repeats share it."""
-        parts = [self.groups[:, None].astype(float), np.round(self.wrench, 9)]
-        if self.branch:
-            parts.append(np.array([BRANCHES.index(b) for b in self.branch], dtype=float)[:, None])
-        if self.temperature is not None:
-            parts.append(self.temperature[:, None])
-        if self.setup:
-            parts.append(np.unique(self.setup, return_inverse=True)[1].reshape(-1, 1).astype(float))
-        return np.unique(np.hstack(parts), axis=0, return_inverse=True)[1].reshape(-1)
+        """(n,) number of the condition (pose, load, how it was reached): repeats share it."""
+        words = [self.branch, self.setup, self.points, self.load_points]
+        labels = [np.unique(w, return_inverse=True)[1].reshape(-1) for w in words if w]
+        return _numbers([self.groups, self.wrench, self.temperature, self.approach, *labels])
 
     def rows(self, keep: NDArray[np.bool_] | Integers) -> Experiment:
         """The experiment with some of its rows."""
-        index = np.flatnonzero(keep) if np.asarray(keep).dtype == bool else np.asarray(keep)
-
-        def pick(values: Floats | None) -> Floats | None:
-            return None if values is None else values[index]
-
-        return replace(
-            self,
-            ids=tuple(self.ids[i] for i in index),
-            position=self.position[index],
-            wrench=self.wrench[index],
-            reading=self.reading[index],
-            sigma=self.sigma[index],
-            rotation=pick(self.rotation),
-            repeat=None if self.repeat is None else self.repeat[index],
-            order=pick(self.order),
-            temperature=pick(self.temperature),
-            branch=tuple(self.branch[i] for i in index) if self.branch else (),
-            setup=tuple(self.setup[i] for i in index) if self.setup else (),
-        )
+        index = (np.flatnonzero(keep) if np.asarray(keep).dtype == bool else np.asarray(keep)).astype(np.intp)
+        picked = {name: _pick(getattr(self, name), index) for name in PER_ROW}
+        return replace(self, **picked)
 
     def with_readings(self, reading: Floats) -> Experiment:
-        """The same plan with other readings (n, 6)."""
+        """The same plan with other readings (n, c)."""
         return replace(self, reading=np.where(self.read, reading, np.nan))
+
+
+def _pick(values: Any, index: Integers) -> Any:
+    if values is None or (isinstance(values, tuple) and not values):
+        return values
+    return tuple(values[i] for i in index) if isinstance(values, tuple) else values[index]
+
+
+def _numbers(parts: list[Any]) -> Integers:
+    """(n,) number of each different row of the parts (n, ...); None is left out."""
+    arrays = [np.asarray(p, dtype=float).reshape(len(p), -1) for p in parts if p is not None]
+    key = np.nan_to_num(np.round(np.hstack(arrays), 9), nan=np.inf) + 0.0
+    return np.unique(key, axis=0, return_inverse=True)[1].reshape(-1)

@@ -1,13 +1,14 @@
 """Effects that live in the measurement: what they do to the wrench that acts and to what is read.
 
-Load side: the true wrench is ``R G w``. Sensor side, ``deflection``: the reading is ``G R u``;
-``position``: instruments give coordinates, so gain and axes act on commanded position plus
-displacement and the commanded position is subtracted again. R turns by the rotation vector ``angle``.
+Load side: the true wrench is ``R G w``. Sensor side, ``deflection``: the reading is ``G Rᵀ u``, the
+sensor's axes being turned by R; ``position``: instruments give coordinates, so gain and axes act on
+commanded position plus displacement and the commanded position is subtracted again. R is
+Rx(angle_x)·Ry(angle_y)·Rz(angle_z) everywhere. Joints and distances are read by other instruments.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -16,12 +17,17 @@ from stiffmap.description import AppliedEffect
 from stiffmap.experiment.experiment import Experiment, Floats
 
 LOAD_SIDE = ("load_direction", "load_gain")
-SENSOR_SIDE = ("sensor_gain", "sensor_axes", "frame_offset", "drift")
+SENSOR_SIDE = ("sensor_gain", "sensor_axes", "frame_offset", "drift", "servo_share")
 
 
-def turned(values: Floats, parameters: Mapping[str, float]) -> Floats:
-    """(n, 6) with linear and angular part turned by the rotation vector ``angle_x`` …"""
-    r = Rotation.from_rotvec([parameters.get(f"angle_{a}", 0.0) for a in "xyz"]).as_matrix()
+def rotation(parameters: Mapping[str, float]) -> Floats:
+    """(3, 3) Rx·Ry·Rz of ``angle_x`` …"""
+    angles = [parameters.get(f"angle_{a}", 0.0) for a in "xyz"]
+    return np.asarray(Rotation.from_euler("XYZ", angles).as_matrix())
+
+
+def turned(values: Floats, r: Floats) -> Floats:
+    """(n, 6) with linear and angular part turned by r (3, 3)."""
     return np.hstack([values[:, :3] @ r.T, values[:, 3:] @ r.T])
 
 
@@ -37,26 +43,34 @@ def true_wrench(experiment: Experiment, terms: Iterable[AppliedEffect]) -> Float
     w = experiment.wrench
     for term in terms:
         if term.kind == "load_direction":
-            w = turned(w, dict(term.parameters))
+            w = turned(w, rotation(dict(term.parameters)))
         elif term.kind == "load_gain":
             w = scaled(w, dict(term.parameters))
     return w
 
 
-def readings(experiment: Experiment, motion: Floats, terms: Iterable[AppliedEffect]) -> Floats:
-    """(n, 6) what the instrument shows for the true `motion` (n, 6)."""
-    out = motion
+def readings(experiment: Experiment, motion: Floats, terms: Sequence[AppliedEffect]) -> Floats:
+    """(n, c) what the instruments show for the true `motion` (n, c)."""
+    out = motion[:, :6]
     for term in terms:
         parameters = dict(term.parameters)
-        if term.kind in ("sensor_gain", "sensor_axes"):
-            change = scaled if term.kind == "sensor_gain" else turned
-            at = _coordinates(experiment)
-            out = change(out + at, parameters) - at
+        at = _coordinates(experiment)
+        if term.kind == "sensor_gain":
+            out = scaled(out + at, parameters) - at
+        elif term.kind == "sensor_axes":
+            out = turned(out + at, rotation(parameters).T) - at
         elif term.kind == "frame_offset" and experiment.quantity == "position":
             out = out + frame_offset(experiment, parameters)
         elif term.kind == "drift":
             out = out + drift(experiment, parameters)
-    return out
+    shares = [t for t in terms if t.kind == "servo_share"]
+    return np.hstack([out, motion[:, 6:] * motor_side(experiment, shares)])
+
+
+def motor_side(experiment: Experiment, shares: Iterable[AppliedEffect]) -> Floats:
+    """(c - 6,) what a channel shows of its motion: a motor the share of its drive that yields before it."""
+    seen = {f"{leg}.{t.element}": dict(t.parameters)["share"] for t in shares for leg in t.legs}
+    return np.array([seen.get(c.joint, 0.0) if c.side == "motor" else 1.0 for c in experiment.extra])
 
 
 def _coordinates(experiment: Experiment) -> Floats:
@@ -69,11 +83,10 @@ def _coordinates(experiment: Experiment) -> Floats:
 
 def frame_offset(experiment: Experiment, parameters: Mapping[str, float]) -> Floats:
     """(n, 6) of a position: the instrument's frame is offset, and turned about the base origin."""
-    turn = np.array([parameters.get(f"angle_{a}", 0.0) for a in "xyz"])
+    r = rotation(parameters)
     shift = np.array([parameters.get(a, 0.0) for a in "xyz"])
-    return np.hstack(
-        [shift + np.cross(turn, experiment.position), np.broadcast_to(turn, (len(experiment), 3))]
-    )
+    turn = np.broadcast_to(Rotation.from_matrix(r).as_rotvec(), experiment.position.shape)
+    return np.hstack([shift + experiment.position @ (r - np.eye(3)).T, turn])
 
 
 def drift(experiment: Experiment, parameters: Mapping[str, float]) -> Floats:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from stiffmap.errors import StiffmapError
-from stiffmap.experiment.experiment import AXES, Experiment, Floats
+from stiffmap.experiment.channels import Channel, metres
+from stiffmap.experiment.experiment import Experiment, Floats
 
 Mask = NDArray[np.bool_]
 CONTRADICTION = 1e-4
@@ -17,7 +18,9 @@ CONTRADICTION = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Per axis (6,), m or rad; NaN where the axis was not read or nothing is known."""
+    """Per channel (c,), m or rad; NaN where it was not read or nothing is known."""
+
+    channels: tuple[Channel, ...]
 
     declared: Floats
     """Root mean square of the declared standard deviations."""
@@ -30,18 +33,20 @@ class Noise:
     floor: Floats
     """The larger of the two."""
     sigma: Floats
-    """(n, 6) standard deviation of every reading, at the floor."""
+    """(n, c) standard deviation of every reading, at the floor."""
 
     @property
     def rms(self) -> float:
-        """Floor of the linear axes together, m."""
-        return float(np.sqrt(np.nanmean(self.floor[:3] ** 2)))
+        """Floor of the lengths together, m; NaN where none was read."""
+        lengths = self.floor[metres(self.channels)]
+        known = lengths[np.isfinite(lengths)]
+        return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
     def contradictions(self) -> list[str]:
         """Axes whose repeats scatter more than the declaration allows, told in words."""
         return [
-            f"{a}: repeats scatter by {s:.3g}, {d:.3g} declared (SI, chance {p:.1g})"
-            for a, s, d, p in zip(AXES, self.repeats, self.declared, self.consistency, strict=True)
+            f"{c.name}: repeats scatter by {s:.3g}, {d:.3g} declared (SI, chance {p:.1g})"
+            for c, s, d, p in zip(self.channels, self.repeats, self.declared, self.consistency, strict=True)
             if p < CONTRADICTION and s > d
         ]
 
@@ -60,7 +65,9 @@ def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
     _check(experiment, floor)
     factor = np.where(declared > 0, floor / np.where(declared > 0, declared, 1.0), np.nan)
     sigma = np.where(experiment.sigma > 0, experiment.sigma * factor, floor)
-    return Noise(declared, repeats, freedom, p, floor, np.where(experiment.read, sigma, np.nan))
+    return Noise(
+        experiment.channels, declared, repeats, freedom, p, floor, np.where(experiment.read, sigma, np.nan)
+    )
 
 
 def _mean(values: Floats) -> Floats:
@@ -74,15 +81,16 @@ def _within(experiment: Experiment, rows: Mask) -> tuple[Floats, NDArray[np.intp
     number = int(condition.max()) + 1
     read = experiment.read & rows[:, None]
     values = np.where(read, experiment.reading, 0.0)
-    count = np.stack([np.bincount(condition, read[:, a], number) for a in range(6)], axis=1)
-    total = np.stack([np.bincount(condition, values[:, a], number) for a in range(6)], axis=1)
+    count = np.stack([np.bincount(condition, read[:, a], number) for a in range(read.shape[1])], axis=1)
+    total = np.stack([np.bincount(condition, values[:, a], number) for a in range(read.shape[1])], axis=1)
     mean = total / np.maximum(count, 1)
     squares = np.where(read, (values - mean[condition]) ** 2, 0.0).sum(axis=0)
     return squares, np.maximum(count - 1, 0).sum(axis=0).astype(np.intp)
 
 
 def _check(experiment: Experiment, floor: Floats) -> None:
-    wrong = [a for a, f, any_ in zip(AXES, floor, experiment.axis_read, strict=True) if any_ and not f > 0]
+    read = zip(experiment.channels, floor, experiment.axis_read, strict=True)
+    wrong = [c.name for c, f, any_ in read if any_ and not f > 0]
     if wrong:
         raise StiffmapError(
             f"{experiment.name}: the noise of {', '.join(wrong)} is zero or unknown; declare it (noise: in "

@@ -11,6 +11,8 @@ from stiffmap import effects
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.joints import check_joints
+from stiffmap.experiment.locate import located
 from stiffmap.experiment.measurement import LOAD_SIDE, SENSOR_SIDE, readings, true_wrench
 from stiffmap.experiment.solving import motions
 from stiffmap.experiment.temperature import at_temperatures, uses_temperature
@@ -28,12 +30,14 @@ class Predictor:
 
     def __init__(self, machine: Machine, experiment: Experiment, *, threads: int | None = None) -> None:
         check_points(machine, experiment)
-        self.machine, self.experiment, self.threads = machine, experiment, threads
+        check_joints(machine, experiment)
+        self.machine, self.threads = machine, threads
+        self.experiment = located(machine, experiment)
         self.solved = 0
         self._memory: dict[tuple[Terms, Terms], Floats] = {}
 
     def __call__(self, terms: Sequence[AppliedEffect] = ()) -> Floats:
-        """(n, 6) m, rad predicted readings; NaN where a pose fails."""
+        """(n, c) m, rad predicted readings; NaN where a pose fails."""
         mechanical = tuple(t for t in terms if t.kind not in LOAD_SIDE + SENSOR_SIDE)
         load = tuple(t for t in terms if t.kind in LOAD_SIDE)
         key = (mechanical, load)
@@ -61,7 +65,7 @@ class Predictor:
     def _branches(self, plan: Experiment, terms: Terms) -> Floats:
         if not any(_has_branch(t) for t in terms):
             return self._solve(plan, terms)
-        out = np.full((len(plan), 6), np.nan)
+        out = np.full((len(plan), len(plan.channels)), np.nan)
         branch = np.array(plan.branch or ("loading",) * len(plan))
         branch = np.where(branch == "", "loading", branch)
         for name in np.unique(branch):
@@ -76,7 +80,7 @@ class Predictor:
 
 
 def predict(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEffect] = ()) -> Floats:
-    """(n, 6) m, rad: what the instrument would show of a machine with `terms` added.
+    """(n, c) m, rad: what the instrument would show of a machine with `terms` added.
 
     Raises StiffmapError for an unknown point or effect.
     """
@@ -85,7 +89,10 @@ def predict(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEff
 
 def check_points(machine: Machine, experiment: Experiment) -> None:
     """Raises StiffmapError where the experiment names a point that the machine does not have."""
-    for name in (experiment.point, experiment.load_point):
+    loop = experiment.loop
+    bodies = [b for b in (loop.instrument_on, loop.force_against) if b not in ("floor", "base")]
+    own = (*experiment.points, *experiment.load_points)
+    for name in dict.fromkeys((experiment.point, experiment.load_point, *own, *bodies)):
         if name not in machine.points:
             raise StiffmapError(
                 f"{experiment.name}: machine {machine.name} has no point '{name}'; "

@@ -7,7 +7,7 @@ frame, unknown zero of a pose) are projected out once and for all. What is left 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ class Problem:
 
     experiment: Experiment
     sigma: Floats
-    """(n, 6) noise floor of each reading."""
+    """(n, c) noise floor of each reading."""
     keep: Mask
     """(n,) rows in use."""
     index: tuple[NDArray[np.intp], NDArray[np.intp]]
@@ -33,22 +33,23 @@ class Problem:
     """(N, q) orthonormal basis of the whitened nuisances."""
     blocks: tuple[tuple[NDArray[np.intp], Floats], ...]
     """Readings that share a zero, and the inverse Cholesky factor of their covariance."""
+    base: Floats
+    """(n, c) prediction of the declared machine."""
 
     @staticmethod
     def of(experiment: Experiment, sigma: Floats, base: Floats, keep: Mask | None = None) -> Problem:
-        """Problem of the rows in `keep`; `base` (n, 6) is the declared machine's prediction."""
+        """Problem of the rows in `keep`; `base` (n, c) is the declared machine's prediction."""
         rows = np.ones(len(experiment), bool) if keep is None else keep
         used = experiment.read & rows[:, None] & np.isfinite(base)
         at, axis = np.nonzero(used)
         index = (at.astype(np.intp), axis.astype(np.intp))
-        bare = Problem(
-            experiment, sigma, rows, index, np.zeros((len(index[0]), 0)), _blocks(experiment, sigma, index)
-        )
+        none = np.zeros((len(index[0]), 0))
+        bare = Problem(experiment, sigma, rows, index, none, _blocks(experiment, sigma, index), base)
         columns = nuisance_columns(experiment, base)
         if not columns.shape[-1]:
             return bare
         q = basis(np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])]))
-        return Problem(experiment, sigma, rows, index, q, bare.blocks)
+        return replace(bare, nuisance=q)
 
     def __len__(self) -> int:
         return len(self.index[0])
@@ -64,7 +65,7 @@ class Problem:
         return self.experiment.groups[self.index[0]]
 
     def white(self, values: Floats) -> Floats:
-        """(n, 6, ...) -> (N, ...): whitened, nuisances projected out."""
+        """(n, c, ...) -> (N, ...): whitened, nuisances projected out."""
         sigma = self.sigma[self.index]
         out = values[self.index] / sigma.reshape(-1, *(1,) * (values.ndim - 2))
         for where, inverse in self.blocks:
@@ -74,6 +75,19 @@ class Problem:
     def residual(self, prediction: Floats) -> Floats:
         """(N,) whitened reading minus prediction; a failed pose counts as a huge residual."""
         return self.white(np.nan_to_num(self.experiment.reading - prediction, nan=1.0))
+
+
+def nuisance_part(problem: Problem, values: Floats) -> Floats:
+    """(n, c) what the nuisances of best fit say of `values` (n, c); NaN where they are."""
+    columns = nuisance_columns(problem.experiment, problem.base)
+    if not columns.shape[-1]:
+        return np.zeros_like(values)
+    bare = replace(problem, nuisance=np.zeros((len(problem), 0)))
+    white = np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])])
+    size = np.linalg.norm(white, axis=0)
+    scaled = white / np.where(size > 0, size, 1.0)
+    found = np.linalg.lstsq(scaled, bare.white(np.nan_to_num(values)), rcond=1e-9)[0]
+    return np.asarray(columns @ (found / np.where(size > 0, size, 1.0)))
 
 
 def basis(columns: Floats, tolerance: float = 1e-9) -> Floats:
@@ -88,14 +102,14 @@ def basis(columns: Floats, tolerance: float = 1e-9) -> Floats:
 def _blocks(
     experiment: Experiment, sigma: Floats, index: tuple[NDArray[np.intp], NDArray[np.intp]]
 ) -> tuple[tuple[NDArray[np.intp], Floats], ...]:
-    zero = experiment.zero_sigma
+    zero, width = experiment.zeros, len(experiment.channels)
     if experiment.quantity != "deflection" or not zero.any():
         return ()
     out = []
-    key = experiment.groups[index[0]] * 6 + index[1]
+    key = experiment.groups[index[0]] * width + index[1]
     for k in np.unique(key):
         where = np.flatnonzero(key == k)
-        s = zero[k % 6]
+        s = zero[k % width]
         if s > 0:
             v = np.diag(sigma[index][where] ** 2) + s**2
             out.append((where, np.linalg.inv(np.linalg.cholesky(v))))

@@ -9,67 +9,77 @@ from scipy.stats import chi2
 
 from stiffmap.experiment.checks import Check, checks
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.limits import refuse
 from stiffmap.experiment.noise import Mask, Noise, noise_of
 from stiffmap.experiment.outliers import suspects
-from stiffmap.experiment.predict import predict
+from stiffmap.experiment.predict import Predictor
+from stiffmap.experiment.problem import Problem, nuisance_part
 from stiffmap.experiment.summary import Summary, summary
 from stiffmap.machine import Machine
 
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """Reading minus prediction, SI, base axes."""
+    """Reading minus prediction, SI, base axes; n rows, c channels."""
 
     experiment: Experiment
+    """With the poses that commanded actuator coordinates stand for."""
     prediction: Floats
-    """(n, 6)."""
+    """(n, c) with the nuisances of best fit."""
     values: Floats
-    """(n, 6) NaN where nothing was read."""
+    """(n, c) NaN where nothing was read."""
     noise: Noise
     set_aside: Mask
     """(n,) rows that contradict their repeats or stand alone; not in `summary` nor `lack_of_fit`."""
     summary: Summary
     lack_of_fit: float
-    """Chance of a residual this large if the machine were as declared."""
+    """Chance of a residual this large if the machine were as declared; nuisances and shared zeros
+    taken into account."""
+    nuisances: int
+    """How many unknown frames and zeros were fitted."""
     groups_off: int
-    """Poses whose mean residual alone is beyond noise (chance below 1e-3 for any of them)."""
+    """Poses whose residuals alone are beyond noise (chance below 1e-3 that any pose is)."""
     checks: list[Check]
 
-    def worst(self, number: int = 10) -> list[tuple[str, float]]:
-        """Ids and residual lengths (m) of the worst rows, linear axes."""
-        size = np.sqrt(np.nansum(self.values[:, :3] ** 2, axis=1))
-        return [(self.experiment.ids[i], float(size[i])) for i in np.argsort(-size)[:number]]
+    def worst(self, number: int = 10) -> list[tuple[str, str, float]]:
+        """Rows by their worst reading, most noise floors first: id, channel, residual (m or rad)."""
+        z = np.nan_to_num(np.abs(self.values / self.noise.sigma))
+        at = [(int(i), int(np.argmax(z[i]))) for i in np.argsort(-z.max(axis=1), kind="stable")[:number]]
+        e = self.experiment
+        return [(e.ids[i], e.channels[a].name, float(self.values[i, a])) for i, a in at if z[i, a] > 0]
 
 
-def residual(machine: Machine, experiment: Experiment) -> Residual:
-    """Residual of every reading; raises StiffmapError for unknown points or an unknown noise."""
-    prediction = predict(machine, experiment)
-    values = experiment.reading - prediction
-    rough = noise_of(experiment)
-    out = suspects(experiment, values, rough.sigma)
-    noise = noise_of(experiment, ~out)
-    kept = np.where(out[:, None], np.nan, values)
-    z = kept / noise.sigma
-    total, number = float(np.nansum(z**2)), int(np.isfinite(z).sum())
+def residual(machine: Machine, experiment: Experiment, *, threads: int | None = None) -> Residual:
+    """Residual of every reading.
+
+    Raises StiffmapError for unknown points or joints, poses out of reach, and an unknown noise.
+    """
+    predictor = Predictor(machine, experiment, threads=threads)
+    e, base = predictor.experiment, predictor()
+    refuse(e, base)
+    rough = noise_of(e)
+    raw = e.reading - base
+    out = suspects(e, raw - nuisance_part(Problem.of(e, rough.sigma, base), raw), rough.sigma)
+    noise = noise_of(e, ~out)
+    problem = Problem.of(e, noise.sigma, base, ~out)
+    part = nuisance_part(problem, raw)
+    kept = np.where(out[:, None], np.nan, raw - part)
+    white = problem.residual(base)
     return Residual(
-        experiment,
-        prediction,
-        values,
+        e,
+        base + part,
+        raw - part,
         noise,
         out,
-        summary(kept, noise.sigma),
-        float(chi2.sf(total, number)),
-        _groups_off(experiment, z),
-        checks(experiment, experiment.reading, noise.sigma, ~out),
+        summary(kept, noise.sigma, e.channels),
+        float(chi2.sf(float(white @ white), max(problem.freedom, 1))),
+        int(problem.nuisance.shape[1]),
+        _groups_off(problem, white),
+        checks(e, e.reading, noise.sigma, ~out),
     )
 
 
-def _groups_off(experiment: Experiment, z: Floats) -> int:
-    off = 0
-    number = int(experiment.groups.max()) + 1
-    for g in range(number):
-        here = z[experiment.groups == g]
-        count = np.isfinite(here).sum(axis=0)
-        means = np.nansum(here, axis=0)[count > 0] / np.sqrt(count[count > 0])
-        off += bool(count.any() and chi2.sf(float(np.sum(means**2)), len(means)) < 1e-3 / number)
-    return off
+def _groups_off(problem: Problem, white: Floats) -> int:
+    total, number = np.bincount(problem.groups, white**2), np.bincount(problem.groups)
+    p = chi2.sf(total[number > 0], number[number > 0])
+    return int((p < 1e-3 / max(len(p), 1)).sum())

@@ -29,18 +29,42 @@ class NoiseModel(FileModel):
     rx: Positive | None = None
     ry: Positive | None = None
     rz: Positive | None = None
+    dd: Positive | None = None
+
+
+LengthOrAngle = Literal["m", "cm", "mm", "um", "in", "rad", "deg"]
+
+
+class JointModel(FileModel):
+    """A column that an encoder reads: full name of the joint, unit of the column and its noise in it.
+
+    ``load``: the joint itself, behind the drive's elasticity. ``motor``: before it.
+    """
+
+    joint: str
+    unit: LengthOrAngle
+    side: Literal["load", "motor"] = "load"
+    noise: Positive | None = None
+
+
+class CommandModel(FileModel):
+    """A column that commands an actuator, by its full name, in place of the pose."""
+
+    actuator: str
+    unit: LengthOrAngle
 
 
 class LoopModel(FileModel):
     """The metrology loop: what the instrument stands on, what carries the target, where the force reacts.
 
     On or against the ``base`` its compliance closes inside the loop and cannot be seen; on the
-    ``floor`` it can. A target on the ``platform`` cannot see the tool holder, one on the ``tool`` can.
+    ``floor`` it can. Another name is a named point of the body that carries the instrument or takes the
+    reaction. A target on the ``platform`` cannot see the tool holder, one on the ``tool`` can.
     """
 
-    instrument_on: Literal["floor", "base"] = "floor"
+    instrument_on: str = "floor"
     target_on: Literal["tool", "platform"] = "tool"
-    force_against: Literal["floor", "base"] = "floor"
+    force_against: str = "floor"
 
 
 class ExperimentFile(FileModel):
@@ -56,8 +80,11 @@ class ExperimentFile(FileModel):
     axes: Literal["base"] = "base"
     noise: NoiseModel = NoiseModel()
     zero_noise: NoiseModel = NoiseModel()
-    unloaded: Literal["centre", "unknown"] = "centre"
+    joints: dict[str, JointModel] = Field(default_factory=dict)
+    command: dict[str, CommandModel] = Field(default_factory=dict)
+    unloaded: Literal["centre", "approach", "unknown"] = "centre"
     frame: Literal["known", "offset_unknown", "unknown"] = "known"
+    tool: Literal["known", "offset_unknown"] = "known"
     gravity: Annotated[list[Finite], Field(min_length=3, max_length=3)] | None = None
     reference_temperature: Finite | None = None
     metrology: LoopModel = LoopModel()

@@ -1,54 +1,163 @@
-"""Motions of the reading point at every row of a plan."""
+"""Motions that every row of a plan would show a perfect instrument."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.description.strain import rests_at_command
+from stiffmap.experiment.channels import DISTANCE
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.joints import joint_channels, joint_motions
+from stiffmap.experiment.rest import lagging, lags, signs
+from stiffmap.experiment.rig import carrier, rigged, targets
+from stiffmap.experiment.where import point_positions
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 from stiffmap.status import Status
 
 
 def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> tuple[Floats, int]:
-    """(n, 6) m, rad of every row, and how many equilibria were solved.
+    """(n, c) m, rad of every row and channel, and how many equilibria were solved.
 
-    Deflection: the loaded minus the unloaded equilibrium of the same commanded pose.
+    Deflection: the loaded minus the unloaded state of the same commanded pose.
     """
-    if not plan.wrench.any() and not _moves_unloaded(machine, plan):
-        return _at_command(machine, plan), 0
-    motion, count = _unique(machine, plan, plan.wrench, threads)
-    if plan.quantity == "deflection" and _moves_unloaded(machine, plan):
-        rest, more = _unique(machine, plan, np.zeros_like(plan.wrench), threads)
-        return motion - rest, count + more
-    return motion, count
+    if DISTANCE in plan.extra:
+        return _with_distance(machine, plan, threads)
+    solver = Solver(rigged(machine, plan.loop), plan, threads)
+    if plan.quantity == "position":
+        return solver.rest() if not plan.wrench.any() else solver.loaded()
+    out, count = solver.loaded()
+    rest, more = solver.rest()
+    return out - rest, count + more
+
+
+def _with_distance(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
+    bare = replace(plan, extra=tuple(c for c in plan.extra if c != DISTANCE), other=None)
+    here, count = motions(machine, bare, threads)
+    assert plan.other is not None
+    rows = np.flatnonzero(np.isfinite(plan.other).all(axis=1))
+    pair = replace(bare, position=plan.other, rotation=plan.other_rotation).rows(rows)
+    there, more = motions(machine, pair, threads)
+    start, end = (positions_of(machine, p, targets(machine, p)) for p in (bare.rows(rows), pair))
+    apart = end - start
+    nominal = np.linalg.norm(apart, axis=1)
+    length = np.linalg.norm(apart + there[:, :3] - here[rows, :3], axis=1)
+    out = np.full((len(plan), len(plan.channels)), np.nan)
+    out[:, [plan.channels.index(c) for c in bare.channels]] = here
+    out[rows, plan.channels.index(DISTANCE)] = length - nominal
+    return out, count + more
+
+
+@dataclass(frozen=True, eq=False)
+class Solver:
+    """States of one machine under one plan."""
+
+    machine: Machine
+    plan: Experiment
+    threads: int | None
+
+    def loaded(self) -> tuple[Floats, int]:
+        """(n, c) under the wrenches of the plan."""
+        return self._equilibria(self.machine, self.plan)
+
+    def rest(self) -> tuple[Floats, int]:
+        """(n, c) without the wrenches: in the centre of every gap, or on the side of the approach."""
+        bare = replace(self.plan, wrench=np.zeros_like(self.plan.wrench))
+        sided = self.plan.quantity == "position" or self.plan.unloaded == "approach"
+        if sided and self.plan.approach is not None and lags(self.machine.description):
+            return self._sided(bare)
+        return self._equilibria(self.machine, bare)
+
+    def _sided(self, bare: Experiment) -> tuple[Floats, int]:
+        sign = signs(self.machine, bare)
+        out, count = np.full((len(bare), len(bare.channels)), np.nan), 0
+        for s in np.unique(sign, axis=0):
+            here = np.flatnonzero((sign == s).all(axis=1))
+            out[here], more = self._equilibria(lagging(self.machine, s, bool(bare.gravity)), bare.rows(here))
+            count += more
+        return out, count
+
+    def _equilibria(self, machine: Machine, plan: Experiment) -> tuple[Floats, int]:
+        if not plan.wrench.any() and not _moves_unloaded(machine, plan):
+            return _at_command(machine, plan), 0
+        labels = np.array(plan.load_points or (plan.load_point,) * len(plan))
+        out, count = np.full((len(plan), len(plan.channels)), np.nan), 0
+        for point in np.unique(labels):
+            here = np.flatnonzero(labels == point)
+            out[here], more = self._unique(machine, plan.rows(here), str(point))
+            count += more
+        return out, count
+
+    def _unique(self, machine: Machine, plan: Experiment, load_point: str) -> tuple[Floats, int]:
+        """Each different (pose, wrench) is solved once."""
+        key = np.hstack([plan.groups[:, None], plan.wrench])
+        _, first, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        back = back.reshape(-1)
+        once = plan.rows(first)
+        read = targets(machine, plan)
+        on = carrier(machine, plan.loop.instrument_on)
+        wanted = list(dict.fromkeys([*read, *([on] if on else [])]))
+        against = carrier(machine, plan.loop.force_against)
+        solution = machine.solve(
+            once.position,
+            once.wrench,
+            rotation=once.rotation,
+            point=load_point,
+            wrenches=_reaction(machine, once, load_point, against) if against else None,
+            read_points=wanted,
+            gravity=once.gravity,
+            stiffness=bool(joint_channels(plan)),
+            threads=self.threads,
+        )
+        moved = np.where(solution.ok[:, None, None], solution.readings[:, 1:], np.nan)
+        linear = moved[back, [wanted.index(r) for r in read]]
+        if on:
+            linear = seen_from(machine, plan, read, on, linear, moved[back, wanted.index(on)])
+        if not joint_channels(plan):
+            return linear, len(first)
+        joints = joint_motions(machine, once, solution.coordinates, solution.coordinate_names)
+        joints = np.where(solution.ok[:, None], joints, np.nan)
+        return np.hstack([linear, joints[back]]), len(first)
+
+
+def positions_of(machine: Machine, plan: Experiment, read: tuple[str, ...]) -> Floats:
+    """(n, 3) m, where the point of each row is as commanded."""
+    at = {p: point_positions(machine, p, plan.position, plan.rotation) for p in set(read)}
+    return np.stack([at[p][i] for i, p in enumerate(read)])
+
+
+def _reaction(machine: Machine, plan: Experiment, load_point: str, against: str) -> dict[str, Floats]:
+    """The opposite of the wrench on the body that takes it, about that body's point."""
+    arm = point_positions(machine, load_point, plan.position, plan.rotation) - point_positions(
+        machine, against, plan.position, plan.rotation
+    )
+    force, moment = plan.wrench[:, :3], plan.wrench[:, 3:]
+    return {against: -np.hstack([force, moment + np.cross(arm, force)])}
+
+
+def seen_from(
+    machine: Machine, plan: Experiment, read: tuple[str, ...], on: str, motion: Floats, carrier_motion: Floats
+) -> Floats:
+    """(n, 6) motion of the points read, in the axes of the body that carries the instrument."""
+    origin = point_positions(machine, on, plan.position, plan.rotation)
+    arm = positions_of(machine, plan, read) - origin
+    turn = Rotation.from_rotvec(np.nan_to_num(carrier_motion[:, 3:]))
+    linear = turn.inv().apply(arm + motion[:, :3] - carrier_motion[:, :3]) - arm
+    angular = (turn.inv() * Rotation.from_rotvec(np.nan_to_num(motion[:, 3:]))).as_rotvec()
+    return np.where(np.isfinite(motion), np.hstack([linear, angular]), np.nan)
 
 
 def _at_command(machine: Machine, plan: Experiment) -> Floats:
-    """(n, 6) zero where the pose can be reached, else NaN."""
+    """(n, c) zero where the pose can be reached, else NaN."""
     status = inverse_kinematics(machine, plan.position, plan.rotation).status
-    return np.where((status == Status.CONVERGED)[:, None], np.zeros((len(plan), 6)), np.nan)
+    zero = np.zeros((len(plan), len(plan.channels)))
+    return np.where((status == Status.CONVERGED)[:, None], zero, np.nan)
 
 
 def _moves_unloaded(machine: Machine, plan: Experiment) -> bool:
     """Without load only errors, preload or weight move a machine from its command."""
     d = machine.description
     return bool(plan.gravity or d.gravity) or not rests_at_command(d)
-
-
-def _unique(machine: Machine, plan: Experiment, wrench: Floats, threads: int | None) -> tuple[Floats, int]:
-    key = np.hstack([plan.groups[:, None], wrench])
-    _, first, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    solution = machine.solve(
-        plan.position[first],
-        wrench[first],
-        rotation=None if plan.rotation is None else plan.rotation[first],
-        point=plan.load_point,
-        read_points=[plan.point],
-        gravity=plan.gravity,
-        stiffness=False,
-        threads=threads,
-    )
-    out = np.where(solution.ok[:, None], solution.readings[:, 1], np.nan)
-    return out[back.reshape(-1)], len(first)

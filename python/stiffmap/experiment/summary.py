@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiffmap.experiment.experiment import AXES, Floats
+from stiffmap.experiment.channels import AXIS_CHANNELS, Channel, metres
+from stiffmap.experiment.experiment import Floats
 
 
 @dataclass(frozen=True)
 class Summary:
-    """Of single readings along the linear axes, m (rotations apart, rad)."""
+    """Of single readings of lengths, m (angles apart, rad)."""
 
     rms: float
     p95: float
@@ -25,13 +26,14 @@ class Summary:
     rotation_rms: float | None = None
 
 
-def summary(residual: Floats, sigma: Floats) -> Summary:
-    """Summary of residuals (n, 6), NaN where nothing was read."""
-    linear, angular = residual[:, :3], residual[:, 3:]
+def summary(residual: Floats, sigma: Floats, channels: tuple[Channel, ...] = AXIS_CHANNELS) -> Summary:
+    """Summary of residuals (n, c), NaN where nothing was read."""
+    linear, angular = residual[:, metres(channels)], residual[:, ~metres(channels)]
     size = np.abs(linear[np.isfinite(linear)])
     if not size.size:
         size = np.array([np.nan])
-    per_axis = {a: rms(residual[:, i]) for i, a in enumerate(AXES) if np.isfinite(residual[:, i]).any()}
+    read = [i for i in range(len(channels)) if np.isfinite(residual[:, i]).any()]
+    per_axis = {channels[i].name: rms(residual[:, i]) for i in read}
     return Summary(
         rms=rms(linear),
         p95=float(np.percentile(size, 95)),

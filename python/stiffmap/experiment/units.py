@@ -8,9 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiffmap.errors import FileError
-from stiffmap.experiment.experiment import WRENCH, Floats
+from stiffmap.experiment.experiment import WRENCH, Channel, Floats
 from stiffmap.experiment.schema import ExperimentFile
 from stiffmap.files.units import FORCES, LENGTHS
+
+ANGLES = {"rad": 1.0, "deg": math.pi / 180.0}
+
+
+def factor(unit: str) -> float:
+    """SI size of a unit of length or angle."""
+    return ANGLES[unit] if unit in ANGLES else float(LENGTHS[unit])
 
 
 @dataclass(frozen=True)
@@ -20,15 +27,19 @@ class Scales:
     length: float
     force: float | None
     radian: float | None
+    own: dict[str, float]
+    """Of columns that declare their unit themselves."""
     file: str
 
     @staticmethod
     def of(model: ExperimentFile, file: str) -> Scales:
         """Factors of a file."""
         units = model.units
-        angle = {None: None, "rad": 1.0, "deg": math.pi / 180.0}[units.angle]
+        angle = None if units.angle is None else ANGLES[units.angle]
         force = None if units.force is None else float(FORCES[units.force])
-        return Scales(float(LENGTHS[units.length]), force, angle, file)
+        own = {name: factor(c.unit) for name, c in model.joints.items()}
+        own |= {name: factor(c.unit) for name, c in model.command.items()}
+        return Scales(float(LENGTHS[units.length]), force, angle, own, file)
 
     def angle(self, column: str) -> float:
         """Factor of a rotation column; raises `FileError` where no unit is declared."""
@@ -38,11 +49,10 @@ class Scales:
             )
         return self.radian
 
-    @property
-    def motion(self) -> Floats:
-        """(6,) factors of [dx dy dz rx ry rz]; rotations without a declared unit become NaN: see `angle`."""
+    def motion(self, channels: tuple[Channel, ...]) -> Floats:
+        """(c,) factors of readings; rotations without a declared unit become NaN: see `angle`."""
         turn = math.nan if self.radian is None else self.radian
-        return np.array([self.length] * 3 + [turn] * 3)
+        return np.array([self.own.get(c.name, self.length if c.unit == "m" else turn) for c in channels])
 
     def wrench(self, columns: list[str]) -> Floats:
         """(6,) factors of [fx fy fz mx my mz]; raises `FileError` where no unit is declared."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from stiffmap.effects.library.geometry import AXES, names_of, rotations
-from stiffmap.effects.sites import at
+from stiffmap.effects.sites import at, at_sites, elastic_drives
 from stiffmap.effects.types import EffectType, Option, Parameter
 
 ANGLES: tuple[Parameter, ...] = rotations("rotation")
@@ -114,4 +114,21 @@ DRIFT = measured(
     options=(Option("per", ("order", "hour"), "what the drift goes with"),),
     needs=("order",),
 )
-EFFECTS = (LOAD_DIRECTION, LOAD_GAIN, SENSOR_GAIN, SENSOR_AXES, FRAME_OFFSET, DRIFT)
+SERVO_SHARE = EffectType(
+    kind="servo_share",
+    title="yield of a drive before its motor's encoder",
+    doc=(
+        "The motor side of a drive reads `share` of the drive's deflection: what its position control "
+        "yields. At 0 the motor stands and all yields behind it, at 1 behind the encoder nothing does. The "
+        "machine at the tool is the same."
+    ),
+    parameters=(Parameter("share", "1", 0.0, 1.0, 0.0, 0.1, "share of the drive's deflection"),),
+    places=at_sites(elastic_drives),
+    apply=None,
+    frame="the drive's coordinate",
+    moves="nothing of the machine",
+    excludes=("servo_share",),
+    needs=("motor",),
+    measurement=True,
+)
+EFFECTS = (LOAD_DIRECTION, LOAD_GAIN, SENSOR_GAIN, SENSOR_AXES, FRAME_OFFSET, DRIFT, SERVO_SHARE)

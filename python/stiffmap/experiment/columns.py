@@ -1,0 +1,161 @@
+"""Columns of data.csv as arrays in SI, each with its own refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.errors import FileError
+from stiffmap.experiment.channels import DISTANCE, Channel
+from stiffmap.experiment.experiment import AXES, BRANCHES, WRENCH, Floats, Integers
+from stiffmap.experiment.schema import ExperimentFile, NoiseModel
+from stiffmap.experiment.table import Table
+from stiffmap.experiment.units import Scales
+
+WORDS = ("id", "branch", "setup", "point", "load_point")
+POSE, ROTATION = ("x", "y", "z"), ("rotx", "roty", "rotz")
+POSE2, ROTATION2 = ("x2", "y2", "z2"), ("rotx2", "roty2", "rotz2")
+APPROACH = ("approach_x", "approach_y", "approach_z")
+READ = (*AXES, DISTANCE.name)
+KNOWN = (
+    *(*WORDS, *POSE, *ROTATION, *POSE2, *ROTATION2, *APPROACH, *WRENCH, *READ, *(f"u_{a}" for a in READ)),
+    *("repeat", "order", "temperature"),
+)
+
+
+def block(table: Table, names: Sequence[str], *, blank: bool, missing: float = np.nan) -> Floats:
+    """(n, names) numbers; a column that is not there is `missing`."""
+    n = len(table.rows)
+    return np.column_stack(
+        [table.numbers(c, blank=blank) if c in table else np.full(n, missing) for c in names]
+    )
+
+
+def position(table: Table, scales: Scales, commanded: bool) -> Floats:
+    """(n, 3) m; NaN where actuator coordinates are commanded instead."""
+    if commanded:
+        twice = [c for c in (*POSE, *ROTATION) if c in table]
+        if twice:
+            raise FileError(
+                f"column '{twice[0]}': actuators are commanded (command:), so the pose follows from them",
+                file=table.file,
+                line=1,
+            )
+        return np.full((len(table.rows), 3), np.nan)
+    return scales.length * np.column_stack([table.numbers(c) for c in POSE])
+
+
+def command(model: ExperimentFile, table: Table, scales: Scales) -> Floats | None:
+    """(n, actuators) m, rad, in the order of the file."""
+    if not model.command:
+        return None
+    return np.column_stack([scales.own[c] * table.numbers(c) for c in model.command])
+
+
+def rotations(table: Table, scales: Scales) -> tuple[Floats | None, Floats | None]:
+    """Commanded orientations (n, 3, 3) of a row and of its second pose, from rotation vectors in base
+    axes against home; the second is as the first where the file does not say."""
+    first, second = (_rotation(table, scales, names) for names in (ROTATION, ROTATION2))
+    if second is not None and first is None:
+        first = np.tile(np.eye(3), (len(table.rows), 1, 1))
+    return first, first if second is None else second
+
+
+def _rotation(table: Table, scales: Scales, names: tuple[str, ...]) -> Floats | None:
+    if not any(c in table for c in names):
+        return None
+    vectors = scales.angle(names[0]) * block(table, names, blank=names == ROTATION2, missing=0.0)
+    return np.ascontiguousarray(Rotation.from_rotvec(np.nan_to_num(vectors)).as_matrix())
+
+
+def other(
+    model: ExperimentFile, table: Table, scales: Scales, reading: Floats, channels: tuple[Channel, ...]
+) -> Floats | None:
+    """(n, 3) m, second pose of the rows that read a distance."""
+    if DISTANCE not in channels:
+        return None
+    if model.quantity != "position":
+        raise FileError(
+            "column 'dd': a distance between two poses is a position, no deflection", file=table.file
+        )
+    out = scales.length * np.column_stack([table.numbers(c, blank=True) for c in POSE2])
+    lost = np.isfinite(reading[:, channels.index(DISTANCE)]) & ~np.isfinite(out).all(axis=1)
+    same = np.abs(out - scales.length * block(table, POSE, blank=True)).max(axis=1) < 1e-9
+    for wrong, why in ((lost, "has no second pose (x2, y2, z2)"), (same, "is between a pose and itself")):
+        if wrong.any():
+            line = table.lines[int(np.flatnonzero(wrong)[0])]
+            raise FileError(f"column 'dd': the distance {why}", file=table.file, line=line)
+    return np.asarray(out)
+
+
+def approach(table: Table) -> Floats | None:
+    """(n, 3) direction of the last travel; an empty cell is 0."""
+    if not any(c in table for c in APPROACH):
+        return None
+    return np.nan_to_num(block(table, APPROACH, blank=True, missing=0.0))
+
+
+def declared(noise: NoiseModel, scales: Scales, channels: Sequence[Channel]) -> Floats:
+    """(c,) declared standard deviations; NaN where none is."""
+    values = [getattr(noise, c.name, None) for c in channels]
+    return np.asarray(scales.motion(tuple(channels)) * np.array([np.nan if v is None else v for v in values]))
+
+
+def sigma(model: ExperimentFile, table: Table, scales: Scales, channels: tuple[Channel, ...]) -> Floats:
+    """(n, c) standard deviation of each reading: its own column, else that of the file."""
+    common = declared(model.noise, scales, channels)
+    for i, c in enumerate(channels):
+        own = model.joints[c.name].noise if c.joint else None
+        common[i] = common[i] if own is None else scales.own[c.name] * own
+    each = scales.motion(channels) * block(table, [f"u_{c.name}" for c in channels], blank=True)
+    if np.any(each < 0):
+        row = int(np.flatnonzero((each < 0).any(axis=1))[0])
+        raise FileError("a standard deviation is negative", file=table.file, line=table.lines[row])
+    return np.where(np.isfinite(each), each, common)
+
+
+def ids(table: Table) -> tuple[str, ...]:
+    """Names of the rows, each once."""
+    if "id" not in table:
+        return tuple(str(i + 1) for i in range(len(table.rows)))
+    seen: dict[str, int] = {}
+    for name, line in zip(table.text("id"), table.lines, strict=True):
+        if name in seen:
+            raise FileError(
+                f"column 'id': '{name}' occurs twice (first in line {seen[name]})", file=table.file, line=line
+            )
+        seen[name] = line
+    return tuple(seen)
+
+
+def whole(table: Table, column: str) -> Integers | None:
+    """Whole numbers."""
+    if column not in table:
+        return None
+    values = table.numbers(column)
+    wrong = np.flatnonzero(values != np.round(values))
+    if wrong.size:
+        raise FileError(
+            f"column '{column}': expected whole numbers", file=table.file, line=table.lines[wrong[0]]
+        )
+    return values.astype(np.intp)
+
+
+def branch(table: Table) -> tuple[str, ...]:
+    """``loading``, ``unloading`` or nothing."""
+    if "branch" not in table:
+        return ()
+    cells = table.text("branch")
+    for cell, line in zip(cells, table.lines, strict=True):
+        if cell not in BRANCHES:
+            raise FileError(
+                f"column 'branch': expected loading or unloading; found '{cell}'", file=table.file, line=line
+            )
+    return tuple(cells)
+
+
+def named(table: Table, column: str, common: str) -> tuple[str, ...]:
+    """Named point of each row; an empty cell is the file's."""
+    return tuple(cell or common for cell in table.text(column)) if column in table else ()

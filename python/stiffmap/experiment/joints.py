@@ -1,0 +1,64 @@
+"""Joint coordinates that encoders read, on the load side and on the motor side of a drive."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stiffmap.description import CommandError, Joint
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment.channels import Channel
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.files.names import all_elements
+from stiffmap.kinematics import inverse_kinematics
+from stiffmap.machine import Machine
+
+
+def joint_motions(machine: Machine, plan: Experiment, coordinates: Floats, names: tuple[str, ...]) -> Floats:
+    """(n, joints) m, rad: how far joints are from where the command puts them.
+
+    coordinates
+        (n, coordinates) of the equilibria. ``load``: the coordinate less the commanded one. ``motor``:
+        the elastic part of it, of which an effect says the share that the motor's encoder sees.
+    """
+    rigid = inverse_kinematics(machine, plan.position, plan.rotation).coordinates
+    out = []
+    for c in joint_channels(plan):
+        i = names.index(c.joint)
+        moved = coordinates[:, i] - rigid[:, i]
+        out.append(moved - _command_error(machine, c, rigid[:, i]) if c.side == "motor" else moved)
+    return np.column_stack(out)
+
+
+def joint_channels(plan: Experiment) -> list[Channel]:
+    """Channels that are joints."""
+    return [c for c in plan.extra if c.joint]
+
+
+def _command_error(machine: Machine, channel: Channel, u: Floats) -> Floats:
+    joint = dict(all_elements(machine.description)).get(channel.joint)
+    errors = joint.command_errors if isinstance(joint, Joint) else ()
+    return np.asarray(sum((_error(e, u) for e in errors), np.zeros_like(u)))
+
+
+def _error(e: CommandError, u: Floats) -> Floats:
+    wave = np.sin(2 * math.pi * (u - e.reference) / e.period + e.phase)
+    return np.asarray(e.offset + e.slope * (u - e.reference) + e.amplitude * wave)
+
+
+def check_joints(machine: Machine, experiment: Experiment) -> None:
+    """Raises StiffmapError for joints that the machine does not have, or that read another unit."""
+    names = machine._names.joints
+    kinds = dict(zip(machine._core.coordinates, machine._core.prismatic, strict=True))
+    for c in (*joint_channels(experiment), *experiment.command_of):
+        if c.joint not in names:
+            raise StiffmapError(
+                f"{experiment.name}: column {c.name}: machine {machine.name} has no joint '{c.joint}'; "
+                f"it has {', '.join(names)}"
+            )
+        if c.side == "motor" and c.joint not in machine.actuators:
+            raise StiffmapError(f"{experiment.name}: column {c.name}: {c.joint} has no motor")
+        if (c.unit == "m") != kinds[c.joint]:
+            expected = "a length" if kinds[c.joint] else "an angle"
+            raise StiffmapError(f"{experiment.name}: column {c.name}: {c.joint} reads {expected}")
