@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from stiffmap.cli.inputs import FolderOption, ThreadsOption, plain
+from stiffmap.cli.inputs import EffectsOption, FolderOption, ThreadsOption, placed, plain
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.experiment import Residual, load_experiment
 from stiffmap.experiment import residual as compute
@@ -19,6 +19,7 @@ def residual(
     machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
     data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
     rows: Annotated[int, typer.Option(help="Number of worst rows to print.")] = 5,
+    effect: EffectsOption = None,
     output: FolderOption = None,
     threads: ThreadsOption = None,
     as_json: JsonOption = False,
@@ -33,8 +34,12 @@ def residual(
       [cyan]stiffmap residual orthoglide-revised experiments/servo[/cyan]
 
       [cyan]stiffmap residual orthoglide-revised experiments/servo --rows 20 -o result[/cyan]
+
+      [cyan]stiffmap residual orthoglide-revised experiments/servo --effect 'compliance actuator z scale=2.1'[/cyan]
     """
-    result = compute(load_machine(machine), load_experiment(data), threads=threads)
+    declared = load_machine(machine)
+    terms = [placed(declared, text) for text in effect or []]
+    result = compute(declared, load_experiment(data), terms, threads=threads)
     if output is not None:
         _write(result, rows, output)
     if as_json:

@@ -2,10 +2,11 @@
 
 from stiffmap.experiment.experiment import Experiment, Loop
 from stiffmap.experiment.load import load_experiment
+from stiffmap.experiment.plans import random_plan
 from stiffmap.experiment.predict import Predictor, predict
 from stiffmap.experiment.residual import Residual, residual
 from stiffmap.experiment.save import save_experiment
-from stiffmap.experiment.simulate import random_plan, simulate
+from stiffmap.experiment.simulate import simulate
 
 __all__ = [
     "Experiment",

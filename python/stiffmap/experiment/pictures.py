@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -88,7 +89,9 @@ def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:
     for column, (name, _, _) in enumerate(drivers):
         grid[-1][column].set_xlabel(name)
     aside = "; crosses: rows set aside" if r.set_aside.any() else ""
-    title = f"{r.experiment.name}: reading minus prediction\ngrey: two standard deviations{aside}"
+    title = (
+        f"{r.experiment.name}: reading minus prediction\ngrey: two standard deviations of the noise{aside}"
+    )
     figure.suptitle(title, fontsize=9)
     return figure
 
@@ -139,18 +142,20 @@ def force_drivers(e: Experiment) -> list[Driver]:
 
 
 def _directions(force: Floats) -> list[Driver]:
-    size = np.linalg.norm(force, axis=1, keepdims=True)
-    unit = np.round(force / np.where(size > 0, size, 1.0), 3) + 0.0
-    kinds, at = np.unique(unit, axis=0, return_inverse=True)
+    top = np.abs(force).max(axis=1, keepdims=True)
+    ratio = np.round(force / np.where(top > 0, top, 1.0), 2) + 0.0
+    kinds, at = np.unique(ratio, axis=0, return_inverse=True)
     if len(kinds) > MOST_LABELS:
         turn = np.degrees(np.arctan2(force[:, 1], force[:, 0]))
         return [("direction in the xy plane / deg", turn, [])]
-    names = [
-        "+".join(f"{v:g}{a}".replace("1x", "x").replace("1y", "y").replace("1z", "z")
-                 for v, a in zip(k, "xyz", strict=True) if v) or "none"
-        for k in kinds
-    ]  # fmt: skip
-    return [("direction of the force", at.reshape(-1).astype(float), names)]
+    return [("direction of the force", at.reshape(-1).astype(float), [direction_name(k) for k in kinds])]
+
+
+def direction_name(ratio: Floats) -> str:
+    """``x``, ``-x+0.5y``, ``none``, from components over the largest."""
+    parts = [f"{v:+g}{a}" for v, a in zip(ratio, "xyz", strict=True) if v]
+    text = re.sub(r"([+-])1([xyz])", r"\1\2", "".join(parts))
+    return text.removeprefix("+") or "none"
 
 
 def history_drivers(e: Experiment) -> list[Driver]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
 
+from stiffmap.description import AppliedEffect
 from stiffmap.experiment.checks import Check, checks
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.limits import refuse
@@ -49,13 +51,20 @@ class Residual:
         return [(e.ids[i], e.channels[a].name, float(self.values[i, a])) for i, a in at if z[i, a] > 0]
 
 
-def residual(machine: Machine, experiment: Experiment, *, threads: int | None = None) -> Residual:
-    """Residual of every reading.
+def residual(
+    machine: Machine,
+    experiment: Experiment,
+    effects: Sequence[AppliedEffect] = (),
+    *,
+    threads: int | None = None,
+) -> Residual:
+    """Residual of every reading, with `effects` in the prediction; those of the measurement may be
+    among them.
 
     Raises StiffmapError for unknown points or joints, poses out of reach, and an unknown noise.
     """
     predictor = Predictor(machine, experiment, threads=threads)
-    e, base = predictor.experiment, predictor()
+    e, base = predictor.experiment, predictor(tuple(effects))
     refuse(e, base)
     rough = noise_of(e)
     raw = e.reading - base

@@ -11,12 +11,14 @@ from stiffmap.description.strain import rests_at_command
 from stiffmap.experiment.channels import DISTANCE
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.joints import joint_channels, joint_motions
+from stiffmap.experiment.noise import Mask
 from stiffmap.experiment.rest import lagging, lags, signs
 from stiffmap.experiment.rig import carrier, rigged, targets
 from stiffmap.experiment.where import point_positions
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
-from stiffmap.status import Status
+from stiffmap.solution import Solution
+from stiffmap.status import Flag, Status
 
 
 def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> tuple[Floats, int]:
@@ -112,15 +114,22 @@ class Solver:
             stiffness=bool(joint_channels(plan)),
             threads=self.threads,
         )
-        moved = np.where(solution.ok[:, None, None], solution.readings[:, 1:], np.nan)
+        ok = solution.ok | _in_play(solution, once)
+        moved = np.where(ok[:, None, None], solution.readings[:, 1:], np.nan)
         linear = moved[back, [wanted.index(r) for r in read]]
         if on:
             linear = seen_from(machine, plan, read, on, linear, moved[back, wanted.index(on)])
         if not joint_channels(plan):
             return linear, len(first)
         joints = joint_motions(machine, once, solution.coordinates, solution.coordinate_names)
-        joints = np.where(solution.ok[:, None], joints, np.nan)
+        joints = np.where(ok[:, None], joints, np.nan)
         return np.hstack([linear, joints[back]]), len(first)
+
+
+def _in_play(solution: Solution, plan: Experiment) -> Mask:
+    """Rows without load where nothing but play is loose: the drives stand in the middle of their gaps."""
+    loose = (solution.status == Status.SINGULAR) & (solution.flags & Flag.FREE_PLAY > 0)
+    return np.asarray(loose & ~plan.wrench.any(axis=1))
 
 
 def positions_of(machine: Machine, plan: Experiment, read: tuple[str, ...]) -> Floats:
