@@ -161,7 +161,7 @@ def test_unreachable_rows_are_an_error(machine: sm.Machine, plan: sm.Experiment)
     twin = simulate(machine, plan, seed=0)
     position = twin.position.copy()
     position[3] = 9.0
-    with pytest.raises(sm.StiffmapError, match=r"no equilibrium at 1 rows \(id 4"):
+    with pytest.raises(sm.StiffmapError, match=r"no equilibrium at 1 row \(id 4"):
         sm.diagnose(machine, replace(twin, position=position))
 
 

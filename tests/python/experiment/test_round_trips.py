@@ -17,6 +17,7 @@ POSITION = ("--quantity", "position", "--poses", "12")
 FEW = ("--poses", "6", "--loads", "6")
 YIELD = "compliance actuator z scale=1.5"
 GROWN = "length bar x error=0.1mm"
+MORE = "length bar x error=0.8mm"
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ class Case:
 CASES = {
     "one axis": Case(YIELD, (*FEW, "--read", "dz")),
     "rotations": Case("compliance bar x scale=2", (*FEW, "--read", "rx,ry,rz", "--angle-noise", "0.001")),
-    "six-dimensional poses": Case("compliance bar x scale=2", (*FEW, "--read", "dx,dy,dz,rx,ry,rz")),
-    "distances": Case(GROWN, (*POSITION, "--distances")),
+    "six-dimensional poses": Case("compliance bar x scale=4", (*FEW, "--read", "dx,dy,dz,rx,ry,rz")),
+    "distances": Case(MORE, (*POSITION, "--distances")),
     "load side": Case("compliance actuator x scale=1.5", (*FEW, "--read", "none", "--joint", "x.actuator")),
     "motor side": Case(
         "servo_share actuator x share=0.3", (*FEW, "--read", "none", "--joint", "x.actuator:motor")
@@ -37,7 +38,7 @@ CASES = {
     "passive joint": Case(GROWN, (*POSITION, "--read", "none", "--joint", "x.proximal")),
     "commanded actuators": Case(GROWN, (*POSITION, "--command")),
     "unknown frame per set-up": Case(
-        GROWN, (*POSITION, "--frame", "unknown", "--setups", "2", "--repeats", "4")
+        MORE, (*POSITION, "--frame", "unknown", "--setups", "2", "--repeats", "4")
     ),
     "unknown point on the tool": Case(
         "lead_error actuator x slope=0.5mm/m", (*POSITION, "--tool", "offset_unknown")
