@@ -28,7 +28,7 @@ class Empirical:
     length: float
     """Correlation length as a share of half the plan's extent."""
     field: Floats
-    """(n, 6) correction at every row, predicted without its pose."""
+    """(n, c) correction at every row, predicted without its pose."""
 
 
 def empirical(experiment: Experiment, residual: Floats, sigma: Floats, seed: int) -> Empirical | None:
