@@ -21,7 +21,7 @@ void count_pose(const Program& P, Block& b, Scratch& s, double* out) {
   out[bench::block] += counted([&] { b.run(); });
   const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
   Elimination e{P, s, {}, splat(1e300), {f, f, f, g, g, g}};
-  Newton n{P, b.in, s, e, b.load, {}, {}, {}, {}};
+  Newton n{P, b.in, s, e, b.load};
   Frame tip = Closing::base_frame();
   V3 at;
   V6 F = b.load, c;
@@ -36,7 +36,7 @@ void count_pose(const Program& P, Block& b, Scratch& s, double* out) {
       out[bench::elements] += counted([&] { spring_tangent(e, P.ops[i], s.stiff[P.ops[i].slot], K, c); });
   out[bench::elimination] += counted([&] { tangent(e, P.chains[P.root], b.load, tip.p, n.K, n.c); });
   out[bench::platform] += counted([&] {
-    n.dense(C);
+    n.dense(n.K, C);
     n.invert(C);
   });
   out[bench::back] += counted([&] { back(e, P.chains[P.root], get(zero), tip.p, V3{}, M{}); });

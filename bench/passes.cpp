@@ -51,7 +51,7 @@ void time_block(Block& b, const M usable, Timer& time) {
   Scratch& s = b.s;
   const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
   Elimination e{P, s, {}, splat(1e300), {f, f, f, g, g, g}};
-  Newton n{P, b.in, s, e, b.load, {}, {}, {}, {}};
+  Newton n{P, b.in, s, e, b.load};
   time(bench::laws, [&] { n.evaluate(false); });
   Frame tip;
   time(bench::frames, [&] {
@@ -69,11 +69,11 @@ void time_block(Block& b, const M usable, Timer& time) {
   time(bench::elimination, [&] { tangent(e, P.chains[P.root], b.load, tip.p, n.K, n.c); });
   V K[6][6], C[6][6], x[6] = {};
   time(bench::platform, [&] {
-    n.dense(C);
+    n.dense(n.K, C);
     n.invert(C);
     bench::keep(C);
   });
-  n.dense(K);
+  n.dense(n.K, K);
   n.tip = tip;
   n.point = tip.p;
   time(bench::back, [&] { back(e, P.chains[P.root], get(x), tip.p, V3{}, M{}); });
@@ -81,7 +81,7 @@ void time_block(Block& b, const M usable, Timer& time) {
   time(bench::iteration, [&] {
     n.evaluate(false);
     n.linearize();
-    n.dense(C);
+    n.dense(n.K, C);
     n.invert(C);
     bench::keep(C);
     back(e, P.chains[P.root], get(x), tip.p, V3{}, M{});

@@ -39,7 +39,7 @@ struct Closing {
       for (int k = 0; k < P.leg_count; ++k) usable &= close_planar(P.planar[k], end, s.x);
       return usable;
     }
-    alignas(64) double rows[W][most_closure_unknowns] = {};
+    alignas(64) double rows[W][most_closure_unknowns];
     for (int i = 0; i < W; ++i) usable[i] = Starts{P}.interpolate(at[i], rows[i]) ? -1 : 0;
     for (int j = 0; j < P.unknown_count; ++j)
       for (int i = 0; i < W; ++i) s.x[P.unknowns[j]][i] = rows[i][j];

@@ -130,7 +130,7 @@ struct Block {
     for (int v = 0; v < in.perturbed_count; ++v) {
       const Program& Q = *in.perturbed[v];
       Elimination e{Q, s, base.e.gravity, splat(0), {}};
-      Newton at{Q, in, s, e, load, {}, {}, {}, {}};
+      Newton at{Q, in, s, e, load};
       set_base(Q);
       at.evaluate(false);
       at.frames_and_wrenches();
@@ -167,20 +167,15 @@ struct Block {
     const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
     Elimination e{
         P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
-    Newton newton{P, in, s, e, load, {}, {}, {}, {}};
+    Newton newton{P, in, s, e, load};
     V iterations = splat(0);
-    M done = newton.solve(usable, P.starts_linear, iterations);
-    if (!newton.fresh) {
-      newton.evaluate(false);
-      newton.linearize();
-    }
-    V K[6][6], C[6][6];
-    newton.dense(K);
-    newton.dense(C);
-    newton.invert(C);
-    done &= e.lowest > Newton::pivot_floor;
-    write(done, newton, K, C, iterations);
-    if (in.perturbed_count) vary(done, newton, C);
+    const M done = newton.solve(usable, P.starts_linear, iterations);
+    V K[6][6];
+    newton.dense(newton.answer, K);
+    write(done, newton, K, newton.compliance, iterations);
+    if (in.perturbed_count == 0) return;
+    newton.linearize();  // lanes that settled early have lost their factors
+    vary(done, newton, newton.compliance);
   }
 
   void write(M done, const Newton& newton, const V (&K)[6][6], const V (&C)[6][6], V iterations) {

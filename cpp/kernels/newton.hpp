@@ -14,11 +14,13 @@ struct Newton {
   const KernelInput& in;
   Scratch& s;
   Elimination& e;
-  V6 load;    ///< external wrench at the point, base axes
-  Frame tip;  ///< frame of the tip; the point is tip.p + tip.R point
-  V3 point;
-  Sym6 K;  ///< symmetric tangent at the point
-  V6 c;
+  V6 load;         ///< external wrench at the point, base axes
+  Frame tip = {};  ///< frame of the tip; the point is tip.p + tip.R point
+  V3 point = {};
+  Sym6 K = {};  ///< symmetric tangent at the point
+  V6 c = {};
+  Sym6 answer = {};         ///< K at the answer
+  V compliance[6][6] = {};  ///< inverse of the tangent of a dead wrench at the answer
 
   // ---- laws -----------------------------------------------------------------------------------
   void law_at(const LawProgram& law, int q) {
@@ -83,7 +85,7 @@ struct Newton {
     return 0.5 * (lo + hi);
   }
 
-  void evaluate(bool secant) {
+  [[gnu::noinline]] void evaluate(bool secant) {
     for (int q = 0; q < P.coordinate_count; ++q) {
       const CoordinateProgram& k = P.coordinates[q];
       if (k.law < 0 || k.locked) {
@@ -125,7 +127,9 @@ struct Newton {
   }
 
   // ---- one linearisation ----------------------------------------------------------------------
-  void frames_and_wrenches() {
+  /// One copy of the code, as of `evaluate` and `linearize`: two could contract differently, and a
+  /// pose's last bits would tell which of them ran.
+  [[gnu::noinline]] void frames_and_wrenches() {
     tip = {{splat(0), splat(0), splat(0)},
            {{{splat(1), splat(0), splat(0)}, {splat(0), splat(1), splat(0)}, {splat(0), splat(0), splat(1)}}}};
     walk<Build::actual>(P, P.chains[P.root], s.x, tip, s);
@@ -137,7 +141,6 @@ struct Newton {
     wrenches(e, P.chains[P.root], F, at);
   }
 
-  /// One copy of the code: two could contract differently, and a pose's last bits would tell which ran.
   [[gnu::noinline]] void linearize() {
     frames_and_wrenches();
     e.lowest = splat(1e300);
@@ -145,8 +148,8 @@ struct Newton {
   }
 
   /// Tangent of a small extra dead wrench at the point, K - S(m)/2 in the rotational block.
-  void dense(V (&m)[6][6]) const {
-    unpack(K, m);
+  void dense(const Sym6& symmetric, V (&m)[6][6]) const {
+    unpack(symmetric, m);
     const V3 h = splat(0.5) * load.b;
     m[3][4] += h.z;
     m[3][5] -= h.y;
@@ -188,45 +191,58 @@ struct Newton {
     return worst * (1 / P.length);
   }
 
+  /// Step of all coordinates from the last linearisation, m its inverse.
+  void step(const V (&m)[6][6], M active) {
+    V rhs[6], eta[6];
+    put(c, rhs);
+    for (int i = 0; i < 6; ++i) {
+      eta[i] = splat(0);
+      for (int j = 0; j < 6; ++j) eta[i] -= m[i][j] * rhs[j];
+    }
+    for (int q = 0; q < P.coordinate_count; ++q) s.dz[q] = splat(0);
+    e.transferred = splat(0);
+    back(e, P.chains[P.root], get(eta), point, V3{}, active);
+  }
+
+  void take(M lanes, const V (&m)[6][6]) {
+    answer = select(lanes, K, answer);
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j) compliance[i][j] = select(lanes, m[i][j], compliance[i][j]);
+  }
+
   /// Iterates until every lane converged or is left to the reference path; lanes never wait for
   /// the answer of others, only for their time.
   M solve(M usable, bool corners, V& iterations) {
     M done = ~usable & usable, failed = ~usable;
-    V previous = splat(0);
+    V previous = splat(1);
     for (int k = 0; k < in.max_iterations; ++k) {
       const bool secant = corners && k == 0;
       evaluate(secant);
       linearize();
       V m[6][6];
-      dense(m);
+      dense(K, m);
       invert(m);
       failed |= ~done & ~(e.lowest > pivot_floor);
-      V rhs[6], eta[6];
-      put(c, rhs);
-      for (int i = 0; i < 6; ++i) {
-        eta[i] = splat(0);
-        for (int j = 0; j < 6; ++j) eta[i] -= m[i][j] * rhs[j];
-      }
       M active = ~done & ~failed;
-      for (int q = 0; q < P.coordinate_count; ++q) s.dz[q] = splat(0);
-      e.transferred = splat(0);
-      back(e, P.chains[P.root], get(eta), point, V3{}, active);
+      step(m, active);
       const V norm = step_norm();
       failed |= active & ~(norm < 1e6);
-      // Nothing left to gain from the step: keep the state, and with it this linearisation, unless
-      // the branches shared the load in another way.
-      const M still = active & (norm < nothing), kept = still & (e.transferred < nothing);
-      if (any(kept)) keep_wrenches(e, kept);
-      done |= still;
-      fresh = all(done | failed) && all(kept == active);
       iterations = select(active, iterations + 1.0, iterations);
-      active &= ~still;
-      for (int q = 0; q < P.coordinate_count; ++q) s.z[q] = select(active, s.z[q] + s.dz[q], s.z[q]);
       if (secant) {
+        move(active);
         start_laws(active);
         continue;
       }
-      done |= active & (norm < in.tolerance);
+      // Settled: this linearisation is the one at the answer. The step is taken all the same, unless
+      // there is nothing to gain from it.
+      const V change = larger(norm, e.transferred);
+      const M settled = active & ((change < small) | ((norm < in.tolerance) & (previous < in.tolerance)));
+      const M kept = active & (change < nothing);
+      take(settled, m);
+      if (any(kept)) keep_wrenches(e, kept);
+      move(active & ~kept);
+      done |= settled;
+      fresh = all(kept == active);
       if (!corners) {
         failed |= active & ~done & ~(norm <= 0.2);
         if (k > 0) failed |= active & ~done & ~((norm <= 0.2 * previous) | (norm <= 1e-7));
@@ -234,13 +250,23 @@ struct Newton {
       previous = norm;
       if (all(done | failed)) break;
     }
-    return done & ~failed;
+    done &= ~failed;
+    if (!fresh) {
+      evaluate(false);
+      frames_and_wrenches();
+    }
+    return done;
+  }
+
+  void move(M lanes) {
+    for (int q = 0; q < P.coordinate_count; ++q) s.z[q] = select(lanes, s.z[q] + s.dz[q], s.z[q]);
   }
 
   static constexpr double pivot_floor = 1e-5;
+  static constexpr double small = 1e-12;  ///< step that changes the tangent by no more than that
   static constexpr double nothing = 1e-14;
   static constexpr double unloaded = 1e-11;
-  bool fresh = false;  ///< the last linearisation is the one at the answer
+  bool fresh = false;  ///< frames and wrenches are those at the answer
 };
 
 }  // namespace stiffmap::kernel

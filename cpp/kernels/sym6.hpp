@@ -28,6 +28,16 @@ inline Sym6 operator+(const Sym6& a, const Sym6& b) {
   return {a.A + b.A, {{a.B.c[0] + b.B.c[0], a.B.c[1] + b.B.c[1], a.B.c[2] + b.B.c[2]}}, a.E + b.E};
 }
 
+inline S3 select(M m, const S3& a, const S3& b) {
+  return {select(m, a.xx, b.xx), select(m, a.yy, b.yy), select(m, a.zz, b.zz),
+          select(m, a.xy, b.xy), select(m, a.xz, b.xz), select(m, a.yz, b.yz)};
+}
+inline Sym6 select(M m, const Sym6& a, const Sym6& b) {
+  return {select(m, a.A, b.A),
+          {{select(m, a.B.c[0], b.B.c[0]), select(m, a.B.c[1], b.B.c[1]), select(m, a.B.c[2], b.B.c[2])}},
+          select(m, a.E, b.E)};
+}
+
 inline V6 operator*(const Sym6& K, const V6& t) { return {K.A * t.a + K.B * t.b, K.B % t.a + K.E * t.b}; }
 
 /// Tangent of the dead wrench with moment m, applied to a twist.
@@ -125,17 +135,22 @@ inline V6 get(const V (&v)[6]) { return {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}}
 /// L D L^T of a symmetric matrix given by its lower part, in place (L below, D on the diagonal);
 /// `inverse` receives 1/D, `lowest` the smallest pivot in multiples of `scale`^2.
 inline void ldlt(V (&m)[6][6], V (&inverse)[6], V& lowest, const double (&scale)[6]) {
+#pragma GCC unroll 6
   for (int j = 0; j < 6; ++j) {
     V w[6];
+#pragma GCC unroll 6
     for (int k = 0; k < j; ++k) w[k] = m[j][k] * m[k][k];
     V d = m[j][j];
+#pragma GCC unroll 6
     for (int k = 0; k < j; ++k) d -= m[j][k] * w[k];
     m[j][j] = d;
     inverse[j] = 1.0 / d;
     const V relative = d * (1 / (scale[j] * scale[j]));
     lowest = lowest < relative ? lowest : relative;
+#pragma GCC unroll 6
     for (int i = j + 1; i < 6; ++i) {
       V s = m[i][j];
+#pragma GCC unroll 6
       for (int k = 0; k < j; ++k) s -= m[i][k] * w[k];
       m[i][j] = s * inverse[j];
     }
@@ -144,10 +159,15 @@ inline void ldlt(V (&m)[6][6], V (&inverse)[6], V& lowest, const double (&scale)
 
 /// Solves with the factors of ldlt, in place.
 inline void ldlt_solve(const V (&m)[6][6], const V (&inverse)[6], V (&x)[6]) {
+#pragma GCC unroll 6
   for (int i = 1; i < 6; ++i)
+#pragma GCC unroll 6
     for (int k = 0; k < i; ++k) x[i] -= m[i][k] * x[k];
+#pragma GCC unroll 6
   for (int i = 0; i < 6; ++i) x[i] *= inverse[i];
+#pragma GCC unroll 6
   for (int i = 4; i >= 0; --i)
+#pragma GCC unroll 6
     for (int k = i + 1; k < 6; ++k) x[i] -= m[k][i] * x[k];
 }
 

@@ -121,8 +121,11 @@ inline void couple(StiffSlot& k, const Sym6& K, const V6& y) {
   k.X[5][3] -= h.y;
   k.X[5][4] += h.x;
   put(y, k.y);
+#pragma GCC unroll 6
   for (int i = 1; i < 6; ++i)
+#pragma GCC unroll 6
     for (int q = 0; q < i; ++q) {
+#pragma GCC unroll 6
       for (int col = 0; col < 6; ++col) k.X[i][col] -= k.L[i][q] * k.X[q][col];
       k.y[i] -= k.L[i][q] * k.y[q];
     }
