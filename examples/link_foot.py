@@ -65,9 +65,9 @@ def bounds_of_any_section(beam: Beam, material: Material) -> tuple[float, float]
 
 
 def bracket(beam: Beam, x: np.ndarray) -> Foot:
-    """The part, from the logarithms of upright, depth and plate; the base is three uprights long."""
-    upright, depth, plate = np.exp(x)
-    return Foot(height=beam.height, upright=upright, depth=depth, base=3 * upright, plate=plate)
+    """The part, from the logarithms of upright and depth; a base as thick as deep, three uprights long."""
+    upright, depth = np.exp(x)
+    return Foot(height=beam.height, upright=upright, depth=depth, base=3 * upright, plate=depth)
 
 
 def solve(shape: Foot, material: Material, study: bool, size: float | None = None) -> PartLink:
@@ -89,13 +89,9 @@ def nearest(beam: Beam, material: Material, weights: np.ndarray) -> Foot:
         k = np.diag(solve(bracket(beam, x), material, study=False).link.compliance)
         return np.asarray(weights * np.log(k / target))
 
-    start = np.log([ratio * depth, depth, depth])
-    thinnest = np.log(0.03 * beam.height)
-    low, high = np.array([-np.inf, -np.inf, thinnest]), np.array([np.inf, np.inf, np.log(0.3 * beam.height)])
+    start = np.log([ratio * depth, depth])
     # A mesh changes in steps with the shape: differences over 4 % look across its noise.
-    found = least_squares(
-        misfit, start, bounds=(low, high), diff_step=0.04 / np.abs(start), max_nfev=6, xtol=1e-4
-    )
+    found = least_squares(misfit, start, diff_step=0.04 / np.abs(start), max_nfev=6, xtol=1e-3)
     return bracket(beam, found.x)
 
 

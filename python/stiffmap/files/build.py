@@ -17,6 +17,7 @@ from stiffmap.files.build_elements import build_elements, build_range
 from stiffmap.files.build_geometry import build_pose, build_vector
 from stiffmap.files.build_legs import build_leg
 from stiffmap.files.context import Context, Gathered
+from stiffmap.files.link_covariance import with_links
 from stiffmap.files.names import point_names
 from stiffmap.files.schema import MachineFile
 from stiffmap.files.schema.base import Number, suggestion
@@ -56,15 +57,9 @@ def build(
     return replace(
         description,
         uncertainty=tuple({**gathered.uncertainty, **model.uncertainty}.items()),
-        extra=description.extra + _links(gathered),
+        extra=with_links(description.extra, gathered.links, context),
         notes=tuple({**gathered.notes, **model.notes}.items()),
     )
-
-
-def _links(gathered: Gathered) -> tuple[tuple[str, Any], ...]:
-    """Covariances of the link files, for `error_map(..., uncertainty=True)`."""
-    uses = tuple((file, tuple(use.springs), use.covariance) for file, use in gathered.links.items())
-    return (("link_covariance", uses),) if uses else ()
 
 
 def _check_points(description: MachineDescription, context: Context) -> None:

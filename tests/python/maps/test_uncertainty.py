@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 import stiffmap as sm
 from stiffmap.cli import main
@@ -130,6 +133,74 @@ def test_covariance_survives_saving(machine: Machine, tmp_path: Path) -> None:
     again = sm.load_machine(tmp_path / "saved.yaml")
     assert again == machine
     assert np.array_equal(uncertain_numbers(again).covariance, uncertain_numbers(machine).covariance)
+
+
+def save_with_some_linked_again(machine: Machine, folder: Path) -> None:
+    """The saved machine (all six compliances written out), whose template names the file again for three springs."""
+    machine.save(folder / "saved.yaml")
+    data = yaml.safe_load((folder / "saved.yaml").read_text(encoding="utf-8"))
+    spring = _spring_of(next(iter(data["templates"].values())))
+    del spring["compliance"]
+    spring["link"] = "bar-link.yaml"
+    (folder / "mixed.yaml").write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+
+
+def _spring_of(elements: list[dict[str, Any]]) -> dict[str, Any]:
+    block = next(e for e in elements if "block" in e)
+    return next(e for e in block["branches"]["low"] if e.get("spring") == "bar")
+
+
+def test_kept_and_new_links_are_merged(machine: Machine, tmp_path: Path) -> None:
+    write_link(tmp_path, 0.8)
+    save_with_some_linked_again(machine, tmp_path)
+    again = sm.load_machine(tmp_path / "mixed.yaml")
+    entries = dict(again.description.extra)["link_covariance"]
+    assert [e[0] for e in entries] == ["bar-link.yaml"]
+    kept = dict(machine.description.extra)["link_covariance"][0]
+    assert sorted(entries[0][1]) == sorted(kept[1])
+    assert len([k for k, _ in again.description.extra if k == "link_covariance"]) == 1
+    assert uncertain_numbers(again).covariance == pytest.approx(uncertain_numbers(machine).covariance)
+
+
+def test_a_link_file_that_changed_is_refused(machine: Machine, tmp_path: Path) -> None:
+    write_link(tmp_path, 0.5)
+    save_with_some_linked_again(machine, tmp_path)
+    with pytest.raises(StiffmapError, match=r"bar-link.yaml has another covariance than the one kept here"):
+        sm.load_machine(tmp_path / "mixed.yaml")
+
+
+def test_a_broken_kept_covariance_is_refused(machine: Machine, tmp_path: Path) -> None:
+    machine.save(tmp_path / "saved.yaml")
+    data = yaml.safe_load((tmp_path / "saved.yaml").read_text(encoding="utf-8"))
+    data["extra"]["link_covariance"][0][2] = [[1.0]]
+    (tmp_path / "saved.yaml").write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+    with pytest.raises(StiffmapError, match=r"expected \[file, \[springs\], 21 x 21 numbers\]"):
+        sm.load_machine(tmp_path / "saved.yaml")
+
+
+def test_map_json_holds_the_band_in_si(
+    machine: Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_link(tmp_path, 0.8)
+    write_machine(tmp_path)
+    arguments = ["--points", "3", "--z", "0", "--force", "100", "--uncertainty", "--no-pictures", "--json"]
+    assert main(["map", "machine.yaml", *arguments, "-o", "out"]) == 0
+    band = json.loads(capsys.readouterr().out)["uncertainty"]
+    at = np.linspace(-0.08, 0.12, 3)
+    ds = sm.error_map(
+        sm.load_machine("machine.yaml"), x=at, y=at, z=0.0, wrench=np.eye(6)[:3] * 100, uncertainty=True
+    )
+    worst = next(r for r in band["rows"] if r["force"] == "worst")
+    assert worst["z"] == 0.0
+    std = ds.worst_deflection_xy_std.values
+    assert worst["max_std"] == pytest.approx(float(std.max()), rel=1e-6)  # m
+    assert worst["median_std"] == pytest.approx(float(np.median(std)), rel=1e-6)
+    relative = std / ds.worst_deflection_xy.values
+    assert worst["max_relative"] == pytest.approx(float(relative.max()), rel=1e-6)
+    assert sum(r["share"] for r in band["ranking"]) == pytest.approx(1.0)
+    assert band["ranking"][0]["number"].startswith("bar-link.yaml k")
+    assert "delta method" in band["method"]
 
 
 def test_unreachable_poses_have_no_deviation(machine: Machine) -> None:
