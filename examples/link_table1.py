@@ -89,8 +89,16 @@ def solve(
     """Identified link of a design."""
     shape = design.shape(length)
     setup = Setup("fixed", "loaded", shape.reference())
-    return link_from_part(
-        shape.mesh, material, setup, UNIT_WRENCHES, size=size, solver="skfem", study=study, refine=study
+    return link_from_part(  # a pin holds the mean motion of its holes
+        shape.mesh,
+        material,
+        setup,
+        UNIT_WRENCHES,
+        size=size,
+        solver="skfem",
+        study=study,
+        other_support="soft",
+        refine=study,
     )
 
 

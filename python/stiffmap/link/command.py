@@ -18,7 +18,7 @@ from stiffmap.link.identify import identify_link
 from stiffmap.link.inputs import UNIT_WRENCHES, read_cases, read_material, read_part
 from stiffmap.link.linkfile import LinkFile, save_link
 from stiffmap.link.mesh import SolidMesh, face_area_centre
-from stiffmap.link.pipeline import PartLink, Solver, link_from_part
+from stiffmap.link.pipeline import PartLink, Solver, Support, link_from_part
 from stiffmap.link.readers import read_field
 from stiffmap.link.result import Link
 from stiffmap.link.solve import Material, Setup
@@ -56,6 +56,12 @@ def link_command(
     quick: Annotated[
         bool, typer.Option("--quick", help="One mesh, one boundary: no share of these.")
     ] = False,
+    support: Annotated[
+        str,
+        typer.Option(
+            help="Besides clamped, for the boundary's share: bed (bolted down), soft (pin in hole)."
+        ),
+    ] = "bed",
     zeros: Annotated[bool, typer.Option("--zeros", help="Set insignificant entries to zero.")] = False,
     out: Annotated[Path | None, typer.Option(help="Link file to write (YAML).")] = None,
     picture: Annotated[Path | None, typer.Option(help="PNG to write.")] = None,
@@ -83,6 +89,7 @@ def link_command(
             size=None if size is None else 1e-3 * size,
             solver=cast(Solver, solver),
             study=not quick,
+            other_support=cast(Support, support),
             refine=not quick and part.suffix.lower() not in MESH,
         )
         if zeros:

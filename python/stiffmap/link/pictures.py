@@ -92,6 +92,8 @@ def _draw_shape(axes: Any, part: PartLink, triangles: Ints, case: int) -> None:
         getattr(axes, f"set_{axis}label")(f"{axis} [mm]", fontsize=7)
     axes.set_box_aspect(size, zoom=0.95)
     axes.tick_params(labelsize=6)
+    for axis, width in zip("xyz", size, strict=True):  # labels of a thin side would overlap
+        axes.locator_params(axis=axis, nbins=4 if width > 0.5 * size.max() else 2)
     axes.set_title(
         f"case {case + 1}: {wrench_words(part.wrenches[case])}\n(displacement × {scale:.0f})", fontsize=9
     )

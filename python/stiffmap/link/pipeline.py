@@ -20,6 +20,7 @@ from stiffmap.link.result import Link
 from stiffmap.link.solve import Material, Setup, mean_motion, solve_skfem
 
 Solver = Literal["auto", "ccx", "skfem"]
+Support = Literal["bed", "soft"]
 COARSER = (2.0, 1.41)  # sizes of the refinement study over the finest
 COARSE_ENOUGH = 1.05
 
@@ -71,6 +72,7 @@ def link_from_part(
     size: float | None = None,
     solver: Solver = "auto",
     study: bool = True,
+    other_support: Support = "bed",
     refine: bool = True,
 ) -> PartLink:
     """Identify a part's spring from its own finite-element field.
@@ -80,13 +82,17 @@ def link_from_part(
         material, setup: SI; wrenches: (cases, 6) N, N·m at ``setup.reference``.
         size: edge length of the finest mesh in m.
         solver: "auto" takes CalculiX where it is installed.
-        study: solve again with a rigid head and on an elastic bed, for the boundary's share of the uncertainty.
+        study: solve again with a rigid head and on another support, for the boundary's share of the error.
+        other_support: "bed" for a base on something as stiff as the part, "soft" where only the mean motion of
+            the fixed face is held, as by a pin in its hole.
         refine: solve two coarser meshes, for the mesh's share.
 
     Raises:
         StiffmapError: see the solvers, the meshers and :func:`identify_link`.
     """
     chosen = chosen_solver(solver)
+    if other_support not in ("bed", "soft"):
+        raise StiffmapError(f"support: expected bed or soft, got {other_support!r}")
     mesh = mesher(size)
     solve = solve_ccx if chosen == "CalculiX" else solve_skfem
     field = solve(mesh, material, setup, wrenches)
@@ -100,7 +106,7 @@ def link_from_part(
         )
         parts["mesh"] = shift_covariance([shift])
     if study:
-        others = [setup._replace(head="rigid"), setup._replace(support="bed")]
+        others = [setup._replace(head="rigid"), setup._replace(support=other_support)]
         shifts = [
             _identify(mesh, nodes, solve_skfem(mesh, material, s, wrenches), s, wrenches).compliance
             - link.compliance

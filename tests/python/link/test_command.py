@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 
 import numpy as np
@@ -18,6 +19,7 @@ from stiffmap.link.gmshmesh import mesh_file
 from stiffmap.link.mesh import checked_mesh
 from stiffmap.link.optional import need
 from stiffmap.link.plan import planned_error, smallest_force, smallest_nodes
+from stiffmap.link.readers import read_dat, read_field
 from stiffmap.link.solve import Material, Setup, solve_skfem
 
 PART = """
@@ -64,6 +66,8 @@ def test_part_to_link_file_and_picture(run, tmp_path, fea):
     assert (tmp_path / "l.png").stat().st_size > 20_000
     data = json.loads(run(*arguments, "--json").output)
     assert data["compliance"] == pytest.approx(link.compliance)
+    assert data["order"] is None
+    assert data["order_note"] == "one mesh"
 
 
 def test_field_to_spring(run, tmp_path):
@@ -90,6 +94,7 @@ def test_help_has_examples(run):
         (("field.csv",), "needs --cases FILE and --reference"),
         (("bar.yaml", "--reference", "1,2"), "--reference: expected x,y,z in mm, got '1,2'"),
         (("bar.yaml", "--solver", "magic"), "solver: expected auto, ccx or skfem"),
+        (("bar.yaml", "--support", "air"), "support: expected bed or soft, got 'air'"),
         (("bar.yaml", "--cases", "absent.csv"), "absent.csv: no such file"),
     ],
 )
@@ -192,6 +197,53 @@ def test_unsolved_calculix_run_is_refused():
     with pytest.raises(StiffmapError, match="ccx stopped") as error:
         calculix.solve_ccx(mesh, Material(0.0, 0.3), Setup("fixed", "loaded", np.zeros(3)), np.eye(6))
     assert "\n" not in str(error.value)
+
+
+def test_frd_of_a_calculix_run_is_read(tmp_path):
+    """The file that ccx itself writes, against its .dat of the same run."""
+    if not calculix.has_ccx():
+        pytest.skip("CalculiX (ccx) is not installed")
+    nodes, tets = one_tet(CORNERS)
+    face = {"fixed": np.array([[0, 2, 1, 6, 5, 4]]), "loaded": np.array([[0, 1, 3, 4, 8, 7]])}
+    mesh = checked_mesh(nodes, tets, face)
+    setup = Setup("fixed", "loaded", np.zeros(3))
+    deck = calculix.ccx_input(mesh, Material(1e9, 0.3), setup, np.eye(6))
+    deck = deck.replace("*NODE PRINT, NSET=ALL", "*NODE FILE\nU\n*NODE PRINT, NSET=ALL")
+    (tmp_path / "t.inp").write_text(deck)
+    subprocess.run(["ccx", "t"], cwd=tmp_path, capture_output=True, check=True)
+    points, u = read_field(tmp_path / "t.frd", "m")
+    _, printed = read_dat(tmp_path / "t.dat")
+    assert points == pytest.approx(mesh.nodes, abs=1e-6)
+    assert u.shape == (6, 10, 3)
+    assert u == pytest.approx(printed, abs=2e-5 * np.abs(printed).max())
+
+
+def test_bad_mesh_through_the_command(run, tmp_path, fea):
+    """A volume mesh whose one element is flat, and one without material: one line each, exit code 2."""
+    rows = "\n".join(f"{i + 1} {x} {y} 0" for i, (x, y) in enumerate([(0, 0), (1, 0), (0, 1), (1, 1)]))
+    (tmp_path / "flat.msh").write_text(
+        f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n{rows}\n$EndNodes\n"
+        "$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n"
+    )
+    done = run("flat.msh", "--unit", "mm", "--material", "steel", "--reference", "0,0,0")
+    assert done.exit_code == 2
+    assert "1 of 1 elements have zero volume" in done.output
+    done = run("flat.msh", "--unit", "mm", "--reference", "0,0,0")
+    assert done.exit_code == 2
+    assert "the part has no material" in done.output
+
+
+def test_nan_in_a_field_file_through_the_command(run, tmp_path):
+    write_field(tmp_path / "field.csv")
+    rows = (tmp_path / "field.csv").read_text().splitlines()
+    cells = rows[4].split(",")
+    (tmp_path / "field.csv").write_text(
+        "\n".join([*rows[:4], ",".join([*cells[:7], "nan", *cells[8:]]), *rows[5:]])
+    )
+    (tmp_path / "cases.csv").write_text(CASES)
+    done = run("field.csv", "--cases", "cases.csv", "--reference", "310,0,0")
+    assert done.exit_code == 2
+    assert "displacements: expected finite numbers, got 1 NaN" in done.output
 
 
 def test_missing_extra_names_the_command(monkeypatch):

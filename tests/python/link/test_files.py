@@ -81,13 +81,15 @@ def test_dat_frd_and_ansys_hold_the_same_field(tmp_path):
     assert u == pytest.approx(1e-3 * U[:2], rel=1e-5)
 
 
-def test_vtu_through_meshio(tmp_path):
+@pytest.mark.parametrize("name", ["a.vtu", "a.vtk"])
+def test_vtu_and_vtk_through_meshio(tmp_path, name):
     meshio = pytest.importorskip("meshio", reason="needs the extra [fea]")
     data = {f"case{k}": u for k, u in enumerate(U)}
-    meshio.Mesh(POINTS, [("vertex", np.arange(10)[:, None])], point_data=data).write(tmp_path / "a.vtu")
-    p, u = read_field(tmp_path / "a.vtu", "m")
+    meshio.Mesh(POINTS, [("vertex", np.arange(10)[:, None])], point_data=data).write(tmp_path / name)
+    p, u = read_field(tmp_path / name, "m")
     assert np.array_equal(p, POINTS)
     assert np.array_equal(u, U)
+    assert read_field(tmp_path / name, "mm")[1] == pytest.approx(1e-3 * U, rel=1e-15)
 
 
 def write(tmp_path, name, text):
