@@ -1,7 +1,7 @@
 """Standard deviations of a map from those of the machine's numbers and of its identified links.
 
 First order (the delta method): variance = J V J', with J the derivatives of the displacement with respect
-to the uncertain numbers and V their covariance (docs/link.md §9).
+to the uncertain numbers and V their covariance (docs/link.md §11).
 """
 
 from __future__ import annotations
