@@ -32,15 +32,16 @@ def periodic_variants(
 ) -> Iterator[tuple[Floats, tuple[tuple[str, float], ...]]]:
     """(n, 6, 2) columns per `scale` of the amplitude, and the period, for every period worth trying."""
     scale = candidate.parameters[0].scale
-    travel = {leg: coordinate(candidate, leg, predictor) for leg in candidate.legs}
-    each = {leg: _offset(candidate, leg, predictor, base) * scale for leg in candidate.legs}
+    legs = candidate.legs or ("",)  # none: a drive before or behind the legs
+    travel = {leg: coordinate(candidate, leg, predictor) for leg in legs}
+    each = {leg: _offset(candidate, leg, predictor, base) * scale for leg in legs}
     if not max(float(np.nanmax(np.abs(c))) for c in each.values()) > 0.0:
         return
     reach = max(float(np.ptp(u)) for u in travel.values())
     for frequency in frequencies(reach, next(iter(travel.values()))):
         parts = [
             np.stack([each[g] * np.sin(w)[:, None], each[g] * np.cos(w)[:, None]], axis=-1)
-            for g in candidate.legs
+            for g in legs
             for w in [2 * np.pi * frequency * travel[g]]
         ]
         yield np.asarray(sum(parts)), (("period", 1.0 / frequency),)
@@ -57,7 +58,7 @@ def frequencies(reach: float, travel: Floats) -> Floats:
 def _offset(candidate: Candidate, leg: str, predictor: Predictor, base: Floats) -> Floats:
     """(n, 6) change of the readings per unit of a zero offset of one drive."""
     step = 1e-5
-    term = AppliedEffect("zero_offset", candidate.element, (leg,), (("error", step),))
+    term = AppliedEffect("zero_offset", candidate.element, (leg,) if leg else (), (("error", step),))
     return (predictor([term]) - base) / step
 
 
@@ -66,15 +67,14 @@ def coordinate(candidate: Candidate, leg: str, predictor: Predictor) -> Floats:
     e = predictor.experiment
     names = predictor.machine.actuators
     found = inverse_kinematics(predictor.machine, e.position, e.rotation)
-    i = next(
-        k for k, n in enumerate(names) if n.split(".")[0] == leg and n.split(".")[-1] == candidate.element
-    )
+    mine = [n.split(".")[0] == leg if leg else "." not in n for n in names]
+    i = next(k for k, n in enumerate(names) if mine[k] and n.split(".")[-1] == candidate.element)
     return np.asarray(found.actuators[:, i] - home(predictor.machine.description, leg, candidate.element))
 
 
 def home(description: MachineDescription, leg: str, element: str) -> float:
     """Home coordinate of a drive."""
-    elements = next(g.elements for g in description.legs if g.name == leg)
+    legs = {g.name: g.elements for g in description.legs} | {"": (*description.base, *description.platform)}
     return next(
-        e.home[0] for s in sequences(elements) for e in s if isinstance(e, Joint) and e.name == element
+        e.home[0] for s in sequences(legs[leg]) for e in s if isinstance(e, Joint) and e.name == element
     )
