@@ -92,12 +92,11 @@ struct Block {
     return Closing{P, s}.close(command, at);
   }
 
-  /// Drives with their errors; every coordinate's value at zero deflection (theory G1, G2).
+  /// Drives and guides with their errors; every coordinate's value at zero deflection (theory G1-G3).
   void set_base(const Program& of) {
     for (int q = 0; q < of.coordinate_count; ++q) {
       const CoordinateProgram& k = of.coordinates[q];
-      const bool sprung = k.role == 1 && k.law >= 0;
-      s.a_base[q] = k.role == 2 ? splat(0) : sprung ? splat(k.home) : s.closed[q];
+      s.a_base[q] = k.role == 2 ? splat(0) : k.from_home ? splat(k.home) : s.closed[q];
       s.scale[q] = splat(1);
     }
     for (int d = 0; d < of.drive_count; ++d) {
@@ -106,7 +105,7 @@ struct Block {
     }
     for (int i = 0; i < of.error_count; ++i) {
       const CommandErrorProgram& k = of.errors[i];
-      const V u = s.closed[k.coordinate] - k.reference;
+      const V u = s.closed[k.of] - k.reference;
       V wave = splat(0), unused;
       if (k.amplitude != 0) sincos(u * (2 * 3.14159265358979323846 / k.period) + k.phase, wave, unused);
       s.a_base[k.coordinate] += k.offset + k.slope * u + k.amplitude * wave;
@@ -117,7 +116,7 @@ struct Block {
     for (int q = 0; q < P.coordinate_count; ++q) {
       const CoordinateProgram& k = P.coordinates[q];
       s.closed[q] = s.x[q];
-      s.z[q] = k.role == 1 && k.law >= 0 ? s.x[q] - k.home : splat(0);
+      s.z[q] = k.from_home ? s.x[q] - k.home : splat(0);
       s.da[q] = splat(1);
       s.tau[q] = s.dtau[q] = s.rubs[q] = splat(0);
     }

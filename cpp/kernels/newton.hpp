@@ -94,6 +94,7 @@ struct Newton {
           s.tau[q] = k.stiffness * (s.x[q] - k.rest);
           s.dtau[q] = splat(k.stiffness);
         }
+        if (k.friction != 0) s.tau[q] = k.friction * s.rubs[q];
         continue;
       }
       const LawProgram& law = P.laws[k.law];
@@ -112,12 +113,16 @@ struct Newton {
   void start_laws(M active) {
     for (int q = 0; q < P.coordinate_count; ++q) {
       const CoordinateProgram& k = P.coordinates[q];
-      if (k.law < 0 || k.locked) continue;
-      const LawProgram& law = P.laws[k.law];
+      if (k.locked || (k.law < 0 && k.friction == 0)) continue;
       for (int i = 0; i < W; ++i) {
         if (!active[i]) continue;
         const double linear = s.z[q][i];
         const bool bears = __builtin_fabs(linear) * k.unit > unloaded * P.length;
+        if (k.law < 0) {
+          s.rubs[q][i] = !bears ? 0 : linear > 0 ? 1 : -1;
+          continue;
+        }
+        const LawProgram& law = P.laws[k.law];
         const double tau = bears ? law.stiffness / s.scale[q][i] * linear : 0.0;
         const double sign = tau > 0 ? 1 : tau < 0 ? -1 : 0;
         s.rubs[q][i] = sign;

@@ -43,8 +43,9 @@ struct LawProgram {
   std::int32_t first, count;  ///< knots
 };
 
+/// Error of the commanded coordinate `of`, which moves `coordinate`: the same, or a deviation of its guide.
 struct CommandErrorProgram {
-  std::int32_t coordinate;
+  std::int32_t coordinate, of;
   double offset, slope, amplitude, period, phase, reference;
 };
 
@@ -56,7 +57,8 @@ struct DriveProgram {
 struct CoordinateProgram {
   double home, lower, upper, unit;
   double stiffness, rest;  ///< of a link spring's direction that is a joint of its own
-  std::int32_t role, locked, law;
+  double friction;         ///< of a free passive joint
+  std::int32_t role, locked, law, from_home;
 };
 
 /// One closure equation set of a leg: the leg's end or a loop inside it.

@@ -16,6 +16,8 @@ std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// Laws with corners or with dry friction: Newton starts from the solution with all laws linear.
 bool has_knots(const Mechanism& m) {
+  const auto rubs = [](const Coordinate& c) { return c.friction != 0; };
+  if (std::any_of(m.coordinates.begin(), m.coordinates.end(), rubs)) return true;
   return std::any_of(m.laws.begin(), m.laws.end(),
                      [](const Law& law) { return law.has_knots() || law.friction() != 0; });
 }
@@ -28,9 +30,10 @@ constexpr double unloaded = 1e-11;
 void start_laws(const Mechanism& m, Problem& p, State& state) {
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
+    const bool bears = std::abs(state.z[j]) * m.unit(j) > unloaded * m.length;
+    if (c.friction != 0) p.friction_sign[j] = !bears ? 0 : state.z[j] > 0 ? 1 : -1;
     if (c.law < 0 || c.locked) continue;
     const Law& law = m.laws[at(c.law)];
-    const bool bears = std::abs(state.z[j]) * m.unit(j) > unloaded * m.length;
     const double tau = bears ? law.stiffness() / p.drive_scale[j] * state.z[j] : 0.0;
     p.friction_sign[j] = tau > 0 ? 1 : tau < 0 ? -1 : 0;
     const double in_spring = tau - law.friction() * p.friction_sign[j];

@@ -18,14 +18,16 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
   }
   for (const Coordinate& c : m.coordinates) {
     const Index j = static_cast<Index>(&c - m.coordinates.data());
-    d.coordinates.push_back({m.home_coordinates[j], c.lower, c.upper, m.unit(j), 0.0, 0.0,
-                             static_cast<std::int32_t>(c.role), c.locked, i32(c.law)});
+    d.coordinates.push_back({m.home_coordinates[j], c.lower, c.upper, m.unit(j), 0.0, 0.0, c.friction,
+                             static_cast<std::int32_t>(c.role), c.locked, i32(c.law), c.from_home()});
+    d.program.starts_linear |= c.friction != 0;
     if (c.role == Role::passive && c.locked) d.program.flag_always |= flag::free_spin;
   }
   for (std::size_t i = 0; i < m.drives.size(); ++i) {
     const Drive& k = m.drives[i];
-    for (const CommandError& e : k.errors)
-      d.errors.push_back({i32(k.coordinate), e.offset, e.slope, e.amplitude, e.period, e.phase, e.reference});
+    for (const auto& [moves, e] : k.errors)
+      d.errors.push_back(
+          {i32(moves), i32(k.coordinate), e.offset, e.slope, e.amplitude, e.period, e.phase, e.reference});
     d.drives.push_back({chains.drives[i].coordinate, chains.drives[i].slot, chains.drives[i].prismatic, k.home,
                         k.compliance_slope, k.force_limit});
   }

@@ -117,6 +117,8 @@ void evaluate_laws(const Mechanism& m, const Problem& p, const State& state, Lin
       out.da[j] = q.da;
       out.dtau[j] = q.dtau;
       out.kind[at(j)] = q.da == 0 ? Kind::fixed : q.dtau == 0 ? Kind::free : Kind::elastic;
+    } else if (c.friction != 0) {
+      out.tau[j] = c.friction * p.friction_sign[j];
     }
     out.x[j] = p.base[j] + a;
   }

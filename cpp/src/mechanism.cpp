@@ -70,10 +70,28 @@ Index Mechanism::add_joint(const Joint& joint, Index node, const std::string& pr
     c.law = static_cast<Index>(laws.size());
     laws.push_back(*joint.law);
   }
-  if (joint.actuated) {
-    c.actuator = static_cast<Index>(drives.size());
-    c.locked = !joint.law;
-    drives.push_back({name, size() - 1, joint.home, joint.compliance_slope, joint.command_errors, joint.force_limit});
+  require(joint.friction == 0 || (!joint.actuated && !joint.law), name + ".friction", "a free passive joint",
+          "another");
+  c.friction = joint.friction;
+  c.about_command = joint.about_command;
+  if (!joint.actuated) return node;
+  c.actuator = static_cast<Index>(drives.size());
+  c.locked = !joint.law;
+  Drive drive{name, size() - 1, joint.home, joint.compliance_slope, {}, joint.force_limit};
+  for (const CommandError& e : joint.command_errors) drive.errors.push_back({drive.coordinate, e});
+  drives.push_back(drive);
+  return add_guide_errors(joint, node, name);
+}
+
+/// Each deviation is a coordinate of its own that nothing moves but its error; no closure knows it.
+Index Mechanism::add_guide_errors(const Joint& joint, Index node, const std::string& name) {
+  for (std::size_t i = 0; i < joint.guide_errors.size(); ++i) {
+    const GuideError& e = joint.guide_errors[i];
+    require(std::abs(e.axis.norm() - 1) < 1e-9, name + ".guide_errors", "a unit vector", e.axis.norm());
+    node = add_coordinate(node, name + ".deviation" + std::to_string(i + 1), Role::spring, JointType::prismatic, e.axis,
+                          0.0);
+    coordinates.back().locked = true;
+    drives.back().errors.push_back({size() - 1, e.error});
   }
   return node;
 }

@@ -12,19 +12,19 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-/// Drive coordinates with their errors, and the drive compliance at that stroke (theory G1, G2).
+/// Drive and guide coordinates with their errors, and the drive compliance at that stroke (theory G1-G3).
 void command(const Mechanism& m, const VecX& x, Problem& p) {
   p.friction_sign.setZero();
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
-    p.base[j] = c.role == Role::spring ? 0.0 : c.role == Role::passive && c.law >= 0 ? m.home_coordinates[j] : x[j];
+    p.base[j] = c.role == Role::spring ? 0.0 : c.from_home() ? m.home_coordinates[j] : x[j];
   }
   for (const Drive& d : m.drives) {
     const double u = x[d.coordinate];
     p.drive_scale[d.coordinate] = 1 + d.compliance_slope * (u - d.home);
-    for (const CommandError& e : d.errors)
-      p.base[d.coordinate] += e.offset + e.slope * (u - e.reference) +
-                              e.amplitude * std::sin(2 * std::numbers::pi * (u - e.reference) / e.period + e.phase);
+    for (const auto& [coordinate, e] : d.errors)
+      p.base[coordinate] += e.offset + e.slope * (u - e.reference) +
+                            e.amplitude * std::sin(2 * std::numbers::pi * (u - e.reference) / e.period + e.phase);
   }
 }
 
@@ -33,7 +33,7 @@ void start_state(const Mechanism& m, const VecX& x, State& state) {
   state.lambda.setZero();
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
-    if (c.role == Role::passive && c.law >= 0) state.z[j] = x[j] - m.home_coordinates[j];
+    if (c.from_home()) state.z[j] = x[j] - m.home_coordinates[j];
   }
 }
 

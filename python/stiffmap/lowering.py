@@ -11,8 +11,10 @@ from stiffmap.description import (
     TASK,
     Block,
     Body,
+    CommandError,
     Element,
     Joint,
+    JointFriction,
     Law,
     MachineDescription,
     Offset,
@@ -23,6 +25,8 @@ from stiffmap.description import (
 from stiffmap.errors import StiffmapError
 
 UNLIMITED = 1e300
+FAR = 10.0  # rad or m: end of the flat pieces of a stick law
+START = 1e-3  # rad or m: slope of a stick law in the linear start of Newton's iteration
 
 
 def build_mechanism(machine: MachineDescription) -> _core.Mechanism:
@@ -95,10 +99,8 @@ def add_joint(out: _core.Chain, e: Joint) -> None:
     range_ = e.drive.range if e.drive and e.drive.range else e.limits
     lower, upper = range_ or (-UNLIMITED, UNLIMITED)
     force = e.drive.force if e.drive and e.drive.force else UNLIMITED
-    errors = [
-        _core.CommandError(c.offset, c.slope, c.amplitude, c.period, c.phase, c.reference)
-        for c in e.command_errors
-    ]
+    stuck = e.friction if e.friction and e.friction.branch == "loading_stuck" else None
+    own = stick_law(stuck.level) if stuck else law(e.law) if e.law else None
     for i, (axis, home) in enumerate(zip(e.axes, e.home, strict=True)):
         out.joint(
             name=e.name if len(e.axes) == 1 else f"{e.name}.{i + 1}",
@@ -106,13 +108,34 @@ def add_joint(out: _core.Chain, e: Joint) -> None:
             axis=np.array(axis),
             actuated=e.actuated,
             home=home,
-            law=law(e.law) if e.law else None,
+            law=own,
             compliance_slope=e.compliance_slope,
-            errors=errors,
+            errors=[command_error(c) for c in e.command_errors],
             lower=lower,
             upper=upper,
             force_limit=force,
+            guide_errors=[(np.array(g.axis), command_error(g.error)) for g in e.guide_errors],
+            friction=sliding_friction(e.friction),
+            about_command=stuck is not None,
         )
+
+
+def command_error(c: CommandError) -> _core.CommandError:
+    """Compiled error of a commanded coordinate."""
+    return _core.CommandError(c.offset, c.slope, c.amplitude, c.period, c.phase, c.reference)
+
+
+def sliding_friction(friction: JointFriction | None) -> float:
+    """Constant force against (positive) or with the joint's motion, theory L3."""
+    if friction is None or friction.branch == "loading_stuck":
+        return 0.0
+    return friction.level if friction.branch == "loading" else -friction.level
+
+
+def stick_law(level: float) -> _core.Law:
+    """Rigid up to the level, then at it: a step and two flat pieces that no joint leaves."""
+    knots = [(-FAR, -level), (0.0, -level), (0.0, level), (FAR, level)]
+    return _core.Law(level / START, 0.0, knots)
 
 
 def add_spring(out: _core.Chain, e: Spring) -> None:

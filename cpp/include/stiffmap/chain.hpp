@@ -29,8 +29,14 @@ struct CommandError {
   double offset = 0, slope = 0, amplitude = 0, period = 1, phase = 0, reference = 0;
 };
 
+/// Deviation of a guide across its stroke, theory (G3): a translation along `axis` of the carriage.
+struct GuideError {
+  Vec3 axis = Vec3::UnitY();
+  CommandError error;
+};
+
 /// One-axis joint. Actuated: `law` is the drive's compliance (none: rigid).
-/// Passive: `law` acts about the home coordinate (none: free).
+/// Passive: `law` acts about the home coordinate, or about the commanded one (none: free).
 struct Joint {
   std::string name;
   JointType type = JointType::revolute;
@@ -40,6 +46,9 @@ struct Joint {
   std::optional<Law> law;
   double compliance_slope = 0;  ///< relative change of the drive compliance per unit of travel
   std::vector<CommandError> command_errors;
+  std::vector<GuideError> guide_errors;
+  double friction = 0;         ///< free passive joint: constant force against its deflection; < 0: with it (theory L3)
+  bool about_command = false;  ///< passive: `law` acts about the commanded coordinate
   double lower = -1e300, upper = 1e300;
   double force_limit = 1e300;
 };

@@ -31,7 +31,12 @@ struct Coordinate {
   double lower = -1e300, upper = 1e300;
   Index actuator = -1;  ///< index among the actuators
   Index law = -1;       ///< index into laws, -1: none
-  bool locked = false;  ///< rigid drive, or a spin that changes nothing (held at home)
+  bool locked = false;  ///< rigid drive, deviation of a guide, or a spin that changes nothing (held at home)
+  double friction = 0;  ///< of a free passive joint
+  bool about_command = false;
+
+  /// The law of a passive joint acts about its home coordinate unless it says otherwise.
+  bool from_home() const { return role == Role::passive && law >= 0 && !about_command; }
 };
 
 /// A coupled spring over coordinates first .. first+5.
@@ -42,11 +47,17 @@ struct SpringGroup {
   Vec6 rest = Vec6::Zero();
 };
 
+/// Error of a drive's commanded coordinate, which moves `coordinate`: its own, or one across the guide.
+struct DriveError {
+  Index coordinate = -1;
+  CommandError error;
+};
+
 struct Drive {
   std::string name;
   Index coordinate = -1;
   double home = 0, compliance_slope = 0;
-  std::vector<CommandError> errors;
+  std::vector<DriveError> errors;
   double force_limit = 1e300;
 };
 
@@ -123,6 +134,7 @@ class Mechanism {
   Index add_chain(const Chain& chain, Index node, const std::string& prefix, bool outermost);
   Index add_block(const Block& block, Index node, const std::string& prefix, bool outermost);
   Index add_joint(const Joint& joint, Index node, const std::string& prefix);
+  Index add_guide_errors(const Joint& joint, Index node, const std::string& name);
   Index add_spring(const Spring& spring, Index node, const std::string& prefix);
   void finish(const std::vector<ExternalSpring>& springs);
   void set_scales();

@@ -103,6 +103,16 @@ class Compiler {
       way.moves = true;
       way.turned = way.turned || j.type == JointType::revolute;
     }
+    for (const GuideError& e : j.guide_errors) guide_error(e, way, ops);
+  }
+
+  /// A slide that only its error moves.
+  void guide_error(const GuideError& e, Way& way, std::vector<Op>& ops) {
+    Op& op = push(OpKind::prismatic, way, ops);
+    op.coordinate = next_++;
+    op.slot = out_.program.joint_slots++;
+    op.axis = 3;
+    for (int i = 0; i < 3; ++i) op.direction[i] = e.axis[i];
   }
 
   /// A spring that is full and regular is one operation; one with uncoupled directions, some of them

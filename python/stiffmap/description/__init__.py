@@ -11,7 +11,7 @@ from stiffmap.description.elements import (
     Point,
     Spring,
 )
-from stiffmap.description.laws import CommandError, Law
+from stiffmap.description.laws import CommandError, GuideError, JointFriction, Law
 from stiffmap.description.machine import (
     TASK,
     AppliedEffect,
@@ -31,7 +31,9 @@ __all__ = [
     "Drive",
     "Element",
     "ExternalSpring",
+    "GuideError",
     "Joint",
+    "JointFriction",
     "Law",
     "Leg",
     "MachineDescription",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from stiffmap.description.laws import CommandError, Law
+from stiffmap.description.laws import CommandError, GuideError, JointFriction, Law
 from stiffmap.description.pose import IDENTITY, Pose, Rows, Vector
 
 Matrix6 = tuple[tuple[float, ...], ...]
@@ -53,6 +53,8 @@ class Joint:
     compliance_slope
         Relative change of the drive's compliance per metre (or rad) of the commanded coordinate,
         measured from ``home``.
+    friction
+        Of a passive joint without a law.
     """
 
     name: str
@@ -63,6 +65,8 @@ class Joint:
     law: Law | None = None
     compliance_slope: float = 0.0
     command_errors: tuple[CommandError, ...] = ()
+    guide_errors: tuple[GuideError, ...] = ()
+    friction: JointFriction | None = None
     limits: tuple[float, float] | None = None
     drive: Drive | None = None
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from stiffmap.description.pose import Vector
+
 Knot = tuple[float, float]
 
 
@@ -28,6 +30,19 @@ class Law:
 
 
 @dataclass(frozen=True)
+class JointFriction:
+    """Dry friction about (along) each axis of a free passive joint: its level (N·m, N) and the branch.
+
+    ``loading`` stands in full against the motion that the joint makes without friction, measured from the
+    commanded configuration; ``unloading`` acts with it (fully reversed); ``loading_stuck`` holds the joint
+    where it is commanded until the level is reached.
+    """
+
+    level: float
+    branch: str = "loading"
+
+
+@dataclass(frozen=True)
 class CommandError:
     """Error of a commanded actuator coordinate u (m or rad), added to the command:
 
@@ -40,3 +55,12 @@ class CommandError:
     period: float = 1.0
     phase: float = 0.0
     reference: float = 0.0
+
+
+@dataclass(frozen=True)
+class GuideError:
+    """Deviation of a guide across its stroke: the carriage stands off along ``axis`` (unit vector, axes
+    of the guide) by the value of ``error`` at the commanded coordinate (m)."""
+
+    axis: Vector
+    error: CommandError

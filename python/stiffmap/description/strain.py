@@ -36,7 +36,7 @@ def _strains(e: Element) -> bool:
         case Offset():
             return e.actual is not None and e.actual != e.nominal
         case Joint():
-            return bool(e.command_errors)
+            return bool(e.command_errors or e.guide_errors)
         case Spring():
             return any(e.rest)
     return False

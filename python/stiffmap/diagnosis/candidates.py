@@ -65,7 +65,7 @@ def candidates(description: MachineDescription, experiment: Experiment) -> list[
 def of_kind(effect: EffectType, description: MachineDescription) -> list[Candidate]:
     """One candidate per place and meaning."""
     out = []
-    for element, legs in effect.places(description):
+    for element, legs in (effect.tried or effect.places)(description):
         parameters = tuple(
             p for p in effect.parameters_at(description, element, legs) if p.fitted or _unknown(p)
         )

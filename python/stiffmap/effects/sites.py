@@ -29,6 +29,34 @@ def elastic_drives(elements: Elements) -> dict[str, tuple[int, ...]]:
     return _by_name(elements, lambda e: isinstance(e, Joint) and e.actuated and e.law is not None)
 
 
+def elastic_directions(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Elastic joints, and single directions of link springs by names such as ``foot.k22``, where no other
+    direction is coupled to them."""
+    out = _by_name(elements, lambda e: isinstance(e, Joint) and e.law is not None)
+    for i in range(6):
+        for name, at in _by_name(elements, lambda e: _alone(e, i)).items():  # noqa: B023 - used at once
+            out[f"{name}.k{i + 1}{i + 1}"] = at
+    return out
+
+
+def _alone(e: Element, i: int) -> bool:
+    if not isinstance(e, Spring):
+        return False
+    m = e.compliance or e.stiffness
+    assert m is not None
+    return m[i][i] > 0.0 and not any(m[i][k] or m[k][i] for k in range(6) if k != i)
+
+
+def guides(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Actuated sliders."""
+    return _by_name(elements, lambda e: isinstance(e, Joint) and e.actuated and e.kind == "prismatic")
+
+
+def free_joints(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Passive joints without a law."""
+    return _by_name(elements, lambda e: isinstance(e, Joint) and not e.actuated and e.law is None)
+
+
 def passive_joints(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Passive joints."""
     return _by_name(elements, lambda e: isinstance(e, Joint) and not e.actuated)

@@ -79,6 +79,8 @@ class EffectType:
         What an experiment must record beside pose, load and reading (``temperature``, ``order``).
     at
         Parameters with the units and bounds of one place (a revolute drive counts in rad).
+    tried
+        Places that a diagnosis tries as an explanation; None: all of them.
     derived
         Further numbers that a report shows, computed from the parameters.
     """
@@ -101,6 +103,7 @@ class EffectType:
     measurement: bool = False
     at: ParametersAt | None = None
     derived: Derived | None = None
+    tried: Places | None = None
     default_element: str | None = field(default=None)
 
     def parameter(self, name: str) -> Parameter:

@@ -12,7 +12,13 @@ from stiffmap.effects import get, kinds
 
 NEW = ("hexapod", "linear-delta", "rotary-delta", "hybrid", "ur10", "five-bar", "swing-table")
 
-ASKS = ("bilinear", "periodic_error", "external_spring")  # for a number that only the caller knows
+ASKS = (
+    "bilinear",
+    "periodic_error",
+    "straightness",
+    "tabulated",
+    "external_spring",
+)  # for a number that only the caller knows
 
 
 def small(kind: str) -> dict[str, float]:

@@ -1,10 +1,10 @@
-"""A drive whose stiffness changes at a force."""
+"""A drive or spring whose stiffness changes at a force."""
 
 from __future__ import annotations
 
 from stiffmap.description import Law, MachineDescription
 from stiffmap.effects.library.drive_law import change_law, in_unit_of_joint, linear
-from stiffmap.effects.sites import at_sites, elastic_drives
+from stiffmap.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter, Placed
 
 PARAMETERS = (
@@ -26,16 +26,18 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="bilinear",
-    title="drive whose stiffness changes at a force",
+    title="spring whose stiffness changes at a force",
     doc=(
         "The declared compliance up to the force `knee` in both directions, `ratio` times it for the force "
-        "beyond (a preloaded screw that opens, a stop that closes)."
+        "beyond (a preloaded screw that opens, a stop that closes); of a drive, an elastic joint or an uncoupled "
+        "direction of a link spring (element `foot.k22`)."
     ),
     parameters=PARAMETERS,
-    places=at_sites(elastic_drives),
+    places=at_sites(elastic_directions),
     apply=apply,
-    frame="the drive's coordinate",
-    excludes=("bilinear", "dead_zone", "hardening", "friction", "position_dependent_compliance"),
+    tried=at_sites(elastic_drives),
+    frame="the coordinate",
+    excludes=("bilinear", "dead_zone", "hardening", "friction", "position_dependent_compliance", "tabulated"),
     stage=10,
     at=in_unit_of_joint(*PARAMETERS),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from stiffmap.description import Law, MachineDescription
 from stiffmap.effects.library.drive_law import change_law, in_unit_of_joint, linear
-from stiffmap.effects.sites import at_sites, elastic_drives
+from stiffmap.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter, Placed
 
 HALF_WIDTH = Parameter(
@@ -31,16 +31,17 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="dead_zone",
-    title="backlash of a drive",
+    title="backlash of a drive, gap in a joint or a spring's direction",
     doc=(
-        "A gap in series with the drive's spring: no force while the deflection is within the half width "
-        "about the centre, the declared stiffness beyond. Unloaded, the drive stands in the centre."
+        "A gap in series with the spring of a drive, an elastic joint or an uncoupled direction of a link spring (element `foot.k22`): no force while the deflection is within the half width "
+        "about the centre, the declared stiffness beyond. Unloaded, it stands in the centre."
     ),
     parameters=(HALF_WIDTH,),
-    places=at_sites(elastic_drives),
+    places=at_sites(elastic_directions),
     apply=apply,
-    frame="the drive's coordinate",
-    excludes=("dead_zone", "hardening"),
+    tried=at_sites(elastic_drives),
+    frame="the coordinate",
+    excludes=("dead_zone", "hardening", "tabulated"),
     stage=10,
     at=in_unit_of_joint(HALF_WIDTH),
 )

@@ -1,13 +1,13 @@
-"""What the effects on a drive's force law share."""
+"""What the effects on the force law of a drive, an elastic joint or a spring's direction share."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 
-from stiffmap.description import Element, Joint, Law, MachineDescription
+from stiffmap.description import Element, Joint, Law, MachineDescription, Spring
 from stiffmap.effects.edit import Elements, change_sites, sequences
-from stiffmap.effects.sites import elastic_drives
+from stiffmap.effects.sites import elastic_directions
 from stiffmap.effects.types import Parameter, ParametersAt, Placed
 from stiffmap.errors import StiffmapError
 
@@ -15,13 +15,30 @@ from stiffmap.errors import StiffmapError
 def change_law(
     description: MachineDescription, placed: Placed, change: Callable[[Law], Law]
 ) -> MachineDescription:
-    """The machine with another law in each drive of the place."""
+    """The machine with another law at each joint or spring direction of the place."""
+    entry = placed.element.partition(".")[2]
 
-    def joint(e: Element) -> Elements:
-        assert isinstance(e, Joint) and e.law is not None
-        return (replace(e, law=change(e.law)),)
+    def element(e: Element) -> Elements:
+        if isinstance(e, Joint):
+            assert e.law is not None
+            return (replace(e, law=change(e.law)),)
+        assert isinstance(e, Spring)
+        return (_with_direction(e, int(entry[1]) - 1, change),)
 
-    return change_sites(description, placed.legs, placed.element, elastic_drives, joint)
+    return change_sites(description, placed.legs, placed.element, elastic_directions, element)
+
+
+def _with_direction(e: Spring, i: int, change: Callable[[Law], Law]) -> Spring:
+    old = dict(e.laws).get(i) or Law(_stiffness(e, i))
+    laws = {**dict(e.laws), i: change(old)}
+    return replace(e, laws=tuple(sorted(laws.items(), key=lambda pair: pair[0])))
+
+
+def _stiffness(e: Spring, i: int) -> float:
+    if e.stiffness is not None:
+        return e.stiffness[i][i]
+    assert e.compliance is not None
+    return 1.0 / e.compliance[i][i]
 
 
 def linear(law: Law) -> Law:
@@ -32,7 +49,10 @@ def linear(law: Law) -> Law:
 
 
 def is_revolute(description: MachineDescription, element: str) -> bool:
-    """Whether the joint of that name turns."""
+    """Whether the joint of that name, or the spring's direction (``foot.k44``), turns."""
+    entry = element.partition(".")[2]
+    if entry:
+        return int(entry[1]) > 3
     chains = [description.base, description.platform, *(leg.elements for leg in description.legs)]
     named = [e for c in chains for seq in sequences(c) for e in seq if e.name == element]
     return any(isinstance(e, Joint) and e.kind != "prismatic" for e in named)

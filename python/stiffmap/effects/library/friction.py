@@ -1,4 +1,4 @@
-"""Dry friction of a drive."""
+"""Dry friction of a drive or an elastic joint."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from dataclasses import replace
 
 from stiffmap.description import Law, MachineDescription
 from stiffmap.effects.library.drive_law import change_law, is_revolute
-from stiffmap.effects.sites import at_sites, elastic_drives
+from stiffmap.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.effects.types import EffectType, Option, Parameter, Placed
 from stiffmap.errors import StiffmapError
 
-FORCE = Parameter("force", "N", 0.0, 1e5, 0.0, 10.0, "Coulomb level of each prismatic drive")
-TORQUE = Parameter("torque", "N·m", 0.0, 1e5, 0.0, 1.0, "Coulomb level of each revolute drive")
+FORCE = Parameter("force", "N", 0.0, 1e5, 0.0, 10.0, "Coulomb level where it slides")
+TORQUE = Parameter("torque", "N·m", 0.0, 1e5, 0.0, 1.0, "Coulomb level where it turns")
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """One branch of the friction loop as a monotone polyline, a dead zone in series included."""
     turns = is_revolute(description, placed.element)
     if ("torque" in placed.values) != turns:
-        raise StiffmapError("give torque (N·m) for a revolute drive and force (N) for a prismatic one")
+        raise StiffmapError("give torque (N·m) where it turns and force (N) where it slides")
     level = placed.values["torque" if turns else "force"]
     branch = placed.options["branch"]
     return change_law(description, placed, lambda old: _law(old, level, branch))
@@ -52,22 +52,24 @@ def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> 
 
 EFFECT = EffectType(
     kind="friction",
-    title="dry friction of a drive",
+    title="dry friction of a drive, an elastic joint or a spring's direction",
     doc=(
-        "Coulomb friction between the drive's spring and its guide, against the spring's motion from its "
-        "unloaded state, with the deflection a and the force F of the drive, level L and compliance c: on "
+        "Coulomb friction beside the spring of a drive, an elastic joint or an uncoupled direction of a link spring "
+        "(element `foot.k22`; a bolted joint that slips), against the spring's motion from its unloaded state, "
+        "with the deflection a and the force F, level L and compliance c: on "
         "the branch `loading` (from zero load) a = c·(F - L·sign F); on the branch `unloading` (from a "
         "larger load, friction fully reversed) a = c·(F + L·sign F). `loading` takes the full level also "
         "where |F| < L, with the sign that F has in the machine without friction; a drive that really "
         "sticks there, a = 0, is `loading_stuck`. Both agree where |F| > L."
     ),
     parameters=(FORCE, TORQUE),
-    places=at_sites(elastic_drives),
+    places=at_sites(elastic_directions),
     apply=apply,
-    frame="the drive's coordinate",
+    tried=at_sites(elastic_drives),
+    frame="the coordinate",
     options=(Option("branch", ("loading", "unloading", "loading_stuck"), "how the load was reached"),),
     one_of=("force", "torque"),
-    excludes=("friction", "hardening", "position_dependent_compliance"),
+    excludes=("friction", "hardening", "position_dependent_compliance", "tabulated"),
     stage=20,
     needs=("branch",),
     at=at,

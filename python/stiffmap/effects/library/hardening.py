@@ -1,10 +1,10 @@
-"""A drive that stiffens with load."""
+"""A drive or spring that stiffens with load."""
 
 from __future__ import annotations
 
 from stiffmap.description import Law, MachineDescription
 from stiffmap.effects.library.drive_law import change_law, in_unit_of_joint, linear
-from stiffmap.effects.sites import at_sites, elastic_drives
+from stiffmap.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter, Placed
 
 CUBIC = Parameter(
@@ -23,13 +23,17 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="hardening",
-    title="drive that stiffens with load",
-    doc="Force of the drive = a/c + cubic·a³ at the deflection a, with the declared compliance c.",
+    title="spring that stiffens with load",
+    doc=(
+        "Force = a/c + cubic·a³ at the deflection a, with the declared compliance c, of a drive, an elastic joint or "
+        "an uncoupled direction of a link spring (element `foot.k22`)."
+    ),
     parameters=(CUBIC,),
-    places=at_sites(elastic_drives),
+    places=at_sites(elastic_directions),
     apply=apply,
-    frame="the drive's coordinate",
-    excludes=("hardening", "dead_zone", "friction", "position_dependent_compliance"),
+    tried=at_sites(elastic_drives),
+    frame="the coordinate",
+    excludes=("hardening", "dead_zone", "friction", "position_dependent_compliance", "tabulated"),
     stage=10,
     at=in_unit_of_joint(CUBIC),
 )
