@@ -62,8 +62,9 @@ class Reference {
     write(m, i, result_, out);
   }
 
-  /// Closed coordinates for the kernels; NaN where the pose is out of reach.
-  void close(const Mechanism& m, const BatchInput& in, Index i, double* x) {
+  /// Closed coordinates for the kernels, NaN where the pose is out of reach; and the tip's pose, where
+  /// the task leaves some of it open.
+  void close(const Mechanism& m, const BatchInput& in, Index i, double* x, Pose& reached) {
     if (!closure_) closure_ = std::make_unique<ClosureWorkspace>(m);
     const Pose pose{Eigen::Map<const Vec3>(in.position + 3 * i), Eigen::Map<const RowMajor3>(in.rotation + 9 * i)};
     VecX found(m.size());
@@ -71,6 +72,7 @@ class Reference {
     // A doubtful branch keeps its flag: the whole pose then takes the reference path.
     if (r.status != Status::converged || r.flags & flag::branch_unverified) found[0] = std::nan("");
     Eigen::Map<VecX>(x, m.size()) = found;
+    reached = m.task == full_task ? pose : r.tip;
   }
 
  private:
@@ -78,6 +80,29 @@ class Reference {
   std::unique_ptr<ClosureWorkspace> closure_;
   PoseInput pose_;
   PoseResult result_;
+};
+
+/// A chunk of poses closed by the reference path, as the kernels read them.
+class ClosedPoses {
+ public:
+  void put(const Mechanism& m, const BatchInput& in, Index begin, Index end, Reference& reference, KernelInput& out) {
+    start_.resize(at(m.size() * fast_chunk));
+    position_.resize(at(3 * fast_chunk));
+    rotation_.resize(at(9 * fast_chunk));
+    Pose reached;
+    for (Index i = begin; i < end; ++i) {
+      const Index k = i - begin;
+      reference.close(m, in, i, start_.data() + m.size() * k, reached);
+      Eigen::Map<Vec3>(position_.data() + 3 * k) = reached.p;
+      Eigen::Map<RowMajor3>(rotation_.data() + 9 * k) = reached.R;
+    }
+    out.start = start_.data() - m.size() * begin;
+    out.position = position_.data() - 3 * begin;
+    out.rotation = rotation_.data() - 9 * begin;
+  }
+
+ private:
+  std::vector<double> start_, position_, rotation_;
 };
 
 /// What the kernels do not do is left to the reference path as a whole.
@@ -169,7 +194,7 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
                             flags.data(),
                             out.iterations};
   struct Scratch {
-    std::vector<double> start;
+    ClosedPoses closed;
     Reference reference;
   };
   std::vector<Scratch> scratch(at(std::max(1, threads)));
@@ -178,11 +203,7 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
     KernelInput input = kernel_input(m, in, options);
     input.perturbed = variants.data();
     input.perturbed_count = out.variants ? static_cast<std::int32_t>(variants.size()) : 0;
-    if (!program.closes) {
-      s.start.resize(at(m.size()) * static_cast<std::size_t>(fast_chunk));
-      for (long i = begin; i < end; ++i) s.reference.close(m, in, i, s.start.data() + m.size() * (i - begin));
-      input.start = s.start.data() - m.size() * begin;
-    }
+    if (!program.closes) s.closed.put(m, in, begin, end, s.reference, input);
     table.run(&program, &input, &answer, begin, end, kernel_scratch(table.scratch_size(&program)));
     for (long i = begin; i < end; ++i) {
       if (!done[static_cast<std::size_t>(i)]) {

@@ -70,14 +70,13 @@ void link(const Mechanism& m, FastPlanData& d) {
 
 FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high) : data_(std::make_unique<FastPlanData>()) {
   if (!m.external_springs.empty()) missing_ = "external springs";
-  if (m.task != full_task) missing_ = "pose components that are not commanded";
   const CompiledChains chains = compile_chains(m, *data_);
   if (missing_.empty()) missing_ = chains.missing;
   if (data_->program.legs_op < 0) missing_ = "no legs";
   if (!missing_.empty()) return;
   fill_tables(m, chains, *data_);
   const bool box = (high - low).minCoeff() >= 0 && high.allFinite();
-  const bool leg_by_leg = only_legs_have_joints(m, *data_) && compile_closure(m, *data_);
+  const bool leg_by_leg = m.task == full_task && only_legs_have_joints(m, *data_) && compile_closure(m, *data_);
   if (leg_by_leg) recognise_planar_legs(m, *data_);
   link(m, *data_);
   data_->program.closes = leg_by_leg && (box || data_->program.planar);

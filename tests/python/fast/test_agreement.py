@@ -11,7 +11,17 @@ from stiffmap import _core
 from stiffmap.files import shipped_machines
 
 LEVELS = _core.kernel_levels()
-FAST = ("orthoglide-revised", "orthoglide-original", "tripteron", "hexapod", "linear-delta", "rotary-delta")
+FAST = (
+    "orthoglide-revised",
+    "orthoglide-original",
+    "tripteron",
+    "hexapod",
+    "linear-delta",
+    "rotary-delta",
+    "hybrid",
+    "five-bar",
+    "swing-table",
+)
 
 
 def test_every_shipped_machine_is_a_case() -> None:
