@@ -17,6 +17,7 @@ FLAGS = {
     "ur10": Flag(0),
     "five-bar": Flag(0),
     "swing-table": Flag(0),
+    "3-rps": Flag(0),
 }
 SPINS = {"hexapod": 6, "linear-delta": 6, "rotary-delta": 6, "hybrid": 6}
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import machine_cases as cases
+import numpy as np
 import pytest
 
 import stiffmap as sm
 from stiffmap.description import AppliedEffect
-from stiffmap.experiment import random_plan, simulate
+from stiffmap.experiment import Experiment, random_plan, simulate
 
 pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")
 
@@ -23,6 +26,7 @@ ZERO = {
     "five-bar": ("motor", ("left",), -1e-3, 12),
     "swing-table": ("motor", ("front_left",), 1e-3, 12),
     "hybrid": ("carriage", ("a",), 2e-4, 10),
+    "3-rps": ("strut", ("b",), 1e-3, 12),
 }
 
 # machine -> drive, legs, true compliance over the declared one, largest force (N), poses
@@ -41,6 +45,13 @@ def named(d: sm.Diagnosis) -> list[tuple[str, str, tuple[str, ...]]]:
     return [(e.kind, e.element, tuple(e.legs)) for e in d.effects]
 
 
+def tilted(plan: Experiment) -> Experiment:
+    """The plan with a tilt of its own for each pose (two repeats each)."""
+    a, b = np.repeat(np.random.default_rng(3).uniform(-0.25, 0.25, (2, len(plan.position) // 2)), 2, axis=1)
+    turns = [cases.turn("x", i) @ cases.turn("y", j) for i, j in zip(a, b, strict=True)]
+    return replace(plan, rotation=np.array(turns))
+
+
 def test_every_shipped_machine_is_a_case() -> None:
     assert set(ZERO) == {*cases.FLAGS, "tripteron"}
 
@@ -52,6 +63,8 @@ def test_zero_of_a_drive(name: str) -> None:
     element, legs, error, poses = ZERO[name]
     machine = sm.load_machine(name)
     plan = random_plan(machine, "position", poses=poses, seed=7)
+    if name == "3-rps":  # level, its legs are all alike
+        plan = tilted(plan)
     wrong = AppliedEffect("zero_offset", element, legs, (("error", error),))
     d = sm.diagnose(machine, simulate(machine, plan, [wrong], seed=1), cross_validate=False)
     assert d.verdict == "effects" and named(d) == [("zero_offset", element, legs)], str(d)

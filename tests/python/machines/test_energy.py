@@ -18,6 +18,7 @@ CASES = {
     "ur10": ([-0.8, 0.1, 0.3], (0, 0), [30, 20, -60]),
     "five-bar": ([0.07, 0.41, 0], (0, 0), [50, -40, 30]),
     "swing-table": ([0.12, 0, 0.4], (0, 0), [40, 100, -300]),
+    "3-rps": ([0, 0, 0.62], (0.2, -0.15), [200, 100, -400]),
     "orthoglide-revised": ([0.1, -0.1, 0.15], (0, 0), [300, 200, -100]),
 }
 
@@ -54,7 +55,7 @@ def test_equilibrium(name: str) -> None:
     assert np.abs(motions @ gradient_off).max() > 100 * np.abs(left).max()
 
 
-@pytest.mark.parametrize("name", ["hexapod", "hybrid", "linear-delta", "five-bar"])
+@pytest.mark.parametrize("name", ["hexapod", "hybrid", "linear-delta", "five-bar", "3-rps"])
 def test_loaded_compliance_is_a_difference_quotient(name: str) -> None:
     machine = sm.load_machine(name)
     p, _, force = CASES[name]

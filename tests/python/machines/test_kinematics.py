@@ -69,6 +69,24 @@ def test_swing_table_swings_on_a_circle() -> None:
     np.testing.assert_allclose(k.rotation, np.broadcast_to(np.eye(3), (5, 3, 3)), **TIGHT)
 
 
+@pytest.mark.parametrize(("a", "b"), [(0.0, 0.0), (0.2, -0.15), (-0.1, 0.25)])
+@pytest.mark.parametrize("z", [0.55, 0.65])
+def test_3rps_balls_stay_in_the_planes_of_their_pins(a: float, b: float, z: float) -> None:
+    """Height and direction are as commanded; shift and turn are those that keep each ball in its plane
+    (K.-M. Lee and D. K. Shah, 1988); the drives are the distances from the pins to the balls."""
+    machine = sm.load_machine("3-rps")
+    wanted = cases.turn("x", a) @ cases.turn("y", b)
+    k = sm.inverse_kinematics(machine, [0, 0, z], wanted)
+    assert k.status == sm.Status.CONVERGED
+    np.testing.assert_allclose(k.rotation[:, 2], wanted[:, 2], **TIGHT)
+    assert k.position[2] == pytest.approx(z, abs=1e-12)
+    for i, angle in enumerate(np.radians([0, 120, 240])):
+        out = np.array([np.cos(angle), np.sin(angle), 0])
+        ball = k.position + k.rotation @ (0.2 * out)
+        assert ball @ [-out[1], out[0], 0] == pytest.approx(0, abs=1e-12)
+        assert np.linalg.norm(ball - 0.375 * out) == pytest.approx(k.actuators[i], abs=1e-11)
+
+
 DH = np.array([  # d, a, alpha: the maker's table of the UR10 (CB3)
     [0.1273, 0, np.pi / 2], [0, -0.612, 0], [0, -0.5723, 0],
     [0.163941, 0, np.pi / 2], [0.1157, 0, -np.pi / 2], [0.0922, 0, 0],
