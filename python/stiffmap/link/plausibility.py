@@ -17,20 +17,26 @@ def smallest_eigenvalue(compliance: Floats, covariance: Floats) -> tuple[float, 
     return float(value[0]), float(np.sqrt(max(float(g @ covariance @ g), 0.0)))
 
 
-def bending_lengths(compliance: Floats) -> dict[str, float]:
-    """Lengths in m that a prismatic cantilever along x would have, by ratio of the entries.
+def bending_lengths(compliance: Floats) -> tuple[str, dict[str, float]]:
+    """Axis and lengths in m that a prismatic cantilever would have, by ratio of the entries.
 
+    The axis is the stiffest translation, its sense that of the couplings. For one along x the lengths are
     ``sqrt(3 k22/k66)`` and ``sqrt(3 k33/k55)`` from the diagonal, ``2 k26/k66`` and ``-2 k35/k55`` from the
-    coupling: all four equal the length of an ideal bar. NaN where a ratio is negative.
+    couplings: all four equal the length of an ideal bar. NaN where a ratio is negative.
     """
     k = compliance
+    axis = int(np.argmin(np.diag(k)[:3]))
+    b, c = (axis + 1) % 3, (axis + 2) % 3
+    sense = 1.0 if k[b, c + 3] - k[c, b + 3] >= 0 else -1.0
+    lengths = {}
     with np.errstate(invalid="ignore", divide="ignore"):
-        return {
-            "sqrt(3 k22/k66)": float(np.sqrt(3 * k[1, 1] / k[5, 5])),
-            "sqrt(3 k33/k55)": float(np.sqrt(3 * k[2, 2] / k[4, 4])),
-            "2 k26/k66": float(2 * k[1, 5] / k[5, 5]),
-            "-2 k35/k55": float(-2 * k[2, 4] / k[4, 4]),
-        }
+        for across, turn in ((b, c + 3), (c, b + 3)):
+            name = f"k{across + 1}{across + 1}/k{turn + 1}{turn + 1}"
+            lengths[f"sqrt(3 {name})"] = float(np.sqrt(3 * k[across, across] / k[turn, turn]))
+        for across, turn, sign in ((b, c + 3, sense), (c, b + 3, -sense)):
+            name = f"k{across + 1}{turn + 1}/k{turn + 1}{turn + 1}"
+            lengths[f"{'-' if sign < 0 else ''}2 {name}"] = float(sign * 2 * k[across, turn] / k[turn, turn])
+    return f"{'-' if sense < 0 else ''}{'xyz'[axis]}", lengths
 
 
 def findings(compliance: Floats, covariance: Floats) -> list[str]:
@@ -49,6 +55,7 @@ def findings(compliance: Floats, covariance: Floats) -> list[str]:
         else "open"
     )
     lines.append(f"definiteness: {verdict}; smallest eigenvalue at unit diagonal {value:.4g} ± {error:.1g}")
-    lengths = ", ".join(f"{k} = {1e3 * v:.1f} mm" for k, v in bending_lengths(compliance).items())
-    lines.append(f"as a cantilever along x (equal when prismatic and slender): {lengths}")
+    axis, found = bending_lengths(compliance)
+    lengths = ", ".join(f"{k} = {1e3 * v:.1f} mm" for k, v in found.items())
+    lines.append(f"as a cantilever along {axis} (equal when prismatic and slender): {lengths}")
     return lines

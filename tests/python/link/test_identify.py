@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from link_fields import REFERENCE, WRENCHES, bar_compliance, end_nodes, noisy_field, rigid_field
+from link_fields import REFERENCE, WRENCHES, L, bar_compliance, end_nodes, noisy_field, rigid_field
 from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
 from stiffmap.link import identify_link, transport_compliance
+from stiffmap.link.plausibility import bending_lengths
 from stiffmap.link.transport import twist_transport
 
 C = bar_compliance()
@@ -236,3 +237,16 @@ def test_indefinite_matrix_is_reported_not_repaired():
     link = identify(points, u)
     assert "NOT positive definite" in link.report()
     assert link.compliance[1, 5] == pytest.approx(bad[1, 5], rel=1e-3)
+
+
+@pytest.mark.parametrize(("axis", "sense"), [(a, s) for a in range(3) for s in (1.0, -1.0)])
+def test_lengths_of_a_cantilever_along_any_axis(axis, sense):
+    """The bar's compliance turned to another axis keeps its four lengths and says the axis."""
+    turn = np.roll(np.eye(3), axis, axis=0)
+    if sense < 0:  # half a turn about the axis after x
+        turn = turn @ np.diag([-1.0, 1.0, -1.0])
+    assert turn[axis, 0] == sense
+    Q = np.kron(np.eye(2), turn)
+    found, lengths = bending_lengths(Q @ bar_compliance() @ Q.T)
+    assert found == ("" if sense > 0 else "-") + "xyz"[axis]
+    assert list(lengths.values()) == pytest.approx([L] * 4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from stiffmap.maps.uncertainty import UPPER, uncertain_numbers
 from stiffmap.maps.uncertainty_block import sensitivities
 from stiffmap.maps.uncertainty_edit import moved, number
 
+EXAMPLES = Path(__file__).parents[3] / "examples"
 GRID = {"x": [-0.05, 0.1], "y": [0.1], "z": [0.05]}
 WRENCH = [200.0, 50.0, 100.0, 0, 0, 0]
 
@@ -218,22 +220,21 @@ def test_bad_requests() -> None:
         sm.uncertainty_ranking(plain)
 
 
-def test_from_a_part_to_a_band(
+def test_the_examples_go_from_a_part_to_a_band(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("gmsh", reason="needs the extra [fea]", exc_type=(ImportError, OSError))
     pytest.importorskip("skfem", reason="needs the extra [fea]")
     monkeypatch.chdir(tmp_path)
-    part = "part: {shape: bar, length: 310, width: 12, height: 24}\nmaterial: {young: 70, poisson: 0.33}\n"
-    Path("bar.yaml").write_text("units: {length: mm, stress: GPa}\n" + part, encoding="utf-8")
+    for name in ("link_bar.yaml", "orthoglide-links.yaml"):
+        shutil.copy(EXAMPLES / name, tmp_path)
     made = main(
-        ["link", "bar.yaml", "--quick", "--size", "12", "--solver", "skfem", "--out", "bar-link.yaml"]
+        ["link", "link_bar.yaml", "--quick", "--size", "12", "--solver", "skfem", "--out", "bar-link.yaml"]
     )
     assert made == 0
-    write_machine(tmp_path)
     capsys.readouterr()
     arguments = ["--points", "2", "--z", "0", "--force", "100", "--uncertainty", "--no-pictures"]
-    assert main(["map", "machine.yaml", *arguments, "-o", "out"]) == 0
+    assert main(["map", "orthoglide-links.yaml", *arguments, "-o", "out"]) == 0
     out = capsys.readouterr().out
     assert "standard deviation" in out
     assert "bar-link.yaml k" in out
