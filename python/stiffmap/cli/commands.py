@@ -27,6 +27,7 @@ COMMANDS = (
     Command("new", "stiffmap.cli.new", "new", "Start a machine file from a template that explains itself."),
     Command("check", "stiffmap.cli.check", "check", "Validate a machine file."),
     Command("show", "stiffmap.cli.show", "show", "Draw a machine and print what it is made of."),
+    Command("effects", "stiffmap.cli.effects", "effects", "List the effects that a machine can have."),
     Command("solve", "stiffmap.cli.solve", "solve", "Deflection and stiffness at one pose under one wrench."),
     Command("map", "stiffmap.cli.map", "map_command", "Error maps of z-planes under a force."),
     Command("polar", "stiffmap.cli.polar", "polar", "Deflection against the direction of a force."),

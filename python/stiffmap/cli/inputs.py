@@ -90,7 +90,9 @@ def machine_with(name: str, effects: Sequence[str] | None) -> Machine:
         return machine
     from stiffmap.effects import apply_records, parse_effect
 
-    return Machine(apply_records(machine.description, [parse_effect(text) for text in effects]))
+    return Machine(
+        apply_records(machine.description, [parse_effect(text, machine.description) for text in effects])
+    )
 
 
 def placed(machine: Machine, text: str) -> AppliedEffect:
@@ -98,7 +100,7 @@ def placed(machine: Machine, text: str) -> AppliedEffect:
     from stiffmap.effects import parse_effect, registry
     from stiffmap.effects.check import place_of
 
-    term = parse_effect(text)
+    term = parse_effect(text, machine.description)
     effect = registry.get(term.kind)
     if effect.measurement:
         element, legs = place_of(effect, machine.description, term.element or None, term.legs or None)

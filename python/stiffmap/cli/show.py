@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.tree import Tree
 
 from stiffmap.cli.inputs import (
+    EffectsOption,
     MachineArgument,
     RotationOption,
     machine_with,
@@ -23,6 +24,7 @@ from stiffmap.cli.inputs import (
 from stiffmap.cli.mobility import Mobility, mobility
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import Block, Body, Element, Joint, Offset, Point, Spring
+from stiffmap.effects import effect_text
 from stiffmap.errors import StiffmapError
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
@@ -36,13 +38,14 @@ def show(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Picture to write. [default: MACHINE.png]")
     ] = None,
+    effect: EffectsOption = None,
     view: Annotated[str, typer.Option(help="Elevation and azimuth of the view, deg.")] = "22,35",
     picture: Annotated[bool, typer.Option(help="Draw the machine.")] = True,
     as_json: JsonOption = False,
 ) -> None:
     """Draw a machine in 3-D at a pose and print what it is made of.
 
-    Elements from base to platform; degrees of freedom, over-constraint (closure equations that follow
+    Elements from base to platform, as built with its effects; the effects; degrees of freedom, over-constraint (closure equations that follow
     from the others) and free spins, counted at the pose.
 
     Examples:
@@ -51,7 +54,7 @@ def show(
 
       [cyan]stiffmap show tripteron --at 300,400,500 -o tripteron.png --view 15,-60[/cyan]
     """
-    m = machine_with(machine, None)
+    m = machine_with(machine, effect)
     p, r = position(at, m), rotation(turned)
     k = inverse_kinematics(m, p, r)
     if int(k.status) != Status.CONVERGED:
@@ -79,6 +82,7 @@ def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:
             "legs": {leg.name: [describe(e) for e in leg.elements] for leg in m.description.legs},
             "base": [describe(e) for e in m.description.base],
             "platform": [describe(e) for e in m.description.platform],
+            "effects": [effect_text(r, m.description) for r in m.description.effects],
             "actuators": list(m.actuators),
             "points": list(m.points),
             "degrees_of_freedom": counts.total,
@@ -102,6 +106,8 @@ def show_text(console: Console, m: Machine, counts: Mobility, file: Path | None)
         for e in elements:
             _grow(branch, e)
     console.print(tree)
+    for r in d.effects:
+        console.print(f"effect: {escape(effect_text(r, d))}")
     console.print(f"platform: {counts.platform} degrees of freedom, {len(m.actuators)} actuators")
     console.print(
         f"mechanism: {counts.joints} joint coordinates, {counts.equations} closure equations of rank "

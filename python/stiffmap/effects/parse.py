@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from stiffmap.description import AppliedEffect
+from stiffmap.description import AppliedEffect, MachineDescription
 from stiffmap.effects import registry
+from stiffmap.effects.check import place_of
 from stiffmap.effects.types import EffectType
 from stiffmap.effects.units import read_value
 from stiffmap.errors import StiffmapError
@@ -14,13 +15,14 @@ from stiffmap.errors import StiffmapError
 _FORM = "KIND [ELEMENT [LEG,LEG…]] name=value… such as: dead_zone actuator y half_width=12um"
 
 
-def parse_effect(text: str) -> AppliedEffect:
+def parse_effect(text: str, machine: MachineDescription | None = None) -> AppliedEffect:
     """Effect from a text such as ``dead_zone actuator y half_width=12um``.
 
     After the kind come the element and the legs (``x,y``; left out or ``all``: all that have the
     element), then the parameters, each number with its unit, and the options. The record goes to
     `apply_records`, which checks it against the machine. Raises StiffmapError for what it cannot
-    read, an unknown kind or parameter, and a number without unit or with a wrong one.
+    read, an unknown kind or parameter, and a number without unit or with a wrong one. With a `machine`
+    also for a length where something turns, and for an element or leg that it does not have.
     """
     words = re.sub(r"\s*=\s*", "=", text).split()
     if not words:
@@ -29,9 +31,22 @@ def parse_effect(text: str) -> AppliedEffect:
     place, assignments = _split(words[1:])
     if len(place) > 2:
         raise StiffmapError(f"{text!r}: cannot read {' '.join(place[2:])!r}; expected {_FORM}")
-    numbers, options = _read(effect, assignments)
+    element = place[0] if place else ""
     legs = tuple(place[1].split(",")) if len(place) == 2 and place[1] != "all" else ()
-    return AppliedEffect(effect.kind, place[0] if place else "", legs, numbers, options)
+    units = _units(effect, machine, element, legs)
+    numbers, options = _read(effect, units, assignments)
+    return AppliedEffect(effect.kind, element, legs, numbers, options)
+
+
+def _units(
+    effect: EffectType, machine: MachineDescription | None, element: str, legs: tuple[str, ...]
+) -> dict[str, tuple[str, ...]]:
+    """The units that each parameter may have; at a known place one only."""
+    if machine is None:
+        return {p.name: effect.units_of(p.name) for p in effect.parameters}
+    declared = machine.declared or machine
+    at = place_of(effect, declared, element or None, legs or None)
+    return {p.name: (p.unit,) for p in effect.parameters_at(declared, *at)}
 
 
 def _split(words: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -49,9 +64,8 @@ def _split(words: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def _read(
-    effect: EffectType, assignments: Sequence[str]
+    effect: EffectType, units: Mapping[str, tuple[str, ...]], assignments: Sequence[str]
 ) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, str], ...]]:
-    known = {p.name: p for p in effect.parameters}
     options = {o.name for o in effect.options}
     numbers: dict[str, float] = {}
     words: dict[str, str] = {}
@@ -61,17 +75,16 @@ def _read(
             raise StiffmapError(f"{effect.kind}: {name} is given twice")
         if name in options:
             words[name] = value
-        elif name in known:
-            numbers[name] = _value(effect, name, value)
+        elif name in units:
+            numbers[name] = _value(effect, name, value, units[name])
         else:
-            there = ", ".join([*known, *sorted(options)])
+            there = ", ".join([*units, *sorted(options)])
             raise StiffmapError(f"{effect.kind}: unknown parameter {name!r}; known: {there}")
     return tuple(numbers.items()), tuple(words.items())
 
 
-def _value(effect: EffectType, name: str, text: str) -> float:
-    """The value in the unit of the parameter, or in the angular one of a revolute drive."""
-    units = effect.units_of(name)
+def _value(effect: EffectType, name: str, text: str, units: Sequence[str]) -> float:
+    """The value in the unit of the parameter, or in the angular one of what turns."""
     for unit in units[1:]:
         try:
             return read_value(text, unit)
@@ -83,12 +96,13 @@ def _value(effect: EffectType, name: str, text: str) -> float:
         raise StiffmapError(f"{effect.kind}: {name}: {problem}") from None
 
 
-def effect_text(record: AppliedEffect) -> str:
-    """The text that `parse_effect` reads as this record, in SI units (those of a prismatic joint)."""
+def effect_text(record: AppliedEffect, machine: MachineDescription | None = None) -> str:
+    """The text that `parse_effect` reads as this record, in SI units (without a machine, of what slides)."""
     effect = registry.get(record.kind)
+    units = _units(effect, machine, record.element, record.legs)
     place = [record.element] if record.element else []
     place += [",".join(record.legs)] if record.legs else []
-    numbers = [f"{n}={v!r}{_shown(effect.units_of(n)[0])}" for n, v in record.parameters]
+    numbers = [f"{n}={v!r}{_shown(units[n][0])}" for n, v in record.parameters]
     return " ".join([record.kind, *place, *numbers, *(f"{n}={w}" for n, w in record.options)])
 
 
