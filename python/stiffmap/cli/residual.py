@@ -75,7 +75,7 @@ def as_plain(r: Residual, rows: int) -> dict[str, Any]:
         "noise_floor": {
             c.name: f for c, f in zip(e.channels, r.noise.floor, strict=True) if c.name in e.axes
         },
-        "contradictory_repeats": r.noise.contradictions(),
+        "limitations": r.limitations,
         "lack_of_fit": r.lack_of_fit,
         "nuisances": r.nuisances,
         "poses_off": r.groups_off,
@@ -102,14 +102,14 @@ def lines(r: Residual, rows: int) -> list[str]:
         f"  rms / noise floor {s.ratio:.2f}; chance of this residual under noise {_chance(r.lack_of_fit)}"
     )
     out += [f"  unknown frames and zeros fitted: {r.nuisances}"] if r.nuisances else []
-    out += [f"  contradictory repeats: {c}" for c in r.noise.contradictions()]
     out.append(f"  poses beyond noise: {r.groups_off} of {int(e.groups.max()) + 1}")
     out.append(f"  rows set aside: {', '.join(aside) or 'none'}")
     for c in r.checks:
         told = f"rms/noise {c.rms:.2f}, chance {_chance(c.p)}" if c.contrasts else c.note
         out.append(f"  {c.name} ({c.meaning}): {told}")
     worst = [f"{i} ({a} {_shown(units[a], v)})" for i, a, v in r.worst(rows)]
-    return [*out, f"  worst rows: {', '.join(worst) or 'none'}"]
+    out.append(f"  worst rows: {', '.join(worst) or 'none'}")
+    return out + [f"  limit: {text}" for text in r.limitations]
 
 
 def _chance(p: float) -> str:

@@ -14,7 +14,6 @@ from stiffmap.diagnosis.describe import aliases_of, as_place, named_effects
 from stiffmap.diagnosis.detect import detectable
 from stiffmap.diagnosis.empirical import empirical
 from stiffmap.diagnosis.explain import explain
-from stiffmap.diagnosis.limits import limitations
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.result import Detectability, Diagnosis, NoiseReport
 from stiffmap.diagnosis.separate import separation
@@ -23,7 +22,7 @@ from stiffmap.diagnosis.structure import Pattern, patterns
 from stiffmap.diagnosis.study import Finding, Study, find, study
 from stiffmap.experiment.checks import Check, checks
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.limits import refuse
+from stiffmap.experiment.limits import limitations, refuse
 from stiffmap.experiment.load import load_experiment
 from stiffmap.experiment.noise import Mask
 from stiffmap.experiment.predict import Predictor
@@ -159,7 +158,7 @@ def _assemble(
         checks_before=checks(e, e.reading, s.noise.sigma, keep),
         checks_after=after_checks(s, finding),
         unexplained=left,
-        limitations=limitations(s),
+        limitations=limitations(e, s.noise, s.predictor.machine),
         significance={"searches": s.searches, "alpha": search.alpha, "needed_minus_ln_p": search.threshold},
         machine=predicted_machine(s, model),
         declared=s.predictor.machine,

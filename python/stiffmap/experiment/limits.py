@@ -1,4 +1,4 @@
-"""What makes an experiment unusable."""
+"""What makes an experiment unusable, and what it cannot tell."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import numpy as np
 
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.noise import Noise
+from stiffmap.machine import Machine
 
 FEWEST = 6
 """Readings: as many as the parameters of the largest effect."""
@@ -34,3 +36,41 @@ def refuse_unreachable(experiment: Experiment, base: Floats) -> None:
         f"{'s' if failed.size > 1 else ''} (id {rows}; first at ({where}) mm): "
         "out of reach, or units are wrong"
     )
+
+
+def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[str]:
+    """What the reader must know, in sentences."""
+    e = experiment
+    out = [f"contradictory repeats: {c}" for c in noise.contradictions()]
+    if e.groups.max() == 0:
+        out.append(
+            "all rows are one pose: what changes over the workspace cannot be told, nothing is held out"
+        )
+    if not (noise.freedom > 0).any():
+        out.append("no repeats: the declared noise is believed")
+    outside = _outside(e, machine)
+    if outside:
+        out.append(f"{outside} row{'s lie' if outside > 1 else ' lies'} outside the declared workspace")
+    if e.quantity == "deflection" and not e.branch:
+        out.append("no branch column: friction is judged as if every load came from zero")
+    return out + _inside_the_loop(e)
+
+
+def _inside_the_loop(e: Experiment) -> list[str]:
+    """What the metrology loop hides."""
+    out = []
+    if e.loop.instrument_on == "base":
+        out.append("the instrument stands on the base: the base's compliance cannot be seen")
+    elif e.loop.force_against == "base" and e.wrench.any():
+        out.append("the force reacts on the base: the base's compliance cannot be seen")
+    if e.loop.target_on == "platform":
+        out.append("the target is on the platform: the tool holder's compliance cannot be seen")
+    return out
+
+
+def _outside(e: Experiment, machine: Machine) -> int:
+    box = machine.description.workspace
+    if box is None:
+        return 0
+    low, high = np.array(box)
+    return int(((e.position < low - 1e-9) | (e.position > high + 1e-9)).any(axis=1).sum())

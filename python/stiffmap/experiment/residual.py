@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from stiffmap.description import AppliedEffect
 from stiffmap.experiment.checks import Check, checks
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.limits import refuse
+from stiffmap.experiment.limits import limitations, refuse
 from stiffmap.experiment.noise import Mask, Noise, noise_of
 from stiffmap.experiment.outliers import suspects
 from stiffmap.experiment.predict import Predictor
@@ -42,6 +42,8 @@ class Residual:
     groups_off: int
     """Poses whose residuals alone are beyond noise (chance below 1e-3 that any pose is)."""
     checks: list[Check]
+    limitations: list[str]
+    """What this experiment cannot tell, in sentences."""
 
     def worst(self, number: int = 10) -> list[tuple[str, str, float]]:
         """Rows by their worst reading, most noise floors first: id, channel, residual (m or rad)."""
@@ -85,6 +87,7 @@ def residual(
         int(problem.nuisance.shape[1]),
         _groups_off(problem, white),
         checks(e, e.reading, noise.sigma, ~out),
+        limitations(e, noise, machine),
     )
 
 
