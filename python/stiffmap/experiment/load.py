@@ -56,6 +56,13 @@ def _rename(table: Table, columns: dict[str, str]) -> Table:
 
 
 def _known_columns(table: Table, own: tuple[str, ...]) -> None:
+    for column in own:
+        if column in read_columns.KNOWN:
+            raise FileError(
+                f"joints, command: '{column}' has a meaning of its own; give the column another name",
+                file=table.file,
+                line=1,
+            )
     known = [*read_columns.KNOWN, *own, *(f"u_{c}" for c in own)]
     for column in table.header:
         if column not in known:

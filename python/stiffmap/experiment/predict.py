@@ -96,7 +96,7 @@ def check_points(machine: Machine, experiment: Experiment) -> None:
         if name not in machine.points:
             raise StiffmapError(
                 f"{experiment.name}: machine {machine.name} has no point '{name}'; "
-                f"it has {', '.join(machine.points)}"
+                f"it has {', '.join(machine.points)} (a machine file names more with 'point')"
             )
 
 

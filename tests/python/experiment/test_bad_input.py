@@ -60,9 +60,14 @@ CASES: dict[str, tuple[Change, Change, tuple[str, ...]]] = {
     "noise negative": (swap("dx: 0.003", "dx: -1"), same, ("experiment.yaml", "dx")),
     "unknown point": (swap("units", "point: probe\nunits"), same, ("no point 'probe'", "tcp")),
     "unknown joint": (
-        swap("units", "joints: {dy: {joint: q.actuator, unit: mm}}\nunits"),
-        same,
+        swap("units", "joints: {q: {joint: q.actuator, unit: mm, noise: 1}}\nunits"),
+        swap("dx,dy\n", "dx,q\n"),
         ("no joint 'q.actuator'", "x.actuator"),
+    ),
+    "taken name": (
+        swap("units", "joints: {dy: {joint: x.actuator, unit: mm}}\nunits"),
+        same,
+        ("'dy' has a meaning of its own",),
     ),
     "joint in a wrong unit": (
         swap("units", "joints: {q: {joint: x.actuator, unit: deg, noise: 1}}\nunits"),
@@ -75,8 +80,8 @@ CASES: dict[str, tuple[Change, Change, tuple[str, ...]]] = {
         ("x.proximal has no motor",),
     ),
     "pose and command": (
-        swap("units", "command: {fz: {actuator: x.actuator, unit: mm}}\nunits"),
-        same,
+        swap("units", "command: {c: {actuator: x.actuator, unit: mm}}\nunits"),
+        swap("fz,", "c,"),
         ("data.csv, line 1", "'x'", "actuators are commanded"),
     ),
     "distance under load": (same, swap("dx,dy\n", "dx,dd\n"), ("'dd'", "no deflection")),
