@@ -85,11 +85,11 @@ def _sums(e: Experiment, values: Floats) -> Floats:
 
 
 def _states(e: Experiment) -> Integers:
-    """(n,) number of everything but pose and load: only alike conditions are compared."""
+    """(n,) number of everything but pose and load: only alike conditions are compared. Temperature is not
+    among it: the unloaded reading is as warm as the loaded one."""
     parts = [np.zeros(len(e))]
     words = [e.branch, e.setup, e.points, e.load_points]
     parts += [np.unique(w, return_inverse=True)[1].reshape(-1).astype(float) for w in words if w]
-    parts += [e.temperature] if e.temperature is not None else []
     parts += list(e.approach.T) if e.approach is not None else []
     return np.unique(np.column_stack(parts), axis=0, return_inverse=True)[1].reshape(-1)
 
