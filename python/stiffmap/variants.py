@@ -23,8 +23,11 @@ def solve_varied(machine: Machine, call: Call, variants: Sequence[Machine]) -> t
     the reference path and variants under another gravity are solved in full. NaN where a pose failed.
     """
     solution, varied = solve_call(machine, call, variants)
-    for i, m in enumerate(variants):
-        other = call.gravity is None and m.description.gravity != machine.description.gravity
+    gravity = machine.description.gravity
+    heavier = [call.gravity is None and m.description.gravity != gravity for m in variants]
+    if not any(heavier) and not np.isnan(varied.sum()):  # nothing is missing
+        return solution, varied
+    for i, (m, other) in enumerate(zip(variants, heavier, strict=True)):
         hole = solution.ok & (other | np.isnan(varied[..., i, :]).any(axis=-1))
         if hole.any():
             varied[hole, i] = solve_call(m, replace(call.only(hole), stiffness=False))[0].displacement

@@ -11,6 +11,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.derivatives.inputs import along_input
 from stiffmap.derivatives.prepared import Prepared
 from stiffmap.derivatives.requests import Requests
+from stiffmap.derivatives.stencil import combine_all
 from stiffmap.solution import Solution
 from stiffmap.solving import Call, solve_call
 from stiffmap.variants import solve_varied
@@ -39,9 +40,10 @@ def _displacement(ready: Prepared, call: Call, table: Table) -> Solution:
     """One step of each neighbour through the factors of the base: docs/fast_path.md F10."""
     machines = [m for p in ready.parameters for m in p.machines]
     solution, varied = solve_varied(ready.base, call, machines)
-    for i, p in enumerate(ready.parameters):
-        ends = [varied[..., 2 * i + k, :] for k in range(2)]
-        table["displacement"][p.name] = p.stencil.combine(solution.displacement, ends)
+    if ready.parameters:
+        slopes = combine_all([p.stencil for p in ready.parameters], solution.displacement, varied)
+        for i, p in enumerate(ready.parameters):
+            table["displacement"][p.name] = slopes[..., i, :]
     return solution
 
 

@@ -61,7 +61,7 @@ def _input(name: str) -> str:
 
 
 def _effect(request: Any) -> EffectRequest:
-    pair = isinstance(request, Sequence) and len(request) == 2
+    pair = isinstance(request, (tuple, list)) and len(request) == 2
     if not pair or not isinstance(request[0], str) or not isinstance(request[1], Mapping):
         raise StiffmapError(f"derivatives: expected (kind, {{parameter: value, ...}}), got {request!r}")
     return request[0], dict(request[1])

@@ -35,3 +35,14 @@ def within(value: float, step: float, lower: float, upper: float) -> Stencil:
         return central(step)
     h = step if value - step < lower else -step
     return Stencil((h, 2 * h), (-1.5 / h, 2.0 / h, -0.5 / h))
+
+
+def combine_all(stencils: Sequence[Stencil], base: Floats, values: Floats) -> Floats:
+    """Derivatives (..., stencils, n) from the base's values (..., n) and all ends (..., 2 stencils, n)."""
+    w = np.array([s.weights for s in stencils])[..., None]
+    ends = values.reshape((*values.shape[:-2], len(stencils), 2, values.shape[-1]))
+    out = ends[..., 0, :] * w[:, 1]
+    out += ends[..., 1, :] * w[:, 2]
+    if w[:, 0].any():
+        out += base[..., None, :] * w[:, 0]
+    return np.asarray(out)

@@ -106,6 +106,10 @@ def _actuator(joint: Joint) -> Plain:
         plain.update({} if drive.range is None else {"range": floats(drive.range)})
         plain.update(_given(speed=drive.speed, force=drive.force, encoder_error=drive.encoder_error))
         plain.update({"friction": _given(**friction)} if _given(**friction) else {})
+    if joint.guide_errors or joint.friction:
+        raise StiffmapError(
+            f"{joint.name}: friction and straightness are saved as effects; add them with with_effect"
+        )
     if joint.command_errors:
         plain["command_errors"] = [_command_error(error) for error in joint.command_errors]
     return plain

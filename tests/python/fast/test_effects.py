@@ -21,6 +21,22 @@ EFFECTS: dict[str, list[Effect]] = {
     ],
     "tilt": [("tilt", {"element": "actuator", "legs": ["z"], "angle_x": 1e-3, "angle_y": -5e-4})],
     "length": [("length", {"element": "bar", "legs": ["y"], "error": 5e-5})],
+    "hardening_of_a_bar": [("hardening", {"element": "bar.k11", "cubic": 1e16})],
+    "tabulated": [("tabulated", {"element": "actuator", "step": 1e-5, "factor_1": 0.5, "factor_3": 0.8})],
+    "straightness": [
+        ("straightness", {"element": "actuator", "amplitude": 2e-5, "period": 0.4, "phase": 0.5}),
+        (
+            "straightness",
+            {"element": "actuator", "legs": ["z"], "amplitude": 3e-5, "period": 1.1, "across": "z"},
+        ),
+    ],
+    **{
+        f"joint_friction_{branch}": [
+            ("joint_friction", {"element": joint, "torque": 0.3, "branch": branch})
+            for joint in ("proximal", "distal", "pin_proximal", "pin_distal")
+        ]
+        for branch in ("loading", "unloading", "loading_stuck")
+    },
     "several": [
         ("dead_zone", {"element": "actuator", "legs": ["x"], "half_width": 5e-6}),
         ("friction", {"element": "actuator", "force": 20.0, "branch": "loading", "legs": ["y", "z"]}),
