@@ -19,6 +19,7 @@ from stiffmap.description import (
     Spring,
 )
 from stiffmap.description.pose import IDENTITY, Rows
+from stiffmap.errors import StiffmapError
 from stiffmap.files.schema.geometry import NAMED
 from stiffmap.files.schema.springs import DIRECTIONS
 
@@ -76,7 +77,14 @@ def _axis(axis: tuple[float, float, float]) -> Any:
     return _NAMES.get(axis, floats(axis))
 
 
+def _refuse_unsaved(joint: Joint) -> None:
+    """Files hold these as effects only: nothing may be lost in silence."""
+    if joint.guide_errors or joint.friction:
+        raise StiffmapError(f"{joint.name}: friction and straightness are saved as effects; use with_effect")
+
+
 def _joint(joint: Joint) -> Plain:
+    _refuse_unsaved(joint)
     plain: Plain = {"joint": joint.name, "kind": joint.kind}
     if len(joint.axes) == 1:
         plain["axis"] = _axis(joint.axes[0])
@@ -89,6 +97,7 @@ def _joint(joint: Joint) -> Plain:
 
 
 def _actuator(joint: Joint) -> Plain:
+    _refuse_unsaved(joint)
     plain: Plain = {
         "actuator": joint.name,
         "kind": joint.kind,
@@ -106,10 +115,6 @@ def _actuator(joint: Joint) -> Plain:
         plain.update({} if drive.range is None else {"range": floats(drive.range)})
         plain.update(_given(speed=drive.speed, force=drive.force, encoder_error=drive.encoder_error))
         plain.update({"friction": _given(**friction)} if _given(**friction) else {})
-    if joint.guide_errors or joint.friction:
-        raise StiffmapError(
-            f"{joint.name}: friction and straightness are saved as effects; add them with with_effect"
-        )
     if joint.command_errors:
         plain["command_errors"] = [_command_error(error) for error in joint.command_errors]
     return plain

@@ -35,8 +35,9 @@ EFFECTS: dict[str, list[Effect]] = {
             ("joint_friction", {"element": joint, "torque": 0.3, "branch": branch})
             for joint in ("proximal", "distal", "pin_proximal", "pin_distal")
         ]
-        for branch in ("loading", "unloading", "loading_stuck")
+        for branch in ("loading", "unloading")
     },
+    "joint_friction_stuck": [("joint_friction", {"element": "pin_distal", "torque": 0.3})],
     "several": [
         ("dead_zone", {"element": "actuator", "legs": ["x"], "half_width": 5e-6}),
         ("friction", {"element": "actuator", "force": 20.0, "branch": "loading", "legs": ["y", "z"]}),
