@@ -21,6 +21,13 @@ std::string join(const std::string& prefix, const std::string& name) {
   return prefix.empty() ? name : prefix + "." + name;
 }
 
+bool has_legs(const Chain& chain) {
+  return std::any_of(chain.elements.begin(), chain.elements.end(), [](const auto& e) {
+    const Block* block = std::get_if<Block>(&e);
+    return block && block->name == "legs";
+  });
+}
+
 }  // namespace
 
 Mechanism::Mechanism(const Chain& root, const Pose& home_pose, const std::vector<ExternalSpring>& springs)
@@ -120,6 +127,7 @@ Index Mechanism::add_spring(const Spring& spring, Index node, const std::string&
 
 Index Mechanism::add_block(const Block& block, Index start, const std::string& prefix, bool outermost) {
   const bool is_legs = outermost && block.name == "legs" && legs.empty();
+  if (is_legs) outside.clear();
   const std::string name = join(prefix, block.name);
   require(!block.branches.empty(), name, "one branch or more", 0);
   Index primary = -1;
@@ -133,18 +141,20 @@ Index Mechanism::add_block(const Block& block, Index start, const std::string& p
   if (is_legs) {
     primary = add_node(primary, {}, {});  // the platform: what follows belongs to no leg
     beyond_legs[static_cast<std::size_t>(primary)] = true;
+    outside = "platform";
   }
   return primary;
 }
 
 Index Mechanism::add_chain(const Chain& chain, Index node, const std::string& prefix, bool outermost) {
+  if (outermost && has_legs(chain)) outside = "base";
   for (const auto& element : chain.elements) {
     std::visit(Overload{
                    [&](const Offset& e) { node = add_node(node, e.nominal, e.actual); },
                    [&](const Joint& e) { node = add_joint(e, node, prefix); },
                    [&](const Spring& e) { node = add_spring(e, node, prefix); },
                    [&](const Body& e) { bodies.push_back({join(prefix, e.name), node, e.mass, e.com}); },
-                   [&](const Point& e) { points.push_back({join(prefix, e.name), node, e.offset}); },
+                   [&](const Point& e) { points.push_back({join(outside, join(prefix, e.name)), node, e.offset}); },
                    [&](const Block& e) { node = add_block(e, node, prefix, outermost); },
                },
                element);

@@ -37,9 +37,7 @@ def build_mechanism(machine: MachineDescription) -> _core.Mechanism:
         root.block("legs", [(leg.name, chain(leg.elements)) for leg in machine.legs])
         add_elements(root, machine.platform)
         springs = [
-            _core.ExternalSpring(
-                s.name, core_name(s.point), np.array(s.anchor), s.stiffness, s.length, s.tension_only
-            )
+            _core.ExternalSpring(s.name, s.point, np.array(s.anchor), s.stiffness, s.length, s.tension_only)
             for s in machine.external_springs
         ]
         if machine.task == TASK:
@@ -47,11 +45,6 @@ def build_mechanism(machine: MachineDescription) -> _core.Mechanism:
         return _core.Mechanism(root, pose(machine.home), springs, [c in machine.task for c in TASK])
     except ValueError as problem:
         raise StiffmapError(f"{machine.name}: {problem}") from None
-
-
-def core_name(point: str) -> str:
-    """Name of a point in the core, which names what is outside the legs by itself alone."""
-    return point.removeprefix("platform.").removeprefix("base.")
 
 
 def pose(p: Pose) -> _core.Pose:

@@ -131,6 +131,7 @@ class Mechanism {
  private:
   Index add_node(Index parent, const Pose& nominal, const Pose& actual);
   Index add_coordinate(Index node, const std::string& name, Role role, JointType type, const Vec3& axis, double home);
+  std::string outside;  ///< while it is built: prefix of points before (base) and behind (platform) the legs
   Index add_chain(const Chain& chain, Index node, const std::string& prefix, bool outermost);
   Index add_block(const Block& block, Index node, const std::string& prefix, bool outermost);
   Index add_joint(const Joint& joint, Index node, const std::string& prefix);

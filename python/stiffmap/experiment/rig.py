@@ -8,7 +8,7 @@ from stiffmap.description import Element, Point, Spring
 from stiffmap.experiment.experiment import Experiment, Loop
 from stiffmap.machine import Machine
 
-BASE, PLATFORM = "rig_on_base", "rig_on_platform"
+BASE, PLATFORM = "base.rig_on_base", "platform.rig_on_platform"
 HOLDER = "tool_compliance"
 
 
@@ -17,10 +17,12 @@ def rigged(machine: Machine, loop: Loop) -> Machine:
     loop needs them."""
     d = machine.description
     if "base" in (loop.instrument_on, loop.force_against) and _yields(d.base):
-        d = replace(d, base=(*d.base, Point(BASE)))
+        d = replace(d, base=(*d.base, Point(BASE.removeprefix("base."))))
     if loop.target_on == "platform" and _yields(d.platform):
         at = next((i for i, e in enumerate(d.platform) if e.name.startswith(HOLDER)), len(d.platform))
-        d = replace(d, platform=(*d.platform[:at], Point(PLATFORM), *d.platform[at:]))
+        d = replace(
+            d, platform=(*d.platform[:at], Point(PLATFORM.removeprefix("platform.")), *d.platform[at:])
+        )
     return machine if d is machine.description else Machine(d)
 
 

@@ -98,3 +98,20 @@ def turned(description: MachineDescription, r: np.ndarray, p: ArrayLike = (0, 0,
         gravity=None,
     )
     return sm.Machine(placed)
+
+
+def parallelogram(k: np.ndarray, d: float, length: float, q: float) -> sm.Machine:
+    """Two bars on pins about y at z = +-d/2, turned by q; the far frame keeps its orientation."""
+
+    def bar(side: float) -> tuple[object, ...]:
+        return (
+            shift("out", (0, 0, side * d / 2)),
+            revolute("proximal", "y", q),
+            shift("length", (length, 0, 0)),
+            stiff("bar", k),
+            revolute("distal", "y", -q),
+            shift("back", (0, 0, -side * d / 2)),
+        )
+
+    tip = (length * np.cos(q), 0.0, -length * np.sin(q))
+    return serial(block("bars", bar(1), bar(-1)), home=Pose.of(tip))  # type: ignore[arg-type]

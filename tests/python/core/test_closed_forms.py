@@ -83,29 +83,12 @@ def test_planar_2r(method: str, elbow: float) -> None:
     assert int(got.flags) & sm.Flag.RIGID_DIRECTION
 
 
-def parallelogram(k: np.ndarray, d: float, length: float, q: float) -> sm.Machine:
-    """Two bars on pins about y at z = +-d/2, turned by q; the far frame keeps its orientation."""
-
-    def bar(side: float) -> tuple[object, ...]:
-        return (
-            b.shift("out", (0, 0, side * d / 2)),
-            b.revolute("proximal", "y", q),
-            b.shift("length", (length, 0, 0)),
-            b.stiff("bar", k),
-            b.revolute("distal", "y", -q),
-            b.shift("back", (0, 0, -side * d / 2)),
-        )
-
-    tip = (length * np.cos(q), 0.0, -length * np.sin(q))
-    return b.serial(b.block("bars", bar(1), bar(-1)), home=Pose.of(tip))  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("q", [0.0, 0.3, -0.7])
 def test_parallelogram(method: str, q: float) -> None:
     length, d = 0.775, 0.25
     k = np.linalg.inv(b.cantilever_compliance(length, 2e8, 3e4, 1.5e4))
-    machine = parallelogram(k, d, length, q)
+    machine = b.parallelogram(k, d, length, q)
     got = machine.solve(machine.description.home.p, method=method)
     turn = np.kron(np.eye(2), b.rotation((0, 1, 0), q))  # bar frame: along the bars
     in_bars = turn.T @ got.stiffness @ turn

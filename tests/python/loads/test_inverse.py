@@ -64,10 +64,8 @@ def test_legs_are_the_derivatives_of_their_wrenches(name: str) -> None:
 
 def test_where_forces_have_no_answer() -> None:
     """A parallelogram is free across its bars: no displacement under a force, but a wrench for each pose."""
-    from test_closed_forms import parallelogram
-
     stiff = np.linalg.inv(b.cantilever_compliance(0.775, 2e8, 3e4, 1.5e4))
-    machine = parallelogram(stiff, 0.25, 0.775, 0.3)
+    machine = b.parallelogram(stiff, 0.25, 0.775, 0.3)
     home = machine.description.home.p
     assert machine.solve(home, [0, 0, 10, 0, 0, 0]).status == sm.Status.SINGULAR
     along_the_bars = np.array([np.cos(0.3), 0, -np.sin(0.3)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import builders as b
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.description import Body, ExternalSpring, Law, Point, Pose
+from stiffmap.files.starter import starter_text
 
 DRIVE = 2e3
 
@@ -68,3 +70,22 @@ def test_bad_load_types() -> None:
         machine.solve((0.5, 0, 0), np.zeros(6), load_type={"tcp": "stiff"})
     with pytest.raises(sm.StiffmapError, match="load_type: no wrench acts at 'nose'"):
         machine.solve((0.5, 0, 0), np.zeros(6), load_type={"nose": "dead"})
+
+
+def test_points_are_named_as_in_the_file(tmp_path: Path) -> None:
+    """By their full names, wherever they are; an unknown one is answered with those that exist."""
+    file = tmp_path / "machine.yaml"
+    file.write_text(starter_text("mine"))
+    machine = sm.load_machine(file)
+    assert machine.points == ("tcp", "left.wrist", "right.wrist", "platform.probe")
+    p = machine.description.home.p
+    s = machine.solve(p, [0, 0, -9, 0, 0, 0], point="platform.probe", read_points=["left.wrist", "tcp"])
+    assert s.ok and np.isfinite(s.readings).all()
+    known = "expected one of tcp, left.wrist, right.wrist, platform.probe, got 'probe'"
+    for call in (
+        lambda: machine.solve(p, point="probe"),
+        lambda: machine.wrench(p, np.zeros(6), point="probe"),
+        lambda: sm.sweep(machine, p, [0, 0, 1], limit=10.0, point="probe"),
+    ):
+        with pytest.raises(sm.StiffmapError, match=known):
+            call()
