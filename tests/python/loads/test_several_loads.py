@@ -77,11 +77,11 @@ def test_points_are_named_as_in_the_file(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     file.write_text(starter_text("mine"))
     machine = sm.load_machine(file)
-    assert machine.points == ("tcp", "left.wrist", "right.wrist", "platform.probe")
+    assert machine.points == ("tcp", "left.wrist", "right.wrist", "middle.wrist", "platform.probe")
     p = machine.description.home.p
     s = machine.solve(p, [0, 0, -9, 0, 0, 0], point="platform.probe", read_points=["left.wrist", "tcp"])
     assert s.ok and np.isfinite(s.readings).all()
-    known = "expected one of tcp, left.wrist, right.wrist, platform.probe, got 'probe'"
+    known = "expected one of tcp, left.wrist, right.wrist, middle.wrist, platform.probe, got 'probe'"
     for call in (
         lambda: machine.solve(p, point="probe"),
         lambda: machine.wrench(p, np.zeros(6), point="probe"),
