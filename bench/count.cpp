@@ -34,7 +34,7 @@ void count_pose(const Program& P, Block& b, Scratch& s, double* out) {
   for (int i = 0; i < P.op_count; ++i)
     if (P.ops[i].kind == OpKind::spring)
       out[bench::elements] += counted([&] { spring_tangent(e, P.ops[i], s.stiff[P.ops[i].slot], K, c); });
-  out[bench::elimination] += counted([&] { tangent(e, P.chains[P.root], b.load, tip.p, n.K, n.c); });
+  out[bench::elimination] += counted([&] { n.K = tangent(e, P.chains[P.root], V3{}, b.load, tip.p).K; });
   out[bench::platform] += counted([&] {
     n.dense(n.K, C);
     n.invert(C);

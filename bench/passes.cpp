@@ -66,7 +66,7 @@ void time_block(Block& b, const M usable, Timer& time) {
     wrenches(e, P.chains[P.root], F, at);
   });
   time(bench::elements, [&] { time_elements(P, s, e); });
-  time(bench::elimination, [&] { tangent(e, P.chains[P.root], b.load, tip.p, n.K, n.c); });
+  time(bench::elimination, [&] { n.K = tangent(e, P.chains[P.root], V3{}, b.load, tip.p).K; });
   V K[6][6], C[6][6], x[6] = {};
   time(bench::platform, [&] {
     n.dense(n.K, C);

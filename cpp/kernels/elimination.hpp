@@ -12,6 +12,7 @@ struct Elimination {
   V3 gravity;
   V lowest;  ///< smallest pivot, dimensionless: at or below zero the pose is not a plain minimum
   double scale[6];
+  bool heavy = false;        ///< there is gravity
   V transferred = splat(0);  ///< largest step of a branch's wrench, over stiffness times length
 
   void guard(V pivot, double unit) {

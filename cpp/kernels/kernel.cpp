@@ -166,6 +166,7 @@ struct Block {
     const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
     Elimination e{
         P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
+    e.heavy = in.gravity[0] != 0 || in.gravity[1] != 0 || in.gravity[2] != 0;
     Newton newton{P, in, s, e, load};
     V iterations = splat(0);
     const M done = newton.solve(usable, P.starts_linear, iterations);

@@ -149,7 +149,9 @@ struct Newton {
   [[gnu::noinline]] void linearize() {
     frames_and_wrenches();
     e.lowest = splat(1e300);
-    tangent(e, P.chains[P.root], load, point, K, c);
+    const Tangent t = tangent(e, P.chains[P.root], V3{}, load, point);
+    K = t.K;
+    c = t.c;
   }
 
   /// Tangent of a small extra dead wrench at the point, K - S(m)/2 in the rotational block.

@@ -12,6 +12,7 @@ struct JointSlot {
   V6 F;     ///< transmitted wrench at o
   V6 J, u;  ///< column and row of the rank-one step at its node
   V inverse, y;
+  V3 turn;  ///< coupling to the turn of the chain's start, only under gravity
 };
 
 struct StiffSlot {                       // a spring or a block: six relative coordinates between two frames
@@ -20,6 +21,7 @@ struct StiffSlot {                       // a spring or a block: six relative co
   V3 p;                                  ///< point behind it
   V6 F;                                  ///< transmitted wrench at p
   V L[6][6], inverse[6], X[6][6], y[6];  ///< elimination of its relative twist
+  V turn[3][6];                          ///< and its coupling to the turn of the chain's start
 };
 
 struct BranchSlot {
@@ -29,6 +31,7 @@ struct BranchSlot {
   V6 error;   ///< twist from its end to the end of the block's first branch
   Sym6 K;
   V6 c;
+  V6 turn[3];  ///< its wrench by the turn of the block's start, only under gravity
 };
 
 /// All scratch of a thread, laid out once in one piece of memory.

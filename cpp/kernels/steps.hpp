@@ -6,24 +6,26 @@
 
 namespace stiffmap::kernel {
 
-/// Step of a joint from the twist behind it; leaves the twist before it.
-inline void joint_step(Elimination& el, const Op& op, V6& eta) {
+/// Step of a joint from the twist behind it and the turn of the start; leaves the twist before it.
+inline void joint_step(Elimination& el, const Op& op, V6& eta, const V3& turn) {
   const JointSlot& j = el.s.joints[op.slot];
   const int q = op.coordinate;
-  const V dz = dot(j.u, eta) * j.inverse + j.y;
+  V dz = dot(j.u, eta) * j.inverse + j.y;
+  if (el.heavy) dz += dot(j.turn, turn) * j.inverse;
   el.s.dz[q] = dz;
   eta = eta - (el.s.da[q] * dz) * j.J;
 }
 
 inline void move_twist(V6& eta, const V3& from, const V3& to) { eta.a = eta.a + cross(eta.b, to - from); }
 
-/// Relative twist of a spring or block from the twist behind it.
-inline V6 relative_twist(const StiffSlot& k, const V6& eta) {
+/// Relative twist of a spring or block from the twist behind it and the turn of the chain's start.
+inline V6 relative_twist(const Elimination& el, const StiffSlot& k, const V6& eta, const V3& turn) {
   V e[6], z[6];
   put(eta, e);
   for (int i = 0; i < 6; ++i) {
     V sum = k.y[i];
     for (int col = 0; col < 6; ++col) sum += k.X[i][col] * e[col];
+    if (el.heavy) sum += k.turn[0][i] * turn.x + k.turn[1][i] * turn.y + k.turn[2][i] * turn.z;
     z[i] = k.inverse[i] * sum;
   }
   for (int i = 4; i >= 0; --i)
@@ -51,7 +53,8 @@ inline void stiff_step(Elimination& el, const Op& op, const V6& zeta, const V3& 
     BranchSlot& branch = el.s.branches[op.first + b];
     const V6 own = zeta + branch.error;
     if (b > 0) {
-      const V6 step = dead(branch.K, branch.F.b, own) + branch.c + V6{cross(turn, branch.F.a), cross(turn, branch.F.b)};
+      V6 step = dead(branch.K, branch.F.b, own) + branch.c + V6{cross(turn, branch.F.a), cross(turn, branch.F.b)};
+      if (el.heavy) step = step + turn.x * branch.turn[0] + turn.y * branch.turn[1] + turn.z * branch.turn[2];
       branch.before = branch.F;
       branch.F = {select(active, branch.F.a + step.a, branch.F.a), select(active, branch.F.b + step.b, branch.F.b)};
       const V force = larger(larger(absolute(step.a.x), absolute(step.a.y)), absolute(step.a.z));
@@ -71,12 +74,12 @@ inline void back(Elimination& el, const ChainProgram& chain, V6 eta, V3 p, const
     if (op.kind <= OpKind::prismatic) {
       move_twist(eta, p, el.s.joints[op.slot].o);
       p = el.s.joints[op.slot].o;
-      joint_step(el, op, eta);
+      joint_step(el, op, eta, turn);
       continue;
     }
     const StiffSlot& k = el.s.stiff[op.slot];
     move_twist(eta, p, k.p);
-    const V6 zeta = relative_twist(k, eta);
+    const V6 zeta = relative_twist(el, k, eta, turn);
     eta = eta - zeta;
     p = k.p;
     stiff_step(el, op, zeta, turn + eta.b, active);
@@ -86,7 +89,8 @@ inline void back(Elimination& el, const ChainProgram& chain, V6 eta, V3 p, const
   move_twist(eta, p, k.p);
   const V3 whole = eta.b;
   for (int i = chain.first; i < chain.first_stiff; ++i)
-    if (el.P.ops[i].kind <= OpKind::prismatic && el.P.ops[i].eliminated) joint_step(el, el.P.ops[i], eta);
+    if (el.P.ops[i].kind <= OpKind::prismatic && el.P.ops[i].eliminated)
+      joint_step(el, el.P.ops[i], eta, turn + whole - eta.b);
   stiff_step(el, op, eta, turn + whole - eta.b, active);
 }
 

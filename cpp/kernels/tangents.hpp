@@ -5,6 +5,7 @@
 
 #include "angles.hpp"
 #include "springs.hpp"
+#include "weights.hpp"
 
 namespace stiffmap::kernel {
 
@@ -13,18 +14,18 @@ struct Tangent {
   Sym6 K;
   V6 c;
   V3 p;
-  int prefix[16];
-  int prefixed = 0;
+  Turning turning;  ///< only under gravity
 };
 
 /// Moves the tangent to point q; F is the wrench transmitted there.
-inline void move(Tangent& t, const V3& q, const V6& F) {
+inline void move(const Elimination& el, Tangent& t, const V3& q, const V6& F) {
   transport(t.K, t.c, q - t.p, F.a);
+  if (el.heavy) transport(t.turning, q - t.p);
   t.p = q;
 }
 
-/// Rank-one step of a coordinate with row u = K J + g, own stiffness d (F4).
-inline void eliminate(Elimination& el, const Op& op, JointSlot& j, V d, Tangent& t) {
+/// Rank-one step of a coordinate with row u = K J + g, own stiffness d (F4), coupling to the start's turn s.
+inline void eliminate(Elimination& el, const Op& op, JointSlot& j, V d, const V3& s, Tangent& t) {
   const int q = op.coordinate;
   const V da = el.s.da[q];
   const V pivot = da * d + el.s.dtau[q];
@@ -34,16 +35,14 @@ inline void eliminate(Elimination& el, const Op& op, JointSlot& j, V d, Tangent&
   j.y = (dot(j.J, t.c) - rho) * j.inverse;
   downdate(t.K, j.u, da * j.inverse);
   t.c = t.c - (da * j.y) * j.u;
+  j.turn = s;
+  if (el.heavy) eliminate(t.turning, j.u, s, da * j.inverse);
 }
 
 inline void append_joint(Elimination& el, const Op& op, Tangent& t) {
   JointSlot& j = el.s.joints[op.slot];
-  if (!op.eliminated) return;
-  if (t.rigid) {
-    t.prefix[t.prefixed++] = static_cast<int>(&op - el.P.ops);
-    return;
-  }
-  move(t, j.o, j.F);
+  if (!op.eliminated || t.rigid) return;
+  move(el, t, j.o, j.F);
   V6 g{};
   if (op.kind == OpKind::prismatic) {
     j.J = {j.w, V3{}};
@@ -54,7 +53,7 @@ inline void append_joint(Elimination& el, const Op& op, Tangent& t) {
   }
   const V6 KJ = t.K * j.J;
   j.u = KJ + g;
-  eliminate(el, op, j, dot(j.J, KJ), t);
+  eliminate(el, op, j, dot(j.J, KJ), el.heavy ? along(t.turning, j.J) : V3{}, t);
 }
 
 /// A joint before the first compliance of a chain whose start is held (F6); F at t.p.
@@ -71,41 +70,82 @@ inline void prepend_joint(Elimination& el, const Op& op, const V6& F, Tangent& t
   }
   const V6 KJ = t.K * j.J;
   j.u = KJ + g;
-  eliminate(el, op, j, dot(j.J, KJ) + d, t);
+  d += dot(j.J, KJ);
+  V3 s{};
+  if (el.heavy) {
+    restart(t.turning, j.o);
+    s = along(t.turning, j.J);
+    if (op.kind == OpKind::revolute) {
+      const V3 Mw = t.turning.M * j.w;
+      d += dot(j.w, Mw) - 2.0 * dot(s, j.w);
+      s = s - Mw + splat(0.5) * cross(j.w, t.turning.moment);  // the turns follow one another
+      j.u = j.u - about(t.turning, j.w);
+    }
+  }
+  eliminate(el, op, j, d, s, t);
 }
 
-inline void tangent(Elimination& el, const ChainProgram& chain, const V6& F, const V3& end, Sym6& K, V6& c);
+/// What comes before the first compliance of a chain that starts at `start`, backwards.
+inline void prepend(Elimination& el, const ChainProgram& chain, const V3& start, const V6& F, Tangent& t) {
+  for (int i = chain.first_stiff - 1; i >= chain.first; --i) {
+    const Op& op = el.P.ops[i];
+    if (op.kind == OpKind::load) {
+      const JointSlot& j = el.s.joints[op.slot];
+      if (el.heavy) hang(t.turning, splat(op.mass) * el.gravity, j.o + j.w);
+    } else if (op.eliminated) {
+      prepend_joint(el, op, F, t);
+    }
+  }
+  if (el.heavy) restart(t.turning, start);
+}
+
+inline Tangent tangent(Elimination& el, const ChainProgram& chain, const V3& start, const V6& F, const V3& end);
 
 /// Relative tangent of a block: sum over its branches, closed to its first one (F8).
-inline void block_tangent(Elimination& el, const Op& op, Sym6& K, V6& c) {
+inline void block_tangent(Elimination& el, const Op& op, Tangent& t) {
+  const V3 start = el.s.stiff[op.slot].start.p;
   for (int b = 0; b < op.count; ++b) {
     BranchSlot& branch = el.s.branches[op.first + b];
-    tangent(el, el.P.chains[op.first + b], branch.F, branch.end.p, branch.K, branch.c);
-    if (b == 0) {
-      branch.error = V6{};
-      K = branch.K;
-      c = branch.c;
-      continue;
+    const Tangent own = tangent(el, el.P.chains[op.first + b], start, branch.F, branch.end.p);
+    branch.K = own.K;
+    branch.c = own.c;
+    branch.error = b ? frame_error(branch.end, el.s.branches[op.first].end) : V6{};
+    t.K = b ? t.K + own.K : own.K;
+    t.c = b ? t.c + own.c + dead(own.K, branch.F.b, branch.error) : own.c;
+    if (!el.heavy) continue;
+    for (int k = 0; k < 3; ++k) {
+      branch.turn[k] = own.turning.G[k];
+      t.turning.G[k] = t.turning.G[k] + own.turning.G[k];
     }
-    branch.error = frame_error(branch.end, el.s.branches[op.first].end);
-    K = K + branch.K;
-    c = c + branch.c + dead(branch.K, branch.F.b, branch.error);
+    t.turning.M = t.turning.M + own.turning.M;
+    t.turning.weight = t.turning.weight + own.turning.weight;
+    t.turning.moment = t.turning.moment + own.turning.moment;
   }
 }
 
 /// D = K + K_e + [0, S(f); -S(f), 0], factorised in the slot (F7).
-inline void factorise(Elimination& el, StiffSlot& k, const Sym6& K, const Sym6& own) {
+inline void factorise(Elimination& el, StiffSlot& k, const Sym6& K, const Tangent& own) {
   const V3 f = k.F.a;
-  Sym6 D = K + own;
+  Sym6 D = K + own.K;
   D.B.c[0] = D.B.c[0] + V3{splat(0), f.z, -f.y};
   D.B.c[1] = D.B.c[1] + V3{-f.z, splat(0), f.x};
   D.B.c[2] = D.B.c[2] + V3{f.y, -f.x, splat(0)};
+  if (el.heavy) {
+    const V6* G = own.turning.G;
+    for (int i = 0; i < 3; ++i) D.B.c[i] = D.B.c[i] - G[i].a;
+    D.E.xx -= 2.0 * G[0].b.x;
+    D.E.yy -= 2.0 * G[1].b.y;
+    D.E.zz -= 2.0 * G[2].b.z;
+    D.E.xy -= G[0].b.y + G[1].b.x;
+    D.E.xz -= G[0].b.z + G[2].b.x;
+    D.E.yz -= G[1].b.z + G[2].b.y;
+  }
   unpack(D, k.L);
   ldlt(k.L, k.inverse, el.lowest, el.scale);
 }
 
 /// X = K + [0, S(f); 0, S(m)/2] and y, both times L^-1.
-inline void couple(StiffSlot& k, const Sym6& K, const V6& y) {
+inline void couple(const Elimination& el, StiffSlot& k, const Sym6& K, const V6& y, const Tangent& own) {
   const V3 f = k.F.a, h = splat(0.5) * k.F.b;
   unpack(K, k.X);
   k.X[0][4] -= f.z;
@@ -120,6 +160,11 @@ inline void couple(StiffSlot& k, const Sym6& K, const V6& y) {
   k.X[4][5] -= h.x;
   k.X[5][3] -= h.y;
   k.X[5][4] += h.x;
+  for (int q = 0; q < 3 && el.heavy; ++q) {
+    V g[6];
+    put(own.turning.G[q], g);
+    for (int i = 0; i < 6; ++i) k.X[i][3 + q] -= g[i];
+  }
   put(y, k.y);
 #pragma GCC unroll 6
   for (int i = 1; i < 6; ++i)
@@ -165,24 +210,46 @@ inline void condense(const StiffSlot& k, Sym6& K, V6& c) {
   c = c - get(full);
 }
 
+/// The same elimination in G and M of the chain (F9).
+inline void condense(StiffSlot& k, Turning& t) {
+  for (int q = 0; q < 3; ++q) {
+    V(&y)[6] = k.turn[q];
+    put(t.G[q], y);
+    V sum[6] = {};
+    for (int i = 0; i < 6; ++i) {
+      for (int r = 0; r < i; ++r) y[i] -= k.L[i][r] * y[r];
+      const V scaled = k.inverse[i] * y[i];
+      for (int col = 0; col < 6; ++col) sum[col] += k.X[i][col] * scaled;
+    }
+    t.G[q] = t.G[q] - get(sum);
+  }
+  for (int i = 0; i < 6; ++i) downdate(t.M, {k.turn[0][i], k.turn[1][i], k.turn[2][i]}, k.inverse[i]);
+}
+
 /// A spring or block behind what came before: its relative twist is eliminated (F7).
-inline void append_stiff(Elimination& el, const Op& op, Tangent& t) {
+inline void append_stiff(Elimination& el, const ChainProgram& chain, const V3& start, const Op& op, Tangent& t) {
   StiffSlot& k = el.s.stiff[op.slot];
-  Sym6 own;
-  V6 c;
-  if (op.kind == OpKind::spring) spring_tangent(el, op, k, own, c);
-  else block_tangent(el, op, own, c);
+  Tangent own;
+  if (el.heavy) own.turning.clear(k.start.p);
+  if (op.kind == OpKind::spring) spring_tangent(el, op, k, own.K, own.c);
+  else block_tangent(el, op, own);
   if (t.rigid) {
     t.rigid = false;
-    t.K = own;
-    t.c = c;
+    t.K = own.K;
+    t.c = own.c;
     t.p = k.p;
-    for (int i = t.prefixed - 1; i >= 0; --i) prepend_joint(el, el.P.ops[t.prefix[i]], k.F, t);
+    if (el.heavy) t.turning = own.turning;
+    prepend(el, chain, start, k.F, t);
     return;
   }
-  move(t, k.p, k.F);
+  if (el.heavy && op.kind == OpKind::block) {
+    move(el, t, k.start.p, {k.F.a + own.turning.weight, V3{}});
+    t.K.E = t.K.E + own.turning.M;
+  }
+  move(el, t, k.p, k.F);
   factorise(el, k, t.K, own);
-  couple(k, t.K, t.c - c);
+  couple(el, k, t.K, t.c - own.c, own);
+  if (el.heavy) condense(k, t.turning);
   condense(k, t.K, t.c);
 }
 
@@ -190,12 +257,13 @@ inline void append_stiff(Elimination& el, const Op& op, Tangent& t) {
 inline void append_load(Elimination& el, const Op& op, Tangent& t) {
   if (t.rigid) return;
   const JointSlot& j = el.s.joints[op.slot];
-  move(t, j.o, j.F);
+  move(el, t, j.o, j.F);
   add_lever(t.K.E, splat(-op.mass), el.gravity, j.w);
+  if (el.heavy) append_weight(t.turning, splat(op.mass) * el.gravity, j.o + j.w, j.o);
 }
 
-/// Tangent of a chain at point `end` under the end wrench F, its start held.
-inline void tangent(Elimination& el, const ChainProgram& chain, const V6& F, const V3& end, Sym6& K, V6& c) {
+/// Tangent of a chain at point `end` under the end wrench F, its start frame at point `start` held.
+inline Tangent tangent(Elimination& el, const ChainProgram& chain, const V3& start, const V6& F, const V3& end) {
   Tangent t;
   for (int i = chain.first; i < chain.first + chain.count; ++i) {
     const Op& op = el.P.ops[i];
@@ -206,16 +274,15 @@ inline void tangent(Elimination& el, const ChainProgram& chain, const V6& F, con
         break;
       case OpKind::spring:
       case OpKind::block:
-        append_stiff(el, op, t);
+        append_stiff(el, chain, start, op, t);
         break;
       case OpKind::load:
         append_load(el, op, t);
         break;
     }
   }
-  move(t, end, F);
-  K = t.K;
-  c = t.c;
+  move(el, t, end, F);
+  return t;
 }
 
 }  // namespace stiffmap::kernel

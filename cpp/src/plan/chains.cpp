@@ -36,7 +36,7 @@ class Compiler {
  private:
   struct Way {  // what has been passed since the chain's start
     Pose nominal, actual;
-    bool rigid = true, turned = false, moves = false;
+    bool rigid = true, moves = false;
     int prefix = 0;
   };
 
@@ -101,7 +101,6 @@ class Compiler {
       found_.missing = "more joints before the first link spring than are supported";
     if (op.eliminated) {
       way.moves = true;
-      way.turned = way.turned || j.type == JointType::revolute;
     }
     for (const GuideError& e : j.guide_errors) guide_error(e, way, ops);
   }
@@ -162,15 +161,13 @@ class Compiler {
       if (way.rigid && ++way.prefix > most_prefix)
         found_.missing = "more joints before the first link spring than are supported";
       way.moves = true;
-      way.turned = way.turned || i >= 3;
     }
   }
 
   void body(const Body& b, Way& way, std::vector<Op>& ops) {
     if (b.mass == 0) return;
-    // Behind a joint that starts from rigid, or in a frame that moves, the elimination leaves out how
-    // the weight turns in the relative problem (docs/fast_path.md F9).
-    if ((way.rigid && way.turned) || in_moving_block_) out_.program.exact_weights = 0;
+    // The turn of a start frame that itself moves in a moving frame is left out (docs/fast_path.md F9).
+    if (moving_blocks_ > 1) out_.program.exact_weights = 0;
     Op& op = push(OpKind::load, way, ops);
     op.slot = out_.program.joint_slots++;
     op.mass = b.mass;
@@ -181,8 +178,8 @@ class Compiler {
     const std::size_t first = out_.chains.size();
     out_.chains.resize(first + b.branches.size());
     const bool is_legs = outermost && b.name == "legs" && out_.program.legs_op < 0;
-    const bool outside = in_moving_block_;
-    in_moving_block_ = in_moving_block_ || way.moves;
+    const bool moves = way.moves;
+    moving_blocks_ += moves;
     const int here = i32(ops.size());
     Op& op = push(OpKind::block, way, ops);
     op.first = i32(first);
@@ -190,10 +187,8 @@ class Compiler {
     op.slot = out_.program.stiff_slots++;
     op.start_moves = way.moves;
     for (std::size_t k = 0; k < b.branches.size(); ++k) chain(b.branches[k].second, first + k, false, way.moves);
-    in_moving_block_ = outside;
-    if (is_legs) {
-      out_.program.legs_op = here;
-    }
+    moving_blocks_ -= moves;
+    if (is_legs) out_.program.legs_op = here;
     way.rigid = false;
     way.moves = true;
   }
@@ -201,7 +196,7 @@ class Compiler {
   const Mechanism& m_;
   FastPlanData& out_;
   std::int32_t next_ = 0;
-  bool in_moving_block_ = false;
+  int moving_blocks_ = 0;  ///< blocks around here whose start moves
   CompiledChains found_;
 };
 

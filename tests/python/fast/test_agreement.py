@@ -60,6 +60,18 @@ def test_no_load_and_every_option_of_pose() -> None:
     assert gap(machine, position, wrench, gravity=(0, 0, -9.81)).worst() < TOLERANCE
 
 
+@pytest.mark.parametrize("name", [n for n in FAST if n != "hybrid"])
+def test_stiffness_under_gravity(name: str) -> None:
+    """Weights in moving blocks and behind pins; the tilted, heavier pull makes their share large."""
+    machine = sm.load_machine(name)
+    position, wrench = draw(machine, 30, seed=16)
+    for gravity in ((0.0, 0.0, -9.81), (12.0, -20.0, 16.0)):
+        found = gap(machine, position, wrench, gravity=gravity)
+        assert found.statuses == 0
+        assert found.poses > 15
+        assert found.worst() < TOLERANCE
+
+
 def test_out_of_reach_is_the_same_on_both_paths() -> None:
     machine = sm.load_machine("tripteron")
     position, wrench = draw(machine, 60, seed=14, margin=-0.4)
