@@ -14,7 +14,7 @@ inline constexpr int most_closure_steps = 12;
 inline constexpr int leaps = 8;
 inline constexpr double trusted_step = 0.25;  // first Gauss-Newton step, relative to the length
 inline constexpr double closed = 1e-12;       // largest error, relative to the length
-inline constexpr double exact = 3e-15;        // the same: nothing left to gain
+inline constexpr double exact = 3e-15;        // the same: a closed form needs no step
 inline constexpr double last_step = 1e-8;     // its square, what it leaves, is below round-off
 
 struct Closing {
@@ -111,7 +111,7 @@ struct Closing {
     for (int step = 0; step < most_closure_steps; ++step) {
       V6 errors[most_unknowns];
       const V error = closure_errors(leg, chain, start, target, errors);
-      done |= ~failed & ((error < exact) | ((error < closed) & (previous < 1e-7)));
+      if (P.planar || step > 0) done |= ~failed & ((error < exact) | ((error < closed) & (previous < 1e-7)));
       failed |= ~done & ~(error < 1e100);
       if (all(done | failed)) break;
       equations.assemble(P, s, leg, errors);

@@ -271,7 +271,7 @@ struct Newton {
 
   static constexpr double pivot_floor = 1e-5;
   static constexpr double small = 1e-13;  ///< step that changes the tangent by no more than that
-  static constexpr double nothing = 1e-14;
+  static constexpr double nothing = 1e-15;
   static constexpr double unloaded = 1e-11;
   bool fresh = false;  ///< frames and wrenches are those at the answer
 };
