@@ -33,8 +33,10 @@ class FileCheck:
 def check_file(path: str | PathLike[str]) -> FileCheck:
     """Load a machine (by path or shipped name) and look it over; raises `StiffmapError` if unusable."""
     from stiffmap.files.shipped import find
+    from stiffmap.lowering import build_mechanism
 
     description = load_description(path)
+    build_mechanism(description)  # refuses a home configuration that does not close, with each leg's gap
     gaps = home_gaps(description)
     return FileCheck(find(path), description, _counts(description), gaps, _warnings(description, gaps))
 

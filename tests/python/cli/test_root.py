@@ -82,7 +82,7 @@ def test_strict_makes_warnings_count(tmp_path: Path, capsys: pytest.CaptureFixtu
     file = tmp_path / "m.yaml"
     run(capsys, "new", str(file))
     file.write_text(
-        file.read_text(encoding="utf-8").replace("home: 53.13010235415598", "home: 50"), encoding="utf-8"
+        file.read_text(encoding="utf-8").replace("home: 53.13010235415598", "home: 53"), encoding="utf-8"
     )
     assert run(capsys, "check", str(file))[0] == 0
     code, out, _ = run(capsys, "check", str(file), "--strict")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 import stiffmap as sm
+from stiffmap.cli import main
 from stiffmap.files import shipped_machines
 
 FIVE_BAR = next(m.path for m in shipped_machines() if m.name == "five-bar")
@@ -24,6 +26,14 @@ def test_impossible_home(tmp_path: Path) -> None:
     file = changed(tmp_path, "home: -151.92751306414704", "home: 0")
     with pytest.raises(sm.StiffmapError, match=r"home configuration: .*legs\.right \d"):
         sm.load_machine(file)
+
+
+def test_check_does_not_call_it_usable(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = changed(tmp_path, "home: -151.92751306414704", "home: 0")
+    assert main(["check", str(file)]) == 2
+    out, error = capsys.readouterr()
+    assert "usable" not in out and error.count("\n") == 1
+    assert re.search(r"home configuration: .*legs\.right \d", error)
 
 
 def test_wrong_assembly_branch(tmp_path: Path) -> None:
