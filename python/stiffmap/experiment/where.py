@@ -29,12 +29,12 @@ def point_positions(machine: Machine, name: str, position: Floats, rotation: Flo
 
 def _walk(d: MachineDescription, name: str, at: Mapping[str, Floats], n: int) -> Floats:
     start = (np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)))
-    frame, found = _along(d.base, "", name, at, start)
+    frame, found = _along(d.base, "base", name, at, start)
     for leg in d.legs:
         if found is None:
             end, found = _along(leg.elements, leg.name, name, at, frame)
     if found is None:
-        _, found = _along(d.platform, "", name, at, end)
+        _, found = _along(d.platform, "platform", name, at, end)
     if found is None:
         raise KeyError(name)
     return found
@@ -45,7 +45,7 @@ def _along(
 ) -> tuple[Frame, Floats | None]:
     """Frame at the end of a sequence, and the point where it is in it."""
     for e in elements:
-        full = f"{path}.{e.name}" if path else e.name
+        full = f"{path}.{e.name}"
         if isinstance(e, Point) and full == name:
             return frame, frame[0] + frame[1] @ np.array(e.offset)
         if isinstance(e, Block):

@@ -68,7 +68,7 @@ def test_what_the_loop_shows(
 
 def test_on_the_platform_nothing_moves(pointed: sm.Machine, plan: Experiment) -> None:
     """Instrument and target on one rigid body."""
-    still = predict(pointed, replace(plan, loop=Loop(instrument_on="probe")))
+    still = predict(pointed, replace(plan, loop=Loop(instrument_on="platform.probe")))
     assert np.abs(predict(pointed, plan)[:, :3]).max() > 1e-4
     assert np.abs(still).max() < 1e-15
 
@@ -87,7 +87,7 @@ def test_seen_from_a_foot(pointed: sm.Machine, plan: Experiment) -> None:
 
 
 def test_a_force_within_one_body_does_nothing(pointed: sm.Machine, plan: Experiment) -> None:
-    assert np.abs(predict(pointed, replace(plan, loop=Loop(force_against="probe")))).max() < 1e-8
+    assert np.abs(predict(pointed, replace(plan, loop=Loop(force_against="platform.probe")))).max() < 1e-8
 
 
 def test_a_force_against_a_foot(pointed: sm.Machine, plan: Experiment) -> None:
@@ -105,13 +105,13 @@ def test_where_points_are(pointed: sm.Machine, plan: Experiment) -> None:
         np.testing.assert_allclose(point_positions(pointed, f"{leg}.gauge", plan.position, None), carried)
         end = point_positions(pointed, f"{leg}.end", plan.position, None)
         np.testing.assert_allclose(end, plan.position, atol=1e-12)  # the leg closes at the TCP
-    probe = point_positions(pointed, "probe", plan.position, None)
+    probe = point_positions(pointed, "platform.probe", plan.position, None)
     np.testing.assert_allclose(probe, plan.position + [0.0, 0.05, -0.12], atol=1e-12)
 
 
 def test_points_may_change_from_row_to_row(pointed: sm.Machine, plan: Experiment) -> None:
-    points = tuple(("tcp", "probe", "z.gauge")[i % 3] for i in range(len(plan)))
-    loads = tuple(("probe", "tcp")[i % 2] for i in range(len(plan)))
+    points = tuple(("tcp", "platform.probe", "z.gauge")[i % 3] for i in range(len(plan)))
+    loads = tuple(("platform.probe", "tcp")[i % 2] for i in range(len(plan)))
     got = predict(pointed, replace(plan, points=points, load_points=loads))
     for i in range(len(plan)):
         alone = pointed.solve(

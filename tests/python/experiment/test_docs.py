@@ -1,0 +1,40 @@
+"""The example files of docs/experiments.md load, and are predicted."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.experiment import Predictor
+from stiffmap.experiment.columns import KNOWN
+from stiffmap.experiment.schema import ExperimentFile
+
+PAGE = (Path(__file__).parents[3] / "docs" / "experiments.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"```yaml\n([^`]*)```\n```csv\n([^`]*)```", PAGE)
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_examples(number: int, tmp_path: Path, orthoglide: sm.Machine) -> None:
+    head, rows = EXAMPLES[number]
+    (tmp_path / "experiment.yaml").write_text(head, encoding="utf-8")
+    (tmp_path / "data.csv").write_text(rows, encoding="utf-8")
+    e = sm.load_experiment(tmp_path)
+    prediction = Predictor(orthoglide, e)()
+    assert np.isfinite(prediction[e.read]).all()
+
+
+def test_all_examples_are_tried() -> None:
+    assert len(EXAMPLES) == 6
+
+
+def test_every_key_and_column_is_explained() -> None:
+    for key in ExperimentFile.model_fields:
+        if key not in ("title", "data", "axes", "notes"):
+            assert f"`{key}`" in PAGE or f"{key}:" in PAGE, key
+    for column in KNOWN:
+        if not column.startswith(("u_", "rotx2", "roty2", "rotz2")):
+            assert re.search(rf"[` ]{column}[` ]", PAGE), column
