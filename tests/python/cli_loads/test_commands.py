@@ -59,6 +59,10 @@ def test_path_finds_the_rods_that_buckle(tmp_path: Path, capsys: pytest.CaptureF
     ("arguments", "message"),
     [
         (["wrench", "hexapod", "--by", "1,2"], "--by: expected 3 numbers"),
+        (
+            ["sweep", "hexapod", "--limit", "9", "--points", "2", "--cross", "1"],
+            "cross: the path has 0 bifurc",
+        ),
         (["sweep", "hexapod", "--control", "arc"], "limit: expected a number other than 0 (m"),
         (["sweep", "hexapod", "--control", "fast", "--limit", "1"], "control: expected one of force"),
         (["stress", "hexapod", "--at", "a,b,c"], "--at: expected numbers"),
