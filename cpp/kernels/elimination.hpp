@@ -15,6 +15,12 @@ struct Elimination {
   bool heavy = false;        ///< there is gravity
   V transferred = splat(0);  ///< largest step of a branch's wrench, over stiffness times length
 
+  /// A leg: only its numbers differ from those of the last pass over all, and the others' results are kept.
+  static constexpr std::int32_t all = -1, all_anew = -2;  ///< all_anew: keeps the residuals of the last pass over all
+  std::int32_t only = all;
+
+  bool skips(const Op& op, int branch) const { return only >= 0 && &op == P.ops + P.legs_op && branch != only; }
+
   void guard(V pivot, double unit) {
     const V relative = pivot * (1 / (scale[0] * scale[0] * unit * unit));
     lowest = lowest < relative ? lowest : relative;

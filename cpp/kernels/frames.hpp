@@ -88,7 +88,7 @@ enum class Build { nominal, actual };
 
 /// Frames along a chain from `f`; springs at rest in the nominal build.
 template <Build B>
-void walk(const Program& P, const ChainProgram& chain, const V* x, Frame& f, Scratch& s) {
+void walk(const Program& P, const ChainProgram& chain, const V* x, Frame& f, Scratch& s, std::int32_t only = -1) {
   for (int i = chain.first; i < chain.first + chain.count; ++i) {
     const Op& op = P.ops[i];
     apply(B == Build::nominal ? op.nominal : op.actual, f);
@@ -103,6 +103,7 @@ void walk(const Program& P, const ChainProgram& chain, const V* x, Frame& f, Scr
       case OpKind::block: {
         s.stiff[op.slot].start = f;
         for (int k = 0; k < op.count; ++k) {
+          if (only >= 0 && i == P.legs_op && k != only) continue;
           Frame end = f;
           walk<B>(P, P.chains[op.first + k], x, end, s);
           s.branches[op.first + k].end = end;

@@ -123,16 +123,29 @@ struct Block {
     set_base(P);
   }
 
+  /// Frames and wrenches of a program's machine at the coordinates found.
+  void pass(Newton& at, const Program& of) {
+    set_base(of);
+    at.evaluate(false);
+    at.frames_and_wrenches();
+  }
+
   /// Displacement of each variant after one step from here, with the factors of the base (F10).
   void vary(M done, const Newton& base, const V (&C)[6][6]) {
     const V3 offset{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
+    Elimination own{P, s, base.e.gravity, splat(0), {}};
+    Newton here{P, in, s, own, load};
+    pass(here, P);
+    residual(own, P.chains[P.root], here.point);
+    std::int32_t moved = Elimination::all;  // leg whose slots hold a variant
     for (int v = 0; v < in.perturbed_count; ++v) {
       const Program& Q = *in.perturbed[v];
       Elimination e{Q, s, base.e.gravity, splat(0), {}};
+      e.only = in.perturbed_leg[v] < 0 ? Elimination::all_anew : in.perturbed_leg[v];
+      if (e.only >= 0 && moved != Elimination::all && moved != e.only) pass(here, P);
+      moved = e.only;
       Newton at{Q, in, s, e, load};
-      set_base(Q);
-      at.evaluate(false);
-      at.frames_and_wrenches();
+      pass(at, Q);
       V c[6], eta[6];
       put(residual(e, Q.chains[Q.root], at.point), c);
       for (int i = 0; i < 6; ++i) {

@@ -137,7 +137,7 @@ struct Newton {
   [[gnu::noinline]] void frames_and_wrenches() {
     tip = {{splat(0), splat(0), splat(0)},
            {{{splat(1), splat(0), splat(0)}, {splat(0), splat(1), splat(0)}, {splat(0), splat(0), splat(1)}}}};
-    walk<Build::actual>(P, P.chains[P.root], s.x, tip, s);
+    walk<Build::actual>(P, P.chains[P.root], s.x, tip, s, e.only);
     point = tip.p;
     if (in.point[0] != 0 || in.point[1] != 0 || in.point[2] != 0)
       point = point + tip.R * V3{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};

@@ -130,7 +130,8 @@ struct KernelInput {
   double point[3];  ///< reference point in the tip frame
   std::int32_t want_stiffness, max_iterations;
   double tolerance;
-  const Program* const* perturbed;  ///< variants of the program with the same operations
+  const Program* const* perturbed;    ///< variants of the program with the same operations
+  const std::int32_t* perturbed_leg;  ///< per variant: the only leg that differs from the program; -1: anything
   std::int32_t perturbed_count;
 };
 

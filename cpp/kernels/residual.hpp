@@ -22,7 +22,9 @@ inline V6 stiff_residual(Elimination& el, const Op& op) {
   V6 sum{};
   for (int b = 0; b < op.count; ++b) {
     BranchSlot& branch = el.s.branches[op.first + b];
-    V6 c = residual(el, el.P.chains[op.first + b], branch.end.p);
+    V6 c = branch.rest;
+    if (!el.skips(op, b)) c = residual(el, el.P.chains[op.first + b], branch.end.p);
+    if (el.only == Elimination::all) branch.rest = c;
     if (b > 0) c = c + dead(branch.K, branch.F.b, frame_error(branch.end, el.s.branches[op.first].end));
     sum = sum + c;
   }

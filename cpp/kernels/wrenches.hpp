@@ -59,6 +59,7 @@ inline void block_wrenches(Elimination& el, const Op& op, V6& F, V3& p) {
   for (int b = op.count - 1; b >= 0; --b) {
     BranchSlot& branch = el.s.branches[op.first + b];
     if (b > 0) first.F = first.F - branch.F;
+    if (el.skips(op, b)) continue;
     V6 Fb = branch.F;
     V3 pb = branch.end.p;
     wrenches(el, el.P.chains[op.first + b], Fb, pb);

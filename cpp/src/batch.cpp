@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "../kernels/dispatch.hpp"
+#include "plan/moved_leg.hpp"
 #include "stiffmap/check.hpp"
 #include "stiffmap/parallel.hpp"
 
@@ -175,11 +176,13 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
   const KernelTable& table = kernel(in.count);
   const Program& program = plan.program();
   std::vector<const Program*> variants;
+  std::vector<std::int32_t> moved;
   for (const FastPlan* v : in.variants) {
     require(v->available() && v->program().op_count == program.op_count &&
                 v->program().coordinate_count == program.coordinate_count,
             "variants", "plans of the same elements", v->missing());
     variants.push_back(&v->program());
+    moved.push_back(moved_leg(program, v->program()));
   }
   std::vector<std::uint8_t> done(at(in.count), 0);
   std::vector<std::uint32_t> flags(at(in.count), 0);
@@ -202,6 +205,7 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
     Scratch& s = scratch[static_cast<std::size_t>(thread)];
     KernelInput input = kernel_input(m, in, options);
     input.perturbed = variants.data();
+    input.perturbed_leg = moved.data();
     input.perturbed_count = out.variants ? static_cast<std::int32_t>(variants.size()) : 0;
     if (!program.closes) s.closed.put(m, in, begin, end, s.reference, input);
     table.run(&program, &input, &answer, begin, end, kernel_scratch(table.scratch_size(&program)));

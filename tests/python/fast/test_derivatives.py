@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
+from stiffmap import _core
 from stiffmap.derivatives.near import Neighbours, with_requests
 from stiffmap.derivatives.stencil import central, within
 from stiffmap.effects import get, kinds
@@ -182,6 +183,24 @@ def test_neighbours_are_what_the_effects_build() -> None:
                 assert near.moved(1, first.name, value) == long, (name, kind, element, legs)
                 checked += 1
     assert checked > 150
+
+
+@pytest.mark.parametrize("level", _core.kernel_levels())
+def test_the_order_of_the_variants_leaves_no_trace(level: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A variant of one leg is evaluated in that leg alone, on what the one before it left in the others."""
+    monkeypatch.setenv("STIFFMAP_ISA", level)
+    poses = np.array([0.02, 0.05, 0.1]) + np.linspace(-0.1, 0.1, 11)[:, None]
+    there = MACHINE.solve(poses, FORCE, derivatives=EFFECTS)
+    back = MACHINE.solve(poses, FORCE, derivatives=EFFECTS[::-1])
+    for i, effect in enumerate(EFFECTS):
+        others = [e for e in EFFECTS if e is not effect]
+        last = MACHINE.solve(poses, FORCE, derivatives=[*others, effect])
+        for name in [n for n in there.derivatives if n.startswith(effect[0])]:
+            for s in (back, last):
+                assert off(s.derivatives[name][..., None], there.derivatives[name][..., None]) < 1e-7, (
+                    i,
+                    name,
+                )
 
 
 def test_the_machines_are_kept() -> None:
