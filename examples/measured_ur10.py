@@ -98,7 +98,9 @@ def write(folder: Path, machine: sm.Machine, t: dict[str, Floats], rows: int) ->
 
 def main() -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("data", type=Path, help="folder with series_B.csv")
     parser.add_argument("-o", "--output", type=Path, default=Path("ur10"))
     parser.add_argument("--rows", type=int, default=150)
