@@ -4,6 +4,7 @@ Least squares over finite-element solutions, started from a beam model. No isotr
 table's EA, EI and GJ together, so the search runs with and without the torsion entry k44: the trade-off.
 
     python examples/link_table1.py
+    python examples/link_table1.py --bars revised --design 12.77 32.44 5.35 41.28 5.87 10.77   (no search)
 """
 
 from __future__ import annotations
@@ -142,12 +143,16 @@ def main() -> None:
     parser.add_argument("--evaluations", type=int, default=5, help="steps of the search (each 7 solutions)")
     parser.add_argument("--weights", type=float, nargs="+", default=[0.0, 1.0], help="of k44 in the search")
     parser.add_argument("--bars", nargs="+", default=list(TABLE), choices=list(TABLE))
+    parser.add_argument("--design", type=float, nargs=6, metavar="MM", help="evaluate it, without a search")
     arguments = parser.parse_args()
     material = Material(*MATERIALS[arguments.material], arguments.material)
     for name in arguments.bars:
         length = TABLE[name][0]
-        for weight in arguments.weights:
-            design, _ = nearest(name, material, weight, arguments.evaluations)
+        for weight in arguments.weights[: 1 if arguments.design else None]:
+            if arguments.design:
+                design = Design(*(1e-3 * v for v in arguments.design))
+            else:
+                design, _ = nearest(name, material, weight, arguments.evaluations)
             print(f"\n{name}, weight {weight:g}: {design}", flush=True)
             # Finer than in the search, so that two coarser meshes exist for the mesh's share.
             part = solve(design, length, material, study=True, size=0.6 * design.shape(length).default_size())
