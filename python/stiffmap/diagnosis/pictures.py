@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from stiffmap.experiment.experiment import AXES, Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.machine import Machine
 
 if TYPE_CHECKING:
@@ -19,7 +19,8 @@ BEFORE, AFTER = "#c1432e", "#2a6f97"
 
 def figures(d: Diagnosis) -> dict[str, Figure]:
     """All figures by the names of their files."""
-    made = {"residual_vectors": vectors(d), "residual_trends": trends(d), "residual_histogram": histogram(d)}
+    made = {"residual_vectors": vectors(d)} if d.experiment.axis_read[:3].any() else {}
+    made |= {"residual_trends": trends(d), "residual_histogram": histogram(d)}
     if d.effects:
         made["maps"] = maps(d)
     return made
@@ -30,7 +31,7 @@ def vectors(d: Diagnosis) -> Figure:
     figure = Figure(figsize=(10, 4.6), layout="constrained")
     before, after = (_pose_means(d.experiment, _kept(d, r)) for r in (d.residual_before, d.residual_after))
     at = _pose_means(d.experiment, d.experiment.position) * MM
-    longest = max(float(np.nanmax(np.linalg.norm(before[:, :3], axis=1))), 1e-12)
+    longest = max(float(np.linalg.norm(np.nan_to_num(before[:, :3]), axis=1).max()), 1e-12)
     scale = 0.25 * max(float(np.ptp(at)), 1.0) / longest
     for i, (name, r, colour) in enumerate((("before", before, BEFORE), ("after", after, AFTER))):
         axes = figure.add_subplot(1, 2, i + 1, projection="3d")
@@ -45,9 +46,10 @@ def vectors(d: Diagnosis) -> Figure:
 
 
 def trends(d: Diagnosis) -> Figure:
-    """Residual of each axis against what may drive it."""
+    """Residual of each channel against what may drive it."""
     against = _drivers(d.experiment)
-    axes_read = [i for i in range(3) if np.isfinite(d.experiment.reading[:, i]).any()]
+    axes_read = [int(i) for i in np.flatnonzero(d.experiment.axis_read)]
+    channels = d.experiment.channels
     figure = Figure(figsize=(2.6 * len(against), 2.2 * len(axes_read) + 0.6), layout="constrained")
     grid = figure.subplots(len(axes_read), len(against), squeeze=False, sharex="col", sharey="row")
     for row, axis in enumerate(axes_read):
@@ -60,7 +62,7 @@ def trends(d: Diagnosis) -> Figure:
                 ax.plot(x, _kept(d, values)[:, axis] * UM, ".", ms=3, color=colour, alpha=0.6, label=label)
             ax.axhline(0, color="0.5", lw=0.6)
             if column == 0:
-                ax.set_ylabel(f"{AXES[axis]} / µm")
+                ax.set_ylabel(f"{channels[axis].name} / {'µm' if channels[axis].unit == 'm' else 'µrad'}")
             if row == len(axes_read) - 1:
                 ax.set_xlabel(name)
     grid[0][0].legend(fontsize=8)

@@ -133,3 +133,14 @@ def test_a_diagnosis_on_disk(tmp_path: Path, twin: Twin, capsys: pytest.CaptureF
 def test_help_has_examples(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([command, "--help"]) == 0
     assert f"stiffmap {command} orthoglide-revised" in capsys.readouterr().out
+
+
+def test_distances_and_encoders_are_diagnosed(tmp_path: Path, twin: Twin) -> None:
+    twin("--quantity", "position", "--poses", "25", "--distances", "--joint", "x.actuator", "--noise", "0.002",
+         "--effect", "length bar y error=0.2mm")  # fmt: skip
+    assert main(["diagnose", "orthoglide-revised", str(tmp_path / "twin"), "-o", str(tmp_path / "out")]) == 1
+    data = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    (effect,) = data["effects"]
+    assert (effect["kind"], effect["element"], effect["legs"]) == ("length", "bar", ["y"])
+    assert effect["parameters"]["error"][1] < 2e-4 < effect["parameters"]["error"][2]
+    assert not (tmp_path / "out" / "residual_vectors.png").exists()
