@@ -184,7 +184,9 @@ def _finish(
         typer.echo(
             f"\n{part.solver}, {len(part.mesh.nodes)} nodes, {len(part.mesh.tets)} ten-node tetrahedra"
         )
-        typer.echo("relative standard uncertainty of the diagonal, by source:")
+        typer.echo(
+            "relative standard uncertainty of the diagonal, by source (fit: which nodes, by block bootstrap):"
+        )
         typer.echo(part.budget.table(link.compliance))
         if part.refinement is not None:
             typer.echo(f"observed order of the mesh error: {part.refinement.words}")
