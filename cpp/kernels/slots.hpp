@@ -32,7 +32,7 @@ struct BranchSlot {
   Sym6 K;
   V6 c;
   V6 turn[3];  ///< its wrench by the turn of the block's start, only under gravity
-  V6 rest;  ///< residual of its chain at the last pass over all
+  V6 rest;     ///< residual of its chain at the last pass over all
 };
 
 /// All scratch of a thread, laid out once in one piece of memory.
