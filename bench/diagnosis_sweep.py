@@ -1,6 +1,6 @@
 """How often a diagnosis names the truth: virtual experiments over effects, sizes and seeds, and null sets.
 
-    python bench/diagnosis_sweep.py --null 150 --seeds 1 --out bench/diagnosis_sweep.jsonl
+    python bench/diagnosis_sweep.py --null 160 --seeds 1 --out bench/diagnosis_sweep.jsonl
 
 Resumable: cases that are in the file are not run again. `--table` prints the table of what is there.
 Size: rms of the effect's whitened signature that no single rival class can imitate, in noise floors.
@@ -12,21 +12,27 @@ import argparse
 import json
 from collections import Counter, defaultdict
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import stiffmap as sm
+from stiffmap.diagnosis.alias import same_way
 from stiffmap.diagnosis.candidates import Candidate
-from stiffmap.diagnosis.rivals import rivals
+from stiffmap.diagnosis.describe import named_effects
+from stiffmap.diagnosis.explain import Explanation, explain
 from stiffmap.diagnosis.screen import Screen
+from stiffmap.diagnosis.search import Search
 from stiffmap.diagnosis.study import Study, find, study
 from stiffmap.diagnosis.verdict import judge, unexplained
 from stiffmap.experiment import Experiment, Predictor, random_plan, simulate
 from stiffmap.experiment.problem import Problem
 
-SIZES = (1.0, 3.0, 10.0)
+SIZES = (6.0, 12.0, 3.0, 20.0, 2.0, 1.0)
+CHUNK = 25
+"""Null sets between two rounds of effects: whatever is there when a run stops is a mixture."""
 
 
 def main() -> None:
@@ -35,11 +41,12 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--machine", default="orthoglide-revised")
-    parser.add_argument("--null", type=int, default=150, help="null sets per quantity")
+    parser.add_argument("--null", type=int, default=160, help="null sets per quantity")
     parser.add_argument("--seeds", type=int, default=1, help="seeds per effect and size")
     parser.add_argument("--quantity", action="append", choices=("position", "deflection"))
     parser.add_argument("--out", type=Path, default=Path("bench/diagnosis_sweep.jsonl"))
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--commit", default="", help="noted in every record")
     parser.add_argument("--table", action="store_true")
     options = parser.parse_args()
     if not options.table:
@@ -51,39 +58,56 @@ def main() -> None:
 def run(options: argparse.Namespace, quantity: str) -> None:
     """All cases of one plan."""
     machine = sm.load_machine(options.machine)
-    number = 60 if quantity == "position" else 20
-    plan = random_plan(machine, quantity, poses=number, loads=9, seed=1)
+    number = 60 if quantity == "position" else 15
+    plan = random_plan(machine, quantity, poses=number, loads=6, seed=1)
     s = study(Predictor(machine, plan, threads=options.threads), 0)
     done = {r["case"] for r in load(options.out)}
     with options.out.open("a", encoding="utf-8") as stream:
         for case, effect, size, seed in cases(s, plan, options):
             if case not in done:
                 result = one(machine, plan, effect, seed, options.threads)
-                record = {"case": case, "quantity": quantity, "size": size, **result}
+                record = {
+                    "case": case,
+                    "quantity": quantity,
+                    "size": size,
+                    "commit": options.commit,
+                    **result,
+                }
                 stream.write(json.dumps(record) + "\n")
                 stream.flush()
 
 
 def cases(s: Study, plan: Experiment, options: argparse.Namespace) -> Iterator[tuple[str, Any, float, int]]:
-    """Null sets, then each class's representative at each size, largest sizes first."""
-    for seed in range(options.null):
-        yield f"{plan.quantity} null {seed}", None, 0.0, seed
+    """Null sets and effects in turn, so that a run that stops early is a fair sample."""
+    nulls = iter(range(options.null))
+    for k, case in enumerate(effect_cases(s, plan, options)):
+        if k % CHUNK == 0:
+            yield from (null_case(plan, seed) for seed in islice(nulls, CHUNK))
+        yield case
+    yield from (null_case(plan, seed) for seed in nulls)
+
+
+def null_case(plan: Experiment, seed: int) -> tuple[str, Any, float, int]:
+    """A set without any effect."""
+    return f"{plan.quantity} null {seed}", None, 0.0, seed
+
+
+def effect_cases(
+    s: Study, plan: Experiment, options: argparse.Namespace
+) -> Iterator[tuple[str, Any, float, int]]:
+    """Each class's representative at each size."""
     screen = Screen.of(Problem.of(plan, s.noise.sigma, s.plan.base), s.plan.variants)
     named = [i for i, v in enumerate(s.plan.variants) if v.candidate in {c.representative for c in s.classes}]
-    for size in sorted(SIZES, reverse=True):
+    for size in SIZES:
         for i in named:
             variant = screen.variants[i]
-            if not variant.shape and len(variant.candidate.legs) != 2:
+            if not variant.shape:
                 for seed in range(options.seeds):
                     values = sized(screen, i, named, size, seed)
                     if values is not None:
                         term = variant.candidate.term(values)
-                        yield (
-                            f"{plan.quantity} {variant.candidate} {size} {seed}",
-                            (variant.candidate, term),
-                            size,
-                            seed,
-                        )
+                        name = f"{plan.quantity} {variant.candidate} {size} {seed}"
+                        yield name, (variant.candidate, term), size, seed
 
 
 def sized(screen: Screen, i: int, others: list[int], size: float, seed: int) -> Any:
@@ -97,7 +121,7 @@ def sized(screen: Screen, i: int, others: list[int], size: float, seed: int) -> 
         (
             np.linalg.norm(w - q @ (q.T @ w))
             for k in others
-            if k != i
+            if k != i and same_way(screen, i, k)
             for q in [screen.basis(k)]
             if len(c.parameters) >= q.shape[1]
         ),
@@ -105,12 +129,17 @@ def sized(screen: Screen, i: int, others: list[int], size: float, seed: int) -> 
     )
     if rest < 1e-9:
         return None
-    values = direction * size * np.sqrt(screen.readings) / rest
-    if np.abs(values).max() > 200:
-        return None
+    tried = [direction, -direction] if not sign.any() else [direction]
+    return next(
+        (v for d in tried if (v := _within(c, d * size * np.sqrt(screen.readings) / rest)) is not None), None
+    )
+
+
+def _within(c: Candidate, values: Any) -> Any:
+    """SI values of so many scales from the null, if the effect allows them."""
     si = np.array([float(p.null or 0.0) + v * p.scale for p, v in zip(c.parameters, values, strict=True)])
     inside = all(p.lower <= v <= p.upper for p, v in zip(c.parameters, si, strict=True))
-    return si if inside else None
+    return si if inside and np.abs(values).max() <= 200 else None
 
 
 def one(machine: sm.Machine, plan: Experiment, effect: Any, seed: int, threads: int) -> dict[str, Any]:
@@ -123,22 +152,36 @@ def one(machine: sm.Machine, plan: Experiment, effect: Any, seed: int, threads: 
     s = study(Predictor(machine, twin, threads=threads), 0)
     finding = find(s)
     finding, verdict = judge(s, finding, unexplained(s, finding))
-    model = finding.model
-    other = rivals(finding.search, model, s.classes) if model.candidates and verdict == "effects" else []
-    named = [aliases(s, c) for c in model.candidates]
-    instead = [c for r in other for c in r.model.candidates]
+    if not finding.model.candidates:
+        return {"verdict": verdict, "outcome": outcome(effect, [], [], verdict)}
+    why = explain(s, finding.search, finding.model)
+    named = [aliases(s, c, why) for c in why.model.candidates]
+    instead = [c for m in why.others for c in m.candidates]
     return {
-        "verdict": "ambiguous" if other else verdict,
-        "names": [str(c) for c in model.candidates],
+        "verdict": "ambiguous" if why.others and verdict == "effects" else verdict,
+        "names": [str(c) for c in why.model.candidates],
         "instead": [str(c) for c in instead],
         "outcome": outcome(effect, named, instead, verdict),
+        "inside": inside(s, finding.search, why, effect),
     }
 
 
-def aliases(s: Study, c: Candidate) -> set[Candidate]:
-    """The candidate and what the plan cannot tell from it."""
-    found = next((k for k in s.classes if k.representative == c), None)
-    return {c} if found is None else {c, *found.members, *found.generalisations}
+def inside(s: Study, search: Search, why: Explanation, effect: Any) -> list[bool]:
+    """Per parameter of a truth that is named itself: whether the 95 % interval holds it."""
+    if effect is None:
+        return []
+    found = [e for e in named_effects(s, search, why.model) if e.place == effect[0].place]
+    truth = dict(effect[1].parameters)
+    return [
+        low <= truth[n] <= high for e in found for n, (_, low, high, _) in e.parameters.items() if n in truth
+    ]
+
+
+def aliases(s: Study, c: Candidate, why: Explanation) -> set[Candidate]:
+    """The candidate and what the plan cannot tell from it, at all or at this size."""
+    near = {a for own, a, _ in why.aliases if own == c}
+    wide = [k for k in s.classes if k.representative in {c, *near}]
+    return {c, *near}.union(*({*k.members, *k.generalisations} for k in wide))
 
 
 def outcome(effect: Any, named: list[set[Candidate]], instead: list[Candidate], verdict: str) -> str:
@@ -181,6 +224,8 @@ def table(records: list[dict[str, Any]]) -> str:
     for (quantity, size), c in sorted(counts.items()):
         label = "null" if size == 0 else f"{size:g}"
         lines.append(f"| {quantity} | {label} | {c.total()} | " + " | ".join(str(c[h]) for h in heads) + " |")
+    held = [v for r in records for v in r.get("inside", [])]
+    lines.append(f"\nTrue values inside their 95 % intervals: {sum(held)} of {len(held)}.")
     return "\n".join(lines)
 
 

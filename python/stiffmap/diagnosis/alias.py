@@ -45,7 +45,7 @@ def alias_classes(screen: Screen, description: MachineDescription) -> list[Alias
             continue
         inside = [b for b in range(len(order)) if b != a and gap[a, b] < tolerance**2]
         same = [
-            b for b in inside if screen.rank[order[b]] == screen.rank[i] and _same_way(screen, i, order[b])
+            b for b in inside if screen.rank[order[b]] == screen.rank[i] and same_way(screen, i, order[b])
         ]
         more = [b for b in inside if screen.rank[order[b]] > screen.rank[i]]
         free = [order[b] for b in same if order[b] not in taken]
@@ -71,7 +71,7 @@ def containment(screen: Screen, order: Sequence[int]) -> Floats:
     return np.asarray(np.maximum(screen.rank[list(order)][:, None] - shared, 0.0))
 
 
-def _same_way(screen: Screen, i: int, j: int) -> bool:
+def same_way(screen: Screen, i: int, j: int) -> bool:
     """False where both can only grow, one against the other."""
     a, b = screen.variants[i], screen.variants[j]
     if a.sign.size != 1 or b.sign.size != 1 or not (a.sign[0] and b.sign[0]):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from stiffmap import effects
 from stiffmap.description import AppliedEffect, MachineDescription
@@ -11,6 +11,8 @@ from stiffmap.effects import EffectType, Parameter, registry
 from stiffmap.experiment.experiment import Experiment
 
 Names = tuple[str, ...]
+PLAUSIBLE = {("thermal_growth", "coefficient"): (-5e-5, 5e-5)}
+"""Ranges narrower than an effect's own, for explanations: 1/K of metals, ceramics and composites."""
 
 
 @dataclass(frozen=True)
@@ -70,9 +72,15 @@ def of_kind(effect: EffectType, description: MachineDescription) -> list[Candida
             p for p in effect.parameters_at(description, element, legs) if p.fitted or _unknown(p)
         )
         parameters = tuple(p for p in parameters if not _later_alternative(effect, p, parameters))
+        parameters = tuple(_plausible(effect.kind, p) for p in parameters)
         if parameters and any(p.null is not None for p in parameters):
             out.append(Candidate(effect.kind, element, legs, parameters))
     return out
+
+
+def _plausible(kind: str, p: Parameter) -> Parameter:
+    lower, upper = PLAUSIBLE.get((kind, p.name), (p.lower, p.upper))
+    return replace(p, lower=max(lower, p.lower), upper=min(upper, p.upper))
 
 
 def _unknown(p: Parameter) -> bool:

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.diagnosis.study import Study, find
+from stiffmap.diagnosis.study import Study, alone, find
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise import Mask
-from stiffmap.experiment.outliers import outliers
 from stiffmap.experiment.summary import Summary, summary
 
 FOLDS = 5
@@ -59,8 +58,8 @@ def held_out(study: Study, listed: Mask, seed: int) -> HeldOut | None:
         finding = find(study, ~test, finalists=3)
         chosen.update(map(str, finding.model.candidates))
         residual = e.reading - study.predictor(finding.model.terms())
-        alone = outliers(e, np.where(test[:, None], residual, np.nan), study.noise.sigma) & listed
-        after[test & ~alone] = residual[test & ~alone]
+        gone = alone(study, np.where(test[:, None], residual, np.nan)) & listed
+        after[test & ~gone] = residual[test & ~gone]
     before = np.where(np.isfinite(after), e.reading - study.plan.base, np.nan)
     sigma = study.noise.sigma
     return HeldOut(

@@ -31,6 +31,8 @@ class Study:
     noise: Noise
     classes: tuple[AliasClass, ...]
     searches: float
+    whole: tuple[Problem, Screen]
+    """All rows, and the representatives on them."""
     seconds: dict[str, float]
     """What the sensitivities and the bootstrap of the search took; nothing where they were known."""
 
@@ -59,6 +61,9 @@ class Finding:
         return self.selection.model
 
 
+TYPICAL = 1.2
+"""Robust spread of residuals, in noise floors, that still counts as a model that fits."""
+
 _SEARCHES: dict[tuple[str, int, bytes], float] = {}
 
 
@@ -72,12 +77,13 @@ def study(predictor: Predictor, seed: int) -> Study:
     problem = Problem.of(e, first.sigma, plan.base)
     screen = Screen.of(problem, plan.variants)
     classes = tuple(alias_classes(screen, predictor.machine.description))
+    named = _representatives(screen, classes)
     key = (plan.digest, seed, np.round(np.log(first.sigma), 2).tobytes())
     prepared = time.perf_counter()
     if key not in _SEARCHES:
-        _SEARCHES[key] = number_of_searches(_representatives(screen, classes), seed)
+        _SEARCHES[key] = number_of_searches(named, seed)
     seconds = {"sensitivities": prepared - start, "null bootstrap": time.perf_counter() - prepared}
-    return Study(predictor, plan, first, classes, _SEARCHES[key], seconds)
+    return Study(predictor, plan, first, classes, _SEARCHES[key], (problem, named), seconds)
 
 
 def find(study: Study, rows: Mask | None = None, *, finalists: int = 5) -> Finding:
@@ -89,19 +95,24 @@ def find(study: Study, rows: Mask | None = None, *, finalists: int = 5) -> Findi
         search = _search(study, allowed & ~out, finalists)
         selection = select(search)
         residual = e.reading - study.predictor(selection.model.terms())
-        again = outliers(e, _held(residual, allowed), study.noise.sigma) & allowed
+        again = alone(study, _held(residual, allowed)) & allowed
         if np.array_equal(again, out):
             break
         out = again
-    search = _search(study, allowed & ~out, finalists)
-    return Finding(_again(selection, search), search, out)
+    else:
+        search = _search(study, allowed & ~out, finalists)
+        selection = select(search)
+    return Finding(selection, search, out)
 
 
-def _again(selection: Selection, search: Search) -> Selection:
-    """The selection's residuals on the rows of this search."""
-    if selection.model.residual is not None and len(selection.model.residual) == len(search.problem):
-        return selection
-    return select(search)
+def alone(study: Study, residual: Floats) -> Mask:
+    """(n,) outliers of residuals (n, 6); where the model does not fit, its misfit is no row's fault:
+    then noise is what most residuals show."""
+    sigma = study.noise.sigma
+    seen = np.isfinite(residual).any(axis=0)
+    typical = np.ones(6)
+    typical[seen] = 1.4826 * np.nanmedian(np.abs(residual / sigma)[:, seen], axis=0)
+    return outliers(study.experiment, residual, sigma * np.maximum(typical / TYPICAL, 1.0))
 
 
 def _held(residual: Floats, allowed: Mask) -> Floats:
@@ -109,6 +120,8 @@ def _held(residual: Floats, allowed: Mask) -> Floats:
 
 
 def _search(study: Study, keep: Mask, finalists: int) -> Search:
+    if keep.all():
+        return Search(study.predictor, *study.whole, study.searches, finalists)
     problem = Problem.of(study.experiment, study.noise.sigma, study.plan.base, keep)
     screen = _representatives(Screen.of(problem, study.plan.variants), study.classes)
     return Search(study.predictor, problem, screen, study.searches, finalists)
