@@ -110,7 +110,7 @@ def alone(study: Study, residual: Floats) -> Mask:
     then noise is what most residuals show."""
     sigma = study.noise.sigma
     seen = np.isfinite(residual).any(axis=0)
-    typical = np.ones(6)
+    typical = np.ones(sigma.shape[1])
     typical[seen] = 1.4826 * np.nanmedian(np.abs(residual / sigma)[:, seen], axis=0)
     return outliers(study.experiment, residual, sigma * np.maximum(typical / TYPICAL, 1.0))
 
