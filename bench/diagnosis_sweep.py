@@ -23,10 +23,10 @@ from stiffmap.diagnosis.alias import same_way
 from stiffmap.diagnosis.candidates import Candidate
 from stiffmap.diagnosis.describe import named_effects
 from stiffmap.diagnosis.explain import Explanation, explain
+from stiffmap.diagnosis.judge import judge
 from stiffmap.diagnosis.screen import Screen
 from stiffmap.diagnosis.search import Search
 from stiffmap.diagnosis.study import Study, find, study
-from stiffmap.diagnosis.verdict import judge, unexplained
 from stiffmap.experiment import Experiment, Predictor, random_plan, simulate
 from stiffmap.experiment.problem import Problem
 
@@ -150,8 +150,7 @@ def one(machine: sm.Machine, plan: Experiment, effect: Any, seed: int, threads: 
     except sm.StiffmapError as problem:
         return {"outcome": "not simulated", "why": str(problem)}
     s = study(Predictor(machine, twin, threads=threads), 0)
-    finding = find(s)
-    finding, verdict = judge(s, finding, unexplained(s, finding))
+    finding, verdict, _ = judge(s, find(s))
     if not finding.model.candidates:
         return {"verdict": verdict, "outcome": outcome(effect, [], [], verdict)}
     why = explain(s, finding.search, finding.model)

@@ -51,7 +51,8 @@ class Candidate:
 
     def __str__(self) -> str:
         legs = f", leg{'s' if len(self.legs) > 1 else ''} {', '.join(self.legs)}" if self.legs else ""
-        return f"{self.kind} of {self.element}{legs}"
+        axes = " by axis" if self.parameters[0].name == "gain_x" else ""
+        return f"{self.kind} of {self.element}{legs}{axes}"
 
 
 def candidates(description: MachineDescription, experiment: Experiment) -> list[Candidate]:
@@ -74,8 +75,16 @@ def of_kind(effect: EffectType, description: MachineDescription) -> list[Candida
         parameters = tuple(p for p in parameters if not _later_alternative(effect, p, parameters))
         parameters = tuple(_plausible(effect.kind, p) for p in parameters)
         if parameters and any(p.null is not None for p in parameters):
-            out.append(Candidate(effect.kind, element, legs, parameters))
+            out += [Candidate(effect.kind, element, legs, part) for part in meanings(parameters)]
     return out
+
+
+def meanings(parameters: tuple[Parameter, ...]) -> list[tuple[Parameter, ...]]:
+    """The parameters, or apart the one that stands for all axes (`gain` beside `gain_x` …): together they
+    would say the same thing twice."""
+    names = {p.name for p in parameters}
+    common = tuple(p for p in parameters if f"{p.name}_x" in names)
+    return [common, tuple(p for p in parameters if p not in common)] if common else [parameters]
 
 
 def _plausible(kind: str, p: Parameter) -> Parameter:

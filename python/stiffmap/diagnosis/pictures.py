@@ -23,7 +23,31 @@ def figures(d: Diagnosis) -> dict[str, Figure]:
     made |= {"residual_trends": trends(d), "residual_histogram": histogram(d)}
     if d.effects:
         made["maps"] = maps(d)
+    if d.unexplained and d.empirical:
+        made["unexplained"] = left(d)
     return made
+
+
+def left(d: Diagnosis) -> Figure:
+    """What is left of the worst axis over the workspace, and the empirical field that would remove it."""
+    assert d.empirical is not None
+    names = [c.name for c in d.experiment.channels]
+    named = [p.axis for p in d.unexplained if p.axis in names[:3]]
+    axis = names.index(named[0]) if named else 0
+    figure = Figure(figsize=(11, 6.4), layout="constrained")
+    at = _pose_means(d.experiment, d.experiment.position) * MM
+    shown = [
+        _pose_means(d.experiment, _kept(d, v))[:, axis] * UM for v in (d.residual_after, d.empirical.field)
+    ]
+    top = max(float(np.nanmax(np.abs(v))) for v in shown)
+    titles = (f"left in {names[axis]}, mean of each pose", "empirical field, from the other poses")
+    for row, (title, values) in enumerate(zip(titles, shown, strict=True)):
+        for column, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
+            ax = figure.add_subplot(2, 3, 3 * row + column + 1)
+            dots = ax.scatter(at[:, a], at[:, b], c=values, cmap="coolwarm", vmin=-top, vmax=top, s=36)
+            ax.set(xlabel=f"{'xyz'[a]} / mm", ylabel=f"{'xyz'[b]} / mm", title=title if column == 1 else "")
+        figure.colorbar(dots, ax=figure.axes[3 * row : 3 * row + 3], label=f"{names[axis]} / µm")
+    return figure
 
 
 def vectors(d: Diagnosis) -> Figure:

@@ -17,6 +17,7 @@ from stiffmap.errors import FileError
 
 if TYPE_CHECKING:
     from stiffmap.diagnosis.result import Diagnosis, Effect
+    from stiffmap.diagnosis.structure import Pattern
     from stiffmap.experiment.checks import Check
 
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
@@ -145,7 +146,8 @@ def _pair(b: Check, a: Check) -> tuple[str, str, str, str]:
 def _left(d: Diagnosis) -> str:
     if not d.unexplained:
         return "<p>Nothing beyond noise.</p>"
-    out = table(("axis", "pattern", "chance"), [(p.axis, p.what, f"{p.p:.2g}") for p in d.unexplained[:12]])
+    rows = [(p.axis, p.what, p.detail, _at(p), f"{p.p:.2g}") for p in d.unexplained[:12]]
+    out = table(("axis", "pattern", "how", "largest at", "chance"), rows)
     if d.empirical:
         out += (
             "<p>An <b>empirical</b> correction (Gaussian process, no physical cause claimed) would bring "
@@ -153,6 +155,12 @@ def _left(d: Diagnosis) -> str:
             f"to {1e3 * d.empirical.after:.4f} mm rms.</p>"
         )
     return out
+
+
+def _at(p: Pattern) -> str:
+    if p.position is None:
+        return ""
+    return "(" + ", ".join(f"{1e3 * v:.0f}" for v in p.position) + f") mm: {p.size:.2g} m (rad) rms"
 
 
 def _detectable(d: Diagnosis) -> str:

@@ -30,10 +30,17 @@ class Pattern:
     """Chance under noise, corrected for all patterns tried."""
     removed: float
     """Drop of chi-square."""
+    detail: str = ""
+    """Period, step or slope, in words with units."""
+    position: tuple[float, float, float] | None = None
+    """Commanded position of the pose where the axis is worst, m."""
+    size: float = float("nan")
+    """rms of what is left there, m or rad."""
 
 
 def patterns(problem: Problem, residual: Floats, tangent: Floats) -> list[Pattern]:
-    """Significant patterns, the most surprising first; `residual` (N,) and `tangent` (N, k) whitened."""
+    """Significant patterns, those first that explain most by least; `residual` (N,) and `tangent` (N, k)
+    whitened."""
     tested = [
         (axis, name, *_drop(problem, residual, tangent, axis, columns))
         for name, columns in features(problem)
@@ -41,6 +48,8 @@ def patterns(problem: Problem, residual: Floats, tangent: Floats) -> list[Patter
         if problem.experiment.read[:, axis].any()
     ]
     number = len(tested)
+    price = float(np.log(max(len(problem), 2)))
+    tested.sort(key=lambda t: t[3] * price - t[2])
     out = [
         Pattern(
             problem.experiment.channels[axis].name,
@@ -50,7 +59,7 @@ def patterns(problem: Problem, residual: Floats, tangent: Floats) -> list[Patter
         )
         for axis, name, drop, rank in tested
     ]
-    return sorted((p for p in out if p.p < ALPHA), key=lambda p: (p.p, -p.removed))
+    return [p for p in out if p.p < ALPHA]
 
 
 def _drop(

@@ -9,7 +9,6 @@ import numpy as np
 
 from stiffmap.description import MachineDescription
 from stiffmap.diagnosis.alias import AliasClass, alias_classes
-from stiffmap.diagnosis.fit import evaluate
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.screen import Screen
 from stiffmap.diagnosis.search import Search, Selection, select
@@ -92,7 +91,7 @@ def find(study: Study, rows: Mask | None = None, *, finalists: int = 5) -> Findi
     allowed = np.ones(len(e), bool) if rows is None else rows
     out = suspects(e, e.reading - study.plan.base, study.noise.sigma) & allowed
     for _ in range(3):
-        search = _search(study, allowed & ~out, finalists)
+        search = search_on(study, allowed & ~out, finalists)
         selection = select(search)
         residual = e.reading - study.predictor(selection.model.terms())
         again = alone(study, _held(residual, allowed)) & allowed
@@ -100,7 +99,7 @@ def find(study: Study, rows: Mask | None = None, *, finalists: int = 5) -> Findi
             break
         out = again
     else:
-        search = _search(study, allowed & ~out, finalists)
+        search = search_on(study, allowed & ~out, finalists)
         selection = select(search)
     return Finding(selection, search, out)
 
@@ -119,7 +118,8 @@ def _held(residual: Floats, allowed: Mask) -> Floats:
     return np.where(allowed[:, None], residual, np.nan)
 
 
-def _search(study: Study, keep: Mask, finalists: int) -> Search:
+def search_on(study: Study, keep: Mask, finalists: int) -> Search:
+    """The search on some of the rows."""
     if keep.all():
         return Search(study.predictor, *study.whole, study.searches, finalists)
     problem = Problem.of(study.experiment, study.noise.sigma, study.plan.base, keep)
@@ -130,8 +130,3 @@ def _search(study: Study, keep: Mask, finalists: int) -> Search:
 def _representatives(screen: Screen, classes: tuple[AliasClass, ...]) -> Screen:
     named = {c.representative for c in classes}
     return screen.only([i for i, v in enumerate(screen.variants) if v.candidate in named])
-
-
-def null_model(finding: Finding) -> Model:
-    """The declared machine on the finding's rows."""
-    return evaluate(Model(), finding.search.predictor, finding.search.problem)

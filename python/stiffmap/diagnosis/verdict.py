@@ -14,13 +14,14 @@ from stiffmap.diagnosis.describe import aliases_of, as_place, named_effects
 from stiffmap.diagnosis.detect import detectable
 from stiffmap.diagnosis.empirical import empirical
 from stiffmap.diagnosis.explain import explain
+from stiffmap.diagnosis.judge import after_checks, judge
+from stiffmap.diagnosis.locate import located
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.result import Detectability, Diagnosis, NoiseReport
 from stiffmap.diagnosis.separate import separation
-from stiffmap.diagnosis.stability import SHARE, explained, steady
-from stiffmap.diagnosis.structure import Pattern, patterns
+from stiffmap.diagnosis.structure import Pattern
 from stiffmap.diagnosis.study import Finding, Study, find, study
-from stiffmap.experiment.checks import Check, checks
+from stiffmap.experiment.checks import checks
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.limits import limitations, refuse
 from stiffmap.experiment.load import load_experiment
@@ -29,8 +30,8 @@ from stiffmap.experiment.predict import Predictor
 from stiffmap.experiment.summary import Summary, summary
 from stiffmap.machine import Machine, load_machine
 
-VIOLATED = 1e-6
-"""Chance below which a model-free check, applied to what the effects leave, refuses the verdict."""
+LISTED = 20
+"""Patterns that a verdict lists at most."""
 
 
 def diagnose(
@@ -66,8 +67,7 @@ def diagnose(
     s = study(predictor, seed)
     clock = [time.perf_counter()]
     finding = find(s)
-    left = unexplained(s, finding)
-    finding, verdict = judge(s, finding, left)
+    finding, verdict, left = judge(s, finding)
     clock.append(time.perf_counter())
     held = held_out(s, finding.outliers, seed) if cross_validate else None
     clock.append(time.perf_counter())
@@ -76,36 +76,6 @@ def diagnose(
     steps = ("search", "cross-validation", "rivals and intervals")
     answer.seconds.update(s.seconds, **dict(zip(steps, np.diff(clock).tolist(), strict=True)))
     return answer
-
-
-def unexplained(s: Study, finding: Finding) -> list[Pattern]:
-    """Patterns and violated checks in what the effects leave."""
-    model = finding.model
-    assert model.residual is not None
-    found = patterns(finding.search.problem, model.residual, model.tangent())
-    for check in after_checks(s, finding):
-        if check.contrasts and check.p < VIOLATED:
-            found.append(Pattern("all axes", f"{check.name} violated ({check.meaning})", check.p, np.nan))
-    return found
-
-
-def after_checks(s: Study, finding: Finding) -> list[Check]:
-    """Model-free checks of the residual."""
-    residual = s.experiment.reading - s.predictor(finding.model.terms())
-    return checks(s.experiment, residual, s.noise.sigma, ~finding.outliers)
-
-
-def judge(s: Study, finding: Finding, left: list[Pattern]) -> tuple[Finding, str]:
-    """Verdict; effects that a rest makes untrustworthy are withdrawn."""
-    model = finding.model
-    if not left:
-        return finding, "effects" if model.candidates else "none"
-    if model.candidates:
-        share = explained(finding.selection.null, model, finding.search.problem.freedom)
-        if share >= SHARE and all(steady(finding.search.problem, model)):
-            return finding, "effects+unattributed"
-    selection = replace(finding.selection, model=finding.selection.null)
-    return replace(finding, selection=selection), "unattributed"
 
 
 def _assemble(
@@ -157,7 +127,9 @@ def _assemble(
         outliers=[e.ids[i] for i in np.flatnonzero(finding.outliers)],
         checks_before=checks(e, e.reading, s.noise.sigma, keep),
         checks_after=after_checks(s, finding),
-        unexplained=left,
+        unexplained=[
+            located(p, e, np.where(keep[:, None], after, np.nan), s.noise.sigma) for p in left[:LISTED]
+        ],
         limitations=limitations(e, s.noise, s.predictor.machine),
         significance={"searches": s.searches, "alpha": search.alpha, "needed_minus_ln_p": search.threshold},
         machine=predicted_machine(s, model),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from stiffmap.diagnosis.result import Diagnosis, Effect
     from stiffmap.diagnosis.separate import Separation
+    from stiffmap.diagnosis.structure import Pattern
 
 SHOWN = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
 VERDICTS = {
@@ -76,11 +77,19 @@ def _left(d: Diagnosis) -> str:
         more = (
             f"; an empirical correction would leave {1e3 * d.empirical.after:.4f} mm" if d.empirical else ""
         )
-        return f"unexplained: {p.what} in {p.axis} (chance {p.p:.1g}){more}"
+        detail = f", {p.detail}" if p.detail else ""
+        return f"unexplained: {p.what} in {p.axis} (chance {p.p:.1g}){detail}{_place(p)}{more}"
     if d.separations:
         return f"to separate: {separation_text(d.separations[0])}"
     out = f"{len(d.outliers)} outliers listed" if d.outliers else "no outliers"
     return f"nothing unexplained: lack of fit p = {d.noise.lack_of_fit_after:.2g}; {out}"
+
+
+def _place(p: Pattern) -> str:
+    if p.position is None:
+        return ""
+    where = ", ".join(f"{1e3 * v:.0f}" for v in p.position)
+    return f"; largest at ({where}) mm, {shown(p.size, 'rad' if p.axis.startswith('r') else 'm')} rms"
 
 
 def _limits(d: Diagnosis) -> str:
