@@ -218,7 +218,8 @@ def table(records: list[dict[str, Any]]) -> str:
     )
     counts: dict[tuple[str, float], Counter[str]] = defaultdict(Counter)
     for r in records:
-        counts[(r["quantity"], r["size"])][r["outcome"]] += 1
+        if r["outcome"] != "not simulated":
+            counts[(r["quantity"], r["size"])][r["outcome"]] += 1
     lines = ["| plan | size | sets | " + " | ".join(heads) + " |", "|" + "---|" * (3 + len(heads))]
     for (quantity, size), c in sorted(counts.items()):
         label = "null" if size == 0 else f"{size:g}"

@@ -8,6 +8,7 @@ import numpy as np
 
 from stiffmap.diagnosis.structure import Pattern, unit, waves
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.noise import Mask
 
 STEP_SHARE = 0.8
 """A single step that explains this share of what waves explain is the simpler description."""
@@ -30,7 +31,7 @@ def located(pattern: Pattern, e: Experiment, residual: Floats, sigma: Floats) ->
 
 
 def worst_pose(
-    e: Experiment, good: np.ndarray[tuple[int], np.dtype[np.bool_]], y: Floats, sigma: Floats
+    e: Experiment, good: Mask, y: Floats, sigma: Floats
 ) -> tuple[tuple[float, float, float], float]:
     """Commanded position (m) of the pose whose readings are longest in standard deviations, and its rms."""
     groups = e.groups[good]
@@ -41,7 +42,7 @@ def worst_pose(
     return (x, y_, z), float(np.sqrt(np.mean(y[groups == worst] ** 2)))
 
 
-def _words(what: str, e: Experiment, good: np.ndarray[tuple[int], np.dtype[np.bool_]], y: Floats) -> str:
+def _words(what: str, e: Experiment, good: Mask, y: Floats) -> str:
     if what.startswith("waves"):
         name = what.split()[-1]
         series = {"order": e.order, "temperature": e.temperature}.get(name)
