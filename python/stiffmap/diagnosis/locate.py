@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.diagnosis.structure import Pattern, unit, waves
+from stiffmap.diagnosis.structure import Pattern, unit
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise import Mask
 
@@ -59,17 +59,22 @@ def _words(what: str, e: Experiment, good: Mask, y: Floats) -> str:
 
 def _wave(name: str, x: Floats, y: Floats) -> str:
     factor, label = (1e3, "mm") if name in "xyz" else (1.0, "K" if name == "temperature" else "readings")
-    columns = waves(unit(x[:, None])[:, 0])
-    a = np.linalg.lstsq(np.column_stack([np.ones(len(y)), columns]), y, rcond=None)[0]
-    explained = float(np.sum((y - y.mean()) ** 2) - np.sum((y - a[0] - columns @ a[1:]) ** 2))
+    total = float(np.sum((y - y.mean()) ** 2))
+    tries = [_single(x, y, k) for k in np.arange(1.0, 12.01, 0.25)]
+    left, period, amplitude = min(tries)
     share, edge, height = _step(x, y)
-    if share > STEP_SHARE * explained:
+    if share > STEP_SHARE * (total - left):
         return f"a step of {1e6 * height:+.1f} µm at {name} = {factor * edge:.4g} {label}"
-    half = len(a[1:]) // 2
-    power = np.hypot(a[1 : half + 1], a[half + 1 :])
-    k = int(np.argmax(power))
-    period = 2.0 * float(np.ptp(x)) / (k + 1)
-    return f"mostly a period of {factor * period:.3g} {label}, amplitude {1e6 * power[k]:.1f} µm"
+    return f"mostly a period of {factor * period:.3g} {label}, amplitude {1e6 * amplitude:.1f} µm"
+
+
+def _single(x: Floats, y: Floats, halves: float) -> tuple[float, float, float]:
+    """Sum of squares that one wave with so many half periods leaves, its period and amplitude."""
+    phase = np.pi * halves * x / float(np.ptp(x))
+    columns = np.column_stack([np.ones(len(y)), np.sin(phase), np.cos(phase)])
+    a = np.linalg.lstsq(columns, y, rcond=None)[0]
+    left = float(np.sum((y - columns @ a) ** 2))
+    return left, 2.0 * float(np.ptp(x)) / halves, float(np.hypot(a[1], a[2]))
 
 
 def _step(x: Floats, y: Floats) -> tuple[float, float, float]:

@@ -41,12 +41,13 @@ def left(d: Diagnosis) -> Figure:
     ]
     top = max(float(np.nanmax(np.abs(v))) for v in shown)
     titles = (f"left in {names[axis]}, mean of each pose", "empirical field, from the other poses")
+    grid = figure.subplots(2, 3)
     for row, (title, values) in enumerate(zip(titles, shown, strict=True)):
         for column, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
-            ax = figure.add_subplot(2, 3, 3 * row + column + 1)
+            ax = grid[row, column]
             dots = ax.scatter(at[:, a], at[:, b], c=values, cmap="coolwarm", vmin=-top, vmax=top, s=36)
             ax.set(xlabel=f"{'xyz'[a]} / mm", ylabel=f"{'xyz'[b]} / mm", title=title if column == 1 else "")
-        figure.colorbar(dots, ax=figure.axes[3 * row : 3 * row + 3], label=f"{names[axis]} / µm")
+        figure.colorbar(dots, ax=list(grid[row]), label=f"{names[axis]} / µm")
     return figure
 
 
