@@ -161,9 +161,11 @@ def seen_from(
 
 def _at_command(machine: Machine, plan: Experiment) -> Floats:
     """(n, c) zero where the pose can be reached, else NaN."""
-    status = inverse_kinematics(machine, plan.position, plan.rotation).status
+    _, first, back = np.unique(plan.groups, return_index=True, return_inverse=True)
+    once = plan.rows(first)
+    status = inverse_kinematics(machine, once.position, once.rotation).status
     zero = np.zeros((len(plan), len(plan.channels)))
-    return np.where((status == Status.CONVERGED)[:, None], zero, np.nan)
+    return np.where((status == Status.CONVERGED)[back.reshape(-1), None], zero, np.nan)
 
 
 def _moves_unloaded(machine: Machine, plan: Experiment) -> bool:
