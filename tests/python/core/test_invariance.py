@@ -37,8 +37,8 @@ def test_wrench_at_another_point_is_the_equivalent_one_at_the_tcp() -> None:
         MachineDescription("m", (Leg("one", (b.stiff("link", k),)),), platform=(Point("flange", tuple(arm)),))
     )
     force = np.array([30.0, -20, 10])
-    at_point = machine.solve((0, 0, 0), [*force, 0, 0, 0], point="flange", read_points=("tcp",))
-    at_tcp = machine.solve((0, 0, 0), [*force, *np.cross(arm, force)], read_points=("flange",))
+    at_point = machine.solve((0, 0, 0), [*force, 0, 0, 0], point="platform.flange", read_points=("tcp",))
+    at_tcp = machine.solve((0, 0, 0), [*force, *np.cross(arm, force)], read_points=("platform.flange",))
     # to first order: the arm itself turns under the dead force
     np.testing.assert_allclose(at_point.readings[1], at_tcp.readings[0], rtol=1e-3, atol=1e-9)
     np.testing.assert_allclose(at_point.readings[0], at_tcp.readings[1], rtol=1e-3, atol=1e-9)
