@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -63,9 +64,9 @@ def run(options: argparse.Namespace, quantity: str) -> None:
     s = study(Predictor(machine, plan, threads=options.threads), 0)
     done = {r["case"] for r in load(options.out)}
     with options.out.open("a", encoding="utf-8") as stream:
-        for case, effect, size, seed in cases(s, plan, options):
+        for case, effect, size in cases(s, plan, options):
             if case not in done:
-                result = one(machine, plan, effect, seed, options.threads)
+                result = one(machine, plan, effect, crc32(case.encode()), options.threads)
                 record = {
                     "case": case,
                     "quantity": quantity,
@@ -77,24 +78,22 @@ def run(options: argparse.Namespace, quantity: str) -> None:
                 stream.flush()
 
 
-def cases(s: Study, plan: Experiment, options: argparse.Namespace) -> Iterator[tuple[str, Any, float, int]]:
+def cases(s: Study, plan: Experiment, options: argparse.Namespace) -> Iterator[tuple[str, Any, float]]:
     """Null sets and effects in turn, so that a run that stops early is a fair sample."""
     nulls = iter(range(options.null))
     for k, case in enumerate(effect_cases(s, plan, options)):
         if k % CHUNK == 0:
-            yield from (null_case(plan, seed) for seed in islice(nulls, CHUNK))
+            yield from (null_case(plan, k) for k in islice(nulls, CHUNK))
         yield case
-    yield from (null_case(plan, seed) for seed in nulls)
+    yield from (null_case(plan, k) for k in nulls)
 
 
-def null_case(plan: Experiment, seed: int) -> tuple[str, Any, float, int]:
+def null_case(plan: Experiment, number: int) -> tuple[str, Any, float]:
     """A set without any effect."""
-    return f"{plan.quantity} null {seed}", None, 0.0, seed
+    return f"{plan.quantity} null {number}", None, 0.0
 
 
-def effect_cases(
-    s: Study, plan: Experiment, options: argparse.Namespace
-) -> Iterator[tuple[str, Any, float, int]]:
+def effect_cases(s: Study, plan: Experiment, options: argparse.Namespace) -> Iterator[tuple[str, Any, float]]:
     """Each class's representative at each size."""
     screen = Screen.of(Problem.of(plan, s.noise.sigma, s.plan.base), s.plan.variants)
     named = [i for i, v in enumerate(s.plan.variants) if v.candidate in {c.representative for c in s.classes}]
@@ -107,7 +106,7 @@ def effect_cases(
                     if values is not None:
                         term = variant.candidate.term(values)
                         name = f"{plan.quantity} {variant.candidate} {size} {seed}"
-                        yield name, (variant.candidate, term), size, seed
+                        yield name, (variant.candidate, term), size
 
 
 def sized(screen: Screen, i: int, others: list[int], size: float, seed: int) -> Any:

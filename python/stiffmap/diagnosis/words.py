@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 SHOWN = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
 VERDICTS = {
     "none": "no effect above the limits of this experiment",
-    "effects": "the declared model lacks",
+    "effects": "the declared model lacks the effects below",
     "ambiguous": "explained, but not by one explanation alone",
     "unattributed": "real structure that no known effect explains",
     "effects+unattributed": "explained in part; real structure remains",
@@ -45,7 +45,8 @@ def effect_text(e: Effect) -> str:
         factor, label = SHOWN.get(unit, (1.0, unit))
         text = f"{name} {value * factor:.4g} [{low * factor:.4g}, {high * factor:.4g}]"
         values.append(text if label == "1" else f"{text} {label}")
-    same = f" (cannot be told from {len(e.aliases)} aliases)" if e.aliases else ""
+    n = len(e.aliases)
+    same = f" (cannot be told from {n} {'alias' if n == 1 else 'aliases'})" if n else ""
     return f"{e.kind} of {e.element}{legs}: {', '.join(values)}{same}"
 
 

@@ -130,3 +130,8 @@ def test_missing_parts_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         load(Command("x", "needs_more", "run", ""))
     with pytest.raises(MissingPartError, match="installation of stiffmap lacks"):
         load(Command("x", "stiffmap.cli.not_written", "run", ""))
+
+
+def test_the_package_runs_as_the_command() -> None:
+    done = subprocess.run([sys.executable, "-m", "stiffmap", "--version"], capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.strip()
