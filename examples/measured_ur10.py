@@ -110,7 +110,7 @@ def main() -> None:
     diagnosis = sm.diagnose(machine, args.output, seed=0)
     print(diagnosis)
     diagnosis.report(args.output / "report.html")
-    diagnosis.to_json(args.output / "diagnosis.json")
+    (args.output / "diagnosis.json").write_text(diagnosis.to_json())
 
 
 if __name__ == "__main__":

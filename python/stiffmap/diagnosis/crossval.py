@@ -23,7 +23,8 @@ class HeldOut:
     before: Summary
     after: Summary
     residual: Floats
-    """(n, 6) reading minus prediction of the model found without the row's group."""
+    """(n, 6) reading minus prediction of the model found without the row's group, `Study.free` of
+    frames and zeros."""
     chosen: dict[str, int]
     """How many of the folds chose each effect."""
     folds: int
@@ -57,10 +58,10 @@ def held_out(study: Study, listed: Mask, seed: int) -> HeldOut | None:
         test = label == fold
         finding = find(study, ~test, finalists=3)
         chosen.update(map(str, finding.model.candidates))
-        residual = e.reading - study.predictor(finding.model.terms())
+        residual = study.free(e.reading - study.predictor(finding.model.terms()), listed)
         gone = alone(study, np.where(test[:, None], residual, np.nan)) & listed
         after[test & ~gone] = residual[test & ~gone]
-    before = np.where(np.isfinite(after), e.reading - study.plan.base, np.nan)
+    before = np.where(np.isfinite(after), study.free(e.reading - study.plan.base, listed), np.nan)
     sigma = study.noise.sigma
     return HeldOut(
         summary(before, sigma, e.channels),

@@ -18,7 +18,7 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise import Mask, Noise, noise_of
 from stiffmap.experiment.outliers import outliers, suspects
 from stiffmap.experiment.predict import Predictor
-from stiffmap.experiment.problem import Problem
+from stiffmap.experiment.problem import Problem, nuisance_part
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +34,17 @@ class Study:
     """All rows, and the representatives on them."""
     seconds: dict[str, float]
     """What the sensitivities and the bootstrap of the search took; nothing where they were known."""
+
+    def free(self, residual: Floats, out: Mask) -> Floats:
+        """(n, c) residual less the unknown frames and zeros that fit its rows outside `out` best.
+
+        Nuisances are taken from all rows, held out or not: an instrument that was set up anew has a frame
+        of its own, which no other set-up tells.
+        """
+        problem = self.whole[0]
+        if out.any():
+            problem = Problem.of(self.experiment, self.noise.sigma, self.plan.base, ~out)
+        return np.asarray(residual - nuisance_part(problem, residual))
 
     @property
     def experiment(self) -> Experiment:
@@ -72,7 +83,9 @@ def study(predictor: Predictor, seed: int) -> Study:
     plan = plan_of(predictor)
     e = predictor.experiment
     rough = noise_of(e)
-    first = noise_of(e, ~suspects(e, e.reading - plan.base, rough.sigma))
+    raw = e.reading - plan.base
+    bare = raw - nuisance_part(Problem.of(e, rough.sigma, plan.base), raw)
+    first = noise_of(e, ~suspects(e, bare, rough.sigma))
     problem = Problem.of(e, first.sigma, plan.base)
     screen = Screen.of(problem, plan.variants)
     classes = tuple(alias_classes(screen, predictor.machine.description))
@@ -89,11 +102,12 @@ def find(study: Study, rows: Mask | None = None, *, finalists: int = 5) -> Findi
     """Effects in the rows; outliers are judged against the model and re-admitted where it explains them."""
     e = study.experiment
     allowed = np.ones(len(e), bool) if rows is None else rows
-    out = suspects(e, e.reading - study.plan.base, study.noise.sigma) & allowed
+    nobody = np.zeros(len(e), bool)
+    out = suspects(e, study.free(e.reading - study.plan.base, nobody), study.noise.sigma) & allowed
     for _ in range(3):
         search = search_on(study, allowed & ~out, finalists)
         selection = select(search)
-        residual = e.reading - study.predictor(selection.model.terms())
+        residual = study.free(e.reading - study.predictor(selection.model.terms()), out)
         again = alone(study, _held(residual, allowed)) & allowed
         if np.array_equal(again, out):
             break

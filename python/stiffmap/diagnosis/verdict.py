@@ -90,8 +90,8 @@ def _assemble(
     why = explain(s, search, finding.model)
     model, other = why.model, why.others
     finding = replace(finding, selection=replace(finding.selection, model=model))
-    before = e.reading - s.plan.base
-    after = e.reading - s.predictor(model.terms())
+    before = s.free(e.reading - s.plan.base, finding.outliers)
+    after = s.free(e.reading - s.predictor(model.terms()), finding.outliers)
     if other and verdict == "effects":
         verdict = "ambiguous"
     inflation = max(1.0, float(np.sqrt(model.chi2 / max(search.problem.freedom, 1)))) if left else 1.0
