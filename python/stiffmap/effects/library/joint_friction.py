@@ -57,5 +57,4 @@ EFFECT = EffectType(
     stage=20,
     needs=("branch",),
     at=at,
-    tried=lambda description: [],
 )
