@@ -7,9 +7,9 @@ CSV files in the folder given. They are read where they are and not part of stif
     python examples/measured_ur10.py ../shared/measured/ipa_ur10_accuracy -o ur10
 
 makes an experiment of commanded joint angles and tracker positions, reduced to the robot's base by a
-hand-eye registration whose rest (frames of instrument and tool) stays unknown, and diagnoses it. With 60 rows the residual is 0.52 mm, 17 noise floors, and the verdict
-`unattributed`: the arm is off in many small ways at once, no four effects explain 80 % of that, and so
-none is claimed.
+hand-eye registration whose rest (frames of instrument and tool) stays unknown, and diagnoses it. With
+60 rows the residual is 0.52 mm, 17 noise floors, and the verdict `unattributed`: the arm is off in many
+small ways at once, no four effects explain 80 % of that, and so none is claimed.
 """
 
 from __future__ import annotations
