@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from stiffmap import effects
@@ -111,6 +111,17 @@ def recorded(effect: EffectType, experiment: Experiment) -> bool:
         "motor": any(c.side == "motor" for c in experiment.extra),
     }
     return all(have.get(need, True) for need in effect.needs)
+
+
+def clash(candidate: Candidate, others: Iterable[Candidate]) -> bool:
+    """Whether the candidate and one of the others exclude each other at a place that they share."""
+    return any(_excludes(candidate, other) for other in others)
+
+
+def _excludes(one: Candidate, other: Candidate) -> bool:
+    legs = set(one.legs) & set(other.legs) or not one.legs or not other.legs
+    named = other.kind in effects.get(one.kind).excludes or one.kind in effects.get(other.kind).excludes
+    return bool(one.element == other.element and legs and named)
 
 
 def in_loop(candidate: Candidate, experiment: Experiment) -> bool:

@@ -32,14 +32,16 @@ Residual = Callable[[Floats], Floats]
 def fit(model: Model, predictor: Predictor, problem: Problem, *, fixed: Sequence[int] = ()) -> Model:
     """The model with the values that minimise chi-square; `fixed` indices stay.
 
-    Its residual and Jacobian belong to these values; chi2 is infinite where the machine cannot be
-    solved with it.
+    Its residual and Jacobian belong to these values. Where the machine cannot be built or solved with
+    them chi2 is infinite, residual and Jacobian are None and `problem` says why; values stay within
+    their bounds.
     """
     free = np.array([i for i in range(len(model.values)) if i not in {*fixed, *model.held}], dtype=np.intp)
+    model = replace(model, values=np.clip(model.values, *model.bounds()))
     try:
         return _descend(model, predictor, problem, free)
-    except StiffmapError:
-        return replace(model, chi2=np.inf)
+    except StiffmapError as error:
+        return replace(model, chi2=np.inf, residual=None, jacobian=None, failure=str(error))
 
 
 def evaluate(model: Model, predictor: Predictor, problem: Problem) -> Model:
@@ -53,10 +55,17 @@ def evaluate(model: Model, predictor: Predictor, problem: Problem) -> Model:
 
 def _descend(model: Model, predictor: Predictor, problem: Problem, free: NDArray[np.intp]) -> Model:
     low, high = model.bounds()
-    x = np.clip(model.values, low, high)
+    x = model.values
 
     def residual(values: Floats) -> Floats:
         return problem.residual(predictor(model.terms(values)))
+
+    def tried_residual(values: Floats) -> Floats:
+        """A step to where the machine cannot be built is one that does not pay."""
+        try:
+            return residual(values)
+        except StiffmapError:
+            return np.full(len(problem), np.inf)
 
     r, j, age = residual(x), jacobian(model, x, predictor, problem, free), 0
     for _ in range(STEPS if free.size else 0):
@@ -64,7 +73,7 @@ def _descend(model: Model, predictor: Predictor, problem: Problem, free: NDArray
         step[free] = _bounded(j, r, (low - x)[free], (high - x)[free])
         if promised(j, r, step[free]) < PAYS:
             break
-        moved, tried = _shorten(residual, x, step, r)
+        moved, tried = _shorten(tried_residual, x, step, r)
         gain = float(r @ r - tried @ tried)
         if gain > 0:
             s = (moved - x)[free]
@@ -76,7 +85,7 @@ def _descend(model: Model, predictor: Predictor, problem: Problem, free: NDArray
         j, age = jacobian(model, x, predictor, problem, free), 0
     full = np.zeros((len(r), len(x)))
     full[:, free] = j
-    return replace(model, values=x, chi2=float(r @ r), residual=r, jacobian=full)
+    return replace(model, values=x, chi2=float(r @ r), residual=r, jacobian=full, failure="")
 
 
 def _bounded(j: Floats, r: Floats, low: Floats, high: Floats) -> Floats:
@@ -119,7 +128,20 @@ def jacobian(
     columns = []
     for i in which:
         step = tangent_step(values, int(i), high[i])
-        moved = values.copy()
-        moved[i] += step
-        columns.append(-problem.white(np.nan_to_num((predictor(model.terms(moved)) - here) / step)))
+        there, step = _beside(model, values, int(i), step, predictor)
+        columns.append(-problem.white(np.nan_to_num((there - here) / step)))
     return np.column_stack(columns) if columns else np.zeros((len(problem), 0))
+
+
+def _beside(model: Model, values: Floats, i: int, step: float, predictor: Predictor) -> tuple[Floats, float]:
+    """Prediction with value i moved by the step, or by its opposite where the machine cannot be built."""
+    low, _ = model.bounds()
+    moved = values.copy()
+    moved[i] += step
+    try:
+        return predictor(model.terms(moved)), step
+    except StiffmapError:
+        moved[i] -= 2 * step
+        if moved[i] < low[i]:
+            raise
+        return predictor(model.terms(moved)), -step

@@ -44,6 +44,8 @@ def outweighing(search: Search, model: Model) -> Model:
             fit(model.without(i), search.predictor, search.problem) for i in range(len(model.candidates))
         ]
         least = min(trials, key=lambda t: t.chi2)
+        if not least.usable:
+            return model
         if least.chi2 - model.chi2 >= model.chi2 - search.problem.freedom:
             return model
         model = least

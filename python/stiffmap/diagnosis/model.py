@@ -30,6 +30,13 @@ class Model:
     """(N,) whitened."""
     held: tuple[int, ...] = ()
     """Values that no fit moves: the readings do not feel them where the effect begins."""
+    failure: str = ""
+    """Why the machine cannot be built or solved with the model; chi2 is then infinite."""
+
+    @property
+    def usable(self) -> bool:
+        """Whether a fit came to an end: there are a residual and a Jacobian."""
+        return self.residual is not None and bool(np.isfinite(self.chi2))
 
     @property
     def scales(self) -> Floats:

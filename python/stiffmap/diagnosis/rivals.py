@@ -65,9 +65,11 @@ def rivals(search: Search, model: Model, classes: Sequence[AliasClass], number: 
     found: list[Rival] = []
     for i, replaced in enumerate(model.candidates):
         reduced = fit(model.without(i), search.predictor, search.problem)
+        if not reduced.usable:
+            continue
         for f in additions(search, reduced, number, MARGIN):
             new = f.model.candidates[-1]
-            if new == replaced or new in longer.get(replaced, set()) or not np.isfinite(f.model.chi2):
+            if new == replaced or new in longer.get(replaced, set()) or not f.model.usable:
                 continue
             rival = compare(search, model, i, f.model, float(np.sqrt(max(reduced.chi2 - model.chi2, 0.0))))
             if f.surprise > search.threshold and stays(search, model, rival):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.diagnosis.candidates import Candidate
+from stiffmap.diagnosis.candidates import Candidate, clash
 from stiffmap.diagnosis.fit import evaluate, fit
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.periodic import is_periodic
@@ -39,6 +39,8 @@ class Search:
     """Number of independent tests that the search is worth."""
     finalists: int = 5
     alpha: float = ALPHA
+    failed: dict[str, str] = field(default_factory=dict)
+    """Candidates whose fit failed, and why; the search goes on without them."""
 
     @property
     def threshold(self) -> float:
@@ -82,19 +84,24 @@ def select(search: Search) -> Selection:
 
 def best_addition(search: Search, model: Model) -> Finalist | None:
     """The candidate that explains most beside the model, judged by full fits of the best few."""
-    found = [f for f in additions(search, model, search.finalists) if np.isfinite(f.model.chi2)]
+    found = [f for f in additions(search, model, search.finalists) if f.model.usable]
     return max(found, key=lambda f: f.surprise, default=None)
 
 
 def additions(search: Search, model: Model, number: int, margin: float = MARGIN) -> list[Finalist]:
     """Full fits of what screening puts first: within `margin` (or `CLOSE`) of the best."""
-    assert model.residual is not None
+    if model.residual is None:
+        return []
     screen = search.screen.beside(model.tangent())
     surprise = screen.surprise(screen.drops(model.residual[:, None])[:, 0])
     best_of: dict[Candidate, int] = {}
     for i in np.argsort(-surprise):
         v = screen.variants[i]
-        if v.candidate not in model.candidates and surprise[i] > 0:
+        if (
+            surprise[i] > 0
+            and v.candidate not in model.candidates
+            and not clash(v.candidate, model.candidates)
+        ):
             best_of.setdefault(v.candidate, int(i))
     top = max(surprise, default=0.0)
     if top < WORTH * search.threshold:
@@ -113,6 +120,9 @@ def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
     begun = [model.plus(variant.candidate, s, held) for s in starts]
     fits = [fit(b, search.predictor, search.problem) for b in begun]
     best = min(fits, key=lambda m: m.chi2)
+    if not best.usable:
+        beside = f" beside {' + '.join(map(str, model.candidates))}" if model.candidates else ""
+        search.failed[f"{variant.candidate}{beside}"] = best.failure
     drop = model.chi2 - best.chi2
     return Finalist(best, drop, surprise_of(drop, best.sizes()[-1]))
 
@@ -161,7 +171,10 @@ def backward(search: Search, model: Model) -> Model:
             fit(model.without(i), search.predictor, search.problem) for i in range(len(model.candidates))
         ]
         sizes = model.sizes()
-        surprise = [surprise_of(t.chi2 - model.chi2, n) for t, n in zip(trials, sizes, strict=True)]
+        surprise = [
+            surprise_of(t.chi2 - model.chi2, n) if t.usable else np.inf
+            for t, n in zip(trials, sizes, strict=True)
+        ]
         worst = int(np.argmin(surprise))
         if surprise[worst] > search.threshold:
             return model
@@ -175,7 +188,7 @@ def exchange(search: Search, model: Model) -> Model:
         better = model
         for i in range(len(model.candidates)):
             reduced = fit(model.without(i), search.predictor, search.problem)
-            found = best_addition(search, reduced)
+            found = best_addition(search, reduced) if reduced.usable else None
             if found and score(found.model, search.problem) > score(better, search.problem) + 1.0:
                 better = found.model
         if better is model:

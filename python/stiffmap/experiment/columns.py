@@ -5,22 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from stiffmap.errors import FileError
 from stiffmap.experiment.channels import DISTANCE, Channel
 from stiffmap.experiment.experiment import AXES, BRANCHES, WRENCH, Floats, Integers
+from stiffmap.experiment.orientation import TURNED, TURNED2
 from stiffmap.experiment.schema import ExperimentFile, NoiseModel
 from stiffmap.experiment.table import Table
 from stiffmap.experiment.units import Scales
 
 WORDS = ("id", "branch", "setup", "point", "load_point")
-POSE, ROTATION = ("x", "y", "z"), ("rotx", "roty", "rotz")
-POSE2, ROTATION2 = ("x2", "y2", "z2"), ("rotx2", "roty2", "rotz2")
+POSE, POSE2 = ("x", "y", "z"), ("x2", "y2", "z2")
 APPROACH = ("approach_x", "approach_y", "approach_z")
 READ = (*AXES, DISTANCE.name)
 KNOWN = (
-    *(*WORDS, *POSE, *ROTATION, *POSE2, *ROTATION2, *APPROACH, *WRENCH, *READ, *(f"u_{a}" for a in READ)),
+    *(*WORDS, *POSE, *TURNED, *POSE2, *TURNED2, *APPROACH, *WRENCH, *READ, *(f"u_{a}" for a in READ)),
     *("repeat", "order", "temperature"),
 )
 
@@ -36,7 +35,7 @@ def block(table: Table, names: Sequence[str], *, blank: bool, missing: float = n
 def position(table: Table, scales: Scales, commanded: bool) -> Floats:
     """(n, 3) m; NaN where actuator coordinates are commanded instead."""
     if commanded:
-        twice = [c for c in (*POSE, *ROTATION) if c in table]
+        twice = [c for c in (*POSE, *TURNED) if c in table]
         if twice:
             raise FileError(
                 f"column '{twice[0]}': actuators are commanded (command:), so the pose follows from them",
@@ -52,22 +51,6 @@ def command(model: ExperimentFile, table: Table, scales: Scales) -> Floats | Non
     if not model.command:
         return None
     return np.column_stack([scales.own[c] * table.numbers(c) for c in model.command])
-
-
-def rotations(table: Table, scales: Scales) -> tuple[Floats | None, Floats | None]:
-    """Commanded orientations (n, 3, 3) of a row and of its second pose, from rotation vectors in base
-    axes against home; the second is as the first where the file does not say."""
-    first, second = (_rotation(table, scales, names) for names in (ROTATION, ROTATION2))
-    if second is not None and first is None:
-        first = np.tile(np.eye(3), (len(table.rows), 1, 1))
-    return first, first if second is None else second
-
-
-def _rotation(table: Table, scales: Scales, names: tuple[str, ...]) -> Floats | None:
-    if not any(c in table for c in names):
-        return None
-    vectors = scales.angle(names[0]) * block(table, names, blank=names == ROTATION2, missing=0.0)
-    return np.ascontiguousarray(Rotation.from_rotvec(np.nan_to_num(vectors)).as_matrix())
 
 
 def other(

@@ -15,6 +15,7 @@ __all__ = ["AXES", "BRANCHES", "WRENCH", "Channel", "Experiment", "Floats", "Int
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 BRANCHES = ("", "loading", "unloading")
 PER_ROW = (
@@ -63,10 +64,13 @@ class Experiment:
     extra: tuple[Channel, ...] = ()
     """Channels after the six axes: a distance, joint coordinates."""
     rotation: Floats | None = None
-    """(n, 3, 3) commanded orientation; None: as at home."""
+    """(n, 3, 3) commanded orientation, of the TCP or against home; None: as at home."""
     other: Floats | None = None
     """(n, 3) m, second commanded pose of a distance; NaN where a row reads none."""
     other_rotation: Floats | None = None
+    rotation_against: str = "base"
+    """``base``: rotations are those of the TCP; ``home``: R = rotation · R_home (as files say, `located`
+    resolves it)."""
     command: Floats | None = None
     """(n, actuators) m, rad: commanded coordinates instead of poses, in the order of `command_of`."""
     command_of: tuple[Channel, ...] = ()

@@ -12,6 +12,7 @@ from stiffmap.errors import FileError
 from stiffmap.experiment import columns as read_columns
 from stiffmap.experiment.channels import AXIS_CHANNELS, DISTANCE, Channel
 from stiffmap.experiment.experiment import AXES, WRENCH, Experiment, Floats, Loop
+from stiffmap.experiment.orientation import rotations
 from stiffmap.experiment.schema import ExperimentFile
 from stiffmap.experiment.table import Table, read_table
 from stiffmap.experiment.units import ANGLES, Scales
@@ -93,7 +94,7 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
     if not np.isfinite(reading).any():
         raise FileError("missing column: no reading (dx, dy, dz, rx, ry, rz, dd, joints)", file=table.file)
     sigma = read_columns.sigma(model, table, scales, channels)
-    rotation, other_rotation = read_columns.rotations(table, scales)
+    rotation, other_rotation = rotations(table, scales, model.orientation)
     experiment = Experiment(
         name=file.parent.name if file.name == "experiment.yaml" else file.stem,
         machine=model.machine,
@@ -107,6 +108,7 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
         rotation=rotation,
         other=read_columns.other(model, table, scales, reading, channels),
         other_rotation=other_rotation,
+        rotation_against=model.orientation.against,
         command=read_columns.command(model, table, scales),
         command_of=tuple(
             Channel(n, "rad" if c.unit in ANGLES else "m", c.actuator) for n, c in model.command.items()

@@ -11,6 +11,7 @@ from stiffmap.errors import FileError
 from stiffmap.experiment import columns
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS
 from stiffmap.experiment.experiment import WRENCH, Experiment
+from stiffmap.experiment.orientation import EULER, TURNED2, rotations
 from stiffmap.experiment.plans import MICRO
 from stiffmap.experiment.schema import ExperimentFile, UnitsModel
 from stiffmap.experiment.table import read_table
@@ -18,7 +19,9 @@ from stiffmap.experiment.units import Scales
 from stiffmap.files.schema.base import suggestion
 from stiffmap.machine import Machine
 
-KNOWN = tuple(c for c in columns.KNOWN if c not in columns.READ and not c.startswith("u_"))
+KNOWN = tuple(
+    c for c in columns.KNOWN if c not in (*columns.READ, *EULER, *TURNED2) and not c.startswith("u_")
+)
 
 
 def load_plan(
@@ -58,7 +61,8 @@ def load_plan(
         wrench=wrench,
         reading=np.where(np.isfinite(sigma), 0.0, np.nan),
         sigma=sigma,
-        rotation=columns.rotations(table, scales)[0],
+        rotation=rotations(table, scales)[0],
+        rotation_against="home",
         approach=columns.approach(table),
         repeat=columns.whole(table, "repeat"),
         order=table.numbers("order") if "order" in table else np.arange(1, n + 1, dtype=float),

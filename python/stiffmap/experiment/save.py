@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.errors import FileError
-from stiffmap.experiment.columns import APPROACH, POSE, POSE2, ROTATION, ROTATION2
+from stiffmap.experiment.columns import APPROACH, POSE, POSE2
 from stiffmap.experiment.experiment import AXES, WRENCH, Channel, Experiment, Floats, Loop
+from stiffmap.experiment.orientation import VECTOR
 from stiffmap.files.yaml_text import text_of
 
 MM = 1e3
@@ -45,6 +47,8 @@ def _head(e: Experiment, title: str) -> dict[str, Any]:
     }
     head |= {k: v for k, v in optional.items() if v is not None}
     head |= {k: getattr(e, k) for k, plain in PLAIN.items() if getattr(e, k) != plain}
+    if e.rotation is not None and e.rotation_against == "base" and e.command is None:
+        head["orientation"] = {"against": "base"}
     if e.loop != Loop():
         head["metrology"] = {k: getattr(e.loop, k) for k in ("instrument_on", "target_on", "force_against")}
     return head
@@ -107,16 +111,16 @@ def _commanded(e: Experiment) -> dict[str, list[Any]]:
     if e.command is not None:
         out = {c.name: _text(e.command[:, i] * _scale(c)) for i, c in enumerate(e.command_of)}
     else:
-        out = {c: _text(e.position[:, i] * MM) for i, c in enumerate(POSE)} | _rotvec(e.rotation, ROTATION)
+        out = {c: _text(e.position[:, i] * MM) for i, c in enumerate(POSE)} | _rotvec(e.rotation, VECTOR)
     if e.other is not None:
         out |= {c: _text(e.other[:, i] * MM) for i, c in enumerate(POSE2)}
-        out |= _rotvec(e.other_rotation, ROTATION2)
+        out |= _rotvec(e.other_rotation, [f"{c}2" for c in VECTOR])
     if e.approach is not None:
         out |= {c: _text(e.approach[:, i]) for i, c in enumerate(APPROACH)}
     return out
 
 
-def _rotvec(rotation: Floats | None, names: tuple[str, ...]) -> dict[str, list[Any]]:
+def _rotvec(rotation: Floats | None, names: Sequence[str]) -> dict[str, list[Any]]:
     if rotation is None:
         return {}
     vectors = Rotation.from_matrix(rotation).as_rotvec()

@@ -67,6 +67,18 @@ class LoopModel(FileModel):
     force_against: str = "floor"
 
 
+class OrientationModel(FileModel):
+    """What the columns of orientation mean.
+
+    ``against: home``: they turn the tool from its orientation at home, about base axes. ``base``: they
+    are the tool's orientation itself. ``euler``: axes of euler1, euler2, euler3 in turn; capitals for
+    axes that turn along (XYZ: x, then the new y, then the new z), small letters for fixed ones.
+    """
+
+    against: Literal["home", "base"] = "home"
+    euler: Annotated[str, Field(pattern=r"^([XYZ]{3}|[xyz]{3})$")] | None = None
+
+
 class ExperimentFile(FileModel):
     """One experiment."""
 
@@ -88,5 +100,6 @@ class ExperimentFile(FileModel):
     gravity: Annotated[list[Finite], Field(min_length=3, max_length=3)] | None = None
     reference_temperature: Finite | None = None
     metrology: LoopModel = LoopModel()
+    orientation: OrientationModel = OrientationModel()
     columns: dict[str, str] = Field(default_factory=dict)
     notes: str = ""

@@ -11,6 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.columns import KNOWN
+from stiffmap.experiment.orientation import MATRIX, TURNED2
 from stiffmap.experiment.schema import ExperimentFile
 
 PAGE = (Path(__file__).parents[3] / "docs" / "experiments.md").read_text(encoding="utf-8")
@@ -36,5 +37,5 @@ def test_every_key_and_column_is_explained() -> None:
         if key not in ("title", "data", "axes", "notes"):
             assert f"`{key}`" in PAGE or f"{key}:" in PAGE, key
     for column in KNOWN:
-        if not column.startswith(("u_", "rotx2", "roty2", "rotz2")):
+        if not column.startswith(("u_", *TURNED2, *MATRIX[2:])):
             assert re.search(rf"[` ]{column}[` ]", PAGE), column
