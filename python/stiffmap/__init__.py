@@ -12,12 +12,12 @@ from stiffmap.status import Flag, Status
 if TYPE_CHECKING:
     from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, load_experiment
+    from stiffmap.internal_wrenches import assembly_stress
     from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
     from stiffmap.link import identify_link
     from stiffmap.machine import Machine, load_machine
     from stiffmap.maps import error_map, polar, sweep, uncertainty_ranking
     from stiffmap.solution import Solution
-    from stiffmap.stress import assembly_stress
 
 try:
     __version__ = version("stiffmap")
@@ -33,7 +33,7 @@ _HOME = {
     "Kinematics": "stiffmap.kinematics",
     "Machine": "stiffmap.machine",
     "Solution": "stiffmap.solution",
-    "assembly_stress": "stiffmap.stress",
+    "assembly_stress": "stiffmap.internal_wrenches",
     "error_map": "stiffmap.maps",
     "forward_kinematics": "stiffmap.kinematics",
     "identify_link": "stiffmap.link",

@@ -38,12 +38,14 @@ def inverse_kinematics(
     position (..., 3) m; rotation (..., 3, 3), None: as at home. docs/theory.md (C3), (C5).
     """
     p = trailing(position, (3,), "position", "positions (m)")
-    home = machine.description.home.r
-    r = trailing(home if rotation is None else rotation, (3, 3), "rotation", "rotation matrices")
-    shape = batch(p.shape[:-1], r.shape[:-2])
-    out = machine._core.closure(
-        machine._plan, rows(p, shape, (3,)), rows(r, shape, (3, 3)), True, thread_count(threads)
+    r = trailing(
+        machine.compiled.home_rotation if rotation is None else rotation,
+        (3, 3),
+        "rotation",
+        "rotation matrices",
     )
+    shape = batch(p.shape[:-1], r.shape[:-2])
+    out = machine.compiled.close_poses(rows(p, shape, (3,)), rows(r, shape, (3, 3)), thread_count(threads))
     return _kinematics(machine, out, shape)
 
 
@@ -52,15 +54,14 @@ def forward_kinematics(machine: Machine, actuators: ArrayLike, *, threads: int |
     n = len(machine.actuators)
     a = trailing(actuators, (n,), "actuators", f"{n} actuator coordinates")
     shape = a.shape[:-1]
-    none = np.zeros((0, 3, 3))
-    # No plan: forward closure always continues from home.
-    out = machine._core.closure(None, rows(a, shape, (n,)), none, False, thread_count(threads))  # type: ignore[arg-type]
+    out = machine.compiled.close_actuators(rows(a, shape, (n,)), thread_count(threads))
     return _kinematics(machine, out, shape)
 
 
 def _kinematics(machine: Machine, out: tuple[Floats, ...], shape: tuple[int, ...]) -> Kinematics:
     x, p, r, status, flags = out
-    index = [i for _, i in machine._core.actuators]
+    names = machine.compiled.names
+    index = [names.joints[a] for a in names.actuators]
     return Kinematics(
         actuators=x[:, index].reshape((*shape, len(index))),
         position=p.reshape((*shape, 3)),

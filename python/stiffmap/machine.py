@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap._core import FastPlan, Mechanism, OneCall
 from stiffmap.broadcasting import Floats
-from stiffmap.derivatives import Prepared, Request, Requests, differentiate, prepare, read_requests
+from stiffmap.compiled import CompiledMachine
+from stiffmap.derivatives import Prepared, Request, differentiate, prepare, read_requests
 from stiffmap.description import MachineDescription
+from stiffmap.effects import add_effect
 from stiffmap.errors import StiffmapError
-from stiffmap.lowering import build_mechanism
-from stiffmap.names import Names, names_of
+from stiffmap.files import load_description, save_description
+from stiffmap.holding_wrench import HoldingWrench, holding_wrench
+from stiffmap.options import SolveKeywords, SolveOptions, merged
 from stiffmap.recent import Recent
 from stiffmap.solution import Solution
-from stiffmap.solving import Call, gravity_vector, solve_call
-
-if TYPE_CHECKING:
-    from stiffmap.inverse import HeldMachine
+from stiffmap.solving import Call, solve_call
 
 MOST_PREPARED = 4  # sets of derivatives whose machines are kept
+PLAIN = ({"threads": 1}, {"threads": None})  # options that one pose does not notice
 
 
 class Machine:
@@ -35,7 +35,7 @@ class Machine:
 
     def __init__(self, description: MachineDescription) -> None:
         self._description = description
-        self._core  # noqa: B018 - refuse an impossible machine when it is made, not when it is used
+        self._compiled = CompiledMachine(description)  # refuses an impossible machine when it is made
 
     @property
     def description(self) -> MachineDescription:
@@ -47,59 +47,39 @@ class Machine:
         """Name of the machine."""
         return self._description.name
 
-    @cached_property
-    def _core(self) -> Mechanism:
-        return build_mechanism(self._description)
-
-    @cached_property
-    def _names(self) -> Names:
-        return names_of(self._core)
-
-    @cached_property
-    def _home_rotation(self) -> Floats:
-        return self._description.home.r
-
-    @cached_property
-    def _plan(self) -> FastPlan:
-        box = self._description.workspace
-        low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))
-        return FastPlan(self._core, np.array(low), np.array(high))
-
-    @cached_property
-    def _one(self) -> OneCall:
-        return OneCall(self._core, self._plan, self._home_rotation, gravity_vector(self, None))
+    @property
+    def compiled(self) -> CompiledMachine:
+        """The machine as the C++ core holds it; what the packages of stiffmap solve with."""
+        return self._compiled
 
     @cached_property
     def _derivable(self) -> Recent[Prepared]:
         return Recent(MOST_PREPARED)
 
-    def _prepared(self, requests: Requests) -> Prepared:
-        return self._derivable.get(requests.key, lambda: prepare(self, requests))
-
     @property
     def fast(self) -> str:
         """Empty if the fast path takes this machine, else what it lacks for it."""
-        return self._plan.missing
+        return self._compiled.not_fast
 
     @property
     def actuators(self) -> tuple[str, ...]:
         """Full names of the actuators."""
-        return self._names.actuators
+        return self._compiled.names.actuators
 
     @property
     def legs(self) -> tuple[str, ...]:
         """Names of the legs."""
-        return self._names.legs
+        return self._compiled.names.legs
 
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the points that wrenches and readings may refer to."""
-        return self._names.points
+        return self._compiled.names.points
 
     @property
     def free_spins(self) -> tuple[str, ...]:
         """Passive coordinates that turn without any effect, held at their home value."""
-        return self._names.free_spins
+        return self._compiled.names.free_spins
 
     @property
     def workspace(self) -> Floats:
@@ -113,18 +93,10 @@ class Machine:
         position: ArrayLike,
         wrench: ArrayLike | None = None,
         *,
-        rotation: ArrayLike | None = None,
-        point: str = "tcp",
-        wrenches: Mapping[str, ArrayLike] | None = None,
-        load_type: str | Mapping[str, str] = "dead",
-        read_points: Sequence[str] = (),
-        gravity: ArrayLike | None = None,
-        method: str = "fast",
-        load_steps: int | str = "auto",
-        stiffness: bool = True,
         derivatives: Sequence[Request] = (),
         derivatives_of: Sequence[str] = ("displacement",),
-        threads: int | None = None,
+        options: SolveOptions | None = None,
+        **given: Unpack[SolveKeywords],
     ) -> Solution:
         """Equilibrium, stiffness and compliance at commanded poses under external wrenches.
 
@@ -166,66 +138,56 @@ class Machine:
             solves for many parameters, the others two solves for each.
         threads
             None: all cores that this process may use.
+        options
+            All of these at once, but the derivatives; a keyword beside it goes before its field.
 
         Notes
         -----
         Poses never raise: see `Solution.status`. Raises StiffmapError for bad input.
         """
-        if (
-            rotation is None
-            and wrenches is None
-            and gravity is None
-            and point == "tcp"
-            and load_type == "dead"
-            and method == "fast"
-            and load_steps == "auto"
-            and stiffness is True
-            and (threads is None or threads == 1)
-            and not read_points
-            and not derivatives
-        ):
-            one = self._one.solve(position, wrench)
+        if options is None and not derivatives and (not given or given in PLAIN):
+            one = self._compiled.solve_one(position, wrench)
             if one is not None:
-                return Solution(one, (), self._names, point)
-        call = Call(
-            position,
-            wrench,
-            rotation,
-            point,
-            wrenches,
-            load_type,
-            read_points,
-            gravity,
-            method,
-            load_steps,
-            stiffness,
-            threads,
-        )
-        if derivatives:
-            return differentiate(self, call, read_requests(derivatives, derivatives_of))
-        return solve_call(self, call)[0]
+                return Solution(one, (), self._compiled.names, "tcp")
+        call = Call(position, wrench, merged(options, given))
+        if not derivatives:
+            return solve_call(self._compiled, call)[0]
+        requests = read_requests(derivatives, derivatives_of)
+        ready = self._derivable.get(requests.key, lambda: prepare(self._compiled, requests))
+        return differentiate(ready, call, requests)
 
-    def wrench(self, position: ArrayLike, displacement: ArrayLike, **options: Any) -> HeldMachine:
+    def wrench(
+        self,
+        position: ArrayLike,
+        displacement: ArrayLike,
+        *,
+        rotation: ArrayLike | None = None,
+        point: str = "tcp",
+        gravity: ArrayLike | None = None,
+        threads: int | None = None,
+    ) -> HoldingWrench:
         """Wrenches that hold the machine at a `displacement` (..., 6) from the commanded pose, eq. (10).
 
-        Options: rotation, point, gravity, threads, as in `stiffmap.inverse.imposed_displacement`.
+        See `stiffmap.holding_wrench.holding_wrench`.
         """
-        from stiffmap.inverse import imposed_displacement
-
-        return imposed_displacement(self, position, displacement, **options)
+        return holding_wrench(
+            self._compiled,
+            position,
+            displacement,
+            rotation=rotation,
+            point=point,
+            gravity=gravity,
+            threads=threads,
+        )
 
     def with_effect(
         self, kind: str, *, element: str | None = None, legs: Sequence[str] | None = None, **parameters: Any
     ) -> Machine:
         """A new machine with an effect added; see `stiffmap.effects`."""
-        from stiffmap.effects import add_effect
-
         return Machine(add_effect(self._description, kind, element=element, legs=legs, **parameters))
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a machine file that loads back equal."""
-        from stiffmap.files import save_description
-
         save_description(self._description, path)
 
     def __eq__(self, other: object) -> bool:
@@ -246,6 +208,4 @@ def load_machine(name_or_path: str | PathLike[str]) -> Machine:
 
     Raises StiffmapError naming file, key, what was expected and what was found.
     """
-    from stiffmap.files import load_description
-
     return Machine(load_description(name_or_path))

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap._core import Answer, OneAnswer
-from stiffmap.names import Names
-from stiffmap.status import Flag, Status
+from stiffmap.compiled import Answer, Flag, Names, Status
 
 Floats = NDArray[np.float64]
 Slopes = Mapping[str, Mapping[str, Floats]]  # quantity -> name of the variable -> derivative
@@ -43,7 +41,7 @@ class Solution:
 
     def __init__(
         self,
-        answer: Answer | OneAnswer,
+        answer: Answer,
         shape: tuple[int, ...],
         names: Names,
         point: str,

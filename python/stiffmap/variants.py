@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from stiffmap.broadcasting import Floats
+from stiffmap.compiled import CompiledMachine
 from stiffmap.solution import Solution
 from stiffmap.solving import Call, solve_call
 
-if TYPE_CHECKING:
-    from stiffmap.machine import Machine
 
-
-def solve_varied(machine: Machine, call: Call, variants: Sequence[Machine]) -> tuple[Solution, Floats]:
+def solve_varied(
+    machine: CompiledMachine, call: Call, variants: Sequence[CompiledMachine]
+) -> tuple[Solution, Floats]:
     """The answer, and the displacements (..., variants, 6) of machines with a parameter moved a little.
 
     One step through the factors of the answer, exact to second order in the move (docs/fast_path.md F10). Poses of
@@ -24,11 +23,13 @@ def solve_varied(machine: Machine, call: Call, variants: Sequence[Machine]) -> t
     """
     solution, varied = solve_call(machine, call, variants)
     gravity = machine.description.gravity
-    heavier = [call.gravity is None and m.description.gravity != gravity for m in variants]
+    heavier = [call.options.gravity is None and m.description.gravity != gravity for m in variants]
     if not any(heavier) and not np.isnan(varied.sum()):  # nothing is missing
         return solution, varied
     for i, (m, other) in enumerate(zip(variants, heavier, strict=True)):
         hole = solution.ok & (other | np.isnan(varied[..., i, :]).any(axis=-1))
         if hole.any():
-            varied[hole, i] = solve_call(m, replace(call.only(hole), stiffness=False))[0].displacement
+            part = call.only(hole)
+            part = replace(part, options=replace(part.options, stiffness=False))
+            varied[hole, i] = solve_call(m, part)[0].displacement
     return solution, varied

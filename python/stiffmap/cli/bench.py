@@ -48,11 +48,12 @@ def bench(
 
       [cyan]STIFFMAP_ISA=base stiffmap bench --json[/cyan]
     """
-    from stiffmap import _core, load_machine
+    from stiffmap import load_machine
+    from stiffmap.compiled import kernel_levels
 
     if rounds < 1:
         raise StiffmapError(f"rounds: expected a positive number, got {rounds}")
-    level = os.environ.get("STIFFMAP_ISA") or _core.kernel_levels()[-1]
+    level = os.environ.get("STIFFMAP_ISA") or kernel_levels()[-1]
     lines = [line for name in MACHINES for line in machine_lines(load_machine(name), rounds)]
     lines += thread_lines(load_machine(MACHINES[1]), rounds)
     if as_json:

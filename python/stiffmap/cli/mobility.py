@@ -9,12 +9,12 @@ from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
 from stiffmap.broadcasting import Floats
+from stiffmap.compiled import Role
 from stiffmap.machine import Machine
 
 STEP = 1e-6
 RANK = 1e-6
 """Relative size below which a singular value counts as zero; central differences err by about 1e-9."""
-SPRING = 2
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ class Mobility:
 
 def mobility(machine: Machine, coordinates: Floats) -> Mobility:
     """Counts at coordinates that close all loops."""
-    core = machine._core
-    free = [i for i, role in enumerate(core.roles) if role != SPRING]
+    core = machine.compiled
+    free = [i for i, role in enumerate(core.names.roles) if role != Role.SPRING]
     loops = [(primary, end) for _, _, primary, end in core.loops]
     columns = [_rates(machine, coordinates, i, loops) for i in free]
     closure = np.array([c for c, _ in columns]).T.reshape(6 * len(loops), len(free))
@@ -71,7 +71,7 @@ def _rates(machine: Machine, x: Floats, index: int, loops: list[tuple[int, int]]
     """Rates of the gaps of all loops and of the platform's frame with one coordinate."""
     shift = np.zeros_like(x)
     shift[index] = STEP
-    (p1, r1), (p0, r0) = (machine._core.frames(x + s) for s in (shift, -shift))
+    (p1, r1), (p0, r0) = (machine.compiled.frames(x + s) for s in (shift, -shift))
     twist = np.concatenate([p1 - p0, Rotation.from_matrix(r1 @ np.swapaxes(r0, 1, 2)).as_rotvec()], axis=1)
     twist /= 2 * STEP
     return np.array([twist[end] - twist[primary] for primary, end in loops]).ravel(), twist[-1]

@@ -126,13 +126,13 @@ def channels(
 
 
 def _encoder(machine: Machine, text: str) -> Channel:
-    kinds = dict(zip(machine._core.coordinates, machine._core.prismatic, strict=True))
+    names = machine.compiled.names
     name, _, side = text.partition(":")
-    if name not in machine._names.joints or (side or "load") not in SIDES:
-        there = ", ".join(machine._names.joints)
+    if name not in names.joints or (side or "load") not in SIDES:
+        there = ", ".join(names.joints)
         raise StiffmapError(f"--joint: expected NAME or NAME:motor with NAME of {there}, got '{text}'")
     column = f"q_{name.replace('.', '_')}{'_motor' if side == 'motor' else ''}"
-    return Channel(column, "m" if kinds[name] else "rad", name, side or "load")
+    return Channel(column, "m" if names.is_prismatic(name) else "rad", name, side or "load")
 
 
 def history(

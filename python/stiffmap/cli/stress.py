@@ -24,8 +24,8 @@ from stiffmap.cli.inputs import (
     rotation,
 )
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.internal_wrenches import InternalWrenches
 from stiffmap.status import Status
-from stiffmap.stress import InternalWrenches
 
 
 def stress(

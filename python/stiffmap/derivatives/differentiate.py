@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,17 +15,13 @@ from stiffmap.solution import Solution
 from stiffmap.solving import Call, solve_call
 from stiffmap.variants import solve_varied
 
-if TYPE_CHECKING:
-    from stiffmap.machine import Machine
-
 Table = dict[str, dict[str, Floats]]  # quantity -> name of the variable -> derivative
 
 
-def differentiate(machine: Machine, call: Call, requests: Requests) -> Solution:
+def differentiate(ready: Prepared, call: Call, requests: Requests) -> Solution:
     """Answer of the machine with all the effects of `requests`, with its derivatives; NaN where a pose failed."""
     if requests.whole:
-        call = replace(call, stiffness=True)
-    ready = machine._prepared(requests)
+        call = replace(call, options=replace(call.options, stiffness=True))
     table: Table = {q: {} for q in requests.of}
     solution = (_whole if requests.whole else _displacement)(ready, call, table)
     for name in requests.inputs:

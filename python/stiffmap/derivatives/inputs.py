@@ -4,26 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from stiffmap.broadcasting import Floats
+from stiffmap.compiled import CompiledMachine
 from stiffmap.derivatives.requests import INPUTS
 from stiffmap.derivatives.stencil import central
 from stiffmap.files.rotation import rotation_about
+from stiffmap.solution import Solution
 from stiffmap.solving import Call, solve_call
-
-if TYPE_CHECKING:
-    from stiffmap.machine import Machine
-    from stiffmap.solution import Solution
 
 POSE_STEP = 1e-4  # of the machine's length, rad
 LOAD_STEP = 1e-5  # N, as the machine's characteristic stiffness times this share of its length
 
 
 def along_input(
-    machine: Machine, call: Call, base: Solution, name: str, of: tuple[str, ...]
+    machine: CompiledMachine, call: Call, base: Solution, name: str, of: tuple[str, ...]
 ) -> Iterator[tuple[str, dict[str, Floats]]]:
     """For each component of an input: its name, and the derivative of each quantity.
 
@@ -40,19 +37,20 @@ def along_input(
         )
 
 
-def _step(machine: Machine, name: str, i: int) -> float:
-    length, stiffness = machine._core.length, machine._core.stiffness
+def _step(machine: CompiledMachine, name: str, i: int) -> float:
+    length, stiffness = machine.length, machine.stiffness
     if name == "wrench":
         return float(LOAD_STEP * stiffness * length * (length if i > 2 else 1.0))
     return float(POSE_STEP * (length if name == "position" else 1.0))
 
 
-def _moved(machine: Machine, call: Call, name: str, i: int, h: float) -> Call:
+def _moved(machine: CompiledMachine, call: Call, name: str, i: int, h: float) -> Call:
     if name == "position":
         return replace(call, position=np.asarray(call.position, dtype=float) + h * np.eye(3)[i])
     if name == "wrench":
         given = np.zeros(6) if call.wrench is None else np.asarray(call.wrench, dtype=float)
         return replace(call, wrench=given + h * np.eye(6)[i])
-    given = machine._home_rotation if call.rotation is None else np.asarray(call.rotation, dtype=float)
+    now = call.options.rotation
+    given = machine.home_rotation if now is None else np.asarray(now, dtype=float)
     turn = np.array(rotation_about(np.eye(3)[i], h))
-    return replace(call, rotation=turn @ given)
+    return replace(call, options=replace(call.options, rotation=turn @ given))

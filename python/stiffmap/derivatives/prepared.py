@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from stiffmap.compiled import CompiledMachine
 from stiffmap.derivatives.near import Neighbours
 from stiffmap.derivatives.requests import Requests, parameter_name
 from stiffmap.derivatives.stencil import Stencil, within
 from stiffmap.effects import get
-
-if TYPE_CHECKING:
-    from stiffmap.machine import Machine
 
 # Of a parameter's typical scale. Truncation of a displacement is below 1e-7 at the small step; the larger one keeps
 # the last digits of a stiffness below its change (docs/effects.md).
@@ -24,20 +21,19 @@ class Moved:
 
     name: str
     stencil: Stencil
-    machines: tuple[Machine, Machine]
+    machines: tuple[CompiledMachine, CompiledMachine]
 
 
 @dataclass(frozen=True)
 class Prepared:
     """A machine with every requested effect, and its neighbours; independent of poses and loads."""
 
-    base: Machine
+    base: CompiledMachine
     parameters: tuple[Moved, ...]
 
 
-def prepare(machine: Machine, requests: Requests) -> Prepared:
+def prepare(machine: CompiledMachine, requests: Requests) -> Prepared:
     """Compiles the machines; StiffmapError for effects that the machine cannot have."""
-    make = type(machine)
     near = Neighbours(machine.description, requests.effects)
     share = WHOLE_STEP if requests.whole else STEP
     out = []
@@ -46,6 +42,6 @@ def prepare(machine: Machine, requests: Requests) -> Prepared:
             if p.name in arguments:
                 value = float(arguments[p.name])
                 stencil = within(value, share * p.scale, p.lower, p.upper)
-                low, high = (make(near.moved(i, p.name, value + h)) for h in stencil.offsets)
+                low, high = (CompiledMachine(near.moved(i, p.name, value + h)) for h in stencil.offsets)
                 out.append(Moved(parameter_name(requests.effects[i], p.name), stencil, (low, high)))
-    return Prepared(make(near.base) if requests.effects else machine, tuple(out))
+    return Prepared(CompiledMachine(near.base) if requests.effects else machine, tuple(out))

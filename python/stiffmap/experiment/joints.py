@@ -49,16 +49,15 @@ def _error(e: CommandError, u: Floats) -> Floats:
 
 def check_joints(machine: Machine, experiment: Experiment) -> None:
     """Raises StiffmapError for joints that the machine does not have, or that read another unit."""
-    names = machine._names.joints
-    kinds = dict(zip(machine._core.coordinates, machine._core.prismatic, strict=True))
+    names = machine.compiled.names
     for c in (*joint_channels(experiment), *experiment.command_of):
-        if c.joint not in names:
+        if c.joint not in names.joints:
             raise StiffmapError(
                 f"{experiment.name}: column {c.name}: machine {machine.name} has no joint '{c.joint}'; "
-                f"it has {', '.join(names)}"
+                f"it has {', '.join(names.joints)}"
             )
         if c.side == "motor" and c.joint not in machine.actuators:
             raise StiffmapError(f"{experiment.name}: column {c.name}: {c.joint} has no motor")
-        if (c.unit == "m") != kinds[c.joint]:
-            expected = "a length" if kinds[c.joint] else "an angle"
+        if (c.unit == "m") != names.is_prismatic(c.joint):
+            expected = "a length" if names.is_prismatic(c.joint) else "an angle"
             raise StiffmapError(f"{experiment.name}: column {c.name}: {c.joint} reads {expected}")

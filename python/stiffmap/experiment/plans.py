@@ -188,8 +188,9 @@ def with_distances(plan: Experiment, sigma: float) -> Experiment:
 def with_command(plan: Experiment, machine: Machine) -> Experiment:
     """The plan's poses as commanded actuator coordinates."""
     found = inverse_kinematics(machine, plan.position, plan.rotation)
-    kinds = dict(zip(machine._core.coordinates, machine._core.prismatic, strict=True))
+    names = machine.compiled.names
     channels = tuple(
-        Channel(f"c_{a.replace('.', '_')}", "m" if kinds[a] else "rad", a) for a in machine.actuators
+        Channel(f"c_{a.replace('.', '_')}", "m" if names.is_prismatic(a) else "rad", a)
+        for a in machine.actuators
     )
     return replace(plan, command=found.actuators, command_of=channels)

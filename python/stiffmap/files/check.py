@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
+from stiffmap.compiled import CompiledMachine
 from stiffmap.description import Joint, MachineDescription
 from stiffmap.files.home import Gap, home_gaps
 from stiffmap.files.load import load_description
 from stiffmap.files.names import all_elements
+from stiffmap.files.shipped import find
 
 GAP_LIMIT = 1e-6
 
@@ -32,11 +34,8 @@ class FileCheck:
 
 def check_file(path: str | PathLike[str]) -> FileCheck:
     """Load a machine (by path or shipped name) and look it over; raises `StiffmapError` if unusable."""
-    from stiffmap.files.shipped import find
-    from stiffmap.lowering import build_mechanism
-
     description = load_description(path)
-    build_mechanism(description)  # refuses a home configuration that does not close, with each leg's gap
+    CompiledMachine(description)  # refuses a home configuration that does not close, with each leg's gap
     gaps = home_gaps(description)
     return FileCheck(find(path), description, _counts(description), gaps, _warnings(description, gaps))
 

@@ -7,17 +7,16 @@ from typing import Any
 import numpy as np
 
 from stiffmap.broadcasting import Floats
+from stiffmap.compiled import Role
 from stiffmap.machine import Machine
 from stiffmap.maps.variables import meaning
-
-SPRING = 2
 
 
 def critical_variables(
     machine: Machine, critical: list[dict[str, Any]]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Variables and coordinates over the dimensions ``critical`` and ``coordinate``."""
-    names = list(machine._core.coordinates)
+    names = list(machine.compiled.names.coordinates)
     modes = np.array([c["mode"] for c in critical]).reshape(-1, len(names))
     sizes = np.abs(modes) * _units(machine)
     over = {
@@ -52,8 +51,8 @@ def _floats(critical: list[dict[str, Any]], key: str, units: str, what: str) -> 
 
 def _units(machine: Machine) -> Floats:
     """Length that a unit of each coordinate stands for."""
-    prismatic = np.array(machine._core.prismatic)
-    return np.where(prismatic, 1.0, machine._core.length)
+    prismatic = np.array(machine.compiled.names.prismatic)
+    return np.where(prismatic, 1.0, machine.compiled.length)
 
 
 def _leg(machine: Machine, names: list[str], sizes: Floats) -> str:
@@ -64,7 +63,7 @@ def _leg(machine: Machine, names: list[str], sizes: Floats) -> str:
 
 def _joint(machine: Machine, names: list[str], sizes: Floats) -> str:
     """Joint, drive or spring coordinate that moves most; joints go before springs."""
-    roles = np.array(machine._core.roles)
-    joints = np.where(roles != SPRING, sizes, 0.0)
+    roles = np.array(machine.compiled.names.roles)
+    joints = np.where(roles != Role.SPRING, sizes, 0.0)
     pick = joints if joints.max(initial=0.0) > 0.1 * sizes.max() else sizes
     return names[int(np.argmax(pick))]

@@ -101,7 +101,16 @@ def error_map(
 
     Raises StiffmapError for bad input, FileError where `out` cannot be written.
     """
-    loading = Loading(machine, point, rotation, gravity, load_type, method, load_steps, threads)
+    loading = Loading(
+        machine,
+        point=point,
+        rotation=rotation,
+        gravity=gravity,
+        load_type=load_type,
+        method=method,
+        load_steps=load_steps,
+        threads=threads,
+    )
     wrenches, names = wrench_cases(wrench, None if cases is None else tuple(cases))
     if directions < 3:
         raise StiffmapError(f"directions: expected 3 or more, got {directions}")

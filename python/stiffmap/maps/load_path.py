@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffmap import _core
 from stiffmap.broadcasting import Floats
+from stiffmap.compiled.machine import PATH_CONTROLS as CONTROLS
 from stiffmap.errors import StiffmapError
 from stiffmap.maps.critical import critical_variables
 from stiffmap.maps.loading import Loading
@@ -18,7 +18,6 @@ from stiffmap.maps.sums import norm
 from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, meaning, status_attrs
 from stiffmap.status import Status
 
-CONTROLS = ("force", "displacement", "arc")
 BRANCH = meaning("1", "0: the path from rest; 1: the branch that crosses it")
 UNITS = {"force": "N", "displacement": "m", "arc": "m"}
 ENDS = (
@@ -37,21 +36,20 @@ def load_path(
     loading: Loading, position: Floats, direction: Floats, control: str, limit: float, steps: int, cross: int
 ) -> xr.Dataset:
     """See `sweep`: what it does with a `limit`."""
-    machine = loading.machine
-    if loading.point not in machine.points:
-        raise StiffmapError(f"point: expected one of {', '.join(machine.points)}, got {loading.point!r}")
-    turned = machine.description.home.r if loading.rotation is None else loading.rotation
-    flags, *branches = _core.path(
-        machine._core,
+    machine, options = loading.machine, loading.options
+    if options.point not in machine.points:
+        raise StiffmapError(f"point: expected one of {', '.join(machine.points)}, got {options.point!r}")
+    turned = machine.compiled.home_rotation if options.rotation is None else options.rotation
+    flags, *branches = machine.compiled.path(
         position,
         np.ascontiguousarray(turned, dtype=float),
         direction,
-        loading.point,
-        np.array(loading.acting_gravity()),
-        CONTROLS.index(control),
-        limit,
-        steps,
-        cross,
+        point=options.point,
+        gravity=np.array(loading.acting_gravity()),
+        control=control,
+        limit=limit,
+        steps=steps,
+        cross=cross,
     )
     (end, points, critical), (crossing_end, crossing, crossing_critical) = branches
     _check_cross(cross, critical, str(ENDS[end]))
@@ -90,7 +88,7 @@ def _check_cross(cross: int, critical: list[dict[str, Any]], end: str) -> None:
         raise StiffmapError(f"cross: the path has {forks} bifurcations, got {cross} (end of the path: {end})")
 
 
-def check_control(control: str, limit: float | None, steps: int, load_type: str, cross: int) -> float:
+def check_control(control: str, limit: float | None, steps: int, load_type: object, cross: int) -> float:
     """The limit as a number; StiffmapError where the options do not fit together."""
     if control not in CONTROLS:
         raise StiffmapError(f"control: expected one of {', '.join(CONTROLS)}, got {control!r}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import xarray as xr
@@ -18,6 +18,7 @@ from stiffmap.maps.loading import Loading, without_failed
 from stiffmap.maps.provenance import describe
 from stiffmap.maps.sums import norm
 from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
+from stiffmap.options import LoadingKeywords, SolveOptions
 
 
 def polar(
@@ -27,25 +28,20 @@ def polar(
     plane: str = "xy",
     *,
     directions: int = 72,
-    point: str = "tcp",
-    rotation: ArrayLike | None = None,
-    gravity: ArrayLike | None = None,
-    load_type: str = "dead",
-    method: str = "fast",
-    load_steps: int | str = "auto",
-    threads: int | None = None,
+    options: SolveOptions | None = None,
+    **given: Unpack[LoadingKeywords],
 ) -> xr.Dataset:
     """Deflection against the direction of a pure force in a plane, at one position.
 
     position (3,) m; force N; `directions` equally spaced directions from the plane's first axis
-    towards its second, each a loaded equilibrium. Other options as in `Machine.solve`.
+    towards its second, each a loaded equilibrium. `options` and other keywords as in `Machine.solve`.
 
     Returns a Dataset with dimension ``angle`` (rad): displacement, deflection, deflection_xy, status,
     flags, and the scalars worst_deflection, worst_direction, best_deflection, best_direction (whole
     translation; with ``_xy`` in the plane) searched between the directions. Failed directions hold NaN
     and their status. Raises StiffmapError for bad input.
     """
-    loading = Loading(machine, point, rotation, gravity, load_type, method, load_steps, threads)
+    loading = Loading(machine, options, **given)
     p, axes = place(position), plane_axes(plane)
     force = magnitude(force, "force", "N")
     if directions < 3:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Unpack
+
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
@@ -14,6 +16,7 @@ from stiffmap.maps.loading import Loading, without_failed
 from stiffmap.maps.provenance import describe
 from stiffmap.maps.sums import dot, norm
 from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
+from stiffmap.options import LoadingKeywords, SolveOptions
 
 
 def sweep(
@@ -26,13 +29,8 @@ def sweep(
     limit: float | None = None,
     steps: int = 40,
     cross: int = 0,
-    point: str = "tcp",
-    rotation: ArrayLike | None = None,
-    gravity: ArrayLike | None = None,
-    load_type: str = "dead",
-    method: str = "fast",
-    load_steps: int | str = "auto",
-    threads: int | None = None,
+    options: SolveOptions | None = None,
+    **given: Unpack[LoadingKeywords],
 ) -> xr.Dataset:
     """Deflection against the size of a force of one direction, at one position.
 
@@ -45,7 +43,7 @@ def sweep(
     other side. That branch ends at the `limit`, or where the force falls to zero.
 
     position (3,) m; direction (3,), any length; forces (n,) N, negative ones act against it;
-    limit of either sign; steps to the limit. Other options as in `Machine.solve`.
+    limit of either sign; steps to the limit. `options` and other keywords as in `Machine.solve`.
 
     Returns a Dataset with dimension ``force``: displacement, deflection, deflection_xy,
     deflection_along (component along the force), compliance_along (of a little more force, m/N),
@@ -57,12 +55,12 @@ def sweep(
     mode_joint (what moves most in it); the attributes ``end`` and ``crossing_end`` say why they ended.
     Raises StiffmapError for bad input.
     """
-    loading = Loading(machine, point, rotation, gravity, load_type, method, load_steps, threads)
+    loading = Loading(machine, options, **given)
     p, u = place(position), unit(direction)
     if forces is None or control != "force":
         if forces is not None:
             raise StiffmapError(f"forces: not with control {control!r}, which finds them; give a limit (m)")
-        reach = check_control(control, limit, steps, load_type, cross)
+        reach = check_control(control, limit, steps, loading.options.load_type, cross)
         return load_path(loading, p, u, control, reach, steps, cross)
     if limit is not None or cross:
         raise StiffmapError(f"{'cross' if limit is None else 'limit'}: not together with forces")

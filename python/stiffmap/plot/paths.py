@@ -71,7 +71,7 @@ def mode_figure(
     if not 0 <= index < count:
         raise StiffmapError(f"index: the path has {count} critical points, got {index}")
     at = path.critical_coordinates.values[index]
-    moved = at + SHARE * machine._core.length * path.mode.values[index]
+    moved = at + SHARE * machine.compiled.length * path.mode.values[index]
     leg, joint = str(path.mode_leg.values[index]), str(path.mode_joint.values[index])
     with paper_style():
         figure = new_figure(5.2, 4.8)
@@ -98,8 +98,8 @@ def _mark(ax: Any, machine: Machine, shape: Skeleton, moved: Floats, leg: str, j
     for of, ends in shape.links:
         if of == leg:
             ax.plot(*(MM * ends.T), color=HALO, lw=7, alpha=0.6, solid_capstyle="round", zorder=0)
-    core = machine._core
-    index = list(core.coordinates).index(joint)
+    core = machine.compiled
+    index = core.names.coordinates.index(joint)
     node = next(i for i, (_, c) in enumerate(core.nodes) if c == index)
     at = core.frames(moved)[0][node]
     ax.scatter(*(MM * at), s=190, facecolor="none", edgecolor=VERMILLION, linewidth=1.8, label="moves most",

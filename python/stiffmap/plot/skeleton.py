@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from stiffmap.broadcasting import Floats
+from stiffmap.compiled import CompiledMachine, Role
 from stiffmap.description import Joint
 from stiffmap.files.names import all_elements
 from stiffmap.machine import Machine
 
-ACTUATOR, PASSIVE = 0, 1
 COINCIDENT = 1e-9
 
 
@@ -34,45 +33,45 @@ class Skeleton:
 
 def skeleton(machine: Machine, coordinates: Floats) -> Skeleton:
     """Geometry to draw at coordinates (springs at rest, or deflected)."""
-    core = machine._core
+    core = machine.compiled
     position, rotation = core.frames(coordinates)
     owner = owners(core)
     joints = {n: e for n, e in all_elements(machine.description) if isinstance(e, Joint)}
-    links, guides, marks = [], [], {ACTUATOR: [], PASSIVE: []}  # type: ignore[var-annotated]
+    links, guides, marks = [], [], {Role.ACTUATOR: [], Role.PASSIVE: []}  # type: ignore[var-annotated]
     for i, (parent, c) in enumerate(core.nodes):
-        role = core.roles[c] if c >= 0 else None
+        role = core.names.roles[c] if c >= 0 else None
         if role in marks:
             marks[role].append(position[i])
-        joint = joints.get(core.coordinates[c]) if c >= 0 else None
+        joint = joints.get(core.names.coordinates[c]) if c >= 0 else None
         if joint is not None and joint.kind == "prismatic" and not _moves(core, parent):
             guides.append((owner[i], travel(joint, float(coordinates[c]), position[i], rotation[i])))
         elif parent >= 0 and np.linalg.norm(position[i] - position[parent]) > COINCIDENT and parent != 0:
             links.append((owner[i], position[[parent, i]]))
     empty = np.zeros((0, 3))
     return Skeleton(
-        links, guides, np.array(marks[ACTUATOR]).reshape(-1, 3) if marks[ACTUATOR] else empty,
-        np.array(marks[PASSIVE]).reshape(-1, 3) if marks[PASSIVE] else empty, position[-1],
+        links, guides, np.array(marks[Role.ACTUATOR]).reshape(-1, 3) if marks[Role.ACTUATOR] else empty,
+        np.array(marks[Role.PASSIVE]).reshape(-1, 3) if marks[Role.PASSIVE] else empty, position[-1],
     )  # fmt: skip
 
 
-def _moves(core: Any, node: int) -> bool:
+def _moves(core: CompiledMachine, node: int) -> bool:
     """Whether a joint lies below a node: a prismatic one above it is a strut, not a guide."""
     while node >= 0:
         parent, c = core.nodes[node]
-        if c >= 0 and core.roles[c] in (ACTUATOR, PASSIVE):
+        if c >= 0 and core.names.roles[c] in (Role.ACTUATOR, Role.PASSIVE):
             return True
         node = parent
     return False
 
 
-def owners(core: Any) -> list[str]:
+def owners(core: CompiledMachine) -> list[str]:
     """Leg that each node belongs to: that of its own coordinate, else its parent's."""
     out: list[str] = []
     last = max((end for block, _, _, end in core.loops if block == "legs"), default=len(core.nodes))
     for i, (parent, c) in enumerate(core.nodes):
-        own = core.coordinates[c].split(".")[0] if c >= 0 else ""
+        own = core.names.coordinates[c].split(".")[0] if c >= 0 else ""
         inherited = out[parent] if parent >= 0 and i <= last else ""
-        out.append(own if own in core.legs else inherited)
+        out.append(own if own in core.names.legs else inherited)
     return out
 
 

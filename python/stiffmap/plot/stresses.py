@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from stiffmap.errors import StiffmapError
+from stiffmap.internal_wrenches import InternalWrenches
 from stiffmap.plot.style import BLUE, CYCLE, VERMILLION, new_figure, paper_style
-from stiffmap.stress import InternalWrenches
 
 DIRECTIONS = ("fx", "fy", "fz", "mx", "my", "mz")
 

@@ -49,7 +49,7 @@ def richardson(f: Callable[[float], np.ndarray], h: float) -> np.ndarray:
 
 def off(found: np.ndarray, true: np.ndarray) -> float:
     """Largest error over the quantity's size, per pose; linear and angular parts in the machine's length."""
-    unit = np.array([1, 1, 1, *[MACHINE._core.length] * 3])
+    unit = np.array([1, 1, 1, *[MACHINE.compiled.length] * 3])
     if true.ndim == 3:
         stiff = np.abs(true).max() > 1e3
         scale = np.outer(1 / unit, 1 / unit) if stiff else np.outer(unit, unit)
@@ -103,12 +103,12 @@ def test_inputs(name: str) -> None:
     for i, variable in enumerate(slopes(s, "stiffness")):
 
         def solved(h: float, i: int = i) -> sm.Solution:
-            call = _moved(machine, Call(poses, FORCE), name, i, h)
-            return machine.solve(call.position, call.wrench, rotation=call.rotation, method="reference")
+            call = _moved(machine.compiled, Call(poses, FORCE), name, i, h)
+            return machine.solve(call.position, call.wrench, options=call.options, method="reference")
 
         for q in QUANTITIES:
             true = richardson(
-                lambda h, q=q, solved=solved: getattr(solved(h), q), 30 * _step(machine, name, i)
+                lambda h, q=q, solved=solved: getattr(solved(h), q), 30 * _step(machine.compiled, name, i)
             )
             assert off(slopes(s, q)[variable], true) < 1e-5, (q, variable)
 

@@ -7,17 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap import _core
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
+from stiffmap.compiled import CompiledMachine, Status
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
 from stiffmap.rotations import check_rotations
-from stiffmap.solving import gravity_vector
-from stiffmap.status import Status
 
 
 @dataclass(frozen=True, eq=False)
-class HeldMachine:
+class HoldingWrench:
     """A batch of poses with a point of the machine held; SI, base axes, moments about the point.
 
     Failed poses hold NaN and their status.
@@ -54,8 +51,8 @@ class HeldMachine:
         return np.asarray(self.status == Status.CONVERGED)
 
 
-def imposed_displacement(
-    machine: Machine,
+def holding_wrench(
+    machine: CompiledMachine,
     position: ArrayLike,
     displacement: ArrayLike,
     *,
@@ -63,7 +60,7 @@ def imposed_displacement(
     point: str = "tcp",
     gravity: ArrayLike | None = None,
     threads: int | None = None,
-) -> HeldMachine:
+) -> HoldingWrench:
     """Wrenches and stiffness of a machine whose `point` is held off its commanded pose.
 
     Parameters
@@ -84,20 +81,20 @@ def imposed_displacement(
     """
     p = trailing(position, (3,), "position", "positions (m)")
     d = trailing(displacement, (6,), "displacement", "displacements [dx dy dz rx ry rz] (m, rad)")
-    home = machine.description.home.r
-    r = trailing(home if rotation is None else rotation, (3, 3), "rotation", "rotation matrices")
+    r = trailing(
+        machine.home_rotation if rotation is None else rotation, (3, 3), "rotation", "rotation matrices"
+    )
     check_rotations(r)
-    if point not in machine.points:
-        raise StiffmapError(f"point: expected one of {', '.join(machine.points)}, got {point!r}")
+    if point not in machine.names.points:
+        raise StiffmapError(f"point: expected one of {', '.join(machine.names.points)}, got {point!r}")
     shape = batch(p.shape[:-1], d.shape[:-1], r.shape[:-2])
-    out = _core.clamp(
-        machine._core,
+    out = machine.impose(
         rows(p, shape, (3,)),
         rows(r, shape, (3, 3)),
         rows(d, shape, (6,)),
-        point,
-        gravity_vector(machine, gravity),
-        thread_count(threads),
+        point=point,
+        gravity=machine.gravity(gravity),
+        threads=thread_count(threads),
     )
     arrays = {name: values.reshape(shape + values.shape[1:]) for name, values in out.items()}
-    return HeldMachine(**arrays, point=point, legs=machine.legs, actuators=machine.actuators)
+    return HoldingWrench(**arrays, point=point, legs=machine.names.legs, actuators=machine.names.actuators)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap import _core
 from stiffmap.broadcasting import Floats, rows, thread_count
+from stiffmap.description import Joint
+from stiffmap.files.names import all_elements
 from stiffmap.machine import Machine
-from stiffmap.solving import gravity_vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,15 +67,14 @@ def assembly_stress(
     )
     shape = s.status.shape
     load = np.zeros(6) if wrench is None else np.asarray(wrench, dtype=float)
-    turned = machine.description.home.r if rotation is None else np.asarray(rotation, dtype=float)
-    (force,) = _core.reactions(
-        machine._core,
+    turned = machine.compiled.home_rotation if rotation is None else np.asarray(rotation, dtype=float)
+    force = machine.compiled.reactions(
         rows(np.asarray(position, dtype=float), shape, (3,)),
         rows(turned, shape, (3, 3)),
         rows(load, shape, (6,)),
-        point,
-        gravity_vector(machine, gravity),
-        thread_count(threads),
+        point=point,
+        gravity=machine.compiled.gravity(gravity),
+        threads=thread_count(threads),
     )
     force = force.reshape((*shape, force.shape[-1]))
     elastic = {n: i for n, i in s.joint_index.items() if n in machine.actuators or _has_law(machine, n)}
@@ -91,9 +90,6 @@ def assembly_stress(
 
 
 def _has_law(machine: Machine, name: str) -> bool:
-    from stiffmap.description import Joint
-    from stiffmap.files.names import all_elements
-
     return any(
         isinstance(e, Joint) and e.law is not None and (name == n or name.rpartition(".")[0] == n)
         for n, e in all_elements(machine.description)

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 
 from stiffmap._core import Mechanism
 
-PASSIVE, SPRING = 1, 2  # roles of coordinates in the core
+
+class Role(IntEnum):
+    """What a coordinate belongs to."""
+
+    ACTUATOR = 0
+    PASSIVE = 1
+    SPRING = 2
 
 
 @dataclass(frozen=True)
@@ -18,22 +25,34 @@ class Names:
     legs: tuple[str, ...]
     points: tuple[str, ...]
     coordinates: tuple[str, ...]
+    roles: tuple[Role, ...]
+    """Of each coordinate."""
+    prismatic: tuple[bool, ...]
+    """Whether each coordinate is a length; else it is an angle."""
     free_spins: tuple[str, ...]
     springs: Mapping[str, int]
     joints: Mapping[str, int]
 
+    def is_prismatic(self, coordinate: str) -> bool:
+        """Whether a coordinate is a length."""
+        return self.prismatic[self.coordinates.index(coordinate)]
+
 
 def names_of(core: Mechanism) -> Names:
     """All names of a mechanism."""
-    coordinates, roles = tuple(core.coordinates), core.roles
+    coordinates, roles = tuple(core.coordinates), tuple(Role(r) for r in core.roles)
     return Names(
         actuators=tuple(n for n, _ in core.actuators),
         legs=tuple(core.legs),
         points=tuple(core.points),
         coordinates=coordinates,
+        roles=roles,
+        prismatic=tuple(core.prismatic),
         free_spins=tuple(
-            n for n, held, r in zip(coordinates, core.locked, roles, strict=True) if held and r == PASSIVE
+            n
+            for n, held, r in zip(coordinates, core.locked, roles, strict=True)
+            if held and r == Role.PASSIVE
         ),
         springs=dict(core.springs),
-        joints={n: i for i, (n, r) in enumerate(zip(coordinates, roles, strict=True)) if r != SPRING},
+        joints={n: i for i, (n, r) in enumerate(zip(coordinates, roles, strict=True)) if r != Role.SPRING},
     )

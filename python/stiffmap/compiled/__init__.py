@@ -1,0 +1,7 @@
+"""The seam to the C++ core: the only package that imports `stiffmap._core`."""
+
+from stiffmap.compiled.machine import Answer, CompiledMachine, kernel_levels
+from stiffmap.compiled.names import Names, Role
+from stiffmap.compiled.status import Flag, Status
+
+__all__ = ["Answer", "CompiledMachine", "Flag", "Names", "Role", "Status", "kernel_levels"]

@@ -1,0 +1,183 @@
+"""A machine as the C++ core holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap import _core
+from stiffmap.broadcasting import Floats
+from stiffmap.compiled.lowering import build_mechanism
+from stiffmap.compiled.names import Names, names_of
+from stiffmap.description import MachineDescription
+from stiffmap.errors import StiffmapError
+
+
+class CompiledMachine:
+    """The compiled mechanism of a description, its kernel plan, and every call on them.
+
+    Calls take C-contiguous arrays with one leading axis of poses, SI, base axes; the public functions broadcast
+    and check before they call. Immutable; may be shared by threads.
+    """
+
+    def __init__(self, description: MachineDescription) -> None:
+        self.description = description
+        self._mechanism = build_mechanism(description)
+
+    @cached_property
+    def names(self) -> Names:
+        """Names of everything in the mechanism."""
+        return names_of(self._mechanism)
+
+    @cached_property
+    def home_rotation(self) -> Floats:
+        """(3, 3) orientation of the tcp at home."""
+        return self.description.home.r
+
+    @cached_property
+    def _plan(self) -> _core.FastPlan:
+        box = self.description.workspace
+        low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))
+        return _core.FastPlan(self._mechanism, np.array(low), np.array(high))
+
+    @cached_property
+    def _one(self) -> _core.OneCall:
+        return _core.OneCall(self._mechanism, self._plan, self.home_rotation, self.gravity())
+
+    @property
+    def not_fast(self) -> str:
+        """What the machine lacks for the fast path; empty if nothing."""
+        return self._plan.missing
+
+    @property
+    def length(self) -> float:
+        """Characteristic length, m."""
+        return self._mechanism.length
+
+    @property
+    def stiffness(self) -> float:
+        """Characteristic stiffness, N/m."""
+        return self._mechanism.stiffness
+
+    @cached_property
+    def nodes(self) -> tuple[tuple[int, int], ...]:
+        """Parent and coordinate of each frame; -1: none."""
+        return tuple(self._mechanism.nodes)
+
+    @cached_property
+    def loops(self) -> tuple[tuple[str, str, int, int], ...]:
+        """Block, branch, and the two frames that each loop closes."""
+        return tuple(self._mechanism.loops)
+
+    def gravity(self, given: ArrayLike | None = None) -> Floats:
+        """(3,) m/s², base axes; the machine file's where nothing is given. StiffmapError for bad numbers."""
+        if given is None:
+            return np.array(self.description.gravity or (0.0, 0.0, 0.0))
+        g = np.asarray(given, dtype=float)
+        if g.shape != (3,) or not np.isfinite(g).all():
+            raise StiffmapError(f"gravity: expected 3 finite numbers (m/s², base axes), got {given!r}")
+        return g
+
+    def solve_one(self, position: Any, wrench: Any) -> _core.OneAnswer | None:
+        """One pose under one wrench at the tcp by the kernels; None for inputs that are not plain numbers."""
+        return self._one.solve(position, wrench)
+
+    def solve(
+        self,
+        position: Floats,
+        rotation: Floats,
+        wrench: Floats,
+        *,
+        load_points: Sequence[str],
+        load_types: Sequence[str],
+        read_points: Sequence[str],
+        gravity: Floats,
+        fast: bool,
+        load_steps: int,
+        threads: int,
+        stiffness: bool,
+        variants: Sequence[CompiledMachine] = (),
+    ) -> _core.Answer:
+        """Equilibria of (n, 3) positions, (n, 3, 3) rotations and (n, load points, 6) wrenches."""
+        return self._mechanism.solve(
+            self._plan if fast else None,  # type: ignore[arg-type]  # None: reference path
+            position,
+            rotation,
+            wrench,
+            load_points,
+            [LOAD_TYPES[t] for t in load_types],
+            read_points,
+            gravity,
+            load_steps,
+            threads,
+            stiffness,
+            [v._plan for v in variants],
+        )
+
+    def close_poses(self, position: Floats, rotation: Floats, threads: int) -> tuple[Any, ...]:
+        """Coordinates, position, rotation, status and flags of (n, 3) positions and (n, 3, 3) rotations."""
+        return self._mechanism.closure(self._plan, position, rotation, True, threads)
+
+    def close_actuators(self, actuators: Floats, threads: int) -> tuple[Any, ...]:
+        """The same of (n, actuators) actuator coordinates, continued from home."""
+        none = np.zeros((0, 3, 3))
+        return self._mechanism.closure(None, actuators, none, False, threads)  # type: ignore[arg-type]
+
+    def impose(
+        self,
+        position: Floats,
+        rotation: Floats,
+        displacement: Floats,
+        *,
+        point: str,
+        gravity: Floats,
+        threads: int,
+    ) -> dict[str, Any]:
+        """Arrays by name: what keeps `point` at (n, 6) displacements from its commanded poses."""
+        return _core.clamp(self._mechanism, position, rotation, displacement, point, gravity, threads)
+
+    def reactions(
+        self, position: Floats, rotation: Floats, wrench: Floats, *, point: str, gravity: Floats, threads: int
+    ) -> Floats:
+        """(n, coordinates) N or N·m of every spring, drive and locked coordinate, reference path."""
+        (force,) = _core.reactions(self._mechanism, position, rotation, wrench, point, gravity, threads)
+        return np.asarray(force)
+
+    def path(
+        self,
+        position: Floats,
+        rotation: Floats,
+        direction: Floats,
+        *,
+        point: str,
+        gravity: Floats,
+        control: str,
+        limit: float,
+        steps: int,
+        cross: int,
+    ) -> tuple[Any, ...]:
+        """Flags, the path of equilibria and the branch that crosses it: (end, points, critical points) each."""
+        how = PATH_CONTROLS.index(control)
+        return _core.path(
+            self._mechanism, position, rotation, direction, point, gravity, how, limit, steps, cross
+        )
+
+    def frames(self, coordinates: Floats) -> tuple[Floats, Floats]:
+        """(nodes, 3) m and (nodes, 3, 3): all frames at given coordinates, nominal geometry."""
+        position, rotation = self._mechanism.frames(coordinates)
+        return position, rotation
+
+
+LOAD_TYPES = {"dead": 0, "follower": 1, "semitangential": 2}
+PATH_CONTROLS = ("force", "displacement", "arc")
+Answer = _core.Answer | _core.OneAnswer
+"""Arrays of a call, with one leading axis of poses."""
+
+
+def kernel_levels() -> list[str]:
+    """Instruction sets that this CPU can run, the widest last."""
+    return list(_core.kernel_levels())

@@ -1,0 +1,33 @@
+"""How a pose ended, and what else is to be known of it."""
+
+from __future__ import annotations
+
+from enum import IntEnum, IntFlag
+
+
+class Status(IntEnum):
+    """Status of one pose; failed poses hold NaN as well."""
+
+    CONVERGED = 0
+    UNREACHABLE = 1
+    SINGULAR = 2
+    UNSTABLE = 3
+    NOT_CONVERGED = 4
+
+
+class Flag(IntFlag):
+    """Bits beside the status; a value with a flag is kept."""
+
+    LEG_SINGULAR = 1 << 0
+    FREE_SPIN = 1 << 1
+    PLATFORM_SINGULAR = 1 << 2
+    INTERNAL_WRENCH_UNDETERMINED = 1 << 3
+    CONFIGURATION_UNDETERMINED = 1 << 4
+    RIGID_DIRECTION = 1 << 5
+    JOINT_LIMIT = 1 << 6
+    DRIVE_RANGE = 1 << 7
+    DRIVE_FORCE = 1 << 8
+    NONCONSERVATIVE = 1 << 9
+    BRANCH_UNVERIFIED = 1 << 10
+    FREE_PLAY = 1 << 11
+    LOAD_STEPPED = 1 << 12

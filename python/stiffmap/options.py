@@ -1,0 +1,70 @@
+"""How poses are solved: the options that `Machine.solve`, maps, experiments and commands pass on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class SolveOptions:
+    """Everything about a solution but the machine, its poses and the wrench."""
+
+    point: str = "tcp"
+    """Named point where the wrench acts and displacement, stiffness and compliance are."""
+    rotation: ArrayLike | None = None
+    """(..., 3, 3), commanded orientation; None: as at home."""
+    wrenches: Mapping[str, ArrayLike] = field(default_factory=dict)
+    """More wrenches: point name -> (..., 6) N, N·m."""
+    load_type: str | Mapping[str, str] = "dead"
+    """How wrenches follow their bodies: dead, follower or semitangential; a mapping says it by point."""
+    read_points: Sequence[str] = ()
+    """Further points whose displacement is wanted."""
+    gravity: ArrayLike | None = None
+    """(3,) m/s², base axes; None: what the machine file says."""
+    method: str = "fast"
+    """``fast`` or ``reference``."""
+    load_steps: int | str = "auto"
+    """``auto`` (adaptive continuation) or the number of equal steps."""
+    stiffness: bool = True
+    """False: displacements, status, flags and iterations only."""
+    threads: int | None = None
+    """None: all cores that this process may use."""
+
+    def as_plain(self) -> dict[str, Any]:
+        """What of the shared options changes numbers, as JSON data; threads do not."""
+        plain = {k: getattr(self, k) for k in ("point", "load_type", "method", "load_steps")}
+        for name in ("rotation", "gravity"):
+            value = getattr(self, name)
+            plain[name] = None if value is None else np.asarray(value, dtype=float).tolist()
+        return plain
+
+
+class LoadingKeywords(TypedDict, total=False):
+    """Fields of `SolveOptions` that one pose, a map, a polar diagram and a sweep share."""
+
+    point: str
+    rotation: ArrayLike | None
+    gravity: ArrayLike | None
+    load_type: str | Mapping[str, str]
+    method: str
+    load_steps: int | str
+    threads: int | None
+
+
+class SolveKeywords(LoadingKeywords, total=False):
+    """All fields of `SolveOptions`, as keywords of `Machine.solve`."""
+
+    wrenches: Mapping[str, ArrayLike] | None
+    read_points: Sequence[str]
+    stiffness: bool
+
+
+def merged(options: SolveOptions | None, given: SolveKeywords | LoadingKeywords) -> SolveOptions:
+    """The options with some fields as given; TypeError for a keyword that is none."""
+    known: dict[str, Any] = {k: v for k, v in given.items() if not (k == "wrenches" and v is None)}
+    return SolveOptions(**known) if options is None else replace(options, **known)
