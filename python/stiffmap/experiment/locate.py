@@ -45,8 +45,7 @@ def located(machine: Machine, experiment: Experiment) -> Experiment:
 
 def _differ(machine: Machine, commanded: Floats, back: Floats) -> Mask:
     """(n,) rows whose pose leads back to other coordinates; a full turn of a joint is the same place."""
-    slides = dict(zip(machine._core.coordinates, machine._core.prismatic, strict=True))
-    turns = np.array([not slides[a] for a in machine.actuators])
+    turns = np.array([not machine.compiled.names.is_prismatic(a) for a in machine.actuators])
     gap = back - commanded
     gap = np.where(turns, (gap + np.pi) % (2 * np.pi) - np.pi, gap)
     return np.asarray(~(np.abs(gap).max(axis=1) < SAME_COMMAND))
