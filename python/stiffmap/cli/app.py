@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from stiffmap.cli.commands import COMMANDS, Command
+from stiffmap.cli.vectors import joined
 from stiffmap.errors import MissingPartError, StiffmapError
 
 BAD_INPUT = 2
@@ -24,7 +25,7 @@ Lengths in mm, forces in N, angles in deg. Every command has [bold]--help[/bold]
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``stiffmap`` (default: with the process's arguments); returns the exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    given = joined(sys.argv[1:] if arguments is None else arguments)
     try:
         build_app(given)(args=given, prog_name="stiffmap")
     except StiffmapError as error:

@@ -22,7 +22,7 @@ def import_urdf(
         Path | None, typer.Option("-o", "--output", help="Machine file to write. [default: NAME.yaml]")
     ] = None,
     without_meshes: Annotated[bool, typer.Option("--without-meshes", help="Do not look for meshes.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing file.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Machine file from a URDF: its tree to a tool as a serial machine, with a sidecar also closed loops.
@@ -41,8 +41,8 @@ def import_urdf(
     found = read(urdf, sidecar, meshes=not without_meshes)
     machine = Machine(found.description)
     file = output or urdf.with_name(f"{machine.name}.yaml")
-    if file.exists() and not force:
-        raise FileError("exists already; use --force to overwrite it", file=str(file))
+    if file.exists() and not overwrite:
+        raise FileError("exists already; use --overwrite to replace it", file=str(file))
     machine.save(file)
     if as_json:
         print_json({"file": str(file), "name": machine.name, "legs": list(machine.legs),

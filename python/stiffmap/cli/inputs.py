@@ -31,6 +31,13 @@ GravityOption = Annotated[
         "--gravity", help="Gravity in m/s², base axes, e.g. 0,0,-9.81; default: the machine file's."
     ),
 ]
+ForceOption = Annotated[
+    str,
+    typer.Option(
+        help="Force on the tool in N: a vector in base axes, such as 300,0,0, or a size, such as 300, "
+        "whose directions are searched."
+    ),
+]
 MethodOption = Annotated[str, typer.Option(help="fast or reference.")]
 ThreadsOption = Annotated[int | None, typer.Option(help="Threads; default: all cores.")]
 ToleranceOption = Annotated[float, typer.Option(help="Tolerated deflection, mm.")]
@@ -45,13 +52,16 @@ RotationOption = Annotated[
 
 
 def numbers(text: str, name: str, count: int | None = None) -> Floats:
-    """Comma-separated finite numbers."""
+    """Finite numbers, separated by commas or blanks."""
+    expected = "numbers" if count is None else f"{count} numbers"
     try:
-        out = np.array([float(part) for part in text.split(",")])
+        out = np.array([float(part) for part in text.replace(",", " ").split()])
     except ValueError:
-        raise StiffmapError(f"--{name}: expected numbers separated by commas, got '{text}'") from None
-    if count is not None and out.size != count:
-        raise StiffmapError(f"--{name}: expected {count} numbers separated by commas, got '{text}'")
+        raise StiffmapError(
+            f"--{name}: expected {expected} without units, such as 100,0,-50; got '{text}'"
+        ) from None
+    if (count is not None and out.size != count) or not out.size:
+        raise StiffmapError(f"--{name}: expected {expected} separated by commas, got '{text}'")
     if not np.isfinite(out).all():
         raise StiffmapError(f"--{name}: expected finite numbers, got '{text}'")
     return out
@@ -76,9 +86,16 @@ def gravity(text: str | None) -> Any:
     return None if text is None else numbers(text, "gravity", 3)
 
 
-def wrench(force: str, moment: str) -> Floats:
-    """Wrench (6,) in N, N·m from N and N·mm."""
-    return np.concatenate([numbers(force, "force", 3), MM * numbers(moment, "moment", 3)])
+def force_given(text: str) -> tuple[float, Floats | None]:
+    """``300``: a size in N, in any direction. ``300,0,0``: a vector in N, base axes, with its size."""
+    given = numbers(text, "force")
+    if given.size not in (1, 3):
+        raise StiffmapError(
+            f"--force: expected a size, such as 300, or a vector, such as 300,0,0; got '{text}'"
+        )
+    if given.size == 1 and given[0] <= 0:
+        raise StiffmapError(f"--force: a size is a positive number (a direction takes three); got '{text}'")
+    return float(np.linalg.norm(given)), given if given.size == 3 else None
 
 
 def machine_with(name: str, effects: Sequence[str] | None) -> Machine:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,6 +13,7 @@ from rich.console import Console
 from stiffmap.cli.inputs import (
     MM,
     EffectsOption,
+    ForceOption,
     GravityOption,
     MachineArgument,
     MethodOption,
@@ -20,6 +22,7 @@ from stiffmap.cli.inputs import (
     ToleranceOption,
     finish,
     folder,
+    force_given,
     gravity,
     machine_with,
     plain,
@@ -27,6 +30,7 @@ from stiffmap.cli.inputs import (
 from stiffmap.cli.map_summary import as_table, failures, summary
 from stiffmap.cli.map_uncertainty import draw_deviations, print_uncertainty, uncertainty_data
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 
 
@@ -39,10 +43,12 @@ def map_command(
         list[float] | None,
         typer.Option(help="z-plane in mm; repeatable. [default: lowest, 0, highest of the workspace]"),
     ] = None,
+    y: Annotated[list[float] | None, typer.Option(help="Planes across y instead, in mm; repeatable.")] = None,
+    x: Annotated[list[float] | None, typer.Option(help="Planes across x instead, in mm; repeatable.")] = None,
     points: Annotated[
-        int, typer.Option(help="Positions along x and along y, over the whole workspace.")
+        int, typer.Option(help="Positions along each axis of a plane, over the whole workspace.")
     ] = 101,
-    force: Annotated[float, typer.Option(help="Size of the force, N.")] = 300.0,
+    force: ForceOption = "300",
     plane: PlaneOption = "xy",
     tolerance: ToleranceOption = 0.25,
     directions: Annotated[
@@ -62,6 +68,12 @@ def map_command(
     zarr: Annotated[bool, typer.Option("--zarr", help="Write Zarr instead of NetCDF.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Take up an interrupted run.")] = False,
     pictures: Annotated[bool, typer.Option(help="Draw the maps.")] = True,
+    formats: Annotated[
+        str, typer.Option("--format", help="Formats of the pictures: png, svg, pdf, or several as png,pdf.")
+    ] = "png",
+    own_scales: Annotated[
+        bool, typer.Option("--own-scales", help="A colour scale for each plane instead of a common one.")
+    ] = False,
     method: MethodOption = "fast",
     threads: ThreadsOption = None,
     as_json: JsonOption = False,
@@ -70,7 +82,10 @@ def map_command(
 
     The default is the paper's Figure 7: 300 N, z = -200, 0 and 300 mm over the whole xy workspace,
     deflection in the plane. The paper does not say where its force points: mapped are the worst
-    direction at every position, the best one, Fx and Fy.
+    direction at every position, the best one, Fx and Fy. A force that is given as a vector is mapped
+    beside the worst and the best direction of its size.
+
+    Coordinates that a machine's task does not command are left at home: a planar machine has one plane.
 
     Exit codes: 0 done, 1 some poses failed (they hold NaN and their status), 2 bad input.
 
@@ -78,19 +93,24 @@ def map_command(
 
       [cyan]stiffmap map orthoglide-revised -o results[/cyan]
 
+      [cyan]stiffmap map orthoglide-revised --force 200,0,-100 --points 41 -o results[/cyan]
+
       [cyan]stiffmap map my_machine.yaml --uncertainty --points 21[/cyan]
 
       [cyan]stiffmap map tripteron --force 100 --points 41 --z 300 --z 500[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --y 0 --plane xz --points 41 --format svg[/cyan]
 
       [cyan]stiffmap map orthoglide-revised --gravity 0,0,-9.81 --tolerance 0.1 --json[/cyan]
     """
     import stiffmap
 
+    kinds = picture_formats(formats)
     target = folder(output) / ("map.zarr" if zarr else "map.nc")
     m = machine_with(machine, effect)
     ds = stiffmap.error_map(
         m,
-        **grid(m, z, points),
+        **grid(m, {"x": x, "y": y, "z": z}, points),
         wrench=cases(plane, force),
         plane=plane,
         directions=directions,
@@ -104,7 +124,7 @@ def map_command(
         out=target,
         resume=resume,
     )
-    files = [target, *(draw(ds, output, plane, MM * tolerance) if pictures else [])]
+    files = [target, *(draw(ds, output, plane, MM * tolerance, kinds, own_scales) if pictures else [])]
     band = uncertainty_data(ds, plane) if uncertainty else None
     files += draw_deviations(ds, output, plane) if uncertainty and pictures else []
     rows = summary(ds, plane, MM * tolerance)
@@ -122,27 +142,51 @@ def map_command(
     finish(bool(failures(ds)))
 
 
-def grid(machine: Machine, z: list[float] | None, points: int) -> dict[str, Any]:
-    """Axes (m) over the workspace box."""
+def grid(machine: Machine, planes: dict[str, list[float] | None], points: int) -> dict[str, Any]:
+    """Axes (m) over the workspace box; a coordinate that is not commanded has one value, its home."""
+    given = {a: MM * np.array(v) for a, v in planes.items() if v}
+    if len(given) > 1:
+        raise StiffmapError(f"--{' and --'.join(given)}: expected planes across one axis")
     low, high = machine.workspace
-    middle = 0.0 if low[2] < 0 < high[2] else (low[2] + high[2]) / 2
-    count = max(points, 0)
-    return {
-        "x": np.linspace(low[0], high[0], count),
-        "y": np.linspace(low[1], high[1], count),
-        "z": [low[2], middle, high[2]] if not z else MM * np.array(z),
-    }
+    task = machine.description.task
+    out: dict[str, Any] = {}
+    for i, a in enumerate("xyz"):
+        if a in given:
+            out[a] = given[a]
+        elif task and a not in task:
+            out[a] = [float(machine.description.home.p[i])]
+        elif a == "z" and not given:
+            middle = 0.0 if low[2] < 0 < high[2] else (low[2] + high[2]) / 2
+            out[a] = [low[2], middle, high[2]]
+        else:
+            out[a] = np.linspace(low[i], high[i], max(points, 0))
+    if task and np.size(out["x"]) == np.size(out["y"]) == 1 and not given:
+        out["z"] = np.linspace(low[2], high[2], max(points, 0))  # only the height is commanded
+    return out
 
 
-def cases(plane: str, force: float) -> dict[str, list[float]]:
-    """Forces along the axes of the plane."""
+def picture_formats(text: str) -> list[str]:
+    """Endings of the pictures' names."""
+    kinds = [k.strip().lower() for k in text.split(",")]
+    if not set(kinds) <= {"png", "svg", "pdf"}:
+        raise StiffmapError(f"--format: expected png, svg, pdf, or several as png,pdf; got '{text}'")
+    return kinds
+
+
+def cases(plane: str, text: str) -> dict[str, list[float]]:
+    """The force that is given as a vector; of a size, forces along the axes of the plane."""
     from stiffmap.maps.inputs import magnitude, plane_axes
 
-    size = magnitude(force, "--force", "N")
+    size, vector = force_given(text)
+    magnitude(size, "--force", "N")
+    if vector is not None:
+        return {"F": [*vector, 0.0, 0.0, 0.0]}
     return {f"F{'xyz'[i]}": [size if k == i else 0.0 for k in range(6)] for i in plane_axes(plane)}
 
 
-def draw(ds: Any, output: Path, plane: str, tolerance: float) -> list[Path]:
+def draw(
+    ds: Any, output: Path, plane: str, tolerance: float, kinds: Sequence[str] = ("png",), own: bool = False
+) -> list[Path]:
     """One picture per reading of the force's direction."""
     from stiffmap.plot import map_figure, save
 
@@ -150,7 +194,7 @@ def draw(ds: Any, output: Path, plane: str, tolerance: float) -> list[Path]:
         w: {"variable": f"{w}_deflection_{plane}"} for w in ("worst", "best")
     }
     chosen |= {str(c): {"variable": f"deflection_{plane}", "case": str(c)} for c in ds.case.values}
-    return [
-        save(map_figure(ds, tolerance=tolerance, **how), output / f"map-{name}.png")
-        for name, how in chosen.items()
-    ]
+    figures = {
+        name: map_figure(ds, tolerance=tolerance, common_scale=not own, **how) for name, how in chosen.items()
+    }
+    return [save(f, output / f"map-{name}.{kind}") for name, f in figures.items() for kind in kinds]

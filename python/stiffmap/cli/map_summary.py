@@ -12,16 +12,20 @@ from rich.table import Table
 from stiffmap.status import Status
 
 
+def across(ds: xr.Dataset) -> str:
+    """The axis whose values are the planes: the one with the fewest, z before y before x."""
+    return min(("z", "y", "x"), key=lambda a: ds.sizes[a])
+
+
 def summary(ds: xr.Dataset, plane: str, tolerance: float) -> list[dict[str, Any]]:
-    """Per z-plane and reading of the force's direction: least, median, largest deflection in the plane "
-    "(m), share of
-    the poses within the tolerance; failed poses do not count as within."""
-    ds = ds.load()
+    """Per plane and reading of the force's direction: least, median, largest deflection in the plane of
+    the force (m), share of the poses within the tolerance; failed poses do not count as within."""
+    ds, axis = ds.load(), across(ds)
     readings = {w: ds[f"{w}_deflection_{plane}"] for w in ("worst", "best")}
     readings |= {str(c): ds[f"deflection_{plane}"].sel(case=c) for c in ds.case.values}
     return [
-        {"z": float(z), "force": name} | _row(values.sel(z=z).values, tolerance)
-        for z in ds.z.values
+        {axis: float(at), "force": name} | _row(values.sel({axis: at}).values, tolerance)
+        for at in ds[axis].values
         for name, values in readings.items()
     ]
 
@@ -46,10 +50,11 @@ def as_table(ds: xr.Dataset, rows: list[dict[str, Any]], plane: str, tolerance: 
         title=f"{ds.attrs['machine']}: deflection in the {plane} plane, mm, under "
         f"{ds.attrs['turning_force_N']:g} N",
     )
-    for head in ("z, mm", "force", "min", "median", "max", f"within {tolerance:g} mm"):
+    axis = across(ds)
+    for head in (f"{axis}, mm", "force", "min", "median", "max", f"within {tolerance:g} mm"):
         table.add_column(head, justify="left" if head == "force" else "right")
     for r in rows:
         sizes = (f"{1e3 * r[k]:.3f}" if np.isfinite(r[k]) else "–" for k in ("min", "median", "max"))
         name = f"{r['force']} direction" if r["force"] in ("worst", "best") else r["force"]
-        table.add_row(f"{1e3 * r['z']:g}", name, *sizes, f"{100 * r['share_within']:.1f} %")
+        table.add_row(f"{1e3 * r[axis]:g}", name, *sizes, f"{100 * r['share_within']:.1f} %")
     return table

@@ -11,20 +11,22 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from stiffmap.cli.map_summary import across
+
 SHOWN = 8
 
 
 def band(ds: xr.Dataset, plane: str) -> list[dict[str, Any]]:
-    """Per z-plane and reading of the force's direction: median and largest standard deviation (m) of the
+    """Per plane and reading of the force's direction: median and largest standard deviation (m) of the
     deflection in the plane, and the largest relative to its deflection."""
     names = {"worst": (f"worst_deflection_{plane}", None)}
     names |= {str(c): (f"deflection_{plane}", c) for c in ds.case.values}
-    rows = []
-    for z in ds.z.values:
+    rows, axis = [], across(ds)
+    for at in ds[axis].values:
         for force, (name, case) in names.items():
-            pick = {"z": z} if case is None else {"z": z, "case": case}
+            pick = {axis: at} if case is None else {axis: at, "case": case}
             size, std = ds[name].sel(pick).values, ds[f"{name}_std"].sel(pick).values
-            rows.append({"z": float(z), "force": force} | _row(size, std))
+            rows.append({axis: float(at), "force": force} | _row(size, std))
     return rows
 
 
@@ -57,7 +59,8 @@ def print_uncertainty(console: Console, data: dict[str, Any], plane: str) -> Non
     """Two tables, mm and per cent."""
     title = f"standard deviation of the deflection in the {plane} plane, mm"
     table = Table(box=box.SIMPLE_HEAD, title=title)
-    for head in ("z, mm", "force", "median", "max", "max, relative"):
+    axis = next(a for a in "xyz" if a in data["rows"][0])
+    for head in (f"{axis}, mm", "force", "median", "max", "max, relative"):
         table.add_column(head, justify="left" if head == "force" else "right")
     for r in data["rows"]:
         name = "worst direction" if r["force"] == "worst" else r["force"]
@@ -66,7 +69,7 @@ def print_uncertainty(console: Console, data: dict[str, Any], plane: str) -> Non
             f"{1e3 * r['max_std']:.4f}",
             f"{100 * r['max_relative']:.1f} %",
         )
-        table.add_row(f"{1e3 * r['z']:g}", name, *sizes)
+        table.add_row(f"{1e3 * r[axis]:g}", name, *sizes)
     console.print(table)
     shares = Table(box=box.SIMPLE_HEAD, title="share in the variance of the deflection, whole map")
     shares.add_column("number")

@@ -17,7 +17,7 @@ from stiffmap.files.starter import starter_text
 
 def new(
     file: Annotated[Path, typer.Argument(help="File to write; its stem becomes the machine's name.")],
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing file.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Start a machine file from a template in which every key is explained.
@@ -26,10 +26,10 @@ def new(
 
       [cyan]stiffmap new my_machine.yaml[/cyan]
 
-      [cyan]stiffmap new --force my_machine.yaml[/cyan]
+      [cyan]stiffmap new --overwrite my_machine.yaml[/cyan]
     """
-    if file.exists() and not force:
-        raise FileError("exists already; use --force to overwrite it", file=str(file))
+    if file.exists() and not overwrite:
+        raise FileError("exists already; use --overwrite to replace it", file=str(file))
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
     try:
         file.write_text(starter_text(name), encoding="utf-8")

@@ -15,6 +15,7 @@ from stiffmap.cli.inputs import (
     MM,
     EffectsOption,
     FolderOption,
+    ForceOption,
     GravityOption,
     MachineArgument,
     MethodOption,
@@ -22,6 +23,7 @@ from stiffmap.cli.inputs import (
     ToleranceOption,
     finish,
     folder,
+    force_given,
     gravity,
     machine_with,
     plain,
@@ -37,7 +39,7 @@ AtOption = Annotated[
 def polar(
     machine: MachineArgument,
     at: AtOption = None,
-    force: Annotated[float, typer.Option(help="Size of the force, N.")] = 300.0,
+    force: ForceOption = "300",
     plane: PlaneOption = "xy",
     directions: Annotated[int, typer.Option(help="Number of directions.")] = 72,
     tolerance: ToleranceOption = 0.25,
@@ -48,6 +50,9 @@ def polar(
     as_json: JsonOption = False,
 ) -> None:
     """Deflection against the direction of a force in a plane: weakest and strongest direction.
+
+    Of a force that is given as a vector, the size turns in the plane, and the deflection under the vector
+    itself is told as well.
 
     With -o: polar diagrams and ellipses of deflections (PNG), and the data (NetCDF).
 
@@ -65,19 +70,31 @@ def polar(
 
     m = machine_with(machine, effect)
     places = [position(text, m) for text in at] if at else [position(None, m)]
-    many = [
-        stiffmap.polar(m, p, force, plane, directions=directions, gravity=gravity(gravity_), method=method)
-        for p in places
-    ]
+    size, vector = force_given(force)
+    how: dict[str, Any] = {"gravity": gravity(gravity_), "method": method}
+    many = [stiffmap.polar(m, p, size, plane, directions=directions, **how) for p in places]
     files = write(many, folder(output), plane, MM * tolerance) if output else []
     if as_json:
-        print_json({"machine": m.name, "diagrams": [as_plain(d, plane) for d in many], "files": files})
+        data = {"machine": m.name, "diagrams": [as_plain(d, plane) for d in many], "files": files}
+        if vector is not None:
+            given = [m.solve(p, [*vector, 0, 0, 0], **how).displacement for p in places]
+            data["displacement_under_the_vector"] = plain(given)
+        print_json(data)
     else:
         console = Console(highlight=False)
         console.print(as_table(many, plane))
+        for p in places if vector is not None else []:
+            console.print(_under(m, p, vector, how), soft_wrap=True)
         if files:
             console.print(f"wrote {', '.join(files)}", soft_wrap=True)
     finish(any(bool((d.status != 0).any()) for d in many))
+
+
+def _under(m: Any, place: Any, vector: Any, how: dict[str, Any]) -> str:
+    """The deflection under the force that was given as a vector, in words."""
+    d = 1e3 * m.solve(place, [*vector, 0, 0, 0], **how).displacement[:3]
+    words = [", ".join(f"{v:.4g}" for v in values) for values in (1e3 * place, vector, d)]
+    return f"at ({words[0]}) mm, force ({words[1]}) N: ({words[2]}) mm, norm {np.linalg.norm(d):.4f} mm"
 
 
 def write(many: list[xr.Dataset], output: Any, plane: str, tolerance: float) -> list[str]:

@@ -11,18 +11,21 @@ from rich.console import Console
 from rich.table import Table
 
 from stiffmap.cli.inputs import (
+    MM,
     EffectsOption,
+    ForceOption,
     GravityOption,
     MachineArgument,
     MethodOption,
     RotationOption,
     finish,
+    force_given,
     gravity,
     machine_with,
+    numbers,
     plain,
     position,
     rotation,
-    wrench,
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.solution import Solution
@@ -35,7 +38,7 @@ SCALE = np.array([1e3] * 3 + [1.0] * 3)
 def solve(
     machine: MachineArgument,
     at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
-    force: Annotated[str, typer.Option(help="Force in N, base axes.")] = "0,0,0",
+    force: ForceOption = "0,0,0",
     moment: Annotated[str, typer.Option(help="Moment about the point in N mm, base axes.")] = "0,0,0",
     turned: RotationOption = None,
     point: Annotated[str, typer.Option(help="Named point where the wrench acts.")] = "tcp",
@@ -46,30 +49,44 @@ def solve(
 ) -> None:
     """Deflection and compliance at one pose under one wrench.
 
+    A force that is given by its size alone acts in the direction in space that pushes the tool furthest.
+
     Exit codes: 0 converged, 1 any other status, 2 bad input.
 
     Examples:
 
       [cyan]stiffmap solve orthoglide-revised --at -200,-200,-200 --force 300,0,0[/cyan]
 
+      [cyan]stiffmap solve orthoglide-revised --at -200 -200 -200 --force 300[/cyan]
+
       [cyan]stiffmap solve tripteron --at 300,400,500 --force 0,0,100 --json[/cyan]
 
       [cyan]stiffmap solve orthoglide-revised --force 0,0,-50 --moment 0,2000,0 --gravity 0,0,-9.81[/cyan]
     """
     m = machine_with(machine, effect)
-    load = wrench(force, moment)
-    s = m.solve(
-        position(at, m),
-        load,
-        rotation=rotation(turned),
-        point=point,
-        gravity=gravity(gravity_),
-        method=method,
-    )
+    how: dict[str, Any] = {
+        "rotation": rotation(turned),
+        "point": point,
+        "gravity": gravity(gravity_),
+        "method": method,
+    }
+    size, vector = force_given(force)
+    if vector is None:
+        from stiffmap.worst_force import worst_force
+
+        acting = worst_force(m, position(at, m), size, **how)
+    else:
+        acting = vector
+    load = np.r_[acting, MM * numbers(moment, "moment", 3)]
+    s = m.solve(position(at, m), load, **how)
     if as_json:
         print_json(as_plain(m.name, s, load))
     else:
-        show(Console(highlight=False), s)
+        console = Console(highlight=False)
+        if vector is None:
+            told = ", ".join(f"{v:.1f}" for v in acting)
+            console.print(f"{size:g} N in the direction that pushes furthest: force ({told}) N")
+        show(console, s)
     finish(int(s.status) != Status.CONVERGED)
 
 

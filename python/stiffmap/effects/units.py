@@ -17,6 +17,9 @@ _PLAIN = {"1": Fraction(1), "%": Fraction(1, 100), "ppm": _MICRO}
 _NUMBER = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)$")
 _ATOM = re.compile(r"^([^\d^]+|1)(?:\^?(\d))?$")
 
+_WORKSHOP = {"m": ("um", "mm"), "rad": ("mrad", "deg"), "m/N": ("mm/N", "um/N"), "N/m": ("N/mm", "N/um")}
+"""Units that a workshop writes, so that no message invites metres."""
+
 Dimension = tuple[tuple[str, int], ...]
 
 
@@ -78,7 +81,8 @@ def read_value(text: str, expected: str) -> float:
     want = unit_factor(expected)[1]
     if not unit:
         if want:
-            raise StiffmapError(f"the unit is missing: expected such as {number}{expected}, got {text!r}")
+            written = " or ".join(number + unit for unit in _WORKSHOP.get(expected, (expected,)))
+            raise StiffmapError(f"the unit is missing: write {written}; got {text!r}")
         return float(number)
     factor, dimension = unit_factor(unit)
     if dimension != want:

@@ -43,7 +43,13 @@ def position(table: Table, scales: Scales, commanded: bool) -> Floats:
                 line=1,
             )
         return np.full((len(table.rows), 3), np.nan)
-    return scales.length * np.column_stack([table.numbers(c) for c in POSE])
+    if scales.length < 1e-5 and not set(POSE) & set(scales.own):
+        raise FileError(
+            "units: with length: um the poses x, y, z would be in µm as well; write their unit, as in "
+            "{length: mm, dx: um, dy: um, dz: um} (or x: um, if they are)",
+            file=scales.file,
+        )
+    return np.asarray(scales.lengths(POSE) * np.column_stack([table.numbers(c) for c in POSE]))
 
 
 def command(model: ExperimentFile, table: Table, scales: Scales) -> Floats | None:
@@ -63,9 +69,9 @@ def other(
         raise FileError(
             "column 'dd': a distance between two poses is a position, no deflection", file=table.file
         )
-    out = scales.length * np.column_stack([table.numbers(c, blank=True) for c in POSE2])
+    out = scales.lengths(POSE2) * np.column_stack([table.numbers(c, blank=True) for c in POSE2])
     lost = np.isfinite(reading[:, channels.index(DISTANCE)]) & ~np.isfinite(out).all(axis=1)
-    same = np.abs(out - scales.length * block(table, POSE, blank=True)).max(axis=1) < 1e-9
+    same = np.abs(out - scales.lengths(POSE) * block(table, POSE, blank=True)).max(axis=1) < 1e-9
     for wrong, why in ((lost, "has no second pose (x2, y2, z2)"), (same, "is between a pose and itself")):
         if wrong.any():
             line = table.lines[int(np.flatnonzero(wrong)[0])]

@@ -42,6 +42,10 @@ def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[
     """What the reader must know, in sentences."""
     e = experiment
     out = [f"contradictory repeats: {c}" for c in noise.contradictions()]
+    if int(e.read.sum()) < FEWEST:
+        out.append(
+            f"{int(e.read.sum())} readings show a residual, but are too few for a diagnosis ({FEWEST})"
+        )
     if e.groups.max() == 0:
         out.append(
             "all rows are one pose: what changes over the workspace cannot be told, nothing is held out"

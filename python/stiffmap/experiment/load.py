@@ -89,7 +89,7 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
     for column in AXES[3:]:
         for name in (column, f"u_{column}"):
             if name in table:
-                scales.angle(name)
+                scales.angle(column)
     reading = scales.motion(channels) * read_columns.block(table, [c.name for c in channels], blank=True)
     if not np.isfinite(reading).any():
         raise FileError("missing column: no reading (dx, dy, dz, rx, ry, rz, dd, joints)", file=table.file)

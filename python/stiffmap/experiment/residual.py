@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from stiffmap.description import AppliedEffect
 from stiffmap.experiment.checks import Check, checks
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.limits import limitations, refuse
+from stiffmap.experiment.limits import limitations, refuse_unreachable
 from stiffmap.experiment.noise import Mask, Noise, noise_of
 from stiffmap.experiment.outliers import suspects
 from stiffmap.experiment.predict import Predictor
@@ -67,7 +67,7 @@ def residual(
     """
     predictor = Predictor(machine, experiment, threads=threads)
     e, base = predictor.experiment, predictor(tuple(effects))
-    refuse(e, base)
+    refuse_unreachable(e, base)
     rough = noise_of(e)
     raw = e.reading - base
     out = suspects(e, raw - nuisance_part(Problem.of(e, rough.sigma, base), raw), rough.sigma)

@@ -12,12 +12,50 @@ Positive = Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=False)]
 
 
-class UnitsModel(FileModel):
-    """Units of data.csv, of the noise and of the frame; angle only where there are rotations."""
+Length = Literal["m", "cm", "mm", "um", "µm", "in"]
+Angle = Literal["rad", "mrad", "deg"]
+Force = Literal["N", "kN", "MN"]
+Moment = Literal["N*m", "N*mm", "kN*m"]
 
-    length: Literal["m", "cm", "mm", "um", "in"]
-    force: Literal["N", "kN", "MN"] | None = None
-    angle: Literal["rad", "deg"] | None = None
+
+class UnitsModel(FileModel):
+    """Units of data.csv, of the noise and of the frame; angle only where there are rotations.
+
+    A column that has a unit of its own is named as well: ``{length: mm, force: N, dx: um, fx: kN}``. Its
+    standard deviations, ``u_dx`` and that of ``noise``, are in the same unit.
+    """
+
+    length: Length
+    force: Force | None = None
+    angle: Angle | None = None
+    temperature: Literal["degC", "K"] | None = None
+    x: Length | None = None
+    y: Length | None = None
+    z: Length | None = None
+    x2: Length | None = None
+    y2: Length | None = None
+    z2: Length | None = None
+    dx: Length | None = None
+    dy: Length | None = None
+    dz: Length | None = None
+    dd: Length | None = None
+    rx: Angle | None = None
+    ry: Angle | None = None
+    rz: Angle | None = None
+    rotx: Angle | None = None
+    roty: Angle | None = None
+    rotz: Angle | None = None
+    fx: Force | None = None
+    fy: Force | None = None
+    fz: Force | None = None
+    mx: Moment | None = None
+    my: Moment | None = None
+    mz: Moment | None = None
+
+    def own(self) -> dict[str, str]:
+        """Units of single columns."""
+        common = ("length", "force", "angle", "temperature")
+        return {k: v for k, v in self.model_dump(exclude_none=True).items() if k not in common}
 
 
 class NoiseModel(FileModel):
@@ -32,7 +70,7 @@ class NoiseModel(FileModel):
     dd: Positive | None = None
 
 
-LengthOrAngle = Literal["m", "cm", "mm", "um", "in", "rad", "deg"]
+LengthOrAngle = Literal["m", "cm", "mm", "um", "µm", "in", "rad", "mrad", "deg"]
 
 
 class JointModel(FileModel):

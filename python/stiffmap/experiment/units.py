@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +13,17 @@ from stiffmap.experiment.experiment import WRENCH, Channel, Floats
 from stiffmap.experiment.schema import ExperimentFile
 from stiffmap.files.units import FORCES, LENGTHS
 
-ANGLES = {"rad": 1.0, "deg": math.pi / 180.0}
+ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
+MOMENTS = {"N*m": 1.0, "N*mm": 1e-3, "kN*m": 1e3}
 
 
 def factor(unit: str) -> float:
-    """SI size of a unit of length or angle."""
-    return ANGLES[unit] if unit in ANGLES else float(LENGTHS[unit])
+    """SI size of a unit of length, angle, force or moment."""
+    for table in (ANGLES, MOMENTS):
+        if unit in table:
+            return table[unit]
+    unit = unit.replace("µ", "u")
+    return float(LENGTHS[unit] if unit in LENGTHS else FORCES[unit])
 
 
 @dataclass(frozen=True)
@@ -37,12 +43,19 @@ class Scales:
         units = model.units
         angle = None if units.angle is None else ANGLES[units.angle]
         force = None if units.force is None else float(FORCES[units.force])
-        own = {name: factor(c.unit) for name, c in model.joints.items()}
+        own = {name: factor(unit) for name, unit in units.own().items()}
+        own |= {name: factor(c.unit) for name, c in model.joints.items()}
         own |= {name: factor(c.unit) for name, c in model.command.items()}
-        return Scales(float(LENGTHS[units.length]), force, angle, own, file)
+        return Scales(factor(units.length), force, angle, own, file)
+
+    def lengths(self, columns: Sequence[str]) -> Floats:
+        """Factors of columns of lengths."""
+        return np.array([self.own.get(c, self.length) for c in columns])
 
     def angle(self, column: str) -> float:
         """Factor of a rotation column; raises `FileError` where no unit is declared."""
+        if column in self.own:
+            return self.own[column]
         if self.radian is None:
             raise FileError(
                 f"units: the unit 'angle' is not declared (column '{column}' needs it)", file=self.file
@@ -56,9 +69,10 @@ class Scales:
 
     def wrench(self, columns: list[str]) -> Floats:
         """(6,) factors of [fx fy fz mx my mz]; raises `FileError` where no unit is declared."""
-        if columns and self.force is None:
+        lost = [c for c in columns if c not in self.own]
+        if lost and self.force is None:
             raise FileError(
-                f"units: the unit 'force' is not declared (column '{columns[0]}' needs it)", file=self.file
+                f"units: the unit 'force' is not declared (column '{lost[0]}' needs it)", file=self.file
             )
         force = 1.0 if self.force is None else self.force
-        return np.array([force if c.startswith("f") else force * self.length for c in WRENCH])
+        return np.array([self.own.get(c, force if c[0] == "f" else force * self.length) for c in WRENCH])

@@ -14,7 +14,9 @@ from stiffmap.files.load import load_description
 from stiffmap.files.names import all_elements
 from stiffmap.files.shipped import find
 
-GAP_LIMIT = 1e-6
+GAP_LIMIT, TURN_LIMIT = 1e-4, 1e-3
+"""Gap of the home over the size of the machine, and rad, beyond which a number was probably mistyped; the
+solver closes what is smaller."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +37,13 @@ class FileCheck:
 def check_file(path: str | PathLike[str]) -> FileCheck:
     """Load a machine (by path or shipped name) and look it over; raises `StiffmapError` if unusable."""
     description = load_description(path)
-    CompiledMachine(description)  # refuses a home configuration that does not close, with each leg's gap
+    machine = CompiledMachine(
+        description
+    )  # refuses a home configuration that does not close, with each leg's gap
     gaps = home_gaps(description)
-    return FileCheck(find(path), description, _counts(description), gaps, _warnings(description, gaps))
+    return FileCheck(
+        find(path), description, _counts(description), gaps, _warnings(description, gaps, machine.length)
+    )
 
 
 def _counts(description: MachineDescription) -> dict[str, int]:
@@ -50,12 +56,12 @@ def _counts(description: MachineDescription) -> dict[str, int]:
     return {"legs": len(description.legs), **{key: counts[key] for key in keys}}
 
 
-def _warnings(description: MachineDescription, gaps: list[Gap]) -> list[str]:
+def _warnings(description: MachineDescription, gaps: list[Gap], size: float) -> list[str]:
     warnings = [
         f"home: {gap.name} is {gap.translation * 1e3:.4g} mm and {gap.rotation:.4g} rad off; "
         "home coordinates should close the machine"
         for gap in gaps
-        if max(gap.translation, gap.rotation) > GAP_LIMIT
+        if gap.translation > GAP_LIMIT * size or gap.rotation > TURN_LIMIT
     ]
     if not any(isinstance(e, Joint) and e.actuated for _, e in all_elements(description)):
         warnings.append("no actuator: the machine cannot be commanded")

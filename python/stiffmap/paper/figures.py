@@ -11,7 +11,7 @@ from stiffmap.paper.results import FORCE, TOLERANCE, Results
 from stiffmap.plot.ellipses import draw_ellipse
 from stiffmap.plot.error_maps import map_figure
 from stiffmap.plot.polars import draw_polar, position_text
-from stiffmap.plot.style import MM, new_figure, panel, paper_style, save
+from stiffmap.plot.style import MM, headline, legend_below, new_figure, panel, paper_style, save
 from stiffmap.plot.sweeps import sweep_figure
 
 
@@ -27,18 +27,15 @@ def figure_5(results: Results) -> Figure:
             bottom = figure.add_subplot(2, 4, i + 5)
             draw_ellipse(bottom, pol, "xy", TOLERANCE)
             bottom.set_title(panel(i + 4), loc="left")
-        figure.suptitle(
-            f"Figure 5. Deflection in the xy plane, mm, under a force of {FORCE:g} N", fontsize=10
-        )
-        handles, labels = bottom.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        headline(figure, f"Figure 5. Deflection in the xy plane, mm, under a force of {FORCE:g} N")
+        legend_below(figure, bottom.get_legend_handles_labels()[0])
     return figure
 
 
 def figure_6(results: Results) -> Figure:
     """Force against deflection at the four points."""
     figure = sweep_figure(list(results.sweeps.values()), tolerance=TOLERANCE)
-    figure.suptitle("Figure 6. Deflection against force at the four points", fontsize=10)
+    headline(figure, "Figure 6. Deflection against force at the four points")
     return figure
 
 
@@ -58,7 +55,8 @@ def save_all(results: Results, folder: Path, dpi: int = 150) -> list[Path]:
         "figure7-Fx": figure_7(results, "deflection_xy", "Fx"),
         "figure7-Fy": figure_7(results, "deflection_xy", "Fy"),
     }
-    figures["figure7-worst"].suptitle(
-        f"Figure 7. {FORCE:g} N in the worst direction of the plane, up to {worst:.2f} mm", fontsize=10
+    headline(
+        figures["figure7-worst"],
+        f"Figure 7. {FORCE:g} N in the worst direction of the plane, up to {worst:.2f} mm",
     )
     return [save(figure, folder / f"{name}.png", dpi) for name, figure in figures.items()]

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stiffmap.plot.polars import force_text, position_text
-from stiffmap.plot.style import BLUE, MM, TOLERANCE, new_figure, panel, paper_style
+from stiffmap.plot.style import BLUE, MM, TOLERANCE, headline, legend_below, new_figure, panel, paper_style
 
 
 def ellipse_figure(
@@ -25,9 +25,8 @@ def ellipse_figure(
             draw_ellipse(ax, pol, plane, tolerance)
             ax.set_title((panel(i) + " " if len(many) > 1 else "") + position_text(pol))
         machine = many[0].attrs["machine"]
-        figure.suptitle(f"{machine}: displacement under {force_text(many[0])}", fontsize=10)
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        headline(figure, f"{machine}: displacement under {force_text(many[0])}")
+        legend_below(figure, axes[0].get_legend_handles_labels()[0])
     return figure
 
 

@@ -1,4 +1,4 @@
-"""Error maps of z-planes."""
+"""Error maps: one panel per plane of positions."""
 
 from __future__ import annotations
 
@@ -6,56 +6,118 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from stiffmap.errors import StiffmapError
+from stiffmap.plot.directions import draw_directions
 from stiffmap.plot.failed import hatch_failed
-from stiffmap.plot.style import COLOURS, MM, TOLERANCE, new_figure, panel, paper_style
+from stiffmap.plot.isolines import draw_isolines, draw_tolerance
+from stiffmap.plot.map_lines import draw_line
+from stiffmap.plot.planes import Planes, on_grid, planes
+from stiffmap.plot.style import (
+    COLOURS,
+    MM,
+    headline,
+    legend_below,
+    length_unit,
+    new_figure,
+    panel,
+    paper_style,
+)
 
 TITLES = {
     "worst_deflection": "worst direction of the force",
     "best_deflection": "best direction of the force",
     "deflection": "",
 }
+FORCE_PLANES = ("xy", "xz", "yz")
 
 
 def map_figure(
     ds: xr.Dataset,
-    variable: str = "worst_deflection_xy",
+    variable: str | None = None,
     *,
     case: str | None = None,
     tolerance: float | None = 0.25e-3,
     directions: bool = True,
+    isolines: bool = True,
     limits: tuple[float, float] | None = None,
+    common_scale: bool = True,
 ) -> Figure:
-    """One map per z-plane with a common colour scale, the tolerance (m) as a contour line.
+    """A map of a deflection: one panel per plane, or one line where only one coordinate varies.
 
-    `variable` is a deflection of `ds` (m); `case` picks a load case where it has several.
-    `directions`: short lines along the force of the worst or best direction. `limits` of the colour
-    scale in m. Raises StiffmapError where `ds` has no such variable or case.
+    Panels stand across the axis with the fewest positions. What lies beyond `tolerance` (m) is dotted, and
+    its share is written over the panel. `variable` is a deflection of `ds` (m); None: the worst one in the
+    plane in which the force turned, or the deflection of a map without directions. `case` picks a load case
+    where it has several. `directions`: short lines along the force of the worst or best direction.
+    `isolines`: thin lines of equal deflection. `limits` of the colour scale in m; `common_scale=False` gives
+    each panel its own. Raises StiffmapError where `ds` has no such variable or case.
     """
+    ds = on_grid(ds)
+    variable = default_variable(ds) if variable is None else variable
     values = pick(ds, variable, case)
+    how = planes(values)
+    unit, factor = length_unit(limits[1] if limits else float(np.nanmax(values.values, initial=0.0)))
     with paper_style():
-        n = values.sizes["z"]
-        figure = new_figure(max(2.35 * n + 0.9, 4.6), 3.1)
-        axes = figure.subplots(1, n, squeeze=False, sharey=True)[0]
-        norm = Normalize(MM * limits[0], MM * limits[1]) if limits else colour_range(values)
-        entries: dict[str, Any] = {}
-        for i, ax in enumerate(axes):
-            mesh = draw_plane(ax, ds, values.isel(z=i), variable, case, norm, tolerance, entries)
-            if directions:
-                draw_directions(ax, ds, variable, i, entries)
-            ax.set_title(f"{panel(i)} z = {MM * float(values.z[i]):g} mm")
-        axes[0].set_ylabel("y, mm")
-        figure.colorbar(mesh, ax=list(axes), label=colour_label(values), shrink=0.85)
-        if entries:
-            figure.legend(handles=list(entries.values()), loc="outside lower center", ncols=len(entries))
-        figure.suptitle(title(ds, variable, case), fontsize=10)
+        if how.is_line:
+            figure = new_figure(5.2, 3.4)
+            draw_line(figure, ds, values, how, (unit, factor), tolerance)
+        else:
+            figure = _panels(ds, values, how, (unit, factor), tolerance, limits, common_scale,
+                             variable, case, directions, isolines)  # fmt: skip
+        headline(figure, title(ds, variable, case))
     return figure
+
+
+def _panels(
+    ds: xr.Dataset,
+    values: xr.DataArray,
+    how: Planes,
+    unit: tuple[str, float],
+    tolerance: float | None,
+    limits: tuple[float, float] | None,
+    common_scale: bool,
+    variable: str,
+    case: str | None,
+    directions: bool,
+    isolines: bool,
+) -> Figure:
+    figure, axes = panel_row(len(how.values), own_scales=not common_scale)
+    norm = Normalize(unit[1] * limits[0], unit[1] * limits[1]) if limits else colour_range(values, unit[1])
+    entries: dict[str, Any] = {}
+    for i, ax in enumerate(axes):
+        plane = values.isel({how.across: i}).transpose(how.up, how.right)
+        own = norm if common_scale or limits else colour_range(plane, unit[1])
+        mesh = draw_plane(ax, ds, plane, how, variable, case, own, tolerance, unit, entries)
+        if isolines:
+            draw_isolines(ax, plane, how, unit[1], own)
+        if directions:
+            draw_directions(ax, ds, variable, how, i, entries)
+        ax.set_title(
+            f"{panel(i) + ' ' if len(axes) > 1 else ''}{how.title(i)}" + shares(plane.values, tolerance)
+        )
+        if not common_scale:
+            figure.colorbar(mesh, ax=ax, label=colour_label(values, unit[0]), shrink=0.85)
+    axes[0].set_ylabel(f"{how.up}, mm")
+    if common_scale:
+        figure.colorbar(mesh, ax=list(axes), label=colour_label(values, unit[0]), shrink=0.85)
+    if entries:
+        legend_below(figure, list(entries.values()))
+    return figure
+
+
+def panel_row(count: int, *, own_scales: bool = False) -> tuple[Figure, Any]:
+    """A figure with a row of panels that share the upward axis."""
+    figure = new_figure(max((2.9 if own_scales else 2.35) * count + 0.9, 4.6), 3.4)
+    return figure, figure.subplots(1, count, squeeze=False, sharey=True)[0]
+
+
+def default_variable(ds: xr.Dataset) -> str:
+    """The worst deflection in the plane of the turning force; of a map without directions the deflection."""
+    found = [f"worst_deflection_{p}" for p in FORCE_PLANES if f"worst_deflection_{p}" in ds]
+    return found[0] if found else "deflection"
 
 
 def pick(ds: xr.Dataset, variable: str, case: str | None) -> xr.DataArray:
@@ -64,91 +126,76 @@ def pick(ds: xr.Dataset, variable: str, case: str | None) -> xr.DataArray:
         raise StiffmapError(f"variable: the map has no deflection {variable!r}")
     values = ds[variable]
     if "case" in values.dims:
+        if case is None and values.sizes["case"] == 1:
+            case = str(values.case.values[0])
         if case is None or case not in values["case"]:
             raise StiffmapError(
                 f"case: expected one of {', '.join(map(str, values.case.values))}, got {case!r}"
             )
         values = values.sel(case=case)
-    return values.sortby(["z", "y", "x"])
+    return on_grid(values.to_dataset(name=variable))[variable].transpose("z", "y", "x")
 
 
-def colour_range(values: xr.DataArray) -> Normalize:
-    """From the least to the largest value (mm)."""
-    v = MM * values.values[np.isfinite(values.values)]
+def colour_range(values: xr.DataArray, factor: float = MM) -> Normalize:
+    """From the least to the largest value, times `factor`."""
+    v = factor * values.values[np.isfinite(values.values)]
     return Normalize(v.min(), v.max()) if v.size else Normalize(0, 1)
+
+
+def shares(values: Any, tolerance: float | None) -> str:
+    """How much of a panel lies beyond the tolerance (m), and has no value."""
+    good = np.isfinite(values)
+    words = []
+    if tolerance is not None and good.any():
+        words.append(f"{_percent(np.mean(values[good] > tolerance))} beyond {MM * tolerance:g} mm")
+    if not good.all():
+        words.append(f"{_percent(np.mean(~good))} without a value")
+    return "\n" + "\n".join(words) if words else ""
+
+
+def _percent(share: float) -> str:
+    """Whole per cents; never 0 or 100 for what is only nearly so."""
+    if 0 < share < 0.005:
+        return "< 1 %"
+    return "> 99 %" if 0.995 < share < 1 else f"{100 * share:.0f} %"
 
 
 def draw_plane(
     ax: Axes,
     ds: xr.Dataset,
     plane: xr.DataArray,
+    how: Planes,
     variable: str,
     case: str | None,
     norm: Normalize,
     tolerance: float | None,
+    unit: tuple[str, float],
     entries: dict[str, Any],
 ) -> Any:
-    """One plane: colours, tolerance line, hatched failures; adds to the legend's entries."""
-    x, y, v = MM * plane.x.values, MM * plane.y.values, MM * plane.values
+    """One plane: colours, tolerance, hatched failures; adds to the legend's entries."""
+    x, y, v = MM * plane[how.right].values, MM * plane[how.up].values, unit[1] * plane.values
     mesh = ax.pcolormesh(x, y, v, shading="nearest", cmap=COLOURS, norm=norm, rasterized=True)
-    name = "status" if variable.startswith("deflection") else "direction_status"
-    status = ds[name] if "case" not in ds[name].dims else ds[name].sel(case=case)
-    for entry in hatch_failed(ax, x, y, v, status.sel(z=plane.z, y=plane.y, x=plane.x).values):
+    for entry in hatch_failed(ax, x, y, v, status_of(ds, plane, how, variable, case)):
         entries[str(entry.get_label())] = entry
-    if tolerance is not None and draw_tolerance(ax, x, y, v, MM * tolerance):
-        entries["tolerance"] = Line2D([], [], color=TOLERANCE, label=f"tolerance {MM * tolerance:g} mm")
+    if tolerance is not None:
+        entries |= draw_tolerance(ax, x, y, v, unit[1] * tolerance, f"{MM * tolerance:g} mm")
     ax.set_aspect("equal")
-    ax.set_xlabel("x, mm")
+    ax.set_xlabel(f"{how.right}, mm")
     return mesh
 
 
-def draw_tolerance(ax: Axes, x: Any, y: Any, v: Any, level: float) -> bool:
-    """The contour line of the tolerance (mm), where it passes through the plane."""
-    finite = v[np.isfinite(v)]
-    if min(v.shape) < 2 or finite.size == 0 or not finite.min() < level < finite.max():
-        return False
-    lines = ax.contour(x, y, v, levels=[level], colors=TOLERANCE, linewidths=1.6)
-    lines.set_path_effects(halo(3, "white"))
-    return True
+def status_of(ds: xr.Dataset, plane: xr.DataArray, how: Planes, variable: str, case: str | None) -> Any:
+    """Status of each position of a plane (up, right)."""
+    status = ds["status" if variable.startswith("deflection") else "direction_status"]
+    if "case" in status.dims:
+        status = status.sel(case=case) if case is not None else status.isel(case=0)
+    return status.sel({how.across: plane[how.across]}).transpose(how.up, how.right).values
 
 
-def halo(width: float, colour: str) -> list[patheffects.AbstractPathEffect]:
-    """An outline that keeps a line visible on any colour."""
-    return [patheffects.withStroke(linewidth=width, foreground=colour)]
-
-
-def draw_directions(ax: Axes, ds: xr.Dataset, variable: str, index: int, entries: dict[str, Any]) -> None:
-    """Short lines along the force of each direction that a worst or best deflection belongs to."""
-    name = variable.replace("_deflection", "_direction")
-    if name == variable or name not in ds or not variable.endswith(("deflection", "_xy")):
-        return
-    angle = ds[name].sortby(["z", "y", "x"]).isel(z=index)
-    angle = angle.isel(y=_spread(angle.sizes["y"]), x=_spread(angle.sizes["x"]))
-    x, y = np.meshgrid(MM * angle.x, MM * angle.y)
-    look: dict[str, Any] = {
-        "pivot": "mid",
-        "headwidth": 0,
-        "headlength": 0,
-        "headaxislength": 0,
-        "width": 0.005,
-    }
-    arrows = ax.quiver(x, y, np.cos(angle), np.sin(angle), color="white", scale=18, **look)
-    arrows.set_path_effects(halo(1.8, "#444444"))
-    line = Line2D([], [], color="white", label="direction of the force", path_effects=halo(2.5, "#444444"))
-    entries["direction"] = line
-
-
-def _spread(count: int, most: int = 9) -> Any:
-    """Indices of at most nine evenly spaced grid values, none at the border."""
-    if count <= most:
-        return np.arange(count)
-    return np.unique(np.round((np.arange(most) + 0.5) * count / most - 0.5).astype(int))
-
-
-def colour_label(values: xr.DataArray) -> str:
+def colour_label(values: xr.DataArray, unit: str = "mm") -> str:
     """What the colours mean."""
     plane = values.name and str(values.name).rpartition("_")[2]
-    return f"deflection in the {plane} plane, mm" if plane in ("xy", "xz", "yz") else "deflection, mm"
+    return f"deflection in the {plane} plane, {unit}" if plane in FORCE_PLANES else f"deflection, {unit}"
 
 
 def title(ds: xr.Dataset, variable: str, case: str | None) -> str:
@@ -161,7 +208,9 @@ def title(ds: xr.Dataset, variable: str, case: str | None) -> str:
 
 def load_text(ds: xr.Dataset, case: str | None) -> str:
     """The external wrench of a case in words."""
-    wrench = ds.wrench.sel(case=case) if "case" in ds.wrench.dims else ds.wrench
+    wrench = ds.wrench
+    if "case" in wrench.dims:
+        wrench = wrench.sel(case=case) if case is not None else wrench.isel(case=0)
     names = zip(wrench.wrench_component.values, wrench.values, strict=True)
     parts = [f"{n} = {v:g} {'N' if n.startswith('f') else 'N m'}" for n, v in names if v]
     return ", ".join(parts) or "no wrench"

@@ -14,7 +14,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 from stiffmap.plot.skeleton import Skeleton, skeleton
-from stiffmap.plot.style import BLACK, CYCLE, MM, new_figure, paper_style
+from stiffmap.plot.style import BLACK, CYCLE, MM, legend_below, new_figure, paper_style
 from stiffmap.status import Status
 
 
@@ -23,11 +23,12 @@ def machine_figure(
     position: ArrayLike | None = None,
     *,
     rotation: ArrayLike | None = None,
-    view: tuple[float, float] = (22.0, 35.0),
+    view: tuple[float, float] | None = None,
 ) -> Figure:
     """The machine at a commanded TCP pose (m, base axes; None: home), springs at rest.
 
-    `view`: elevation and azimuth in deg. Raises StiffmapError where the pose cannot be reached.
+    `view`: elevation and azimuth in deg; None: from above where everything lies in a plane of constant z,
+    else (22, 35). Raises StiffmapError where the pose cannot be reached.
     """
     p = machine.description.home.p if position is None else np.asarray(position, dtype=float)
     k = inverse_kinematics(machine, p, rotation)
@@ -39,14 +40,14 @@ def machine_figure(
     with paper_style():
         figure = new_figure(5.6, 5.2)
         ax: Any = figure.add_subplot(projection="3d")
-        draw_skeleton(ax, skeleton(machine, k.coordinates), machine.legs)
+        shape = skeleton(machine, k.coordinates)
+        draw_skeleton(ax, shape, machine.legs)
         if machine.description.workspace is not None:
             draw_box(ax, machine.workspace)
         ax.set_aspect("equal")
-        ax.view_init(*view)
-        ax.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
+        look_from(ax, shape, view)
         ax.set_title(f"{machine.name} at ({', '.join(f'{MM * v:g}' for v in p)}) mm", fontsize=10)
-        figure.legend(loc="outside lower center", ncols=4)
+        legend_below(figure, ax.get_legend_handles_labels()[0], most=4)
     return figure
 
 
@@ -67,6 +68,17 @@ def draw_skeleton(ax: Any, s: Skeleton, legs: tuple[str, ...]) -> None:
                label="passive joint", depthshade=False)  # fmt: skip
     ax.scatter(*(MM * s.tcp), marker="*", s=110, color=CYCLE[4], edgecolor=BLACK, linewidth=0.5, label="TCP",
                depthshade=False)  # fmt: skip
+
+
+def look_from(ax: Any, shape: Skeleton, view: tuple[float, float] | None = None) -> None:
+    """Direction of view, and labels of the axes that can be seen."""
+    points = [MM * p for _, ends in (*shape.links, *shape.guides) for p in ends]
+    flat = bool(points) and float(np.ptp(np.array(points)[:, 2])) < 1e-3
+    ax.view_init(*(view or ((90.0, -90.0) if flat else (22.0, 35.0))))
+    ax.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
+    if flat and view is None:
+        ax.set_zlabel("")
+        ax.set_zticks([])
 
 
 def draw_box(ax: Any, box: Floats) -> None:

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
-from stiffmap.plot.machines import draw_skeleton
+from stiffmap.plot.machines import draw_skeleton, look_from
 from stiffmap.plot.polars import position_text
 from stiffmap.plot.skeleton import Skeleton, skeleton
-from stiffmap.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, new_figure, paper_style
+from stiffmap.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, legend_below, new_figure, paper_style
 from stiffmap.status import Status
 
 MARKS = {"limit": "^", "bifurcation": "X"}
@@ -40,7 +40,7 @@ def path_figure(path: xr.Dataset) -> Figure:
         ax.axhline(0, color="0.7", lw=0.6, zorder=0)
         ax.set(xlabel="displacement along the force, mm", ylabel="force, N")
         ax.set_title(f"{path.attrs['machine']}, {position_text(path)}")
-        figure.legend(loc="outside lower center", ncols=2)
+        legend_below(figure, ax.get_legend_handles_labels()[0], most=2)
     return figure
 
 
@@ -64,7 +64,7 @@ def _joined(values: Any, where: Any) -> Any:
 
 
 def mode_figure(
-    machine: Machine, path: xr.Dataset, index: int = 0, *, view: tuple[float, float] = (22.0, 35.0)
+    machine: Machine, path: xr.Dataset, index: int = 0, *, view: tuple[float, float] | None = None
 ) -> Figure:
     """A critical point of a path: the machine there (grey) and moved along the mode, largely enlarged."""
     count = path.sizes.get("critical", 0)
@@ -82,14 +82,13 @@ def mode_figure(
         draw_skeleton(ax, shape, machine.legs)
         _mark(ax, machine, shape, moved, leg, joint)
         ax.set_aspect("equal")
-        ax.view_init(*view)
-        ax.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
+        look_from(ax, shape, view)
         ax.set_title(
             f"{machine.name}: {path.critical_kind.values[index]} point at "
             f"{float(path.critical_force[index]):.4g} N\nmode enlarged: "
             + (f"leg {leg}, " if leg else "") + f"most in {joint}", fontsize=9,
         )  # fmt: skip
-        figure.legend(loc="outside lower center", ncols=4)
+        legend_below(figure, ax.get_legend_handles_labels()[0], most=4)
     return figure
 
 

@@ -9,7 +9,17 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from stiffmap.plot.style import BLUE, MM, TOLERANCE, new_figure, panel, paper_style
+from stiffmap.plot.style import (
+    BLUE,
+    MM,
+    TOLERANCE,
+    headline,
+    legend_below,
+    length_unit,
+    new_figure,
+    panel,
+    paper_style,
+)
 
 
 def polar_figure(
@@ -22,24 +32,25 @@ def polar_figure(
     many = [diagrams] if isinstance(diagrams, xr.Dataset) else list(diagrams)
     with paper_style():
         figure = new_figure(max(2.6 * len(many) + 0.4, 4.0), 3.3)
+        factor = length_unit(max(float(np.nanmax(p[variable].values, initial=0.0)) for p in many))[1]
         for i, pol in enumerate(many):
             ax: Any = figure.add_subplot(1, len(many), i + 1, projection="polar")
-            draw_polar(ax, pol, variable, tolerance)
+            draw_polar(ax, pol, variable, tolerance, factor)
             ax.set_title((panel(i) + " " if len(many) > 1 else "") + position_text(pol))
         machine = many[0].attrs["machine"]
-        figure.suptitle(f"{machine}: deflection, mm, under {force_text(many[0])}", fontsize=10)
-        handles, labels = ax.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        unit = length_unit(max(float(np.nanmax(p[variable].values, initial=0.0)) for p in many))[0]
+        headline(figure, f"{machine}: deflection, {unit}, under {force_text(many[0])}")
+        legend_below(figure, ax.get_legend_handles_labels()[0])
     return figure
 
 
-def draw_polar(ax: Any, pol: xr.Dataset, variable: str, tolerance: float | None) -> None:
+def draw_polar(ax: Any, pol: xr.Dataset, variable: str, tolerance: float | None, factor: float = MM) -> None:
     """One diagram on a polar axis; gaps where a direction failed."""
     angle, value = (np.append(pol[n].values, pol[n].values[0]) for n in ("angle", variable))
-    ax.plot(angle, MM * value, color=BLUE, label=in_words(variable))
+    ax.plot(angle, factor * value, color=BLUE, label=in_words(variable))
     if tolerance is not None:
         ring = np.linspace(0, 2 * np.pi, 181)
-        ax.plot(ring, np.full(181, MM * tolerance), color=TOLERANCE, lw=1, ls="--",
+        ax.plot(ring, np.full(181, factor * tolerance), color=TOLERANCE, lw=1, ls="--",
                 label=f"tolerance {MM * tolerance:g} mm")  # fmt: skip
     ax.set_ylim(0, None)
     ax.set_rlabel_position(100)
@@ -57,9 +68,9 @@ def in_words(variable: str) -> str:
 
 def position_text(ds: xr.Dataset) -> str:
     """Position in mm."""
-    return ", ".join(f"{n} = {MM * v:g}" for n, v in zip("xyz", ds.position.values, strict=True)) + " mm"
+    return f"({', '.join(f'{MM * v:g}' for v in ds.position.values)}) mm"
 
 
 def force_text(ds: xr.Dataset) -> str:
     """The force of a polar diagram."""
-    return f"a force of {float(ds.force):g} N"
+    return f"a force of {float(ds.force):g}\u00a0N"

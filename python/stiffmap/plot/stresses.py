@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.errors import StiffmapError
 from stiffmap.internal_wrenches import InternalWrenches
-from stiffmap.plot.style import BLUE, CYCLE, VERMILLION, new_figure, paper_style
+from stiffmap.plot.style import BLUE, CYCLE, VERMILLION, headline, legend_below, new_figure, paper_style
 
 DIRECTIONS = ("fx", "fy", "fz", "mx", "my", "mz")
 
@@ -33,6 +33,6 @@ def stress_figure(stress: InternalWrenches, title: str = "") -> Figure:
             reach = 1.1 * max(float(np.nanmax(np.abs(values[:, first : first + 3]), initial=0.0)), 1e-6)
             ax.set(xlim=(-reach, reach), xlabel=unit, yticks=rows, yticklabels=names)
         axes[0].invert_yaxis()
-        figure.suptitle(title or "internal wrenches, spring axes", fontsize=10)
-        figure.legend(loc="outside lower center", ncols=3)
+        headline(figure, title or "internal wrenches, spring axes")
+        legend_below(figure, axes[0].get_legend_handles_labels()[0])
     return figure

@@ -10,7 +10,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stiffmap.plot.polars import in_words, position_text
-from stiffmap.plot.style import BLACK, CYCLE, DASHES, MM, new_figure, panel, paper_style
+from stiffmap.plot.style import (
+    BLACK,
+    CYCLE,
+    DASHES,
+    MM,
+    headline,
+    legend_below,
+    new_figure,
+    panel,
+    paper_style,
+)
 from stiffmap.status import Status
 
 
@@ -35,9 +45,8 @@ def sweep_figure(
             )
         axes[0].set_ylabel(f"{in_words(variable)}, mm")
         machine = next(iter(many[0].values())).attrs["machine"]
-        figure.suptitle(f"{machine}: deflection against force", fontsize=10)
-        entries = {str(h.get_label()): h for ax in axes for h in ax.get_legend_handles_labels()[0]}
-        figure.legend(handles=list(entries.values()), loc="outside lower center", ncols=min(len(entries), 6))
+        headline(figure, f"{machine}: deflection against force")
+        legend_below(figure, [h for ax in axes for h in ax.get_legend_handles_labels()[0]])
     return figure
 
 

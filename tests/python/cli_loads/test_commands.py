@@ -65,7 +65,7 @@ def test_path_finds_the_rods_that_buckle(tmp_path: Path, capsys: pytest.CaptureF
         ),
         (["sweep", "hexapod", "--control", "arc"], "limit: expected a number other than 0 (m"),
         (["sweep", "hexapod", "--control", "fast", "--limit", "1"], "control: expected one of force"),
-        (["stress", "hexapod", "--at", "a,b,c"], "--at: expected numbers"),
+        (["stress", "hexapod", "--at", "a,b,c"], "--at: expected 3 numbers"),
     ],
 )
 def test_bad_input(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:

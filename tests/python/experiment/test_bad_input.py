@@ -55,7 +55,7 @@ CASES: dict[str, tuple[Change, Change, tuple[str, ...]]] = {
     "text for a number": (same, swap("-0.049", "oops"), ("data.csv, line 3", "'dx'", "'oops'")),
     "empty force": (same, swap("-100,0,0", ",0,0"), ("data.csv, line 3", "'fx'", "an empty cell")),
     "infinite": (same, swap("90,0", "inf,0"), ("data.csv, line 4", "'x'", "finite")),
-    "too few readings": (same, lambda t: "\n".join(t.split()[:3]) + "\n", ("4 readings are fewer",)),
+    "poses in µm": (swap("length: mm", "length: um"), same, ("poses x, y, z would be in µm", "dx: um")),
     "noise zero": (swap("dx: 0.003", "dx: 0"), same, ("noise of dx is zero or unknown", "declare it")),
     "noise negative": (swap("dx: 0.003", "dx: -1"), same, ("experiment.yaml", "dx")),
     "unknown point": (swap("units", "point: probe\nunits"), same, ("no point 'probe'", "tcp")),
@@ -122,6 +122,16 @@ def test_a_folder_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
 def residual_lines(folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
     assert main(["residual", "orthoglide-revised", str(folder)]) in (0, 1)
     return capsys.readouterr().out
+
+
+def test_few_readings_have_a_residual_and_no_diagnosis(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = write(tmp_path, rows="\n".join(ROWS.split()[:3]) + "\n")
+    told = residual_lines(folder, capsys)
+    assert "4 readings of deflection" in told and "limit: 4 readings show a residual" in told
+    assert main(["diagnose", "orthoglide-revised", str(folder)]) == 2
+    assert "4 readings are fewer" in capsys.readouterr().err
 
 
 def test_one_pose_is_a_limit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

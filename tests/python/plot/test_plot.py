@@ -37,10 +37,14 @@ def test_map_draws_values_in_mm_and_the_tolerance(machine: sm.Machine) -> None:
         np.testing.assert_array_equal(mesh.get_array(), 1e3 * ds.worst_deflection_xy.sel(z=z))
         assert ax.get_aspect() == 1.0
         assert ax.get_xlabel() == "x, mm"
-    contours = [[c for c in ax.collections if isinstance(c, QuadContourSet)] for ax in (first, second)]
-    assert [len(c) for c in contours] == [1, 0]  # z = 300 mm is nowhere within the tolerance
-    assert contours[0][0].levels.tolist() == [0.25]
-    assert "tolerance 0.25 mm" in legend(figure)
+    lines = [
+        [c for c in ax.collections if isinstance(c, QuadContourSet) and not c.filled]
+        for ax in (first, second)
+    ]
+    at = [[c for c in found if c.levels.tolist() == [0.25]] for found in lines]
+    assert [len(c) for c in at] == [1, 0]  # z = 300 mm is nowhere within the tolerance
+    assert {"tolerance 0.25 mm", "beyond 0.25 mm"} <= legend(figure)
+    assert second.get_title().endswith("100 % beyond 0.25 mm")
 
 
 def test_failed_cells_are_hatched_not_coloured(machine: sm.Machine) -> None:
@@ -59,7 +63,7 @@ def test_failed_cells_are_hatched_not_coloured(machine: sm.Machine) -> None:
 def test_map_refuses_what_is_not_there(machine: sm.Machine) -> None:
     ds = sm.error_map(machine, x=0.0, y=0.0, z=0.0, wrench={"a": [1.0, 0, 0, 0, 0, 0]}, plane=None)
     with pytest.raises(sm.StiffmapError, match="no deflection 'worst_deflection_xy'"):
-        plot.map_figure(ds)
+        plot.map_figure(ds, "worst_deflection_xy")
     with pytest.raises(sm.StiffmapError, match="case: expected one of a"):
         plot.map_figure(ds, "deflection", case="b")
     assert "fx = 1 N" in plot.map_figure(ds, "deflection", case="a").get_suptitle()
