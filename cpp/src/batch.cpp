@@ -59,6 +59,7 @@ class Reference {
       pose_.gravity = in.gravity;
     }
     read(in, i, pose_);
+    pose_.closed = in.closed ? in.closed + m.size() * i : nullptr;
     solve_pose(m, pose_, options, *ws_, result_);
     write(m, i, result_, out);
   }
@@ -69,7 +70,8 @@ class Reference {
     if (!closure_) closure_ = std::make_unique<ClosureWorkspace>(m);
     const Pose pose{Eigen::Map<const Vec3>(in.position + 3 * i), Eigen::Map<const RowMajor3>(in.rotation + 9 * i)};
     VecX found(m.size());
-    const ClosureResult r = inverse_closure(m, pose, *closure_, found);
+    if (in.closed) found = Eigen::Map<const VecX>(in.closed + m.size() * i, m.size());
+    const ClosureResult r = in.closed ? given_closure(m, *closure_, found) : inverse_closure(m, pose, *closure_, found);
     // A doubtful branch keeps its flag: the whole pose then takes the reference path.
     if (r.status != Status::converged || r.flags & flag::branch_unverified) found[0] = std::nan("");
     Eigen::Map<VecX>(x, m.size()) = found;
@@ -207,7 +209,7 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
     input.perturbed = variants.data();
     input.perturbed_leg = moved.data();
     input.perturbed_count = out.variants ? static_cast<std::int32_t>(variants.size()) : 0;
-    if (!program.closes) s.closed.put(m, in, begin, end, s.reference, input);
+    if (in.closed || !program.closes) s.closed.put(m, in, begin, end, s.reference, input);
     table.run(&program, &input, &answer, begin, end, kernel_scratch(table.scratch_size(&program)));
     for (long i = begin; i < end; ++i) {
       if (!done[static_cast<std::size_t>(i)]) {

@@ -148,7 +148,8 @@ bool continuation(const Mechanism& m, const Target& target, Set&& set, ClosureWo
   return true;
 }
 
-void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace& ws, VecX& x, ClosureResult& out) {
+void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace& ws, const VecX& x,
+            ClosureResult& out) {
   out.residual = residual(m, x, target, ws) * m.length;
   out.tip = ws.frames.at(m.tip);
   out.status = ok ? Status::converged : Status::unreachable;
@@ -219,19 +220,80 @@ ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorks
   return out;
 }
 
-ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x) {
+namespace {
+
+/// Joint coordinates of `given`, springs and spins as at home.
+VecX joints_only(const Mechanism& m, const VecX& given) {
+  VecX x = m.home_coordinates;
+  for (Index j = 0; j < m.size(); ++j) {
+    const Coordinate& c = m.coordinates[at(j)];
+    if (c.role == Role::actuator || (c.role == Role::passive && !c.locked)) x[j] = given[j];
+  }
+  return x;
+}
+
+/// From closed coordinates `x` to given actuators.
+ClosureResult follow_actuators(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x) {
   ClosureResult out;
-  if (!actuators.allFinite()) return out;
   select_unknowns(m, false, ws);
-  x = m.home_coordinates;
+  const VecX from = x;
   const auto set = [&](double s, VecX& trial) {
     for (std::size_t i = 0; i < m.drives.size(); ++i) {
       const Index j = m.drives[i].coordinate;
-      trial[j] = m.home_coordinates[j] + s * (actuators[static_cast<Index>(i)] - m.home_coordinates[j]);
+      trial[j] = from[j] + s * (actuators[static_cast<Index>(i)] - from[j]);
     }
   };
   const bool ok = continuation(m, Target{}, set, ws, x, out);
   finish(m, Target{}, ok, ws, x, out);
+  return out;
+}
+
+}  // namespace
+
+ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x) {
+  if (!actuators.allFinite()) return {};
+  x = m.home_coordinates;
+  return follow_actuators(m, actuators, ws, x);
+}
+
+ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x,
+                              const VecX& from) {
+  if (!actuators.allFinite() || !from.allFinite()) return {};
+  x = joints_only(m, from);
+  select_unknowns(m, false, ws);
+  int iterations = 0;
+  if (!close(m, Target{}, Pace::damped, ws, x, iterations)) return {};
+  return follow_actuators(m, actuators, ws, x);
+}
+
+ClosureResult branch_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x, const VecX& from) {
+  ClosureResult out;
+  if (!pose.p.allFinite() || !pose.R.allFinite() || !from.allFinite()) return out;
+  const VecX start = joints_only(m, from);
+  x = start;
+  select_unknowns(m, false, ws);
+  Pose way;
+  const Target target{&way, m.task};
+  bool ok = close(m, Target{}, Pace::damped, ws, x, out.iterations);
+  select_unknowns(m, true, ws);
+  if (ok) {
+    const Pose first = ws.frames.at(m.tip);
+    ok = continuation(m, target, [&](double s, VecX&) { way = on_the_way(first, pose, s); }, ws, x, out);
+  }
+  way = pose;
+  if (!ok) {  // actuators and the others may belong to different configurations: all move at once
+    x = start;
+    ok = close(m, target, Pace::damped, ws, x, out.iterations);
+    if (ok) out.flags |= flag::branch_unverified;
+  }
+  finish(m, target, ok, ws, x, out);
+  return out;
+}
+
+ClosureResult given_closure(const Mechanism& m, ClosureWorkspace& ws, const VecX& x) {
+  ClosureResult out;
+  if (!x.allFinite()) return out;
+  finish(m, Target{}, true, ws, x, out);
   return out;
 }
 

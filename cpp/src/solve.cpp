@@ -227,7 +227,9 @@ SolveWorkspace::SolveWorkspace(const Mechanism& m)
     : closure(m), equilibrium(m), stiffness(m), problem(m), state(m), nominal(m), x(VecX::Zero(m.size())) {}
 
 ClosureResult prepare_pose(const Mechanism& m, const PoseInput& in, SolveWorkspace& ws) {
-  const ClosureResult closure = inverse_closure(m, in.commanded, ws.closure, ws.x);
+  if (in.closed) ws.x = Eigen::Map<const VecX>(in.closed, m.size());
+  const ClosureResult closure =
+      in.closed ? given_closure(m, ws.closure, ws.x) : inverse_closure(m, in.commanded, ws.closure, ws.x);
   if (closure.status != Status::converged) return closure;
   ws.reached = m.task == full_task ? in.commanded : closure.tip;
   forward(m, Geometry::nominal, ws.x, ws.nominal);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <pybind11/stl.h>
 
+#include <optional>
+
 #include "../../cpp/kernels/dispatch.hpp"
 #include "answer.hpp"
 #include "stiffmap/parallel.hpp"
@@ -20,13 +22,14 @@ std::vector<Index> point_indices(const Mechanism& m, const std::vector<std::stri
 Answer solve(const Mechanism& m, const FastPlan* plan, const Array& position, const Array& rotation,
              const Array& wrench, const std::vector<std::string>& load_points, const std::vector<int>& load_types,
              const std::vector<std::string>& read_points, const Array& gravity, int load_steps, int threads, bool full,
-             const std::vector<const FastPlan*>& variants) {
+             const std::vector<const FastPlan*>& variants, const std::optional<Array>& closed) {
   const py::ssize_t n = position.ndim() ? position.shape(0) : 0;
   BatchInput in;
   in.count = n;
   in.position = data(position, {n, 3}, "position");
   in.rotation = data(rotation, {n, 3, 3}, "rotation");
   in.wrench = data(wrench, {n, static_cast<py::ssize_t>(load_points.size()), 6}, "wrench");
+  if (closed) in.closed = data(*closed, {n, m.size()}, "closed coordinates");
   in.gravity = Eigen::Map<const Vec3>(data(gravity, {3}, "gravity"));
   in.read_points = point_indices(m, read_points);
   require(!in.read_points.empty(), "read_points", "at least one point", 0);
@@ -50,11 +53,13 @@ Answer solve(const Mechanism& m, const FastPlan* plan, const Array& position, co
   return answer;
 }
 
-/// Coordinates and tip poses by closure: from poses, or from actuators.
+/// Coordinates and tip poses by closure: from poses, or from actuators; on the branch of `start` (poses x
+/// coordinates) where it is given.
 py::tuple closure(const Mechanism& m, const FastPlan* plan, const Array& given, const Array& rotation, bool inverse,
-                  int threads) {
+                  int threads, const std::optional<Array>& start) {
   const py::ssize_t n = given.shape(0), drives = static_cast<py::ssize_t>(m.drives.size());
   const double* values = data(given, {n, inverse ? 3 : drives}, inverse ? "position" : "actuators");
+  const double* starts = start ? data(*start, {n, m.size()}, "start") : nullptr;
   const double* R = inverse ? data(rotation, {n, 3, 3}, "rotation") : nullptr;
   auto coordinates = empty({n, m.size()}), position = empty({n, 3}), turned = empty({n, 3, 3});
   py::array_t<std::uint8_t> status(n);
@@ -71,11 +76,14 @@ py::tuple closure(const Mechanism& m, const FastPlan* plan, const Array& given, 
       Pose at;
       for (long i = begin; i < end; ++i) {
         const Vec3 p = inverse ? Vec3(Eigen::Map<const Vec3>(values + 3 * i)) : Vec3::Zero();
+        const VecX a = inverse ? VecX() : VecX(Eigen::Map<const VecX>(values + drives * i, drives));
         ClosureResult r;
-        if (!inverse) r = forward_closure(m, Eigen::Map<const VecX>(values + drives * i, drives), ws, x);
+        if (starts) from = Eigen::Map<const VecX>(starts + m.size() * i, m.size());
+        if (!inverse) r = starts ? forward_closure(m, a, ws, x, from) : forward_closure(m, a, ws, x);
+        else if (starts) r = branch_closure(m, {p, Eigen::Map<const Row3>(R + 9 * i)}, ws, x, from);
         else if (plan && plan->nearest_start(m, p, from, at))
           r = inverse_closure(m, {p, Eigen::Map<const Row3>(R + 9 * i)}, ws, x, from, at);
-        if (inverse && (r.status != Status::converged || r.flags & flag::branch_unverified))
+        if (inverse && !starts && (r.status != Status::converged || r.flags & flag::branch_unverified))
           r = inverse_closure(m, {p, Eigen::Map<const Row3>(R + 9 * i)}, ws, x);
         const bool ok = r.status == Status::converged;
         const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -126,8 +134,9 @@ void bind_solve(py::module_& m) {
   py::class_<Mechanism>(m.attr("Mechanism"))
       .def("solve", &solve, "plan"_a.none(true), "position"_a, "rotation"_a, "wrench"_a, "load_points"_a,
            "load_types"_a, "read_points"_a, "gravity"_a, "load_steps"_a, "threads"_a, "full"_a,
-           "variants"_a = std::vector<const FastPlan*>{})
-      .def("closure", &closure, "plan"_a.none(true), "given"_a, "rotation"_a, "inverse"_a, "threads"_a)
+           "variants"_a = std::vector<const FastPlan*>{}, "closed"_a = py::none())
+      .def("closure", &closure, "plan"_a.none(true), "given"_a, "rotation"_a, "inverse"_a, "threads"_a,
+           "start"_a = py::none())
       .def("frames", &frames, "coordinates"_a);
 }
 

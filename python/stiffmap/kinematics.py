@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stiffmap.branches import Start, start_coordinates
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
-from stiffmap.machine import Machine
+from stiffmap.compiled import CompiledMachine
+
+if TYPE_CHECKING:
+    from stiffmap.machine import Machine
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,36 +36,63 @@ class Kinematics:
 
 
 def inverse_kinematics(
-    machine: Machine, position: ArrayLike, rotation: ArrayLike | None = None, *, threads: int | None = None
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    start: Start | None = None,
+    threads: int | None = None,
 ) -> Kinematics:
     """Actuator and passive coordinates at commanded TCP poses, on the declared assembly branch.
 
-    position (..., 3) m; rotation (..., 3, 3), None: as at home. docs/theory.md (C3), (C5).
+    position (..., 3) m; rotation (..., 3, 3), None: as at home. start: joint coordinates on another branch
+    (docs/conventions.md), which are closed with their actuators held and continued to the pose; None: from
+    home. docs/theory.md (C3), (C5).
     """
+    return close_poses(machine.compiled, position, rotation, start, threads)
+
+
+def forward_kinematics(
+    machine: Machine, actuators: ArrayLike, *, start: Start | None = None, threads: int | None = None
+) -> Kinematics:
+    """TCP pose at actuator coordinates (..., actuators) m or rad, by continuation from home or from `start`."""
+    return close_actuators(machine.compiled, actuators, start, threads)
+
+
+def close_poses(
+    machine: CompiledMachine,
+    position: ArrayLike,
+    rotation: ArrayLike | None,
+    start: Start | None,
+    threads: int | None,
+) -> Kinematics:
+    """See `inverse_kinematics`."""
     p = trailing(position, (3,), "position", "positions (m)")
-    r = trailing(
-        machine.compiled.home_rotation if rotation is None else rotation,
-        (3, 3),
-        "rotation",
-        "rotation matrices",
-    )
-    shape = batch(p.shape[:-1], r.shape[:-2])
-    out = machine.compiled.close_poses(rows(p, shape, (3,)), rows(r, shape, (3, 3)), thread_count(threads))
+    r = machine.home_rotation if rotation is None else rotation
+    r = trailing(r, (3, 3), "rotation", "rotation matrices")
+    x = None if start is None else start_coordinates(machine, start)
+    shape = batch(p.shape[:-1], r.shape[:-2], *(() if x is None else (x.shape[:-1],)))
+    from_x = None if x is None else rows(x, shape, x.shape[-1:])
+    out = machine.close_poses(rows(p, shape, (3,)), rows(r, shape, (3, 3)), thread_count(threads), from_x)
     return _kinematics(machine, out, shape)
 
 
-def forward_kinematics(machine: Machine, actuators: ArrayLike, *, threads: int | None = None) -> Kinematics:
-    """TCP pose at actuator coordinates (..., actuators) m or rad, by continuation from home."""
-    n = len(machine.actuators)
+def close_actuators(
+    machine: CompiledMachine, actuators: ArrayLike, start: Start | None, threads: int | None
+) -> Kinematics:
+    """See `forward_kinematics`."""
+    n = len(machine.names.actuators)
     a = trailing(actuators, (n,), "actuators", f"{n} actuator coordinates")
-    shape = a.shape[:-1]
-    out = machine.compiled.close_actuators(rows(a, shape, (n,)), thread_count(threads))
+    x = None if start is None else start_coordinates(machine, start)
+    shape = batch(a.shape[:-1], *(() if x is None else (x.shape[:-1],)))
+    from_x = None if x is None else rows(x, shape, x.shape[-1:])
+    out = machine.close_actuators(rows(a, shape, (n,)), thread_count(threads), from_x)
     return _kinematics(machine, out, shape)
 
 
-def _kinematics(machine: Machine, out: tuple[Floats, ...], shape: tuple[int, ...]) -> Kinematics:
+def _kinematics(machine: CompiledMachine, out: tuple[Floats, ...], shape: tuple[int, ...]) -> Kinematics:
     x, p, r, status, flags = out
-    names = machine.compiled.names
+    names = machine.names
     index = [names.joints[a] for a in names.actuators]
     return Kinematics(
         actuators=x[:, index].reshape((*shape, len(index))),

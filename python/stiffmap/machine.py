@@ -21,7 +21,7 @@ from stiffmap.holding_wrench import HoldingWrench, holding_wrench
 from stiffmap.options import SolveKeywords, SolveOptions, merged
 from stiffmap.recent import Recent
 from stiffmap.solution import Solution
-from stiffmap.solving import Call, solve_call
+from stiffmap.solving import Call, solve_call, solve_joints
 
 MOST_PREPARED = 4  # sets of derivatives whose machines are kept
 PLAIN = ({"threads": 1}, {"threads": None})  # options that one pose does not notice
@@ -136,6 +136,11 @@ class Machine:
             ``displacement``, ``stiffness``, ``compliance``: see `Solution.derivatives`,
             `Solution.stiffness_derivatives`, `Solution.compliance_derivatives`. Displacement alone costs a few
             solves for many parameters, the others two solves for each.
+        start
+            Joint coordinates that name the assembly mode (elbow up or down): a mapping joint name -> (...) m or
+            rad (those left out are as at home), or (..., coordinates) as `Solution.coordinates` has them. They
+            need not be closed: loops are closed with the actuators held, then continued to the pose. None: the
+            mode of home.
         threads
             None: all cores that this process may use.
         options
@@ -155,6 +160,23 @@ class Machine:
         requests = read_requests(derivatives, derivatives_of)
         ready = self._derivable.get(requests.key, lambda: prepare(self._compiled, requests))
         return differentiate(ready, call, requests)
+
+    def solve_joints(
+        self,
+        actuators: ArrayLike,
+        wrench: ArrayLike | None = None,
+        *,
+        options: SolveOptions | None = None,
+        **given: Unpack[SolveKeywords],
+    ) -> Solution:
+        """Equilibrium and stiffness at commanded actuators (..., actuators) m or rad, in the order of `actuators`.
+
+        The unloaded pose is where forward kinematics puts the TCP, by continuation from home or from `start`
+        (as in `solve`); `Solution.unloaded` holds it, and displacements count from there. The other arguments
+        are those of `solve`. UNREACHABLE where the actuators do not go together. StiffmapError for bad input.
+        """
+        home = self._description.home.p
+        return solve_joints(self._compiled, actuators, Call(home, wrench, merged(options, given)))
 
     def wrench(
         self,

@@ -9,6 +9,8 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stiffmap.branches import Start
+
 
 @dataclass(frozen=True, eq=False)
 class SolveOptions:
@@ -32,6 +34,8 @@ class SolveOptions:
     """``auto`` (adaptive continuation) or the number of equal steps."""
     stiffness: bool = True
     """False: displacements, status, flags and iterations only."""
+    start: Start | None = None
+    """Joint coordinates that name the assembly mode: docs/conventions.md. None: that of home."""
     threads: int | None = None
     """None: all cores that this process may use."""
 
@@ -41,6 +45,13 @@ class SolveOptions:
         for name in ("rotation", "gravity"):
             value = getattr(self, name)
             plain[name] = None if value is None else np.asarray(value, dtype=float).tolist()
+        if self.start is not None:
+            mapping = isinstance(self.start, Mapping)
+            plain["start"] = (
+                {k: np.asarray(v, dtype=float).tolist() for k, v in self.start.items()}  # type: ignore[union-attr]
+                if mapping
+                else np.asarray(self.start, dtype=float).tolist()
+            )
         return plain
 
 
@@ -53,6 +64,7 @@ class LoadingKeywords(TypedDict, total=False):
     load_type: str | Mapping[str, str]
     method: str
     load_steps: int | str
+    start: Start | None
     threads: int | None
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.compiled import Answer, Flag, Names, Status
+from stiffmap.kinematics import Kinematics
 
 Floats = NDArray[np.float64]
 Slopes = Mapping[str, Mapping[str, Floats]]  # quantity -> name of the variable -> derivative
@@ -34,10 +35,12 @@ class Solution:
     Failed poses hold NaN and their status. Arrays are made when they are first asked for.
     """
 
-    __slots__ = ("_answer", "_made", "_names", "_order", "_shape", "_slopes", "point")
+    __slots__ = ("_answer", "_made", "_names", "_order", "_shape", "_slopes", "point", "unloaded")
 
     point: str
     """Point where the wrench acts and displacement, stiffness and compliance are."""
+    unloaded: Kinematics | None
+    """TCP pose and coordinates before any load, of `Machine.solve_joints` and `Machine.solve(start=...)`."""
 
     def __init__(
         self,
@@ -47,6 +50,7 @@ class Solution:
         point: str,
         order: tuple[int, ...] = (0,),
         slopes: Slopes | None = None,
+        unloaded: Kinematics | None = None,
     ) -> None:
         self._answer = answer
         self._shape = shape
@@ -55,6 +59,7 @@ class Solution:
         self._made: dict[str, Any] | None = None
         self.point = point
         self._slopes: Slopes = slopes or {}
+        self.unloaded = unloaded
 
     def _array(self, name: str) -> Any:
         if self._made is None:
@@ -72,11 +77,14 @@ class Solution:
         return a.reshape(self._shape + a.shape[1:])
 
     def _with_derivatives(self, slopes: Slopes) -> Solution:
-        return Solution(self._answer, self._shape, self._names, self.point, self._order, slopes)
+        return Solution(
+            self._answer, self._shape, self._names, self.point, self._order, slopes, self.unloaded
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         arrays = SimpleNamespace(**{name: getattr(self._answer, name) for name in FIELDS})
-        return Solution, (arrays, self._shape, self._names, self.point, self._order, self._slopes)
+        told = (self._shape, self._names, self.point, self._order, self._slopes, self.unloaded)
+        return Solution, (arrays, *told)
 
     @property
     def readings(self) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing, w
 from stiffmap.compiled import CompiledMachine
 from stiffmap.compiled.machine import LOAD_TYPES
 from stiffmap.errors import StiffmapError
+from stiffmap.kinematics import Kinematics, close_actuators, close_poses
 from stiffmap.options import SolveOptions
 from stiffmap.rotations import check_rotations
 from stiffmap.solution import Solution
@@ -39,6 +40,11 @@ class Call:
             o,
             rotation=None if o.rotation is None else cut(o.rotation, 2),
             wrenches={n: cut(w, 1) for n, w in o.wrenches.items()},
+            start={n: cut(v, 0) for n, v in o.start.items()}
+            if isinstance(o.start, Mapping)
+            else None
+            if o.start is None
+            else cut(o.start, 1),
         )
         return Call(cut(self.position, 1), None if self.wrench is None else cut(self.wrench, 1), options)
 
@@ -52,6 +58,35 @@ def solve_call(
     """
     o = call.options
     p, w, r, extra = _arrays(machine, call)
+    if o.start is None:
+        return _solve(machine, o, (p, w, r, extra), variants, None)
+    unloaded = close_poses(machine, p, r, o.start, o.threads)
+    shape = unloaded.status.shape
+    p, r = np.broadcast_to(p, (*shape, 3)), np.broadcast_to(r, (*shape, 3, 3))
+    return _solve(machine, o, (p, w, r, extra), variants, unloaded)
+
+
+def solve_joints(machine: CompiledMachine, actuators: ArrayLike, call: Call) -> Solution:
+    """The answer at actuator coordinates (..., actuators): see `Machine.solve_joints`."""
+    o = call.options
+    if o.rotation is not None:
+        raise StiffmapError("rotation: expected none, since the actuators decide it, got one")
+    unloaded = close_actuators(machine, actuators, o.start, o.threads)
+    lost = np.isnan(unloaded.rotation).any((-2, -1), keepdims=True)
+    r = np.where(lost, machine.home_rotation, unloaded.rotation)
+    _, w, _, extra = _arrays(machine, replace(call, position=np.zeros(3)))
+    return _solve(machine, o, (unloaded.position, w, r, extra), (), unloaded)[0]
+
+
+def _solve(
+    machine: CompiledMachine,
+    o: SolveOptions,
+    arrays: tuple[Floats, Floats, Floats, dict[str, Floats]],
+    variants: Sequence[CompiledMachine],
+    unloaded: Kinematics | None,
+) -> tuple[Solution, Floats]:
+    """At coordinates that are closed already where `unloaded` holds them."""
+    p, w, r, extra = arrays
     shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2], *(v.shape[:-1] for v in extra.values()))
     if o.method not in METHODS:
         raise StiffmapError(f"method: expected 'fast' or 'reference', got {o.method!r}")
@@ -71,9 +106,15 @@ def solve_call(
         threads=thread_count(o.threads),
         stiffness=o.stiffness,
         variants=variants,
+        closed=None
+        if unloaded is None
+        else rows(unloaded.coordinates, shape, unloaded.coordinates.shape[-1:]),
     )
+    if unloaded is not None:
+        flags = answer.flags  # also how sure the branch is
+        flags |= rows(unloaded.flags, shape, ())  # type: ignore[arg-type]
     order = (0, *(read.index(n) for n in o.read_points))
-    solution = Solution(answer, shape, machine.names, o.point, order)
+    solution = Solution(answer, shape, machine.names, o.point, order, unloaded=unloaded)
     return solution, answer.variants.reshape((*shape, len(variants), 6) if variants else (0,))
 
 

@@ -13,6 +13,7 @@ struct BatchInput {
   const double* position = nullptr;  ///< count x 3
   const double* rotation = nullptr;  ///< count x 9
   const double* wrench = nullptr;    ///< count x load points x 6
+  const double* closed = nullptr;    ///< count x coordinates already closed at the poses; null: found by closure
   std::vector<LoadPoint> load_points;
   std::vector<Index> read_points;
   Vec3 gravity = Vec3::Zero();

@@ -37,6 +37,17 @@ ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorks
 /// Coordinates `x` and tip pose for given actuator coordinates.
 ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x);
 
+/// The same, continued from the joint coordinates of `from` (closed first, its actuators held) instead of from home.
+ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x,
+                              const VecX& from);
+
+/// Coordinates at which the tip has the pose, on the assembly branch of the joint coordinates `from`: these are
+/// closed with their actuators held, then continued to the pose. Never from home.
+ClosureResult branch_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x, const VecX& from);
+
+/// What there is to say of coordinates that are closed already: tip pose and limits; NaN is out of reach.
+ClosureResult given_closure(const Mechanism& m, ClosureWorkspace& ws, const VecX& x);
+
 /// Closes the mechanism at home exactly, starting from the declared coordinates, and locks passive
 /// coordinates that spin without effect on any frame that carries load (theory C6).
 /// Throws with the residual of each leg where the home configuration is impossible.

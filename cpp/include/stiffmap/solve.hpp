@@ -15,6 +15,7 @@ struct PoseInput {
   std::vector<LoadPoint> load_points;
   std::vector<Vec6> wrenches;      ///< one per load point
   std::vector<Index> read_points;  ///< indices into Mechanism::points; the first defines stiffness
+  const double* closed = nullptr;  ///< coordinates already closed at the commanded pose; null: found by closure
 };
 
 struct SolveOptions {

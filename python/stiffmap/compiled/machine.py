@@ -101,8 +101,12 @@ class CompiledMachine:
         threads: int,
         stiffness: bool,
         variants: Sequence[CompiledMachine] = (),
+        closed: Floats | None = None,
     ) -> _core.Answer:
-        """Equilibria of (n, 3) positions, (n, 3, 3) rotations and (n, load points, 6) wrenches."""
+        """Equilibria of (n, 3) positions, (n, 3, 3) rotations and (n, load points, 6) wrenches.
+
+        closed: (n, coordinates) already closed at these poses, NaN out of reach; None: found by closure.
+        """
         return self._mechanism.solve(
             self._plan if fast else None,  # type: ignore[arg-type]  # None: reference path
             position,
@@ -116,16 +120,28 @@ class CompiledMachine:
             threads,
             stiffness,
             [v._plan for v in variants],
+            closed,
         )
 
-    def close_poses(self, position: Floats, rotation: Floats, threads: int) -> tuple[Any, ...]:
-        """Coordinates, position, rotation, status and flags of (n, 3) positions and (n, 3, 3) rotations."""
-        return self._mechanism.closure(self._plan, position, rotation, True, threads)
+    def close_poses(
+        self, position: Floats, rotation: Floats, threads: int, start: Floats | None = None
+    ) -> tuple[Any, ...]:
+        """Coordinates, position, rotation, status and flags of (n, 3) positions and (n, 3, 3) rotations.
 
-    def close_actuators(self, actuators: Floats, threads: int) -> tuple[Any, ...]:
-        """The same of (n, actuators) actuator coordinates, continued from home."""
+        start: (n, coordinates) on the assembly branch that is meant; None: that of home.
+        """
+        return self._mechanism.closure(self._plan, position, rotation, True, threads, start)
+
+    def close_actuators(
+        self, actuators: Floats, threads: int, start: Floats | None = None
+    ) -> tuple[Any, ...]:
+        """The same of (n, actuators) actuator coordinates, continued from home or from `start`."""
         none = np.zeros((0, 3, 3))
-        return self._mechanism.closure(None, actuators, none, False, threads)  # type: ignore[arg-type]
+        return self._mechanism.closure(None, actuators, none, False, threads, start)  # type: ignore[arg-type]
+
+    def home_coordinates(self) -> Floats:
+        """(coordinates,) at home."""
+        return np.asarray(self._mechanism.home_coordinates())
 
     def impose(
         self,
