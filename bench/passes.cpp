@@ -51,7 +51,7 @@ void time_block(Block& b, const M usable, Timer& time) {
   Scratch& s = b.s;
   const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
   Elimination e{P, s, {}, splat(1e300), {f, f, f, g, g, g}};
-  Newton n{P, b.in, s, e, b.load};
+  Newton n{P, b.in, s, e, b.load, e.gravity};
   time(bench::laws, [&] { n.evaluate(false); });
   Frame tip;
   time(bench::frames, [&] {

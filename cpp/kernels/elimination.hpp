@@ -13,6 +13,7 @@ struct Elimination {
   V lowest;  ///< smallest pivot, dimensionless: at or below zero the pose is not a plain minimum
   double scale[6];
   bool heavy = false;        ///< there is gravity
+  V3 pending = {};           ///< gravity that acts, but is not in the wrenches yet: the first step under a load (F11)
   V transferred = splat(0);  ///< largest step of a branch's wrench, over stiffness times length
 
   /// A leg: only its numbers differ from those of the last pass over all, and the others' results are kept.

@@ -30,7 +30,7 @@ Scratch lay_out(const Program& P, void* memory, std::int64_t* bytes) {
   s.stiff = take<StiffSlot>(at, P.stiff_slots);
   s.branches = take<BranchSlot>(at, P.chain_count);
   const int n = P.coordinate_count;
-  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.rubs})
+  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.rubs, &s.kept})
     *v = take<V>(at, n);
   if (bytes) *bytes = at - begin + 64;
   return s;
@@ -134,7 +134,7 @@ struct Block {
   void vary(M done, const Newton& base, const V (&C)[6][6]) {
     const V3 offset{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
     Elimination own{P, s, base.e.gravity, splat(0), {}};
-    Newton here{P, in, s, own, load};
+    Newton here{P, in, s, own, load, own.gravity};
     pass(here, P);
     residual(own, P.chains[P.root], here.point);
     std::int32_t moved = Elimination::all;  // leg whose slots hold a variant
@@ -144,7 +144,7 @@ struct Block {
       e.only = in.perturbed_leg[v] < 0 ? Elimination::all_anew : in.perturbed_leg[v];
       if (e.only >= 0 && moved != Elimination::all && moved != e.only) pass(here, P);
       moved = e.only;
-      Newton at{Q, in, s, e, load};
+      Newton at{Q, in, s, e, load, e.gravity};
       pass(at, Q);
       V c[6], eta[6];
       put(residual(e, Q.chains[Q.root], at.point), c);
@@ -180,9 +180,9 @@ struct Block {
     Elimination e{
         P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
     e.heavy = in.gravity[0] != 0 || in.gravity[1] != 0 || in.gravity[2] != 0;
-    Newton newton{P, in, s, e, load};
-    V iterations = splat(0);
-    const M done = newton.solve(usable, P.starts_linear, iterations);
+    Newton newton{P, in, s, e, load, e.gravity};
+    V iterations = splat(0), steps;
+    const M done = newton.solve(usable, P.starts_linear, iterations, steps);
     V K[6][6];
     newton.dense(newton.answer, K);
     write(done, newton, K, newton.compliance, iterations);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "frames.hpp"
+#include "load_steps.hpp"
 #include "steps.hpp"
 #include "tangents.hpp"
 #include "wrenches.hpp"
@@ -14,8 +15,11 @@ struct Newton {
   const KernelInput& in;
   Scratch& s;
   Elimination& e;
-  V6 load;         ///< external wrench at the point, base axes
-  Frame tip = {};  ///< frame of the tip; the point is tip.p + tip.R point
+  V6 whole_load;  ///< external wrench at the point, base axes
+  V3 whole_gravity;
+  V6 load = whole_load;  ///< the share that acts
+  V6 pending = {};       ///< what is added in this step (F11)
+  Frame tip = {};        ///< frame of the tip; the point is tip.p + tip.R point
   V3 point = {};
   Sym6 K = {};  ///< symmetric tangent at the point
   V6 c = {};
@@ -151,7 +155,7 @@ struct Newton {
     e.lowest = splat(1e300);
     const Tangent t = tangent(e, P.chains[P.root], V3{}, load, point);
     K = t.K;
-    c = t.c;
+    c = t.c - pending;
   }
 
   /// Tangent of a small extra dead wrench at the point, K - S(m)/2 in the rotational block.
@@ -218,24 +222,26 @@ struct Newton {
   }
 
   /// Iterates until every lane converged or is left to the reference path; lanes never wait for
-  /// the answer of others, only for their time.
-  M solve(M usable, bool corners, V& iterations) {
+  /// the answer of others, only for their time. A lane that is not trusted halves its own load step.
+  M solve(M usable, bool corners, V& iterations, V& steps) {
     M done = ~usable & usable, failed = ~usable;
-    V previous = splat(1);
-    for (int k = 0; k < in.max_iterations; ++k) {
+    LoadSteps way{P, s};
+    way.begin(unloaded_lanes());
+    for (int k = 0; k < most_iterations; ++k) {
       const bool secant = corners && k == 0;
+      const M first = way.factor > way.acting;
+      put_load(way.acting, way.factor);
       evaluate(secant);
       linearize();
       V m[6][6];
       dense(K, m);
       invert(m);
-      failed |= ~done & ~(e.lowest > pivot_floor);
       M active = ~done & ~failed;
       step(m, active);
       const V norm = step_norm();
-      failed |= active & ~(norm < 1e6);
       iterations = select(active, iterations + 1.0, iterations);
       if (secant) {
+        failed |= active & ~(norm < 1e6);
         move(active);
         start_laws(active);
         continue;
@@ -243,32 +249,59 @@ struct Newton {
       // Settled: this linearisation is the one at the answer. The step is taken all the same, unless
       // there is nothing to gain from it.
       const V change = larger(norm, e.transferred);
-      const M settled = active & ((change < small) | ((norm < in.tolerance) & (previous < in.tolerance)));
-      const M kept = active & (change < nothing);
-      take(settled, m);
+      const M whole = way.acting == 1.0;
+      const M settled = active & whole & ((change < small) | ((norm < in.tolerance) & (way.previous < in.tolerance)));
+      failed |= settled & ~(e.lowest > pivot_floor);
+      const M kept = active & whole & (change < nothing);
+      take(settled & ~failed, m);
       if (any(kept)) keep_wrenches(e, kept);
-      move(active & ~kept);
-      done |= settled;
-      fresh = all(kept == active);
+      M distrusted = active & ~settled & ~(norm < 1e6);
       if (!corners) {
-        failed |= active & ~done & ~(norm <= 0.2);
-        if (k > 0) failed |= active & ~done & ~((norm <= 0.2 * previous) | (norm <= 1e-7));
+        distrusted |= active & ~settled & ~(norm <= 0.2);
+        distrusted |= active & ~settled & ~((norm <= 0.2 * way.previous) | (norm <= 1e-7));
       }
-      previous = norm;
+      distrusted |= active & ~settled & (way.tries >= static_cast<double>(in.max_iterations));
+      move(active & ~kept & ~distrusted);
+      done |= settled & ~failed;
+      fresh = all(kept == active);
+      way.previous = norm;
+      way.tries += 1.0;
+      way.acting = way.factor;
+      const M arrived = active & ~whole & ~first & ~distrusted & (norm < in.tolerance);
+      if (any(arrived)) way.advance(arrived);
+      if (any(distrusted)) failed |= corners ? distrusted : way.halve(distrusted);
       if (all(done | failed)) break;
     }
-    done &= ~failed;
+    put_load(splat(1), splat(1));
+    steps = way.halved;
     if (!fresh) {
       evaluate(false);
       frames_and_wrenches();
     }
-    return done;
+    return done & ~failed;
+  }
+
+  /// The share that acts, and the one whose equilibrium is sought.
+  void put_load(V acting, V factor) {
+    load = acting * whole_load;
+    pending = (factor - acting) * whole_load;
+    e.gravity = acting * whole_gravity;
+    e.pending = (factor - acting) * whole_gravity;
+  }
+
+  /// Lanes under no load at all.
+  M unloaded_lanes() const {
+    const V6& w = whole_load;
+    const V sum = absolute(w.a.x) + absolute(w.a.y) + absolute(w.a.z) + absolute(w.b.x) + absolute(w.b.y) +
+                  absolute(w.b.z) + (e.heavy ? splat(1) : splat(0));
+    return sum == 0.0;
   }
 
   void move(M lanes) {
     for (int q = 0; q < P.coordinate_count; ++q) s.z[q] = select(lanes, s.z[q] + s.dz[q], s.z[q]);
   }
 
+  static constexpr int most_iterations = 96;
   static constexpr double pivot_floor = 1e-5;
   static constexpr double small = 1e-13;  ///< step that changes the tangent by no more than that
   static constexpr double nothing = 1e-15;

@@ -28,6 +28,7 @@ struct BranchSlot {
   Frame end;
   V6 F;       ///< wrench that acts on its end
   V6 before;  ///< the same before the last step
+  V6 kept;    ///< the same at the last load step in equilibrium
   V6 error;   ///< twist from its end to the end of the block's first branch
   Sym6 K;
   V6 c;
@@ -39,8 +40,9 @@ struct BranchSlot {
 struct Scratch {
   JointSlot* joints;
   StiffSlot* stiff;
-  BranchSlot* branches;                                              ///< per chain
-  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *rubs;  ///< rubs: sign of dry friction
+  BranchSlot* branches;  ///< per chain
+  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *rubs,
+      *kept;  ///< rubs: sign of dry friction; kept: z at the last load step in equilibrium
 };
 
 }  // namespace stiffmap::kernel

@@ -24,14 +24,15 @@ inline void move(const Elimination& el, Tangent& t, const V3& q, const V6& F) {
   t.p = q;
 }
 
-/// Rank-one step of a coordinate with row u = K J + g, own stiffness d (F4), coupling to the start's turn s.
-inline void eliminate(Elimination& el, const Op& op, JointSlot& j, V d, const V3& s, Tangent& t) {
+/// Rank-one step of a coordinate with row u = K J + g, own stiffness d (F4), coupling to the start's turn s;
+/// `pull` is the pending weights' share of its force (F11).
+inline void eliminate(Elimination& el, const Op& op, JointSlot& j, V d, const V3& s, V pull, Tangent& t) {
   const int q = op.coordinate;
   const V da = el.s.da[q];
   const V pivot = da * d + el.s.dtau[q];
   el.guard(pivot, el.P.coordinates[q].unit);
   j.inverse = 1.0 / pivot;
-  const V rho = el.s.tau[q] - dot(j.w, op.kind == OpKind::prismatic ? j.F.a : j.F.b);
+  const V rho = el.s.tau[q] - dot(j.w, op.kind == OpKind::prismatic ? j.F.a : j.F.b) - pull;
   j.y = (dot(j.J, t.c) - rho) * j.inverse;
   downdate(t.K, j.u, da * j.inverse);
   t.c = t.c - (da * j.y) * j.u;
@@ -53,11 +54,11 @@ inline void append_joint(Elimination& el, const Op& op, Tangent& t) {
   }
   const V6 KJ = t.K * j.J;
   j.u = KJ + g;
-  eliminate(el, op, j, dot(j.J, KJ), el.heavy ? along(t.turning, j.J) : V3{}, t);
+  eliminate(el, op, j, dot(j.J, KJ), el.heavy ? along(t.turning, j.J) : V3{}, splat(0), t);
 }
 
 /// A joint before the first compliance of a chain whose start is held (F6); F at t.p.
-inline void prepend_joint(Elimination& el, const Op& op, const V6& F, Tangent& t) {
+inline void prepend_joint(Elimination& el, const Op& op, const V6& F, const V6& hung, Tangent& t) {
   JointSlot& j = el.s.joints[op.slot];
   V6 g{};
   V d{};
@@ -82,18 +83,22 @@ inline void prepend_joint(Elimination& el, const Op& op, const V6& F, Tangent& t
       j.u = j.u - about(t.turning, j.w);
     }
   }
-  eliminate(el, op, j, d, s, t);
+  eliminate(el, op, j, d, s, el.heavy ? dot(j.J, hung) : splat(0), t);
 }
 
 /// What comes before the first compliance of a chain that starts at `start`, backwards.
 inline void prepend(Elimination& el, const ChainProgram& chain, const V3& start, const V6& F, Tangent& t) {
+  V6 hung{};  // pending weights between the joint and the compliance, about t.p
   for (int i = chain.first_stiff - 1; i >= chain.first; --i) {
     const Op& op = el.P.ops[i];
     if (op.kind == OpKind::load) {
       const JointSlot& j = el.s.joints[op.slot];
-      if (el.heavy) hang(t.turning, splat(op.mass) * el.gravity, j.o + j.w);
+      if (!el.heavy) continue;
+      hang(t.turning, splat(op.mass) * el.gravity, j.o + j.w);
+      const V3 w = splat(op.mass) * el.pending;
+      hung = hung + V6{w, cross(j.o + j.w - t.p, w)};
     } else if (op.eliminated) {
-      prepend_joint(el, op, F, t);
+      prepend_joint(el, op, F, hung, t);
     }
   }
   if (el.heavy) restart(t.turning, start);
@@ -259,7 +264,10 @@ inline void append_load(Elimination& el, const Op& op, Tangent& t) {
   const JointSlot& j = el.s.joints[op.slot];
   move(el, t, j.o, j.F);
   add_lever(t.K.E, splat(-op.mass), el.gravity, j.w);
-  if (el.heavy) append_weight(t.turning, splat(op.mass) * el.gravity, j.o + j.w, j.o);
+  if (!el.heavy) return;
+  append_weight(t.turning, splat(op.mass) * el.gravity, j.o + j.w, j.o);
+  const V3 w = splat(op.mass) * el.pending;
+  t.c = t.c - V6{w, cross(j.w, w)};
 }
 
 /// Tangent of a chain at point `end` under the end wrench F, its start frame at point `start` held.

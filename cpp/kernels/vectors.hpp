@@ -41,6 +41,7 @@ struct V6 {
 inline V6 operator+(const V6& x, const V6& y) { return {x.a + y.a, x.b + y.b}; }
 inline V6 operator-(const V6& x, const V6& y) { return {x.a - y.a, x.b - y.b}; }
 inline V6 operator*(V s, const V6& x) { return {s * x.a, s * x.b}; }
+inline V6 select(M m, const V6& x, const V6& y) { return {select(m, x.a, y.a), select(m, x.b, y.b)}; }
 inline V dot(const V6& x, const V6& y) { return dot(x.a, y.a) + dot(x.b, y.b); }
 
 }  // namespace stiffmap::kernel
