@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 from stiffmap.errors import StiffmapError
 from stiffmap.status import Flag, Status
+from stiffmap.version import __version__
 
 if TYPE_CHECKING:
     from stiffmap.diagnosis import Diagnosis, diagnose
@@ -18,11 +18,6 @@ if TYPE_CHECKING:
     from stiffmap.machine import Machine, load_machine
     from stiffmap.maps import error_map, polar, sweep, uncertainty_ranking
     from stiffmap.solution import Solution
-
-try:
-    __version__ = version("stiffmap")
-except PackageNotFoundError:  # a source tree that is not installed
-    __version__ = "0"
 
 # Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
 _HOME = {

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.broadcasting import Floats, rows, thread_count
 from stiffmap.description import Joint
-from stiffmap.files.names import all_elements
+from stiffmap.description.tree import all_elements
 from stiffmap.machine import Machine
 
 

@@ -1,6 +1,8 @@
-"""Check of commanded orientations."""
+"""Rotation matrices."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -21,3 +23,14 @@ def check_rotations(r: Floats) -> None:
             f"rotation: expected rotation matrices, got one with |R^T R - I| = {np.max(bad):.1e}"
             f"{' and det < 0' if np.any(mirrored) else ''}"
         )
+
+
+def rotation_about(axis: Floats, angle: float) -> Floats:
+    """Rotation matrix (3, 3) about a unit vector (3,) by ``angle`` (rad), by Rodrigues' formula."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    # quarter turns exactly, so that frames of perpendicular axes stay free of 1e-17
+    cosine, sine = (float(round(v)) if abs(v - round(v)) < 1e-15 else v for v in (cosine, sine))
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    matrix: Floats = np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+    return matrix

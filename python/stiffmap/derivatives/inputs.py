@@ -11,7 +11,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.compiled import CompiledMachine
 from stiffmap.derivatives.requests import INPUTS
 from stiffmap.derivatives.stencil import central
-from stiffmap.files.rotation import rotation_about
+from stiffmap.rotations import rotation_about
 from stiffmap.solution import Solution
 from stiffmap.solving import Call, solve_call
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from stiffmap.diagnosis.alias import AliasClass
 from stiffmap.diagnosis.candidates import Candidate
+from stiffmap.diagnosis.findings import Effect
 from stiffmap.diagnosis.fit import fit
 from stiffmap.diagnosis.interval import intervals
 from stiffmap.diagnosis.model import Model
-from stiffmap.diagnosis.result import Effect
 from stiffmap.diagnosis.search import Search, surprise_of
 from stiffmap.diagnosis.significance import global_p
 from stiffmap.diagnosis.study import Study

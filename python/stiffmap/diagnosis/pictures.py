@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.figure import Figure
 
+from stiffmap.diagnosis.findings import Findings
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.machine import Machine
-
-if TYPE_CHECKING:
-    from stiffmap.diagnosis.result import Diagnosis
 
 UM, MM = 1e6, 1e3
 BEFORE, AFTER = "#c1432e", "#2a6f97"
 
 
-def figures(d: Diagnosis) -> dict[str, Figure]:
+def figures(d: Findings) -> dict[str, Figure]:
     """All figures by the names of their files."""
     made = {"residual_vectors": vectors(d)} if d.experiment.axis_read[:3].any() else {}
     made |= {"residual_trends": trends(d), "residual_histogram": histogram(d)}
@@ -28,7 +24,7 @@ def figures(d: Diagnosis) -> dict[str, Figure]:
     return made
 
 
-def left(d: Diagnosis) -> Figure:
+def left(d: Findings) -> Figure:
     """What is left of the worst axis over the workspace, and the empirical field that would remove it."""
     assert d.empirical is not None
     names = [c.name for c in d.experiment.channels]
@@ -51,7 +47,7 @@ def left(d: Diagnosis) -> Figure:
     return figure
 
 
-def vectors(d: Diagnosis) -> Figure:
+def vectors(d: Findings) -> Figure:
     """Mean residual vector of each pose, before and after, on one scale."""
     figure = Figure(figsize=(10, 4.6), layout="constrained")
     before, after = (_pose_means(d.experiment, _kept(d, r)) for r in (d.residual_before, d.residual_after))
@@ -70,7 +66,7 @@ def vectors(d: Diagnosis) -> Figure:
     return figure
 
 
-def trends(d: Diagnosis) -> Figure:
+def trends(d: Findings) -> Figure:
     """Residual of each channel against what may drive it."""
     against = _drivers(d.experiment)
     axes_read = [int(i) for i in np.flatnonzero(d.experiment.axis_read)]
@@ -108,7 +104,7 @@ def _drivers(e: Experiment) -> list[tuple[str, Floats]]:
     return out
 
 
-def histogram(d: Diagnosis) -> Figure:
+def histogram(d: Findings) -> Figure:
     """Residuals over the noise floor, beside the normal distribution that noise alone would give."""
     figure = Figure(figsize=(6, 3.4), layout="constrained")
     ax = figure.subplots()
@@ -126,7 +122,7 @@ def histogram(d: Diagnosis) -> Figure:
     return figure
 
 
-def maps(d: Diagnosis) -> Figure:
+def maps(d: Findings) -> Figure:
     """Error over a z-plane: declared machine, corrected machine, and what changes."""
     x, y, force, one, other = plane_errors(d)
     figure = Figure(figsize=(11, 3.8), layout="constrained")
@@ -144,7 +140,7 @@ def maps(d: Diagnosis) -> Figure:
     return figure
 
 
-def plane_errors(d: Diagnosis, count: int = 25) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+def plane_errors(d: Findings, count: int = 25) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """x, y (count), the force (6,), and errors (count, count, 3) m before and after."""
     low, high = d.declared.workspace
     x, y = np.linspace(low[0], high[0], count), np.linspace(low[1], high[1], count)
@@ -154,7 +150,7 @@ def plane_errors(d: Diagnosis, count: int = 25) -> tuple[Floats, Floats, Floats,
     return x, y, force, one, other
 
 
-def _worst_force(d: Diagnosis, position: Floats) -> tuple[Floats, Floats, Floats]:
+def _worst_force(d: Findings, position: Floats) -> tuple[Floats, Floats, Floats]:
     """Of the forces used, along x, y or z, the one under which the machines differ most."""
     size = float(np.abs(d.experiment.wrench[:, :3]).max())
     tried = [np.append(size * axis, np.zeros(3)) for axis in np.eye(3)] if size > 0 else [np.zeros(6)]
@@ -171,7 +167,7 @@ def _middle(machine: Machine) -> Floats:
     return np.asarray(machine.workspace.mean(axis=0))
 
 
-def _kept(d: Diagnosis, values: Floats) -> Floats:
+def _kept(d: Findings, values: Floats) -> Floats:
     return np.where(d.set_aside[:, None], np.nan, values)
 
 

@@ -8,17 +8,14 @@ from html import escape
 from io import BytesIO
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from stiffmap.diagnosis.words import effect_text, separation_text, shown
+from stiffmap.diagnosis.findings import Effect, Findings
+from stiffmap.diagnosis.structure import Pattern
+from stiffmap.diagnosis.words import effect_text, five_lines, separation_text, shown
 from stiffmap.errors import FileError
-
-if TYPE_CHECKING:
-    from stiffmap.diagnosis.result import Diagnosis, Effect
-    from stiffmap.diagnosis.structure import Pattern
-    from stiffmap.experiment.checks import Check
+from stiffmap.experiment.checks import Check
 
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
 table{border-collapse:collapse;margin:.5rem 0}td,th{border:1px solid #ccc;padding:.2rem .6rem;text-align:left}
@@ -27,7 +24,7 @@ th{background:#f3f3f3}img{max-width:100%}
 small{color:#555}"""
 
 
-def write_report(d: Diagnosis, path: str | PathLike[str]) -> None:
+def write_report(d: Findings, path: str | PathLike[str]) -> None:
     """Write the file; raises `FileError` where it cannot be written."""
     try:
         Path(path).write_text(html(d), encoding="utf-8")
@@ -35,7 +32,7 @@ def write_report(d: Diagnosis, path: str | PathLike[str]) -> None:
         raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
 
 
-def html(d: Diagnosis) -> str:
+def html(d: Findings) -> str:
     """The report as text."""
     from stiffmap.diagnosis.pictures import figures
 
@@ -44,7 +41,7 @@ def html(d: Diagnosis) -> str:
         f"<h1>Diagnosis of {escape(d.declared.name)}</h1><p>Experiment {escape(d.experiment.name)}: "
         f"{len(d.experiment)} rows of {d.experiment.quantity}, axes {', '.join(d.experiment.axes)}. "
         "Lengths in mm unless a unit is named; base axes.</p>",
-        "<div class='verdict'>" + "<br>".join(escape(line) for line in d.lines()) + "</div>",
+        "<div class='verdict'>" + "<br>".join(escape(line) for line in five_lines(d)) + "</div>",
         "<h2>Effects</h2>" + _effects(d),
         "<h2>Before and after, on readings that no fit saw</h2>" + _sizes(d),
         "<h2>Noise and fit</h2>" + _noise(d),
@@ -76,7 +73,7 @@ def _list(items: Iterable[str]) -> str:
     return "<ul>" + "".join(f"<li>{escape(i)}</li>" for i in items) + "</ul>"
 
 
-def _effects(d: Diagnosis) -> str:
+def _effects(d: Findings) -> str:
     if not d.effects:
         return "<p>No effect is named.</p>"
     out = "".join(_effect(e) for e in d.effects)
@@ -100,7 +97,7 @@ def _effect(e: Effect) -> str:
     )
 
 
-def _sizes(d: Diagnosis) -> str:
+def _sizes(d: Findings) -> str:
     names = [("before", d.before), ("after", d.after)]
     rows = [(n, *(f"{1e3 * v:.4f}" for v in (s.rms, s.p95, s.max)), f"{s.ratio:.3f}", s.n) for n, s in names]
     axes = [(a, f"{1e3 * d.before.per_axis[a]:.4f}", f"{1e3 * v:.4f}") for a, v in d.after.per_axis.items()]
@@ -114,7 +111,7 @@ def _sizes(d: Diagnosis) -> str:
     )
 
 
-def _noise(d: Diagnosis) -> str:
+def _noise(d: Findings) -> str:
     n = d.noise
     rows = [
         (a, f"{n.floor[a]:.3g}", f"{n.repeats[a]:.3g}", f"{n.declared[a]:.3g}", f"{n.consistency[a]:.2g}")
@@ -143,7 +140,7 @@ def _pair(b: Check, a: Check) -> tuple[str, str, str, str]:
     return (f"{b.rms:.2f}", f"{b.p:.2g}", f"{a.rms:.2f}", f"{a.p:.2g}")
 
 
-def _left(d: Diagnosis) -> str:
+def _left(d: Findings) -> str:
     if not d.unexplained:
         return "<p>Nothing beyond noise.</p>"
     rows = [(p.axis, p.what, p.detail, _at(p), f"{p.p:.2g}") for p in d.unexplained[:12]]
@@ -163,7 +160,7 @@ def _at(p: Pattern) -> str:
     return "(" + ", ".join(f"{1e3 * v:.0f}" for v in p.position) + f") mm: {p.size:.2g} m (rad) rms"
 
 
-def _detectable(d: Diagnosis) -> str:
+def _detectable(d: Findings) -> str:
     rows = [
         (
             x.kind,

@@ -14,10 +14,11 @@ from stiffmap.diagnosis.describe import aliases_of, as_place, named_effects
 from stiffmap.diagnosis.detect import detectable
 from stiffmap.diagnosis.empirical import empirical
 from stiffmap.diagnosis.explain import explain
+from stiffmap.diagnosis.findings import Detectability, NoiseReport
 from stiffmap.diagnosis.judge import after_checks, judge
 from stiffmap.diagnosis.locate import located
 from stiffmap.diagnosis.model import Model
-from stiffmap.diagnosis.result import Detectability, Diagnosis, NoiseReport
+from stiffmap.diagnosis.result import Diagnosis
 from stiffmap.diagnosis.separate import separation
 from stiffmap.diagnosis.structure import Pattern
 from stiffmap.diagnosis.study import Finding, Study, find, study

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from stiffmap.diagnosis.result import Diagnosis, Effect
-    from stiffmap.diagnosis.separate import Separation
-    from stiffmap.diagnosis.structure import Pattern
+from stiffmap.diagnosis.findings import Effect, Findings
+from stiffmap.diagnosis.separate import Separation
+from stiffmap.diagnosis.structure import Pattern
 
 SHOWN = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
 VERDICTS = {
@@ -19,7 +16,7 @@ VERDICTS = {
 }
 
 
-def five_lines(d: Diagnosis) -> list[str]:
+def five_lines(d: Findings) -> list[str]:
     """Verdict, effects, before and after, noise, and what could not be seen."""
     return [
         f"verdict: {d.verdict} - {VERDICTS[d.verdict]}",
@@ -63,7 +60,7 @@ def separation_text(s: Separation) -> str:
     return f"read {s.axis} at ({where}) mm under force ({load}) N: they differ by {gap}, {many}"
 
 
-def _others(d: Diagnosis) -> str:
+def _others(d: Findings) -> str:
     if not d.alternatives:
         return ""
     other = " or ".join(
@@ -72,7 +69,7 @@ def _others(d: Diagnosis) -> str:
     return f" -- or instead: {other}"
 
 
-def _left(d: Diagnosis) -> str:
+def _left(d: Findings) -> str:
     if d.unexplained:
         p = d.unexplained[0]
         more = (
@@ -93,7 +90,7 @@ def _place(p: Pattern) -> str:
     return f"; largest at ({where}) mm, {shown(p.size, 'rad' if p.axis.startswith('r') else 'm')} rms"
 
 
-def _limits(d: Diagnosis) -> str:
+def _limits(d: Findings) -> str:
     if d.limitations:
         return "limits: " + "; ".join(d.limitations[:3])
     return (

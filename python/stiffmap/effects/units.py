@@ -8,7 +8,7 @@ from collections import Counter
 from fractions import Fraction
 
 from stiffmap.errors import StiffmapError
-from stiffmap.files.units import FORCES, LENGTHS, MASSES
+from stiffmap.units import FORCES, LENGTHS, MASSES
 
 _MICRO = Fraction(1, 10**6)
 _ANGLES = {"rad": Fraction(1), "mrad": Fraction(1, 1000), "urad": _MICRO}

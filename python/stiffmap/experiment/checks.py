@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.experiment.conditions import Conditions
-from stiffmap.experiment.contrasts import CONTRASTS, Contrast
+from stiffmap.experiment.conditions import Conditions, Contrast
+from stiffmap.experiment.contrasts import CONTRASTS
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise import Mask
 

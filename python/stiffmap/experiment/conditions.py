@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiffmap.experiment.contrasts import Contrast
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise import Mask
+
+Contrast = tuple[list[tuple[int, int]], list[float]]
+"""(condition, channel) pairs and their weights."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,17 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from stiffmap.experiment.conditions import Conditions, Contrast
 from stiffmap.experiment.experiment import Floats, Integers
-
-if TYPE_CHECKING:
-    from stiffmap.experiment.conditions import Conditions
-
-Contrast = tuple[list[tuple[int, int]], list[float]]
-"""(condition, channel) pairs and their weights."""
 
 
 def alike(t: Conditions) -> Iterator[Integers]:

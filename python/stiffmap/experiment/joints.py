@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from stiffmap.description import CommandError, Joint
+from stiffmap.description.tree import all_elements
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.files.names import all_elements
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 

@@ -11,7 +11,7 @@ import numpy as np
 from stiffmap.errors import FileError
 from stiffmap.experiment.experiment import WRENCH, Channel, Floats
 from stiffmap.experiment.schema import ExperimentFile
-from stiffmap.files.units import FORCES, LENGTHS
+from stiffmap.units import FORCES, LENGTHS
 
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
 MOMENTS = {"N*m": 1.0, "N*mm": 1e-3, "kN*m": 1e3}

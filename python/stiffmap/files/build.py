@@ -13,18 +13,18 @@ from stiffmap.description import (
     MachineDescription,
 )
 from stiffmap.description.pose import Vector
+from stiffmap.description.tree import point_names
 from stiffmap.files.build_elements import build_elements, build_range
 from stiffmap.files.build_geometry import build_pose, build_vector
 from stiffmap.files.build_legs import build_leg
 from stiffmap.files.context import Context, Gathered
 from stiffmap.files.link_covariance import with_links
-from stiffmap.files.names import point_names
 from stiffmap.files.schema import MachineFile
 from stiffmap.files.schema.base import Number, suggestion
 from stiffmap.files.schema.geometry import Box
 from stiffmap.files.schema.machine import EffectModel, ExternalSpringModel
-from stiffmap.files.units import LENGTH, NONE, Dimension, UnitSystem
 from stiffmap.files.yaml_text import Document
+from stiffmap.units import LENGTH, NONE, Dimension, UnitSystem
 
 GRAVITY_LIMIT = 1000.0  # m/s²; above it, the file gave mm/s²
 

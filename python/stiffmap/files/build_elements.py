@@ -35,7 +35,7 @@ from stiffmap.files.schema.elements import (
     PointModel,
     SpringModel,
 )
-from stiffmap.files.units import ANGLE, FORCE, INERTIA, LENGTH, MASS, MOMENT, NONE, Dimension
+from stiffmap.units import ANGLE, FORCE, INERTIA, LENGTH, MASS, MOMENT, NONE, Dimension
 
 ZERO = Number(value=0.0)
 

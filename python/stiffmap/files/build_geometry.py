@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from stiffmap.description.pose import IDENTITY, Pose, Rows, Vector, vector
 from stiffmap.files.context import Context
-from stiffmap.files.rotation import rotation_about
 from stiffmap.files.schema.base import Number
 from stiffmap.files.schema.geometry import NAMED, Frame, Turn
-from stiffmap.files.units import ANGLE, LENGTH, NONE, Dimension
+from stiffmap.rotations import rotation_about
+from stiffmap.units import ANGLE, LENGTH, NONE, Dimension
 
 ROTATION_TOLERANCE = 1e-9
 

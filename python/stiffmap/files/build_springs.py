@@ -16,7 +16,7 @@ from stiffmap.files.matrix_checks import asymmetry, lowest_eigenvalue
 from stiffmap.files.schema.base import Number
 from stiffmap.files.schema.elements import SpringModel
 from stiffmap.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix
-from stiffmap.files.units import ANGLE, BENDING, FORCE, LENGTH, MODULUS, MOMENT, NONE, Dimension
+from stiffmap.units import ANGLE, BENDING, FORCE, LENGTH, MODULUS, MOMENT, NONE, Dimension
 
 _COMPLIANCE = {0: Dimension(length=1, force=-1), 1: Dimension(force=-1), 2: Dimension(length=-1, force=-1)}
 _STIFFNESS = {0: Dimension(length=-1, force=1), 1: FORCE, 2: MOMENT}
@@ -162,12 +162,12 @@ def build_law(model: LawModel, angular: bool, context: Context, name: str) -> La
 
 def load_link(name: str, context: Context) -> Matrix6:
     """Compliance of an identified link file, whose path is relative to the machine file."""
-    from stiffmap.files.optional import optional
+    from stiffmap.link import load_link as read_link  # scipy, only where a file names a link
 
     path = context.folder / name
     if not path.exists():
         context.fail(f"no link file '{name}' in {context.folder}")
-    link = optional("stiffmap.link", "load_link", "identified link files")(path)
+    link = read_link(path)
     matrix = np.asarray(link.compliance, dtype=float)
     _check(matrix, "compliance", context)
     context.note(name, "link")

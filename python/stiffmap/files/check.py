@@ -9,9 +9,9 @@ from pathlib import Path
 
 from stiffmap.compiled import CompiledMachine
 from stiffmap.description import Joint, MachineDescription
+from stiffmap.description.tree import all_elements
 from stiffmap.files.home import Gap, home_gaps
 from stiffmap.files.load import load_description
-from stiffmap.files.names import all_elements
 from stiffmap.files.shipped import find
 
 GAP_LIMIT, TURN_LIMIT = 1e-4, 1e-3

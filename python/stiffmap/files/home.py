@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiffmap.description import Block, Element, Joint, MachineDescription, Offset, Pose
-from stiffmap.files.rotation import rotation_about
+from stiffmap.rotations import rotation_about
 
 
 @dataclass(frozen=True)

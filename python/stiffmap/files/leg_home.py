@@ -9,7 +9,7 @@ from stiffmap.errors import FileError
 from stiffmap.files.build_elements import home_coordinates
 from stiffmap.files.context import Context
 from stiffmap.files.schema.base import Number, suggestion
-from stiffmap.files.units import ANGLE, LENGTH
+from stiffmap.units import ANGLE, LENGTH
 
 Home = Number | list[Number]
 

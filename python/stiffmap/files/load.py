@@ -10,9 +10,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from stiffmap.description import MachineDescription
+from stiffmap.effects import apply_records
 from stiffmap.errors import FileError
 from stiffmap.files.build import build, build_effect
-from stiffmap.files.optional import optional
 from stiffmap.files.report import file_error
 from stiffmap.files.schema import MachineFile
 from stiffmap.files.schema.base import describe
@@ -40,8 +40,7 @@ def describe_document(document: Document, file: str, folder: Path) -> MachineDes
     base = build(model, document, file, folder)
     if not model.effects:
         return base
-    apply_records = optional("stiffmap.effects", "apply_records", "the effects of a machine file")
-    applied: MachineDescription = apply_records(base, tuple(build_effect(e) for e in model.effects))
+    applied = apply_records(base, tuple(build_effect(e) for e in model.effects))
     return applied if applied.declared is not None else replace(applied, declared=base)
 
 

@@ -11,11 +11,12 @@ from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Bools, Floats
 from stiffmap.link.checks import Field, check_points, checked_field, identifiable_columns
 from stiffmap.link.correlation import Correlation, analyse_correlation
+from stiffmap.link.estimate import Evidence
 from stiffmap.link.finite import refuse_finite_rotation
 from stiffmap.link.noise import Noise, estimate_noise
 from stiffmap.link.outliers import LEVEL, find_outliers
 from stiffmap.link.regression import regress
-from stiffmap.link.result import Evidence, Link, build_link
+from stiffmap.link.result import Link, build_link
 from stiffmap.link.rigidfit import RigidFit, fit_exact, fit_linear, turn_back
 from stiffmap.link.transport import twist_transport
 

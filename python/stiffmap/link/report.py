@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Floats
+from stiffmap.link.estimate import Estimate
 from stiffmap.link.plausibility import findings
-
-if TYPE_CHECKING:
-    from stiffmap.link.result import Link
 
 
 def unit_factor(length: str) -> Floats:
@@ -33,12 +29,12 @@ def unit_name(i: int, j: int, length: str) -> str:
     return f"rad/(N·{length})" if i >= 3 and j >= 3 else "1/N"
 
 
-def write_report(link: Link, length: str) -> str:
+def write_report(link: Estimate, length: str) -> str:
     """See :meth:`stiffmap.link.Link.report`."""
     return "\n".join([*_table(link, length), *_field_lines(link), *_matrix_lines(link)])
 
 
-def _table(link: Link, length: str) -> list[str]:
+def _table(link: Estimate, length: str) -> list[str]:
     factor = unit_factor(length)
     C, error = link.compliance * factor, link.standard_error * factor
     zero = link.insignificant
@@ -65,7 +61,7 @@ def _table(link: Link, length: str) -> list[str]:
     return lines
 
 
-def _field_lines(link: Link) -> list[str]:
+def _field_lines(link: Estimate) -> list[str]:
     e, noise = link.evidence, link.evidence.noise
     size = np.sqrt(np.mean(np.sum(e.field.displacements**2, axis=2), axis=1))
     place = np.array2string(link.reference, precision=6)
@@ -94,7 +90,7 @@ def _field_lines(link: Link) -> list[str]:
     return lines
 
 
-def _matrix_lines(link: Link) -> list[str]:
+def _matrix_lines(link: Estimate) -> list[str]:
     missing = ~np.isfinite(link.compliance)
     lines = [
         f"asymmetry before symmetrisation: {link.asymmetry:.2e} of sqrt(kii kjj) "

@@ -10,6 +10,7 @@ import numpy as np
 
 from stiffmap.machine import Machine
 from stiffmap.maps.loading import Loading
+from stiffmap.version import __version__
 
 
 def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, Any]:
@@ -17,8 +18,6 @@ def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, An
 
     The call leaves out what cannot change the numbers: threads, chunks, output path, time of day.
     """
-    import stiffmap
-
     machine = loading.machine
     return {
         "title": f"{title}: {machine.name}",
@@ -26,7 +25,7 @@ def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, An
         "machine_title": machine.description.title,
         "machine_digest": digest(machine),
         "effects": json.dumps([plain_effect(e) for e in machine.description.effects]),
-        "stiffmap_version": stiffmap.__version__,
+        "stiffmap_version": __version__,
         "call": json.dumps(plain(call) | loading.options.as_plain(), ensure_ascii=False),
         "units": "SI: m, rad, N, N m",
         "axes": "base axes of the machine, right-handed; positions are those of the commanded tcp",

@@ -9,7 +9,7 @@ import numpy as np
 from stiffmap.broadcasting import Floats
 from stiffmap.compiled import CompiledMachine, Role
 from stiffmap.description import Joint
-from stiffmap.files.names import all_elements
+from stiffmap.description.tree import all_elements
 from stiffmap.machine import Machine
 
 COINCIDENT = 1e-9

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.description import Body, Drive, Element, Joint, Law, Offset, Pose, Spring
-from stiffmap.files.rotation import rotation_about
+from stiffmap.rotations import rotation_about
 from stiffmap.urdf.model import UrdfJoint, UrdfModel
 from stiffmap.urdf.sidecar import Elasticity, LinkSpring, Sidecar
 

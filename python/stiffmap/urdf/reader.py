@@ -11,7 +11,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.description import Body, Pose
 from stiffmap.description.pose import vector
 from stiffmap.errors import FileError
-from stiffmap.files.rotation import rotation_about
+from stiffmap.rotations import rotation_about
 from stiffmap.urdf.model import UrdfJoint, UrdfModel
 
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}

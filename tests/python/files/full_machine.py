@@ -20,7 +20,7 @@ from stiffmap.description import (
     Pose,
     Spring,
 )
-from stiffmap.files.rotation import rotation_about
+from stiffmap.rotations import rotation_about
 
 
 def random_rotation(rng: np.random.Generator) -> np.ndarray:

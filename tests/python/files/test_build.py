@@ -9,7 +9,7 @@ import pytest
 from machine_text import BASE, changed, description, with_element
 
 from stiffmap.description import Element, Joint, Law, Offset, Spring
-from stiffmap.files.units import Dimension, UnitSystem
+from stiffmap.units import Dimension, UnitSystem
 
 
 def last(text: str) -> Element:

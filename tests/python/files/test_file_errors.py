@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from machine_text import BASE, ELEMENTS, changed, description, with_element
 
-from stiffmap.errors import FileError, MissingPartError, StiffmapError, UnknownMachineError
+from stiffmap.errors import FileError, StiffmapError, UnknownMachineError
 from stiffmap.files import load_description
 
 
@@ -158,15 +158,6 @@ def test_beam_says_which_products_it_needs() -> None:
 def test_unknown_material() -> None:
     beam = {"length": 1.0, "round": {"diameter": 1.0}, "material": "steel"}
     assert "unknown material 'steel'" in message(with_element({"spring": "b", "beam": beam}))
-
-
-def test_effects_without_their_module(monkeypatch: pytest.MonkeyPatch) -> None:
-    import sys
-
-    monkeypatch.setitem(sys.modules, "stiffmap.effects", None)
-    text = changed((("effects",), [{"kind": "dead_zone", "element": "drive"}]))
-    with pytest.raises(MissingPartError, match=r"stiffmap\.effects"):
-        description(text)
 
 
 def test_law_on_a_coupled_direction() -> None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 from full_machine import full_machine
@@ -63,9 +61,7 @@ RECORD = AppliedEffect("dead_zone", "actuator", ("1", "2"), (("half_width", 1.2e
 def test_effects_are_saved_beside_the_declared_machine(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = ModuleType("stiffmap.effects")
-    module.apply_records = heavier  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "stiffmap.effects", module)
+    monkeypatch.setattr("stiffmap.files.load.apply_records", heavier)
     base = load_description("tripteron")
     changed = replace(heavier(base, (RECORD, RECORD)), declared=base)
     save_description(changed, tmp_path / "m.yaml")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from stiffmap.description import Block, Body, Joint, MachineDescription, Spring
+from stiffmap.description.tree import all_elements
 from stiffmap.files import load_description, shipped_machines
 from stiffmap.files.home import home_gaps
-from stiffmap.files.names import all_elements
 
 NAMES = ["orthoglide-original", "orthoglide-revised", "tripteron"]
 

@@ -20,7 +20,7 @@ from stiffmap.description import (
     Pose,
     Spring,
 )
-from stiffmap.files.names import point_names
+from stiffmap.description.tree import point_names
 
 from .energy import Loads
 

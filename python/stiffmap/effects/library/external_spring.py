@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.description import ExternalSpring, MachineDescription
+from stiffmap.description.tree import point_names
 from stiffmap.effects.types import EffectType, Option, Parameter, Place, Placed
-from stiffmap.files.names import point_names
 
 ANCHOR = tuple(
     Parameter(f"anchor_{a}", "m", -100.0, 100.0, None, 0.1, f"fixed end, {a}", fitted=False) for a in "xyz"

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stiffmap.description import Joint, Pose
 from stiffmap.effects.types import Parameter, Placed
-from stiffmap.files.rotation import rotation_about
+from stiffmap.rotations import rotation_about
 
 AXES = "xyz"
 

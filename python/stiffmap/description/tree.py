@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from stiffmap.description import Block, Element, MachineDescription, Point
+from stiffmap.description.elements import Block, Element, Point
+from stiffmap.description.machine import MachineDescription
 
 
 def walk(elements: tuple[Element, ...], name: str) -> Iterator[tuple[str, Element]]:
