@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
+from scipy.spatial.transform import Rotation
 
 from stiffmap.cli.inputs import EffectsOption, FolderOption, ThreadsOption, placed, plain
 from stiffmap.cli.output import JsonOption, print_json
-from stiffmap.experiment import Residual, load_experiment
+from stiffmap.experiment import Experiment, Residual, load_experiment
 from stiffmap.experiment import residual as compute
 from stiffmap.experiment.channels import Channel
 from stiffmap.machine import load_machine
@@ -93,7 +95,11 @@ def lines(r: Residual, rows: int) -> list[str]:
     units = {c.name: c for c in e.channels}
     aside = [e.ids[i] for i in r.set_aside.nonzero()[0]]
     out = [f"{e.name}: {s.n} readings of {e.quantity} in {len(e)} rows; reading minus prediction"]
-    out.append(f"  all lengths: rms {_mm(s.rms)}, 95 % {_mm(s.p95)}, largest {_mm(s.max)}")
+    if np.isfinite(s.rms):
+        out.append(f"  all lengths: rms {_mm(s.rms)}, 95 % {_mm(s.p95)}, largest {_mm(s.max)}")
+    if s.rotation_rms is not None:
+        out.append(f"  all angles: rms {1e3 * s.rotation_rms:.4f} mrad")
+    out += [f"  found: {line}" for line in _registered(e)]
     out += [
         f"  {a}: rms {_shown(units[a], v)}, noise floor {_shown(units[a], _floor(r, a))}"
         for a, v in s.per_axis.items()
@@ -110,6 +116,16 @@ def lines(r: Residual, rows: int) -> list[str]:
     worst = [f"{i} ({a} {_shown(units[a], v)})" for i, a, v in r.worst(rows)]
     out.append(f"  worst rows: {', '.join(worst) or 'none'}")
     return out + [f"  limit: {text}" for text in r.limitations]
+
+
+def _registered(e: Experiment) -> list[str]:
+    """Where instruments stand and targets sit, in words."""
+    out = []
+    for name, turn, shift in e.registration:
+        angles = np.degrees(Rotation.from_matrix(turn).as_rotvec())
+        at = ", ".join(f"{1e3 * v:.3f}" for v in shift)
+        out.append(f"{name} at ({at}) mm, rotation vector ({', '.join(f'{a:.4f}' for a in angles)}) deg")
+    return out
 
 
 def _chance(p: float) -> str:

@@ -13,9 +13,9 @@ import numpy as np
 from stiffmap.description import AppliedEffect, Joint, MachineDescription
 from stiffmap.diagnosis.candidates import Candidate
 from stiffmap.effects.edit import sequences
+from stiffmap.experiment.configuration import coordinates_of
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.predict import Predictor
-from stiffmap.kinematics import inverse_kinematics
 
 KIND = "periodic_error"
 SHORTEST = 2e-3
@@ -66,10 +66,13 @@ def coordinate(candidate: Candidate, leg: str, predictor: Predictor) -> Floats:
     """(n,) commanded coordinate of a drive from its home."""
     e = predictor.experiment
     names = predictor.machine.actuators
-    found = inverse_kinematics(predictor.machine, e.position, e.rotation)
+    found = coordinates_of(predictor.machine, e)
     mine = [n.split(".")[0] == leg if leg else "." not in n for n in names]
     i = next(k for k, n in enumerate(names) if mine[k] and n.split(".")[-1] == candidate.element)
-    return np.asarray(found.actuators[:, i] - home(predictor.machine.description, leg, candidate.element))
+    return np.asarray(
+        found[:, predictor.machine.compiled.names.joints[names[i]]]
+        - home(predictor.machine.description, leg, candidate.element)
+    )
 
 
 def home(description: MachineDescription, leg: str, element: str) -> float:

@@ -17,7 +17,8 @@ class Parameter:
     ``null`` is the value at which the effect vanishes (``None``: there is no fixed one), ``scale`` a
     typical size for steps and plots, ``default`` the value of a parameter that is left out (``None``:
     it must be given). A parameter that is not ``fitted`` says how the effect is meant (a pivot, a
-    recorded temperature) and is known beforehand. ``angular`` is the unit on a joint that turns.
+    recorded temperature) and is known beforehand. ``angular`` is the unit on a joint that turns, with an upper
+    bound and a typical size of its own where those of a length mean nothing.
     """
 
     name: str
@@ -30,6 +31,8 @@ class Parameter:
     default: float | None = None
     fitted: bool = True
     angular: str = ""
+    angular_upper: float | None = None
+    angular_scale: float | None = None
 
 
 @dataclass(frozen=True)

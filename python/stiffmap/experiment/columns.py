@@ -5,22 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.errors import FileError
-from stiffmap.experiment.channels import DISTANCE, Channel
+from stiffmap.experiment.channels import DISTANCE, HEIGHT, Channel
 from stiffmap.experiment.experiment import AXES, BRANCHES, WRENCH, Floats, Integers
 from stiffmap.experiment.orientation import TURNED, TURNED2
 from stiffmap.experiment.schema import ExperimentFile, NoiseModel
 from stiffmap.experiment.table import Table
 from stiffmap.experiment.units import Scales
 
-WORDS = ("id", "branch", "setup", "point", "load_point")
+WORDS = ("id", "branch", "setup", "point", "load_point", "instrument", "target")
+SEEN, SEEN_TURNED, SEEN_QUATERNION = ("px", "py", "pz"), ("prx", "pry", "prz"), ("pqx", "pqy", "pqz", "pqw")
+ABSOLUTE = (*SEEN, *SEEN_TURNED, *SEEN_QUATERNION, "contact", "distance")
 POSE, POSE2 = ("x", "y", "z"), ("x2", "y2", "z2")
 APPROACH = ("approach_x", "approach_y", "approach_z")
-READ = (*AXES, DISTANCE.name)
+READ = (*AXES, DISTANCE.name, HEIGHT.name)
 KNOWN = (
     *(*WORDS, *POSE, *TURNED, *POSE2, *TURNED2, *APPROACH, *WRENCH, *READ, *(f"u_{a}" for a in READ)),
     *("repeat", "order", "temperature"),
+    *ABSOLUTE,
 )
 
 
@@ -59,12 +63,86 @@ def command(model: ExperimentFile, table: Table, scales: Scales) -> Floats | Non
     return np.column_stack([scales.own[c] * table.numbers(c) for c in model.command])
 
 
+def other_command(model: ExperimentFile, table: Table, scales: Scales) -> Floats | None:
+    """(n, actuators) m, rad: the second command of a distance, in columns named as the first with a 2 behind."""
+    wanted = [f"{c}2" for c in model.command]
+    if not any(c in table for c in wanted):
+        return None
+    columns = [
+        scales.own[c] * table.numbers(w, blank=True) for c, w in zip(model.command, wanted, strict=True)
+    ]
+    return np.column_stack(columns)
+
+
+def seen(table: Table, scales: Scales) -> Floats | None:
+    """(n, 3) m: coordinates of the target in the instrument's frame."""
+    if not any(c in table for c in SEEN):
+        return None
+    out = scales.length * np.column_stack([table.numbers(c, blank=True) for c in SEEN])
+    return np.where(np.asarray(np.isfinite(out).all(axis=1))[:, None], out, np.nan)
+
+
+def seen_rotation(model: ExperimentFile, table: Table, scales: Scales) -> Floats | None:
+    """(n, 3, 3) of the target in the instrument's frame, from three angles or a quaternion; NaN where blank."""
+    names = next((g for g in (SEEN_TURNED, SEEN_QUATERNION) if any(c in table for c in g)), None)
+    if names is None:
+        return None
+    values = np.column_stack([table.numbers(c, blank=True) for c in names])
+    good = np.asarray(np.isfinite(values).all(axis=1))
+    if names is SEEN_QUATERNION:
+        filled = np.where(good[:, None], values, [0.0, 0.0, 0.0, 1.0])
+        wrong = np.flatnonzero(np.abs(np.linalg.norm(filled, axis=1) - 1.0) > 1e-2)
+        if wrong.size:
+            raise FileError(
+                "columns 'pqx' to 'pqw': expected a quaternion of length 1, x y z w",
+                file=table.file,
+                line=table.lines[int(wrong[0])],
+            )
+        turned = Rotation.from_quat(filled)
+    else:
+        filled = scales.angle(names[0]) * np.where(good[:, None], values, 0.0)
+        word = model.target_orientation
+        turned = Rotation.from_rotvec(filled) if word == "rotvec" else Rotation.from_euler(word, filled)
+    return np.where(good[:, None, None], turned.as_matrix(), np.nan)
+
+
+def gravities(model: ExperimentFile, table: Table) -> tuple[tuple[float, float, float] | None, Floats | None]:
+    """Gravity of all rows, or (n, 3) where the file gives one for each set-up."""
+    given = model.gravity
+    if given is None or isinstance(given, list):
+        return (None if given is None else (given[0], given[1], given[2])), None
+    if "setup" not in table:
+        raise FileError("gravity: a gravity for each set-up needs the column 'setup'", file=table.file)
+    labels = table.text("setup")
+    for row, label in zip(table.lines, labels, strict=True):
+        if label not in given:
+            raise FileError(
+                f"gravity: no gravity for set-up '{label}'; given for {', '.join(given)}",
+                file=table.file,
+                line=row,
+            )
+    return None, np.array([given[label] for label in labels])
+
+
+def labels(table: Table, name: str) -> tuple[str, ...]:
+    """Words of a column, or nothing."""
+    return tuple(table.text(name)) if name in table else ()
+
+
 def other(
     model: ExperimentFile, table: Table, scales: Scales, reading: Floats, channels: tuple[Channel, ...]
 ) -> Floats | None:
     """(n, 3) m, second pose of the rows that read a distance."""
     if DISTANCE not in channels:
         return None
+    if model.command:
+        if not all(f"{c}2" in table for c in model.command):
+            raise FileError(
+                "column 'dd' or 'distance': actuators are commanded, so the second pose needs the columns "
+                + ", ".join(f"{c}2" for c in model.command),
+                file=table.file,
+            )
+        return np.full((len(table.rows), 3), np.nan)
     if model.quantity != "position":
         raise FileError(
             "column 'dd': a distance between two poses is a position, no deflection", file=table.file

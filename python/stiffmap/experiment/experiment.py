@@ -21,6 +21,8 @@ BRANCHES = ("", "loading", "unloading")
 PER_ROW = (
     *("ids", "position", "wrench", "reading", "sigma", "rotation", "other", "other_rotation", "command"),
     *("approach", "repeat", "order", "temperature", "branch", "setup", "points", "load_points"),
+    *("joints", "other_command", "other_joints", "gravity_of", "instrument", "target"),
+    *("seen", "seen_rotation", "contact", "apart"),
 )
 """Fields with one entry per row; None or empty where the experiment has none."""
 
@@ -74,6 +76,34 @@ class Experiment:
     command: Floats | None = None
     """(n, actuators) m, rad: commanded coordinates instead of poses, in the order of `command_of`."""
     command_of: tuple[Channel, ...] = ()
+    joints: Floats | None = None
+    """(n, j) m, rad: coordinates of `joint_names` of the rigid machine at `command`, once `located`."""
+    joint_names: tuple[str, ...] = ()
+    other_command: Floats | None = None
+    """(n, actuators): second command of a distance."""
+    other_joints: Floats | None = None
+    seen: Floats | None = None
+    """(n, 3) m: coordinates of the target in the instrument's own frame; NaN where not seen."""
+    seen_rotation: Floats | None = None
+    """(n, 3, 3) of the target in the instrument's own frame."""
+    contact: Floats | None = None
+    """(n,) m: height above the surface at which the command touched it; NaN where nothing was touched."""
+    apart: Floats | None = None
+    """(n,) m: measured distance between the point at both commands."""
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    """Of the surface that heights are measured against, base axes."""
+    surface: str = "known"
+    """The surface: ``known``, its height ``offset_unknown``, or ``unknown`` with two tilts; per set-up."""
+    instrument: tuple[str, ...] = ()
+    """Instrument of each row; each has a frame of its own."""
+    target: tuple[str, ...] = ()
+    """Target of each row; each sits at a place of its own on the tool. Empty: one per set-up."""
+    gravity_of: Floats | None = None
+    """(n, 3) m/s² where gravity differs from row to row, base axes; else `gravity`."""
+    registration: tuple[tuple[str, Floats, Floats], ...] = ()
+    """Frames and tools that `resolved` found: name, rotation (3, 3), translation (3,) m."""
+    out_of_reach: tuple[str, ...] = ()
+    """Rows that the declared machine has no state for, set aside by `located` and `Predictor`."""
     approach: Floats | None = None
     """(n, 3) direction of the last travel to the pose, any length; zero where unknown."""
     repeat: Integers | None = None
@@ -96,7 +126,7 @@ class Experiment:
     """State without load: ``centre`` of every gap, side of the last ``approach``, or ``unknown``."""
     frame: str = "known"
     tool: str = "known"
-    """Point on the tool: ``known``, or off by an ``offset_unknown`` in the tool's axes."""
+    """Point on the tool: ``known``, off by an ``offset_unknown`` in the tool's axes, or ``unknown`` with a turn."""
     loop: Loop = Loop()
     title: str = ""
     source: str = ""

@@ -10,8 +10,8 @@ from stiffmap.description import CommandError, Joint
 from stiffmap.description.tree import all_elements
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.channels import Channel
+from stiffmap.experiment.configuration import coordinates_of
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 
 
@@ -22,7 +22,7 @@ def joint_motions(machine: Machine, plan: Experiment, coordinates: Floats, names
         (n, coordinates) of the equilibria. ``load``: the coordinate less the commanded one. ``motor``:
         the elastic part of it, of which an effect says the share that the motor's encoder sees.
     """
-    rigid = inverse_kinematics(machine, plan.position, plan.rotation).coordinates
+    rigid = coordinates_of(machine, plan)
     out = []
     for c in joint_channels(plan):
         i = names.index(c.joint)

@@ -41,7 +41,8 @@ def refuse_unreachable(experiment: Experiment, base: Floats) -> None:
 def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[str]:
     """What the reader must know, in sentences."""
     e = experiment
-    out = [f"contradictory repeats: {c}" for c in noise.contradictions()]
+    out = [f"set aside: {told}" for told in e.out_of_reach]
+    out += [f"contradictory repeats: {c}" for c in noise.contradictions()]
     if int(e.read.sum()) < FEWEST:
         out.append(
             f"{int(e.read.sum())} readings show a residual, but are too few for a diagnosis ({FEWEST})"

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from stiffmap.errors import FileError
 from stiffmap.experiment import columns as read_columns
-from stiffmap.experiment.channels import AXIS_CHANNELS, DISTANCE, Channel
+from stiffmap.experiment.channels import AXIS_CHANNELS, DISTANCE, HEIGHT, Channel
 from stiffmap.experiment.experiment import AXES, WRENCH, Experiment, Floats, Loop
 from stiffmap.experiment.orientation import rotations
 from stiffmap.experiment.schema import ExperimentFile
@@ -35,7 +35,8 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
     document = read(file)
     model = _validate(document, str(file))
     table = _rename(read_table(file.parent / model.data), model.columns)
-    _known_columns(table, (*model.joints, *model.command))
+    seconds = [f"{c}2" for c in model.command if f"{c}2" in table]
+    _known_columns(table, (*model.joints, *model.command, *seconds))
     return _assemble(model, table, Scales.of(model, str(file)), file)
 
 
@@ -80,7 +81,9 @@ def extra_channels(model: ExperimentFile, table: Table) -> tuple[Channel, ...]:
     joints = [
         Channel(name, "rad" if j.unit in ANGLES else "m", j.joint, j.side) for name, j in model.joints.items()
     ]
-    return (*([DISTANCE] if DISTANCE.name in table else []), *joints)
+    distance = DISTANCE.name in table or "distance" in table
+    height = HEIGHT.name in table or "contact" in table
+    return (*([DISTANCE] if distance else []), *([HEIGHT] if height else []), *joints)
 
 
 def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -> Experiment:
@@ -91,8 +94,24 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
             if name in table:
                 scales.angle(column)
     reading = scales.motion(channels) * read_columns.block(table, [c.name for c in channels], blank=True)
+    seen, seen_rotation = read_columns.seen(table, scales), read_columns.seen_rotation(model, table, scales)
+    contact = scales.length * table.numbers("contact", blank=True) if "contact" in table else None
+    apart = scales.length * table.numbers("distance", blank=True) if "distance" in table else None
+    _promise(reading, channels, table, seen, seen_rotation, contact, apart)
     if not np.isfinite(reading).any():
-        raise FileError("missing column: no reading (dx, dy, dz, rx, ry, rz, dd, joints)", file=table.file)
+        raise FileError(
+            "missing column: no reading (dx, dy, dz, rx, ry, rz, dd, hh, px, py, pz, contact, distance, joints)",
+            file=table.file,
+        )
+    if model.quantity != "position":
+        absolute = [c for c in (*read_columns.ABSOLUTE, HEIGHT.name) if c in table]
+        if absolute:
+            raise FileError(f"column '{absolute[0]}': is a position, no deflection", file=table.file, line=1)
+    gravity, gravity_of = read_columns.gravities(model, table)
+    normal = np.array(model.surface.normal)
+    if not np.linalg.norm(normal) > 0:
+        raise FileError("surface: normal: expected a direction, got three zeros", file=str(file))
+    normal = normal / np.linalg.norm(normal)
     sigma = read_columns.sigma(model, table, scales, channels)
     rotation, other_rotation = rotations(table, scales, model.orientation)
     experiment = Experiment(
@@ -119,12 +138,22 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
         temperature=table.numbers("temperature") if "temperature" in table else None,
         reference_temperature=model.reference_temperature,
         branch=read_columns.branch(table),
-        setup=tuple(table.text("setup")) if "setup" in table else (),
+        setup=read_columns.labels(table, "setup"),
+        instrument=read_columns.labels(table, "instrument"),
+        target=read_columns.labels(table, "target"),
+        other_command=read_columns.other_command(model, table, scales),
+        seen=seen,
+        seen_rotation=seen_rotation,
+        contact=contact,
+        apart=apart,
+        normal=(float(normal[0]), float(normal[1]), float(normal[2])),
+        surface=model.surface.shape,
+        gravity_of=gravity_of,
         point=model.point,
         load_point=model.load_point or model.point,
         points=read_columns.named(table, "point", model.point),
         load_points=read_columns.named(table, "load_point", model.load_point or model.point),
-        gravity=None if model.gravity is None else (model.gravity[0], model.gravity[1], model.gravity[2]),
+        gravity=gravity,
         zero_sigma=np.nan_to_num(read_columns.declared(model.zero_noise, scales, AXIS_CHANNELS)),
         unloaded=model.unloaded,
         frame=model.frame,
@@ -138,6 +167,33 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
             "unloaded: approach needs the columns approach_x, approach_y, approach_z", file=str(file)
         )
     return experiment
+
+
+def _promise(
+    reading: Floats,
+    channels: tuple[Channel, ...],
+    table: Table,
+    seen: Floats | None,
+    seen_rotation: Floats | None,
+    contact: Floats | None,
+    apart: Floats | None,
+) -> None:
+    """Marks what absolute columns will read once poses are known; FileError where both forms are given."""
+    at = {c.name: i for i, c in enumerate(channels)}
+    parts = [(seen, AXES[:3]), (seen_rotation, AXES[3:]), (contact, ("hh",)), (apart, ("dd",))]
+    for values, names in parts:
+        if values is None:
+            continue
+        twice = [n for n in names if n in table]
+        if twice:
+            raise FileError(
+                f"column '{twice[0]}': the file has the same reading in coordinates of its own as well; give one",
+                file=table.file,
+                line=1,
+            )
+        good = np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+        for n in names:
+            reading[good, at[n]] = 0.0
 
 
 def _wrench(model: ExperimentFile, table: Table, scales: Scales) -> Floats:

@@ -1,4 +1,4 @@
-"""Commanded poses of an experiment on one machine: orientations of the TCP, and poses of commanded joints."""
+"""Commanded poses of an experiment on one machine: orientations of the TCP, configurations of commanded joints."""
 
 from __future__ import annotations
 
@@ -7,58 +7,76 @@ from dataclasses import replace
 import numpy as np
 
 from stiffmap.errors import StiffmapError
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.experiment import Experiment, Mask
 from stiffmap.experiment.orientation import against_base
-from stiffmap.kinematics import forward_kinematics, inverse_kinematics
+from stiffmap.kinematics import Kinematics, forward_kinematics
 from stiffmap.machine import Machine
 
 AS_HOME = 1e-9
-SAME_COMMAND = 1e-6
-"""m, rad: commanded coordinates that the pose leads back to."""
+NAMED = 5
+"""Rows that a sentence names."""
 
 
 def located(machine: Machine, experiment: Experiment) -> Experiment:
-    """The experiment with its orientations in base axes, and with the poses that its commanded
-    coordinates stand for, by the declared machine's kinematics.
+    """The experiment with its orientations in base axes, and with the configurations and poses that its
+    commanded coordinates stand for, by the declared machine's kinematics.
 
-    Raises StiffmapError where the coordinates are not those of the machine's actuators, and names the
-    rows that no pose belongs to, or whose pose the machine reaches from home in another branch.
+    Rows without one are left out and named in `out_of_reach`. Raises StiffmapError where the coordinates
+    are not those of the machine's actuators, or no row has a pose.
     """
-    if experiment.command is None:
+    if experiment.command is None or experiment.joints is not None:
         return against_base(experiment, machine.description.home.r)
-    actuators = experiment.command[:, _columns(machine, experiment)]
-    found = forward_kinematics(machine, actuators)
-    lost: Mask = np.asarray(~np.isfinite(found.position).all(axis=1))
-    _refuse(experiment, lost, "the machine has no pose at", "out of reach, or units are wrong")
-    back = inverse_kinematics(machine, found.position, found.rotation).actuators
-    _refuse(
+    order = _columns(machine, experiment)
+    found = forward_kinematics(machine, experiment.command[:, order])
+    names = machine.compiled.names
+    index = list(names.joints.values())
+    home = np.nanmax(np.abs(found.rotation - machine.description.home.r), initial=0.0) < AS_HOME
+    out = replace(
         experiment,
-        _differ(machine, actuators, back),
-        "the machine reaches from home in another branch the pose of",
-        "such rows cannot be predicted at these coordinates; give the machine a home in their branch, "
-        "or leave them out",
+        position=found.position,
+        rotation=None if home else found.rotation,
+        rotation_against="base",
+        joints=found.coordinates[:, index],
+        joint_names=tuple(names.joints),
     )
-    home = np.abs(found.rotation - machine.description.home.r).max() < AS_HOME
-    rotation = None if home else found.rotation
-    return replace(experiment, position=found.position, rotation=rotation, rotation_against="base")
+    failed: Mask = np.asarray(~np.isfinite(found.position).all(axis=1))
+    if experiment.other_command is not None:
+        there = forward_kinematics(machine, experiment.other_command[:, order])
+        out = _with_other(out, found, there, index)
+        wanted = np.asarray(np.isfinite(experiment.other_command).all(axis=1))
+        failed |= wanted & ~np.asarray(np.isfinite(there.position).all(axis=1))
+    return without(out, failed, "the machine has no pose at the commanded coordinates of")
 
 
-def _differ(machine: Machine, commanded: Floats, back: Floats) -> Mask:
-    """(n,) rows whose pose leads back to other coordinates; a full turn of a joint is the same place."""
-    turns = np.array([not machine.compiled.names.is_prismatic(a) for a in machine.actuators])
-    gap = back - commanded
-    gap = np.where(turns, (gap + np.pi) % (2 * np.pi) - np.pi, gap)
-    return np.asarray(~(np.abs(gap).max(axis=1) < SAME_COMMAND))
+def _with_other(plan: Experiment, here: Kinematics, there: Kinematics, index: list[int]) -> Experiment:
+    turned = plan.rotation is not None or not np.allclose(
+        np.nan_to_num(there.rotation), np.nan_to_num(here.rotation[:1]), atol=AS_HOME
+    )
+    return replace(
+        plan,
+        other=there.position,
+        rotation=here.rotation if turned else None,
+        other_rotation=there.rotation if turned else None,
+        other_joints=there.coordinates[:, index],
+    )
 
 
-def _refuse(experiment: Experiment, wrong: Mask, what: str, why: str) -> None:
-    rows = np.flatnonzero(wrong)
-    if rows.size:
-        names = ", ".join(experiment.ids[i] for i in rows[:5]) + (" ..." if rows.size > 5 else "")
-        plural = "s" if rows.size > 1 else ""
-        raise StiffmapError(
-            f"{experiment.name}: {what} the commanded coordinates of {rows.size} row{plural} (id {names}): {why}"
-        )
+def without(experiment: Experiment, failed: Mask, why: str) -> Experiment:
+    """The experiment without the rows `failed` (n,), which it then names; StiffmapError if none is left."""
+    at = np.flatnonzero(failed)
+    if not at.size:
+        return experiment
+    rows = ", ".join(experiment.ids[i] for i in at[:NAMED]) + (" ..." if at.size > NAMED else "")
+    where = experiment.position[at[0]]
+    first = (
+        f"; first at ({', '.join(f'{1e3 * v:.1f}' for v in where)}) mm" if np.isfinite(where).all() else ""
+    )
+    plural = "s" if at.size > 1 else ""
+    told = f"{why} {at.size} row{plural} (id {rows}{first}): out of reach, or units are wrong"
+    if at.size == len(experiment):
+        raise StiffmapError(f"{experiment.name}: {told}")
+    kept = experiment.rows(~failed)
+    return replace(kept, out_of_reach=(*experiment.out_of_reach, told))
 
 
 def _columns(machine: Machine, experiment: Experiment) -> list[int]:

@@ -6,13 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stiffmap.experiment.channels import DISTANCE
+from stiffmap.experiment.channels import DISTANCE, HEIGHT
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.resolve import setups_of, targets_of
 
 
 def nuisance_columns(experiment: Experiment, base: Floats) -> Floats:
     """(n, c, q) changes of the readings; `base` (n, c) is the declared machine's prediction."""
-    columns = [c for part in (_zeros, _frames, _tools) for c in part(experiment, base)]
+    columns = [c for part in (_zeros, _frames, _tools, _surfaces) for c in part(experiment, base)]
     return np.stack(columns, axis=-1) if columns else np.zeros((*experiment.reading.shape, 0))
 
 
@@ -24,8 +25,8 @@ def _zeros(experiment: Experiment, base: Floats) -> Iterator[Floats]:
 
 
 def _setups(experiment: Experiment) -> Iterator[Floats]:
-    """(n,) 1 where a row belongs to the set-up."""
-    label = np.unique(experiment.setup or ("",) * len(experiment), return_inverse=True)[1]
+    """(n,) 1 where a row belongs to the set-up of an instrument."""
+    label = setups_of(experiment)[0]
     yield from ((label == s).astype(float) for s in np.unique(label))
 
 
@@ -49,10 +50,11 @@ def _turns(here: Floats, experiment: Experiment, base: Floats) -> Iterator[Float
 
 
 def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
-    """The point on the tool, one per set-up: off by a vector that turns with the tool."""
+    """Where targets sit on the tool: off by a vector that turns with the tool, and turned if that is unknown."""
     if experiment.tool == "known":
         return
-    for here in _setups(experiment):
+    label = targets_of(experiment)[0]
+    for here in ((label == t).astype(float) for t in np.unique(label)):
         for k in range(3):
             arm = _tool_axis(experiment.rotation, len(experiment), k)
             moved = np.cross(np.nan_to_num(base[:, 3:6]), arm)
@@ -61,6 +63,23 @@ def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
             if DISTANCE in experiment.extra:
                 column[:, experiment.channels.index(DISTANCE)] = _stretch(experiment, arm, k)
             yield here[:, None] * column
+            if experiment.tool == "unknown" and experiment.quantity == "position":
+                yield here[:, None] * _wide(experiment, np.hstack([np.zeros_like(arm), arm]))
+
+
+def _surfaces(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+    """Height and tilts of the surface that heights are measured against, one per set-up."""
+    if HEIGHT not in experiment.extra or experiment.surface == "known":
+        return
+    across = np.linalg.svd(np.array([experiment.normal]))[2][1:]
+    for here in _setups(experiment):
+        shapes = [np.ones(len(experiment))]
+        if experiment.surface == "unknown":
+            shapes += [experiment.position @ a for a in across]
+        for shape in shapes:
+            column = np.zeros_like(experiment.reading)
+            column[:, experiment.channels.index(HEIGHT)] = here * shape
+            yield column
 
 
 def _tool_axis(rotation: Floats | None, n: int, k: int) -> Floats:

@@ -12,8 +12,9 @@ from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.joints import check_joints
-from stiffmap.experiment.locate import located
+from stiffmap.experiment.locate import located, without
 from stiffmap.experiment.measurement import LOAD_SIDE, SENSOR_SIDE, readings, true_wrench
+from stiffmap.experiment.resolve import resolved
 from stiffmap.experiment.solving import motions
 from stiffmap.experiment.temperature import at_temperatures, uses_temperature
 from stiffmap.machine import Machine
@@ -31,10 +32,11 @@ class Predictor:
     def __init__(self, machine: Machine, experiment: Experiment, *, threads: int | None = None) -> None:
         check_points(machine, experiment)
         check_joints(machine, experiment)
-        self.machine, self.threads = machine, threads
-        self.experiment = located(machine, experiment)
+        self.threads = threads
+        self.machine, self.experiment = resolved(machine, located(machine, experiment))
         self.solved = 0
         self._memory: dict[tuple[Terms, Terms], Floats] = {}
+        self._set_aside()
 
     def __call__(self, terms: Sequence[AppliedEffect] = ()) -> Floats:
         """(n, c) m, rad predicted readings; NaN where a pose fails."""
@@ -46,6 +48,14 @@ class Predictor:
                 self._memory.clear()
             self._memory[key] = self._motion(mechanical, load)
         return readings(self.experiment, self._memory[key], [t for t in terms if t.kind in SENSOR_SIDE])
+
+    def _set_aside(self) -> None:
+        """Leaves out the rows that the declared machine has no equilibrium for, and names them."""
+        e = self.experiment
+        failed = np.asarray((e.read & ~np.isfinite(self())).any(axis=1))
+        if failed.any():
+            self._memory.clear()
+            self.experiment = without(e, failed, "the machine has no equilibrium at")
 
     def with_terms(self, terms: Sequence[AppliedEffect]) -> Machine:
         """The machine with the mechanical terms added."""

@@ -6,11 +6,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.description import CommandError, Element, Joint, Leg, MachineDescription
 from stiffmap.effects.edit import edit_sequences
+from stiffmap.experiment.configuration import coordinates_of
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.kinematics import inverse_kinematics
+from stiffmap.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.machine import Machine
 
 TRAVEL = 1e-3
@@ -41,11 +43,32 @@ def signs(machine: Machine, experiment: Experiment) -> Floats:
     assert experiment.approach is not None
     length = np.linalg.norm(experiment.approach, axis=1, keepdims=True)
     back = TRAVEL * experiment.approach / np.where(length > 0, length, 1.0)
-    here = inverse_kinematics(machine, experiment.position, experiment.rotation).actuators
-    there = inverse_kinematics(machine, experiment.position - back, experiment.rotation).actuators
-    moved = np.nan_to_num(here - there)
+    moved = np.nan_to_num(_travels(machine, experiment, back))
     top = np.abs(moved).max(axis=1, keepdims=True)
     return np.asarray(np.where(np.abs(moved) > STILL * np.where(top > 0, top, 1.0), np.sign(moved), 0.0))
+
+
+def _travels(machine: Machine, experiment: Experiment, back: Floats) -> Floats:
+    """(n, actuators) travel of each drive over the last way `back` (n, 3) m to the pose."""
+    if experiment.joints is None:
+        here = inverse_kinematics(machine, experiment.position, experiment.rotation).actuators
+        there = inverse_kinematics(machine, experiment.position - back, experiment.rotation).actuators
+        return np.asarray(here - there)
+    twist = np.hstack([back, np.zeros_like(back)])
+    return np.asarray(np.einsum("nai,ni->na", np.linalg.pinv(drive_jacobian(machine, experiment)), twist))
+
+
+def drive_jacobian(machine: Machine, plan: Experiment, step: float = 1e-6) -> Floats:
+    """(n, 6, actuators) twist of the TCP per unit of each drive of the rigid machine, in the plan's branch."""
+    start = coordinates_of(machine, plan)
+    drives = [machine.compiled.names.joints[a] for a in machine.actuators]
+    columns = []
+    for k in range(len(drives)):
+        unit = step * np.eye(len(drives))[k]
+        up, down = (forward_kinematics(machine, start[:, drives] + s * unit, start=start) for s in (1, -1))
+        turn = Rotation.from_matrix(up.rotation @ np.swapaxes(down.rotation, 1, 2)).as_rotvec()
+        columns.append(np.hstack([up.position - down.position, turn]) / (2 * step))
+    return np.stack(columns, axis=-1)
 
 
 def lagging(machine: Machine, sign: Floats, weighs: bool = False) -> Machine:

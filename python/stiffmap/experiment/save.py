@@ -12,13 +12,21 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.errors import FileError
-from stiffmap.experiment.columns import APPROACH, POSE, POSE2
+from stiffmap.experiment.columns import APPROACH, POSE, POSE2, SEEN, SEEN_TURNED
 from stiffmap.experiment.experiment import AXES, WRENCH, Channel, Experiment, Floats, Loop
 from stiffmap.experiment.orientation import VECTOR
 from stiffmap.files.yaml_text import text_of
 
 MM = 1e3
 PLAIN = {"unloaded": "centre", "frame": "known", "tool": "known"}
+WORDS = {
+    "branch": "branch",
+    "setup": "setup",
+    "instrument": "instrument",
+    "target": "target",
+    "point": "points",
+    "load_point": "load_points",
+}
 
 
 def save_experiment(experiment: Experiment, folder: str | PathLike[str], title: str = "") -> None:
@@ -42,16 +50,25 @@ def _head(e: Experiment, title: str) -> dict[str, Any]:
     head |= {"units": {"length": "mm", "force": "N", "angle": "rad"}}
     head |= _noise(e) | _own_columns(e)
     optional = {
-        "gravity": None if e.gravity is None else list(e.gravity),
+        "gravity": _gravity(e),
         "reference_temperature": e.reference_temperature,
     }
     head |= {k: v for k, v in optional.items() if v is not None}
     head |= {k: getattr(e, k) for k, plain in PLAIN.items() if getattr(e, k) != plain}
     if e.rotation is not None and e.rotation_against == "base" and e.command is None:
         head["orientation"] = {"against": "base"}
+    if any(c.name == "hh" for c in e.extra):
+        head["surface"] = {"normal": list(e.normal), "shape": e.surface}
     if e.loop != Loop():
         head["metrology"] = {k: getattr(e.loop, k) for k in ("instrument_on", "target_on", "force_against")}
     return head
+
+
+def _gravity(e: Experiment) -> Any:
+    """Of all rows, or of each set-up."""
+    if e.gravity_of is None:
+        return None if e.gravity is None else list(e.gravity)
+    return {s: [float(v) for v in g] for s, g in zip(e.setup, e.gravity_of, strict=True)}
 
 
 def _noise(e: Experiment) -> dict[str, Any]:
@@ -95,24 +112,49 @@ def _scale(c: Channel) -> float:
 def _columns(e: Experiment) -> dict[str, list[Any]]:
     columns: dict[str, list[Any]] = {"id": list(e.ids)}
     columns |= _commanded(e) | _loads(e)
+    absolute, told = _absolute(e)
+    columns |= absolute
     for i, c in enumerate(e.channels):
-        if e.axis_read[i]:
+        if e.axis_read[i] and c.name not in told:
             columns[c.name] = _text(e.reading[:, i] * _scale(c))
             if not _alike(e, i) and np.isfinite(e.sigma[:, i]).any():
                 columns[f"u_{c.name}"] = _text(e.sigma[:, i] * _scale(c))
     for name, values in (("repeat", e.repeat), ("order", e.order), ("temperature", e.temperature)):
         if values is not None:
             columns[name] = _text(np.asarray(values, dtype=float))
-    words = (("branch", e.branch), ("setup", e.setup), ("point", e.points), ("load_point", e.load_points))
-    return columns | {n: list(v) for n, v in words if v}
+    words = {n: getattr(e, field) for n, field in WORDS.items()}
+    return columns | {n: list(v) for n, v in words.items() if v}
+
+
+def _absolute(e: Experiment) -> tuple[dict[str, list[Any]], tuple[str, ...]]:
+    """Columns of readings in coordinates of their own, and the channels that they stand for."""
+    columns: dict[str, list[Any]] = {}
+    told: tuple[str, ...] = ()
+    if e.seen is not None:
+        columns |= {c: _text(e.seen[:, i] * MM) for i, c in enumerate(SEEN)}
+        told += AXES[:3]
+    if e.seen_rotation is not None:
+        good = np.asarray(np.isfinite(e.seen_rotation).all(axis=(1, 2)))
+        turns = Rotation.from_matrix(np.where(good[:, None, None], e.seen_rotation, np.eye(3))).as_rotvec()
+        columns |= {c: _text(np.where(good, turns[:, i], np.nan)) for i, c in enumerate(SEEN_TURNED)}
+        told += AXES[3:]
+    for name, values, channel in (("contact", e.contact, "hh"), ("distance", e.apart, "dd")):
+        if values is not None:
+            columns[name] = _text(values * MM)
+            told += (channel,)
+    return columns, told
 
 
 def _commanded(e: Experiment) -> dict[str, list[Any]]:
     if e.command is not None:
         out = {c.name: _text(e.command[:, i] * _scale(c)) for i, c in enumerate(e.command_of)}
+        if e.other_command is not None:
+            out |= {
+                f"{c.name}2": _text(e.other_command[:, i] * _scale(c)) for i, c in enumerate(e.command_of)
+            }
     else:
         out = {c: _text(e.position[:, i] * MM) for i, c in enumerate(POSE)} | _rotvec(e.rotation, VECTOR)
-    if e.other is not None:
+    if e.other is not None and e.command is None:
         out |= {c: _text(e.other[:, i] * MM) for i, c in enumerate(POSE2)}
         out |= _rotvec(e.other_rotation, [f"{c}2" for c in VECTOR])
     if e.approach is not None:

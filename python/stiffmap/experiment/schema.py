@@ -68,6 +68,7 @@ class NoiseModel(FileModel):
     ry: Positive | None = None
     rz: Positive | None = None
     dd: Positive | None = None
+    hh: Positive | None = None
 
 
 LengthOrAngle = Literal["m", "cm", "mm", "um", "µm", "in", "rad", "mrad", "deg"]
@@ -117,6 +118,19 @@ class OrientationModel(FileModel):
     euler: Annotated[str, Field(pattern=r"^([XYZ]{3}|[xyz]{3})$")] | None = None
 
 
+Axes3 = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+
+
+class SurfaceModel(FileModel):
+    """The surface that heights are measured against: its normal in base axes, and what is known of it.
+
+    ``offset_unknown``: its height is fitted; ``unknown``: height and two tilts. Per set-up.
+    """
+
+    normal: Axes3 = Field(default_factory=lambda: [0.0, 0.0, 1.0])
+    shape: Literal["known", "offset_unknown", "unknown"] = "known"
+
+
 class ExperimentFile(FileModel):
     """One experiment."""
 
@@ -134,8 +148,10 @@ class ExperimentFile(FileModel):
     command: dict[str, CommandModel] = Field(default_factory=dict)
     unloaded: Literal["centre", "approach", "unknown"] = "centre"
     frame: Literal["known", "offset_unknown", "unknown"] = "known"
-    tool: Literal["known", "offset_unknown"] = "known"
-    gravity: Annotated[list[Finite], Field(min_length=3, max_length=3)] | None = None
+    tool: Literal["known", "offset_unknown", "unknown"] = "known"
+    target_orientation: Literal["rotvec", "xyz", "XYZ", "zyx", "ZYX", "ZYZ", "zyz"] = "rotvec"
+    surface: SurfaceModel = SurfaceModel()
+    gravity: Axes3 | dict[str, Axes3] | None = None
     reference_temperature: Finite | None = None
     metrology: LoopModel = LoopModel()
     orientation: OrientationModel = OrientationModel()

@@ -40,14 +40,15 @@ def simulate(
         raise StiffmapError(f"{plan.name}: a virtual experiment needs a declared noise for every axis read")
     predictor = Predictor(machine, plan)
     exact = predictor(tuple(effects))
-    refuse_unreachable(predictor.experiment, exact)
+    plan = predictor.experiment
+    refuse_unreachable(plan, exact)
     rng = np.random.default_rng(seed)
     reading = exact + np.nan_to_num(plan.sigma) * rng.standard_normal(exact.shape)
-    reading = reading + _zeros(plan, rng) + _unknown(predictor.experiment, predictor(), rng)
+    reading = reading + _zeros(plan, rng) + _unknown(plan, predictor(), rng)
     wild = rng.random(len(plan)) < outliers
     size = rng.uniform(5, 20, (int(wild.sum()), 1)) * plan.sigma[wild]
     reading[wild] += rng.choice([-1, 1], (int(wild.sum()), exact.shape[1])) * size
-    return replace(plan, reading=np.where(plan.read, reading, np.nan))
+    return replace(plan, reading=np.where(plan.read, reading, np.nan), joints=None, other_joints=None)
 
 
 def _zeros(plan: Experiment, rng: np.random.Generator) -> Floats:

@@ -8,23 +8,22 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.description import Block, Element, Joint, MachineDescription, Offset, Point, Pose
-from stiffmap.experiment.experiment import Floats
-from stiffmap.kinematics import inverse_kinematics
+from stiffmap.experiment.configuration import coordinates_of
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.machine import Machine
 
 Frame = tuple[Floats, Floats]
 """Positions (n, 3) and rotations (n, 3, 3)."""
 
 
-def point_positions(machine: Machine, name: str, position: Floats, rotation: Floats | None) -> Floats:
-    """(n, 3) m, base axes, of a point at commanded TCP poses; NaN where they cannot be reached."""
+def point_positions(machine: Machine, name: str, plan: Experiment) -> Floats:
+    """(n, 3) m, base axes, of a point where each row is commanded; NaN where that is out of reach."""
     if name == "tcp":
-        return position
-    found = inverse_kinematics(machine, position, rotation)
-    names = machine.solve(machine.description.home.p).coordinate_names
-    at = {n: found.coordinates[:, i] for i, n in enumerate(names)}
-    walked = _walk(machine.description, name, at, len(position))
-    return np.where(np.isfinite(found.position), walked, np.nan)
+        return plan.position
+    found = coordinates_of(machine, plan)
+    at = {n: found[:, i] for i, n in enumerate(machine.compiled.names.coordinates)}
+    walked = _walk(machine.description, name, at, len(plan))
+    return np.where(np.asarray(np.isfinite(found).all(axis=1))[:, None], walked, np.nan)
 
 
 def _walk(d: MachineDescription, name: str, at: Mapping[str, Floats], n: int) -> Floats:

@@ -157,11 +157,10 @@ def test_same_seed_same_answer(machine: sm.Machine, plan: sm.Experiment) -> None
     assert one == two
 
 
-def test_unreachable_rows_are_an_error(machine: sm.Machine, plan: sm.Experiment) -> None:
+def test_no_reachable_row_is_an_error(machine: sm.Machine, plan: sm.Experiment) -> None:
     twin = simulate(machine, plan, seed=0)
-    position = twin.position.copy()
-    position[3] = 9.0
-    with pytest.raises(sm.StiffmapError, match=r"no equilibrium at 1 row \(id 4"):
+    position = np.full_like(twin.position, 9.0)
+    with pytest.raises(sm.StiffmapError, match=r"no equilibrium at \d+ rows \(id 1"):
         sm.diagnose(machine, replace(twin, position=position))
 
 

@@ -76,7 +76,7 @@ def test_on_the_platform_nothing_moves(pointed: sm.Machine, plan: Experiment) ->
 def test_seen_from_a_foot(pointed: sm.Machine, plan: Experiment) -> None:
     """By the distance to the gauge, which no frame changes, and by the turn between the bodies."""
     s = pointed.solve(plan.position, plan.wrench, read_points=["x.gauge"])
-    arm = plan.position - point_positions(pointed, "x.gauge", plan.position, None)
+    arm = plan.position - point_positions(pointed, "x.gauge", plan)
     true = arm + s.readings[:, 0, :3] - s.readings[:, 1, :3]
     seen = predict(pointed, replace(plan, loop=Loop(instrument_on="x.gauge")))
     np.testing.assert_allclose(
@@ -92,7 +92,7 @@ def test_a_force_within_one_body_does_nothing(pointed: sm.Machine, plan: Experim
 
 def test_a_force_against_a_foot(pointed: sm.Machine, plan: Experiment) -> None:
     got = predict(pointed, replace(plan, loop=Loop(force_against="y.gauge")))
-    arm = plan.position - point_positions(pointed, "y.gauge", plan.position, None)
+    arm = plan.position - point_positions(pointed, "y.gauge", plan)
     back = -np.hstack([plan.wrench[:, :3], np.cross(arm, plan.wrench[:, :3])])
     both = pointed.solve(plan.position, plan.wrench, wrenches={"y.gauge": back})
     np.testing.assert_allclose(got, both.displacement, atol=1e-12)
@@ -102,10 +102,10 @@ def test_where_points_are(pointed: sm.Machine, plan: Experiment) -> None:
     q = sm.inverse_kinematics(pointed, plan.position).actuators
     for i, leg in enumerate("xyz"):
         carried = np.roll(OFFSET, i) + q[:, [i]] * np.eye(3)[i]
-        np.testing.assert_allclose(point_positions(pointed, f"{leg}.gauge", plan.position, None), carried)
-        end = point_positions(pointed, f"{leg}.end", plan.position, None)
+        np.testing.assert_allclose(point_positions(pointed, f"{leg}.gauge", plan), carried)
+        end = point_positions(pointed, f"{leg}.end", plan)
         np.testing.assert_allclose(end, plan.position, atol=1e-12)  # the leg closes at the TCP
-    probe = point_positions(pointed, "platform.probe", plan.position, None)
+    probe = point_positions(pointed, "platform.probe", plan)
     np.testing.assert_allclose(probe, plan.position + [0.0, 0.05, -0.12], atol=1e-12)
 
 

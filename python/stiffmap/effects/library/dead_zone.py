@@ -16,6 +16,8 @@ HALF_WIDTH = Parameter(
     1e-5,
     "deflection without force to each side of the centre",
     angular="rad",
+    angular_upper=0.5,
+    angular_scale=1e-4,
 )
 
 

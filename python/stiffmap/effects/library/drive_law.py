@@ -58,12 +58,18 @@ def is_revolute(description: MachineDescription, element: str) -> bool:
     return any(isinstance(e, Joint) and e.kind != "prismatic" for e in named)
 
 
+def _turning(p: Parameter) -> Parameter:
+    """The parameter on a joint that turns: unit, bound and size of an angle."""
+    upper, scale = p.angular_upper or p.upper, p.angular_scale or p.scale
+    return replace(p, unit=p.angular or p.unit, upper=upper, scale=scale)
+
+
 def in_unit_of_joint(*parameters: Parameter) -> ParametersAt:
     """Parameters whose units become the angular ones where the joint turns."""
 
     def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
         if not is_revolute(description, element):
             return parameters
-        return tuple(replace(p, unit=p.angular or p.unit) for p in parameters)
+        return tuple(map(_turning, parameters))
 
     return at

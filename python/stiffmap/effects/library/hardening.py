@@ -8,7 +8,15 @@ from stiffmap.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter, Placed
 
 CUBIC = Parameter(
-    "cubic", "N/m^3", 0.0, 1e20, 0.0, 1e14, "coefficient of the deflection's third power", angular="N·m/rad^3"
+    "cubic",
+    "N/m^3",
+    0.0,
+    1e20,
+    0.0,
+    1e14,
+    "coefficient of the deflection's third power",
+    angular="N·m/rad^3",
+    angular_scale=1e9,
 )
 
 

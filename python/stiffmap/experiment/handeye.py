@@ -1,0 +1,245 @@
+"""Where an instrument stands and where its target sits on the tool, without a guess of either.
+
+Targets are seen at ``B = Y A X``: A the commanded tool frame in base axes, Y the base in the instrument's
+frame (one per set-up), X the target in the tool's frame (one per target). The start is in closed form: turns
+from the logarithms of relative rotations (F. C. Park, B. J. Martin, "Robot sensor calibration: solving AX = XB
+on the Euclidean group", IEEE T-RA 10, 1994), shifts by linear least squares. Then Gauss-Newton on all frames
+at once on the exact poses, outliers weighed down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from stiffmap.experiment.experiment import Floats, Integers
+
+STEPS = 60
+DONE = 1e-12
+"""m, rad: last step of a fit that has come to rest."""
+ARM = 0.2
+"""m: how far apart the starts of a target's place are where no orientation is seen."""
+PAIRS = 400
+"""Relative rotations that the closed form takes."""
+HUBER = 3.0
+"""Robust standard deviations beyond which a reading's weight falls."""
+PARALLEL = 1e-3
+"""Second singular value of the relative turns, over the first: below it they have one axis only."""
+Mask = NDArray[np.bool_]
+
+
+@dataclass
+class Frames:
+    """Instruments and targets: rotations (k, 3, 3) and translations (k, 3), m."""
+
+    base_r: Floats
+    base_p: Floats
+    tool_r: Floats
+    tool_p: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """What was commanded and seen; n rows."""
+
+    p: Floats
+    r: Floats
+    """(n, 3), (n, 3, 3) commanded tool frame."""
+    q: Floats
+    m: Floats
+    """(n, 3), (n, 3, 3) target in the instrument's frame; NaN where not seen."""
+    setup: Integers
+    target: Integers
+    tool_unknown: bool = True
+    turn_unknown: bool = True
+    """Whether the target's orientation on the tool is unknown as well."""
+    placed: Mask = field(init=False)
+    turned: Mask = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "placed", np.isfinite(self.q).all(axis=1))
+        object.__setattr__(self, "turned", np.isfinite(self.m).all(axis=(1, 2)))
+
+
+def find_frames(s: Sighting) -> Frames:
+    """Frames of instruments and targets of best fit."""
+    return min((_refined(s, f) for f in _starts(s)), key=lambda f: _cost(s, f))
+
+
+def unmoved(s: Sighting) -> Frames:
+    """Instruments at the base and targets at the tool."""
+    setups, targets = int(s.setup.max()) + 1, int(s.target.max()) + 1
+    turns = np.tile(np.eye(3), (setups, 1, 1)), np.tile(np.eye(3), (targets, 1, 1))
+    return Frames(turns[0], np.zeros((setups, 3)), turns[1], np.zeros((targets, 3)))
+
+
+def as_commanded(s: Sighting, f: Frames) -> tuple[Floats, Floats]:
+    """(n, 3) and (n, 3) in base axes: seen minus commanded. The tool's position and rotation vector where the
+    orientation is seen, else the target's position."""
+    y, x = f.base_r[s.setup], f.tool_r[s.target]
+    turn = np.swapaxes(y, 1, 2) @ np.nan_to_num(s.m) @ np.swapaxes(x, 1, 2)
+    held = np.where(s.turned[:, None, None], turn, s.r)
+    at = np.einsum("nji,nj->ni", y, s.q - f.base_p[s.setup])
+    shift = at - s.p - np.einsum("nij,nj->ni", held, f.tool_p[s.target])
+    safe = np.where(s.turned[:, None, None], turn, np.eye(3))
+    error = Rotation.from_matrix(safe @ np.where(s.turned[:, None, None], np.swapaxes(s.r, 1, 2), np.eye(3)))
+    return shift, np.where(s.turned[:, None], error.as_rotvec(), np.nan)
+
+
+def _starts(s: Sighting) -> list[Frames]:
+    setups, targets = int(s.setup.max()) + 1, int(s.target.max()) + 1
+    tool_r = np.tile(np.eye(3), (targets, 1, 1))
+    if s.turned.any() and s.turn_unknown and s.tool_unknown:
+        for k in range(targets):
+            tool_r[k] = _tool_turn(s, k)
+    if s.turned.any():
+        base_r = np.stack([_base_turn(s, tool_r, k) for k in range(setups)])
+        return [_shifts(s, base_r, tool_r)]
+    # No orientation: a rigid fit for each of a few places of the target; the refinement does the rest.
+    arms = (
+        [np.zeros(3), *(sign * ARM * a for a in np.eye(3) for sign in (1, -1))]
+        if s.tool_unknown
+        else [np.zeros(3)]
+    )
+    return [_rigid(s, tool_r, np.tile(arm, (targets, 1)), setups) for arm in arms]
+
+
+def _pairs(s: Sighting, rows: Integers) -> tuple[Integers, Integers]:
+    rng = np.random.default_rng(0)
+    i, k = rng.integers(0, len(rows), (2, PAIRS))
+    i, k = rows[i], rows[k]
+    same = (s.setup[i] == s.setup[k]) & (i != k)
+    return i[same], k[same]
+
+
+def _tool_turn(s: Sighting, target: int) -> Floats:
+    """(3, 3) orientation of a target on the tool; unity where all turns have one axis, which leaves it open."""
+    i, k = _pairs(s, np.flatnonzero(s.turned & (s.target == target)))
+    a = Rotation.from_matrix(np.swapaxes(s.r[i], 1, 2) @ s.r[k]).as_rotvec()
+    b = Rotation.from_matrix(np.swapaxes(s.m[i], 1, 2) @ s.m[k]).as_rotvec()
+    if len(a) < 2:
+        return np.eye(3)
+    spread = np.linalg.svd(a, compute_uv=False)
+    if spread[1] < PARALLEL * spread[0] or not spread[0] > 0:
+        return np.eye(3)
+    return np.asarray(Rotation.align_vectors(a, b)[0].as_matrix())
+
+
+def _base_turn(s: Sighting, tool_r: Floats, setup: int) -> Floats:
+    here = np.flatnonzero(s.turned & (s.setup == setup))
+    if not here.size:
+        return np.eye(3)
+    x = tool_r[s.target[here]]
+    turns = s.m[here] @ np.swapaxes(x, 1, 2) @ np.swapaxes(s.r[here], 1, 2)
+    return np.asarray(Rotation.from_matrix(turns).mean().as_matrix())
+
+
+def _shifts(s: Sighting, base_r: Floats, tool_r: Floats) -> Frames:
+    """Shifts that fit best for given turns; a target's place that the plan leaves open stays at the tool."""
+    setups, targets = len(base_r), len(tool_r)
+    n, unknown = int(s.placed.sum()), 3 * setups + (3 * targets if s.tool_unknown else 0)
+    out = Frames(base_r, np.zeros((setups, 3)), tool_r, np.zeros((targets, 3)))
+    if not n:
+        return out
+    at = np.flatnonzero(s.placed)
+    a = np.zeros((n, 3, unknown))
+    for row, i in enumerate(at):
+        a[row, :, 3 * s.setup[i] : 3 * s.setup[i] + 3] = np.eye(3)
+        if s.tool_unknown:
+            k = 3 * (setups + s.target[i])
+            a[row, :, k : k + 3] = base_r[s.setup[i]] @ s.r[i]
+    b = s.q[at] - np.einsum("nij,nj->ni", base_r[s.setup[at]], s.p[at])
+    ridge = 1e-6 * np.eye(unknown)[3 * setups :]
+    found = np.linalg.lstsq(
+        np.vstack([a.reshape(-1, unknown), ridge]), np.append(b.ravel(), np.zeros(len(ridge)))
+    )[0]
+    out.base_p = found[: 3 * setups].reshape(-1, 3)
+    if s.tool_unknown:
+        out.tool_p = found[3 * setups :].reshape(-1, 3)
+    return out
+
+
+def _rigid(s: Sighting, tool_r: Floats, tool_p: Floats, setups: int) -> Frames:
+    """Each instrument by the rigid motion that fits best (W. Kabsch 1976) for given places of the targets."""
+    out = Frames(np.tile(np.eye(3), (setups, 1, 1)), np.zeros((setups, 3)), tool_r, tool_p)
+    at = s.p + np.einsum("nij,nj->ni", s.r, tool_p[s.target])
+    for k in range(setups):
+        here = np.flatnonzero(s.placed & (s.setup == k))
+        if here.size < 3:
+            continue
+        a, b = at[here], s.q[here]
+        a0, b0 = a.mean(axis=0), b.mean(axis=0)
+        u, _, vt = np.linalg.svd((b - b0).T @ (a - a0))
+        flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+        out.base_r[k] = u @ flip @ vt
+        out.base_p[k] = b0 - out.base_r[k] @ a0
+    return out
+
+
+def _refined(s: Sighting, f: Frames) -> Frames:
+    """Gauss-Newton on all frames; steps of least norm, so that what the plan leaves open stays."""
+    for _ in range(STEPS):
+        residual, columns = _linear(s, f)
+        weight = _weights(residual)
+        size = np.linalg.norm(columns, axis=0)
+        scale = np.where(size > 0, size, 1.0)
+        step = -np.linalg.lstsq((columns / scale) * weight[:, None], residual * weight, rcond=1e-9)[0] / scale
+        _move(f, step, s)
+        if np.abs(step).max(initial=0.0) < DONE:
+            break
+    return f
+
+
+def _cost(s: Sighting, f: Frames) -> float:
+    residual, _ = _linear(s, f)
+    return float(np.sum(np.abs(residual)))
+
+
+def _weights(residual: Floats) -> Floats:
+    typical = 1.4826 * np.median(np.abs(residual)) if residual.size else 0.0
+    far = np.abs(residual) / max(HUBER * typical, 1e-15)
+    return np.asarray(np.sqrt(1.0 / np.maximum(far, 1.0)))
+
+
+def _linear(s: Sighting, f: Frames) -> tuple[Floats, Floats]:
+    """Residual of all rows, angles as lengths at the size of the motion, and its derivative."""
+    shift, turn = as_commanded(s, f)
+    setups, targets = len(f.base_r), len(f.tool_r)
+    n, unknown = len(s.p), 6 * setups + 6 * targets
+    d = np.zeros((n, 6, unknown))
+    at = s.p + shift + np.einsum("nij,nj->ni", s.r, f.tool_p[s.target])
+    for axis in range(3):
+        e = np.eye(3)[axis]
+        y = 6 * s.setup
+        rows = np.arange(n)
+        d[rows, axis, y + axis] = -1.0
+        d[rows, :3, y + 3 + axis] = -np.cross(e, at)
+        d[rows, 3:, y + 3 + axis] = -e
+        if not s.tool_unknown:
+            continue
+        x = 6 * (setups + s.target)
+        d[rows, :3, x + axis] = -s.r[:, :, axis]
+        if s.turn_unknown:
+            d[rows, 3:, x + 3 + axis] = -s.r[:, :, axis]
+            lever = np.einsum("nij,nj->ni", s.r, f.tool_p[s.target])
+            d[rows, :3, x + 3 + axis] = np.where(s.turned[:, None], np.cross(s.r[:, :, axis], lever), 0.0)
+    size = max(float(np.linalg.norm(np.ptp(s.p, axis=0))), 1e-3)
+    residual = np.hstack([shift, turn * size])
+    d[:, 3:] *= size
+    good = np.hstack([np.repeat(s.placed[:, None], 3, axis=1), np.repeat(s.turned[:, None], 3, axis=1)])
+    return residual[good], d[good]
+
+
+def _move(f: Frames, step: Floats, s: Sighting) -> None:
+    setups = len(f.base_r)
+    parts = step.reshape(-1, 6)
+    for k in range(setups):  # instrument: the base moves by a small motion in base axes
+        turn = Rotation.from_rotvec(parts[k, 3:]).as_matrix()
+        f.base_p[k] = f.base_p[k] + f.base_r[k] @ parts[k, :3]
+        f.base_r[k] = f.base_r[k] @ turn
+    for k in range(len(f.tool_r)):
+        f.tool_p[k] = f.tool_p[k] + parts[setups + k, :3]
+        f.tool_r[k] = Rotation.from_rotvec(parts[setups + k, 3:]).as_matrix() @ f.tool_r[k]
