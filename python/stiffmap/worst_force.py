@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats
-from stiffmap.machine import Machine
 from stiffmap.compiled import Status
+from stiffmap.machine import Machine
 
 STEPS, SETTLED = 50, 1e-9
 
