@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/closure.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -79,9 +78,10 @@ double newton_step(const Mechanism& m, const Target& target, ClosureWorkspace& w
   }
   for (Index i = 0; i < ws.A.rows(); ++i)
     if (i % 6 >= 3) ws.A.row(i) *= m.length;
-  ws.qr.setThreshold(rank_threshold);
-  ws.qr.compute(ws.A);
-  ws.step.head(n) = ws.qr.solve(-ws.e);
+  ws.qr.compute(ws.A, rank_threshold);
+  ws.right = -ws.e;
+  ws.qr.solve(ws.right, ws.shortest);
+  ws.step.head(n) = ws.shortest;
   const double norm = ws.step.head(n).norm() / m.length;
   for (Index k = 0; k < n; ++k) ws.step[k] /= m.unit(ws.unknown[at(k)]);
   return norm;
@@ -170,10 +170,10 @@ void lock_spins(Mechanism& m, ClosureWorkspace& ws) {
     residual(m, m.home_coordinates, target, ws);
     newton_step(m, target, ws);
     if (ws.unknown.empty()) return;
-    const Eigen::BDCSVD<MatX> svd(ws.A, Eigen::ComputeFullV);
-    const Index n = ws.A.cols(), rank = (svd.singularValues().array() > rank_threshold).count();
+    const Singular svd = singular_vectors(ws.A);
+    const Index n = ws.A.cols(), rank = (svd.values.array() > rank_threshold).count();
     if (rank == n) return;
-    const VecX spin = svd.matrixV().col(n - 1);
+    const VecX spin = svd.V.col(n - 1);
     VecX turned = m.home_coordinates;
     for (Index k = 0; k < n; ++k) turned[ws.unknown[at(k)]] += 0.3 * spin[k];
     if (residual(m, turned, target, ws) > 1e-9) return;  // singular at home, but no spin

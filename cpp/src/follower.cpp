@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/follower.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -20,9 +19,9 @@ constexpr double same_load = 1e-7;    // eigenvalues (scaled tangent) of modes t
 /// eigenvalue nearest zero. Of several that buckle together, the combination that moves one coordinate most.
 VecX critical_mode(const SaddleSystem& saddle, const Mechanism& m) {
   const Index n = m.size();
-  const Eigen::SelfAdjointEigenSolver<MatX> eigen(0.5 * (saddle.matrix() + saddle.matrix().transpose()));
-  const MatX& V = eigen.eigenvectors();
-  const VecX size = eigen.eigenvalues().cwiseAbs();
+  const EigenX eigen = symmetric_eigen(0.5 * (saddle.matrix() + saddle.matrix().transpose()));
+  const MatX& V = eigen.vectors;
+  const VecX size = eigen.values.cwiseAbs();
   const auto moves = [&](Index i) { return V.col(i).head(n).norm() >= 1e-3; };
   Index best = -1;
   for (Index i = 0; i < size.size(); ++i)
@@ -131,7 +130,8 @@ bool Follower::correct(const Constraint& c, LoadedState& y) {
     evaluate(y);
     const VecX rhs = residual(c, y, row);
     border(row);
-    const VecX step = lu_.solve(rhs);
+    VecX step;
+    lu_.solve(rhs, step);
     const double norm = motion(step);
     if (!std::isfinite(norm) || norm > trusted_step) return false;
     if (k > 1 && norm > trusted_shrinking * previous && norm > 1e-7) return false;
@@ -157,7 +157,9 @@ int Follower::unstable_directions() {
 
 VecX Follower::tangent(const VecX& row) {
   border(row);
-  return lu_.solve(load_row()).normalized();
+  VecX t;
+  lu_.solve(load_row(), t);
+  return t.normalized();
 }
 
 PathPoint Follower::report(const LoadedState& y) const {

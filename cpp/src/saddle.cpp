@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/saddle.hpp"
 
-#include <Eigen/SVD>
 #include <cmath>
 
 namespace stiffmap {
@@ -127,19 +126,17 @@ void SaddleSystem::assemble(const Mechanism& m, const Linearization& lin) {
 
 void SaddleSystem::factorize() {
   lu_.compute(A_);
-  const auto& U = lu_.matrixLU();
-  double lowest = std::abs(U(0, 0)), highest = lowest;
-  sign_ = lu_.permutationP().determinant();
-  for (Index i = 0; i < U.rows(); ++i) {
-    const double u = std::abs(U(i, i));
-    lowest = std::min(lowest, u);
-    highest = std::max(highest, u);
-    if (U(i, i) < 0) sign_ = -sign_;
+  const auto pivots = lu_.pivots();
+  double lowest = std::abs(pivots[0]), highest = lowest;
+  sign_ = lu_.exchanges();
+  for (const double pivot : pivots) {
+    lowest = std::min(lowest, std::abs(pivot));
+    highest = std::max(highest, std::abs(pivot));
+    if (pivot < 0) sign_ = -sign_;
   }
   regular_ = well_conditioned_ = lowest > pivot_alarm * std::min(1.0, highest);
   if (well_conditioned_) return;
-  cod_.setThreshold(rank_threshold);
-  cod_.compute(A_);
+  cod_.compute(A_, rank_threshold);
   regular_ = cod_.rank() == A_.rows();
 }
 
@@ -147,8 +144,8 @@ void SaddleSystem::solve(const VecX& force, const VecX& closure, VecX& dz, VecX&
   rhs_.head(n_) = force;
   rhs_.tail(nl_) = closure;
   to_forces(rhs_);
-  if (well_conditioned_) sol_.noalias() = lu_.solve(rhs_);
-  else sol_ = cod_.solve(rhs_);
+  if (well_conditioned_) lu_.solve(rhs_, sol_);
+  else cod_.solve(rhs_, sol_);
   to_coordinates(sol_);
   dz = sol_.head(n_);
   dlambda = sol_.tail(nl_);
@@ -170,11 +167,8 @@ void SaddleSystem::to_forces(VecX& v) const {
 
 MatX SaddleSystem::null_space() const {
   if (regular_) return MatX(n_ + nl_, 0);
-  const Eigen::BDCSVD<MatX> svd(A_, Eigen::ComputeFullV);
-  const VecX& sv = svd.singularValues();
-  Index zero = 0;
-  for (Index i = 0; i < sv.size(); ++i) zero += sv[i] < rank_threshold;
-  return svd.matrixV().rightCols(zero);
+  const Singular svd = singular_vectors(A_);
+  return svd.V.rightCols((svd.values.array() < rank_threshold).count());
 }
 
 void SaddleSystem::to_unknowns(const Linearization& lin, Eigen::Ref<MatX> J) const {
@@ -185,9 +179,7 @@ void SaddleSystem::to_unknowns(const Linearization& lin, Eigen::Ref<MatX> J) con
 
 Index SaddleSystem::closure_rank() const {
   if (nl_ == 0) return 0;
-  Eigen::ColPivHouseholderQR<MatX> qr(A_.topRightCorner(n_, nl_));
-  qr.setThreshold(rank_threshold);
-  return qr.rank();
+  return rank_of(A_.topRightCorner(n_, nl_), rank_threshold);
 }
 
 double SaddleSystem::step_norm(const Mechanism& m, const VecX& dz) const {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/spring.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "stiffmap/check.hpp"
+#include "stiffmap/dense.hpp"
 
 namespace stiffmap {
 namespace {
@@ -27,7 +27,7 @@ void check_symmetric_psd(const Mat6& M, const std::string& name) {
     for (int j = 0; j < 6; ++j)
       require(M(i, j) == 0 || (s[i] > 0 && s[j] > 0), name, "a positive semidefinite 6x6 matrix",
               "a coupling to a zero diagonal entry");
-  const double lowest = Eigen::SelfAdjointEigenSolver<Mat6>(N, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  const double lowest = symmetric_eigen(N).values[0];
   require(lowest > -1e-9, name, "a positive semidefinite 6x6 matrix; lowest scaled eigenvalue >= 0", lowest);
 }
 
@@ -46,10 +46,10 @@ SpringMatrix spring_from_compliance(const Mat6& C, const std::string& name) {
   const Mat6 N = 0.5 * (s.asDiagonal() * (C + C.transpose()) * s.asDiagonal());
   SpringMatrix out;
   // Directions with a zero diagonal are rigid as they stand; the rest may hide a rank defect.
-  Eigen::SelfAdjointEigenSolver<Mat6> eigen(N);
+  const Eigen6 eigen = symmetric_eigen(N);
   int rank = 0, moving = 0;
   for (int i = 0; i < 6; ++i) {
-    rank += eigen.eigenvalues()[i] > 1e-9;
+    rank += eigen.values[i] > 1e-9;
     moving += s[i] > 0;
   }
   if (rank == moving) {
@@ -57,19 +57,19 @@ SpringMatrix spring_from_compliance(const Mat6& C, const std::string& name) {
     Mat6 full = N;
     for (int i = 0; i < 6; ++i)
       if (out.rigid[i]) full(i, i) = 1;
-    Mat6 K = full.inverse();
+    Mat6 K = inverse(full);
     for (int i = 0; i < 6; ++i)
       if (out.rigid[i]) K(i, i) = 0;
     out.stiffness = s.asDiagonal() * K * s.asDiagonal();
     out.stiffness = (0.5 * (out.stiffness + out.stiffness.transpose())).eval();
     return out;
   }
-  Eigen::SelfAdjointEigenSolver<Mat6> plain(0.5 * (C + C.transpose()));
-  out.basis = plain.eigenvectors();
+  const Eigen6 plain = symmetric_eigen(Mat6(0.5 * (C + C.transpose())));
+  out.basis = plain.vectors;
   out.rotated = true;
   for (int i = 0; i < 6; ++i) {
-    const double c = plain.eigenvalues()[i];
-    out.rigid[i] = c < 1e-9 * plain.eigenvalues()[5];
+    const double c = plain.values[i];
+    out.rigid[i] = c < 1e-9 * plain.values[5];
     out.stiffness(i, i) = out.rigid[i] ? 0 : 1 / c;
   }
   return out;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/stiffness.hpp"
 
-#include <Eigen/SVD>
 #include <cmath>
 #include <limits>
 
@@ -23,8 +22,8 @@ void partition(const SaddleSystem& saddle, StiffnessWorkspace& ws) {
   }
 }
 
-bool well_conditioned(const Eigen::PartialPivLU<MatX>& lu) {
-  const auto d = lu.matrixLU().diagonal().cwiseAbs();
+bool well_conditioned(const Lu& lu) {
+  const auto d = lu.pivots().cwiseAbs();
   return d.minCoeff() > pivot_alarm * std::min(1.0, d.maxCoeff());
 }
 
@@ -33,18 +32,18 @@ Mat6 unscale(const Mat6& K, const Vec6& s) { return s.asDiagonal() * K * s.asDia
 
 /// Null twists of the scaled stiffness; compliance only where there are none.
 void invert(const Mat6& scaled, const Vec6& s, StiffnessResult& out) {
-  const Eigen::JacobiSVD<Mat6> svd(scaled, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Vec6& sv = svd.singularValues();
+  const Singular6 svd = singular_vectors(scaled);
+  const Vec6& sv = svd.values;
   for (int i = 0; i < 6; ++i) out.free += sv[i] <= rank_threshold * std::max(sv[0], 1e-12);
   out.free_twists.setConstant(nan);
   if (out.free == 0) {
     const Vec6 si = s.cwiseInverse();
-    out.compliance = unscale(scaled.partialPivLu().inverse(), si);
+    out.compliance = unscale(inverse(scaled), si);
     return;
   }
   out.compliance.setConstant(nan);
   for (int k = 0; k < out.free; ++k) {
-    const Vec6 twist = s.cwiseInverse().asDiagonal() * svd.matrixV().col(6 - out.free + k);
+    const Vec6 twist = s.cwiseInverse().asDiagonal() * svd.V.col(6 - out.free + k);
     out.free_twists.col(k) = twist.normalized();
   }
 }
@@ -88,7 +87,7 @@ StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, co
   ws.lu_theta.compute(ws.K);  // k_theta^F = (K_theta - H_thetatheta)^-1
   ws.B.resize(nt, rows + nq);
   ws.B << ws.Jt, ws.Hq;
-  ws.X.noalias() = ws.lu_theta.solve(ws.B);  // k_theta^F [J_theta^T, H_thetaq]
+  ws.lu_theta.solve(ws.B, ws.X);  // k_theta^F [J_theta^T, H_thetaq]
   ws.M.resize(rows + nq, rows + nq);
   ws.M.topLeftCorner(rows, rows).noalias() = ws.Jt.transpose() * ws.X.leftCols(rows);
   ws.M.topRightCorner(rows, nq).noalias() = ws.Jt.transpose() * ws.X.rightCols(nq);
@@ -106,8 +105,7 @@ StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, co
   // Inertia of the whole tangent from its parts: theory (K4).
   ws.sub = ws.K;
   ws.sub = 0.5 * (ws.sub + ws.sub.transpose()).eval();
-  ws.llt.compute(ws.sub);
-  out.elastic_definite = nt == 0 || ws.llt.info() == Eigen::Success;
+  out.elastic_definite = nt == 0 || cholesky(ws.sub);
   ws.sub = 0.5 * (ws.M.bottomRightCorner(nl + nq, nl + nq) + ws.M.bottomRightCorner(nl + nq, nl + nq).transpose());
   out.positive = symmetric_inertia(ws.sub, rank_threshold).positive;
 
@@ -120,15 +118,15 @@ StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, co
   ws.lu.compute(ws.M);
   Mat6 scaled;
   if (well_conditioned(ws.lu)) {
-    scaled = ws.lu.solve(ws.B).topRows<6>() / (soft * soft);
+    ws.lu.solve(ws.B, ws.X);
+    scaled = ws.X.topRows<6>() / (soft * soft);
   } else {
-    Eigen::CompleteOrthogonalDecomposition<MatX> cod(ws.M.rows(), ws.M.cols());
-    cod.setThreshold(rank_threshold);
-    cod.compute(ws.M);
-    const MatX X = cod.solve(ws.B);
-    scaled = X.topRows<6>() / (soft * soft);
+    Orthogonal cod(ws.M.rows(), ws.M.cols());
+    cod.compute(ws.M, rank_threshold);
+    cod.solve(ws.B, ws.X);
+    scaled = ws.X.topRows<6>() / (soft * soft);
     // Nothing solves for a motion that is impossible; a truncated near-null direction leaves far less.
-    if ((ws.M * X - ws.B).cwiseAbs().maxCoeff() > 0.3) out.flags |= flag::rigid_direction;
+    if ((ws.M * ws.X - ws.B).cwiseAbs().maxCoeff() > 0.3) out.flags |= flag::rigid_direction;
   }
   if (out.flags & flag::rigid_direction) {  // some motion of the point is impossible: see compliance
     out.stiffness.setConstant(nan);

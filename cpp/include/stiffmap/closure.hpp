@@ -3,8 +3,7 @@
 // the actuators to the pose, by continuation from home so that the assembly branch is kept.
 #pragma once
 
-#include <Eigen/QR>
-
+#include "stiffmap/dense.hpp"
 #include "stiffmap/kinematics.hpp"
 
 namespace stiffmap {
@@ -14,9 +13,9 @@ struct ClosureWorkspace {
   explicit ClosureWorkspace(const Mechanism& m);
   Frames frames;
   MatX J, A;
-  VecX e, step, x, trial, start;
+  VecX e, step, right, shortest, x, trial, start;
   std::vector<Index> unknown;
-  Eigen::CompleteOrthogonalDecomposition<MatX> qr;
+  Orthogonal qr;
 };
 
 struct ClosureResult {

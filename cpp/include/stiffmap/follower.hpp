@@ -2,8 +2,6 @@
 // Newton on equilibrium with the load as one more unknown, and what happens at a point of a load path.
 #pragma once
 
-#include <Eigen/LU>
-
 #include "stiffmap/solve.hpp"
 
 namespace stiffmap {
@@ -82,7 +80,7 @@ class Follower {
   MatX J_, B_;
   Index size_;
   VecX force_, rhs_, gradient_;  ///< gradient of the displacement along the load, scaled unknowns
-  Eigen::PartialPivLU<MatX> lu_;
+  Lu lu_;
   double load_unit_ = 1;  ///< N per unit of the scaled load
   Pose nominal_;
 

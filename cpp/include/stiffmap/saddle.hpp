@@ -2,9 +2,7 @@
 // The scaled bordered tangent [K - H, -J^T; -J, 0] of theory (E7): assembly, solution, inertia.
 #pragma once
 
-#include <Eigen/LU>
-#include <Eigen/QR>
-
+#include "stiffmap/dense.hpp"
 #include "stiffmap/linearization.hpp"
 
 namespace stiffmap {
@@ -57,8 +55,8 @@ class SaddleSystem {
   VecX s_, rhs_, sol_;
   std::vector<Kind> kind_;
   std::vector<std::pair<Index, SpringMatrix>> rotated_;  // springs with hidden rigid directions
-  Eigen::PartialPivLU<MatX> lu_;
-  Eigen::CompleteOrthogonalDecomposition<MatX> cod_;
+  Lu lu_;
+  Orthogonal cod_;
   bool regular_ = true, well_conditioned_ = true;
   double sign_ = 1;
 };

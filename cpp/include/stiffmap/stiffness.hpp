@@ -3,8 +3,6 @@
 // inertia say of it.
 #pragma once
 
-#include <Eigen/Cholesky>
-
 #include "stiffmap/saddle.hpp"
 
 namespace stiffmap {
@@ -23,8 +21,7 @@ struct StiffnessWorkspace {
   explicit StiffnessWorkspace(const Mechanism& m);
   MatX J, K, Jt, Hq, B, M, X, sub;
   std::vector<Index> theta, q;
-  Eigen::PartialPivLU<MatX> lu_theta, lu;
-  Eigen::LLT<MatX> llt;
+  Lu lu_theta, lu;
 };
 
 /// Stiffness and compliance of point `offset` of `node` between a small extra dead wrench at the point

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "chains.hpp"
 
-#include <Eigen/Eigenvalues>
-
 namespace stiffmap {
 namespace {
 
@@ -125,9 +123,8 @@ class Compiler {
       whole(i, i) = law.stiffness();
     }
     const Vec6 d = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    const bool deficient =
-        s.matrix.rotated || s.matrix.rigid.any() ||
-        Eigen::SelfAdjointEigenSolver<Mat6>(d.asDiagonal() * whole * d.asDiagonal()).eigenvalues()[0] < 1e-9;
+    const bool deficient = s.matrix.rotated || s.matrix.rigid.any() ||
+                           symmetric_eigen(Mat6(d.asDiagonal() * whole * d.asDiagonal())).values[0] < 1e-9;
     if (deficient || corners) {
       if (s.matrix.rotated || !Mat6(K.diagonal().asDiagonal()).isApprox(K, 1e-14))
         found_.missing = "a coupled link spring with rigid or free directions or with gaps";

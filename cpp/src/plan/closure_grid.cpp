@@ -70,8 +70,7 @@ class GridKey {
 
 /// At a folded or stretched leg Newton starts badly: such a node is no start for its neighbours.
 bool nearly_singular(ClosureWorkspace& ws) {
-  ws.qr.setThreshold(0.02);
-  ws.qr.compute(ws.A);
+  ws.qr.compute(ws.A, 0.02);
   return ws.qr.rank() < static_cast<Index>(ws.unknown.size());
 }
 
