@@ -19,7 +19,7 @@ constexpr double same_load = 1e-7;    // eigenvalues (scaled tangent) of modes t
 /// eigenvalue nearest zero. Of several that buckle together, the combination that moves one coordinate most.
 VecX critical_mode(const SaddleSystem& saddle, const Mechanism& m) {
   const Index n = m.size();
-  const EigenX eigen = symmetric_eigen(0.5 * (saddle.matrix() + saddle.matrix().transpose()));
+  const EigenX eigen = symmetric_eigen(MatX(0.5 * (saddle.matrix() + saddle.matrix().transpose())));
   const MatX& V = eigen.vectors;
   const VecX size = eigen.values.cwiseAbs();
   const auto moves = [&](Index i) { return V.col(i).head(n).norm() >= 1e-3; };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "chains.hpp"
 
+#include "stiffmap/dense.hpp"
+
 namespace stiffmap {
 namespace {
 
