@@ -13,7 +13,7 @@ HEADERS = sorted((ROOT / "cpp/include/stiffmap").glob("*.hpp"))
 # A header may include headers of earlier ranks only.
 RANKS = (
     ("types", "check", "parallel"),
-    ("se3",),
+    ("dense", "se3"),
     ("law", "spring", "load"),
     ("chain",),
     ("mechanism",),
