@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
     from stiffmap.link import identify_link
     from stiffmap.machine import Machine, load_machine
-    from stiffmap.maps import error_map, polar, sweep, uncertainty_ranking
+    from stiffmap.maps import error_map, map_estimate, map_statistics, polar, sweep, uncertainty_ranking
     from stiffmap.solution import Solution
 
 # Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
@@ -34,6 +34,8 @@ _HOME = {
     "identify_link": "stiffmap.link",
     "inverse_kinematics": "stiffmap.kinematics",
     "load_machine": "stiffmap.machine",
+    "map_estimate": "stiffmap.maps",
+    "map_statistics": "stiffmap.maps",
     "polar": "stiffmap.maps",
     "sweep": "stiffmap.maps",
     "uncertainty_ranking": "stiffmap.maps",
@@ -57,6 +59,8 @@ __all__ = [
     "inverse_kinematics",
     "load_experiment",
     "load_machine",
+    "map_estimate",
+    "map_statistics",
     "polar",
     "sweep",
     "uncertainty_ranking",

@@ -1,8 +1,18 @@
 """Labelled results over a workspace: error maps, polar diagrams, force sweeps (xarray, SI)."""
 
+from stiffmap.maps.estimate import MapEstimate, map_estimate
 from stiffmap.maps.grid_map import error_map
 from stiffmap.maps.polar_diagram import polar
 from stiffmap.maps.ranking import uncertainty_ranking
+from stiffmap.maps.statistics import map_statistics
 from stiffmap.maps.sweep_line import sweep
 
-__all__ = ["error_map", "polar", "sweep", "uncertainty_ranking"]
+__all__ = [
+    "MapEstimate",
+    "error_map",
+    "map_estimate",
+    "map_statistics",
+    "polar",
+    "sweep",
+    "uncertainty_ranking",
+]

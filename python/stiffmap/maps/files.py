@@ -6,6 +6,7 @@ import os
 import shutil
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from stiffmap.errors import FileError, MissingPartError
@@ -38,8 +39,7 @@ def _write(ds: xr.Dataset, path: Path, zarr: bool) -> None:
         ds.to_netcdf(path, engine="netcdf4")
         return
     try:
-        # Format 2, since strings have no agreed form in format 3 yet.
-        ds.to_zarr(path, mode="w", zarr_format=2)
+        zarr_strings(ds).to_zarr(path, mode="w", zarr_format=3, consolidated=False)
     except ImportError as error:
         raise MissingPartError("writing Zarr needs the package zarr: pip install 'stiffmap[zarr]'") from error
 
@@ -47,7 +47,17 @@ def _write(ds: xr.Dataset, path: Path, zarr: bool) -> None:
 def read_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a written Dataset; values are read when they are used."""
     target = Path(path)
-    return xr.open_zarr(target) if is_zarr(target) else xr.open_dataset(target, engine="netcdf4")
+    if not is_zarr(target):
+        return xr.open_dataset(target, engine="netcdf4")
+    ds = xr.open_zarr(target, consolidated=False)
+    names = [n for n, c in ds.coords.items() if c.dtype.kind == "T"]
+    return ds.assign_coords({n: (ds[n].dims, np.array(ds[n].values.tolist(), str), ds[n].attrs) for n in names})
+
+
+def zarr_strings(ds: xr.Dataset) -> xr.Dataset:
+    """Names as strings of any length: the form that Zarr's third format has agreed on."""
+    names = [n for n, c in ds.coords.items() if c.dtype.kind == "U"]
+    return ds.assign_coords({n: ds[n].astype(object) for n in names})
 
 
 def partial_folder(path: Path) -> Path:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 from numpy.typing import ArrayLike
@@ -13,15 +15,14 @@ from numpy.typing import ArrayLike
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.maps.block import solve_block
-from stiffmap.maps.files import partial_folder, read_dataset, write_dataset
-from stiffmap.maps.inputs import axis, magnitude, plane_axes, plane_force, wrench_cases
-from stiffmap.maps.loading import Loading
+from stiffmap.maps.cluster import on_cluster
+from stiffmap.maps.files import is_zarr, partial_folder, read_dataset, write_dataset
 from stiffmap.maps.plan import MapPlan
 from stiffmap.maps.progress import track
+from stiffmap.maps.request import map_plan
 from stiffmap.maps.store import Store, folder_store, memory_store
-from stiffmap.maps.uncertainty import uncertain_numbers
-
-POSES_AT_ONCE = 1024
+from stiffmap.maps.tiles import POSES_AT_ONCE, Tiles, blocks_of, solve_rows, tiles_of
+from stiffmap.maps.zarr_map import open_zarr_map
 
 
 def error_map(
@@ -49,6 +50,7 @@ def error_map(
     progress: bool | None = None,
     out: str | PathLike[str] | None = None,
     resume: bool = False,
+    scheduler: Any = None,
 ) -> xr.Dataset:
     """How far the machine is pushed off its commanded position, over a grid of positions.
 
@@ -86,9 +88,13 @@ def error_map(
         Show a progress bar on standard error; None: where that is a terminal.
     out
         Also write the map there: NetCDF, or Zarr where the name ends in ``.zarr``. It then grows on
-        the disk, not in memory, and the Dataset that is returned reads it when used.
+        the disk, not in memory, and the Dataset that is returned reads it when used. Zarr is written once, in
+        chunks that can be read while the rest is missing; it is the form for maps of more than 10^7 poses.
     resume
         Take up what an interrupted run of the same call left beside `out`.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers solve the map, tile by tile
+        (docs/big_maps.md). No number depends on it.
 
     Returns
     -------
@@ -101,48 +107,31 @@ def error_map(
 
     Raises StiffmapError for bad input, FileError where `out` cannot be written.
     """
-    loading = Loading(
-        machine,
-        point=point,
-        rotation=rotation,
-        gravity=gravity,
-        load_type=load_type,
-        method=method,
-        load_steps=load_steps,
-        threads=threads,
-    )
-    wrenches, names = wrench_cases(wrench, None if cases is None else tuple(cases))
-    if directions < 3:
-        raise StiffmapError(f"directions: expected 3 or more, got {directions}")
-    plan = MapPlan(
-        loading=loading,
-        x=axis(x, "x"),
-        y=axis(y, "y"),
-        z=axis(z, "z"),
-        wrenches=wrenches,
-        cases=names,
-        shown_plane="xy" if plane is None else "".join("xyz"[i] for i in plane_axes(plane)),
-        turning=plane is not None,
-        force=0.0 if plane is None else plane_force(wrenches, force),
-        directions=directions,
-        tolerance=magnitude(tolerance, "tolerance", "m"),
-        compliance=compliance,
-        uncertain=uncertain_numbers(machine) if uncertainty else None,
-    )
+    plan = map_plan(
+        machine, x=x, y=y, z=z, wrench=wrench, cases=cases, plane=plane, force=force, directions=directions,
+        tolerance=tolerance, compliance=compliance, uncertainty=uncertainty, point=point, rotation=rotation,
+        gravity=gravity, load_type=load_type, method=method, load_steps=load_steps, threads=threads,
+    )  # fmt: skip
+    solver = partial(solve_here, poses=at_once(chunk)) if scheduler is None else partial(on_cluster, scheduler=scheduler)
     if out is None:
         store = memory_store(plan)
-        fill(plan, store, chunk, progress)
+        fill(plan, store, chunk, progress) if scheduler is None else _fill(plan, store, solver, progress)
         return plan.dataset(store.arrays)
-    return _on_disk(plan, Path(out), resume, chunk, progress)
+    target = Path(out)
+    if is_zarr(target):
+        _to_zarr(plan, target, resume, solver, progress)
+    else:
+        _to_netcdf(plan, target, resume, chunk, progress, None if scheduler is None else solver)
+    return read_dataset(target)
+
+
+Solver = Callable[[MapPlan, Tiles, Sequence[int]], Iterator[tuple[int, dict[str, Any]]]]
+"""From tiles that are missing to tiles that are solved, in any order."""
 
 
 def fill(plan: MapPlan, store: Store, chunk: int | None, progress: bool | None) -> None:
     """Solve the rows that are not done, block by block."""
-    poses = POSES_AT_ONCE if chunk is None else chunk
-    if poses < 1:
-        raise StiffmapError(f"chunk: expected 1 or more, got {chunk}")
-    step = max(1, poses // plan.x.size)
-    blocks = [slice(i, min(i + step, plan.rows)) for i in range(0, plan.rows, step)]
+    blocks = blocks_of(slice(0, plan.rows), plan.x.size, at_once(chunk))
     try:
         for rows in track(blocks, len(blocks), "map", progress):
             if not store.done[rows].all():
@@ -151,10 +140,45 @@ def fill(plan: MapPlan, store: Store, chunk: int | None, progress: bool | None) 
         store.flush()
 
 
-def _on_disk(plan: MapPlan, out: Path, resume: bool, chunk: int | None, progress: bool | None) -> xr.Dataset:
+def at_once(chunk: int | None) -> int:
+    """Poses solved at once."""
+    if chunk is not None and chunk < 1:
+        raise StiffmapError(f"chunk: expected 1 or more, got {chunk}")
+    return POSES_AT_ONCE if chunk is None else chunk
+
+
+def _fill(plan: MapPlan, store: Store, solver: Solver, progress: bool | None) -> None:
+    """Solve the tiles that are not done."""
+    tiles = tiles_of(plan)
+    missing = [i for i in range(tiles.count) if not store.done[tiles.rows_of(i)].all()]
+    try:
+        for index, values in track(solver(plan, tiles, missing), len(missing), "map", progress):
+            store.put(tiles.rows_of(index), values)
+    finally:
+        store.flush()
+
+
+def _to_netcdf(
+    plan: MapPlan, out: Path, resume: bool, chunk: int | None, progress: bool | None, solver: Solver | None
+) -> None:
     folder = partial_folder(out)
     store = folder_store(plan, folder, resume)
-    fill(plan, store, chunk, progress)
+    fill(plan, store, chunk, progress) if solver is None else _fill(plan, store, solver, progress)
     write_dataset(plan.dataset(store.arrays), out)
     shutil.rmtree(folder)
-    return read_dataset(out)
+
+
+def _to_zarr(plan: MapPlan, out: Path, resume: bool, solver: Solver, progress: bool | None) -> None:
+    with open_zarr_map(plan, partial_folder(out), resume) as store:
+        missing = [i for i in range(store.tiles.count) if not store.done[i]]
+        for index, values in track(solver(plan, store.tiles, missing), len(missing), "map", progress):
+            store.put(index, values)
+        store.finish(out)
+
+
+def solve_here(
+    plan: MapPlan, tiles: Tiles, indices: Sequence[int], poses: int
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Solved tiles, in order."""
+    for i in indices:
+        yield i, solve_rows(plan, tiles.rows_of(i), poses)

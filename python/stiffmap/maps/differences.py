@@ -1,0 +1,34 @@
+"""In what two maps differ, for the message that refuses to mix them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+WORDS = {"machine_digest": "the machine's description", "stiffmap_version": "the version of stiffmap"}
+LEFT_OUT = ("coordinates", "title", "machine_title", "effects", "extremes_method", "turning_force", "turning_force_N")
+"""What follows from another attribute."""
+LONG = 60
+
+
+def difference(kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+    """What differs between the attributes of two maps, in words; empty: nothing."""
+    old, new = _flat(kept), _flat(wanted)
+    names = [n for n in {**old, **new} if old.get(n) != new.get(n)]
+    return "; ".join(f"{WORDS.get(n, n)} {_both(old.get(n), new.get(n))}" for n in names)
+
+
+def _flat(attrs: Mapping[str, Any]) -> dict[str, Any]:
+    plain = json.loads(json.dumps(dict(attrs), default=lambda v: v.tolist()))
+    call = json.loads(plain.pop("call", "{}"))
+    return {k: v for k, v in {**plain, **call}.items() if k not in LEFT_OUT}
+
+
+def _both(old: Any, new: Any) -> str:
+    if isinstance(old, list) and isinstance(new, list) and old and new and not isinstance(old[0], list):
+        return (
+            f"was {len(old)} numbers from {old[0]} to {old[-1]}, is {len(new)} from {new[0]} to {new[-1]}"
+        )
+    texts = [json.dumps(v, ensure_ascii=False) for v in (old, new)]
+    return "differs" if max(map(len, texts)) > LONG else f"was {texts[0]}, is {texts[1]}"

@@ -1,0 +1,56 @@
+"""From the arguments of a map to its plan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from stiffmap.errors import StiffmapError
+from stiffmap.machine import Machine
+from stiffmap.maps.inputs import axis, magnitude, plane_axes, plane_force, wrench_cases
+from stiffmap.maps.loading import Loading
+from stiffmap.maps.plan import MapPlan
+from stiffmap.maps.uncertainty import uncertain_numbers
+
+
+def map_plan(
+    machine: Machine,
+    *,
+    x: ArrayLike,
+    y: ArrayLike,
+    z: ArrayLike,
+    wrench: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    cases: Sequence[str] | None = None,
+    plane: str | None = "xy",
+    force: float | None = None,
+    directions: int = 4,
+    tolerance: float = 0.25e-3,
+    compliance: bool = False,
+    uncertainty: bool = False,
+    **how: Any,
+) -> MapPlan:
+    """The plan of `stiffmap.error_map` with these arguments; `how`: the fields of `Loading`.
+
+    Raises StiffmapError for bad input.
+    """
+    loading = Loading(machine, **how)
+    wrenches, names = wrench_cases(wrench, None if cases is None else tuple(cases))
+    if directions < 3:
+        raise StiffmapError(f"directions: expected 3 or more, got {directions}")
+    return MapPlan(
+        loading=loading,
+        x=axis(x, "x"),
+        y=axis(y, "y"),
+        z=axis(z, "z"),
+        wrenches=wrenches,
+        cases=names,
+        shown_plane="xy" if plane is None else "".join("xyz"[i] for i in plane_axes(plane)),
+        turning=plane is not None,
+        force=0.0 if plane is None else plane_force(wrenches, force),
+        directions=directions,
+        tolerance=magnitude(tolerance, "tolerance", "m"),
+        compliance=compliance,
+        uncertain=uncertain_numbers(machine) if uncertainty else None,
+    )

@@ -1,0 +1,176 @@
+"""A map that grows in a Zarr folder, a chunk of every variable per tile, and survives being killed.
+
+While it grows, the folder is called ``NAME.zarr.partial`` and holds a journal beside the arrays: a line for each
+tile whose chunks are complete, with their checksums. The finished folder holds the map alone, so that its bytes
+don't depend on interruptions, threads or the order of the tiles.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from stiffmap.errors import FileError, MissingPartError, StiffmapError
+from stiffmap.maps.differences import difference
+from stiffmap.maps.files import zarr_strings
+from stiffmap.maps.plan import MapPlan
+from stiffmap.maps.store import FILL
+from stiffmap.maps.tiles import Tiles, tiles_of
+
+JOURNAL = "journal.jsonl"
+
+
+class ZarrMap:
+    """An unfinished map on the disk; `open_zarr_map` makes it."""
+
+    def __init__(self, plan: MapPlan, folder: Path, tiles: Tiles) -> None:
+        self.plan, self.folder, self.tiles = plan, folder, tiles
+        self.done: NDArray[np.bool_] = np.zeros(tiles.count, dtype=bool)
+
+    def put(self, index: int, values: dict[str, Any]) -> None:
+        """Write a tile's chunks, then its line in the journal. FileError where the disk refuses."""
+        plane, y = self.tiles.place(index)
+        try:
+            for name, array in values.items():
+                self._arrays[name][plane, y] = array
+            line = json.dumps({"tile": index, "crc": {n: crc(self.chunk(n, index)) for n in values}})
+            with (self.folder / JOURNAL).open("a", encoding="utf-8") as journal:
+                journal.write(line + "\n")
+        except OSError as error:
+            raise FileError(
+                f"cannot be written: {error.strerror or error}; {int(self.done.sum())} of {self.tiles.count} "
+                "tiles are kept, resume=True (--resume) goes on with them",
+                file=str(self.folder),
+            ) from error
+        self.done[index] = True
+
+    def chunk(self, name: str, index: int) -> Path:
+        """File of a variable's chunk."""
+        plane, y = self.tiles.place(index)
+        tail = ["0"] * (1 + len(self._arrays[name].shape) - 3)
+        return self.folder.joinpath(name, "c", str(plane), str(y.start // self.tiles.height), *tail)
+
+    @cached_property
+    def _arrays(self) -> Any:
+        package = zarr_package()
+        # Also chunks of nothing but fill values: a chunk that is missing is one that is not done.
+        with package.config.set({"array.write_empty_chunks": True}):
+            group = package.open_group(self.folder, mode="r+", zarr_format=3)
+            return {v.name: group[v.name] for v in self.plan.variables}
+
+    def finish(self, out: Path) -> None:
+        """Put the complete map in its place."""
+        (self.folder / JOURNAL).unlink(missing_ok=True)
+        if out.is_dir():
+            shutil.rmtree(out)
+        os.replace(self.folder, out)
+
+    def begin(self) -> None:
+        """Write the empty map: metadata and coordinates."""
+        package = zarr_package()
+        frame = xr.Dataset(coords=self.plan.coords, attrs=self.plan.attrs)
+        zarr_strings(frame).to_zarr(self.folder, mode="w", zarr_format=3, consolidated=False)
+        group = package.open_group(self.folder, mode="r+", zarr_format=3)
+        from zarr.codecs import Crc32cCodec, ZstdCodec
+
+        for v in self.plan.variables:
+            tail = self.plan.tail(v)
+            group.create_array(
+                v.name,
+                shape=(*self.plan.shape, *tail),
+                chunks=(1, self.tiles.height, self.plan.x.size, *tail),
+                dtype=v.dtype,
+                fill_value=FILL[v.dtype],
+                compressors=[ZstdCodec(level=1), Crc32cCodec()],
+                dimension_names=self.plan.dims(v),
+                attributes={k: a.tolist() if isinstance(a, np.ndarray) else a for k, a in v.attrs.items()},
+            )
+        (self.folder / JOURNAL).write_text("", encoding="utf-8")
+
+    def recover(self) -> None:
+        """Take up what an earlier run left.
+
+        StiffmapError where it belongs to another map, FileError for a chunk that is damaged.
+        """
+        kept = json.loads((self.folder / "zarr.json").read_text(encoding="utf-8"))["attributes"]
+        found = difference(kept, self.plan.attrs)
+        if found:
+            raise StiffmapError(
+                f"{self.folder}: holds part of another map: {found}; delete it, or choose another file"
+            )
+        for entry in entries(self.folder / JOURNAL):
+            checks = {self.chunk(n, entry["tile"]): value for n, value in entry["crc"].items()}
+            for path, value in checks.items():
+                if path.exists() and crc(path) != value:
+                    raise FileError(
+                        f"is damaged: expected checksum {value}, found {crc(path)}; delete this chunk, and "
+                        "resume=True (--resume) computes it again",
+                        file=str(path),
+                    )
+            self.done[entry["tile"]] = all(path.exists() for path in checks)
+
+
+def zarr_package() -> Any:
+    """The package zarr; MissingPartError where it is absent."""
+    try:
+        import zarr
+    except ImportError as error:
+        raise MissingPartError("writing Zarr needs the package zarr: pip install 'stiffmap[zarr]'") from error
+    return zarr
+
+
+def crc(path: Path) -> int:
+    """Checksum of a file."""
+    return zlib.crc32(path.read_bytes())
+
+
+def entries(journal: Path) -> Iterator[dict[str, Any]]:
+    """Complete lines of the journal; the last one may have been cut off."""
+    for line in journal.read_text(encoding="utf-8").split("\n")[:-1]:
+        yield json.loads(line)
+
+
+@contextmanager
+def only_job(folder: Path) -> Iterator[None]:
+    """Hold the folder for this process; FileError where another one has it."""
+    path = folder.with_name(f"{folder.name}.lock")
+    with path.open("w") as handle:
+        lock(handle, folder)
+        yield
+        path.unlink()
+
+
+def lock(handle: IO[str], folder: Path) -> None:
+    """An advisory lock, given back when the process ends, however it ends."""
+    try:
+        import fcntl
+    except ImportError:  # not on this system: two jobs are then not told apart
+        return
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise FileError("is being written by another job", file=str(folder)) from error
+
+
+@contextmanager
+def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> Iterator[ZarrMap]:
+    """The unfinished map in `folder`, new or taken up, held for this process alone."""
+    zarr_package()
+    with only_job(folder):
+        out = ZarrMap(plan, folder, tiles_of(plan))
+        if resume and (folder / JOURNAL).exists():
+            out.recover()
+        else:
+            out.begin()
+        yield out
