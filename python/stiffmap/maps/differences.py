@@ -7,7 +7,15 @@ from collections.abc import Mapping
 from typing import Any
 
 WORDS = {"machine_digest": "the machine's description", "stiffmap_version": "the version of stiffmap"}
-LEFT_OUT = ("coordinates", "title", "machine_title", "effects", "extremes_method", "turning_force", "turning_force_N")
+LEFT_OUT = (
+    "coordinates",
+    "title",
+    "machine_title",
+    "effects",
+    "extremes_method",
+    "turning_force",
+    "turning_force_N",
+)
 """What follows from another attribute."""
 LONG = 60
 
@@ -27,8 +35,6 @@ def _flat(attrs: Mapping[str, Any]) -> dict[str, Any]:
 
 def _both(old: Any, new: Any) -> str:
     if isinstance(old, list) and isinstance(new, list) and old and new and not isinstance(old[0], list):
-        return (
-            f"was {len(old)} numbers from {old[0]} to {old[-1]}, is {len(new)} from {new[0]} to {new[-1]}"
-        )
+        return f"was {len(old)} numbers from {old[0]} to {old[-1]}, is {len(new)} from {new[0]} to {new[-1]}"
     texts = [json.dumps(v, ensure_ascii=False) for v in (old, new)]
     return "differs" if max(map(len, texts)) > LONG else f"was {texts[0]}, is {texts[1]}"

@@ -112,7 +112,11 @@ def error_map(
         tolerance=tolerance, compliance=compliance, uncertainty=uncertainty, point=point, rotation=rotation,
         gravity=gravity, load_type=load_type, method=method, load_steps=load_steps, threads=threads,
     )  # fmt: skip
-    solver = partial(solve_here, poses=at_once(chunk)) if scheduler is None else partial(on_cluster, scheduler=scheduler)
+    solver = (
+        partial(solve_here, poses=at_once(chunk))
+        if scheduler is None
+        else partial(on_cluster, scheduler=scheduler)
+    )
     if out is None:
         store = memory_store(plan)
         fill(plan, store, chunk, progress) if scheduler is None else _fill(plan, store, solver, progress)

@@ -62,7 +62,11 @@ def map_statistics(
         raise StiffmapError(f"percentiles: expected numbers from 0 to 100, got {list(percentiles)}")
     plan = map_plan(machine, **call)
     tiles = tiles_of(plan)
-    solver = partial(solve_here, poses=at_once(chunk)) if scheduler is None else partial(on_cluster, scheduler=scheduler)
+    solver = (
+        partial(solve_here, poses=at_once(chunk))
+        if scheduler is None
+        else partial(on_cluster, scheduler=scheduler)
+    )
     every = range(tiles.count)
     found = {v.name: _Deflection(plan, tiles, v) for v in plan.variables if DEFLECTION.fullmatch(v.name)}
     counts = np.zeros((plan.z.size, len(plan.wrenches), len(Status)), dtype=np.int64)
@@ -114,7 +118,10 @@ class _Deflection:
             if np.isnan(flat).all():
                 continue
             here = int(np.nanargmax(flat))
-            old, new = (self.most[plane, c], self.place[plane, c]), (flat[here], y.start * self.plan.x.size + here)
+            old, new = (
+                (self.most[plane, c], self.place[plane, c]),
+                (flat[here], y.start * self.plan.x.size + here),
+            )
             if not old[0] >= new[0] or (old[0] == new[0] and new[1] < old[1]):
                 self.most[plane, c], self.place[plane, c] = new
 
@@ -142,7 +149,11 @@ class _Deflection:
                 nodes if case else nodes[:, 0],
                 meaning("m", f"pose of the largest value {of}"),
             ),
-            f"{name}_within": (("z", *case), cut(share), meaning("1", f"share of the area {of} within tolerance_m")),
+            f"{name}_within": (
+                ("z", *case),
+                cut(share),
+                meaning("1", f"share of the area {of} within tolerance_m"),
+            ),
             f"{name}_percentile": (
                 ("percentile", "z", *case),
                 cut(np.moveaxis(each, -1, 0)),
@@ -153,7 +164,11 @@ class _Deflection:
                 cut(np.moveaxis(both, -1, 0)),
                 meaning("m", f"percentiles {of} over the whole map"),
             ),
-            f"{name}_column_max": (("y", "x", *case), cut(self.column), meaning("m", f"largest value {of} over z")),
+            f"{name}_column_max": (
+                ("y", "x", *case),
+                cut(self.column),
+                meaning("m", f"largest value {of} over z"),
+            ),
         }
 
 
