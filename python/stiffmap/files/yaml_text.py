@@ -14,8 +14,10 @@ from typing import Any
 import yaml
 
 from stiffmap.errors import FileError
+from stiffmap.files.yaml_limits import check_size
 
 KeyPath = tuple[str | int, ...]
+LONGEST_INTEGER = 300  # digits: what a float can hold
 
 
 class _Loader(yaml.SafeLoader):
@@ -41,7 +43,13 @@ _Loader.add_implicit_resolver(
 
 
 def _construct_int(loader: Any, node: Any) -> int:
-    return int(loader.construct_scalar(node))  # decimal, also with a leading zero
+    digits = loader.construct_scalar(node)
+    if len(digits) > LONGEST_INTEGER:
+        raise yaml.constructor.ConstructorError(
+            problem=f"expected an integer of at most {LONGEST_INTEGER} digits, found {len(digits)}",
+            problem_mark=node.start_mark,
+        )
+    return int(digits)  # decimal, also with a leading zero
 
 
 _Loader.add_constructor("tag:yaml.org,2002:int", _construct_int)
@@ -64,7 +72,11 @@ class Document:
 
 def parse(text: str, file: str = "") -> Document:
     """Parse YAML text; raises `FileError` with the line of a syntax error or a repeated key."""
-    loader = _Loader(text)
+    check_size(text, file)
+    try:
+        loader = _Loader(text)  # refuses characters that YAML has not
+    except yaml.YAMLError as error:
+        raise FileError(f"not valid YAML: {' '.join(str(error).split())}", file=file) from error
     try:
         node = loader.get_single_node()
         lines: dict[KeyPath, int] = {}

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from stiffmap.errors import StiffmapError
+from stiffmap.files.yaml_text import read
 from stiffmap.link.arrays import Floats
 from stiffmap.link.gmshmesh import UNITS
 from stiffmap.link.shapes import Bar, Foot, ForkBar, HollowBar
@@ -86,12 +86,9 @@ def read_part(path: str | Path) -> tuple[Any, Material | None, str]:
     Raises:
         StiffmapError: no such file, not YAML, units missing, unknown shape or key, lengths that do not fit.
     """
-    try:
-        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except OSError:
-        raise StiffmapError(f"{path}: no such file") from None
-    except yaml.YAMLError as error:
-        raise StiffmapError(f"{path}: not YAML: {' '.join(str(error).split())[:120]}") from None
+    if not Path(path).exists():
+        raise StiffmapError(f"{path}: no such file")
+    data = read(Path(path)).data
     if not isinstance(data, dict):
         raise StiffmapError(f"{path}: expected the keys units, part, material; got {type(data).__name__}")
     file = _validated(path, PartFile, data)

@@ -10,6 +10,7 @@ import numpy as np
 import yaml
 
 from stiffmap.errors import StiffmapError
+from stiffmap.files.yaml_text import read
 from stiffmap.link.arrays import Floats
 
 SYMMETRY = 1e-6  # of sqrt(C_ii C_jj)
@@ -77,12 +78,9 @@ def load_link(path: str | Path) -> LinkFile:
 
 
 def _read(path: str | Path) -> dict[str, Any]:
-    try:
-        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except OSError:
-        raise StiffmapError(f"{path}: no such link file") from None
-    except yaml.YAMLError as error:
-        raise StiffmapError(f"{path}: not YAML: {' '.join(str(error).split())[:120]}") from None
+    if not Path(path).exists():
+        raise StiffmapError(f"{path}: no such link file")
+    data = read(Path(path)).data
     if not isinstance(data, dict) or data.get("kind") != "stiffmap-link":
         raise StiffmapError(f"{path}: expected a link file (kind: stiffmap-link), made by `stiffmap link`")
     return data

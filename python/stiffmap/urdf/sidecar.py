@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from stiffmap.errors import FileError
+from stiffmap.files.yaml_text import read
 
 Numbers6 = Annotated[list[float], Field(min_length=6, max_length=6)]
 Matrix = Annotated[list[Numbers6], Field(min_length=6, max_length=6)]
@@ -58,12 +58,7 @@ def read_sidecar(path: Path | None) -> Sidecar:
         return Sidecar()
     file = str(path)
     try:
-        data: Any = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-        side = Sidecar.model_validate(data)
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=file) from None
-    except yaml.YAMLError as error:
-        raise FileError(f"not YAML: {' '.join(str(error).split())}", file=file) from None
+        side = Sidecar.model_validate(read(path).data)
     except ValidationError as error:
         first = error.errors()[0]
         raise FileError(first["msg"], file=file, key=".".join(map(str, first["loc"]))) from None

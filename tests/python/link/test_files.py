@@ -178,7 +178,7 @@ def test_part_file_comes_in_si(tmp_path):
         (("length: 310", "length: -310"), "length: .*greater than 0, got -0.31"),
         (("young: 70000, poisson: 0.33", "young: 70000"), "material: expected young and poisson"),
         (("material", "mterial"), "mterial: Extra inputs"),
-        (("part:", "part: ["), "not YAML"),
+        (("part:", "part: ["), "not valid YAML"),
     ],
 )
 def test_bad_part_files(tmp_path, change, words):
