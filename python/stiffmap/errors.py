@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
+LONGEST_WORD, LONGEST_MESSAGE = 400, 3000  # characters
+
 
 class StiffmapError(ValueError):
-    """A problem in what the user gave, told in one line."""
+    """A problem in what the user gave, told in one line; what was found is shortened where it is very long."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(shortened(str(message)))
 
 
 class FileError(StiffmapError):
@@ -25,3 +32,10 @@ class UnknownMachineError(StiffmapError):
 
 class MissingPartError(StiffmapError):
     """An optional part of stiffmap, or a package that it needs, is not installed."""
+
+
+def shortened(message: str) -> str:
+    """The message without the middle of endless words, and without its end where it is endless itself."""
+    cut = re.sub(rf"\S{{{LONGEST_WORD},}}", lambda m: f"{m[0][:60]}…{m[0][-20:]}", message)
+    left = len(cut) - LONGEST_MESSAGE
+    return cut if left <= 0 else f"{cut[:LONGEST_MESSAGE]}… ({left} more characters)"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,7 +82,7 @@ def read_table(path: Path) -> Table:
 
 
 def _check(header: Sequence[str], rows: Sequence[tuple[int, list[str]]], file: str) -> None:
-    twice = sorted({c for c in header if header.count(c) > 1})
+    twice = sorted(c for c, times in Counter(header).items() if times > 1)
     if twice:
         raise FileError(f"column '{twice[0]}' occurs twice", file=file, line=1)
     for line, row in rows:

@@ -52,6 +52,7 @@ def _construct_int(loader: Any, node: Any) -> int:
     return int(digits)  # decimal, also with a leading zero
 
 
+_PLAIN = {f"tag:yaml.org,2002:{t}" for t in ("null", "bool", "int", "float", "str", "seq", "map")}
 _Loader.add_constructor("tag:yaml.org,2002:int", _construct_int)
 
 
@@ -88,7 +89,9 @@ def parse(text: str, file: str = "") -> Document:
         mark = error.problem_mark or error.context_mark
         line = None if mark is None else mark.line + 1
         raise FileError(f"not valid YAML: {error.problem or error.context}", file=file, line=line) from error
-    except yaml.YAMLError as error:
+    except FileError:
+        raise
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: an explicit tag that does not fit, !!float x
         raise FileError(f"not valid YAML: {' '.join(str(error).split())}", file=file) from error
     finally:
         loader.dispose()
@@ -101,6 +104,10 @@ def _text_keys(
     lines.setdefault(path, node.start_mark.line + 1)
     if id(node) in above:
         raise FileError("an anchor contains itself", file=file, line=node.start_mark.line + 1)
+    if node.tag not in _PLAIN:
+        raise FileError(
+            f"expected plain data, found the tag {node.tag}", file=file, line=node.start_mark.line + 1
+        )
     above = (*above, id(node))
     if isinstance(node, yaml.SequenceNode):
         for i, item in enumerate(node.value):
