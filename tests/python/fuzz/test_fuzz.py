@@ -26,10 +26,12 @@ def test_mutated_files_are_read_or_refused(kind: str, tmp_path: Path) -> None:
 @settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.text(max_size=200))
 def test_any_text_is_read_or_refused(text: str) -> None:
+    ending = ""
     try:
         parse(text, "f.yaml")
     except sm.StiffmapError as error:
-        assert str(error).startswith("f.yaml")
+        ending = str(error)
+    assert ending == "" or ending.startswith("f.yaml")
 
 
 LAUGHS = "a: &a [x, x]\n" + "".join(
