@@ -28,7 +28,7 @@ def check_size(text: str, file: str = "") -> None:
     for event in _events(text):
         line = event.start_mark.line + 1
         if isinstance(event, yaml.AliasEvent):
-            count += anchored.get(event.anchor, 0)
+            count += anchored.get(str(event.anchor), 0)
         elif isinstance(event, yaml.CollectionStartEvent):
             open_.append((event.anchor, count))
             count += 1

@@ -41,7 +41,7 @@ def on_cluster(
 
         threads = max(1, sum(client.nthreads().values()))
         first = [submit(i) for _, i in zip(range(WAITING_PER_THREAD * threads), left, strict=False)]
-        running = as_completed(first)
+        running: Any = as_completed(first)  # type: ignore[no-untyped-call]
         for future in running:
             values = future.result()
             yield number.pop(future), values
@@ -67,7 +67,7 @@ def client_of(scheduler: Any) -> Iterator[Any]:
         yield scheduler
         return
     try:
-        client = Client(scheduler, timeout=10, set_as_default=False)
+        client: Any = Client(scheduler, timeout=10, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, TimeoutError, ValueError) as error:
         raise StiffmapError(
             f"scheduler: expected the address of a running dask scheduler such as tcp://127.0.0.1:8786, "

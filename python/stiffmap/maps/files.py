@@ -59,7 +59,8 @@ def read_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
 def zarr_strings(ds: xr.Dataset) -> xr.Dataset:
     """Names as strings of any length: the form that Zarr's third format has agreed on."""
     names = [n for n, c in ds.coords.items() if c.dtype.kind == "U"]
-    return ds.assign_coords({n: ds[n].astype(object) for n in names})
+    out: xr.Dataset = ds.assign_coords({n: ds[n].astype(object) for n in names})
+    return out
 
 
 def partial_folder(path: Path) -> Path:
