@@ -51,9 +51,10 @@ def read_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
         return xr.open_dataset(target, engine="netcdf4")
     ds = xr.open_zarr(target, consolidated=False)
     names = [n for n, c in ds.coords.items() if c.dtype.kind == "T"]
-    return ds.assign_coords(
+    out: xr.Dataset = ds.assign_coords(
         {n: (ds[n].dims, np.array(ds[n].values.tolist(), str), ds[n].attrs) for n in names}
     )
+    return out
 
 
 def zarr_strings(ds: xr.Dataset) -> xr.Dataset:
