@@ -10,6 +10,7 @@ from stiffmap.status import Flag, Status
 from stiffmap.version import __version__
 
 if TYPE_CHECKING:
+    from stiffmap.compensation import Commands, compensate
     from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, load_experiment
     from stiffmap.internal_wrenches import assembly_stress
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 
 # Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
 _HOME = {
+    "Commands": "stiffmap.compensation",
     "Diagnosis": "stiffmap.diagnosis",
+    "compensate": "stiffmap.compensation",
     "Experiment": "stiffmap.experiment",
     "diagnose": "stiffmap.diagnosis",
     "load_experiment": "stiffmap.experiment",
@@ -42,6 +45,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Commands",
     "Diagnosis",
     "Experiment",
     "Flag",
@@ -52,6 +56,7 @@ __all__ = [
     "StiffmapError",
     "__version__",
     "assembly_stress",
+    "compensate",
     "diagnose",
     "error_map",
     "forward_kinematics",

@@ -42,5 +42,9 @@ COMMANDS = (
         "diagnose", "stiffmap.cli.diagnose", "diagnose_command", "Which physical effect a machine lacks."
     ),
     Command("simulate", "stiffmap.cli.simulate", "simulate", "Write a virtual experiment."),
+    Command("plan", "stiffmap.cli.plan", "plan", "Which poses, loads and readings tell most."),
+    Command(
+        "compensate", "stiffmap.cli.compensate", "compensate", "Commands that cancel what a machine lacks."
+    ),
     Command("bench", "stiffmap.cli.bench", "bench", "Speed of this installation on this computer."),
 )

@@ -66,7 +66,9 @@ def drive_jacobian(machine: Machine, plan: Experiment, step: float = 1e-6) -> Fl
     for k in range(len(drives)):
         unit = step * np.eye(len(drives))[k]
         up, down = (forward_kinematics(machine, start[:, drives] + s * unit, start=start) for s in (1, -1))
-        turn = Rotation.from_matrix(up.rotation @ np.swapaxes(down.rotation, 1, 2)).as_rotvec()
+        between = up.rotation @ np.swapaxes(down.rotation, 1, 2)
+        lost = ~np.asarray(np.isfinite(between).all(axis=(1, 2)))[:, None, None]
+        turn = Rotation.from_matrix(np.where(lost, np.eye(3), between)).as_rotvec()
         columns.append(np.hstack([up.position - down.position, turn]) / (2 * step))
     return np.stack(columns, axis=-1)
 

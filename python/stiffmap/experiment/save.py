@@ -126,6 +126,13 @@ def _columns(e: Experiment) -> dict[str, list[Any]]:
     return columns | {n: list(v) for n, v in words.items() if v}
 
 
+def plan_columns(e: Experiment) -> dict[str, list[Any]]:
+    """Columns of a plan's rows, without readings, as `stiffmap simulate --plan` reads them (mm, N, rad)."""
+    loads = {c: v for c, v in _loads(e).items() if e.quantity == "deflection" or any(float(x) for x in v)}
+    words = {n: list(getattr(e, field)) for n, field in WORDS.items() if getattr(e, field)}
+    return {"id": list(e.ids)} | _commanded(e) | loads | words
+
+
 def _absolute(e: Experiment) -> tuple[dict[str, list[Any]], tuple[str, ...]]:
     """Columns of readings in coordinates of their own, and the channels that they stand for."""
     columns: dict[str, list[Any]] = {}
