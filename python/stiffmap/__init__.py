@@ -23,9 +23,11 @@ if TYPE_CHECKING:
 # Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
 _HOME = {
     "Commands": "stiffmap.compensation",
+    "Calibration": "stiffmap.calibration",
     "Diagnosis": "stiffmap.diagnosis",
     "compensate": "stiffmap.compensation",
     "Experiment": "stiffmap.experiment",
+    "calibrate": "stiffmap.calibration",
     "diagnose": "stiffmap.diagnosis",
     "load_experiment": "stiffmap.experiment",
     "Kinematics": "stiffmap.kinematics",
@@ -46,6 +48,7 @@ _HOME = {
 
 __all__ = [
     "Commands",
+    "Calibration",
     "Diagnosis",
     "Experiment",
     "Flag",
@@ -57,6 +60,7 @@ __all__ = [
     "__version__",
     "assembly_stress",
     "compensate",
+    "calibrate",
     "diagnose",
     "error_map",
     "forward_kinematics",

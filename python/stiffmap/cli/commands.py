@@ -41,6 +41,9 @@ COMMANDS = (
     Command(
         "diagnose", "stiffmap.cli.diagnose", "diagnose_command", "Which physical effect a machine lacks."
     ),
+    Command(
+        "calibrate", "stiffmap.cli.calibrate", "calibrate_command", "All uncertain numbers of a machine."
+    ),
     Command("simulate", "stiffmap.cli.simulate", "simulate", "Write a virtual experiment."),
     Command("plan", "stiffmap.cli.plan", "plan", "Which poses, loads and readings tell most."),
     Command(

@@ -1,0 +1,163 @@
+"""How readings change with what may be off, and Gauss-Newton with priors on it."""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stiffmap.calibration.edit import edited
+from stiffmap.calibration.unknowns import Unknown
+from stiffmap.description import AppliedEffect
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.predict import Predictor
+from stiffmap.experiment.problem import Problem
+from stiffmap.machine import Machine
+
+STEP = 0.1
+"""Of a standard uncertainty, for differences."""
+STEPS, CLOSE = 8, 1e-3
+"""Gauss-Newton steps at most; change (in standard uncertainties, or posterior ones) that ends them."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """What the readings feel of each unknown."""
+
+    unknowns: tuple[Unknown, ...]
+    columns: Floats
+    """(n, c, p) change of the readings per standard uncertainty."""
+    base: Floats
+    """(n, c) prediction of the declared machine."""
+    failed: tuple[tuple[str, str], ...] = ()
+    """Unknowns that the machine cannot be built or solved with, and why."""
+    stopped: bool = False
+    """Whether a time budget ended the differences before all unknowns had their turn."""
+
+
+def predicted(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats) -> Floats:
+    """(n, c) readings of the machine with unknowns at `values` (p,), in standard uncertainties."""
+    moves: dict[tuple[str, str], float] = {}
+    scale = 0.0
+    for unknown, value in zip(unknowns, values, strict=True):
+        if value == 0.0:
+            continue
+        scale += unknown.u * value if unknown.of_instrument else 0.0
+        for place, weight in unknown.moves:
+            moves[place] = moves.get(place, 0.0) + weight * unknown.u * float(value)
+    beside = predictor
+    if moves:
+        beside = copy.copy(predictor)
+        beside.machine = Machine(edited(predictor.machine.description, moves))
+        beside._memory = {}
+    gain = AppliedEffect("sensor_gain", "sensor", (), (("gain", 1.0 + scale),))
+    return beside([gain] if scale else [])
+
+
+def sensitivity(
+    predictor: Predictor,
+    unknowns: Sequence[Unknown],
+    *,
+    until: float = np.inf,
+    progress: Progress | None = None,
+) -> Sensitivity:
+    """Differences of variants of the machine, one per unknown; `until` (s, of time.monotonic) ends them."""
+    base = predictor()
+    found: list[Unknown] = []
+    columns: list[Floats] = []
+    failed: list[tuple[str, str]] = []
+    stopped = False
+    for k, u in enumerate(unknowns):
+        if time.monotonic() > until:
+            stopped = True
+            break
+        if progress is not None:
+            progress(u.name, k, len(unknowns))
+        try:
+            column = (predicted(predictor, [u], np.array([STEP])) - base) / STEP
+        except StiffmapError as problem:
+            failed.append((u.name, str(problem)))
+            continue
+        if not np.isfinite(column[np.isfinite(base)]).all():
+            failed.append((u.name, "the machine fails with it at some poses"))
+            continue
+        if np.abs(np.nan_to_num(column)).max(initial=0.0) > 0.0:
+            found.append(u)
+            columns.append(column)
+    stack = np.stack(columns, axis=-1) if columns else np.zeros((*base.shape, 0))
+    return Sensitivity(tuple(found), stack, base, tuple(failed), stopped)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Unknowns at their best."""
+
+    values: Floats
+    """(p,) in standard uncertainties."""
+    prediction: Floats
+    """(n, c)."""
+    residual: Floats
+    """(N,) whitened, at `values`."""
+    linear: Floats
+    """(N,) the residual as seen from zero: residual + A values."""
+    converged: bool
+
+
+def fitted(
+    predictor: Predictor,
+    problem: Problem,
+    s: Sensitivity,
+    columns: Floats,
+    weigh: Callable[[Floats, Floats], Floats],
+    *,
+    until: float = np.inf,
+) -> Fitted:
+    """Gauss-Newton with the Jacobian at the declared machine, which small errors hardly change.
+
+    columns
+        (N, p) whitened `s.columns`.
+    weigh
+        (columns, linear residual) -> values: the posterior mean under the priors.
+    """
+    values = np.zeros(columns.shape[1])
+    prediction = s.base
+    residual = problem.residual(prediction)
+    converged = not columns.shape[1]
+    for _ in range(STEPS if columns.shape[1] else 0):
+        wanted = weigh(columns, residual + columns @ values)
+        step = wanted - values
+        if float(np.abs(step).max()) < CLOSE or float(np.linalg.norm(columns @ step)) < CLOSE:
+            converged = True
+            break
+        moved = _step(predictor, problem, s, values, step, residual)
+        if moved is None:
+            break
+        values, prediction, residual = moved
+        if time.monotonic() > until:
+            break
+    return Fitted(values, prediction, residual, residual + columns @ values, converged)
+
+
+def _step(
+    predictor: Predictor, problem: Problem, s: Sensitivity, values: Floats, step: Floats, residual: Floats
+) -> tuple[Floats, Floats, Floats] | None:
+    """The step, halved while the machine cannot be solved with it or the misfit and prior grow."""
+    before = float(residual @ residual) + float(values @ values)
+    for _ in range(4):
+        moved = values + step
+        try:
+            prediction = predicted(predictor, s.unknowns, moved)
+        except StiffmapError:
+            step = step / 2
+            continue
+        here = problem.residual(prediction)
+        if float(here @ here) + float(moved @ moved) <= before * (1.0 + 1e-9):
+            return moved, prediction, here
+        step = step / 2
+    return None

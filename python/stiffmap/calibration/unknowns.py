@@ -1,0 +1,192 @@
+"""Every number of a machine and of its instrument that may be off, generated from the machine's tree.
+
+Six errors of each joint's frame, less those that its own coordinate takes up; zeros and gains of drives;
+lengths of links between passive joints, and their differences where links should be alike; compliances,
+masses; the tool; the scale of the instrument. Which of them a plan can tell is left to the singular
+values of its Jacobian (`statistics`), not to rules by hand: the same for serial arms and closed loops.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from stiffmap.calibration.defaults import Tolerances
+from stiffmap.calibration.edit import END, FRAME
+from stiffmap.description import Block, Body, Element, Joint, MachineDescription, Offset, Spring
+from stiffmap.experiment.experiment import Experiment
+
+INSTRUMENT = "instrument"
+GROUPS = (
+    "zeros",
+    "gains",
+    "axis positions",
+    "axis directions",
+    "guide lean",
+    "link lengths",
+    "rod mismatch",
+    "width",
+    "tool",
+    "drive compliance",
+    "link compliance",
+    "masses",
+    INSTRUMENT,
+)
+GEOMETRY = GROUPS[:9]
+ALONG = 0.999
+"""Cosine beyond which an axis is that of a joint's own motion."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number that may be off by a normal error with standard uncertainty `u` (SI or relative).
+
+    moves
+        (full name, what is moved) -> weight, see `edit.edited`; empty for the instrument's scale.
+    """
+
+    name: str
+    group: str
+    unit: str
+    u: float
+    moves: tuple[tuple[tuple[str, str], float], ...] = ()
+    leg: str = ""
+
+    @property
+    def of_instrument(self) -> bool:
+        """Whether the instrument is meant, not the machine."""
+        return self.group == INSTRUMENT
+
+
+def unknowns(
+    description: MachineDescription, experiment: Experiment, tolerances: Tolerances | None = None
+) -> list[Unknown]:
+    """All unknowns that readings of this kind can depend on.
+
+    Standard uncertainties are those of the machine file where it gives some, else of `tolerances`.
+    """
+    t = tolerances or Tolerances()
+    bare = description.declared or description
+    given = dict(bare.uncertainty)
+    loaded = bool(experiment.wrench.any() or experiment.gravity or bare.gravity)
+    weighs = bool(experiment.gravity or bare.gravity)
+    out: list[Unknown] = []
+    for leg in bare.legs:
+        out += _of_sequence(leg.elements, leg.name, leg.name, t, given)
+        if len(bare.legs) > 1:
+            out += _frame(f"{leg.name}.{END}", leg.name, FRAME, t.position, t.direction, "axis positions")
+    out += _of_sequence(bare.base, "base", "", t, given)
+    out += _of_sequence(bare.platform, "platform", "", t, given)
+    out += _frame(f"platform.{END}", "", FRAME, t.tool, t.direction, "tool", "tool")
+    if experiment.quantity == "position":
+        out.append(Unknown("scale of the instrument", INSTRUMENT, "1", t.instrument))
+    if not loaded:
+        out = [p for p in out if p.group not in ("drive compliance", "link compliance")]
+    if not weighs:
+        out = [p for p in out if p.group != "masses"]
+    return out
+
+
+def _of_sequence(
+    elements: tuple[Element, ...], path: str, leg: str, t: Tolerances, given: dict[str, float]
+) -> list[Unknown]:
+    out: list[Unknown] = []
+    for e in elements:
+        name = f"{path}.{e.name}"
+        if isinstance(e, Block):
+            out += _of_block(e, path, leg, t)
+        elif isinstance(e, Joint):
+            out += _of_joint(e, name, leg, t, given)
+        elif isinstance(e, Spring) and not e.laws:
+            out.append(_relative(name, leg, "link compliance", "compliance", t.compliance))
+        elif isinstance(e, Body) and e.mass > 0.0:
+            u = given.get(f"{name}/mass")
+            out.append(_relative(name, leg, "masses", "mass", u / e.mass if u else t.mass))
+    return out
+
+
+def _relative(name: str, leg: str, group: str, what: str, u: float) -> Unknown:
+    return Unknown(f"{what} of {name}", group, "ln", u, (((name, what), 1.0),), leg)
+
+
+def _of_joint(e: Joint, name: str, leg: str, t: Tolerances, given: dict[str, float]) -> Iterator[Unknown]:
+    """Frame errors that the joint's own motion does not take up; of a drive its zero and gain."""
+    slides = e.kind == "prismatic"
+    kept = list(FRAME)
+    axes = [np.abs(np.array(a)) for a in e.axes]
+    for axis in axes[:1]:
+        along = int(np.argmax(axis))
+        if axis[along] > ALONG:
+            kept.remove(FRAME[along + (0 if slides else 3)])
+    if e.kind == "spherical":
+        kept = [k for k in kept if k in FRAME[:3]]
+    turned = "guide lean" if slides else "axis directions"
+    yield from _frame(name, leg, tuple(kept), t.position, t.direction, "axis positions", turned)
+    if e.actuated:
+        unit, u = ("m", t.zero) if slides else ("rad", t.turning_zero)
+        yield Unknown(f"zero of {name}", "zeros", unit, u, (((name, "zero"), 1.0),), leg)
+        yield Unknown(f"gain of {name}", "gains", "1", t.gain, (((name, "gain"), 1.0),), leg)
+    if e.law is not None and not e.law.cubic and not e.law.knots:
+        u_law = given.get(f"{name}/compliance")
+        relative = u_law * e.law.stiffness if u_law else t.compliance
+        yield _relative(
+            name, leg, "drive compliance" if e.actuated else "link compliance", "compliance", relative
+        )
+
+
+def _frame(
+    name: str,
+    leg: str,
+    axes: tuple[str, ...],
+    position: float,
+    direction: float,
+    moved: str,
+    turned: str = "axis directions",
+) -> Iterator[Unknown]:
+    for a in axes:
+        turns = a in FRAME[3:]
+        yield Unknown(
+            f"{'turn' if turns else 'shift'} of {name} {'about' if turns else 'along'} {a[-1]}",
+            turned if turns else moved,
+            "rad" if turns else "m",
+            direction if turns else position,
+            (((name, a), 1.0),),
+            leg,
+        )
+
+
+def _of_block(block: Block, path: str, leg: str, t: Tolerances) -> Iterator[Unknown]:
+    """Lengths of the offsets of a parallel block: their mean, and how its branches differ."""
+    lengths = [
+        [e for e in b.elements if isinstance(e, Offset) and np.linalg.norm(e.nominal.p) > 0]
+        for b in block.branches
+    ]
+    names = [e.name for e in lengths[0] if all(e.name in [o.name for o in other] for other in lengths)]
+    longest = max((float(np.linalg.norm(e.nominal.p)) for e in lengths[0]), default=0.0)
+    for element in names:
+        at = [(f"{path}.{b.name}.{element}", "length") for b in block.branches]
+        size = float(np.linalg.norm(next(e for e in lengths[0] if e.name == element).nominal.p))
+        rod = size > 0.5 * longest
+        place = f"{path}.{block.name}.{element}"
+        if rod:
+            common = tuple((a, 1.0) for a in at)
+            yield Unknown(f"length of {place}", "link lengths", "m", t.length, common, leg)
+        for i, other in enumerate(at[1:]):
+            between = f"{block.branches[0].name} and {block.branches[i + 1].name}"
+            yield Unknown(
+                f"difference of {place} between {between}",
+                "rod mismatch" if rod else "width",
+                "m",
+                t.mismatch,
+                ((at[0], -0.5), (other, 0.5)),
+                leg,
+            )
+    for branch in block.branches:
+        for e in branch.elements:
+            if isinstance(e, Spring) and not e.laws:
+                name = f"{path}.{branch.name}.{e.name}"
+                yield _relative(name, leg, "link compliance", "compliance", t.compliance)
+            elif isinstance(e, Body) and e.mass > 0.0:
+                yield _relative(f"{path}.{branch.name}.{e.name}", leg, "masses", "mass", t.mass)

@@ -1,0 +1,71 @@
+"""A calibration in plain lines, in mm, mrad, ppm and per cent."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from stiffmap.calibration.result import Beyond, Calibration
+
+SHOWN = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm"), "ln": (1e2, "%")}
+
+
+def shown(value: float, unit: str) -> str:
+    """A number in the units of the screen."""
+    factor, name = SHOWN[unit]
+    return f"{value * factor:.4g} {name}"
+
+
+def lines(c: Calibration) -> list[str]:
+    """Verdict, groups, misfit before and after, what is left."""
+    out = [f"calibration: {c.verdict}{' (stopped early)' if c.stopped else ''}"]
+    out += [f"  {_beyond(b)}" for b in c.beyond]
+    out.append(f"told by the readings: {c.rank} directions of {len(c.rows)} unknowns")
+    out.append("groups: " + _groups(c))
+    out.append(
+        f"misfit: rms {shown(c.rms_before, c.unit)} as declared, {shown(c.rms_after, c.unit)} calibrated; "
+        f"{100 * c.explained:.1f} % explained (noise {shown(c.noise, c.unit)})"
+    )
+    if c.held_out:
+        h = c.held_out
+        out.append(
+            f"held-out {h.by}: rms {shown(h.before, c.unit)} as declared, {shown(h.after, c.unit)} with all "
+            f"unknowns, {shown(h.chosen, c.unit)} with the chosen groups"
+        )
+    if c.floor > 0.0:
+        where = ", ".join(f"{k} {shown(v, _unit(k, c.unit))}" for k, v in c.rest.items())
+        out.append(f"model-form floor: {shown(c.floor, c.unit)} per pose beyond noise; left: {where}")
+    return out
+
+
+def _unit(name: str, unit: str) -> str:
+    return "rad" if name.startswith("r") else unit
+
+
+def _beyond(b: Beyond) -> str:
+    other = f"; or instead: {', '.join(b.rivals[:3])}" if b.rivals else ""
+    more = f" and {len(b.rivals) - 3} more" if len(b.rivals) > 3 else ""
+    return f"{b.name}: {shown(b.value, b.unit)} ± {shown(b.sigma, b.unit)} ({b.nats:.0f} nats){other}{more}"
+
+
+def _groups(c: Calibration) -> str:
+    chosen = [g for g in c.groups.groups if g.name in c.groups.chosen]
+    told = [
+        f"{g.name} {g.alone:+.0f} nats" + (f" (or {', '.join(g.rivals)})" if g.rivals else "")
+        for g in sorted(chosen, key=lambda g: -g.last)
+    ]
+    return "; ".join(told) or "none is demanded"
+
+
+def table(c: Calibration, most: int | None = None) -> list[str]:
+    """Name, value, u, posterior sigma, pull, observability."""
+    width = max((len(r.name) for r in c.rows), default=4)
+    out = [f"{'unknown':{width}}  {'value':>12}  {'u':>11}  {'sigma':>11}  {'pull':>6}  {'u/sigma':>8}  told"]
+    for r in sorted(c.rows, key=lambda r: -r.observability)[:most]:
+        told = ("minimal" if r.minimal else "yes") if r.identifiable else "no"
+        cells = (shown(v, r.unit) for v in (r.value, r.u, r.sigma))
+        value, u, sigma = cells
+        out.append(
+            f"{r.name:{width}}  {value:>12}  {u:>11}  {sigma:>11}  {r.pull:6.1f}  {r.observability:8.1f}  {told}"
+        )
+    return out

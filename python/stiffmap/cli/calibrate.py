@@ -1,0 +1,70 @@
+"""``stiffmap calibrate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from stiffmap.calibration import Calibration, Tolerances, calibrate
+from stiffmap.cli.output import JsonOption
+from stiffmap.errors import FileError
+
+
+def calibrate_command(
+    machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
+    data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for calibration.json and table.txt.")
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option(min=1e-3, help="Factor on the default standard uncertainties of the machine.")
+    ] = 1.0,
+    exclude: Annotated[
+        list[str] | None, typer.Option(help="Group that is known to be right; may be repeated.")
+    ] = None,
+    budget: Annotated[
+        float | None, typer.Option(min=0.1, help="Seconds after which the best so far is given.")
+    ] = None,
+    rows: Annotated[int, typer.Option(help="Unknowns to list.")] = 20,
+    seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
+    threads: Annotated[int | None, typer.Option(help="Threads; default: all cores.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """All uncertain numbers of a machine from readings at once, and which of them the readings can tell.
+
+    Exit codes: 0 as declared or within tolerance, 1 beyond tolerance, 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap calibrate ur10 experiments/tracker -o result[/cyan]
+
+      [cyan]stiffmap calibrate linear-delta experiments/heights --exclude gains --tolerance 2[/cyan]
+    """
+    result = calibrate(
+        machine,
+        data,
+        tolerances=Tolerances().scaled(tolerance),
+        exclude=exclude or (),
+        budget=budget,
+        seed=seed,
+        threads=threads,
+    )
+    if output is not None:
+        write(result, output)
+    print(result.to_json() if as_json else "\n".join([*result.lines(), "", *result.table(rows)]))
+    if result.beyond:
+        raise typer.Exit(1)
+
+
+def write(result: Calibration, folder: Path) -> None:
+    """All files of a calibration; raises `FileError` where the folder cannot be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "calibration.json").write_text(result.to_json(), encoding="utf-8")
+        text = "\n".join([*result.lines(), "", *result.table()]) + "\n"
+        (folder / "table.txt").write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror}", file=str(folder)) from error
+    result.machine.save(folder / "machine.yaml")

@@ -1,0 +1,109 @@
+"""Linear-Gaussian inference against densities written out in full."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import multivariate_normal
+
+from stiffmap.calibration.beyond import FREE, _gains
+from stiffmap.calibration.floor import Blocks, model_form
+from stiffmap.calibration.groups import compare
+from stiffmap.calibration.statistics import Sums, directions, independent
+
+Floats = NDArray[np.float64]
+
+
+@pytest.fixture
+def case() -> tuple[Floats, Floats]:
+    rng = np.random.default_rng(4)
+    a = rng.standard_normal((30, 5)) * [3.0, 1.0, 0.3, 2.0, 0.0]
+    return a, a @ rng.standard_normal(5) + rng.standard_normal(30)
+
+
+def density(r: Floats, covariance: Floats) -> float:
+    return float(
+        multivariate_normal(np.zeros(len(r)), covariance).logpdf(r) + 0.5 * len(r) * np.log(2 * np.pi)
+    )
+
+
+def test_evidence_is_the_marginal_density(case: tuple[Floats, Floats]) -> None:
+    a, r = case
+    assert Sums.of(a, r).log_evidence == pytest.approx(density(r, np.eye(30) + a @ a.T), rel=1e-10)
+
+
+def test_the_posterior_is_the_conditional_normal(case: tuple[Floats, Floats]) -> None:
+    a, r = case
+    s = Sums.of(a, r)
+    gain = a.T @ np.linalg.inv(np.eye(30) + a @ a.T)
+    assert s.estimate == pytest.approx(gain @ r, rel=1e-9)
+    assert s.covariance == pytest.approx(np.eye(5) - gain @ a, abs=1e-9)
+
+
+def test_sums_of_parts_are_those_of_the_whole(case: tuple[Floats, Floats]) -> None:
+    a, r = case
+    whole, part = Sums.of(a, r), Sums.of(a[:12], r[:12])
+    rest = whole - part
+    assert rest.estimate == pytest.approx(Sums.of(a[12:], r[12:]).estimate, rel=1e-9)
+    values = np.arange(5.0)
+    assert rest.misfit(values) == pytest.approx(float(((r - a @ values)[12:] ** 2).sum()), rel=1e-9)
+
+
+def test_letting_one_go_is_the_evidence_of_a_wider_prior(case: tuple[Floats, Floats]) -> None:
+    a, r = case
+    gains = _gains(Sums.of(a, r))
+    for i in range(5):
+        wide = a * np.where(np.arange(5) == i, FREE, 1.0)
+        expected = density(r, np.eye(30) + wide @ wide.T) - density(r, np.eye(30) + a @ a.T)
+        assert gains[i] == pytest.approx(expected, abs=1e-7)
+
+
+def test_blocks_share_a_random_effect(case: tuple[Floats, Floats]) -> None:
+    a, r = case
+    label = np.arange(30) // 3
+    shared = np.kron(np.eye(10), np.ones((3, 3)))
+    blocks = Blocks.of(a, r, label)
+    for rho in (0.0, 0.7, 40.0):
+        covariance = np.eye(30) + rho * shared + a @ a.T
+        assert blocks.log_likelihood(rho) == pytest.approx(density(r, covariance), rel=1e-9)
+
+
+def test_the_floor_is_found_and_is_none_where_there_is_none() -> None:
+    rng = np.random.default_rng(7)
+    label = np.arange(2000) // 2
+    a = rng.standard_normal((2000, 4))
+    noise = rng.standard_normal(2000)
+    model = 3.0 * rng.standard_normal(1000)[label]
+    assert model_form(Blocks.of(a, noise, label)) < 0.1
+    found = model_form(Blocks.of(a, a @ np.ones(4) + noise + model, label))
+    assert found == pytest.approx(9.0, rel=4 * np.sqrt(2 / 1000))
+
+
+def test_a_minimal_set_spans_what_is_told() -> None:
+    """Three columns of rank two: any two stand for all; one that is not felt is in no set."""
+    x, y = np.eye(40)[:2] * 50.0
+    a = np.column_stack([x, y, x + y, 0.1 * y])
+    kept, rest = independent(a.T @ a)
+    assert len(kept) == 2 and 3 in rest
+    assert np.linalg.matrix_rank(a[:, kept]) == 2
+    assert directions(np.column_stack([x, 0 * x])).shape == (2, 1)
+
+
+def test_groups_that_explain_the_same_are_rivals() -> None:
+    rng = np.random.default_rng(1)
+    base, one, other = rng.standard_normal((3, 200))
+    a = np.column_stack([base, one, one + 0.01 * other, other]) * 5.0
+    r = a @ [1.0, 1.0, 0.0, 0.0] + rng.standard_normal(200)
+    members = {"base": [0], "lean": [1], "rods": [2], "width": [3]}
+    choice = compare(Sums.of(a, r), members, ["base"])
+    assert len(choice.chosen) == 1 and choice.chosen[0] in ("lean", "rods")
+    (rival,) = choice.rivals
+    assert {choice.chosen[0], *rival} == {"lean", "rods"}
+
+
+def test_nothing_is_chosen_in_noise() -> None:
+    rng = np.random.default_rng(2)
+    a = rng.standard_normal((300, 12)) * 10.0
+    choice = compare(Sums.of(a, rng.standard_normal(300)), {"one": [*range(6)], "two": [*range(6, 12)]})
+    assert choice.chosen == ()
