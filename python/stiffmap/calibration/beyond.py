@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stiffmap.calibration.facts import Beyond
 from stiffmap.calibration.groups import STRONG
-from stiffmap.calibration.result import Beyond
 from stiffmap.calibration.statistics import Sums
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.experiment.experiment import Floats

@@ -12,16 +12,17 @@ import numpy as np
 from stiffmap.calibration.beyond import beyond_tolerance
 from stiffmap.calibration.defaults import Tolerances
 from stiffmap.calibration.edit import edited
+from stiffmap.calibration.facts import Beyond, HeldOut, Row
 from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.groups import Choice, compare
 from stiffmap.calibration.model import Fitted, Progress, Sensitivity, fitted, sensitivity
-from stiffmap.calibration.result import Beyond, Calibration, HeldOut, Row
+from stiffmap.calibration.result import Calibration
 from stiffmap.calibration.statistics import Sums, directions, independent
 from stiffmap.calibration.unknowns import GROUPS, Unknown, unknowns
-from stiffmap.diagnosis.crossval import folds
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.folds import folds
 from stiffmap.experiment.limits import refuse
 from stiffmap.experiment.load import load_experiment
 from stiffmap.experiment.noise import Noise, noise_of

@@ -1,137 +1,24 @@
-"""The answer of a calibration."""
+"""The answer of a calibration, with its words."""
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
-import numpy as np
-
-from stiffmap.calibration.groups import Choice
-from stiffmap.calibration.unknowns import Unknown
-from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.machine import Machine
-
-
-@dataclass(frozen=True)
-class Row:
-    """One unknown: declared standard uncertainty, posterior, and whether the readings tell it."""
-
-    name: str
-    group: str
-    leg: str
-    unit: str
-    """``m``, ``rad``, ``1`` or ``ln`` (logarithm of a factor)."""
-    value: float
-    """Posterior mean of its error."""
-    u: float
-    sigma: float
-    """Posterior standard deviation."""
-    pull: float
-    """Value over the standard deviation that it should have if `u` is right."""
-    identifiable: bool
-    """Whether the readings say more of it than its uncertainty does."""
-    observability: float
-    """u / sigma: how many times the readings sharpen it."""
-    minimal: bool
-    """Whether it belongs to the minimal set that stands for all that the readings tell."""
-
-
-@dataclass(frozen=True)
-class Beyond:
-    """An unknown that its standard uncertainty cannot account for."""
-
-    name: str
-    value: float
-    sigma: float
-    unit: str
-    nats: float
-    """Evidence gained by letting it go beyond its tolerance."""
-    rivals: tuple[str, ...] = ()
-    """Others that would explain as much in its place."""
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """Readings that no estimate saw; rms in m (rad where only angles are read)."""
-
-    by: str
-    before: float
-    """Declared machine; unknown frames and zeros fitted."""
-    after: float
-    chosen: float
-    """With the chosen groups only."""
-    groups: dict[str, float]
-    """With one group alone beside the base."""
+from stiffmap.calibration.facts import Facts
+from stiffmap.calibration.words import lines, table
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class Calibration(Facts):
     """What a machine's numbers are, given their uncertainties and the readings; SI."""
-
-    verdict: str
-    """``as declared``, ``adjusted within tolerance`` or ``beyond tolerance: NAME``."""
-    rows: tuple[Row, ...]
-    beyond: tuple[Beyond, ...]
-    groups: Choice
-    rank: int
-    """Directions that the readings tell, of `len(rows)`."""
-    held_out: HeldOut | None
-    rms_before: float
-    rms_after: float
-    noise: float
-    """Noise floor, m (rad where only angles are read)."""
-    floor: float
-    """Standard deviation of what the calibrated model leaves per pose beyond noise."""
-    explained: float
-    """Share of the misfit's squares that the calibration takes away."""
-    rest: dict[str, float]
-    """rms of what is left, by reading and by set-up, m or rad."""
-    outliers: tuple[str, ...]
-    failed: tuple[tuple[str, str], ...]
-    stopped: bool
-    """Whether the time budget ended it early: what follows is the best so far."""
-    unit: str
-    machine: Machine = field(repr=False)
-    """The machine built as calibrated; its controller keeps the declared numbers."""
-    experiment: Experiment = field(repr=False)
-    residual: Floats = field(repr=False)
-    """(n, c) reading minus prediction, less fitted frames and zeros."""
-    unknowns: tuple[Unknown, ...] = field(repr=False, default=())
-    values: Floats = field(repr=False, default_factory=lambda: np.zeros(0))
-    """(p,) in standard uncertainties."""
-    seconds: dict[str, float] = field(default_factory=dict)
 
     def lines(self) -> list[str]:
         """The verdict in a few lines."""
-        from stiffmap.calibration.words import lines
-
         return lines(self)
 
     def table(self, most: int | None = None) -> list[str]:
         """The unknowns, one a line, those first that the readings tell best."""
-        from stiffmap.calibration.words import table
-
         return table(self, most)
-
-    def to_json(self) -> str:
-        """All but arrays and machines, SI; NaN is null."""
-        return json.dumps(self.as_plain(), indent=2, ensure_ascii=False, allow_nan=False)
-
-    def as_plain(self) -> dict[str, Any]:
-        """JSON data."""
-        from stiffmap.diagnosis.result import plain
-
-        measures = ("rms_before", "rms_after", "noise", "floor", "explained", "rest")
-        names = ("verdict", "rank", *measures, "outliers", "stopped", "unit", "seconds")
-        out = {n: plain(getattr(self, n)) for n in names}
-        out["held_out"] = plain(asdict(self.held_out)) if self.held_out else None
-        out["groups"] = plain(asdict(self.groups))
-        out["beyond"] = [plain(asdict(b)) for b in self.beyond]
-        out["table"] = [plain(asdict(r)) for r in self.rows]
-        out["failed"] = [list(f) for f in self.failed]
-        return out
 
     def __str__(self) -> str:
         return "\n".join(self.lines())

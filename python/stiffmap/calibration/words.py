@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from stiffmap.calibration.result import Beyond, Calibration
+from stiffmap.calibration.facts import Beyond, Facts
 
 SHOWN = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm"), "ln": (1e2, "%")}
 
@@ -16,7 +13,7 @@ def shown(value: float, unit: str) -> str:
     return f"{value * factor:.4g} {name}"
 
 
-def lines(c: Calibration) -> list[str]:
+def lines(c: Facts) -> list[str]:
     """Verdict, groups, misfit before and after, what is left."""
     out = [f"calibration: {c.verdict}{' (stopped early)' if c.stopped else ''}"]
     out += [f"  {_beyond(b)}" for b in c.beyond]
@@ -48,7 +45,7 @@ def _beyond(b: Beyond) -> str:
     return f"{b.name}: {shown(b.value, b.unit)} ± {shown(b.sigma, b.unit)} ({b.nats:.0f} nats){other}{more}"
 
 
-def _groups(c: Calibration) -> str:
+def _groups(c: Facts) -> str:
     chosen = [g for g in c.groups.groups if g.name in c.groups.chosen]
     told = [
         f"{g.name} {g.alone:+.0f} nats" + (f" (or {', '.join(g.rivals)})" if g.rivals else "")
@@ -57,7 +54,7 @@ def _groups(c: Calibration) -> str:
     return "; ".join(told) or "none is demanded"
 
 
-def table(c: Calibration, most: int | None = None) -> list[str]:
+def table(c: Facts, most: int | None = None) -> list[str]:
     """Name, value, u, posterior sigma, pull, observability."""
     width = max((len(r.name) for r in c.rows), default=4)
     out = [f"{'unknown':{width}}  {'value':>12}  {'u':>11}  {'sigma':>11}  {'pull':>6}  {'u/sigma':>8}  told"]

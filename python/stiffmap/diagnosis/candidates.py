@@ -113,6 +113,11 @@ def recorded(effect: EffectType, experiment: Experiment) -> bool:
     return all(have.get(need, True) for need in effect.needs)
 
 
+def check_kinds(names: Iterable[str]) -> frozenset[str]:
+    """Kinds of effects by their names; StiffmapError for one that does not exist."""
+    return frozenset(effects.get(n).kind for n in names)
+
+
 def clash(candidate: Candidate, others: Iterable[Candidate]) -> bool:
     """Whether the candidate and one of the others exclude each other at a place that they share."""
     return any(_excludes(candidate, other) for other in others)

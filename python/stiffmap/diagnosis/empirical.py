@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiffmap.diagnosis.crossval import folds
 from stiffmap.diagnosis.structure import unit
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
+from stiffmap.experiment.folds import folds
 from stiffmap.experiment.summary import rms
 
 LENGTHS = (0.5, 1.0, 2.0)

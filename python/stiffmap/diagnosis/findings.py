@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, is_dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
+from stiffmap.calibration import Calibration
 from stiffmap.diagnosis.crossval import HeldOut
 from stiffmap.diagnosis.empirical import Empirical
 from stiffmap.diagnosis.separate import Separation
@@ -19,6 +17,7 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise import Mask
 from stiffmap.experiment.summary import Summary
 from stiffmap.machine import Machine
+from stiffmap.plain import plain
 
 Place = Mapping[str, Any]
 
@@ -107,6 +106,15 @@ class Findings:
     residual_after: Floats = field(repr=False)
     set_aside: Mask = field(repr=False)
     empirical: Empirical | None = None
+    calibration: Calibration | None = None
+    """Below the effects, where many small errors explain the readings better than exact numbers do;
+    `machine` has its effects on the declared machine, `calibration.machine` is the machine as built."""
+    refused: list[str] = field(default_factory=list)
+    """Effects that the readings seemed to demand and that are not named, and why."""
+    stopped: bool = False
+    """Whether a time budget or Ctrl-C ended it early: the answer is the best so far."""
+    explained: float = 0.0
+    """Share of the misfit beyond noise (and calibration) that the effects take away."""
     seconds: dict[str, float] = field(default_factory=dict)
     """What each step took; ``null bootstrap`` is done once per plan and kept while the process lives."""
 
@@ -134,6 +142,9 @@ class Findings:
             "limitations",
             "significance",
             "seconds",
+            "refused",
+            "stopped",
+            "explained",
         )
         out: dict[str, Any] = {"verdict": self.verdict, "units": "SI (m, rad, N, N·m, kg), base axes"}
         out |= {"machine": self.declared.name, "experiment": self.experiment.name}
@@ -141,22 +152,10 @@ class Findings:
         if self.held_out:
             h = self.held_out
             out["held_out"] = {"folds": h.folds, "by": h.by, "chosen": h.chosen}
+        out["calibration"] = self.calibration.as_plain() if self.calibration else None
         if self.empirical:
             e = self.empirical
             out["empirical_correction"] = plain(
                 {"rms_before": e.before, "rms_after": e.after, "length": e.length}
             )
         return out
-
-
-def plain(value: Any) -> Any:
-    """Data that JSON can hold; what is not finite becomes null."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return {k: plain(v) for k, v in asdict(value).items()}
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(v) for v in value]
-    if isinstance(value, (np.floating, np.integer)):
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value

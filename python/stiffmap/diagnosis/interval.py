@@ -29,7 +29,7 @@ def intervals(model: Model, predictor: Predictor, problem: Problem, inflation: f
     out = np.zeros((len(model.values), 2))
     for i, value in enumerate(model.values):
         alone = seen_alone(model.jacobian, i)
-        if alone * (high[i] - low[i]) * UNSEEN < 1.0:
+        if unseen(model, i):
             out[i] = low[i], high[i]
             continue
         step = np.sqrt(RISE) / alone * inflation
@@ -37,6 +37,13 @@ def intervals(model: Model, predictor: Predictor, problem: Problem, inflation: f
             limit = (low, high)[side][i]
             out[i, side] = _end(model, predictor, problem, i, value, sign * step, limit, RISE * inflation**2)
     return out
+
+
+def unseen(model: Model, i: int) -> bool:
+    """Whether the readings do not determine value i: its interval would be its whole range."""
+    assert model.jacobian is not None
+    low, high = model.bounds()
+    return bool(seen_alone(model.jacobian, i) * (high[i] - low[i]) * UNSEEN < 1.0)
 
 
 def seen_alone(jacobian: Floats, i: int) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.diagnosis.candidates import Candidate, clash
+from stiffmap.diagnosis.clock import Clock
 from stiffmap.diagnosis.fit import evaluate, fit
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.periodic import is_periodic
@@ -39,6 +40,7 @@ class Search:
     """Number of independent tests that the search is worth."""
     finalists: int = 5
     alpha: float = ALPHA
+    clock: Clock = field(default_factory=Clock)
     failed: dict[str, str] = field(default_factory=dict)
     """Candidates whose fit failed, and why; the search goes on without them."""
 
@@ -70,15 +72,23 @@ class Selection:
 def select(search: Search) -> Selection:
     """Effects that the readings demand, one after the other."""
     null = evaluate(Model(), search.predictor, search.problem)
-    model, steps = null, []
-    for _ in range(MOST_EFFECTS):
-        best = best_addition(search, model)
-        if best is None or best.surprise < search.threshold:
-            break
-        model = backward(search, exchange(search, best.model))
-        steps.append(" + ".join(map(str, model.candidates)))
-        if steps.count(steps[-1]) > 1:
-            break
+    model = null
+    steps: list[str] = []
+    try:
+        for _ in range(MOST_EFFECTS):
+            if search.clock.over:
+                break
+            search.clock.say(f"an effect beside {steps[-1]}" if steps else "a first effect")
+            best = best_addition(search, model)
+            if best is None or best.surprise < search.threshold:
+                break
+            model = best.model
+            model = backward(search, exchange(search, model))
+            steps.append(" + ".join(map(str, model.candidates)))
+            if steps.count(steps[-1]) > 1:
+                break
+    except KeyboardInterrupt:  # the best so far is an answer
+        search.clock.stop()
     return Selection(model, null, tuple(steps))
 
 
@@ -185,6 +195,8 @@ def backward(search: Search, model: Model) -> Model:
 def exchange(search: Search, model: Model) -> Model:
     """Replace single effects by others while that explains clearly more."""
     for _ in range(3 if len(model.candidates) > 1 else 0):
+        if search.clock.over:
+            return model
         better = model
         for i in range(len(model.candidates)):
             reduced = fit(model.without(i), search.predictor, search.problem)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from stiffmap.description import MachineDescription
 from stiffmap.diagnosis.alias import AliasClass, alias_classes
+from stiffmap.diagnosis.clock import Clock
+from stiffmap.diagnosis.layer import Layer
 from stiffmap.diagnosis.model import Model
 from stiffmap.diagnosis.screen import Screen
 from stiffmap.diagnosis.search import Search, Selection, select
@@ -32,19 +34,33 @@ class Study:
     searches: float
     whole: tuple[Problem, Screen]
     """All rows, and the representatives on them."""
-    seconds: dict[str, float]
+    layer: Layer | None = None
+    """Calibration below the effects; None: the declared numbers are taken as exact."""
+    clock: Clock = field(default_factory=Clock)
+    without: frozenset[str] = frozenset()
+    """Kinds of effects that are not tried."""
+    seconds: dict[str, float] = field(default_factory=dict)
     """What the sensitivities and the bootstrap of the search took; nothing where they were known."""
 
-    def free(self, residual: Floats, out: Mask) -> Floats:
-        """(n, c) residual less the unknown frames and zeros that fit its rows outside `out` best.
+    def free(
+        self, residual: Floats, out: Mask, train: Mask | None = None, *, calibrated: bool = True
+    ) -> Floats:
+        """(n, c) residual less the calibration that fits its rows in `train` best (default: those outside
+        `out`), unless not `calibrated`, and less the unknown frames and zeros that fit those outside `out`.
 
         Nuisances are taken from all rows, held out or not: an instrument that was set up anew has a frame
         of its own, which no other set-up tells.
         """
-        problem = self.whole[0]
-        if out.any():
-            problem = Problem.of(self.experiment, self.noise.sigma, self.plan.base, ~out)
+        problem = self.problem_of(~out) if out.any() else self.whole[0]
+        if self.layer is not None and calibrated:
+            told = problem if train is None else self.problem_of(train & ~out)
+            residual = residual - self.layer.part(told, residual)
         return np.asarray(residual - nuisance_part(problem, residual))
+
+    def problem_of(self, keep: Mask) -> Problem:
+        """The problem of some of the rows."""
+        uncertain = None if self.layer is None else self.layer.columns
+        return Problem.of(self.experiment, self.noise.sigma, self.plan.base, keep, uncertain)
 
     @property
     def experiment(self) -> Experiment:
@@ -77,25 +93,54 @@ TYPICAL = 1.2
 _SEARCHES: dict[tuple[str, int, bytes], float] = {}
 
 
-def study(predictor: Predictor, seed: int) -> Study:
-    """Prepare: sensitivities, noise floor without suspects, alias classes, null search."""
+def study(
+    predictor: Predictor,
+    seed: int,
+    layer: Layer | None = None,
+    clock: Clock | None = None,
+    without: frozenset[str] = frozenset(),
+) -> Study:
+    """Prepare: sensitivities, noise floor without suspects, alias classes, null search.
+
+    layer
+        Calibration below the effects: its uncertain numbers are integrated out of everything.
+    without
+        Kinds of effects that are not tried.
+    """
     start = time.perf_counter()
+    if clock is not None:
+        clock.say("sensitivities of all candidates")
     plan = plan_of(predictor)
+    if without:
+        kept = tuple(v for v in plan.variants if v.candidate.kind not in without)
+        plan = replace(plan, variants=kept, digest=plan.digest + repr(sorted(without)))
     e = predictor.experiment
     rough = noise_of(e)
     raw = e.reading - plan.base
     bare = raw - nuisance_part(Problem.of(e, rough.sigma, plan.base), raw)
-    first = noise_of(e, ~suspects(e, bare, rough.sigma))
-    problem = Problem.of(e, first.sigma, plan.base)
+    first = noise_of(e, ~suspects(e, bare, rough.sigma)) if layer is None else layer.noise
+    problem = Problem.of(e, first.sigma, plan.base, None, None if layer is None else layer.columns)
     screen = Screen.of(problem, plan.variants)
     classes = tuple(alias_classes(screen, predictor.machine.description))
     named = _representatives(screen, classes)
-    key = (plan.digest, seed, np.round(np.log(first.sigma), 2).tobytes())
+    sizes = np.round(np.log(first.sigma), 2).tobytes()
+    key = (plan.digest + ("" if layer is None else layer.digest), seed, sizes)
     prepared = time.perf_counter()
     if key not in _SEARCHES:
         _SEARCHES[key] = number_of_searches(named, seed)
     seconds = {"sensitivities": prepared - start, "null bootstrap": time.perf_counter() - prepared}
-    return Study(predictor, plan, first, classes, _SEARCHES[key], (problem, named), seconds)
+    return Study(
+        predictor,
+        plan,
+        first,
+        classes,
+        _SEARCHES[key],
+        (problem, named),
+        layer,
+        clock or Clock(),
+        without,
+        seconds,
+    )
 
 
 def find(study: Study, rows: Mask | None = None, *, finalists: int = 5) -> Finding:
@@ -103,11 +148,14 @@ def find(study: Study, rows: Mask | None = None, *, finalists: int = 5) -> Findi
     e = study.experiment
     allowed = np.ones(len(e), bool) if rows is None else rows
     nobody = np.zeros(len(e), bool)
-    out = suspects(e, study.free(e.reading - study.plan.base, nobody), study.noise.sigma) & allowed
-    for _ in range(3):
+    bare = study.free(e.reading - study.plan.base, nobody, allowed)
+    out = suspects(e, bare, study.noise.sigma) & allowed
+    if study.layer is not None:  # what a calibrated machine leaves is judged against the model below
+        out = study.layer.out & allowed
+    for _ in range(1 if study.clock.over else 3):
         search = search_on(study, allowed & ~out, finalists)
         selection = select(search)
-        residual = study.free(e.reading - study.predictor(selection.model.terms()), out)
+        residual = study.free(e.reading - study.predictor(selection.model.terms()), out, allowed)
         again = alone(study, _held(residual, allowed)) & allowed
         if np.array_equal(again, out):
             break
@@ -135,10 +183,10 @@ def _held(residual: Floats, allowed: Mask) -> Floats:
 def search_on(study: Study, keep: Mask, finalists: int) -> Search:
     """The search on some of the rows."""
     if keep.all():
-        return Search(study.predictor, *study.whole, study.searches, finalists)
-    problem = Problem.of(study.experiment, study.noise.sigma, study.plan.base, keep)
+        return Search(study.predictor, *study.whole, study.searches, finalists, clock=study.clock)
+    problem = study.problem_of(keep)
     screen = _representatives(Screen.of(problem, study.plan.variants), study.classes)
-    return Search(study.predictor, problem, screen, study.searches, finalists)
+    return Search(study.predictor, problem, screen, study.searches, finalists, clock=study.clock)
 
 
 def _representatives(screen: Screen, classes: tuple[AliasClass, ...]) -> Screen:

@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 
 import numpy as np
 from scipy.stats import chi2
 
+from stiffmap.calibration import GROUPS, Tolerances
+from stiffmap.diagnosis.candidates import check_kinds
+from stiffmap.diagnosis.clock import Clock, Progress
 from stiffmap.diagnosis.crossval import HeldOut, held_out
 from stiffmap.diagnosis.describe import aliases_of, as_place, named_effects
 from stiffmap.diagnosis.detect import detectable
 from stiffmap.diagnosis.empirical import empirical
-from stiffmap.diagnosis.explain import explain
+from stiffmap.diagnosis.explain import Explanation, explain
 from stiffmap.diagnosis.findings import Detectability, NoiseReport
-from stiffmap.diagnosis.judge import after_checks, judge
+from stiffmap.diagnosis.judge import after_checks
 from stiffmap.diagnosis.locate import located
 from stiffmap.diagnosis.model import Model
+from stiffmap.diagnosis.on_top import Answer, find_effects
 from stiffmap.diagnosis.result import Diagnosis
 from stiffmap.diagnosis.separate import separation
-from stiffmap.diagnosis.structure import Pattern
-from stiffmap.diagnosis.study import Finding, Study, find, study
+from stiffmap.diagnosis.stability import explained
+from stiffmap.diagnosis.study import Finding, Study, study
 from stiffmap.experiment.checks import checks
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.limits import limitations, refuse
@@ -42,6 +47,10 @@ def diagnose(
     seed: int = 0,
     threads: int | None = None,
     cross_validate: bool = True,
+    tolerances: Tolerances | None = None,
+    exclude: Sequence[str] = (),
+    budget: float | None = None,
+    progress: Progress | None = None,
 ) -> Diagnosis:
     """Which physical effect the declared machine lacks, where, how large, and how sure that is.
 
@@ -57,6 +66,16 @@ def diagnose(
         None: all cores that this process may use.
     cross_validate
         False leaves out the nested cross-validation: `before` and `after` are then not held out.
+    tolerances
+        Standard uncertainties of what the machine file declares, where it gives none: effects are named
+        only beside them (docs/calibration.md).
+    exclude
+        Kinds of effects, or groups of the calibration, that are known not to be.
+    budget
+        Seconds after which no new step begins; the answer is then the best so far, `stopped` is set, and so it
+        is after Ctrl-C.
+    progress
+        Called with a text on what is tried.
 
     Raises StiffmapError for files that cannot be used, poses out of reach, and noise that is unknown.
     docs/diagnosis.md tells the method.
@@ -65,33 +84,30 @@ def diagnose(
     data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
     predictor = Predictor(machine, data, threads=threads)
     refuse(predictor.experiment, predictor())
-    s = study(predictor, seed)
-    clock = [time.perf_counter()]
-    finding = find(s)
-    finding, verdict, left = judge(s, finding)
-    clock.append(time.perf_counter())
-    held = held_out(s, finding.outliers, seed) if cross_validate else None
-    clock.append(time.perf_counter())
-    answer = _assemble(s, finding, verdict, left, held, seed)
-    clock.append(time.perf_counter())
+    clock = Clock.of(budget, progress)
+    groups = tuple(n for n in exclude if n in GROUPS)
+    s = study(predictor, seed, None, clock, check_kinds(n for n in exclude if n not in GROUPS))
+    times = [time.perf_counter()]
+    found = find_effects(s, seed, tolerances or Tolerances(), groups)
+    times.append(time.perf_counter())
+    held = found.held
+    if held is None and cross_validate:
+        held = held_out(found.study, found.finding.outliers, seed, found.finding)
+    times.append(time.perf_counter())
+    answer = _assemble(found, held, seed)
+    times.append(time.perf_counter())
     steps = ("search", "cross-validation", "rivals and intervals")
-    answer.seconds.update(s.seconds, **dict(zip(steps, np.diff(clock).tolist(), strict=True)))
+    answer.seconds.update(s.seconds, **dict(zip(steps, np.diff(times).tolist(), strict=True)))
     return answer
 
 
-def _assemble(
-    s: Study,
-    finding: Finding,
-    verdict: str,
-    left: list[Pattern],
-    held: HeldOut | None,
-    seed: int,
-) -> Diagnosis:
+def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
+    s, finding, verdict, left = found.study, found.finding, found.verdict, found.left
     e, search = s.experiment, finding.search
-    why = explain(s, search, finding.model)
+    why = Explanation(finding.model) if s.clock.over else explain(s, search, finding.model)
     model, other = why.model, why.others
     finding = replace(finding, selection=replace(finding.selection, model=model))
-    before = s.free(e.reading - s.plan.base, finding.outliers)
+    before = s.free(e.reading - s.plan.base, finding.outliers, calibrated=False)
     after = s.free(e.reading - s.predictor(model.terms()), finding.outliers)
     if other and verdict == "effects":
         verdict = "ambiguous"
@@ -140,6 +156,12 @@ def _assemble(
         residual_after=after,
         set_aside=finding.outliers,
         empirical=empirical(e, np.where(keep[:, None], after, np.nan), s.noise.sigma, seed) if left else None,
+        calibration=found.calibration,
+        refused=list(found.refused),
+        stopped=s.clock.stopped,
+        explained=explained(finding.selection.null, model, search.problem.freedom)
+        if model.candidates
+        else 0.0,
     )
 
 

@@ -17,7 +17,7 @@ VERDICTS = {
 
 
 def five_lines(d: Findings) -> list[str]:
-    """Verdict, effects, before and after, noise, and what could not be seen."""
+    """Verdict, effects, before and after, noise, and what could not be seen; then the calibration, if any."""
     return [
         f"verdict: {d.verdict} - {VERDICTS[d.verdict]}",
         "effects: " + ("; ".join(effect_text(e) for e in d.effects) or "none") + _others(d),
@@ -25,7 +25,31 @@ def five_lines(d: Findings) -> list[str]:
         f"(noise floor {1e3 * d.noise.rms:.4f} mm, ratio {d.after.ratio:.3f}, n = {d.after.n})",
         _left(d),
         _limits(d),
+        *_more(d),
     ]
+
+
+def _more(d: Findings) -> list[str]:
+    """Share explained beside a rest, the calibration below the effects, what is not named and why."""
+    out = []
+    if d.unexplained:
+        h = d.held_out
+        gain = ""
+        if h is not None and h.gain is not None and d.effects:
+            gain = f"; held-out gain {h.gain[0]:.3g} ± {h.gain[1]:.2g} noise variances per reading"
+        all_ = 1.0 - (d.after.rms / d.before.rms) ** 2 if d.before.rms > 0 else 0.0
+        out.append(
+            f"explained: {100 * all_:.1f} % of the squares as declared, {100 * d.explained:.1f} % of the misfit "
+            f"by effects{gain}"
+        )
+    if d.calibration is not None:
+        c = d.calibration
+        out += [f"calibration: {c.verdict}, {c.rank} directions told", *c.lines()[1 : 1 + len(c.beyond)]]
+        out += [line for line in c.lines() if line.startswith(("groups:", "model-form"))]
+    out += [f"not named: {why}" for why in d.refused]
+    if d.stopped:
+        out.append("stopped early: this is the best so far")
+    return out
 
 
 def shown(value: float, unit: str) -> str:

@@ -16,6 +16,8 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.nuisance import nuisance_columns
 
 Mask = NDArray[np.bool_]
+FELT = 1e-3
+"""Singular value below which an uncertain number changes no reading."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +37,24 @@ class Problem:
     """Readings that share a zero, and the inverse Cholesky factor of their covariance."""
     base: Floats
     """(n, c) prediction of the declared machine."""
+    uncertain: Floats | None = None
+    """(N, k) W: declared numbers that are uncertain make the covariance I + AAᵀ, whose inverse root is
+    I - WWᵀ; None: they are taken as exact."""
 
     @staticmethod
-    def of(experiment: Experiment, sigma: Floats, base: Floats, keep: Mask | None = None) -> Problem:
-        """Problem of the rows in `keep`; `base` (n, c) is the declared machine's prediction."""
+    def of(
+        experiment: Experiment,
+        sigma: Floats,
+        base: Floats,
+        keep: Mask | None = None,
+        uncertain: Floats | None = None,
+    ) -> Problem:
+        """Problem of the rows in `keep`; `base` (n, c) is the declared machine's prediction.
+
+        uncertain
+            (n, c, p) change of the readings per standard uncertainty of each number that is uncertain: the
+            readings are then judged with all of them integrated out (docs/theory.md (M1)).
+        """
         rows = np.ones(len(experiment), bool) if keep is None else keep
         used = experiment.read & rows[:, None] & np.isfinite(base)
         at, axis = np.nonzero(used)
@@ -46,10 +62,12 @@ class Problem:
         none = np.zeros((len(index[0]), 0))
         bare = Problem(experiment, sigma, rows, index, none, _blocks(experiment, sigma, index), base)
         columns = nuisance_columns(experiment, base)
-        if not columns.shape[-1]:
+        if columns.shape[-1]:
+            q = basis(np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])]))
+            bare = replace(bare, nuisance=q)
+        if uncertain is None or not uncertain.shape[-1]:
             return bare
-        q = basis(np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])]))
-        return replace(bare, nuisance=q)
+        return replace(bare, uncertain=_root(bare.white(uncertain)))
 
     def __len__(self) -> int:
         return len(self.index[0])
@@ -70,7 +88,15 @@ class Problem:
         out = values[self.index] / sigma.reshape(-1, *(1,) * (values.ndim - 2))
         for where, inverse in self.blocks:
             out[where] = inverse @ values[self.index][where]
-        return np.asarray(out - self.nuisance @ (self.nuisance.T @ out))
+        out = out - self.nuisance @ (self.nuisance.T @ out)
+        if self.uncertain is not None:
+            out = out - self.uncertain @ (self.uncertain.T @ out)
+        return np.asarray(out)
+
+    @property
+    def exact(self) -> Problem:
+        """The problem with the declared numbers taken as exact."""
+        return replace(self, uncertain=None)
 
     def residual(self, prediction: Floats) -> Floats:
         """(N,) whitened reading minus prediction; a failed pose counts as a huge residual."""
@@ -82,12 +108,20 @@ def nuisance_part(problem: Problem, values: Floats) -> Floats:
     columns = nuisance_columns(problem.experiment, problem.base)
     if not columns.shape[-1]:
         return np.zeros_like(values)
-    bare = replace(problem, nuisance=np.zeros((len(problem), 0)))
+    bare = replace(problem.exact, nuisance=np.zeros((len(problem), 0)))
     white = np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])])
     size = np.linalg.norm(white, axis=0)
     scaled = white / np.where(size > 0, size, 1.0)
     found = np.linalg.lstsq(scaled, bare.white(np.nan_to_num(values)), rcond=1e-9)[0]
     return np.asarray(columns @ (found / np.where(size > 0, size, 1.0)))
+
+
+def _root(columns: Floats) -> Floats:
+    """(N, k) W with (I - WWᵀ)² = (I + AAᵀ)⁻¹ for whitened columns A (N, p)."""
+    size, vectors = np.linalg.eigh(columns.T @ columns)
+    felt = size > FELT**2
+    q = columns @ (vectors[:, felt] / np.sqrt(size[felt]))
+    return np.asarray(q * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + size[felt])))
 
 
 def basis(columns: Floats, tolerance: float = 1e-9) -> Floats:
