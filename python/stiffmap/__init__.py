@@ -47,8 +47,8 @@ _HOME = {
 }
 
 __all__ = [
-    "Commands",
     "Calibration",
+    "Commands",
     "Diagnosis",
     "Experiment",
     "Flag",
@@ -59,8 +59,8 @@ __all__ = [
     "StiffmapError",
     "__version__",
     "assembly_stress",
-    "compensate",
     "calibrate",
+    "compensate",
     "diagnose",
     "error_map",
     "forward_kinematics",
