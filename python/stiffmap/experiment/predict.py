@@ -11,6 +11,8 @@ from stiffmap import effects
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.history import KINDS as HISTORY
+from stiffmap.experiment.history import Drives, drives_of, history_motion
 from stiffmap.experiment.joints import check_joints
 from stiffmap.experiment.locate import located, without
 from stiffmap.experiment.measurement import LOAD_SIDE, SENSOR_SIDE, readings, true_wrench
@@ -20,6 +22,8 @@ from stiffmap.experiment.temperature import at_temperatures, uses_temperature
 from stiffmap.machine import Machine
 
 Terms = tuple[AppliedEffect, ...]
+ELSEWHERE = LOAD_SIDE + SENSOR_SIDE + HISTORY
+"""Kinds that are no part of the machine."""
 
 
 class Predictor:
@@ -36,18 +40,26 @@ class Predictor:
         self.machine, self.experiment = resolved(machine, located(machine, experiment))
         self.solved = 0
         self._memory: dict[tuple[Terms, Terms], Floats] = {}
+        self._drives: dict[tuple[Terms, Terms], Drives] = {}
         self._set_aside()
 
     def __call__(self, terms: Sequence[AppliedEffect] = ()) -> Floats:
         """(n, c) m, rad predicted readings; NaN where a pose fails."""
-        mechanical = tuple(t for t in terms if t.kind not in LOAD_SIDE + SENSOR_SIDE)
+        mechanical = tuple(t for t in terms if t.kind not in ELSEWHERE)
         load = tuple(t for t in terms if t.kind in LOAD_SIDE)
         key = (mechanical, load)
         if key not in self._memory:
             if len(self._memory) > 2000:
                 self._memory.clear()
             self._memory[key] = self._motion(mechanical, load)
-        return readings(self.experiment, self._memory[key], [t for t in terms if t.kind in SENSOR_SIDE])
+        motion = self._memory[key]
+        remembering = tuple(t for t in terms if t.kind in HISTORY)
+        if remembering:
+            plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
+            if key not in self._drives:
+                self._drives = {key: drives_of(self.with_terms(mechanical), plan)}
+            motion = motion + history_motion(self._drives[key], plan, remembering)
+        return readings(self.experiment, motion, [t for t in terms if t.kind in SENSOR_SIDE])
 
     def _set_aside(self) -> None:
         """Leaves out the rows that the declared machine has no equilibrium for, and names them."""
@@ -61,7 +73,7 @@ class Predictor:
         """The machine with the mechanical terms added."""
         machine = self.machine
         for t in terms:
-            if t.kind not in LOAD_SIDE + SENSOR_SIDE:
+            if t.kind not in ELSEWHERE:
                 given = {**dict(t.parameters), **dict(t.options)}
                 machine = machine.with_effect(t.kind, element=t.element, legs=t.legs or None, **given)
         return machine

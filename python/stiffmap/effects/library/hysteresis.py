@@ -1,0 +1,51 @@
+"""What a drive remembers: friction, play and stiffening along a sequence of loads."""
+
+from __future__ import annotations
+
+from stiffmap.description import MachineDescription
+from stiffmap.effects.library.drive_law import in_unit_of_joint
+from stiffmap.effects.sites import at_sites, elastic_drives
+from stiffmap.effects.types import EffectType, Parameter, Place
+
+PARAMETERS = (
+    Parameter("level", "N", 0.0, 1e6, 0.0, 1.0, "Coulomb level", default=0.0, angular="N·m"),
+    Parameter("spread", "1", 0.0, 1.0, 0.0, 0.1, "half width of the levels about it, relative", default=0.0),
+    Parameter("breakaway", "1", 1.0, 10.0, 1.0, 0.1, "level at standstill over it", default=1.0),
+    Parameter(
+        "half_width", "m", 0.0, 0.01, 0.0, 1e-5, "play to each side", default=0.0, angular="rad",
+        angular_upper=0.5, angular_scale=1e-4,
+    ),
+    Parameter(
+        "seat", "N", 1e-6, 1e6, None, 1.0, "force over which the play is crossed", default=1e-3, angular="N·m"
+    ),
+    Parameter("ratio", "1", 1e-3, 1e3, 1.0, 0.1, "compliance at large loads over that at small ones", default=1.0),
+    Parameter("knee", "N", 1e-6, 1e6, None, 100.0, "force where it changes", default=100.0, angular="N·m"),
+)  # fmt: skip
+
+
+def nowhere(description: MachineDescription) -> list[Place]:
+    """A diagnosis does not try it by itself: it needs rows in order of time."""
+    return []
+
+
+EFFECT = EffectType(
+    kind="hysteresis",
+    title="friction, play and stiffening of a drive along a sequence of loads",
+    doc=(
+        "Rows in order of time; a set-up starts afresh. The force s that the drive's spring feels follows the drive's "
+        "force F within the friction: |F - s| is at most `level`, or `level` times `breakaway` while s stands still; "
+        "with `spread` it is the mean of many such elements, levels evenly between (1 - spread) and (1 + spread) "
+        "times `level`. The deflection is then the drive's own at s, its compliance c changed from c to ratio·c at the "
+        "`knee`, plus play: c·(ratio·s + (1 - ratio)·knee·tanh(s/knee)) + half_width·tanh(s/seat)."
+    ),
+    parameters=PARAMETERS,
+    places=at_sites(elastic_drives),
+    apply=None,
+    tried=nowhere,
+    frame="the drive's coordinate",
+    moves="what the drive moves",
+    excludes=("hysteresis", "friction"),
+    needs=("order",),
+    measurement=True,
+    at=in_unit_of_joint(*PARAMETERS),
+)

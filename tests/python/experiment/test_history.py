@@ -1,0 +1,126 @@
+"""Drives that remember: against incremental energy minimisation, and on a machine of one joint."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+import stiffmap as sm
+from stiffmap.cli.inputs import placed
+from stiffmap.experiment import Predictor, load_experiment
+from stiffmap.experiment.history import deflection, spring_force
+from stiffmap.planning import estimate
+
+ONE_JOINT = """
+name: gear
+title: a gearbox whose output is clamped
+units: {length: mm, force: N, angle: deg}
+home: {translation: [0, 0, 0]}
+legs:
+  box:
+    elements:
+      - {actuator: gear, kind: revolute, axis: z, home: 0, compliance: 1.0e-6}
+"""
+PLAIN = {
+    "level": 0.0,
+    "spread": 0.0,
+    "breakaway": 1.0,
+    "half_width": 0.0,
+    "seat": 1e-3,
+    "ratio": 1.0,
+    "knee": 1.0,
+}
+
+
+def ramps(top: float = 40.0, number: int = 60) -> np.ndarray:
+    legs = [
+        np.linspace(0, top, number),
+        np.linspace(top, -top, 2 * number),
+        np.linspace(-top, 0.6 * top, number),
+    ]
+    return np.concatenate([*legs, np.linspace(0.6 * top, 0.0, number)])
+
+
+def test_coulomb_beside_a_stiffening_spring_is_the_path_of_least_energy() -> None:
+    """Each step minimises energy - work + level |step|: no operator in it."""
+    level, cubic, stiffness = 5.0, 3.0, 2.0
+    force, a, wanted = ramps(), 0.0, []
+    for f in force:
+
+        def energy(x: float, f: float = f, last: float = a) -> float:
+            return 0.5 * stiffness * x**2 + 0.25 * cubic * x**4 - f * x + level * abs(x - last)
+
+        best = minimize_scalar(energy, bounds=(-20, 20), method="bounded", options={"xatol": 1e-12}).x
+        a = a if energy(a) <= energy(best) + 1e-12 else best
+        wanted.append(a)
+    s = spring_force(force, level)
+    got = [next(r.real for r in np.roots([cubic, 0, stiffness, -v]) if abs(r.imag) < 1e-9) for v in s]
+    np.testing.assert_allclose(got, wanted, atol=2e-4)
+
+
+def test_masing_the_branches_are_the_first_loading_twice_as_large() -> None:
+    values = PLAIN | {"level": 4.0, "spread": 1.0}
+    up = np.linspace(0, 20, 400)
+    first = deflection(up, 0.1, values)
+    down = deflection(np.append(up, 20 - 2 * up), 0.1, values)[400:]
+    np.testing.assert_allclose(first[-1] - down, 2 * first, atol=1e-9)
+
+
+def test_breaking_away_needs_more_than_going_on() -> None:
+    s = spring_force(np.array([1.0, 1.9, 2.1, 3.0, 2.5, 1.0, 0.5]), 1.0, 2.0)
+    np.testing.assert_allclose(s, [0, 0, 1.1, 2.0, 2.0, 2.0, 2.0])
+
+
+def test_play_and_stiffening() -> None:
+    force = np.array([-1e3, 1e3])
+    wide = deflection(force, 1e-6, PLAIN | {"half_width": 0.03})
+    np.testing.assert_allclose(wide, [-0.031, 0.031])
+    stiff = deflection(force, 1e-6, PLAIN | {"ratio": 0.5, "knee": 1.0})
+    np.testing.assert_allclose(stiff[1], 0.5e-3 + 0.5e-6, rtol=1e-6)
+
+
+@pytest.fixture
+def gear(tmp_path: Path) -> sm.Machine:
+    (tmp_path / "gear.yaml").write_text(ONE_JOINT)
+    return sm.load_machine(tmp_path / "gear.yaml")
+
+
+def ramp_folder(place: Path, reading: np.ndarray | None = None, order: bool = True) -> Path:
+    place.mkdir(exist_ok=True)
+    (place / "experiment.yaml").write_text(
+        "machine: gear\nquantity: position\nunits: {length: m, force: N, angle: rad}\nnoise: {rz: 1e-5}\n"
+        "command: {q: {actuator: box.gear, unit: rad}}\nframe: offset_unknown\n"
+    )
+    torque = ramps()
+    rz = np.zeros(len(torque)) if reading is None else reading
+    rows = [
+        f"0,{t},{r},{i}" if order else f"0,{t},{r}" for i, (t, r) in enumerate(zip(torque, rz, strict=True))
+    ]
+    (place / "data.csv").write_text("\n".join(["q,mz,rz" + (",order" if order else ""), *rows]) + "\n")
+    return place
+
+
+def test_one_joint_is_a_machine_of_its_own(gear: sm.Machine, tmp_path: Path) -> None:
+    text = "hysteresis gear level=4N.m spread=0.5 half_width=0.5deg ratio=0.6 knee=15N.m seat=1N.m"
+    term = placed(gear, text.replace("N.m", "N·m"))
+    e = load_experiment(ramp_folder(tmp_path / "a"))
+    exact = Predictor(gear, e)([term])[:, 5]
+    values = PLAIN | dict(term.parameters)
+    np.testing.assert_allclose(exact, deflection(ramps(), 1e-3, values), atol=1e-9)
+    noisy = exact + 1e-5 * np.random.default_rng(0).standard_normal(len(exact)) + 0.2
+    data = load_experiment(ramp_folder(tmp_path / "b", noisy))
+    start = placed(gear, text.replace("level=4", "level=3").replace("0.5deg", "0.4deg").replace("N.m", "N·m"))
+    found = estimate(gear, data, [start])
+    at = dict(found.terms[0].parameters)
+    assert at["level"] == pytest.approx(4.0, rel=0.01)
+    assert at["half_width"] == pytest.approx(np.radians(0.5), rel=0.01)
+    assert found.misfit < 1.15
+
+
+def test_time_is_needed(gear: sm.Machine, tmp_path: Path) -> None:
+    e = load_experiment(ramp_folder(tmp_path / "a", order=False))
+    with pytest.raises(sm.StiffmapError, match="order"):
+        Predictor(gear, e)([placed(gear, "hysteresis gear level=4N·m")])
