@@ -27,6 +27,7 @@ from stiffmap.cli.inputs import (
     machine_with,
     plain,
 )
+from stiffmap.cli.map_big import print_estimate, print_statistics
 from stiffmap.cli.map_summary import as_table, failures, summary
 from stiffmap.cli.map_uncertainty import draw_deviations, print_uncertainty, uncertainty_data
 from stiffmap.cli.output import JsonOption, print_json
@@ -74,6 +75,16 @@ def map_command(
     own_scales: Annotated[
         bool, typer.Option("--own-scales", help="A colour scale for each plane instead of a common one.")
     ] = False,
+    estimate: Annotated[
+        bool,
+        typer.Option("--estimate", help="Only say how long it will take, and the memory and disk it needs."),
+    ] = False,
+    statistics: Annotated[
+        bool, typer.Option("--statistics", help="Maxima, percentiles and shares only; no map is stored.")
+    ] = False,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler whose workers solve the map.")
+    ] = None,
     method: MethodOption = "fast",
     threads: ThreadsOption = None,
     as_json: JsonOption = False,
@@ -102,24 +113,38 @@ def map_command(
       [cyan]stiffmap map orthoglide-revised --y 0 --plane xz --points 41 --format svg[/cyan]
 
       [cyan]stiffmap map orthoglide-revised --gravity 0,0,-9.81 --tolerance 0.1 --json[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --points 2001 --estimate[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --points 51 --statistics[/cyan]
     """
     import stiffmap
 
     kinds = picture_formats(formats)
-    target = folder(output) / ("map.zarr" if zarr else "map.nc")
     m = machine_with(machine, effect)
+    call: dict[str, Any] = {
+        **grid(m, {"x": x, "y": y, "z": z}, points),
+        "wrench": cases(plane, force),
+        "plane": plane,
+        "directions": directions,
+        "tolerance": MM * tolerance,
+        "gravity": gravity(gravity_),
+        "compliance": compliance,
+        "uncertainty": uncertainty,
+        "method": method,
+        "threads": threads,
+    }
+    if estimate:
+        print_estimate(m, call, as_json)
+        return
+    if statistics:
+        print_statistics(m, call, plane, scheduler, as_json)
+        return
+    target = folder(output) / ("map.zarr" if zarr else "map.nc")
     ds = stiffmap.error_map(
         m,
-        **grid(m, {"x": x, "y": y, "z": z}, points),
-        wrench=cases(plane, force),
-        plane=plane,
-        directions=directions,
-        tolerance=MM * tolerance,
-        gravity=gravity(gravity_),
-        compliance=compliance,
-        uncertainty=uncertainty,
-        method=method,
-        threads=threads,
+        **call,
+        scheduler=scheduler,
         progress=False if as_json else None,
         out=target,
         resume=resume,

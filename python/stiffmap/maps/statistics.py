@@ -138,9 +138,11 @@ class _Deflection:
         nodes = np.where(np.isnan(self.most)[..., None], np.nan, nodes)
         heights = cells(p.y)
         share = (self.within * heights[:, None]).sum(1) / (heights.sum() * cells(p.x).sum())
+        # A bin's upper edge may lie beyond the largest value.
         each = np.array([[h.percentiles(percentiles) for h in row] for row in self.histograms])
+        each = np.fmin(each, self.most[..., None])
         total = [Histogram.joined([row[c] for row in self.histograms]) for c in range(self.cases)]
-        both = np.array([h.percentiles(percentiles) for h in total])
+        both = np.fmin([h.percentiles(percentiles) for h in total], np.fmax.reduce(self.most)[:, None])
         of = f"of {name}"
         return {
             f"{name}_max": (("z", *case), cut(self.most), meaning("m", f"largest value {of}")),
