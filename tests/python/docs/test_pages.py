@@ -1,0 +1,127 @@
+"""Every command block and every Python block of README and docs runs, in the order of its page."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from blocks import Block, Reader, blocks, commands, own_part
+
+import stiffmap as sm
+
+ROOT = Path(__file__).parents[3]
+PAGES = {
+    p.relative_to(ROOT).as_posix(): p for p in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+}
+WITH_CODE = {name: page for name, page in PAGES.items() if blocks(page)}
+QUICK = ("docs/machine_files.md", "docs/machines.md", "docs/effects.md")
+"""Pages for the fast lane; the others solve maps and diagnose."""
+
+ROBOT = """<robot name="arm"><link name="base"/><link name="upper"/><link name="tool"/>
+<joint name="q1" type="revolute"><origin xyz="0 0 0.3"/><axis xyz="0 0 1"/><parent link="base"/><child link="upper"/>
+<limit lower="-2" upper="2" effort="100" velocity="2"/></joint>
+<joint name="q2" type="revolute"><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/><parent link="upper"/><child link="tool"/>
+<limit lower="-2" upper="2" effort="80" velocity="2"/></joint></robot>
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """What a reader has: a copy of the examples, and files of his own that a page names."""
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    sm.load_machine("tripteron").save(tmp_path / "my_machine.yaml")
+    (tmp_path / "arm.urdf").write_text(ROBOT)
+    shutil.copy(ROOT / "examples/link_bar.yaml", tmp_path / "bar.yaml")
+    field, cases = link_tables()
+    (tmp_path / "field.csv").write_text(field)
+    (tmp_path / "cases.csv").write_text(cases)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def link_arrays() -> dict[str, Any]:
+    """A displacement field with its loads, as a page takes it as given."""
+    rng = np.random.default_rng(1)
+    points = rng.uniform(-0.03, 0.03, (60, 3))
+    compliance = np.diag([1e-8, 3e-6, 2e-6, 1e-4, 2e-4, 3e-4])
+    wrenches = np.diag([100.0, 10, 10, 1, 1, 1])
+    twists = wrenches @ compliance
+    displacements = np.array([t[:3] + np.cross(t[3:], points) for t in twists])
+    displacements += 1e-9 * rng.standard_normal(displacements.shape)
+    return {"points": points, "displacements": displacements, "wrenches": wrenches,
+            "reference": np.zeros(3), "other_point": np.array([0.1, 0, 0])}  # fmt: skip
+
+
+def link_tables() -> tuple[str, str]:
+    """The same as the two tables of `stiffmap link`, mm and N·mm."""
+    a = link_arrays()
+    field = ["case,x,y,z,ux,uy,uz"]
+    for case, u in enumerate(a["displacements"]):
+        for p, d in zip(a["points"], u, strict=True):
+            values = [*(1e3 * p + [310, 0, 0]), *(1e3 * d)]
+            field.append(",".join([f"c{case}", *(f"{v:.12g}" for v in values)]))
+    cases = ["case,fx,fy,fz,mx,my,mz"]
+    for case, w in enumerate(a["wrenches"]):
+        cases.append(",".join([f"c{case}", *(f"{v:g}" for v in [*w[:3], *(1e3 * w[3:])])]))
+    return "\n".join(field) + "\n", "\n".join(cases) + "\n"
+
+
+def given(name: str) -> dict[str, Any]:
+    """Variables that a page takes as given."""
+    x = np.linspace(-0.1, 0.1, 3)
+    some: dict[str, Any] = {"__name__": "page"}
+    if name == "docs/effects.md":
+        some |= {"poses": np.zeros((2, 3)), "wrench": np.array([300.0, 0, 0, 0, 0, 0])}
+    if name == "docs/link.md":
+        some |= link_arrays() | {"x": x, "y": x, "z": [0.0], "wrench": [300.0, 0, 0, 0, 0, 0]}
+        some["machine"] = sm.load_machine(ROOT / "examples/orthoglide-links.yaml") if linked() else None
+    return some
+
+
+def linked() -> bool:
+    """Whether the machine with a link file loads: the page makes that file by finite elements."""
+    return (ROOT / "examples/bar-link.yaml").exists()
+
+
+def cannot(block: Block) -> str:
+    """Why a block does not run here; empty if it does."""
+    if block.language == "shell" and any("bracket.step" in c for c in commands(block.code)):
+        return "needs a part of the reader's"
+    if "fivebar.urdf" in block.code:
+        return "tests/python/urdf runs it"
+    if "skfem" in block.code or "bar.yaml" in block.code or "uncertainty=True" in block.code:
+        return "" if importlib.util.find_spec("skfem") and linked() else "needs finite elements"
+    return ""
+
+
+@pytest.mark.parametrize(
+    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in WITH_CODE]
+)
+def test_page_runs(name: str, folder: Path) -> None:
+    reader = Reader(folder, given(name))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for block in blocks(WITH_CODE[name]):
+            if not cannot(block):
+                reader.follow(block)
+    assert os.getcwd() == str(folder)
+
+
+def test_most_blocks_run() -> None:
+    """What is left out stays the exception."""
+    every = [b for page in WITH_CODE.values() for b in blocks(page)]
+    left = [b for b in every if cannot(b)]
+    assert len(every) >= 20 and len(left) <= len(every) // 4, [(b.line, cannot(b)) for b in left]
+
+
+def test_installing_is_left_to_the_test_command() -> None:
+    assert own_part(
+        "python3 -m venv .venv && .venv/bin/python -m pip install . && .venv/bin/stiffmap map a"
+    ) == ("stiffmap map a")
+    assert own_part("./test.sh") == ""
