@@ -18,13 +18,15 @@ from stiffmap.diagnosis.significance import global_p
 from stiffmap.diagnosis.study import Study
 from stiffmap.effects import Placed, registry
 from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise import Mask
 
 
 def named_effects(study: Study, search: Search, model: Model, inflation: float = 1.0) -> list[Effect]:
     """The effects of a model, values and 95 % intervals in SI."""
     if not model.candidates:
         return []
-    limits = intervals(model, search.predictor, search.problem, inflation) * model.scales[:, None]
+    ends = intervals(model, search.predictor, search.problem, inflation)
+    limits = ends.values * model.scales[:, None]
     return [
         Effect(
             candidate.kind,
@@ -34,9 +36,16 @@ def named_effects(study: Study, search: Search, model: Model, inflation: float =
             aliases_of(study.classes, candidate),
             _evidence(search, model, i),
             definition(candidate),
+            _open_ends(candidate, ends.found[part]),
         )
         for i, (candidate, part) in enumerate(zip(model.candidates, model.parts(), strict=True))
     ]
+
+
+def _open_ends(candidate: Candidate, found: Mask) -> tuple[str, ...]:
+    """Ends of intervals that were not found: ``scale upper``."""
+    names = [f"{p.name} {side}" for p in candidate.parameters for side in ("lower", "upper")]
+    return tuple(n for n, ok in zip(names, found.ravel(), strict=True) if not ok)
 
 
 def _parameters(

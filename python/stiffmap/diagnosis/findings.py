@@ -36,6 +36,9 @@ class Effect:
     evidence: dict[str, float]
     definition: str = ""
     """Definition, pivot, frame and what moves with it."""
+    open_ends: tuple[str, ...] = ()
+    """Ends of intervals that were not found, as ``scale upper``: the machine cannot be solved beyond them, or the
+    readings hardly change; the number given is then no limit."""
 
     @property
     def place(self) -> tuple[str, str, tuple[str, ...]]:

@@ -123,25 +123,27 @@ def jacobian(
     model: Model, values: Floats, predictor: Predictor, problem: Problem, which: NDArray[np.intp]
 ) -> Floats:
     """(N, len(which)) change of the whitened residual per unit of each value."""
-    here = predictor(model.terms(values))
+    here = problem.check(predictor(model.terms(values)))
     _, high = model.bounds()
     columns = []
     for i in which:
         step = tangent_step(values, int(i), high[i])
-        there, step = _beside(model, values, int(i), step, predictor)
-        columns.append(-problem.white(np.nan_to_num((there - here) / step)))
+        there, step = _beside(model, values, int(i), step, predictor, problem)
+        columns.append(-problem.white((there - here) / step))
     return np.column_stack(columns) if columns else np.zeros((len(problem), 0))
 
 
-def _beside(model: Model, values: Floats, i: int, step: float, predictor: Predictor) -> tuple[Floats, float]:
-    """Prediction with value i moved by the step, or by its opposite where the machine cannot be built."""
+def _beside(
+    model: Model, values: Floats, i: int, step: float, predictor: Predictor, problem: Problem
+) -> tuple[Floats, float]:
+    """Prediction with value i moved by the step, or by its opposite where the machine cannot be built or solved."""
     low, _ = model.bounds()
     moved = values.copy()
     moved[i] += step
     try:
-        return predictor(model.terms(moved)), step
+        return problem.check(predictor(model.terms(moved))), step
     except StiffmapError:
         moved[i] -= 2 * step
         if moved[i] < low[i]:
             raise
-        return predictor(model.terms(moved)), -step
+        return problem.check(predictor(model.terms(moved))), -step

@@ -81,7 +81,7 @@ def _digest(predictor: Predictor) -> str:
     parts += [e.reference_temperature, e.extra, e.points, e.load_points, e.unloaded]
     parts += [e.frame, e.tool, e.instrument, e.target, e.surface, e.normal, e.joint_names]
     arrays = [e.position, e.wrench, e.rotation, e.other, e.other_rotation, e.approach, e.order, e.temperature]
-    arrays += [e.joints, e.other_joints, e.gravity_of]
+    arrays += [e.joints, e.other_joints, e.gravity_of, e.hours]
     raw = repr(parts).encode() + b"".join(
         b"-" if a is None else np.ascontiguousarray(a).tobytes() for a in arrays
     )

@@ -23,7 +23,7 @@ APPROACH = ("approach_x", "approach_y", "approach_z")
 READ = (*AXES, DISTANCE.name, HEIGHT.name)
 KNOWN = (
     *(*WORDS, *POSE, *TURNED, *POSE2, *TURNED2, *APPROACH, *WRENCH, *READ, *(f"u_{a}" for a in READ)),
-    *("repeat", "order", "temperature"),
+    *("repeat", "order", "hours", "temperature"),
     *ABSOLUTE,
 )
 

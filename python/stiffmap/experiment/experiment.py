@@ -20,7 +20,7 @@ WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 BRANCHES = ("", "loading", "unloading")
 PER_ROW = (
     *("ids", "position", "wrench", "reading", "sigma", "rotation", "other", "other_rotation", "command"),
-    *("approach", "repeat", "order", "temperature", "branch", "setup", "points", "load_points"),
+    *("approach", "repeat", "order", "hours", "temperature", "branch", "setup", "points", "load_points"),
     *("joints", "other_command", "other_joints", "gravity_of", "instrument", "target"),
     *("seen", "seen_rotation", "contact", "apart"),
 )
@@ -108,6 +108,9 @@ class Experiment:
     """(n, 3) direction of the last travel to the pose, any length; zero where unknown."""
     repeat: Integers | None = None
     order: Floats | None = None
+    """(n,) order of measurement; only differences count."""
+    hours: Floats | None = None
+    """(n,) h, when each row was read; only differences count."""
     temperature: Floats | None = None
     """(n,) °C or K; only differences to `reference_temperature` count."""
     reference_temperature: float | None = None

@@ -135,6 +135,7 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
         approach=read_columns.approach(table),
         repeat=read_columns.whole(table, "repeat"),
         order=table.numbers("order") if "order" in table else None,
+        hours=table.numbers("hours") if "hours" in table else None,
         temperature=table.numbers("temperature") if "temperature" in table else None,
         reference_temperature=model.reference_temperature,
         branch=read_columns.branch(table),

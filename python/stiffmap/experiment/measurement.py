@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.description import AppliedEffect
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 
 LOAD_SIDE = ("load_direction", "load_gain")
@@ -62,7 +63,7 @@ def readings(experiment: Experiment, motion: Floats, terms: Sequence[AppliedEffe
         elif term.kind == "frame_offset" and experiment.quantity == "position":
             out = out + frame_offset(experiment, parameters)
         elif term.kind == "drift":
-            out = out + drift(experiment, parameters)
+            out = out + drift(experiment, term)
     shares = [t for t in terms if t.kind == "servo_share"]
     return np.hstack([out, motion[:, 6:] * motor_side(experiment, shares)])
 
@@ -89,10 +90,16 @@ def frame_offset(experiment: Experiment, parameters: Mapping[str, float]) -> Flo
     return np.hstack([shift + experiment.position @ (r - np.eye(3)).T, turn])
 
 
-def drift(experiment: Experiment, parameters: Mapping[str, float]) -> Floats:
-    """(n, 6) proportional to the order of measurement, zero at the first reading."""
-    if experiment.order is None:
-        return np.zeros((len(experiment), 6))
-    elapsed = experiment.order - experiment.order.min()
-    rate = np.array([parameters.get(a, 0.0) for a in "xyz"] + [0.0] * 3)
-    return np.asarray(elapsed[:, None] * rate)
+def drift(experiment: Experiment, term: AppliedEffect) -> Floats:
+    """(n, 6) proportional to the order of measurement or to the hours, zero at the first reading.
+
+    StiffmapError where the experiment has no such column.
+    """
+    per = str(dict(term.options).get("per", "order"))
+    column = "hours" if per == "hour" else "order"
+    clock = experiment.hours if per == "hour" else experiment.order
+    if clock is None:
+        raise StiffmapError(f"{experiment.name}: drift per {per} needs a column '{column}'")
+    rates = dict(term.parameters)
+    rate = np.array([rates.get(a, 0.0) for a in "xyz"] + [0.0] * 3)
+    return np.asarray((clock - clock.min())[:, None] * rate)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.nuisance import nuisance_columns
 
@@ -98,9 +99,20 @@ class Problem:
         """The problem with the declared numbers taken as exact."""
         return replace(self, uncertain=None)
 
+    def check(self, prediction: Floats) -> Floats:
+        """The prediction; StiffmapError where a pose that the problem reads could not be solved."""
+        failed = np.isnan(prediction[self.index])
+        if failed.any():
+            rows = np.unique(self.index[0][failed])
+            first = self.experiment.ids[int(rows[0])]
+            raise StiffmapError(
+                f"{len(rows)} rows of the experiment have no equilibrium, the first is '{first}'"
+            )
+        return prediction
+
     def residual(self, prediction: Floats) -> Floats:
-        """(N,) whitened reading minus prediction; a failed pose counts as a huge residual."""
-        return self.white(np.nan_to_num(self.experiment.reading - prediction, nan=1.0))
+        """(N,) whitened reading minus prediction; StiffmapError where a pose that it reads failed."""
+        return self.white(self.experiment.reading - self.check(prediction))
 
 
 def nuisance_part(problem: Problem, values: Floats) -> Floats:

@@ -119,7 +119,12 @@ def _columns(e: Experiment) -> dict[str, list[Any]]:
             columns[c.name] = _text(e.reading[:, i] * _scale(c))
             if not _alike(e, i) and np.isfinite(e.sigma[:, i]).any():
                 columns[f"u_{c.name}"] = _text(e.sigma[:, i] * _scale(c))
-    for name, values in (("repeat", e.repeat), ("order", e.order), ("temperature", e.temperature)):
+    for name, values in (
+        ("repeat", e.repeat),
+        ("order", e.order),
+        ("hours", e.hours),
+        ("temperature", e.temperature),
+    ):
         if values is not None:
             columns[name] = _text(np.asarray(values, dtype=float))
     words = {n: getattr(e, field) for n, field in WORDS.items()}
