@@ -46,6 +46,7 @@ COMMANDS = (
     ),
     Command("simulate", "stiffmap.cli.simulate", "simulate", "Write a virtual experiment."),
     Command("plan", "stiffmap.cli.plan", "plan", "Which poses, loads and readings tell most."),
+    Command("monitor", "stiffmap.cli.monitor", "monitor", "What changed between two experiments."),
     Command(
         "compensate", "stiffmap.cli.compensate", "compensate", "Commands that cancel what a machine lacks."
     ),

@@ -1,0 +1,86 @@
+"""What changed between two measurements of a machine; what two specimens of a type share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from stiffmap.description import AppliedEffect
+from stiffmap.experiment.experiment import Experiment
+from stiffmap.machine import Machine
+from stiffmap.planning.estimate import Estimate, estimate
+
+ALPHA = 0.01
+"""Chance of a change in any number where there is none."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One number in two experiments, SI."""
+
+    name: str
+    unit: str
+    before: float
+    after: float
+    u: float
+    """Standard uncertainty of the difference, misfit of both fits included."""
+    p: float
+    """Chance of such a difference if nothing changed, corrected for the number of numbers (Bonferroni)."""
+
+    @property
+    def changed(self) -> bool:
+        """Whether it is beyond chance."""
+        return self.p < ALPHA
+
+    def __str__(self) -> str:
+        word = "changed" if self.changed else "as before"
+        step = self.after - self.before
+        return (
+            f"{self.name}: {word}, {self.before:.5g} -> {self.after:.5g} {self.unit} "
+            f"({step:+.3g} ± {2 * self.u:.2g}, chance {self.p:.2g})"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Two experiments with the same effects fitted to each."""
+
+    first: Estimate
+    second: Estimate
+    changes: tuple[Change, ...]
+    p: float
+    """Chance of all differences together if the numbers are common."""
+
+    @property
+    def common(self) -> bool:
+        """Whether one set of numbers serves both: a property of the type rather than of a specimen."""
+        return self.p >= ALPHA
+
+    def __str__(self) -> str:
+        word = "one set of numbers serves both" if self.common else "the two differ"
+        return "\n".join([f"{word} (chance {self.p:.2g})", *map(str, self.changes)])
+
+
+def compare(
+    machine: Machine, first: Experiment, second: Experiment, terms: Sequence[AppliedEffect]
+) -> Comparison:
+    """Numbers of `terms` in two experiments: before and after, or one specimen and another.
+
+    Each is fitted on its own; differences are judged with both covariances, enlarged where a model does not fit.
+    Raises StiffmapError as `estimate` does.
+    """
+    a, b = (estimate(machine, e, terms) for e in (first, second))
+    step = b.values - a.values
+    covariance = a.covariance * a.misfit**2 + b.covariance * b.misfit**2
+    u = np.sqrt(np.diag(covariance))
+    single = chi2.sf((step / np.where(u > 0, u, np.inf)) ** 2, 1)
+    scaled = covariance / np.outer(u, u)
+    together = float((step / u) @ np.linalg.pinv(scaled) @ (step / u))
+    changes = tuple(
+        Change(n, s, float(x), float(y), float(w), float(min(1.0, len(step) * p)))
+        for n, s, x, y, w, p in zip(a.names, a.units, a.values, b.values, u, single, strict=True)
+    )
+    return Comparison(a, b, changes, float(chi2.sf(together, len(step))))
