@@ -77,7 +77,7 @@ void time_block(Block& b, const M usable, Timer& time) {
   n.tip = tip;
   n.point = tip.p;
   time(bench::back, [&] { back(e, P.chains[P.root], get(x), tip.p, V3{}, M{}); });
-  time(bench::output, [&] { b.write(usable, n, K, C, splat(1)); });
+  time(bench::output, [&] { b.write(usable, n, K, C, splat(1), splat(0)); });
   time(bench::iteration, [&] {
     n.evaluate(false);
     n.linearize();

@@ -56,6 +56,21 @@ inline V3 rotation_between(const M3& a, const M3& b) {
   return factor * n;
 }
 
+/// R turned by a rotation vector in the frame in which R's columns are given.
+inline M3 turned_by(const M3& R, const V3& by) {
+  const V angle = root(dot(by, by));
+  const V safe = select(angle > 0.0, angle, splat(1));
+  V sn, cs;
+  sincos(angle, sn, cs);
+  const V3 u = (1.0 / safe) * by;
+  M3 out;
+  for (int k = 0; k < 3; ++k) {
+    const V3 w = R.c[k];
+    out.c[k] = cs * w + sn * cross(u, w) + ((1.0 - cs) * dot(u, w)) * u;
+  }
+  return out;
+}
+
 /// Twist from frame a to frame b.
 inline V6 frame_error(const Frame& a, const Frame& b) { return {b.p - a.p, rotation_between(a.R, b.R)}; }
 

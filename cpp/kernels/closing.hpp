@@ -3,6 +3,7 @@
 // trust test as the reference closure. A lane that fails it is left to the reference path.
 #pragma once
 
+#include "approach.hpp"
 #include "frames.hpp"
 #include "normal_equations.hpp"
 #include "planar.hpp"
@@ -11,18 +12,21 @@
 namespace stiffmap::kernel {
 
 inline constexpr int most_closure_steps = 12;
-inline constexpr int leaps = 8;
-inline constexpr double trusted_step = 0.25;  // first Gauss-Newton step, relative to the length
-inline constexpr double closed = 1e-12;       // largest error, relative to the length
-inline constexpr double exact = 3e-15;        // the same: a closed form needs no step
-inline constexpr double last_step = 1e-8;     // its square, what it leaves, is below round-off
+inline constexpr int most_leaps = 48;
+inline constexpr double shortest_leap = 1.0 / 256;  // of the way
+inline constexpr double trusted_step = 0.25;        // first Gauss-Newton step, relative to the length
+inline constexpr double closed = 1e-12;             // largest error, relative to the length
+inline constexpr double exact = 3e-15;              // the same: a closed form needs no step
+inline constexpr double last_step = 1e-8;           // its square, what it leaves, is below round-off
 
 struct Closing {
   const Program& P;
   Scratch& s;
 
+  M never = {};  ///< lanes whose pose is out of reach, as far as descents from here and from home can tell
+
   /// Closes the legs to `tip`, whose position is at[lane]; returns the lanes that closed, coordinates
-  /// in s.x. Where the start was too far, the nearest node is continued in short leaps.
+  /// in s.x. Where the start was too far, the nearest node is continued in leaps.
   M close(const Frame& tip, const double* const (&at)[W]) {
     for (int q = 0; q < P.coordinate_count; ++q) s.x[q] = splat(P.coordinates[q].role == 2 ? 0 : P.coordinates[q].home);
     const M usable = start(tip, at);
@@ -36,45 +40,108 @@ struct Closing {
     if (P.planar) {
       const Frame end = legs_end(tip);
       usable = ~usable;
-      for (int k = 0; k < P.leg_count; ++k) usable &= close_planar(P.planar[k], end, s.x);
+      for (int k = 0; k < P.leg_count; ++k) usable &= close_planar(P.planar[k], end, s.x, never);
       return usable;
     }
     alignas(64) double rows[W][most_closure_unknowns];
     for (int i = 0; i < W; ++i) usable[i] = Starts{P}.interpolate(at[i], rows[i]) ? -1 : 0;
     for (int j = 0; j < P.unknown_count; ++j)
-      for (int i = 0; i < W; ++i) s.x[P.unknowns[j]][i] = rows[i][j];
+      for (int i = 0; i < W; ++i)
+        if (usable[i]) s.x[P.unknowns[j]][i] = rows[i][j];
     return usable;
   }
 
-  M leap(const Frame& tip, const double* const (&at)[W], M left) {
-    V3 from = tip.p;
-    M moving{};
+  /// Adaptive continuation of theory (C5), each lane by its own leaps, from the node of the grid that is nearest
+  /// (home where there is none) straight to the pose.
+  M leap(const Frame& tip, const double* const (&at)[W], M moving) {
+    Frame from = home();
+    const V3 turn = rotation_between(from.R, tip.R);
+    M closed_lanes{}, stuck{};
+    for (int q = 0; q < P.coordinate_count; ++q)
+      if (P.coordinates[q].role != 2) s.x[q] = select(moving, splat(P.coordinates[q].home), s.x[q]);
     for (int i = 0; i < W; ++i) {
+      if (!moving[i]) continue;
       double node[3];
-      const double* row = left[i] ? Starts{P}.nearest(at[i], node) : nullptr;
+      const double* row = Starts{P}.nearest(at[i], node);
       if (!row) continue;
-      moving[i] = -1;
-      from.x[i] = node[0];
-      from.y[i] = node[1];
-      from.z[i] = node[2];
+      from.p.x[i] = node[0];
+      from.p.y[i] = node[1];
+      from.p.z[i] = node[2];
       for (int j = 0; j < P.unknown_count; ++j) s.x[P.unknowns[j]][i] = row[j];
     }
-    for (int k = 1; k <= leaps && any(moving); ++k) {
-      const Frame way{from + splat(static_cast<double>(k) / leaps) * (tip.p - from), tip.R};
-      moving &= reach(k == leaps ? tip : way, moving);
+    // What is not a number can not be reached.
+    stuck |= moving & ~((dot(tip.p, tip.p) + dot(turn, turn)) < 1e200);
+    moving &= ~stuck;
+    V reached = splat(0), stride = splat(0.5);
+    keep(moving);
+    for (int k = 0; k < most_leaps && any(moving); ++k) {
+      const V goal = select(reached + stride < 1.0, reached + stride, splat(1));
+      const M last = goal == 1.0;
+      const Frame way = between(from, turn, tip, goal, last);
+      const M got = reach(way, moving), lost = moving & ~got;
+      reached = select(got, goal, reached);
+      stride = select(got, 2.0 * stride, select(lost, 0.5 * stride, stride));
+      for (int q = 0; q < P.coordinate_count; ++q) s.x[q] = select(lost, s.kept[q], s.x[q]);
+      keep(got);
+      closed_lanes |= got & last;
+      stuck |= lost & (stride < shortest_leap);
+      moving &= ~closed_lanes & ~stuck;
     }
-    return moving;
+    if (any(stuck)) never |= out_of_reach(tip, stuck);
+    return closed_lanes;
+  }
+
+  void keep(M lanes) {
+    for (int q = 0; q < P.coordinate_count; ++q) s.kept[q] = select(lanes, s.x[q], s.kept[q]);
+  }
+
+  Frame home() const {
+    return {{splat(P.home_p[0]), splat(P.home_p[1]), splat(P.home_p[2])}, constant_rotation(P.home_R)};
+  }
+
+  static Frame between(const Frame& from, const V3& turn, const Frame& tip, V share, M last) {
+    Frame way = tip;
+    way.p = select(last, tip.p, from.p + share * (tip.p - from.p));
+    const M3 turned = turned_by(from.R, share * turn);
+    for (int i = 0; i < 3; ++i) way.R.c[i] = select(last, tip.R.c[i], turned.c[i]);
+    return way;
+  }
+
+  /// Lanes where a leg stays away from `tip` in descents from the present coordinates and from home.
+  M out_of_reach(const Frame& tip, M lanes) {
+    M no = lanes;
+    for (int attempt = 0; attempt < 2 && any(no); ++attempt) {
+      if (attempt == 1)
+        for (int q = 0; q < P.coordinate_count; ++q)
+          if (P.coordinates[q].role != 2) s.x[q] = select(no, splat(P.coordinates[q].home), s.x[q]);
+      M some{};
+      each_leg(tip, [&](const LegClosure& leg, int chain, const Frame& before, const Frame& after) {
+        const M left = no & ~some;
+        if (any(left)) some |= Approach{P, s}.stays_away(*this, leg, chain, before, after, left);
+      });
+      no &= some;
+    }
+    return no;
   }
 
   M reach(const Frame& tip, M usable) {
     M ok = usable;
-    const Op& block = P.ops[P.legs_op];
-    const ChainProgram& root = P.chains[P.root];
+    each_leg(tip, [&](const LegClosure& leg, int chain, const Frame& before, const Frame& after) {
+      ok &= close_leg(leg, chain, before, after, ok);
+    });
+    return ok;
+  }
+
+  /// Calls with each set of equations that closes by itself: a leg between its fixed frames, or the whole machine.
+  template <class Call>
+  void each_leg(const Frame& tip, const Call& call) {
     Frame before = base_frame();
+    if (P.closes == 2) return call(P.legs[0], P.root, before, tip);
+    const ChainProgram& root = P.chains[P.root];
     const Frame after = legs_end(tip);
     for (int i = root.first; i <= P.legs_op; ++i) apply(P.ops[i].nominal, before);
-    for (int k = 0; k < block.count; ++k) ok &= close_leg(P.legs[k], block.first + k, before, after, ok);
-    return ok;
+    const Op& block = P.ops[P.legs_op];
+    for (int k = 0; k < block.count; ++k) call(P.legs[k], block.first + k, before, after);
   }
 
   static Frame base_frame() {
@@ -114,7 +181,7 @@ struct Closing {
       if (P.planar || step > 0) done |= ~failed & ((error < exact) | ((error < closed) & (previous < 1e-7)));
       failed |= ~done & ~(error < 1e100);
       if (all(done | failed)) break;
-      equations.assemble(P, s, leg, errors);
+      equations.assemble(P, s, leg, errors, target.R);
       V missing = equations.solve(leg.unknowns);
       V norm = splat(0);
       for (int k = 0; k < leg.unknowns; ++k) norm += equations.g[k] * equations.g[k];
@@ -148,8 +215,11 @@ struct Closing {
       V cosine;
       V6& e = errors[q];
       e = {b.p - a.p, splat(P.length) * sine_between(a.R, b.R, cosine)};
+      const bool part = eq.primary < 0 && P.open_task;
+      if (part) e = TipTask(P, a.R, b.R).error(e);
       worst = larger(worst, larger(larger(absolute(e.a.x), absolute(e.a.y)), absolute(e.a.z)));
       worst = larger(worst, larger(larger(absolute(e.b.x), absolute(e.b.y)), absolute(e.b.z)));
+      if (part && TipTask::any_rotation_open(P)) continue;
       worst = select(cosine > 0.0, worst, splat(1e200));
     }
     return worst * (1 / P.length);

@@ -28,6 +28,7 @@ Scratch lay_out(const Program& P, void* memory, std::int64_t* bytes) {
   Scratch s;
   s.joints = take<JointSlot>(at, P.joint_slots);
   s.stiff = take<StiffSlot>(at, P.stiff_slots);
+  s.groups = take<GroupSlot>(at, P.group_slots);
   s.branches = take<BranchSlot>(at, P.chain_count);
   const int n = P.coordinate_count;
   for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.rubs, &s.kept})
@@ -52,6 +53,7 @@ struct Block {
   int count;
   Frame command;
   V6 load;
+  M never = {};  ///< lanes out of reach
 
   std::int64_t pose(int lane) const { return first + (lane < count ? lane : count - 1); }
 
@@ -89,7 +91,14 @@ struct Block {
   M close() {
     const double* at[W];
     for (int i = 0; i < W; ++i) at[i] = in.position + 3 * pose(i);
-    return Closing{P, s}.close(command, at);
+    Closing closing{P, s};
+    const M ok = closing.close(command, at);
+    never = closing.never & ~ok;
+    if (P.open_task) {  // the closed machine completes the command
+      command = Closing::base_frame();
+      walk<Build::nominal>(P, P.chains[P.root], s.x, command, s);
+    }
+    return ok;
   }
 
   /// Drives and guides with their errors; every coordinate's value at zero deflection (theory G1-G3).
@@ -154,16 +163,7 @@ struct Block {
       }
       const V6 step = get(eta);
       // Rotation vectors add to first order only: turn the frame by the step, then compare.
-      M3 R = at.tip.R;
-      const V angle = root(dot(step.b, step.b));
-      const V safe = select(angle > 0.0, angle, splat(1));
-      V sn, cs;
-      sincos(angle, sn, cs);
-      const V3 u = (1.0 / safe) * step.b;
-      for (int k = 0; k < 3; ++k) {
-        const V3 w = at.tip.R.c[k];
-        R.c[k] = cs * w + sn * cross(u, w) + ((1.0 - cs) * dot(u, w)) * u;
-      }
+      const M3 R = turned_by(at.tip.R, step.b);
       const V6 d{at.point + step.a - (command.p + command.R * offset), rotation_between(command.R, R)};
       put(d, c);
       for (int i = 0; i < count; ++i)
@@ -185,20 +185,20 @@ struct Block {
     const M done = newton.solve(usable, P.starts_linear, iterations, steps);
     V K[6][6];
     newton.dense(newton.answer, K);
-    write(done, newton, K, newton.compliance, iterations);
+    write(done, newton, K, newton.compliance, iterations, steps);
     if (in.perturbed_count == 0) return;
     newton.linearize();  // lanes that settled early have lost their factors
     vary(done, newton, newton.compliance);
   }
 
-  void write(M done, const Newton& newton, const V (&K)[6][6], const V (&C)[6][6], V iterations) {
+  void write(M done, const Newton& newton, const V (&K)[6][6], const V (&C)[6][6], V iterations, V steps) {
     const V3 offset{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
     const V6 d{newton.point - (command.p + command.R * offset), rotation_between(command.R, newton.tip.R)};
     V moved[6];
     put(d, moved);
     for (int i = 0; i < count; ++i) {
       const std::int64_t k = first + i;
-      out.done[k] = done[i] ? 1 : 0;
+      out.done[k] = done[i] ? pose_solved : never[i] ? pose_unreachable : pose_left;
       if (!done[i]) continue;
       for (int r = 0; r < 6; ++r) out.displacement[6 * k + r] = moved[r][i];
       if (out.stiffness)
@@ -211,10 +211,10 @@ struct Block {
       if (out.coordinates)
         for (int q = 0; q < P.coordinate_count; ++q) out.coordinates[P.coordinate_count * k + q] = s.x[q][i];
     }
-    write_efforts(done, newton);
+    write_efforts(done, newton, steps);
   }
 
-  void write_efforts(M done, const Newton& newton) {
+  void write_efforts(M done, const Newton& newton, V steps) {
     V high = splat(0), range = splat(0), limit = splat(0);
     for (int d = 0; d < P.drive_count; ++d) {
       const DriveProgram& k = P.drives[d];
@@ -235,7 +235,8 @@ struct Block {
     for (int i = 0; i < count; ++i)
       if (done[i])
         out.flags[first + i] = (high[i] > 0 ? P.flag_force : 0u) | (range[i] > 0 ? P.flag_range : 0u) |
-                               (limit[i] > 0 ? P.flag_limit : 0u) | P.flag_always;
+                               (limit[i] > 0 ? P.flag_limit : 0u) | (steps[i] > 0 ? P.flag_stepped : 0u) |
+                               P.flag_always;
     if (!out.leg_wrench || P.legs_op < 0) return;
     const Op& block = P.ops[P.legs_op];
     for (int b = 0; b < block.count; ++b) {
@@ -254,7 +255,7 @@ void run(const Program* P, const KernelInput* in, const KernelOutput* out, std::
   Scratch s = lay_out(*P, scratch, nullptr);
   for (std::int64_t i = begin; i < end; i += W) {
     const int count = static_cast<int>(end - i < W ? end - i : W);
-    Block block{*P, *in, *out, s, i, count, {}, {}};
+    Block block{*P, *in, *out, s, i, count, {}, {}, {}};
     block.run();
   }
 }

@@ -33,8 +33,10 @@ struct Op {
 
 struct ChainProgram {
   std::int32_t first, count;  ///< operations
-  std::int32_t first_stiff;   ///< the first spring or block: what comes before starts from rigid
-  Constant nominal, actual;   ///< after the last operation
+  std::int32_t
+      first_stiff;     ///< the first spring or block, or the last joint of the group: before it the chain is rigid
+  std::int32_t group;  ///< slot of the six joints with which a chain without spring or block begins (F12); -1: none
+  Constant nominal, actual;  ///< after the last operation
 };
 
 /// Polyline in (a, tau) by knots, or linear with a cubic term: see Law.
@@ -104,19 +106,22 @@ struct Program {
   const ClosureEquation* equations;
   const ClosureTerm* terms;
   const std::int32_t* unknowns;
-  const PlanarLeg* planar;  ///< one per leg, or null: the closure starts from the grid
-  const double* grid;       ///< closure starts: nodes x row of unknowns of all legs, NaN where unreachable
+  const std::int32_t* envelope;  ///< per unknown: the first one of its leg that shares an equation with one up to it
+  const PlanarLeg* planar;       ///< one per leg, or null: the closure starts from the grid
+  const double* grid;            ///< closure starts: nodes x row of unknowns of all legs, NaN where unreachable
   std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count;
   std::int32_t root, legs_op;  ///< root chain; the legs' block operation
-  std::int32_t joint_slots, stiff_slots;
-  std::int32_t closes;         ///< the legs can be closed one by one
+  std::int32_t joint_slots, stiff_slots, group_slots;
+  std::int32_t closes;         ///< 1: leg by leg, 2: all at once (`legs` is then the whole machine)
+  std::int32_t task[6];        ///< commanded pose components, rotations about the axes of the commanded frame
+  std::int32_t open_task;      ///< some are not
   std::int32_t exact_weights;  ///< the tangent is exact with the bodies' weight too
   std::int32_t starts_linear;  ///< a law with knots or friction: Newton starts with all laws linear
-  std::uint32_t flag_force, flag_range, flag_limit, flag_always;
+  std::uint32_t flag_force, flag_range, flag_limit, flag_always, flag_stepped;
   std::int32_t grid_n[3], grid_row;  ///< nodes along each axis; numbers per node, a multiple of 8
   double grid_low[3], grid_step[3];
   double length, stiffness;
-  double home_R[9];
+  double home_p[3], home_R[9];  ///< tip pose at home, R by columns
 };
 
 /// What each pose asks, row-major.
@@ -135,7 +140,10 @@ struct KernelInput {
   std::int32_t perturbed_count;
 };
 
-/// Row-major answers; null: not wanted. `done` is 0 where the pose needs the reference path.
+/// How a pose left the kernels.
+inline constexpr std::uint8_t pose_left = 0, pose_solved = 1, pose_unreachable = 2;  // left: to the reference path
+
+/// Row-major answers; null: not wanted. `done`: pose_left, pose_solved or pose_unreachable.
 struct KernelOutput {
   double *displacement, *stiffness, *compliance, *effort, *leg_wrench, *coordinates;
   double* perturbed;  ///< count x variants x 6: displacement after one step from the base's answer
@@ -145,10 +153,10 @@ struct KernelOutput {
 };
 
 /// Layout that both sides of the border were compiled with: a stale kernel library is refused.
-inline constexpr std::int64_t program_layout = sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) +
-                                               41 * sizeof(Op) + 43 * sizeof(CoordinateProgram) +
-                                               47 * sizeof(DriveProgram) + 53 * sizeof(LawProgram) +
-                                               59 * sizeof(ClosureTerm) + 61 * sizeof(PlanarLeg);
+inline constexpr std::int64_t program_layout =
+    sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) + 41 * sizeof(Op) +
+    43 * sizeof(CoordinateProgram) + 47 * sizeof(DriveProgram) + 53 * sizeof(LawProgram) + 59 * sizeof(ClosureTerm) +
+    67 * sizeof(ChainProgram) + 61 * sizeof(PlanarLeg);
 
 /// The one symbol that each level exports. Poses begin .. end-1; `scratch` of scratch_size() bytes.
 struct KernelTable {

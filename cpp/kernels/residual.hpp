@@ -3,6 +3,7 @@
 #pragma once
 
 #include "angles.hpp"
+#include "groups.hpp"
 #include "springs.hpp"
 
 namespace stiffmap::kernel {
@@ -53,7 +54,11 @@ inline V6 residual(Elimination& el, const ChainProgram& chain, const V3& end) {
     c.b = c.b - cross(to - p, c.a);
     p = to;
   };
-  for (int i = chain.first_stiff; i < chain.first + chain.count; ++i) {
+  if (chain.group >= 0) {
+    c = group_residual(el, chain, {});
+    p = el.s.joints[el.P.ops[chain.first_stiff].slot].o;
+  }
+  for (int i = chain.group >= 0 ? chain.first_stiff + 1 : chain.first_stiff; i < chain.first + chain.count; ++i) {
     const Op& op = el.P.ops[i];
     if (op.kind == OpKind::load || (op.kind <= OpKind::prismatic && !op.eliminated)) continue;
     if (op.kind <= OpKind::prismatic) {

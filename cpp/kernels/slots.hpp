@@ -36,10 +36,17 @@ struct BranchSlot {
   V6 rest;     ///< residual of its chain at the last pass over all
 };
 
+/// The six joints with which a chain without spring or block begins (F12).
+struct GroupSlot {
+  V inverse[6][6];  ///< from the twist of its end to the joints' steps
+  V3 p;             ///< its end
+};
+
 /// All scratch of a thread, laid out once in one piece of memory.
 struct Scratch {
   JointSlot* joints;
   StiffSlot* stiff;
+  GroupSlot* groups;
   BranchSlot* branches;  ///< per chain
   V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *rubs,
       *kept;  ///< rubs: sign of dry friction; kept: z at the last load step in equilibrium

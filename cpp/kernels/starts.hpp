@@ -6,8 +6,8 @@
 
 namespace stiffmap::kernel {
 
-inline constexpr int most_unknowns = 24;
-inline constexpr int most_closure_unknowns = 8 * most_unknowns;
+inline constexpr int most_unknowns = 48;  // of a leg
+inline constexpr int most_closure_unknowns = 192;
 
 struct Starts {
   const Program& P;
@@ -71,11 +71,15 @@ struct Starts {
     return !any(doubtful != doubtful);
   }
 
-  /// The nearest node within reach: its row of unknowns and its position; null: none.
+  /// The nearest node within reach (of the face of the grid for a point outside): its row of unknowns and its
+  /// position; null: none.
   const double* nearest(const double* p, double (&at)[3]) const {
     Stencil axis[3];
-    for (int k = 0; k < 3; ++k)
-      if (!stencil(k, p[k], 2, axis[k])) return nullptr;
+    for (int k = 0; k < 3; ++k) {
+      const double high = P.grid_low[k] + (P.grid_n[k] - 1) * P.grid_step[k];
+      const double inside = p[k] < P.grid_low[k] ? P.grid_low[k] : p[k] > high ? high : p[k];
+      if (!stencil(k, inside, 2, axis[k])) return nullptr;
+    }
     const std::int64_t stride[3] = {1, P.grid_n[0], static_cast<std::int64_t>(P.grid_n[0]) * P.grid_n[1]};
     double best = 1e300;
     const double* found = nullptr;

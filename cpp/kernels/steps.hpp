@@ -2,7 +2,7 @@
 // Back substitution: steps of all coordinates, from the tip to the base (docs/fast_path.md F4, F7, F8).
 #pragma once
 
-#include "elimination.hpp"
+#include "groups.hpp"
 
 namespace stiffmap::kernel {
 
@@ -83,6 +83,10 @@ inline void back(Elimination& el, const ChainProgram& chain, V6 eta, V3 p, const
     eta = eta - zeta;
     p = k.p;
     stiff_step(el, op, zeta, turn + eta.b, active);
+  }
+  if (chain.group >= 0) {
+    move_twist(eta, p, el.s.groups[chain.group].p);
+    return group_step(el, chain, eta);
   }
   const Op& op = el.P.ops[chain.first_stiff];
   const StiffSlot& k = el.s.stiff[op.slot];

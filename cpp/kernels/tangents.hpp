@@ -4,6 +4,7 @@
 #pragma once
 
 #include "angles.hpp"
+#include "groups.hpp"
 #include "springs.hpp"
 #include "weights.hpp"
 
@@ -86,15 +87,22 @@ inline void prepend_joint(Elimination& el, const Op& op, const V6& F, const V6& 
   eliminate(el, op, j, d, s, el.heavy ? dot(j.J, hung) : splat(0), t);
 }
 
+/// Weights of a chain's bodies that act, but are not in the wrenches yet (F11), about p.
+inline V6 pending_weights(const Elimination& el, const Turning& t, const V3& p) {
+  const V3 w = t.mass * el.pending;
+  return {w, cross(t.lever, el.pending) + cross(t.start - p, w)};
+}
+
 /// What comes before the first compliance of a chain that starts at `start`, backwards.
 inline void prepend(Elimination& el, const ChainProgram& chain, const V3& start, const V6& F, Tangent& t) {
-  V6 hung{};  // pending weights between the joint and the compliance, about t.p
+  V6 hung{};  // pending weights beyond the joint, about t.p
+  if (el.heavy) hung = pending_weights(el, t.turning, t.p);
   for (int i = chain.first_stiff - 1; i >= chain.first; --i) {
     const Op& op = el.P.ops[i];
     if (op.kind == OpKind::load) {
       const JointSlot& j = el.s.joints[op.slot];
       if (!el.heavy) continue;
-      hang(t.turning, splat(op.mass) * el.gravity, j.o + j.w);
+      hang(t.turning, op.mass, splat(op.mass) * el.gravity, j.o + j.w);
       const V3 w = splat(op.mass) * el.pending;
       hung = hung + V6{w, cross(j.o + j.w - t.p, w)};
     } else if (op.eliminated) {
@@ -124,6 +132,8 @@ inline void block_tangent(Elimination& el, const Op& op, Tangent& t) {
     }
     t.turning.M = t.turning.M + own.turning.M;
     t.turning.weight = t.turning.weight + own.turning.weight;
+    t.turning.mass += own.turning.mass;
+    t.turning.lever = t.turning.lever + own.turning.lever;
     t.turning.moment = t.turning.moment + own.turning.moment;
   }
 }
@@ -216,10 +226,10 @@ inline void condense(const StiffSlot& k, Sym6& K, V6& c) {
 }
 
 /// The same elimination in G and M of the chain (F9).
-inline void condense(StiffSlot& k, Turning& t) {
+inline void condense(StiffSlot& k, const V6 (&inner)[3], Turning& t) {
   for (int q = 0; q < 3; ++q) {
     V(&y)[6] = k.turn[q];
-    put(t.G[q], y);
+    put(t.G[q] - inner[q], y);
     V sum[6] = {};
     for (int i = 0; i < 6; ++i) {
       for (int r = 0; r < i; ++r) y[i] -= k.L[i][r] * y[r];
@@ -250,11 +260,13 @@ inline void append_stiff(Elimination& el, const ChainProgram& chain, const V3& s
   if (el.heavy && op.kind == OpKind::block) {
     move(el, t, k.start.p, {k.F.a + own.turning.weight, V3{}});
     t.K.E = t.K.E + own.turning.M;
+    append_block(t.turning, own.turning);
+    t.c = t.c - pending_weights(el, own.turning, t.p);
   }
   move(el, t, k.p, k.F);
   factorise(el, k, t.K, own);
   couple(el, k, t.K, t.c - own.c, own);
-  if (el.heavy) condense(k, t.turning);
+  if (el.heavy) condense(k, own.turning.G, t.turning);
   condense(k, t.K, t.c);
 }
 
@@ -265,7 +277,7 @@ inline void append_load(Elimination& el, const Op& op, Tangent& t) {
   move(el, t, j.o, j.F);
   add_lever(t.K.E, splat(-op.mass), el.gravity, j.w);
   if (!el.heavy) return;
-  append_weight(t.turning, splat(op.mass) * el.gravity, j.o + j.w, j.o);
+  append_weight(t.turning, op.mass, splat(op.mass) * el.gravity, j.o + j.w, j.o);
   const V3 w = splat(op.mass) * el.pending;
   t.c = t.c - V6{w, cross(j.w, w)};
 }
@@ -273,7 +285,15 @@ inline void append_load(Elimination& el, const Op& op, Tangent& t) {
 /// Tangent of a chain at point `end` under the end wrench F, its start frame at point `start` held.
 inline Tangent tangent(Elimination& el, const ChainProgram& chain, const V3& start, const V6& F, const V3& end) {
   Tangent t;
-  for (int i = chain.first; i < chain.first + chain.count; ++i) {
+  int from = chain.first;
+  if (chain.group >= 0) {
+    t.rigid = false;
+    group_tangent(el, chain, t.K, t.c);
+    t.p = el.s.groups[chain.group].p;
+    if (el.heavy) t.turning.clear(t.p);
+    from = chain.first_stiff + 1;
+  }
+  for (int i = from; i < chain.first + chain.count; ++i) {
     const Op& op = el.P.ops[i];
     switch (op.kind) {
       case OpKind::revolute:

@@ -12,12 +12,15 @@ struct Turning {
   V6 G[3];
   S3 M;
   V3 weight, moment;  ///< of all its bodies, about `start`
+  V mass;             ///< of them
+  V3 lever;           ///< masses times centres, from `start`
   V3 start;
 
   void clear(const V3& at) {
     for (V6& g : G) g = V6{};
     M = S3{};
-    weight = moment = V3{};
+    weight = moment = lever = V3{};
+    mass = splat(0);
     start = at;
   }
 };
@@ -36,7 +39,9 @@ inline void downdate(S3& S, const V3& a, V scale) {
 }
 
 /// A body joins the chain rigidly: the lever arm of its weight about the start.
-inline void hang(Turning& t, const V3& weight, const V3& centre) {
+inline void hang(Turning& t, double mass, const V3& weight, const V3& centre) {
+  t.mass += mass;
+  t.lever = t.lever + splat(mass) * (centre - t.start);
   add_lever(t.M, splat(-1.0), weight, centre - t.start);
   t.weight = t.weight + weight;
   t.moment = t.moment + cross(centre - t.start, weight);
@@ -46,15 +51,33 @@ inline void hang(Turning& t, const V3& weight, const V3& centre) {
 inline void restart(Turning& t, const V3& start) {
   add_lever(t.M, splat(-1.0), t.weight, t.start - start);
   t.moment = t.moment + cross(t.start - start, t.weight);
+  t.lever = t.lever + t.mass * (t.start - start);
   t.start = start;
 }
 
 /// A body joins behind a compliance at point p: its weight turned by -s is a change of the end's wrench.
-inline void append_weight(Turning& t, const V3& weight, const V3& centre, const V3& p) {
-  hang(t, weight, centre);
+inline void append_weight(Turning& t, double mass, const V3& weight, const V3& centre, const V3& p) {
+  hang(t, mass, weight, centre);
   const V3 w = weight, o{};
   const V3 turned[3] = {{o.x, -w.z, w.y}, {w.z, o.x, -w.x}, {-w.y, w.x, o.x}};
   for (int k = 0; k < 3; ++k) t.G[k] = t.G[k] + V6{turned[k], cross(centre - p, turned[k])};
+}
+
+/// A block whose start is the end of this chain: in the frame of the chain's start its weights turn too, and it takes
+/// part in the turn of the whole.
+inline void append_block(Turning& t, Turning block) {
+  const V3 w = block.weight, m = splat(0.5) * block.moment, o{};
+  const S3& M = block.M;
+  const V3 force[3] = {{o.x, -w.z, w.y}, {w.z, o.x, -w.x}, {-w.y, w.x, o.x}};
+  const V3 follows[3] = {{o.x, -m.z, m.y}, {m.z, o.x, -m.x}, {-m.y, m.x, o.x}};
+  const V3 column[3] = {{M.xx, M.xy, M.xz}, {M.xy, M.yy, M.yz}, {M.xz, M.yz, M.zz}};
+  for (int k = 0; k < 3; ++k) t.G[k] = t.G[k] + V6{force[k], column[k] + follows[k]};
+  restart(block, t.start);
+  t.M = t.M + block.M;
+  t.weight = t.weight + block.weight;
+  t.moment = t.moment + block.moment;
+  t.mass += block.mass;
+  t.lever = t.lever + block.lever;
 }
 
 /// Another reference point of the end, r further.

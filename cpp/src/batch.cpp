@@ -50,17 +50,24 @@ void write(const Mechanism& m, Index i, const PoseResult& r, const BatchOutput& 
 /// The dense path and its scratch, made when first needed.
 class Reference {
  public:
-  void solve(const Mechanism& m, const BatchInput& in, const SolveOptions& options, Index i, const BatchOutput& out) {
-    if (!ws_) {
-      ws_ = std::make_unique<SolveWorkspace>(m);
-      pose_.load_points = in.load_points;
-      pose_.read_points = in.read_points;
-      pose_.wrenches.assign(in.load_points.size(), Vec6::Zero());
-      pose_.gravity = in.gravity;
-    }
+  void solve(const Mechanism& m, const BatchInput& in, const SolveOptions& options, Index i, const BatchOutput& out,
+             std::uint32_t flags = 0) {
+    prepare(m, in);
+    if (!ws_) ws_ = std::make_unique<SolveWorkspace>(m);
     read(in, i, pose_);
     pose_.closed = in.closed ? in.closed + m.size() * i : nullptr;
     solve_pose(m, pose_, options, *ws_, result_);
+    result_.flags |= flags;
+    write(m, i, result_, out);
+  }
+
+  /// What is said of a pose that the kernels found out of reach.
+  void unreachable(const Mechanism& m, const BatchInput& in, Index i, const BatchOutput& out) {
+    prepare(m, in);
+    result_.flags = 0;
+    result_.iterations = 0;
+    result_.indeterminate.assign(at(m.size()), false);
+    fail_pose(m, pose_, Status::unreachable, result_);
     write(m, i, result_, out);
   }
 
@@ -79,6 +86,15 @@ class Reference {
   }
 
  private:
+  void prepare(const Mechanism& m, const BatchInput& in) {
+    if (!pose_.read_points.empty()) return;
+    pose_.load_points = in.load_points;
+    pose_.read_points = in.read_points;
+    pose_.wrenches.assign(in.load_points.size(), Vec6::Zero());
+    pose_.gravity = in.gravity;
+    result_.x = VecX::Zero(m.size());
+  }
+
   std::unique_ptr<SolveWorkspace> ws_;
   std::unique_ptr<ClosureWorkspace> closure_;
   PoseInput pose_;
@@ -173,7 +189,9 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
   if (!takes(m, plan, in, options)) {
     const Index n = in.count * 6 * static_cast<Index>(in.variants.size());
     if (out.variants) Eigen::Map<VecX>(out.variants, n).setConstant(std::nan(""));
-    return solve_reference(m, in, options, threads, out);
+    solve_reference(m, in, options, threads, out);
+    for (Index i = 0; out.flags && i < in.count; ++i) out.flags[i] |= flag::reference_path;
+    return;
   }
   const KernelTable& table = kernel(in.count);
   const Program& program = plan.program();
@@ -212,8 +230,10 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
     if (in.closed || !program.closes) s.closed.put(m, in, begin, end, s.reference, input);
     table.run(&program, &input, &answer, begin, end, kernel_scratch(table.scratch_size(&program)));
     for (long i = begin; i < end; ++i) {
-      if (!done[static_cast<std::size_t>(i)]) {
-        s.reference.solve(m, in, options, i, out);
+      const std::uint8_t how = done[static_cast<std::size_t>(i)];
+      if (how != pose_solved) {
+        if (how == pose_unreachable) s.reference.unreachable(m, in, i, out);
+        else s.reference.solve(m, in, options, i, out, flag::reference_path);
         if (out.variants) {
           const Index n = 6 * static_cast<Index>(variants.size());
           Eigen::Map<VecX>(out.variants + n * i, n).setConstant(std::nan(""));

@@ -51,6 +51,7 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.equations = d.equations.data();
   p.terms = d.terms.data();
   p.unknowns = d.unknowns.data();
+  p.envelope = d.envelope.data();
   p.planar = d.planar.empty() ? nullptr : d.planar.data();
   p.op_count = i32(d.ops.size());
   p.chain_count = i32(d.chains.size());
@@ -62,6 +63,7 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.flag_force = flag::drive_force;
   p.flag_range = flag::drive_range;
   p.flag_limit = flag::joint_limit;
+  p.flag_stepped = flag::load_stepped;
   p.length = m.length;
   p.stiffness = m.stiffness;
 }
@@ -78,9 +80,15 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high) : data
   const bool box = (high - low).minCoeff() >= 0 && high.allFinite();
   const bool leg_by_leg = m.task == full_task && only_legs_have_joints(m, *data_) && compile_closure(m, *data_);
   if (leg_by_leg) recognise_planar_legs(m, *data_);
+  const bool whole = !leg_by_leg && box && compile_whole_closure(m, *data_);
   link(m, *data_);
-  data_->program.closes = leg_by_leg && (box || data_->program.planar);
-  if (data_->program.closes && !data_->program.planar) place_grid(m, low, high, *data_);
+  Program& p = data_->program;
+  for (std::size_t i = 0; i < 6; ++i) p.task[i] = m.task[i];
+  for (int i = 0; i < 3; ++i) p.home_p[i] = m.home.p[i];
+  for (int i = 0; i < 9; ++i) p.home_R[i] = m.home.R(i % 3, i / 3);
+  p.open_task = m.task != full_task;
+  p.closes = leg_by_leg && (box || p.planar) ? 1 : whole ? 2 : 0;
+  if (p.closes && !p.planar) place_grid(m, low, high, *data_);
 }
 
 bool FastPlan::nearest_start(const Mechanism& m, const Vec3& position, VecX& x, Pose& at) const {

@@ -7,6 +7,11 @@
 
 namespace stiffmap {
 
+namespace flag {
+/// The fast path was asked for and left the pose to the reference path. Bits below: types.hpp.
+inline constexpr std::uint32_t reference_path = 1u << 13;
+}  // namespace flag
+
 /// Row-major inputs of `count` poses.
 struct BatchInput {
   Index count = 0;

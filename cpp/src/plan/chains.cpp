@@ -68,9 +68,23 @@ class Compiler {
     for (std::size_t i = 0; i < ops.size(); ++i)
       if (p.first_stiff < 0 && (ops[i].kind == OpKind::spring || ops[i].kind == OpKind::block))
         p.first_stiff = p.first + i32(i);
-    if (p.first_stiff < 0) found_.missing = "a chain without a full link spring";
+    p.group = -1;
+    if (p.first_stiff < 0) first_group(p, ops, start_moves);
     if (outermost && out_.program.legs_op >= 0) out_.program.legs_op += p.first;
     out_.ops.insert(out_.ops.end(), ops.begin(), ops.end());
+  }
+
+  /// A chain without spring or block starts with its first six joints together (docs/fast_path.md F12).
+  void first_group(ChainProgram& p, const std::vector<Op>& ops, bool start_moves) {
+    int joints = 0;
+    for (std::size_t i = 0; i < ops.size(); ++i) {
+      if (ops[i].kind == OpKind::load && start_moves) out_.program.exact_weights = 0;
+      if (ops[i].kind > OpKind::prismatic || !ops[i].eliminated || p.first_stiff >= 0) continue;
+      if (++joints < 6) continue;
+      p.first_stiff = p.first + i32(i);
+      p.group = out_.program.group_slots++;
+    }
+    if (p.group < 0) found_.missing = "a chain with neither a full link spring nor six joints that yield";
   }
 
   Op& push(OpKind kind, Way& way, std::vector<Op>& ops) {
@@ -165,8 +179,6 @@ class Compiler {
 
   void body(const Body& b, Way& way, std::vector<Op>& ops) {
     if (b.mass == 0) return;
-    // The turn of a start frame that itself moves in a moving frame is left out (docs/fast_path.md F9).
-    if (moving_blocks_ > 1) out_.program.exact_weights = 0;
     Op& op = push(OpKind::load, way, ops);
     op.slot = out_.program.joint_slots++;
     op.mass = b.mass;
@@ -177,8 +189,6 @@ class Compiler {
     const std::size_t first = out_.chains.size();
     out_.chains.resize(first + b.branches.size());
     const bool is_legs = outermost && b.name == "legs" && out_.program.legs_op < 0;
-    const bool moves = way.moves;
-    moving_blocks_ += moves;
     const int here = i32(ops.size());
     Op& op = push(OpKind::block, way, ops);
     op.first = i32(first);
@@ -186,7 +196,6 @@ class Compiler {
     op.slot = out_.program.stiff_slots++;
     op.start_moves = way.moves;
     for (std::size_t k = 0; k < b.branches.size(); ++k) chain(b.branches[k].second, first + k, false, way.moves);
-    moving_blocks_ -= moves;
     if (is_legs) out_.program.legs_op = here;
     way.rigid = false;
     way.moves = true;
@@ -195,7 +204,6 @@ class Compiler {
   const Mechanism& m_;
   FastPlanData& out_;
   std::int32_t next_ = 0;
-  int moving_blocks_ = 0;  ///< blocks around here whose start moves
   CompiledChains found_;
 };
 

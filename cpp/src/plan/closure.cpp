@@ -1,39 +1,74 @@
 // SPDX-License-Identifier: MIT
 #include "closure.hpp"
 
+#include <algorithm>
 #include <map>
 
 namespace stiffmap {
 namespace {
 
-constexpr int most_leg_unknowns = 24;
+constexpr int most_leg_unknowns = 48, most_unknowns = 192;  // as starts.hpp of the kernels
 
 class ClosureCompiler {
  public:
   ClosureCompiler(const Mechanism& m, FastPlanData& out) : m_(m), out_(out) {}
 
-  bool run() {
+  bool legs() {
     const Op block = out_.ops[static_cast<std::size_t>(out_.program.legs_op)];
-    for (int k = 0; k < block.count; ++k) {
-      LegClosure leg{};
-      leg.first_equation = i32(out_.equations.size());
-      leg.first_unknown = i32(out_.unknowns.size());
-      local_.clear();
-      std::vector<ClosureTerm> way;
-      const int chain = block.first + k;
-      follow(chain, way);
-      add_equation(chain, -1, way);
-      leg.equations = i32(out_.equations.size()) - leg.first_equation;
-      leg.unknowns = i32(local_.size());
-      if (leg.unknowns > most_leg_unknowns || leg.equations > most_leg_unknowns ||
-          out_.unknowns.size() > 8 * most_leg_unknowns)
-        return false;
-      out_.legs.push_back(leg);
-    }
+    for (int k = 0; k < block.count; ++k)
+      if (!close(block.first + k)) return false;
     return true;
   }
 
+  bool whole() { return close(out_.program.root); }
+
  private:
+  /// The loops inside a chain, and its end against the command.
+  bool close(std::int32_t chain) {
+    LegClosure leg{};
+    leg.first_equation = i32(out_.equations.size());
+    leg.first_unknown = i32(out_.unknowns.size());
+    local_.clear();
+    std::vector<ClosureTerm> way;
+    follow(chain, way);
+    add_equation(chain, -1, way);
+    leg.equations = i32(out_.equations.size()) - leg.first_equation;
+    leg.unknowns = i32(local_.size());
+    if (leg.unknowns > most_leg_unknowns || leg.equations > most_leg_unknowns ||
+        out_.unknowns.size() > static_cast<std::size_t>(most_unknowns))
+      return false;
+    for (int i = 0; i < leg.equations; ++i) {
+      const ClosureEquation& e = out_.equations[static_cast<std::size_t>(leg.first_equation + i)];
+      if (e.count > 2 * most_leg_unknowns) return false;
+    }
+    turn_round(leg);
+    out_.legs.push_back(leg);
+    return true;
+  }
+
+  /// Unknowns in the reverse order of the chains: those that all loops share come last, so that eliminating the
+  /// others fills little; and the first entry of each row of the normal equations.
+  void turn_round(const LegClosure& leg) {
+    const auto first = out_.unknowns.begin() + leg.first_unknown;
+    std::reverse(first, out_.unknowns.end());
+    std::vector<std::int32_t> row(static_cast<std::size_t>(leg.unknowns));
+    for (std::size_t i = 0; i < row.size(); ++i) row[i] = i32(i);
+    for (int i = 0; i < leg.equations; ++i) {
+      const ClosureEquation& e = out_.equations[static_cast<std::size_t>(leg.first_equation + i)];
+      std::int32_t lowest = leg.unknowns;
+      for (int t = 0; t < e.count; ++t) {
+        std::int32_t& u = out_.terms[static_cast<std::size_t>(e.first + t)].unknown;
+        u = leg.unknowns - 1 - u;
+        lowest = std::min(lowest, u);
+      }
+      for (int t = 0; t < e.count; ++t) {
+        std::int32_t& r = row[static_cast<std::size_t>(out_.terms[static_cast<std::size_t>(e.first + t)].unknown)];
+        r = std::min(r, lowest);
+      }
+    }
+    out_.envelope.insert(out_.envelope.end(), row.begin(), row.end());
+  }
+
   /// Appends the joints of the primary way through a chain; loops met on it become equations.
   void follow(int chain, std::vector<ClosureTerm>& way) {
     const ChainProgram& c = out_.chains[static_cast<std::size_t>(chain)];
@@ -78,7 +113,9 @@ class ClosureCompiler {
 
 }  // namespace
 
-bool compile_closure(const Mechanism& m, FastPlanData& out) { return ClosureCompiler(m, out).run(); }
+bool compile_closure(const Mechanism& m, FastPlanData& out) { return ClosureCompiler(m, out).legs(); }
+
+bool compile_whole_closure(const Mechanism& m, FastPlanData& out) { return ClosureCompiler(m, out).whole(); }
 
 bool only_legs_have_joints(const Mechanism& m, const FastPlanData& d) {
   const ChainProgram& root = d.chains[0];

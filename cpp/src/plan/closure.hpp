@@ -12,6 +12,9 @@ bool only_legs_have_joints(const Mechanism& m, const FastPlanData& d);
 /// Closure equations of each leg: its end against the command, and each loop inside it; false: too many.
 bool compile_closure(const Mechanism& m, FastPlanData& out);
 
+/// The same for the whole machine at once: every loop, and the commanded components of the tip.
+bool compile_whole_closure(const Mechanism& m, FastPlanData& out);
+
 /// Closed forms, if every leg has one.
 void recognise_planar_legs(const Mechanism& m, FastPlanData& out);
 

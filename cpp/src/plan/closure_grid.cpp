@@ -24,6 +24,8 @@ class GridKey {
     add(d.program.grid_step);
     add(m.home.p);
     add(m.home.R);
+    add(m.task);
+    add(d.program.closes);
   }
 
   std::string text;

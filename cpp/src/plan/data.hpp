@@ -26,7 +26,7 @@ struct FastPlanData {
   std::vector<LegClosure> legs;
   std::vector<ClosureEquation> equations;
   std::vector<ClosureTerm> terms;
-  std::vector<std::int32_t> unknowns;
+  std::vector<std::int32_t> unknowns, envelope;
   std::vector<PlanarLeg> planar;
   std::shared_ptr<const std::vector<double>> grid;
 };

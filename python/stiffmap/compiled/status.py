@@ -31,3 +31,4 @@ class Flag(IntFlag):
     BRANCH_UNVERIFIED = 1 << 10
     FREE_PLAY = 1 << 11
     LOAD_STEPPED = 1 << 12
+    REFERENCE_PATH = 1 << 13

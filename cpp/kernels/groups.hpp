@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+// The six joints with which a chain without spring or block begins: what is before them is rigid, so there is no
+// tangent to append the first ones to; together they make one (docs/fast_path.md F12).
+#pragma once
+
+#include "elimination.hpp"
+
+namespace stiffmap::kernel {
+
+/// The eliminated joints of a chain up to its `first_stiff`, from the base.
+struct Group {
+  const Op* joint[6];
+  Group(const Program& P, const ChainProgram& chain) {
+    for (int i = chain.first, k = 0; i <= chain.first_stiff && k < 6; ++i)
+      if (P.ops[i].kind <= OpKind::prismatic && P.ops[i].eliminated) joint[k++] = P.ops + i;
+  }
+};
+
+/// Inverse of a 6x6 by Gauss-Jordan, each lane with its own order of rows; returns the smallest pivot.
+inline V invert_by_rows(V (&m)[6][6], V (&x)[6][6]) {
+  V lowest = splat(1e300);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) x[i][j] = splat(i == j ? 1 : 0);
+  for (int k = 0; k < 6; ++k) {
+    for (int i = k + 1; i < 6; ++i) {
+      const M swap = absolute(m[i][k]) > absolute(m[k][k]);
+      for (int j = 0; j < 6; ++j) {
+        const V a = m[k][j], b = m[i][j], c = x[k][j], d = x[i][j];
+        m[k][j] = select(swap, b, a);
+        m[i][j] = select(swap, a, b);
+        x[k][j] = select(swap, d, c);
+        x[i][j] = select(swap, c, d);
+      }
+    }
+    const V size = absolute(m[k][k]);
+    lowest = size < lowest ? size : lowest;
+    const V inverse = 1.0 / m[k][k];
+    for (int j = 0; j < 6; ++j) {
+      m[k][j] *= inverse;
+      x[k][j] *= inverse;
+    }
+    for (int i = 0; i < 6; ++i) {
+      if (i == k) continue;
+      const V f = m[i][k];
+      for (int j = 0; j < 6; ++j) {
+        m[i][j] -= f * m[k][j];
+        x[i][j] -= f * x[k][j];
+      }
+    }
+  }
+  return lowest;
+}
+
+/// How the generalised forces of the joints turn with the joints: -H of theory (E4), half of the moment turning.
+inline void group_stiffness(const Elimination& el, const ChainProgram& chain, const V6& F, const V3& end, V (&A)[6][6],
+                            V (&pull)[6]) {
+  const Group group(el.P, chain);
+  // Sum of lever arm times force of all that acts behind the joint: A w = sum r (f·w), trace = sum r·f.
+  M3 arms{};
+  V3 force = F.a, pending{}, moment{};
+  V3 at = end;
+  const auto lever = [&](const V3& r, const V3& f) {
+    arms.c[0] = arms.c[0] + f.x * r;
+    arms.c[1] = arms.c[1] + f.y * r;
+    arms.c[2] = arms.c[2] + f.z * r;
+  };
+  int b = 5;
+  for (int i = chain.first_stiff; i >= chain.first && b >= 0; --i) {
+    const Op& op = el.P.ops[i];
+    const bool joint = op.kind <= OpKind::prismatic;
+    if (joint && !op.eliminated) continue;
+    const JointSlot& j = el.s.joints[op.slot];
+    lever(at - j.o, force);
+    moment = moment + cross(at - j.o, pending);
+    at = j.o;
+    if (!joint) {
+      const V3 weight = splat(op.mass) * el.gravity, more = splat(op.mass) * el.pending;
+      lever(j.w, weight);
+      force = force + weight;
+      moment = moment + cross(j.w, more);
+      pending = pending + more;
+      continue;
+    }
+    V3 g;
+    if (op.kind == OpKind::prismatic) {
+      g = cross(j.w, force);
+      pull[b] = dot(j.w, pending);
+    } else {
+      const V trace = arms.c[0].x + arms.c[1].y + arms.c[2].z;
+      g = arms * j.w - trace * j.w + splat(0.5) * cross(j.w, F.b);
+      pull[b] = dot(j.w, moment);
+    }
+    for (int a = 0; a <= b; ++a) {
+      const Op& before = *group.joint[a];
+      const bool turns = before.kind == OpKind::revolute;
+      A[a][b] = turns ? -dot(el.s.joints[before.slot].w, g) : splat(0);
+      A[b][a] = A[a][b];
+    }
+    A[b][b] += el.s.dtau[op.coordinate] / el.s.da[op.coordinate];
+    --b;
+  }
+}
+
+/// Out-of-balance wrench at the end of the group from the joints' out-of-balance forces: J^-T rho.
+inline V6 group_residual(Elimination& el, const ChainProgram& chain, const V (&pull)[6]) {
+  const Group group(el.P, chain);
+  const GroupSlot& k = el.s.groups[chain.group];
+  V c[6] = {};
+  for (int a = 0; a < 6; ++a) {
+    const Op& op = *group.joint[a];
+    const JointSlot& j = el.s.joints[op.slot];
+    const V rho = el.s.tau[op.coordinate] - dot(j.w, op.kind == OpKind::prismatic ? j.F.a : j.F.b) - pull[a];
+    for (int i = 0; i < 6; ++i) c[i] += k.inverse[a][i] * rho;
+  }
+  return get(c);
+}
+
+/// Tangent K = J^-T A J^-1 and c at the last joint of the group.
+inline void group_tangent(Elimination& el, const ChainProgram& chain, Sym6& K, V6& c) {
+  const Group group(el.P, chain);
+  GroupSlot& k = el.s.groups[chain.group];
+  const JointSlot& last = el.s.joints[group.joint[5]->slot];
+  k.p = last.o;
+  V A[6][6], pull[6], J[6][6], Y[6][6];
+  group_stiffness(el, chain, last.F, k.p, A, pull);
+  for (int a = 0; a < 6; ++a) {
+    const JointSlot& j = el.s.joints[group.joint[a]->slot];
+    V column[6];
+    put(group.joint[a]->kind == OpKind::prismatic ? V6{j.w, V3{}} : V6{cross(j.w, k.p - j.o), j.w}, column);
+    for (int i = 0; i < 6; ++i) J[i][a] = column[i] * (i < 3 ? 1 / el.P.length : 1.0);
+  }
+  const V pivot = invert_by_rows(J, k.inverse);
+  el.lowest = select(pivot > 1e-4, el.lowest, splat(-1));  // next to a singular configuration: left to the reference
+  for (int a = 0; a < 6; ++a)
+    for (int i = 0; i < 3; ++i) k.inverse[a][i] *= 1 / el.P.length;
+  for (int a = 0; a < 6; ++a)
+    for (int i = 0; i < 6; ++i) {
+      Y[a][i] = A[a][0] * k.inverse[0][i];
+      for (int b = 1; b < 6; ++b) Y[a][i] += A[a][b] * k.inverse[b][i];
+    }
+  const auto entry = [&](int i, int q) {
+    V sum = k.inverse[0][i] * Y[0][q];
+    for (int a = 1; a < 6; ++a) sum += k.inverse[a][i] * Y[a][q];
+    return sum;
+  };
+  K.A = {entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(0, 2), entry(1, 2)};
+  for (int q = 0; q < 3; ++q) K.B.c[q] = {entry(0, 3 + q), entry(1, 3 + q), entry(2, 3 + q)};
+  K.E = {entry(3, 3), entry(4, 4), entry(5, 5), entry(3, 4), entry(3, 5), entry(4, 5)};
+  c = group_residual(el, chain, pull);
+}
+
+/// Steps of the group's joints from the twist of its end.
+inline void group_step(Elimination& el, const ChainProgram& chain, const V6& eta) {
+  const Group group(el.P, chain);
+  const GroupSlot& k = el.s.groups[chain.group];
+  V e[6];
+  put(eta, e);
+  for (int a = 0; a < 6; ++a) {
+    V step = k.inverse[a][0] * e[0];
+    for (int i = 1; i < 6; ++i) step += k.inverse[a][i] * e[i];
+    const int q = group.joint[a]->coordinate;
+    el.s.dz[q] = step / el.s.da[q];
+  }
+}
+
+}  // namespace stiffmap::kernel
