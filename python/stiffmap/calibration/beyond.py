@@ -22,6 +22,10 @@ FREE = 100.0
 FAR = 3.0
 """Standard uncertainties that a number must be off to be called beyond tolerance."""
 MOST = 4
+WIDEST = float(np.log(100.0))
+"""Of a factor's logarithm; beyond it something else is wrong."""
+SHARE = 0.7
+"""Of the folds that must gain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +37,11 @@ class BeyondTolerance:
     factor: Floats
 
 
-def beyond_tolerance(sums: Sums, unknowns: Sequence[Unknown]) -> BeyondTolerance:
-    """Forward search; the instrument's scale is its certificate's and never let go."""
+def beyond_tolerance(sums: Sums, unknowns: Sequence[Unknown], folds: Sequence[Sums] = ()) -> BeyondTolerance:
+    """Forward search; the instrument's scale is its certificate's and never let go, and a mass or compliance
+    goes no further than `WIDEST`. Most of the `folds` must gain by themselves: a model's error that
+    poses share is no noise, and sums over all of them overstate what they say.
+    """
     factor = np.ones(len(unknowns))
     found: list[Beyond] = []
     which: list[int] = []
@@ -49,7 +56,12 @@ def beyond_tolerance(sums: Sums, unknowns: Sequence[Unknown]) -> BeyondTolerance
         trial[best] = FREE
         freed = sums.scaled(trial)
         value = float(freed.estimate[best] * FREE)
-        if abs(value) < FAR:
+        p = unknowns[best]
+        if (
+            abs(value) < FAR
+            or (p.unit == "ln" and abs(value) * p.u > WIDEST)
+            or not _holds(folds, factor, best)
+        ):
             break
         factor = trial
         which.append(best)
@@ -57,9 +69,14 @@ def beyond_tolerance(sums: Sums, unknowns: Sequence[Unknown]) -> BeyondTolerance
         rivals = tuple(
             unknowns[i].name for i in np.argsort(-gains) if i != best and gains[i] > gains[best] - STRONG
         )
-        p = unknowns[best]
         found.append(Beyond(p.name, value * p.u, spread * p.u, p.unit, float(gains[best]), rivals))
     return BeyondTolerance(tuple(found), tuple(which), factor)
+
+
+def _holds(folds: Sequence[Sums], factor: Floats, i: int) -> bool:
+    """Whether letting unknown i go pays in most of the folds, each by itself."""
+    gains = [_gains(f.scaled(factor))[i] > 0.0 for f in folds]
+    return not gains or sum(gains) >= SHARE * len(gains)
 
 
 def _gains(sums: Sums) -> Floats:

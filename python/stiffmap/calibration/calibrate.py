@@ -102,6 +102,13 @@ class Calibrator:
     """Variance of the model's error per pose, in noise variances."""
     out: Mask
     seconds: dict[str, float]
+    until: float = np.inf
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the time budget ended it before it was done."""
+        late = not self.fit.converged and time.monotonic() > self.until
+        return self.sensitivity.stopped or late
 
     @staticmethod
     def of(
@@ -140,13 +147,13 @@ class Calibrator:
         q = problem.nuisance.shape[1]
         felt = columns @ directions(columns)
 
-        def weigh(a: Floats, linear: Floats) -> Floats:
+        def weigh(a: Floats, linear: Floats) -> tuple[Floats, float]:
             rho = model_form(Blocks.of(felt, linear, label, q))
-            return Blocks.of(a, linear, label, q).beside(rho).estimate
+            return Blocks.of(a, linear, label, q).beside(rho).estimate, 1.0 + rho
 
         fit = fitted(predictor, problem, s, columns, weigh, until=until)
         rho = model_form(Blocks.of(felt, fit.linear, label, q))
-        return Calibrator(predictor, s, noise, problem, columns, fit, rho, out, seconds)
+        return Calibrator(predictor, s, noise, problem, columns, fit, rho, out, seconds, until)
 
     def _alone(self) -> Mask:
         """(n,) rows that stand out of what the fit leaves; its misfit as a whole is no row's fault."""
@@ -186,7 +193,7 @@ class Calibrator:
         start = time.perf_counter()
         sums, members = self.sums, self.members()
         names = self.sensitivity.unknowns
-        found = beyond_tolerance(sums, names)
+        found = beyond_tolerance(sums, names, self._folds(seed))
         freed = sums.scaled(found.factor)
         choice = compare(freed, members, [b for b in BASE if b in members])
         fit, rho = self.fit, self.rho
@@ -219,7 +226,7 @@ class Calibrator:
             rest=_rest(e, np.where(keep, after, np.nan), size),
             outliers=tuple(e.ids[i] for i in np.flatnonzero(self.out)),
             failed=self.sensitivity.failed,
-            stopped=self.sensitivity.stopped or not fit.converged,
+            stopped=self.stopped,
             unit=unit,
             machine=Machine(edited(self.predictor.machine.description, moves)),
             experiment=e,
@@ -228,6 +235,11 @@ class Calibrator:
             values=values,
             seconds=seconds,
         )
+
+    def _folds(self, seed: int) -> list[Sums]:
+        """The sums of each fold's own readings."""
+        label = folds(self.predictor.experiment, seed)[0][self.problem.index[0]]
+        return [self.blocks(label == k).beside(self.rho) for k in np.unique(label)]
 
     def residual_at(self, values: Floats) -> Floats:
         """(N,) whitened residual at values (p,), linear in them."""
@@ -261,6 +273,8 @@ class Calibrator:
                 values[which] = others.pick(which).estimate * factor[which]
                 left[name][test] = self.residual_at(values)[test]
         found = {name: size(self.unwhite(r)) for name, r in left.items()}
+        keep = ~self.out[:, None]
+        found["before"] = size(np.where(keep, self.left(self.sensitivity.base), np.nan))
         return HeldOut(by, found.pop("before"), found.pop("all"), found.pop("chosen"), found)
 
 

@@ -114,7 +114,7 @@ def fitted(
     problem: Problem,
     s: Sensitivity,
     columns: Floats,
-    weigh: Callable[[Floats, Floats], Floats],
+    weigh: Callable[[Floats, Floats], tuple[Floats, float]],
     *,
     until: float = np.inf,
 ) -> Fitted:
@@ -123,19 +123,20 @@ def fitted(
     columns
         (N, p) whitened `s.columns`.
     weigh
-        (columns, linear residual) -> values: the posterior mean under the priors.
+        (columns, linear residual) -> the posterior mean under the priors, and the variance of one
+        reading's misfit in noise variances.
     """
     values = np.zeros(columns.shape[1])
     prediction = s.base
     residual = problem.residual(prediction)
     converged = not columns.shape[1]
     for _ in range(STEPS if columns.shape[1] else 0):
-        wanted = weigh(columns, residual + columns @ values)
+        wanted, variance = weigh(columns, residual + columns @ values)
         step = wanted - values
         if float(np.abs(step).max()) < CLOSE or float(np.linalg.norm(columns @ step)) < CLOSE:
             converged = True
             break
-        moved = _step(predictor, problem, s, values, step, residual)
+        moved = _step(predictor, problem, s, values, step, residual, variance)
         if moved is None:
             break
         values, prediction, residual = moved
@@ -145,10 +146,16 @@ def fitted(
 
 
 def _step(
-    predictor: Predictor, problem: Problem, s: Sensitivity, values: Floats, step: Floats, residual: Floats
+    predictor: Predictor,
+    problem: Problem,
+    s: Sensitivity,
+    values: Floats,
+    step: Floats,
+    residual: Floats,
+    variance: float,
 ) -> tuple[Floats, Floats, Floats] | None:
     """The step, halved while the machine cannot be solved with it or the misfit and prior grow."""
-    before = float(residual @ residual) + float(values @ values)
+    before = float(residual @ residual) / variance + float(values @ values)
     for _ in range(4):
         moved = values + step
         try:
@@ -157,7 +164,7 @@ def _step(
             step = step / 2
             continue
         here = problem.residual(prediction)
-        if float(here @ here) + float(moved @ moved) <= before * (1.0 + 1e-9):
+        if float(here @ here) / variance + float(moved @ moved) <= before * (1.0 + 1e-6):
             return moved, prediction, here
         step = step / 2
     return None

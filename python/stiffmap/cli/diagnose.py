@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from stiffmap.calibration import Tolerances
 from stiffmap.cli.output import JsonOption
 from stiffmap.diagnosis import Diagnosis, diagnose
 from stiffmap.errors import FileError
@@ -20,23 +22,50 @@ def diagnose_command(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of folds and simulated noise.")] = 0,
     threads: Annotated[int | None, typer.Option(help="Threads; default: all cores.")] = None,
+    exclude: Annotated[
+        list[str] | None, typer.Option(help="Kind of effect or group of numbers known not to be; repeatable.")
+    ] = None,
+    budget: Annotated[
+        float | None, typer.Option(min=0.1, help="Seconds after which the best so far is given.")
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option(min=1e-3, help="Factor on the default standard uncertainties of the machine.")
+    ] = 1.0,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing of what is being tried.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Which physical effect a machine lacks, where it sits, how large it is, and how sure that is.
 
     With -o: diagnosis.json (SI), report.html (all inside), machine.yaml (corrected), pictures.
+    Ctrl-C ends the search: what was found by then is the answer.
     Exit codes: 0 verdict none, 1 verdict with findings, 2 bad input.
 
     Examples:
 
       [cyan]stiffmap diagnose orthoglide-revised experiments/servo -o result[/cyan]
+
+      [cyan]stiffmap diagnose ur10 tracker --exclude sensor_gain --budget 60[/cyan]
     """
-    result = diagnose(machine, data, seed=seed, threads=threads)
+    silent = quiet or as_json or not sys.stderr.isatty()
+    result = diagnose(
+        machine,
+        data,
+        seed=seed,
+        threads=threads,
+        exclude=exclude or (),
+        budget=budget,
+        tolerances=Tolerances().scaled(tolerance),
+        progress=None if silent else _say,
+    )
     if output is not None:
         write(result, output)
     print(result.to_json() if as_json else result)
     if result.verdict != "none":
         raise typer.Exit(1)
+
+
+def _say(what: str) -> None:
+    print(f"trying: {what}", file=sys.stderr)
 
 
 def write(result: Diagnosis, folder: Path) -> None:
@@ -52,3 +81,5 @@ def write(result: Diagnosis, folder: Path) -> None:
         raise FileError(f"cannot be written: {error.strerror}", file=str(folder)) from error
     result.report(folder / "report.html")
     result.machine.save(folder / "machine.yaml")
+    if result.calibration is not None:
+        result.calibration.machine.save(folder / "calibrated.yaml")
