@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiffmap.description import Joint, MachineDescription
+from stiffmap.description.tree import sequences
 from stiffmap.diagnosis.candidates import Candidate
 from stiffmap.diagnosis.screen import Screen
 from stiffmap.effects import registry
-from stiffmap.effects.edit import sequences
 from stiffmap.experiment.experiment import Floats
 
 LARGEST, DETECTABLE = 20.0, 3.0

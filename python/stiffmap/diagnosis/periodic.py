@@ -10,9 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stiffmap.description import AppliedEffect, Joint, MachineDescription
+from stiffmap.description import AppliedEffect
 from stiffmap.diagnosis.candidates import Candidate
-from stiffmap.effects.edit import sequences
 from stiffmap.experiment.configuration import coordinates_of
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.predict import Predictor
@@ -69,15 +68,6 @@ def coordinate(candidate: Candidate, leg: str, predictor: Predictor) -> Floats:
     found = coordinates_of(predictor.machine, e)
     mine = [n.split(".")[0] == leg if leg else "." not in n for n in names]
     i = next(k for k, n in enumerate(names) if mine[k] and n.split(".")[-1] == candidate.element)
-    return np.asarray(
-        found[:, predictor.machine.compiled.names.joints[names[i]]]
-        - home(predictor.machine.description, leg, candidate.element)
-    )
-
-
-def home(description: MachineDescription, leg: str, element: str) -> float:
-    """Home coordinate of a drive."""
-    legs = {g.name: g.elements for g in description.legs} | {"": (*description.base, *description.platform)}
-    return next(
-        e.home[0] for s in sequences(legs[leg]) for e in s if isinstance(e, Joint) and e.name == element
-    )
+    compiled = predictor.machine.compiled
+    joint = compiled.names.joints[names[i]]
+    return np.asarray(found[:, joint] - compiled.home_coordinates()[joint])

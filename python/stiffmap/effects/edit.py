@@ -2,36 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
-from stiffmap.description import Block, Element, MachineDescription, Offset, Pose
+from stiffmap.description import Element, MachineDescription, Offset, Pose
+from stiffmap.description.tree import Edit, Elements, edit_sequences
 
-Elements = tuple[Element, ...]
 Sites = Callable[[Elements], dict[str, tuple[int, ...]]]
-Edit = Callable[[Elements], Elements]
 Change = Callable[[Element], Elements]
-
-
-def sequences(elements: Elements) -> Iterator[Elements]:
-    """A sequence and those of the branches in it."""
-    yield elements
-    for element in elements:
-        if isinstance(element, Block):
-            for branch in element.branches:
-                yield from sequences(branch.elements)
-
-
-def edit_sequences(elements: Elements, edit: Edit) -> Elements:
-    """The sequence with ``edit`` applied to it and to those of the branches in it."""
-
-    def inside(element: Element) -> Element:
-        if not isinstance(element, Block):
-            return element
-        branches = tuple(replace(b, elements=edit_sequences(b.elements, edit)) for b in element.branches)
-        return replace(element, branches=branches)
-
-    return edit(tuple(inside(element) for element in elements))
 
 
 def edit_legs(description: MachineDescription, legs: tuple[str, ...], edit: Edit) -> MachineDescription:

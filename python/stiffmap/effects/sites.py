@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from stiffmap.description import Block, Body, Element, Joint, MachineDescription, Offset, Point, Spring
-from stiffmap.effects.edit import Elements, Sites, sequences
+from stiffmap.description.tree import Elements, sequences
+from stiffmap.effects.edit import Sites
 from stiffmap.effects.types import Place
 
 
@@ -54,7 +55,7 @@ def guides(elements: Elements) -> dict[str, tuple[int, ...]]:
 
 def free_joints(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Passive joints without a law."""
-    return _by_name(elements, lambda e: isinstance(e, Joint) and not e.actuated and e.law is None)
+    return _by_name(elements, lambda e: isinstance(e, Joint) and e.free)
 
 
 def passive_joints(elements: Elements) -> dict[str, tuple[int, ...]]:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.description import CommandError, Element, Joint, Leg, MachineDescription
-from stiffmap.effects.edit import edit_sequences
+from stiffmap.description.tree import edit_sequences
 from stiffmap.experiment.configuration import coordinates_of
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.kinematics import forward_kinematics, inverse_kinematics

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
-from stiffmap.description import Block, Body, Element, Joint, MachineDescription, Offset, Point, Spring
+from stiffmap.description import Body, Element, Joint, MachineDescription, Offset, Point, Spring, tree
 from stiffmap.description.elements import Matrix6
 from stiffmap.description.pose import Pose, Vector
-
-Change = Callable[[Element], Element | None]
-"""None: the element has no such number."""
-TOOL_ENDS = ("base", "platform")
 
 
 def moved(description: MachineDescription, key: str, delta: float) -> MachineDescription | None:
@@ -28,65 +23,17 @@ def moved(description: MachineDescription, key: str, delta: float) -> MachineDes
     def change(element: Element) -> Element | None:
         return _moved_number(element, field, delta)
 
-    if sequence in TOOL_ENDS:
-        found = _edit(getattr(description, sequence), path, change)
-        if found is None:
-            return None
-        return (
-            replace(description, base=found) if sequence == "base" else replace(description, platform=found)
-        )
-    legs, hit = [], False
-    for leg in description.legs:
-        found = _edit(leg.elements, path, change) if leg.name == sequence else None
-        hit = hit or found is not None
-        legs.append(leg if found is None else replace(leg, elements=found))
-    return replace(description, legs=tuple(legs)) if hit else None
+    return tree.edit(description, full, change)
 
 
 def number(description: MachineDescription, key: str) -> float | None:
     """The number (SI) under ``full.name/field``; None as in `moved`."""
-    seen: list[float] = []
     full, _, field = key.partition("/")
-    sequence, *path = full.split(".")
-
-    def look(element: Element) -> Element | None:
-        value = _value(element, field)
-        if value is not None:
-            seen.append(value)
-        return None
-
-    pools = [getattr(description, sequence)] if sequence in TOOL_ENDS else []
-    pools += [leg.elements for leg in description.legs if leg.name == sequence]
-    for pool in pools:
-        if path:
-            _edit(pool, path, look)
-    seen += [getattr(s, field) for s in description.external_springs
-             if not path and s.name == sequence and field in ("stiffness", "length")]  # fmt: skip
-    return seen[0] if seen else None
-
-
-def _edit(elements: tuple[Element, ...], path: list[str], change: Change) -> tuple[Element, ...] | None:
-    out, hit = list(elements), False
-    for i, element in enumerate(elements):
-        new: Element | None = None
-        if len(path) == 1 and element.name == path[0]:
-            new = change(element)
-        elif isinstance(element, Block):
-            new = _edit_block(element, path, change)
-        if new is not None:
-            out[i], hit = new, True
-    return tuple(out) if hit else None
-
-
-def _edit_block(block: Block, path: list[str], change: Change) -> Element | None:
-    """A full name holds the branch, not the block."""
-    for i, branch in enumerate(block.branches):
-        found = _edit(branch.elements, path[1:], change) if branch.name == path[0] and path[1:] else None
-        if found is not None:
-            branches = list(block.branches)
-            branches[i] = replace(branch, elements=found)
-            return replace(block, branches=tuple(branches))
-    return None
+    if "." in full:
+        values = (_value(element, field) for element in tree.find(description, full))
+        return next((value for value in values if value is not None), None)
+    springs = [s for s in description.external_springs if s.name == full and field in ("stiffness", "length")]
+    return getattr(springs[0], field) if springs else None
 
 
 def _moved_number(element: Element, field: str, delta: float) -> Element | None:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.description import Block, Branch, Element, Joint, MachineDescription, Offset
-from stiffmap.effects.edit import Elements, change_sites
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import change_sites
 from stiffmap.effects.sites import blocks
 from stiffmap.effects.types import Placed
 

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from stiffmap.description import CommandError, Element, Joint, MachineDescription
-from stiffmap.effects.edit import Elements, change_sites
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import change_sites
 from stiffmap.effects.sites import drives
 from stiffmap.effects.types import Placed
 

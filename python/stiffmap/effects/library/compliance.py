@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from stiffmap.description import Element, Joint, Law, MachineDescription, Spring
-from stiffmap.effects.edit import Elements, change_sites
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import change_sites
 from stiffmap.effects.sites import at_sites, found, joints, springs
 from stiffmap.effects.types import EffectType, Parameter, Placed
 from stiffmap.errors import StiffmapError

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from stiffmap.description import Element, Joint, Law, MachineDescription, Spring
-from stiffmap.effects.edit import Elements, change_sites, sequences
+from stiffmap.description.tree import Elements, sequences
+from stiffmap.effects.edit import change_sites
 from stiffmap.effects.sites import elastic_directions
 from stiffmap.effects.types import Parameter, ParametersAt, Placed
 from stiffmap.errors import StiffmapError

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.description import Body, Element, MachineDescription
-from stiffmap.effects.edit import Elements, change_sites, sequences
+from stiffmap.description.tree import Elements, sequences
+from stiffmap.effects.edit import change_sites
 from stiffmap.effects.sites import bodies, places
 from stiffmap.effects.types import EffectType, Parameter, Place, Placed
 from stiffmap.errors import StiffmapError

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.description import Joint, Law, MachineDescription, Offset, Pose, Spring
-from stiffmap.effects.edit import Elements, edit_legs
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import edit_legs
 from stiffmap.effects.library.joint_compliance import insert_at, pins
 from stiffmap.effects.sites import at_sites, passive_joints
 from stiffmap.effects.types import EffectType, Parameter, Placed

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from stiffmap.description import Joint, MachineDescription, Spring
-from stiffmap.effects.edit import Elements, edit_legs, splice
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import edit_legs, splice
 from stiffmap.effects.library.spring import PARAMETERS, isotropic
 from stiffmap.effects.sites import at_sites, passive_joints, springs
 from stiffmap.effects.types import EffectType, Placed

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.description import MachineDescription, Offset, Pose
-from stiffmap.effects.edit import Elements, built, splice
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import built, splice
 from stiffmap.effects.library.geometry import names_of, rotation_of, rotations
 from stiffmap.effects.sites import per_leg
 from stiffmap.effects.types import EffectType, Parameter, Placed

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from stiffmap.description import Element, MachineDescription, Offset, Pose
-from stiffmap.effects.edit import Elements, change_sites
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import change_sites
 from stiffmap.effects.sites import at_sites, lengths
 from stiffmap.effects.types import EffectType, Parameter, Placed
 

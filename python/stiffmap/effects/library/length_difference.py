@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.description import Block, Branch, MachineDescription, Spring
-from stiffmap.effects.edit import Elements
+from stiffmap.description.tree import Elements
 from stiffmap.effects.library.bars import change_branches, spread_blocks
 from stiffmap.effects.library.length import longer
 from stiffmap.effects.sites import at_sites, links

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.description import Element, Joint, MachineDescription
-from stiffmap.effects.edit import Elements, change_sites
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import change_sites
 from stiffmap.effects.library.drive_law import in_unit_of_joint
 from stiffmap.effects.sites import at_sites, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter, Placed

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.description import Element, MachineDescription, Pose
-from stiffmap.effects.edit import Elements, built, change_sites, splice
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import built, change_sites, splice
 from stiffmap.effects.library.geometry import names_of, translation_of, translations
 from stiffmap.effects.sites import joints, per_leg, places
 from stiffmap.effects.types import EffectType, Parameter, Place, Placed

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.description import Element, MachineDescription, Spring
-from stiffmap.effects.edit import Elements, change_sites
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import change_sites
 from stiffmap.effects.library.geometry import names_of, translation_of, translations
 from stiffmap.effects.sites import at_sites, springs
 from stiffmap.effects.types import EffectType, Parameter, Placed

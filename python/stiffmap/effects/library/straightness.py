@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.description import CommandError, Element, GuideError, Joint, MachineDescription
-from stiffmap.effects.edit import Elements, change_sites
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import change_sites
 from stiffmap.effects.library import periodic_error
 from stiffmap.effects.sites import at_sites, guides
 from stiffmap.effects.types import EffectType, Option, Placed

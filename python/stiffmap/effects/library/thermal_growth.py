@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from stiffmap.description import Element, MachineDescription
-from stiffmap.effects.edit import Elements, change_sites
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import change_sites
 from stiffmap.effects.library.length import longer
 from stiffmap.effects.sites import at_sites, lengths
 from stiffmap.effects.types import EffectType, Parameter, Placed

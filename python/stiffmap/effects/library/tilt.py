@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from stiffmap.description import Element, Joint, MachineDescription
-from stiffmap.effects.edit import Elements, built, change_sites
+from stiffmap.description.tree import Elements
+from stiffmap.effects.edit import built, change_sites
 from stiffmap.effects.library.geometry import about, home_position, names_of, rotation_of, rotations
 from stiffmap.effects.sites import at_sites, joints
 from stiffmap.effects.types import EffectType, Parameter, Placed
