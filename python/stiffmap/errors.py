@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 LONGEST_WORD, LONGEST_MESSAGE = 400, 3000  # characters
 
@@ -24,6 +25,24 @@ class FileError(StiffmapError):
         place = file if line is None else f"{file}, line {line}"
         super().__init__(": ".join(part for part in (place, key, message) if part))
         self.file, self.line, self.key, self.reason = file, line, key, message
+
+
+class FileErrors(FileError):
+    """Several problems of one file, one line each; ``problems`` holds them, the other attributes are those of
+    the first."""
+
+    def __init__(self, problems: Sequence[FileError]) -> None:
+        first = problems[0]
+        super().__init__(first.reason, file=first.file, line=first.line, key=first.key)
+        self.args = ("\n".join(str(p) for p in problems),)
+        self.problems = tuple(problems)
+
+
+def together(problems: Sequence[FileError]) -> FileError:
+    """One error of one or more problems: each once, in the order of the lines."""
+    flat = [one for p in problems for one in (p.problems if isinstance(p, FileErrors) else (p,))]
+    each = sorted({str(p): p for p in flat}.values(), key=lambda p: p.line or 0)
+    return each[0] if len(each) == 1 else FileErrors(each)
 
 
 class UnknownMachineError(StiffmapError):

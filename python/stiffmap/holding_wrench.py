@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.compiled import CompiledMachine, Status
 from stiffmap.errors import StiffmapError
-from stiffmap.rotations import check_rotations
+from stiffmap.rotations import as_rotations
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def holding_wrench(
     r = trailing(
         machine.home_rotation if rotation is None else rotation, (3, 3), "rotation", "rotation matrices"
     )
-    check_rotations(r)
+    r = as_rotations(r)
     if point not in machine.names.points:
         raise StiffmapError(f"point: expected one of {', '.join(machine.names.points)}, got {point!r}")
     shape = batch(p.shape[:-1], d.shape[:-1], r.shape[:-2])

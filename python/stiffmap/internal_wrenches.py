@@ -91,6 +91,6 @@ def assembly_stress(
 
 def _has_law(machine: Machine, name: str) -> bool:
     return any(
-        isinstance(e, Joint) and e.law is not None and (name == n or name.rpartition(".")[0] == n)
+        isinstance(e, Joint) and any(e.laws) and (name == n or name.rpartition(".")[0] == n)
         for n, e in all_elements(machine.description)
     )

@@ -1,4 +1,4 @@
-"""Rotation matrices."""
+"""Rotation matrices: about an axis, and as they are commanded."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import numpy as np
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 
-ORTHOGONAL = 1e-9
+ORTHOGONAL = 1e-6  # entries of R^T R - I that the digits of an input may leave
+EXACT = 1e-13
 
 
-def check_rotations(r: Floats) -> None:
-    """StiffmapError unless all finite matrices (..., 3, 3) are rotations."""
+def as_rotations(r: Floats) -> Floats:
+    """Matrices (..., 3, 3) as rotations: those that are off by the digits of the input are replaced by the
+    nearest rotation, poses that are not finite are kept. StiffmapError for anything else."""
     finite = np.asarray(np.isfinite(r).all(axis=(-2, -1)))
     off = np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(axis=(-2, -1), initial=0)
     mirrored = np.linalg.det(np.where(finite[..., None, None], r, np.eye(3))) < 0
@@ -23,6 +25,13 @@ def check_rotations(r: Floats) -> None:
             f"rotation: expected rotation matrices, got one with |R^T R - I| = {np.max(bad):.1e}"
             f"{' and det < 0' if np.any(mirrored) else ''}"
         )
+    rough = finite & (off > EXACT)
+    if not np.any(rough):
+        return r
+    out = r.copy()
+    u, _, v = np.linalg.svd(r[rough])
+    out[rough] = u @ v
+    return out
 
 
 def rotation_about(axis: Floats, angle: float) -> Floats:

@@ -14,7 +14,7 @@ from stiffmap.compiled.machine import LOAD_TYPES
 from stiffmap.errors import StiffmapError
 from stiffmap.kinematics import Kinematics, close_actuators, close_poses
 from stiffmap.options import SolveOptions
-from stiffmap.rotations import check_rotations
+from stiffmap.rotations import as_rotations
 from stiffmap.solution import Solution
 
 METHODS = ("fast", "reference")
@@ -124,7 +124,7 @@ def _arrays(machine: CompiledMachine, call: Call) -> tuple[Floats, Floats, Float
     r = machine.home_rotation
     if call.options.rotation is not None:
         r = trailing(call.options.rotation, (3, 3), "rotation", "rotation matrices")
-        check_rotations(r)
+        r = as_rotations(r)
     extra = {n: wrench_array(v, f"wrenches[{n!r}]") for n, v in call.options.wrenches.items()}
     return p, w, r, extra
 

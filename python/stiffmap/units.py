@@ -1,4 +1,4 @@
-"""Units of a machine file, and their exact conversion to SI."""
+"""Units of length, force, mass and angle, and their exact conversion to SI."""
 
 from __future__ import annotations
 
@@ -60,3 +60,9 @@ class UnitSystem:
         if self.angle == "deg" and dimension.angle:
             result *= math.radians(1.0) ** dimension.angle
         return float(result)
+
+    def say(self, si: float, dimension: Dimension, digits: int = 4) -> str:
+        """An SI length or angle with its unit, as the file would write it."""
+        unit = self.angle if dimension == ANGLE else self.length
+        scale = math.radians(1.0) if unit == "deg" else 1.0 if unit == "rad" else float(LENGTHS[unit])
+        return f"{si / scale:.{digits}g} {unit}"

@@ -11,7 +11,7 @@ import typer
 
 from stiffmap.cli.commands import COMMANDS, Command
 from stiffmap.cli.vectors import joined
-from stiffmap.errors import MissingPartError, StiffmapError
+from stiffmap.errors import FileErrors, MissingPartError, StiffmapError
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -29,7 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         build_app(given)(args=given, prog_name="stiffmap")
     except StiffmapError as error:
-        print(f"stiffmap: {one_line(error)}", file=sys.stderr)
+        for problem in error.problems if isinstance(error, FileErrors) else (error,):
+            print(f"stiffmap: {one_line(problem)}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         return INTERRUPTED

@@ -153,7 +153,7 @@ def describe(e: Element) -> str:
 
 def _joint(e: Joint) -> str:
     if not e.actuated:
-        return f"passive {e.kind} joint" + (" with a spring" if e.law else "")
+        return f"passive {e.kind} joint" + ("" if e.free else " with a spring")
     if e.law is None:
         return f"{e.kind} actuator, rigid"
     unit, scale = ("mm/N", 1e3) if e.kind == "prismatic" else ("rad/(N m)", 1.0)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiffmap import _core
+from stiffmap.compiled.ball import charted
 from stiffmap.description import (
     TASK,
     Block,
@@ -31,20 +32,29 @@ START = 1e-3  # rad or m: slope of a stick law in the linear start of Newton's i
 
 def build_mechanism(machine: MachineDescription) -> _core.Mechanism:
     """Compiled mechanism; raises StiffmapError where the core refuses the description."""
-    root = _core.Chain()
     try:
-        add_elements(root, machine.base)
-        root.block("legs", [(leg.name, chain(leg.elements)) for leg in machine.legs])
-        add_elements(root, machine.platform)
+        root = root_chain(machine)
         springs = [
             _core.ExternalSpring(s.name, s.point, np.array(s.anchor), s.stiffness, s.length, s.tension_only)
             for s in machine.external_springs
         ]
-        if machine.task == TASK:
-            return _core.Mechanism(root, pose(machine.home), springs)
-        return _core.Mechanism(root, pose(machine.home), springs, [c in machine.task for c in TASK])
+        return _core.Mechanism(root, pose(machine.home), springs, task(machine))
     except ValueError as problem:
         raise StiffmapError(f"{machine.name}: {problem}") from None
+
+
+def root_chain(machine: MachineDescription) -> _core.Chain:
+    """Compiled chain from the base through the legs to the TCP."""
+    root = _core.Chain()
+    add_elements(root, machine.base)
+    root.block("legs", [(leg.name, chain(leg.elements)) for leg in machine.legs])
+    add_elements(root, machine.platform)
+    return root
+
+
+def task(machine: MachineDescription) -> list[bool]:
+    """Which of the six pose components are commanded."""
+    return [c in machine.task for c in TASK]
 
 
 def pose(p: Pose) -> _core.Pose:
@@ -85,15 +95,19 @@ def add_elements(out: _core.Chain, elements: Sequence[Element]) -> None:
 
 def add_joint(out: _core.Chain, e: Joint) -> None:
     """A joint as elementary joints; several axes get the names ``name.1``, ``name.2`` …"""
-    if len(e.axes) != len(e.home):
-        raise StiffmapError(
-            f"joint {e.name}: expected one home coordinate per axis ({len(e.axes)}), got {len(e.home)}"
-        )
+    for what, given in (("home", e.home), ("axis_laws", e.axis_laws or None)):
+        if given is not None and len(given) != len(e.axes):
+            raise StiffmapError(
+                f"joint {e.name}: expected one entry of {what} per axis ({len(e.axes)}), got {len(given)}"
+            )
+    e, turn = charted(e)
+    if turn is not None:
+        out.offset(f"{e.name}.home", pose(turn), pose(turn))
     range_ = e.drive.range if e.drive and e.drive.range else e.limits
     lower, upper = range_ or (-UNLIMITED, UNLIMITED)
     force = e.drive.force if e.drive and e.drive.force else UNLIMITED
     stuck = e.friction if e.friction and e.friction.branch == "loading_stuck" else None
-    own = stick_law(stuck.level) if stuck else law(e.law) if e.law else None
+    own = [stick_law(stuck.level) if stuck else law(one) if one else None for one in e.laws]
     for i, (axis, home) in enumerate(zip(e.axes, e.home, strict=True)):
         out.joint(
             name=e.name if len(e.axes) == 1 else f"{e.name}.{i + 1}",
@@ -101,7 +115,7 @@ def add_joint(out: _core.Chain, e: Joint) -> None:
             axis=np.array(axis),
             actuated=e.actuated,
             home=home,
-            law=own,
+            law=own[i],
             compliance_slope=e.compliance_slope,
             errors=[command_error(c) for c in e.command_errors],
             lower=lower,

@@ -48,11 +48,12 @@ class Joint:
         Coordinates (m, rad) in the home configuration, one per axis.
     actuated
         One axis only. ``law`` is then the compliance of the drive (``None``: rigid); a passive
-        joint with ``law=None`` turns freely, otherwise ``law`` applies to each of its axes about
-        its home coordinate.
+        joint with ``law=None`` turns freely, otherwise ``law`` applies to each of its axes.
+    axis_laws
+        One law per axis of a passive joint, in place of ``law``.
     compliance_slope
         Relative change of the drive's compliance per metre (or rad) of the commanded coordinate,
-        measured from ``home``.
+        measured from the closed home configuration.
     friction
         Of a passive joint without a law.
     """
@@ -63,12 +64,23 @@ class Joint:
     home: tuple[float, ...] = (0.0,)
     actuated: bool = False
     law: Law | None = None
+    axis_laws: tuple[Law, ...] = ()
     compliance_slope: float = 0.0
     command_errors: tuple[CommandError, ...] = ()
     guide_errors: tuple[GuideError, ...] = ()
     friction: JointFriction | None = None
     limits: tuple[float, float] | None = None
     drive: Drive | None = None
+
+    @property
+    def laws(self) -> tuple[Law | None, ...]:
+        """Law of each axis; ``None``: free, or rigid where it is actuated."""
+        return self.axis_laws or (self.law,) * len(self.axes)
+
+    @property
+    def free(self) -> bool:
+        """Passive, and no spring about any axis."""
+        return not self.actuated and not any(self.laws)
 
 
 @dataclass(frozen=True)

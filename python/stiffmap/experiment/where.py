@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from stiffmap.compiled.ball import charted
 from stiffmap.description import Block, Element, Joint, MachineDescription, Offset, Point, Pose
 from stiffmap.experiment.configuration import coordinates_of
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -56,7 +57,8 @@ def _along(
         elif isinstance(e, Offset):
             frame = _step(frame, e.nominal)
         elif isinstance(e, Joint):
-            frame = _turn(frame, e, full, at)
+            own, turn = charted(e)
+            frame = _turn(frame if turn is None else _step(frame, turn), own, full, at)
     return frame, None
 
 

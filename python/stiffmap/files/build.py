@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from stiffmap.description import (
     ExternalSpring,
     MachineDescription,
 )
-from stiffmap.description.pose import Vector
+from stiffmap.description.pose import Pose, Vector
 from stiffmap.description.tree import point_names
 from stiffmap.files.build_elements import build_elements, build_range
 from stiffmap.files.build_geometry import build_pose, build_vector
@@ -32,26 +33,31 @@ GRAVITY_LIMIT = 1000.0  # m/s²; above it, the file gave mm/s²
 def build(
     model: MachineFile, document: Document, file: str = "", folder: Path = Path()
 ) -> MachineDescription:
-    """Description without its effects, which the caller applies; raises `FileError`."""
+    """Description without its effects, which the caller applies; raises `FileError` with every problem."""
     units = UnitSystem(**model.units.model_dump())
     context = Context(file, document, folder, units, model.materials, Gathered())
+    tried = context.attempt
+    templates = {name: t for name, t in model.templates.items() if isinstance(t, list)}
+    legs = [tried(partial(build_leg, *leg, templates, context)) for leg in model.legs.items()]
+    springs = [
+        tried(partial(_external_spring, name, s, context.at("external_springs", name).inside(name)))
+        for name, s in model.external_springs.items()
+    ]
     description = MachineDescription(
         task=tuple(c for c in TASK if c in model.task),
         name=model.name,
-        legs=tuple(build_leg(name, leg, model.templates, context) for name, leg in model.legs.items()),
+        legs=tuple(leg for leg in legs if leg is not None),
         base=build_elements(model.base, context.at("base").inside("base")),
         platform=build_elements(model.platform, context.at("platform").inside("platform")),
-        home=build_pose(model.home, context.at("home"), "home."),
-        workspace=_workspace(model.workspace, context.at("workspace")),
-        gravity=_gravity(model.gravity, context.at("gravity")),
-        external_springs=tuple(
-            _external_spring(name, spring, context.at("external_springs", name).inside(name))
-            for name, spring in model.external_springs.items()
-        ),
+        home=tried(partial(build_pose, model.home, context.at("home"), "home.")) or Pose(),
+        workspace=tried(partial(_workspace, model.workspace, context.at("workspace"))),
+        gravity=tried(partial(_gravity, model.gravity, context.at("gravity"))),
+        external_springs=tuple(s for s in springs if s is not None),
         title=model.title,
         source=model.source,
         extra=tuple((key, _tuples(value)) for key, value in model.extra.items()),
     )
+    context.raise_problems()
     _check_points(description, context.at("external_springs"))
     gathered = context.gathered
     return replace(

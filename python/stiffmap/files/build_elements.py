@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +43,7 @@ ZERO = Number(value=0.0)
 
 
 def build_elements(models: Sequence[ElementModel], context: Context) -> tuple[Element, ...]:
-    """A sequence; raises `FileError` where a name occurs twice.
+    """A sequence; problems (also a name that occurs twice) are kept in ``context`` for the end.
 
     Bodies and points have names of their own sort: a body may be called as the spring that follows it.
     """
@@ -49,14 +51,17 @@ def build_elements(models: Sequence[ElementModel], context: Context) -> tuple[El
     elements = []
     for i, model in enumerate(models):
         here = context.at(i)
-        element = build_element(model, here)
+        element = context.attempt(partial(build_element, model, here))
+        if element is None:
+            continue
         names = [element.name]
         if isinstance(element, Block):
             names += [branch.name for branch in element.branches]
         sort = {Body: "body", Point: "point"}.get(type(element), "element")
         for name in names:
             if (sort, name) in taken:
-                here.fail(f"the name '{name}' is taken by an earlier {sort} of this sequence")
+                taken_by = f"the name '{name}' is taken by an earlier {sort} of this sequence"
+                context.gathered.problems.append(here.error(taken_by))
             taken.add((sort, name))
         elements.append(element)
     return tuple(elements)
@@ -98,7 +103,7 @@ def _joint(model: JointModel, context: Context) -> Joint:
     axes = tuple(model.axes) if model.axes is not None else (model.axis,)
     angular = model.kind != "prismatic"
     coordinate = ANGLE if angular else LENGTH
-    home = model.home if isinstance(model.home, list) else [model.home or ZERO] * len(axes)
+    home = _list(model.home) if model.home is not None else [ZERO] * len(axes)
     limits = None
     if model.limits is not None:
         limits = build_range(model.limits, coordinate, context, "limits")
@@ -106,30 +111,55 @@ def _joint(model: JointModel, context: Context) -> Joint:
         model.joint,
         model.kind,
         tuple(a for a in axes if a is not None),
-        home_coordinates(home, coordinate, context),
-        law=_law(model, angular, context),
+        coordinates(home, coordinate, context),
+        **_laws(model, angular, context),
         limits=limits,
     )
 
 
-def home_coordinates(numbers: Sequence[Number], dimension: Dimension, context: Context) -> tuple[float, ...]:
-    """SI home coordinates, one per axis."""
-    names = ["home"] if len(numbers) == 1 else [f"home.{i + 1}" for i in range(len(numbers))]
+def _list(numbers: Number | list[Number]) -> list[Number]:
+    return numbers if isinstance(numbers, list) else [numbers]
+
+
+def _laws(model: JointModel, angular: bool, context: Context) -> dict[str, Any]:
+    """``law``, or ``axis_laws`` where there is a list."""
+    for key in ("stiffness", "compliance"):
+        given = getattr(model, key)
+        if isinstance(given, list):
+            one = [
+                _linear_law(key, number, angular, context.at(key, i), f".{i + 1}")
+                for i, number in enumerate(given)
+            ]
+            return {"law": one[0]} if len(one) == 1 else {"axis_laws": tuple(one)}
+    return {"law": _law(model, angular, context)}
+
+
+def coordinates(
+    numbers: Sequence[Number], dimension: Dimension, context: Context, key: str = "home"
+) -> tuple[float, ...]:
+    """SI coordinates, one per axis."""
+    names = [key] if len(numbers) == 1 else [f"{key}.{i + 1}" for i in range(len(numbers))]
     return tuple(context.si(n, dimension, name) for n, name in zip(numbers, names, strict=True))
 
 
 def _law(model: JointModel | ActuatorModel, angular: bool, context: Context) -> Law | None:
-    linear = Dimension(length=1, force=1) if angular else Dimension(length=-1, force=1)
-    if model.stiffness is not None:
-        if model.stiffness.value <= 0.0:
-            context.at("stiffness").fail(f"must be positive; found {model.stiffness.value}")
-        return Law(context.si(model.stiffness, linear, "stiffness"))
-    if model.compliance is not None:
-        inverse = Dimension(*(-n for n in linear))
-        return Law(context.at("compliance").inverse(model.compliance, inverse, "stiffness"))
+    for key in ("stiffness", "compliance"):
+        number = getattr(model, key)
+        if number is not None:
+            return _linear_law(key, number, angular, context.at(key))
     if model.law is not None:
         return build_law(model.law, angular, context.at("law"), "law")
     return None
+
+
+def _linear_law(key: str, number: Number, angular: bool, context: Context, axis: str = "") -> Law:
+    """The law of one stiffness or compliance at this place of the file."""
+    linear = Dimension(length=1, force=1) if angular else Dimension(length=-1, force=1)
+    if key == "compliance":
+        return Law(context.inverse(number, Dimension(*(-n for n in linear)), f"stiffness{axis}"))
+    if number.value <= 0.0:
+        context.fail(f"must be positive; found {number.value}")
+    return Law(context.si(number, linear, f"stiffness{axis}"))
 
 
 def build_range(pair: list[Number], dimension: Dimension, context: Context, name: str) -> tuple[float, float]:
@@ -163,7 +193,7 @@ def _actuator(model: ActuatorModel, context: Context) -> Joint:
         model.actuator,
         model.kind,
         (model.axis,),
-        home_coordinates([model.home or ZERO], coordinate, context),
+        coordinates([model.home or ZERO], coordinate, context),
         actuated=True,
         law=_law(model, angular, context),
         compliance_slope=slope or 0.0,

@@ -12,7 +12,8 @@ from stiffmap.files.schema.geometry import NAMED, Frame, Turn
 from stiffmap.rotations import rotation_about
 from stiffmap.units import ANGLE, LENGTH, NONE, Dimension
 
-ROTATION_TOLERANCE = 1e-9
+ROTATION_TOLERANCE = 1e-6
+EXACT = 1e-14  # such rows stay as written: saved files must load back equal
 
 
 def build_vector(numbers: list[Number], dimension: Dimension, context: Context, name: str) -> Vector:
@@ -61,6 +62,9 @@ def _checked_rows(rows: list[list[Number]], context: Context) -> Rows:
         )
     if np.linalg.det(matrix) < 0.0:
         context.fail("the rotation is left-handed (determinant -1)")
+    if error > EXACT:
+        u, _, v = np.linalg.svd(matrix)  # the nearest rotation
+        matrix = u @ v
     return _rows(matrix) if np.any(matrix != np.eye(3)) else IDENTITY
 
 

@@ -22,6 +22,7 @@ def build_leg(name: str, leg: LegModel, templates: dict[str, list[ElementModel]]
     if name in RESERVED:
         here.fail(f"'{name}' cannot be a leg's name: full names use it")
     here.note(leg.note)
+    problems = len(context.gathered.problems)
     if leg.template is not None:
         if leg.template not in templates:
             known = list(templates)
@@ -33,8 +34,10 @@ def build_leg(name: str, leg: LegModel, templates: dict[str, list[ElementModel]]
         elements = build_elements(templates[leg.template], template)
     else:
         elements = build_elements(leg.elements or [], here.at("elements"))
+    if len(context.gathered.problems) > problems:
+        context.raise_problems()  # what follows refers to the elements
     for joint, home in (leg.home or {}).items():
-        elements = with_home(elements, joint.split("."), home, here.at("home", joint).inside(joint))
+        elements = with_home(elements, joint, home, here.at("home", joint).inside(joint))
     return Leg(name, (*_frame(leg, here, elements), *elements, *_attach(leg, here, elements)))
 
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
-from stiffmap.errors import FileError
+from stiffmap.errors import FileError, together
 from stiffmap.files.report import key_text
 from stiffmap.files.schema.base import Number
 from stiffmap.files.schema.springs import Material
 from stiffmap.files.yaml_text import Document, KeyPath
 from stiffmap.units import Dimension, UnitSystem
+
+T = TypeVar("T")
 
 
 @dataclass
@@ -30,6 +33,7 @@ class Gathered:
     uncertainty: dict[str, float] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
     links: dict[str, LinkUse] = field(default_factory=dict)
+    problems: list[FileError] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,19 @@ class Context:
     def fail(self, message: str) -> NoReturn:
         """Raise an error at this place."""
         raise self.error(message)
+
+    def attempt(self, build: Callable[[], T]) -> T | None:
+        """What ``build`` makes; None where it fails, its problem kept for the end."""
+        try:
+            return build()
+        except FileError as problem:
+            self.gathered.problems.append(problem)
+            return None
+
+    def raise_problems(self) -> None:
+        """Raise everything that was kept."""
+        if self.gathered.problems:
+            raise together(self.gathered.problems)
 
     def note(self, text: str, field_name: str = "") -> None:
         """Keep a note about the element, or about one of its fields."""

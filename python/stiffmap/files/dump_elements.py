@@ -93,7 +93,15 @@ def _joint(joint: Joint) -> Plain:
     plain["home"] = float(joint.home[0]) if len(joint.home) == 1 else floats(joint.home)
     if joint.limits is not None:
         plain["limits"] = floats(joint.limits)
-    return {**plain, **_law(joint.law)}
+    return {**plain, **_law(joint.law), **_axis_laws(joint)}
+
+
+def _axis_laws(joint: Joint) -> Plain:
+    if not joint.axis_laws:
+        return {}
+    if any(set(_law_terms(one)) != {"stiffness"} for one in joint.axis_laws):
+        raise StiffmapError(f"{joint.name}: a file holds one stiffness per axis, no other laws")
+    return {"stiffness": [float(one.stiffness) for one in joint.axis_laws]}
 
 
 def _actuator(joint: Joint) -> Plain:

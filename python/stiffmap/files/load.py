@@ -17,6 +17,7 @@ from stiffmap.files.report import file_error
 from stiffmap.files.schema import MachineFile
 from stiffmap.files.schema.base import describe
 from stiffmap.files.shipped import find
+from stiffmap.files.templates import expanded
 from stiffmap.files.yaml_text import Document, parse, read
 
 
@@ -36,6 +37,8 @@ def description_from_text(text: str, file: str = "text", folder: Path = Path()) 
 
 def describe_document(document: Document, file: str, folder: Path) -> MachineDescription:
     """Schema, then SI, then effects."""
+    if isinstance(document.data, dict):
+        document = expanded(document, file)
     model = validate(document, file)
     base = build(model, document, file, folder)
     if not model.effects:
@@ -45,7 +48,7 @@ def describe_document(document: Document, file: str, folder: Path) -> MachineDes
 
 
 def validate(document: Document, file: str) -> MachineFile:
-    """Plain data against the schema; raises `FileError` with the first problem."""
+    """Plain data against the schema; raises `FileError` with every problem."""
     if not isinstance(document.data, dict):
         found = describe(document.data)
         raise FileError(f"a machine file is a mapping with name, units and legs; found {found}", file=file)

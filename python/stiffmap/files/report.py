@@ -6,25 +6,25 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from stiffmap.errors import FileError
+from stiffmap.errors import FileError, together
 from stiffmap.files.schema.base import describe, suggestion
 from stiffmap.files.schema.elements import SORTS
 from stiffmap.files.yaml_text import Document, KeyPath
 
 
 def file_error(error: ValidationError, document: Document, file: str) -> FileError:
-    """The first of pydantic's errors; how many more there are is said."""
-    errors = error.errors(include_url=False)
-    first = errors[0]
-    missing = first["type"] == "missing"
-    path = _path(first["loc"], document.data, missing)
-    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    """All of pydantic's errors."""
+    return together([_one(e, document, file) for e in error.errors(include_url=False)])
+
+
+def _one(error: Any, document: Document, file: str) -> FileError:
+    missing = error["type"] == "missing"
+    path = _path(error["loc"], document.data, missing)
     if missing:
         path, message = path[:-1], f"missing key '{path[-1]}'"
     else:
-        message = _message(first)
-    line = document.line(path) or 1
-    return FileError(message + more, file=file, line=line, key=key_text(path))
+        message = _message(error)
+    return FileError(message, file=file, line=document.line(path) or 1, key=key_text(path))
 
 
 def key_text(path: KeyPath) -> str:

@@ -38,7 +38,7 @@ def test_schema_file_is_current() -> None:
 def test_starter_loads_and_closes() -> None:
     machine = description_from_text(starter_text("mine"))
     assert machine.name == "mine"
-    assert max(gap.translation for gap in home_gaps(machine)) < 1e-15
+    assert max(gap.translation for gap in home_gaps(machine)) < 1e-5  # four digits, which loading closes
 
 
 @pytest.mark.parametrize("key", sorted(keys(machine_schema()) - WRITTEN_ON_SAVING))

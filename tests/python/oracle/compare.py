@@ -8,7 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
+from stiffmap.description import MachineDescription
 
+from .energy import Loads
 from .generate import Generator
 from .minimise import Oracle
 
@@ -38,7 +40,13 @@ def compare(seed: int, methods: tuple[str, ...] = ("reference", "fast")) -> list
     """Machine and loads of `seed`: solved by each method and by energy minimisation."""
     generator = Generator(seed)
     description = generator.machine()
-    loads = generator.loads(description)
+    return compare_machine(description, generator.loads(description), methods)
+
+
+def compare_machine(
+    description: MachineDescription, loads: Loads, methods: tuple[str, ...] = ("reference", "fast")
+) -> list[Comparison]:
+    """A machine under loads at its home pose, solved by each method and by energy minimisation."""
     machine = sm.Machine(description)
     truth = Oracle(description, loads).solve()
     moved = truth.position - description.home.p

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import (
     BaseModel,
@@ -11,10 +11,12 @@ from pydantic import (
     ConfigDict,
     Field,
     GetJsonSchemaHandler,
+    ModelWrapValidatorHandler,
+    ValidationError,
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, PydanticCustomError
+from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, PydanticKnownError
 
 
 def describe(value: object) -> str:
@@ -38,26 +40,54 @@ class FileModel(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
-    @model_validator(mode="before")
     @classmethod
-    def _known_keys(cls, data: Any) -> Any:
+    def as_mapping(cls, data: Any) -> Any:
+        """Another way to write the mapping, as the mapping."""
+        return data
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _known_keys(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         if isinstance(data, BaseModel):
-            return data
-        known = list(cls.model_fields)
+            return handler(data)
+        data = cls.as_mapping(data)
+        known = [f.alias or name for name, f in cls.model_fields.items()]
         if not isinstance(data, dict):
             raise PydanticCustomError(
                 "mapping_expected",
                 "expected a mapping with keys among {known}; found {found}",
                 {"known": ", ".join(known), "found": describe(data)},
             )
-        for key in data:
-            if key not in known:
-                raise PydanticCustomError(
-                    "unknown_key",
-                    "unknown key '{key}'{near}; known keys: {known}",
-                    {"key": key, "near": suggestion(str(key), known), "known": ", ".join(known)},
-                )
-        return data
+        unknown = [key for key in data if key not in known]
+        if not unknown:
+            return handler(data)
+        problems = [_unknown_key(str(key), known, data) for key in unknown]
+        try:
+            handler({key: value for key, value in data.items() if key in known})
+        except ValidationError as error:
+            # what is missing at this level may be the key that is not spelled right
+            inside = [e for e in error.errors(include_url=False) if e["loc"] and e["type"] != "missing"]
+            problems += [_once_more(e) for e in inside]
+        raise ValidationError.from_exception_data(cls.__name__, problems)
+
+
+def _unknown_key(key: str, known: list[str], data: Any) -> InitErrorDetails:
+    error = PydanticCustomError(
+        "unknown_key",
+        "unknown key '{key}'{near}; known keys: {known}",
+        {"key": key, "near": suggestion(key, known), "known": ", ".join(known)},
+    )
+    return InitErrorDetails(type=error, loc=(), input=data)
+
+
+def _once_more(error: Any) -> InitErrorDetails:
+    """A problem that has been found, to be raised with others."""
+    context = error.get("ctx", {})
+    try:
+        sort: Any = PydanticKnownError(error["type"], context)
+    except KeyError:
+        sort = PydanticCustomError(error["type"], "{message}", {**context, "message": error["msg"]})
+    return InitErrorDetails(type=sort, loc=error["loc"], input=error["input"])
 
 
 def _as_name(value: Any) -> Any:
@@ -80,10 +110,10 @@ class Number(FileModel):
     u: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
     note: str = ""
 
-    @model_validator(mode="before")
     @classmethod
-    def _plain(cls, data: Any) -> Any:
-        if isinstance(data, (dict, BaseModel)):
+    def as_mapping(cls, data: Any) -> Any:
+        """A plain number as its value."""
+        if isinstance(data, dict):
             return data
         if isinstance(data, bool) or not isinstance(data, (int, float)):
             raise PydanticCustomError(

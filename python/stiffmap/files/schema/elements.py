@@ -24,7 +24,8 @@ class OffsetModel(Frame):
 
 
 class JointModel(FileModel):
-    """Passive joint; it turns or slides freely unless it has a stiffness or a law."""
+    """Passive joint; it turns or slides freely unless it has a stiffness or a law, for all axes or a list with
+    one per axis."""
 
     joint: Name
     kind: Literal["revolute", "prismatic", "universal", "spherical"]
@@ -32,8 +33,8 @@ class JointModel(FileModel):
     axes: list[Axis] | None = None
     home: Number | Numbers | None = None
     limits: Pair | None = None
-    stiffness: Number | None = None
-    compliance: Number | None = None
+    stiffness: Number | Numbers | None = None
+    compliance: Number | Numbers | None = None
     law: LawModel | None = None
     note: str = ""
 
@@ -47,10 +48,16 @@ class JointModel(FileModel):
                 "a {kind} joint needs {what}",
                 {"kind": self.kind, "what": "one axis" if needed == 1 else f"axes: a list of {needed}"},
             )
-        if isinstance(self.home, list) and len(self.home) != needed:
-            raise PydanticCustomError("home", "home needs {n} coordinates", {"n": needed})
-        if isinstance(self.home, Number) and needed != 1:
-            raise PydanticCustomError("home", "home needs a list of {n} coordinates", {"n": needed})
+        for key in ("home", "stiffness", "compliance"):
+            value = getattr(self, key)
+            whole = key in ("stiffness", "compliance")  # one number then holds for every axis
+            if isinstance(value, list) and len(value) != needed:
+                what = "one number" if needed == 1 else f"{needed} numbers"
+                raise PydanticCustomError("per_axis", "{key} needs {what}", {"key": key, "what": what})
+            if isinstance(value, Number) and needed != 1 and not whole:
+                raise PydanticCustomError(
+                    "per_axis", "{key} needs a list of {n} numbers", {"key": key, "n": needed}
+                )
         one_of(self, ("stiffness", "compliance", "law"))
         return self
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Vector3
@@ -38,13 +38,33 @@ class LegModel(FileModel):
     frame: Frame | None = None
     attach: Literal["base_axes"] | Frame | None = None
     home: dict[str, Number | Numbers] | None = None
+    parameters: dict[str, Number] | None = Field(
+        default=None, alias="with", description="Parameters of the template."
+    )
     note: str = ""
 
     @model_validator(mode="after")
     def _one_chain(self) -> LegModel:
         if (self.template is None) == (self.elements is None):
             raise PydanticCustomError("leg", "give exactly one of template and elements")
+        if self.parameters is not None:
+            raise PydanticCustomError("with", "with: this leg's template has no parameters")
         return self
+
+
+class TemplateModel(FileModel):
+    """A template with parameters: ``$name`` in its elements stands for the number that a leg gives under
+    ``with``, else for the one here (nothing: every leg must give it). Legs are written out before the file is
+    read, see `stiffmap.files.templates`."""
+
+    parameters: dict[str, Number | None] = Field(default_factory=dict)
+    elements: list[dict[str, Any]]
+
+
+AnyTemplate = Annotated[
+    Annotated[list[ElementModel], Tag("plain")] | Annotated[TemplateModel, Tag("with_parameters")],
+    Discriminator(lambda data: "with_parameters" if isinstance(data, (dict, TemplateModel)) else "plain"),
+]
 
 
 class ExternalSpringModel(FileModel):
@@ -87,7 +107,7 @@ class MachineFile(FileModel):
     ] = Field(default_factory=lambda: list(get_args(Component)))
     workspace: Box | None = None
     materials: dict[Name, Material] = Field(default_factory=dict)
-    templates: dict[Name, list[ElementModel]] = Field(default_factory=dict)
+    templates: dict[Name, AnyTemplate] = Field(default_factory=dict)
     base: list[ElementModel] = Field(default_factory=list)
     legs: Annotated[dict[Name, LegModel], Field(min_length=1)]
     platform: list[ElementModel] = Field(default_factory=list)

@@ -27,15 +27,15 @@ class Matrix(FileModel):
     diagonal: _Six | None = None
     entries: dict[Literal[ENTRIES], Number] | None = None  # type: ignore[valid-type]
 
-    @model_validator(mode="before")
     @classmethod
-    def _forms(cls, data: Any) -> Any:
+    def as_mapping(cls, data: Any) -> Any:
+        """Rows, diagonal or entries under their key."""
         if isinstance(data, list):
             nested = bool(data) and isinstance(data[0], list)
             return {"rows" if nested else "diagonal": data}
         if isinstance(data, dict) and not set(data) <= {"rows", "diagonal", "entries"}:
             return {"entries": _upper(data)}
-        if not isinstance(data, (dict, Matrix)):
+        if not isinstance(data, dict):
             raise PydanticCustomError(
                 "matrix",
                 "expected six diagonal terms, six rows of six, or entries such as k11, k26; found {found}",

@@ -1,0 +1,53 @@
+"""Axes of universal and ball joints: chosen away from lock where any would do (docs/theory.md C8)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from stiffmap.description import Joint, Pose
+from stiffmap.description.pose import IDENTITY
+from stiffmap.errors import StiffmapError
+from stiffmap.rotations import rotation_about
+
+PARALLEL = 1e-3  # sine of the angle between axes that make no joint of this kind
+WIDE = 0.9  # volume that three axes span at home; below it, a free ball joint gets others
+
+
+def any_axes_do(e: Joint) -> bool:
+    """A ball joint without spring, friction and limits: its axes only number its rotations."""
+    return e.kind == "spherical" and e.free and e.friction is None and e.limits is None
+
+
+def charted(e: Joint) -> tuple[Joint, Pose | None]:
+    """The joint with axes that do not lock at home, and the constant rotation before it (None: none).
+
+    A free ball joint whose axes are far from perpendicular at home gets three that are. StiffmapError where axes that are meant (with a
+    spring, friction or limits about them) lock at home, or where neighbouring axes are parallel.
+    """
+    if len(e.axes) < 2:
+        return e, None
+    axes = np.array(e.axes)
+    for i in range(len(axes) - 1):
+        if np.linalg.norm(np.cross(axes[i], axes[i + 1])) < PARALLEL:
+            raise StiffmapError(
+                f"joint {e.name}: axes {i + 1} and {i + 2} of a {e.kind} joint must not be parallel, "
+                f"got {e.axes[i]} and {e.axes[i + 1]}"
+            )
+    if e.kind != "spherical":
+        return e, None
+    turn, at_home = np.eye(3), []
+    for axis, angle in zip(axes, e.home, strict=True):
+        at_home.append(turn @ axis)
+        turn = turn @ rotation_about(axis, angle)
+    spread = abs(float(np.linalg.det(np.array(at_home))))
+    if any_axes_do(e) and spread < WIDE:
+        flat = replace(e, axes=IDENTITY, home=(0.0, 0.0, 0.0))
+        return flat, Pose.of(rotation=turn)
+    if spread < PARALLEL:
+        raise StiffmapError(
+            f"joint {e.name}: the first and the last axis of this ball joint coincide at home (gimbal lock); "
+            "its spring, friction or limits refer to these axes: choose axes that are perpendicular at home"
+        )
+    return e, None
