@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stiffmap.description import AppliedEffect, Joint
 from stiffmap.description.tree import all_elements
@@ -32,16 +33,19 @@ ELEMENTS = 16
 """Elements that stand for a spread of levels."""
 
 
-def spring_force(force: Floats, level: float, breakaway: float = 1.0) -> Floats:
-    """(n,) force s that the spring feels while the drive's `force` (n,) runs, from rest at s = 0."""
-    out, s, sliding = np.empty_like(force), 0.0, 0.0
+def spring_force(force: Floats, level: ArrayLike, breakaway: float = 1.0) -> Floats:
+    """(n, ...) force s that the spring feels while the drive's `force` (n,) runs, from rest at s = 0, with
+    elements of these levels (...)."""
+    levels = np.asarray(level, dtype=float)
+    s, sliding = np.zeros(levels.shape), np.zeros(levels.shape)
+    out = np.empty((len(force), *levels.shape))
     for i, f in enumerate(force):
-        reach = level if sliding * (f - s) > 0 else level * breakaway
-        if abs(f - s) > reach:
-            sliding = 1.0 if f > s else -1.0
-            s = f - sliding * level
-        elif sliding and sliding * (f - s) < level * (1 - 1e-12):
-            sliding = 0.0
+        gap = f - s
+        reach = np.where(sliding * gap > 0, levels, levels * breakaway)
+        moves = np.abs(gap) > reach
+        rests = ~moves & (sliding * gap < levels * (1 - 1e-12))
+        sliding = np.where(moves, np.sign(gap), np.where(rests, 0.0, sliding))
+        s = np.where(moves, f - sliding * levels, s)
         out[i] = s
     return out
 
@@ -51,12 +55,9 @@ def deflection(force: Floats, compliance: float, values: Mapping[str, float]) ->
     level, spread = values["level"], values["spread"]
     levels = level * (1 + spread * np.linspace(-1, 1, ELEMENTS)) if spread > 0 else np.array([level])
     ratio, knee = values["ratio"], values["knee"]
-    total = np.zeros_like(force)
-    for one in levels:
-        s = spring_force(force, float(one), values["breakaway"])
-        bent = ratio * s + (1 - ratio) * knee * np.tanh(s / knee)
-        total += compliance * bent + values["half_width"] * np.tanh(s / values["seat"])
-    return np.asarray(total / len(levels))
+    s = spring_force(force, levels, values["breakaway"])
+    bent = ratio * s + (1 - ratio) * knee * np.tanh(s / knee)
+    return np.asarray((compliance * bent + values["half_width"] * np.tanh(s / values["seat"])).mean(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +100,15 @@ def _efforts(machine: Machine, plan: Experiment) -> Floats:
     """(n, actuators) of the drives on their legs."""
     start = coordinates_of(machine, plan)
     drives = [machine.compiled.names.joints[a] for a in machine.actuators]
-    options = SolveOptions(start=start, gravity=plan.gravity, point=plan.load_point)
-    return machine.solve_joints(start[:, drives], plan.wrench, options=options).actuator_effort
+    points = plan.load_points or (plan.load_point,) * len(plan)
+    gravity = np.zeros((len(plan), 0)) if plan.gravity_of is None else plan.gravity_of
+    out = np.empty((len(plan), len(drives)))
+    for key in dict.fromkeys(zip(points, map(tuple, gravity.tolist()), strict=True)):
+        here = [i for i, k in enumerate(zip(points, map(tuple, gravity.tolist()), strict=True)) if k == key]
+        options = SolveOptions(start=start[here], gravity=key[1] or plan.gravity, point=key[0])
+        found = machine.solve_joints(start[here][:, drives], plan.wrench[here], options=options)
+        out[here] = found.actuator_effort
+    return out
 
 
 def _drives(machine: Machine, term: AppliedEffect) -> list[str]:

@@ -124,3 +124,26 @@ def test_time_is_needed(gear: sm.Machine, tmp_path: Path) -> None:
     e = load_experiment(ramp_folder(tmp_path / "a", order=False))
     with pytest.raises(sm.StiffmapError, match="order"):
         Predictor(gear, e)([placed(gear, "hysteresis gear level=4N·m")])
+
+
+def test_gravity_and_loads_of_every_row_reach_the_drives(tmp_path: Path) -> None:
+    """An arm under its own weight: friction of the shoulder shifts it by level times compliance."""
+    machine = sm.load_machine("ur10")
+    names = [f"q{i}" for i in range(6)]
+    commands = "".join(
+        f"  {n}: {{actuator: {a}, unit: deg}}\n" for n, a in zip(names, machine.actuators, strict=True)
+    )
+    (tmp_path / "experiment.yaml").write_text(
+        "machine: ur10\nquantity: position\nunits: {length: m, angle: deg}\nnoise: {dx: 1e-5}\n"
+        f"gravity: {{up: [0, 0, -9.81], down: [0, 0, 9.81]}}\ncommand:\n{commands}"
+    )
+    rows = ["0,-60,90,-120,-90,0,0,1,up", "0,-60,90,-120,-90,0,0,2,down"]
+    (tmp_path / "data.csv").write_text("\n".join([",".join([*names, "dx", "order", "setup"]), *rows]) + "\n")
+    predict = Predictor(machine, load_experiment(tmp_path))
+    more = predict([placed(machine, "hysteresis shoulder level=5N·m")]) - predict()
+    q = np.radians([0, -60, 90, -120, -90, 0])
+    step = 1e-6 * np.eye(6)[1]
+    ahead, behind = (sm.forward_kinematics(machine, q + s * step).position for s in (1, -1))
+    lag = 2.5e-5 * 5.0 * (ahead - behind) / 2e-6
+    np.testing.assert_allclose(np.abs(more[:, :3]), np.abs([lag, lag]), rtol=1e-3, atol=1e-9)
+    np.testing.assert_allclose(more[0, :3], -more[1, :3], atol=1e-9)
