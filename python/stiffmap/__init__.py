@@ -11,6 +11,7 @@ from stiffmap.version import __version__
 
 if TYPE_CHECKING:
     from stiffmap.compensation import Commands, compensate
+    from stiffmap.budget import DeflectionBudget, deflection_budget
     from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, load_experiment
     from stiffmap.internal_wrenches import assembly_stress
@@ -33,6 +34,8 @@ _HOME = {
     "Kinematics": "stiffmap.kinematics",
     "Machine": "stiffmap.machine",
     "Solution": "stiffmap.solution",
+    "DeflectionBudget": "stiffmap.budget",
+    "deflection_budget": "stiffmap.budget",
     "assembly_stress": "stiffmap.internal_wrenches",
     "error_map": "stiffmap.maps",
     "forward_kinematics": "stiffmap.kinematics",
@@ -49,6 +52,7 @@ _HOME = {
 __all__ = [
     "Calibration",
     "Commands",
+    "DeflectionBudget",
     "Diagnosis",
     "Experiment",
     "Flag",
@@ -61,6 +65,7 @@ __all__ = [
     "assembly_stress",
     "calibrate",
     "compensate",
+    "deflection_budget",
     "diagnose",
     "error_map",
     "forward_kinematics",

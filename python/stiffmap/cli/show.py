@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 from rich.console import Console
 from rich.markup import escape
@@ -39,7 +40,17 @@ def show(
         Path | None, typer.Option("-o", "--output", help="Picture to write. [default: MACHINE.png]")
     ] = None,
     effect: EffectsOption = None,
-    view: Annotated[str, typer.Option(help="Elevation and azimuth of the view, deg.")] = "22,35",
+    load: Annotated[
+        str | None,
+        typer.Option(help="Force on the tool in N, e.g. 300,0,0: draw the machine deformed by it."),
+    ] = None,
+    page: Annotated[
+        Path | None, typer.Option(help="With --load: also write a page (HTML) in which the machine turns.")
+    ] = None,
+    view: Annotated[
+        str | None,
+        typer.Option(help="Elevation and azimuth of the view, deg. [default: 22,35; flat: from above]"),
+    ] = None,
     picture: Annotated[bool, typer.Option(help="Draw the machine.")] = True,
     as_json: JsonOption = False,
 ) -> None:
@@ -48,11 +59,16 @@ def show(
     Elements from base to platform, as built with its effects; the effects; degrees of freedom, over-constraint (closure equations that follow
     from the others) and free spins, counted at the pose.
 
+    With --load: the shape without load (dashed), under it (enlarged), and the share of each spring and drive
+    in the deflection of the tool.
+
     Examples:
 
       [cyan]stiffmap show orthoglide-revised[/cyan]
 
       [cyan]stiffmap show tripteron --at 300,400,500 -o tripteron.png --view 15,-60[/cyan]
+
+      [cyan]stiffmap show orthoglide-revised --at -200,-200,-200 --load 300,0,0 --page loaded.html[/cyan]
     """
     m = machine_with(machine, effect)
     p, r = position(at, m), rotation(turned)
@@ -60,18 +76,49 @@ def show(
     if int(k.status) != Status.CONVERGED:
         raise StiffmapError(f"{m.name} cannot take this pose: {Status(int(k.status)).name.lower()}")
     counts = mobility(m, k.coordinates)
-    file = _draw(m, p, r, output or Path(f"{m.name}.png"), view) if picture else None
-    if as_json:
+    wrench = None if load is None else np.r_[numbers(load, "load", 3), np.zeros(3)]
+    file = _draw(m, p, r, output or Path(f"{m.name}.png"), view, wrench) if picture else None
+    if page is not None:
+        from stiffmap.report.page import write_page
+
+        if wrench is None:
+            raise StiffmapError("--page: needs --load, the force under which the machine is drawn")
+        write_page(m, page, p, wrench, rotation=r)
+    if wrench is not None:
+        _show_load(m, p, r, wrench, file, page, as_json)
+    elif as_json:
         print_json(as_plain(m, counts, file))
     else:
         show_text(Console(highlight=False, soft_wrap=True), m, counts, file)
 
 
-def _draw(m: Machine, p: Any, r: Any, path: Path, view: str) -> Path:
-    from stiffmap.plot import machine_figure, save
+def _draw(m: Machine, p: Any, r: Any, path: Path, view: str | None, wrench: Any) -> Path:
+    from stiffmap.plot import loaded_figure, machine_figure, save
 
-    elevation, azimuth = numbers(view, "view", 2)
-    return save(machine_figure(m, p, rotation=r, view=(float(elevation), float(azimuth))), path)
+    angles = None if view is None else numbers(view, "view", 2)
+    looks = None if angles is None else (float(angles[0]), float(angles[1]))
+    if wrench is not None:
+        return save(loaded_figure(m, p, wrench, rotation=r, view=looks), path)
+    return save(machine_figure(m, p, rotation=r, view=looks), path)
+
+
+def _show_load(
+    m: Machine, p: Any, r: Any, wrench: Any, file: Path | None, page: Path | None, as_json: bool
+) -> None:
+    """The budget of the deflection, and the files written."""
+    from stiffmap.budget import deflection_budget
+
+    budget = deflection_budget(m, p, wrench, rotation=r)
+    files = [str(f) for f in (file, page) if f is not None]
+    if as_json:
+        shares = {n: {"share": s, "displacement": c} for n, c, s in budget.ranked()}
+        found = {"machine": m.name, "wrench": wrench, "displacement": budget.displacement, "elements": shares}
+        print_json(plain(found | {"second_order": budget.rest_share, "files": files}))
+        return
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(escape(str(budget)))
+    if files:
+        console.print(f"wrote {escape(', '.join(files))}")
 
 
 def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:

@@ -5,7 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 VECTORS = frozenset(
-    ("--at", "--force", "--moment", "--direction", "--by", "--turn", "--rotation", "--gravity", "--view")
+    (
+        "--at",
+        "--force",
+        "--moment",
+        "--direction",
+        "--by",
+        "--turn",
+        "--rotation",
+        "--gravity",
+        "--view",
+        "--load",
+    )
 )
 """Options whose value is a vector; all but ``--view`` have three numbers."""
 

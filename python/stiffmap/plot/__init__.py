@@ -6,6 +6,7 @@ never shown as a value. No display is needed.
 
 from stiffmap.plot.ellipses import ellipse_figure
 from stiffmap.plot.error_maps import map_figure
+from stiffmap.plot.loaded import loaded_figure
 from stiffmap.plot.machines import machine_figure
 from stiffmap.plot.paths import mode_figure, path_figure
 from stiffmap.plot.polars import polar_figure
@@ -15,6 +16,7 @@ from stiffmap.plot.sweeps import sweep_figure
 
 __all__ = [
     "ellipse_figure",
+    "loaded_figure",
     "machine_figure",
     "map_figure",
     "mode_figure",

@@ -31,8 +31,9 @@ class Skeleton:
     """(3,)."""
 
 
-def skeleton(machine: Machine, coordinates: Floats) -> Skeleton:
-    """Geometry to draw at coordinates (springs at rest, or deflected)."""
+def skeleton(machine: Machine, coordinates: Floats, *, shortest: float = COINCIDENT) -> Skeleton:
+    """Geometry to draw at coordinates (springs at rest, or deflected); pieces that are not longer than
+    `shortest` (m) are left out."""
     core = machine.compiled
     position, rotation = core.frames(coordinates)
     owner = owners(core)
@@ -45,7 +46,7 @@ def skeleton(machine: Machine, coordinates: Floats) -> Skeleton:
         joint = joints.get(core.names.coordinates[c]) if c >= 0 else None
         if joint is not None and joint.kind == "prismatic" and not _moves(core, parent):
             guides.append((owner[i], travel(joint, float(coordinates[c]), position[i], rotation[i])))
-        elif parent >= 0 and np.linalg.norm(position[i] - position[parent]) > COINCIDENT and parent != 0:
+        elif parent >= 0 and np.linalg.norm(position[i] - position[parent]) > shortest and parent != 0:
             links.append((owner[i], position[[parent, i]]))
     empty = np.zeros((0, 3))
     return Skeleton(

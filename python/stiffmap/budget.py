@@ -1,0 +1,152 @@
+"""Where the deflection of the tool comes from: the share of each spring and drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap.broadcasting import Floats
+from stiffmap.compiled import Role, Status
+from stiffmap.errors import StiffmapError
+from stiffmap.machine import Machine
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+STEP = 1e-3
+"""Of the load, of the central differences of internal wrenches."""
+
+
+@dataclass(frozen=True, eq=False)
+class DeflectionBudget:
+    """Contributions to the displacement of the TCP at one pose under one wrench, SI, base axes."""
+
+    elements: tuple[str, ...]
+    """Full names of springs, elastic joints and drives."""
+    contributions: Floats
+    """(elements, 6) m, rad: displacement of the point that the deflection of each element causes."""
+    displacement: Floats
+    """(6,) under the load, against the machine without it."""
+    position: Floats
+    wrench: Floats
+    point: str
+
+    @property
+    def shares(self) -> Floats:
+        """(elements,) part of each in the translation, along the translation; they sum to 1 - `rest_share`.
+
+        A negative share reduces the deflection.
+        """
+        d = self.displacement[:3]
+        return np.asarray(self.contributions[:, :3] @ d / (d @ d))
+
+    @property
+    def rest_share(self) -> float:
+        """What is of second order in the deflections, or lies in external springs."""
+        return float(1.0 - self.shares.sum())
+
+    def ranked(self) -> list[tuple[str, Floats, float]]:
+        """Element, contribution (6,), share; the largest share first."""
+        order = np.argsort(-np.abs(self.shares), kind="stable")
+        return [(self.elements[i], self.contributions[i], float(self.shares[i])) for i in order]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Rows by element, µm and %, the largest share first."""
+        import pandas as pd
+
+        names = ("dx, µm", "dy, µm", "dz, µm")
+        rows = {
+            n: dict(zip(names, 1e6 * c[:3], strict=True)) | {"share, %": 100 * s} for n, c, s in self.ranked()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("element")
+
+    def __str__(self) -> str:
+        size = 1e6 * float(np.linalg.norm(self.displacement[:3]))
+        lines = [f"{size:.1f} µm at {self.point}, of which"]
+        lines += [
+            f"  {100 * s:6.1f} %  {n:<24} ({', '.join(f'{v:.1f}' for v in 1e6 * c[:3])}) µm"
+            for n, c, s in self.ranked()
+        ]
+        return "\n".join([*lines, f"  {100 * self.rest_share:6.1f} %  of second order"])
+
+    def _repr_html_(self) -> str:
+        from stiffmap.html import budget_html
+
+        return budget_html(self)
+
+
+def deflection_budget(
+    machine: Machine,
+    position: ArrayLike | None = None,
+    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    *,
+    rotation: ArrayLike | None = None,
+    point: str = "tcp",
+    gravity: ArrayLike | None = None,
+) -> DeflectionBudget:
+    """How much of the tool's deflection each spring, elastic joint and drive causes.
+
+    position (3,) m, None: home; wrench (6,) N, N·m at `point`; gravity (3,) m/s², None: the machine
+    file's. By the unit-load theorem an element that deflects by t moves the point by Nᵀ t, where N is the
+    wrench in the element under a unit wrench at the point. With N at half of the load the contributions sum
+    to the displacement to first order; what is left is of second order in the load (`rest_share`).
+    In a statically determinate machine each is the motion of the point if that element alone yielded.
+    Raises StiffmapError where the pose has no stable equilibrium.
+    """
+    p = machine.description.home.p if position is None else np.asarray(position, dtype=float)
+    load = np.asarray(wrench, dtype=float)
+    g = machine.compiled.gravity(gravity)
+    options: dict[str, Any] = {"rotation": rotation, "point": point, "method": "reference"}
+    loaded = machine.solve(p, load, gravity=g, **options)
+    free = machine.solve(p, np.zeros(6), gravity=(0.0, 0.0, 0.0), **options)
+    for s in (loaded, free):
+        if s.status.shape != ():
+            raise StiffmapError("position: expected one pose and one wrench")
+        if int(s.status) != Status.CONVERGED:
+            raise StiffmapError(
+                f"the pose is {Status(int(s.status)).name.lower()}: it has no deflection to share"
+            )
+    unit = _unit_reactions(machine, p, load / 2, g / 2, rotation, point)
+    moved = loaded.coordinates - free.coordinates
+    names, parts = _elements(machine)
+    contributions = np.array([unit[:, i] @ np.nan_to_num(moved[i]) for i in parts]).reshape(-1, 6)
+    return DeflectionBudget(names, contributions, loaded.displacement - free.displacement, p, load, point)
+
+
+def _unit_reactions(
+    machine: Machine, p: Floats, load: Floats, gravity: Floats, rotation: ArrayLike | None, point: str
+) -> Floats:
+    """(6, coordinates): wrench in each coordinate per unit wrench at the point."""
+    size = max(float(np.abs(load).max()), 1.0)
+    steps = STEP * size * np.array([1.0, 1.0, 1.0, *[machine.compiled.length] * 3])
+    wrenches = np.concatenate([load + np.diag(steps), load - np.diag(steps)])
+    turned = machine.compiled.home_rotation if rotation is None else np.asarray(rotation, dtype=float)
+    force = machine.compiled.reactions(
+        np.tile(p, (12, 1)), np.tile(turned, (12, 1, 1)), wrenches, point=point, gravity=gravity, threads=1
+    )
+    return np.asarray((force[:6] - force[6:]) / (2 * steps[:, None]))
+
+
+def _elements(machine: Machine) -> tuple[tuple[str, ...], list[list[int]]]:
+    """Full names and the coordinates of what can deflect; free joints are none."""
+    names = machine.compiled.names
+    parts: dict[str, list[int]] = {}
+    for i, (name, role) in enumerate(zip(names.coordinates, names.roles, strict=True)):
+        element = name.rpartition(".")[0] if role == Role.SPRING else name
+        if role == Role.PASSIVE and not _elastic(machine, name):
+            continue
+        parts.setdefault(element, []).append(i)
+    return tuple(parts), list(parts.values())
+
+
+def _elastic(machine: Machine, name: str) -> bool:
+    from stiffmap.description import Joint
+    from stiffmap.files.names import all_elements
+
+    return any(
+        isinstance(e, Joint) and e.law is not None and (name == n or name.rpartition(".")[0] == n)
+        for n, e in all_elements(machine.description)
+    )

@@ -1,0 +1,160 @@
+"""A machine under load: its shape without it (grey), with it (enlarged), and where the deflection comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from stiffmap.broadcasting import Floats
+from stiffmap.budget import DeflectionBudget, deflection_budget
+from stiffmap.compiled import Status
+from stiffmap.errors import StiffmapError
+from stiffmap.machine import Machine
+from stiffmap.plot.machines import draw_skeleton, look_from
+from stiffmap.plot.skeleton import Skeleton, skeleton
+from stiffmap.plot.style import BLUE, MM, ORANGE, headline, legend_below, new_figure, paper_style
+
+SHOWN = 0.08
+"""Of the machine's extent, how far the tool moves in the picture."""
+MOST_BARS = 10
+FORCE = "#C1121F"
+
+
+@dataclass(frozen=True)
+class LoadedShape:
+    """The machine at rest and under load, with the factor that makes the difference visible."""
+
+    rest: Skeleton
+    loaded: Skeleton
+    factor: float
+    displacement: Floats
+    force: Floats
+
+    def enlarged(self, factor: float | None = None) -> Skeleton:
+        """The loaded shape with every frame's translation times the factor."""
+        k = self.factor if factor is None else factor
+
+        def mix(a: Floats, b: Floats) -> Floats:
+            return np.asarray(a + k * (b - a))
+
+        return Skeleton(
+            [(n, mix(a, b)) for (n, a), (_, b) in zip(self.rest.links, self.loaded.links, strict=True)],
+            self.rest.guides,
+            mix(self.rest.actuators, self.loaded.actuators),
+            mix(self.rest.passive, self.loaded.passive),
+            mix(self.rest.tcp, self.loaded.tcp),
+        )
+
+    @property
+    def extent(self) -> float:
+        """Diagonal of what is drawn, m."""
+        points = np.concatenate(
+            [ends for _, ends in (*self.rest.links, *self.rest.guides)] or [np.zeros((1, 3))]
+        )
+        return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def loaded_shape(
+    machine: Machine, position: ArrayLike | None, wrench: ArrayLike, *, rotation: ArrayLike | None = None
+) -> LoadedShape:
+    """Shapes at a pose (m) without and under a wrench (N, N·m at the TCP).
+
+    Raises StiffmapError where one of them is no stable equilibrium.
+    """
+    p = machine.description.home.p if position is None else np.asarray(position, dtype=float)
+    load = np.asarray(wrench, dtype=float)
+    both = machine.solve(p, np.stack([np.zeros(6), load]), rotation=rotation)
+    if (both.status != Status.CONVERGED).any():
+        where = ", ".join(f"{MM * v:g}" for v in p)
+        raise StiffmapError(
+            f"{machine.name} cannot be drawn under load at ({where}) mm: "
+            f"{Status(int(both.status.max())).name.lower()}"
+        )
+    rest, loaded = (skeleton(machine, c, shortest=-1.0) for c in both.coordinates)
+    d = np.asarray(both.displacement[1] - both.displacement[0])
+    shape = LoadedShape(rest, loaded, 1.0, d, load[:3])
+    return LoadedShape(
+        rest, loaded, round_factor(SHOWN * shape.extent, float(np.linalg.norm(d[:3]))), d, load[:3]
+    )
+
+
+def round_factor(wanted: float, size: float) -> float:
+    """1, 2 or 5 times a power of ten, near wanted over size."""
+    if size <= 0 or wanted <= 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(wanted / size))
+    return float(max(s for s in (1.0, 2.0, 5.0) if s * power <= wanted / size) * power)
+
+
+def loaded_figure(
+    machine: Machine,
+    position: ArrayLike | None = None,
+    wrench: ArrayLike = (0.0, 0.0, -300.0, 0.0, 0.0, 0.0),
+    *,
+    rotation: ArrayLike | None = None,
+    view: tuple[float, float] | None = None,
+) -> Figure:
+    """The machine loaded and deformed, and the share of each element in the tool's deflection."""
+    shape = loaded_shape(machine, position, wrench, rotation=rotation)
+    budget = deflection_budget(machine, position, wrench, rotation=rotation)
+    with paper_style():
+        figure = new_figure(9.4, 5.0)
+        ax: Any = figure.add_subplot(1, 2, 1, projection="3d")
+        draw_loaded(ax, shape, machine.legs, view)
+        draw_budget(figure.add_subplot(1, 2, 2), budget)
+        where = ", ".join(f"{MM * v:g}" for v in budget.position)
+        force = ", ".join(f"{v:g}" for v in budget.wrench[:3])
+        headline(figure, f"{machine.name} at ({where}) mm under ({force}) N: the tool moves "
+                         f"{1e6 * np.linalg.norm(shape.displacement[:3]):.1f} µm (drawn × {shape.factor:g})")  # fmt: skip
+        legend_below(figure, ax.get_legend_handles_labels()[0])
+    return figure
+
+
+def draw_loaded(
+    ax: Any, shape: LoadedShape, legs: tuple[str, ...], view: tuple[float, float] | None = None
+) -> None:
+    """Ghost, enlarged shape, arrow of the force."""
+    label: str | None = "without load"
+    for _, ends in shape.rest.links:
+        ax.plot(*(MM * ends.T), color="0.72", lw=1.4, ls="--", zorder=1, label=label)
+        label = None
+    moved = shape.enlarged()
+    draw_skeleton(ax, moved, legs)
+    size = float(np.linalg.norm(shape.force))
+    if size > 0:
+        arrow = 0.16 * shape.extent * shape.force / size
+        tail = moved.tcp - arrow
+        ax.quiver(
+            *(MM * tail),
+            *(MM * arrow),
+            color=FORCE,
+            lw=2.2,
+            arrow_length_ratio=0.3,
+            label=f"force {size:g} N",
+        )
+    ax.set_aspect("equal")
+    ax.set_box_aspect(None, zoom=0.88)  # room for the label of z
+    look_from(ax, shape.rest, view)
+
+
+def draw_budget(ax: Any, budget: DeflectionBudget) -> None:
+    """A bar per element, in the direction in which the tool moves."""
+    size = 1e6 * float(np.linalg.norm(budget.displacement[:3]))
+    ranked = [(n, size * s, s) for n, _, s in budget.ranked()]
+    rest = sum(s for _, _, s in ranked[MOST_BARS:])
+    if len(ranked) > MOST_BARS:
+        ranked = [*ranked[:MOST_BARS], (f"{len(ranked) - MOST_BARS} others", size * rest, rest)]
+    at = np.arange(len(ranked))
+    values = [v for _, v, _ in ranked]
+    ax.barh(at, values, color=[BLUE if v >= 0 else ORANGE for v in values])
+    for i, (_, v, s) in enumerate(ranked):
+        ax.text(max(v, 0), i, f" {v:.1f} µm, {100 * s:.0f} %", va="center", fontsize=7)
+    ax.set_yticks(at, [n for n, _, _ in ranked])
+    ax.invert_yaxis()
+    ax.set_xlim(min(0.0, 1.15 * min(values, default=0)), 1.45 * max(max(values, default=1), 1e-9))
+    ax.axvline(0, color="0.3", lw=0.6)
+    ax.set(xlabel="part of the tool's deflection, µm", title="where the deflection comes from")

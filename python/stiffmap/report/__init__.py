@@ -1,0 +1,1 @@
+"""What a workshop reads and signs: sentences, pages that need no server."""

@@ -1,0 +1,87 @@
+"""Shares of a deflection: closed forms, and sums on every shipped machine."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap import plot
+from stiffmap.cli import main
+from stiffmap.files.load import description_from_text
+from stiffmap.files.shipped import shipped_names
+from stiffmap.plot.loaded import loaded_shape, round_factor
+
+PUSHER = """
+name: pusher
+units: {length: mm, force: N, angle: deg}
+home: {translation: [500, 0, 0]}
+legs:
+  arm:
+    elements:
+      - {actuator: drive, kind: prismatic, axis: x, compliance: 1.0e-4}
+      - {offset: length, translation: [500, 0, 0]}
+      - {spring: bar, beam: {length: 500, EA: 1.0e8, GJ: 1.0e9, EIy: 2.0e9, EIz: 1.0e9}}
+"""
+
+
+def test_drive_and_beam_in_series() -> None:
+    machine = sm.Machine(description_from_text(PUSHER))
+    small = 1e-3
+    b = sm.deflection_budget(machine, None, small * np.array([1.0, 2.0, 4.0, 0, 0, 0]))
+    parts = dict(zip(b.elements, b.contributions / small, strict=True))
+    np.testing.assert_allclose(parts["arm.drive"], [1e-7, 0, 0, 0, 0, 0], rtol=1e-4, atol=1e-10)
+    length, ea, eiy, eiz = 0.5, 1e8, 2e3, 1e3
+    translation = [length / ea, 2 * length**3 / (3 * eiz), 4 * length**3 / (3 * eiy)]
+    turn = [0.0, -4 * length**2 / (2 * eiy), 2 * length**2 / (2 * eiz)]
+    np.testing.assert_allclose(parts["arm.bar"], [*translation, *turn], rtol=1e-4, atol=1e-10)
+    assert b.shares.sum() == pytest.approx(1.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_shares_sum_to_the_deflection(name: str) -> None:
+    machine = sm.load_machine(name)
+    p = machine.description.home.p
+    large, small = (
+        sm.deflection_budget(machine, p, np.array([60.0, 40.0, -30.0, 0, 0, 0]) * k) for k in (1, 0.25)
+    )
+    assert abs(small.rest_share) < 2e-3
+    # the remainder is of second order: a quarter of the load leaves a quarter of its share
+    assert abs(small.rest_share) < abs(large.rest_share) / 3 + 1e-5
+    frame = large.to_dataframe()
+    assert frame["share, %"].sum() == pytest.approx(100 * (1 - large.rest_share), abs=1e-9)
+    assert next(iter(frame.index)) == large.ranked()[0][0]
+
+
+def test_an_unreachable_pose_has_no_budget() -> None:
+    with pytest.raises(sm.StiffmapError, match="unreachable"):
+        sm.deflection_budget(sm.load_machine("five-bar"), [9.0, 0, 0], [1.0, 0, 0, 0, 0, 0])
+
+
+def test_the_loaded_picture_enlarges_what_was_solved() -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    shape = loaded_shape(machine, [0.1, 0.0, 0.1], [0, 300.0, 0, 0, 0, 0])
+    moved = shape.enlarged(7.0).tcp - shape.rest.tcp
+    np.testing.assert_allclose(moved, 7 * shape.displacement[:3], atol=1e-12)
+    assert [round_factor(0.08, d) for d in (0.08, 0.03, 1e-4, 0.0)] == [1.0, 2.0, 500.0, 1.0]
+    figure = plot.loaded_figure(machine, [0.1, 0.0, 0.1], [0, 300.0, 0, 0, 0, 0])
+    assert "drawn ×" in figure.get_suptitle()
+
+
+def test_show_load_writes_picture_page_and_shares(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, page = tmp_path / "m.png", tmp_path / "m.html"
+    code = main(
+        ["show", "five-bar", "--load", "0", "-100", "0", "-o", str(out), "--page", str(page), "--json"]
+    )
+    assert code == 0
+    data = json.loads(capsys.readouterr().out)
+    shares = {n: e["share"] for n, e in data["elements"].items()}
+    assert sum(shares.values()) + data["second_order"] == pytest.approx(1.0)
+    assert out.read_bytes().startswith(b"\x89PNG")
+    text = page.read_text(encoding="utf-8")
+    assert "http" not in text and "left.motor" in text and '"links"' in text
+    assert main(["show", "five-bar", "--page", str(page), "--no-picture"]) == 2
+    assert "--page: needs --load" in capsys.readouterr().err
