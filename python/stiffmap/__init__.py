@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from stiffmap.compensation import Commands, compensate
     from stiffmap.budget import DeflectionBudget, deflection_budget
     from stiffmap.diagnosis import Diagnosis, diagnose
-    from stiffmap.experiment import Experiment, load_experiment
+    from stiffmap.experiment import Experiment, Residual, load_experiment
+    from stiffmap.experiment.residual import residual
+    from stiffmap.experiment.simulate import simulate
+    from stiffmap.files.shipped import machine_names
     from stiffmap.internal_wrenches import assembly_stress
     from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
     from stiffmap.link import identify_link
@@ -30,7 +33,11 @@ _HOME = {
     "Experiment": "stiffmap.experiment",
     "calibrate": "stiffmap.calibration",
     "diagnose": "stiffmap.diagnosis",
+    "Residual": "stiffmap.experiment",
     "load_experiment": "stiffmap.experiment",
+    "machine_names": "stiffmap.files.shipped",
+    "residual": "stiffmap.experiment",
+    "simulate": "stiffmap.experiment",
     "Kinematics": "stiffmap.kinematics",
     "Machine": "stiffmap.machine",
     "Solution": "stiffmap.solution",
@@ -58,6 +65,7 @@ __all__ = [
     "Flag",
     "Kinematics",
     "Machine",
+    "Residual",
     "Solution",
     "Status",
     "StiffmapError",
@@ -73,9 +81,12 @@ __all__ = [
     "inverse_kinematics",
     "load_experiment",
     "load_machine",
+    "machine_names",
     "map_estimate",
     "map_statistics",
     "polar",
+    "residual",
+    "simulate",
     "sweep",
     "uncertainty_ranking",
 ]
@@ -90,4 +101,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)

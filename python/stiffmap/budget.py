@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from stiffmap.broadcasting import Floats
 from stiffmap.compiled import Role, Status
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
+from stiffmap.html import table, titled
+from stiffmap.machine import Machine, takes_machine
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,11 +74,15 @@ class DeflectionBudget:
         return "\n".join([*lines, f"  {100 * self.rest_share:6.1f} %  of second order"])
 
     def _repr_html_(self) -> str:
-        from stiffmap.html import budget_html
+        """Shares, folded where there are many."""
+        size = 1e6 * float(np.linalg.norm(self.displacement[:3]))
+        rows = [
+            (n, f"{100 * s:.1f} %", ", ".join(f"{v:.1f}" for v in 1e6 * c[:3])) for n, c, s in self.ranked()
+        ]
+        return titled(f"{size:.1f} µm at {self.point}", table(("element", "share", "dx, dy, dz, µm"), rows))
 
-        return budget_html(self)
 
-
+@takes_machine
 def deflection_budget(
     machine: Machine,
     position: ArrayLike | None = None,
@@ -144,7 +149,7 @@ def _elements(machine: Machine) -> tuple[tuple[str, ...], list[list[int]]]:
 
 def _elastic(machine: Machine, name: str) -> bool:
     from stiffmap.description import Joint
-    from stiffmap.files.names import all_elements
+    from stiffmap.description.tree import all_elements
 
     return any(
         isinstance(e, Joint) and e.law is not None and (name == n or name.rpartition(".")[0] == n)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.broadcasting import Floats, rows, thread_count
 from stiffmap.description import Joint
 from stiffmap.description.tree import all_elements
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +37,7 @@ class InternalWrenches:
         return name, sizes[name]
 
 
+@takes_machine
 def assembly_stress(
     machine: Machine,
     position: ArrayLike,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import cached_property
+import warnings
+from collections.abc import Callable, Sequence
+from functools import cached_property, wraps
 from os import PathLike
-from typing import Any, Unpack
+from typing import Any, Concatenate, ParamSpec, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.compiled import CompiledMachine
 from stiffmap.derivatives import Prepared, Request, differentiate, prepare, read_requests
 from stiffmap.description import MachineDescription
+from stiffmap.description.told import machine_html
 from stiffmap.effects import add_effect
 from stiffmap.errors import StiffmapError
 from stiffmap.files import load_description, save_description
@@ -221,6 +223,9 @@ class Machine:
     def __reduce__(self) -> tuple[type[Machine], tuple[MachineDescription]]:
         return (Machine, (self._description,))
 
+    def _repr_html_(self) -> str:
+        return machine_html(self._description, self.actuators, self.points)
+
     def __repr__(self) -> str:
         return f"Machine({self.name!r}: legs {', '.join(self.legs)}; actuators {', '.join(self.actuators)})"
 
@@ -231,3 +236,38 @@ def load_machine(name_or_path: str | PathLike[str]) -> Machine:
     Raises StiffmapError naming file, key, what was expected and what was found.
     """
     return Machine(load_description(name_or_path))
+
+
+def as_machine(machine: Machine | str | PathLike[str]) -> Machine:
+    """The machine itself, or the one of that shipped name or file."""
+    return machine if isinstance(machine, Machine) else load_machine(machine)
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def takes_machine(
+    function: Callable[Concatenate[Machine, P], R],
+) -> Callable[Concatenate[Machine | str | PathLike[str], P], R]:
+    """Let the first argument of a public function also be a shipped name or a machine file."""
+
+    @wraps(function)
+    def with_machine(machine: Machine | str | PathLike[str], *args: P.args, **options: P.kwargs) -> R:
+        return function(as_machine(machine), *args, **options)
+
+    return with_machine  # type: ignore[return-value]  # the name of the first argument is kept
+
+
+METRES_TOO_FAR = 100.0
+
+
+def hint_metres(machine: Machine, position: ArrayLike, failed: bool) -> None:
+    """Warn where every pose failed and lies as far outside as millimetres read as metres do."""
+    far = float(np.abs(np.asarray(position, dtype=float)).max(initial=0.0))
+    if failed and far > METRES_TOO_FAR * machine.compiled.length:
+        warnings.warn(
+            f"no pose can be reached: positions up to {far:g} m, the machine measures "
+            f"{machine.compiled.length:.2g} m; metres are expected (200 mm is 0.2)",
+            stacklevel=4,
+        )

@@ -16,7 +16,12 @@ if TYPE_CHECKING:
 
 
 def effects(
-    kind: Annotated[str | None, typer.Argument(help="One kind: its definition and parameters.")] = None,
+    kind: Annotated[
+        str | None,
+        typer.Argument(
+            help="One kind: its definition and parameters; or a word for it, such as backlash, Spiel, sag."
+        ),
+    ] = None,
     on: Annotated[str | None, typer.Option(help="Machine: the elements and legs where each can be.")] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -28,13 +33,19 @@ def effects(
 
       [cyan]stiffmap effects friction[/cyan]
 
+      [cyan]stiffmap effects backlash[/cyan]
+
       [cyan]stiffmap effects straightness --on orthoglide-revised[/cyan]
     """
     from stiffmap.effects import get, kinds
+    from stiffmap.effects.synonyms import found_by
     from stiffmap.machine import load_machine
 
     machine = load_machine(on) if on else None
-    chosen = [get(kind)] if kind else [get(k) for k in kinds()]
+    if kind and kind not in kinds() and (meant := found_by(kind, kinds())):
+        chosen = [get(k) for k in meant]
+    else:
+        chosen = [get(kind)] if kind else [get(k) for k in kinds()]
     if as_json:
         print_json([_plain(e, machine) for e in chosen])
         return

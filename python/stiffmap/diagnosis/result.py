@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from html import escape
 from os import PathLike
 
 from stiffmap.diagnosis.findings import Findings
+from stiffmap.diagnosis.sentences import next_step, opening
 from stiffmap.diagnosis.words import five_lines
+from stiffmap.html import titled
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +25,10 @@ class Diagnosis(Findings):
         from stiffmap.diagnosis.report import write_report  # draws, so it loads matplotlib
 
         write_report(self, path)
+
+    def _repr_html_(self) -> str:
+        lines = "".join(f"<li>{escape(line)}</li>" for line in self.lines())
+        return titled(opening(self), f"<p>{escape(next_step(self))}</p><ul>{lines}</ul>")
 
     def __str__(self) -> str:
         return "\n".join(self.lines())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from difflib import get_close_matches
 from functools import cache
 
+from stiffmap.effects.synonyms import found_by
 from stiffmap.effects.types import EffectType
 from stiffmap.errors import StiffmapError
 
@@ -24,7 +25,7 @@ def kinds() -> tuple[str, ...]:
 def get(kind: str) -> EffectType:
     """The kind of that name; StiffmapError lists those that exist."""
     if kind not in _known():
-        near = get_close_matches(str(kind), kinds(), 1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        near = [*found_by(str(kind), kinds())[:2], *get_close_matches(str(kind), kinds(), 1)]
+        hint = f" (did you mean {' or '.join(map(repr, dict.fromkeys(near)))}?)" if near else ""
         raise StiffmapError(f"no effect {kind!r}{hint}; there are: {', '.join(kinds())}")
     return _known()[kind]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
+from stiffmap.experiment.told import experiment_html
 
 __all__ = ["AXES", "BRANCHES", "WRENCH", "Channel", "Experiment", "Floats", "Integers", "Loop"]
 
@@ -133,6 +134,9 @@ class Experiment:
     loop: Loop = Loop()
     title: str = ""
     source: str = ""
+
+    def _repr_html_(self) -> str:
+        return experiment_html(self)
 
     def __len__(self) -> int:
         return len(self.ids)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -17,7 +18,11 @@ from stiffmap.experiment.outliers import suspects
 from stiffmap.experiment.predict import Predictor
 from stiffmap.experiment.problem import Problem, nuisance_part
 from stiffmap.experiment.summary import Summary, summary
-from stiffmap.machine import Machine
+from stiffmap.experiment.told import residual_html
+from stiffmap.machine import Machine, takes_machine
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +50,28 @@ class Residual:
     limitations: list[str]
     """What this experiment cannot tell, in sentences."""
 
+    def _repr_html_(self) -> str:
+        return residual_html(self)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """A row per row of the experiment: pose (mm), wrench (N, N·m), and of each channel reading, prediction
+        and residual (µm, mrad)."""
+        import pandas as pd
+
+        e = self.experiment
+        out: dict[str, Any] = {f"{a}, mm": 1e3 * e.position[:, i] for i, a in enumerate("xyz")}
+        out |= {f"f{a}, N": e.wrench[:, i] for i, a in enumerate("xyz")}
+        for i in np.flatnonzero(e.axis_read):
+            c = e.channels[int(i)]
+            unit, factor = ("µm", 1e6) if c.unit == "m" else ("mrad", 1e3)
+            for what, values in (
+                ("reading", e.reading),
+                ("prediction", self.prediction),
+                ("residual", self.values),
+            ):
+                out[f"{c.name} {what}, {unit}"] = factor * values[:, i]
+        return pd.DataFrame(out, index=pd.Index(e.ids, name="id"))
+
     def worst(self, number: int = 10) -> list[tuple[str, str, float]]:
         """Rows by their worst reading, most noise floors first: id, channel, residual (m or rad)."""
         z = np.nan_to_num(np.abs(self.values / self.noise.sigma))
@@ -53,6 +80,7 @@ class Residual:
         return [(e.ids[i], e.channels[a].name, float(self.values[i, a])) for i, a in at if z[i, a] > 0]
 
 
+@takes_machine
 def residual(
     machine: Machine,
     experiment: Experiment,

@@ -13,12 +13,13 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.limits import refuse_unreachable
 from stiffmap.experiment.nuisance import nuisance_columns
 from stiffmap.experiment.predict import Predictor
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 
 UNKNOWN = 1e-4
 """m, rad: standard deviation of an unknown frame, tool point or zero."""
 
 
+@takes_machine
 def simulate(
     machine: Machine,
     plan: Experiment,

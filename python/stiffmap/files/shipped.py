@@ -31,6 +31,11 @@ def shipped_names() -> list[str]:
     return sorted(path.stem for path in machine_folder().glob("*.yaml"))
 
 
+def machine_names() -> list[str]:
+    """Names of the machines that come with stiffmap."""
+    return shipped_names()
+
+
 def shipped_machines() -> list[ShippedMachine]:
     """The shipped machines, sorted by name."""
     machines = []

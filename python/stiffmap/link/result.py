@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stiffmap.errors import StiffmapError
+from stiffmap.html import table, titled
 from stiffmap.link.arrays import Bools, Floats
 from stiffmap.link.bootstrap import block_bootstrap
 from stiffmap.link.estimate import Estimate, Evidence
 from stiffmap.link.noise import Noise
 from stiffmap.link.regression import constrain, structure
-from stiffmap.link.report import write_report
+from stiffmap.link.report import unit_factor, unit_name, write_report
 from stiffmap.link.zeros import insignificant_entries
 
 
@@ -34,6 +35,21 @@ class Link(Estimate):
         gain = np.einsum("ef,kfa->kea", P, e.regression.gain)
         f = e.field
         return block_bootstrap(f.points, f.displacements, gain, f.reference, e.kept, patches, samples, seed)
+
+    def _repr_html_(self) -> str:
+        c, s, f = self.compliance, self.standard_error, unit_factor("mm")
+        rows = [
+            (
+                f"k{i + 1}{j + 1}",
+                f"{c[i, j] * f[i, j]:.4g}",
+                f"{s[i, j] * f[i, j]:.1g}",
+                unit_name(i, j, "mm"),
+            )
+            for i in range(6)
+            for j in range(i, 6)
+            if i == j or not self.insignificant[i, j]
+        ]
+        return titled("compliance of the link", table(("entry", "value", "±", "unit"), rows))
 
     def report(self, length: str = "mm") -> str:
         """The table of the paper's Table 1 with error bars, then what speaks for and against the fit.

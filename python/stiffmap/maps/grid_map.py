@@ -9,11 +9,13 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from stiffmap.compiled import Status
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, hint_metres, takes_machine
 from stiffmap.maps.block import solve_block
 from stiffmap.maps.cluster import on_cluster
 from stiffmap.maps.files import is_zarr, partial_folder, read_dataset, write_dataset
@@ -25,6 +27,7 @@ from stiffmap.maps.tiles import POSES_AT_ONCE, Tiles, blocks_of, solve_rows, til
 from stiffmap.maps.zarr_map import open_zarr_map
 
 
+@takes_machine
 def error_map(
     machine: Machine,
     *,
@@ -120,7 +123,9 @@ def error_map(
     if out is None:
         store = memory_store(plan)
         fill(plan, store, chunk, progress) if scheduler is None else _fill(plan, store, solver, progress)
-        return plan.dataset(store.arrays)
+        ds = plan.dataset(store.arrays)
+        hint_metres(machine, np.r_[plan.x, plan.y, plan.z], bool((ds.status == Status.UNREACHABLE).all()))
+        return ds
     target = Path(out)
     if is_zarr(target):
         _to_zarr(plan, target, resume, solver, progress)

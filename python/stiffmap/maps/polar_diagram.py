@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.extremes import find_extreme
 from stiffmap.maps.fan import Fan, direction, even_angles, fan_of
 from stiffmap.maps.inputs import magnitude, place, plane_axes
@@ -21,6 +21,7 @@ from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, flag_attrs, meaning
 from stiffmap.options import LoadingKeywords, SolveOptions
 
 
+@takes_machine
 def polar(
     machine: Machine,
     position: ArrayLike,

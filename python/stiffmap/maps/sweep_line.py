@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.inputs import force_list, place, unit
 from stiffmap.maps.load_path import check_control, load_path
 from stiffmap.maps.loading import Loading, without_failed
@@ -19,6 +19,7 @@ from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, flag_attrs, meaning
 from stiffmap.options import LoadingKeywords, SolveOptions
 
 
+@takes_machine
 def sweep(
     machine: Machine,
     position: ArrayLike,

@@ -13,7 +13,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.budget import DeflectionBudget, deflection_budget
 from stiffmap.compiled import Status
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.plot.machines import draw_skeleton, look_from
 from stiffmap.plot.skeleton import Skeleton, skeleton
 from stiffmap.plot.style import BLUE, MM, ORANGE, headline, legend_below, new_figure, paper_style
@@ -90,6 +90,7 @@ def round_factor(wanted: float, size: float) -> float:
     return float(max(s for s in (1.0, 2.0, 5.0) if s * power <= wanted / size) * power)
 
 
+@takes_machine
 def loaded_figure(
     machine: Machine,
     position: ArrayLike | None = None,

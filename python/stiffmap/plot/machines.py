@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.kinematics import inverse_kinematics
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.plot.skeleton import Skeleton, skeleton
 from stiffmap.plot.style import BLACK, CYCLE, MM, legend_below, new_figure, paper_style
 from stiffmap.status import Status
 
 
+@takes_machine
 def machine_figure(
     machine: Machine,
     position: ArrayLike | None = None,

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from math import floor, log10
+from typing import Any
 
+from stiffmap.diagnosis.findings import Effect
+from stiffmap.diagnosis.words import separation_text
 from stiffmap.effects import registry
-
-if TYPE_CHECKING:
-    from stiffmap.diagnosis import Diagnosis
-    from stiffmap.diagnosis.result import Effect
 
 UNITS = {
     "m": (1e6, "µm"),
@@ -32,8 +31,6 @@ def measured(value: float, low: float, high: float, unit: str) -> str:
 
 
 def _exponent(value: float) -> float:
-    from math import floor, log10
-
     return floor(log10(value))
 
 
@@ -69,7 +66,7 @@ def _softer(e: Effect) -> str:
     return f"{head}: {measured(value, low, high, unit)} instead of {factor * value / scale:.3g}"
 
 
-def opening(d: Diagnosis) -> str:
+def opening(d: Any) -> str:
     """The verdict as one says it."""
     size = f"{1e6 * d.before.rms:.1f} µm rms, noise {1e6 * d.noise.rms:.1f} µm"
     told = "; ".join(sentence(e) for e in d.effects)
@@ -85,7 +82,7 @@ def opening(d: Diagnosis) -> str:
     return f"{told}.{rest}"
 
 
-def next_step(d: Diagnosis) -> str:
+def next_step(d: Any) -> str:
     """What to do with the answer."""
     if d.verdict == "none":
         return "Nothing to correct. Keep the readings as the record of this state."
@@ -95,8 +92,6 @@ def next_step(d: Diagnosis) -> str:
             "first, and read again there."
         )
     if d.verdict == "ambiguous" and d.separations:
-        from stiffmap.diagnosis.words import separation_text
-
         return f"One more measurement decides: {separation_text(d.separations[0])}."
     if any(e.aliases for e in d.effects):
         return (
