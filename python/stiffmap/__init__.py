@@ -10,8 +10,8 @@ from stiffmap.status import Flag, Status
 from stiffmap.version import __version__
 
 if TYPE_CHECKING:
-    from stiffmap.compensation import Commands, compensate
     from stiffmap.budget import DeflectionBudget, deflection_budget
+    from stiffmap.compensation import Commands, compensate
     from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, Residual, load_experiment
     from stiffmap.experiment.residual import residual
