@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
+from typing import Any
 
 MOST_ROWS = 8
 CELL = "style='text-align:left;padding:2px 10px'"
@@ -24,3 +25,16 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 def titled(title: str, *parts: str) -> str:
     """A block with a bold first line."""
     return f"<div><b>{escape(title)}</b>{''.join(parts)}</div>"
+
+
+def machine_html(d: Any, actuators: Sequence[str], points: Sequence[str]) -> str:
+    """Title, what is commanded, elements of each leg."""
+    rows = [("drives", ", ".join(actuators)), ("commanded", ", ".join(d.task) or "x, y, z, rx, ry, rz")]
+    if d.workspace is not None:
+        box = zip("xyz", *d.workspace, strict=True)
+        rows.append(("workspace, mm", "; ".join(f"{a} {1e3 * u:g} … {1e3 * v:g}" for a, u, v in box)))
+    rows.append(("points", ", ".join(points)))
+    effects = "; ".join(f"{e.kind} of {e.element} {' '.join(e.legs)}" for e in d.effects)
+    rows.append(("effects", effects or "none"))
+    parts = [(f"leg {leg.name}", " → ".join(e.name for e in leg.elements)) for leg in d.legs]
+    return titled(f"{d.name}: {d.title}", table(("", ""), rows), table(("chain", "elements"), parts))

@@ -15,11 +15,11 @@ from stiffmap.broadcasting import Floats
 from stiffmap.compiled import CompiledMachine
 from stiffmap.derivatives import Prepared, Request, differentiate, prepare, read_requests
 from stiffmap.description import MachineDescription
-from stiffmap.description.told import machine_html
 from stiffmap.effects import add_effect
 from stiffmap.errors import StiffmapError
 from stiffmap.files import load_description, save_description
 from stiffmap.holding_wrench import HoldingWrench, holding_wrench
+from stiffmap.html import machine_html
 from stiffmap.options import SolveKeywords, SolveOptions, merged
 from stiffmap.recent import Recent
 from stiffmap.solution import Solution

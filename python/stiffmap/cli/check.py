@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any
 
 import typer
@@ -17,7 +18,7 @@ def check(
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 where there are warnings.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Validate a machine file: keys, units, springs, names, and whether its home configuration closes.
+    """Validate a machine file and look it over: keys, units, home, free motions, reach, odd numbers.
 
     Exit codes: 0 usable, 1 usable with warnings (--strict), 2 not usable.
 
@@ -29,13 +30,21 @@ def check(
 
       [cyan]stiffmap check --strict my_machine.yaml[/cyan]
     """
-    result = check_file(file)
+    result = with_advice(check_file(file), file)
     if as_json:
         print_json(as_plain(result))
     else:
         _print(result)
     if strict and result.warnings:
         raise typer.Exit(1)
+
+
+def with_advice(result: FileCheck, file: str) -> FileCheck:
+    """The check with findings about freedoms, reach and numbers among its warnings."""
+    from stiffmap.advice import advice
+    from stiffmap.machine import Machine
+
+    return replace(result, warnings=[*result.warnings, *advice(Machine(result.description), file)])
 
 
 def as_plain(result: FileCheck) -> dict[str, Any]:

@@ -37,6 +37,7 @@ COMMANDS = (
     Command("sweep", "stiffmap.cli.sweep", "sweep", "Deflection against the size of a force."),
     Command("paper", "stiffmap.cli.paper", "paper", "Reproduce the figures and statements of the paper."),
     Command("link", "stiffmap.cli.link", "link_command", "Spring of a link from a part or a field."),
+    Command("experiment", "stiffmap.cli.experiment", "experiment", "Experiment folder from a spreadsheet."),
     Command("residual", "stiffmap.cli.residual", "residual", "Readings of an experiment against a machine."),
     Command(
         "diagnose", "stiffmap.cli.diagnose", "diagnose_command", "Which physical effect a machine lacks."

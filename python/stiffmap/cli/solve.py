@@ -10,6 +10,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from stiffmap.advice import free_motions
 from stiffmap.cli.inputs import (
     MM,
     EffectsOption,
@@ -87,6 +88,8 @@ def solve(
             told = ", ".join(f"{v:.1f}" for v in acting)
             console.print(f"{size:g} N in the direction that pushes furthest: force ({told}) N")
         show(console, s)
+        if int(s.status) == Status.SINGULAR and (ways := free_motions(m, s.free_twists)):
+            console.print(f"free: the platform can {'; '.join(ways)}", soft_wrap=True)
     finish(int(s.status) != Status.CONVERGED)
 
 

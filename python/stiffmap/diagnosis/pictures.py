@@ -114,7 +114,13 @@ def histogram(d: Findings) -> Figure:
     bins = np.linspace(-width, width, 61)
     for z, colour, label in zip(both, (BEFORE, AFTER), ("before", "after"), strict=True):
         ax.hist(
-            z[np.isfinite(z)], bins.tolist(), density=True, histtype="step", color=colour, label=label, lw=1.5
+            np.clip(z[np.isfinite(z)], bins[0], bins[-1]),
+            bins.tolist(),
+            density=True,
+            histtype="step",
+            color=colour,
+            label=label,
+            lw=1.5,
         )
     ax.plot(bins, np.exp(-(bins**2) / 2) / np.sqrt(2 * np.pi), color="0.4", ls="--", label="noise alone")
     ax.set(xlabel="residual / noise floor (standard deviations)", ylabel="density")

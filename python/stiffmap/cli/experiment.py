@@ -1,0 +1,128 @@
+"""``stiffmap experiment``: from a spreadsheet to an experiment folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.errors import FileError, StiffmapError
+
+
+def experiment(
+    action: Annotated[str, typer.Argument(help="new: make a folder from a spreadsheet.")],
+    file: Annotated[
+        Path, typer.Argument(help="Spreadsheet: .xlsx, .csv, .txt (any separator and decimal sign).")
+    ],
+    machine: Annotated[str, typer.Option(help="Declared machine: shipped name or machine file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the experiment.")],
+    quantity: Annotated[
+        str, typer.Option(help="deflection (loaded minus unloaded) or position (measured minus commanded).")
+    ] = "deflection",
+    mapped: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map", help="What a column is, e.g. dx='Uhr 1 [µm]'; repeats: dx='Uhr 1|Uhr 2'; repeatable."
+        ),
+    ] = None,
+    unit: Annotated[list[str] | None, typer.Option(help="Unit of a column without one, e.g. dx=um.")] = None,
+    constant: Annotated[
+        list[str] | None, typer.Option("--set", help="What is the same in all rows, mm and N, e.g. z=0.")
+    ] = None,
+    noise: Annotated[
+        list[str] | None, typer.Option(help="One standard deviation of a reading in its unit, e.g. dx=2.")
+    ] = None,
+    sheet: Annotated[str | None, typer.Option(help="Sheet of the workbook. [default: the first]")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing experiment.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Make an experiment of a spreadsheet: columns, units and repeats are understood and told in words.
+
+    Units stand in brackets in the header. The header may come after other lines; n/a, - and empty cells were not
+    read; further columns go to notes.csv. Exit codes: 0 done, 2 bad input, or a question that --map answers.
+
+    Examples:
+
+      [cyan]stiffmap experiment new readings.xlsx --machine five-bar -o readings[/cyan]
+
+      [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
+    """
+    from stiffmap.experiment import load_experiment
+    from stiffmap.machine import load_machine
+    from stiffmap.spreadsheet.convert import understand, write_folder
+    from stiffmap.spreadsheet.sheet import read_sheet
+
+    if action != "new":
+        raise StiffmapError(f"experiment: expected 'new', got '{action}'")
+    if quantity not in ("deflection", "position"):
+        raise StiffmapError(f"--quantity: expected deflection or position, got '{quantity}'")
+    load_machine(machine)
+    if (output / "experiment.yaml").exists() and not overwrite:
+        raise FileError("exists already; use --overwrite to replace it", file=str(output / "experiment.yaml"))
+    table = read_sheet(file, sheet)
+    chosen = {k: v.split("|") for k, v in _pairs(mapped, "map").items()}
+    found = understand(table, chosen, _pairs(unit, "unit"), _numbers(constant, "set"))
+    write_folder(found, table, output, machine, quantity, _numbers(noise, "noise"), f"from {file.name}")
+    made = load_experiment(output)
+    if as_json:
+        print_json({"folder": str(output), "rows": len(made), "repeats": found.repeats,
+                    "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units})  # fmt: skip
+        return
+    console = Console(highlight=False, soft_wrap=True)
+    for c in found.columns:
+        told = f"repeat {c.repeat} of {c.meaning}" if c.repeat else c.meaning
+        where = (
+            "kept in notes.csv" if c.meaning == "note" else f"{told}, {found.units.get(c.meaning, 'no unit')}"
+        )
+        console.print(f"'{escape(table.header[c.index])}': {where}")
+    for name, value in found.constants.items():
+        console.print(f"{name} = {value:g} in every row")
+    _show(console, made)
+    poses = int(made.groups.max()) + 1
+    console.print(
+        f"{output}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
+    )
+    if not (made.sigma[made.read] > 0).all():
+        console.print("no noise is declared: repeats must show it (five or more), or say --noise dx=…")
+    console.print(
+        f"next: [cyan]stiffmap residual {escape(machine)} {escape(str(output))}[/cyan]", soft_wrap=True
+    )
+
+
+def _show(console: Console, made: object) -> None:
+    from stiffmap.experiment.told import experiment_rows
+
+    head, rows = experiment_rows(made)
+    table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood")
+    for name in head:
+        table.add_column(name, justify="right")
+    for row in rows:
+        table.add_row(*row)
+    console.print(table)
+
+
+def _pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
+    out = {}
+    for text in given or []:
+        key, equals, value = text.partition("=")
+        if not equals or not value:
+            raise StiffmapError(f"--{name}: expected NAME=VALUE, such as dx=…; got '{text}'")
+        out[key.strip()] = value.strip()
+    return out
+
+
+def _numbers(given: Sequence[str] | None, name: str) -> dict[str, float]:
+    out = {}
+    for key, text in _pairs(given, name).items():
+        try:
+            out[key] = float(text)
+        except ValueError:
+            raise StiffmapError(f"--{name}: expected a number, such as {key}=0; got '{text}'") from None
+    return out

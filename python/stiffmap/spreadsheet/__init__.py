@@ -1,0 +1,1 @@
+"""Experiments from spreadsheets as workshops write them."""

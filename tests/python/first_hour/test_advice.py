@@ -1,0 +1,78 @@
+"""`stiffmap check` as an adviser: quiet about good machines, plain about bad ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.advice import advice, twist_words
+from stiffmap.cli import main
+from stiffmap.files.shipped import machine_folder
+from stiffmap.files.starter import starter_text
+
+STARTER = starter_text("m")
+FIVE_BAR = (machine_folder() / "five-bar.yaml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", sm.machine_names())
+def test_shipped_machines_are_left_in_peace(name: str) -> None:
+    assert advice(sm.load_machine(name), name) == []
+
+
+CASES = {
+    "modulus": (
+        STARTER,
+        "E: 2.1e5",
+        "E: 2.1e11",
+        "materials.steel.E = 2.1e+11 N/mm² is no solid (steel: 2.1e+05",
+    ),
+    "mass": (STARTER, "mass: 6", "mass: 5000", "5000 kg is more than solid steel"),
+    "beam": (
+        STARTER,
+        "length: 500\n",
+        "length: 5000\n",
+        "the beam of 'bar' is 5000 long, the offset before it spans 500",
+    ),
+    "box": (STARTER, "y: [320, 430]", "y: [320, 630]", "3 of 9 positions of the workspace cannot be reached"),
+    "limit": (
+        STARTER,
+        "range: [-200, 200]",
+        "range: [0, 200]",
+        "left.drive: home lies at the end of its range",
+    ),
+    "no task": (FIVE_BAR, "task: [x, y]", "", "2 drives, 6 components commanded; name those that are"),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_odd_is_named(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, old, new, words = CASES[name]
+    assert old in text
+    (tmp_path / "m.yaml").write_text(text.replace(old, new), encoding="utf-8")
+    assert main(["check", str(tmp_path / "m.yaml")]) == 0
+    assert "warning: " in capsys.readouterr().out
+    assert any(words in a for a in advice(sm.load_machine(tmp_path / "m.yaml"), tmp_path / "m.yaml"))
+
+
+def test_free_motions_in_words() -> None:
+    assert twist_words(np.array([0, 0, 0, 0, 0, 1.0]), 0.5) == "turn about z"
+    assert twist_words(np.array([1.0, 0, 0, 0, 0, 0]), 0.5) == "move along x"
+    assert twist_words(np.array([0.4, 0, 0, 0, 0, 1.0]), 0.5) == "turn about z and shift with it"
+    assert twist_words(np.array([1.0, 1.0, 0, 0, 0, 0]), 0.5) == "move along (0.71, 0.71, 0)"
+
+
+def test_a_rigid_machine_is_named(tmp_path: Path) -> None:
+    text = """name: rigid
+units: {length: mm, force: N, angle: deg}
+home: {translation: [500, 0, 0]}
+legs:
+  arm:
+    elements:
+      - {actuator: drive, kind: prismatic, axis: x, rigid: true}
+      - {offset: length, translation: [500, 0, 0]}
+"""
+    (tmp_path / "m.yaml").write_text(text, encoding="utf-8")
+    assert any("rigid" in a for a in advice(sm.load_machine(tmp_path / "m.yaml"), tmp_path / "m.yaml"))
