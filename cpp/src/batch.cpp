@@ -180,7 +180,10 @@ void solve_reference(const Mechanism& m, const BatchInput& in, const SolveOption
                      const BatchOutput& out) {
   std::vector<Reference> scratch(at(std::max(1, threads)));
   parallel_chunks(in.count, reference_chunk, threads, [&](int thread, long begin, long end) {
-    for (long i = begin; i < end; ++i) scratch[static_cast<std::size_t>(thread)].solve(m, in, options, i, out);
+    for (long i = begin; i < end; ++i) {
+      if (thread == 0 && in.poll) in.poll();
+      scratch[static_cast<std::size_t>(thread)].solve(m, in, options, i, out);
+    }
   });
 }
 
@@ -222,6 +225,7 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
   };
   std::vector<Scratch> scratch(at(std::max(1, threads)));
   parallel_chunks(in.count, fast_chunk, threads, [&](int thread, long begin, long end) {
+    if (thread == 0 && in.poll) in.poll();
     Scratch& s = scratch[static_cast<std::size_t>(thread)];
     KernelInput input = kernel_input(m, in, options);
     input.perturbed = variants.data();
@@ -232,6 +236,7 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
     for (long i = begin; i < end; ++i) {
       const std::uint8_t how = done[static_cast<std::size_t>(i)];
       if (how != pose_solved) {
+        if (thread == 0 && in.poll) in.poll();
         if (how == pose_unreachable) s.reference.unreachable(m, in, i, out);
         else s.reference.solve(m, in, options, i, out, flag::reference_path);
         if (out.variants) {

@@ -10,6 +10,12 @@
 namespace stiffmap::bindings {
 namespace {
 
+/// Ctrl-C ends a batch between two chunks.
+void stop_where_interrupted() {
+  py::gil_scoped_acquire held;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+}
+
 py::array_t<double> empty(const Shape& shape) { return py::array_t<double>(shape); }
 
 std::vector<Index> point_indices(const Mechanism& m, const std::vector<std::string>& names) {
@@ -31,6 +37,7 @@ Answer solve(const Mechanism& m, const FastPlan* plan, const Array& position, co
   in.wrench = data(wrench, {n, static_cast<py::ssize_t>(load_points.size()), 6}, "wrench");
   if (closed) in.closed = data(*closed, {n, m.size()}, "closed coordinates");
   in.gravity = Eigen::Map<const Vec3>(data(gravity, {3}, "gravity"));
+  in.poll = &stop_where_interrupted;
   in.read_points = point_indices(m, read_points);
   require(!in.read_points.empty(), "read_points", "at least one point", 0);
   require(load_types.size() == load_points.size(), "load_types", "one per load point", load_types.size());

@@ -23,6 +23,7 @@ struct BatchInput {
   std::vector<Index> read_points;
   Vec3 gravity = Vec3::Zero();
   std::vector<const FastPlan*> variants;  ///< plans of the same machine with a parameter moved
+  void (*poll)() = nullptr;               ///< called now and then on the calling thread; throws to stop the batch
 };
 
 /// Row-major outputs; null pointers are not written.
