@@ -105,7 +105,7 @@ struct Block {
   void set_base(const Program& of) {
     for (int q = 0; q < of.coordinate_count; ++q) {
       const CoordinateProgram& k = of.coordinates[q];
-      s.a_base[q] = k.role == 2 ? splat(0) : k.from_home ? splat(k.home) : s.closed[q];
+      s.a_base[q] = k.role == 2 ? splat(0) : k.from_home ? splat(k.rest) : s.closed[q];
       s.scale[q] = splat(1);
     }
     for (int d = 0; d < of.drive_count; ++d) {
@@ -125,11 +125,23 @@ struct Block {
     for (int q = 0; q < P.coordinate_count; ++q) {
       const CoordinateProgram& k = P.coordinates[q];
       s.closed[q] = s.x[q];
-      s.z[q] = k.from_home ? s.x[q] - k.home : splat(0);
+      s.z[q] = k.from_home ? s.x[q] - k.rest : splat(0);
       s.da[q] = splat(1);
       s.tau[q] = s.dtau[q] = s.rubs[q] = splat(0);
     }
     set_base(P);
+  }
+
+  /// Lanes in which a ball joint's axes are less than `least` from coinciding.
+  M locked(double least) const {
+    M hit{};
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      if (!P.coordinates[q].ball) continue;
+      V sn, cs;
+      sincos(s.closed[q] - P.coordinates[q].middle, sn, cs);
+      hit |= absolute(cs) < least;
+    }
+    return hit;
   }
 
   /// Frames and wrenches of a program's machine at the coordinates found.
@@ -173,8 +185,9 @@ struct Block {
   }
 
   void run() {
-    const M usable = read();
+    M usable = read();
     set_start();
+    usable &= ~locked(P.locked);
     for (int k = 0; k < P.chain_count; ++k) s.branches[k].F = V6{};
     const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
     Elimination e{
@@ -232,11 +245,12 @@ struct Block {
       if (k.role == 0) range = select(off, splat(1), range);
       if (k.role == 1) limit = select(off, splat(1), limit);
     }
+    const M lock = locked(P.near_lock);
     for (int i = 0; i < count; ++i)
       if (done[i])
-        out.flags[first + i] = (high[i] > 0 ? P.flag_force : 0u) | (range[i] > 0 ? P.flag_range : 0u) |
-                               (limit[i] > 0 ? P.flag_limit : 0u) | (steps[i] > 0 ? P.flag_stepped : 0u) |
-                               P.flag_always;
+        out.flags[first + i] = (lock[i] ? P.flag_lock : 0u) | (high[i] > 0 ? P.flag_force : 0u) |
+                               (range[i] > 0 ? P.flag_range : 0u) | (limit[i] > 0 ? P.flag_limit : 0u) |
+                               (steps[i] > 0 ? P.flag_stepped : 0u) | P.flag_always;
     if (!out.leg_wrench || P.legs_op < 0) return;
     const Op& block = P.ops[P.legs_op];
     for (int b = 0; b < block.count; ++b) {

@@ -58,8 +58,10 @@ struct DriveProgram {
 
 struct CoordinateProgram {
   double home, lower, upper, unit;
-  double stiffness, rest;  ///< of a link spring's direction that is a joint of its own
+  double stiffness, rest;  ///< of a link spring's direction that is a joint of its own; rest: of a joint's law too
   double friction;         ///< of a free passive joint
+  double middle;           ///< of a ball joint's second coordinate: its axes are perpendicular there
+  std::int32_t ball;       ///< it is one
   std::int32_t role, locked, law, from_home;
 };
 
@@ -117,10 +119,10 @@ struct Program {
   std::int32_t open_task;      ///< some are not
   std::int32_t exact_weights;  ///< the tangent is exact with the bodies' weight too
   std::int32_t starts_linear;  ///< a law with knots or friction: Newton starts with all laws linear
-  std::uint32_t flag_force, flag_range, flag_limit, flag_always, flag_stepped;
+  std::uint32_t flag_force, flag_range, flag_limit, flag_lock, flag_always, flag_stepped;
   std::int32_t grid_n[3], grid_row;  ///< nodes along each axis; numbers per node, a multiple of 8
   double grid_low[3], grid_step[3];
-  double length, stiffness;
+  double length, stiffness, near_lock, locked;
   double home_p[3], home_R[9];  ///< tip pose at home, R by columns
 };
 

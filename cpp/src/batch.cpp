@@ -79,8 +79,8 @@ class Reference {
     VecX found(m.size());
     if (in.closed) found = Eigen::Map<const VecX>(in.closed + m.size() * i, m.size());
     const ClosureResult r = in.closed ? given_closure(m, *closure_, found) : inverse_closure(m, pose, *closure_, found);
-    // A doubtful branch keeps its flag: the whole pose then takes the reference path.
-    if (r.status != Status::converged || r.flags & flag::branch_unverified) found[0] = std::nan("");
+    // A doubtful branch keeps its flag, and a misfit is known to the reference path alone.
+    if (r.status != Status::converged || r.flags & flag::branch_unverified || !r.exact) found[0] = std::nan("");
     Eigen::Map<VecX>(x, m.size()) = found;
     reached = m.task == full_task ? pose : r.tip;
   }

@@ -3,33 +3,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+#include <random>
 
-#include "stiffmap/check.hpp"
+#include "closing.hpp"
 
 namespace stiffmap {
+namespace closing {
 namespace {
 
-constexpr double closed = 1e-12;        // relative to the mechanism's length
+constexpr double stationary = 1e-9;     // a step that leaves what misfit there is
 constexpr double contraction = 0.25;    // Newton steps of a trusted continuation shrink at least so
 constexpr double shortest_leap = 1e-3;  // of the way from home
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-/// What is to be closed: the loops, and the tip where its pose is given.
-struct Target {
-  const Pose* tip = nullptr;
-  Task task = full_task;
-
-  /// Zero in the components of a tip error (or its Jacobian) that are not commanded.
-  template <class Rows>
-  void mask(Rows&& rows) const {
-    if (task == full_task) return;
-    rows.template bottomRows<3>() = (tip->R.transpose() * rows.template bottomRows<3>()).eval();
-    for (int i = 0; i < 6; ++i)
-      if (!task[static_cast<std::size_t>(i)]) rows.row(i).setZero();
-  }
-};
+}  // namespace
 
 void select_unknowns(const Mechanism& m, bool actuators, ClosureWorkspace& ws) {
   ws.unknown.clear();
@@ -40,7 +28,6 @@ void select_unknowns(const Mechanism& m, bool actuators, ClosureWorkspace& ws) {
   }
 }
 
-/// Residual, angles as lengths; returns its largest entry relative to the length.
 double residual(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws) {
   forward(m, Geometry::nominal, x, ws.frames);
   ws.e.setZero();
@@ -56,7 +43,6 @@ double residual(const Mechanism& m, const VecX& x, const Target& target, Closure
   return ws.e.cwiseAbs().maxCoeff() / m.length;
 }
 
-/// Gauss-Newton step of least norm over the unknowns, at the frames of the last residual.
 double newton_step(const Mechanism& m, const Target& target, ClosureWorkspace& ws) {
   ws.J.setZero();
   if (target.tip) {
@@ -87,14 +73,10 @@ double newton_step(const Mechanism& m, const Target& target, ClosureWorkspace& w
   return norm;
 }
 
-void apply(ClosureWorkspace& ws, VecX& x, double factor) {
+static void apply(ClosureWorkspace& ws, VecX& x, double factor) {
   for (std::size_t k = 0; k < ws.unknown.size(); ++k) x[ws.unknown[k]] += factor * ws.step[static_cast<Index>(k)];
 }
 
-enum class Pace { contracting, damped };
-
-/// Newton to the target. Contracting: gives up unless the steps shrink fast (theory C5), so that the
-/// solution is the continuation of the start. Damped: steps limited, as many as it takes.
 bool close(const Mechanism& m, const Target& target, Pace pace, ClosureWorkspace& ws, VecX& x, int& iterations) {
   const int most = pace == Pace::contracting ? 12 : 120;
   double previous = 0, error = residual(m, x, target, ws);
@@ -106,11 +88,19 @@ bool close(const Mechanism& m, const Target& target, Pace pace, ClosureWorkspace
     if (pace == Pace::contracting && k > 0 && norm > contraction * previous && norm > 1e-9) return false;
     apply(ws, x, norm > 0.1 ? 0.1 / norm : 1.0);
     previous = norm;
+    const double before = error;
     error = residual(m, x, target, ws);
-    if (error < closed && norm < 1e-7) return true;
+    if (error < round_off && norm < 1e-7) return true;
+    if (norm < stationary && error > 0.5 * before) return error < input_tolerance;
   }
-  return error < closed;
+  return error < round_off;
 }
+
+}  // namespace closing
+
+namespace {
+
+using namespace closing;
 
 /// Interpolates between home and the pose.
 Pose on_the_way(const Pose& a, const Pose& b, double s) {
@@ -150,7 +140,9 @@ bool continuation(const Mechanism& m, const Target& target, Set&& set, ClosureWo
 
 void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace& ws, const VecX& x,
             ClosureResult& out) {
-  out.residual = residual(m, x, target, ws) * m.length;
+  const double error = residual(m, x, target, ws);
+  out.residual = error * m.length;
+  out.exact = error < round_off;
   out.tip = ws.frames.at(m.tip);
   out.status = ok ? Status::converged : Status::unreachable;
   if (!ok) return;
@@ -159,21 +151,63 @@ void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace&
     if (x[j] >= c.lower && x[j] <= c.upper) continue;
     out.flags |= c.role == Role::actuator ? flag::drive_range : flag::joint_limit;
   }
+  for (const Ball& b : m.balls)
+    if (b.spread(x[b.first + 1]) < near_lock) out.flags |= flag::gimbal_lock;
 }
 
-/// A spin moves passive coordinates and nothing that the closure sees, at home as anywhere: the null
-/// direction is found at home and at a configuration turned along it, and one coordinate of it held.
-void lock_spins(Mechanism& m, ClosureWorkspace& ws) {
+}  // namespace
+
+namespace {
+
+/// Null directions of the closure over the passive coordinates, tip held, at the frames of the last residual.
+MatX still_directions(const Mechanism& m, const Target& target, ClosureWorkspace& ws) {
+  newton_step(m, target, ws);
+  const Index n = ws.A.cols();
+  if (n == 0) return MatX(0, 0);
+  const Singular svd = singular_vectors(ws.A);
+  const Index rank = (svd.values.array() > rank_threshold).count();
+  return svd.V.rightCols(n - rank);
+}
+
+/// The same a little way off home, where no axes coincide by chance; false where no such place was found.
+bool still_off_home(const Mechanism& m, ClosureWorkspace& ws, MatX& out) {
+  VecX x = m.home_coordinates;
+  std::minstd_rand random(1);
+  std::uniform_real_distribution<double> share(-0.05, 0.05);
+  select_unknowns(m, true, ws);
+  for (const Index j : ws.unknown) x[j] += share(random) * m.length / m.unit(j);
+  int iterations = 0;
+  const bool ok = close(m, Target{}, Pace::damped, ws, x, iterations);
+  const Pose tip = ws.frames.at(m.tip);
+  select_unknowns(m, false, ws);
+  if (!ok) return false;
+  const Target target{&tip};
+  residual(m, x, target, ws);
+  out = still_directions(m, target, ws);
+  return true;
+}
+
+}  // namespace
+
+/// A spin moves passive coordinates and nothing that the closure sees, at home as anywhere: its null
+/// direction stays one where it is turned along, and has its like off home (axes that coincide at home only
+/// have not: a gimbal lock). One coordinate of it is held.
+void lock_spins(Mechanism& m) {
+  ClosureWorkspace ws(m);
   const Target target{&m.home};
   for (;;) {
     select_unknowns(m, false, ws);
     residual(m, m.home_coordinates, target, ws);
-    newton_step(m, target, ws);
-    if (ws.unknown.empty()) return;
-    const Singular svd = singular_vectors(ws.A);
-    const Index n = ws.A.cols(), rank = (svd.values.array() > rank_threshold).count();
-    if (rank == n) return;
-    const VecX spin = svd.V.col(n - 1);
+    const MatX still = still_directions(m, target, ws);
+    if (still.cols() == 0) return;
+    VecX spin = still.rightCols<1>();
+    MatX off_home;
+    if (still_off_home(m, ws, off_home) && off_home.cols() < still.cols()) {
+      if (off_home.cols() == 0) return;
+      // the direction at home that is nearest to a spin elsewhere
+      spin = (still * (still.transpose() * off_home.rightCols<1>())).normalized();
+    }
+    const Index n = spin.size();
     VecX turned = m.home_coordinates;
     for (Index k = 0; k < n; ++k) turned[ws.unknown[at(k)]] += 0.3 * spin[k];
     if (residual(m, turned, target, ws) > 1e-9) return;  // singular at home, but no spin
@@ -182,8 +216,6 @@ void lock_spins(Mechanism& m, ClosureWorkspace& ws) {
     m.coordinates[at(ws.unknown[at(held)])].locked = true;
   }
 }
-
-}  // namespace
 
 ClosureWorkspace::ClosureWorkspace(const Mechanism& m)
     : frames(m),
@@ -295,24 +327,6 @@ ClosureResult given_closure(const Mechanism& m, ClosureWorkspace& ws, const VecX
   if (!x.allFinite()) return out;
   finish(m, Target{}, true, ws, x, out);
   return out;
-}
-
-void close_home(Mechanism& m) {
-  ClosureWorkspace ws(m);
-  VecX& x = m.home_coordinates;
-  select_unknowns(m, true, ws);
-  const Target target{&m.home};
-  const double declared = residual(m, x, target, ws);
-  std::ostringstream misfit;
-  misfit << "platform " << ws.e.head<6>().norm() << " m";
-  for (std::size_t i = 0; i < m.loops.size(); ++i)
-    misfit << ", " << m.loops[i].block << "." << m.loops[i].branch << " "
-           << ws.e.segment<6>(6 + 6 * static_cast<Index>(i)).norm() << " m";
-  int iterations = 0;
-  const bool ok = declared < 0.05 && close(m, target, Pace::damped, ws, x, iterations);
-  require(ok, "home configuration", "coordinates that close every leg and loop (within 5 % of the machine's size)",
-          misfit.str());
-  lock_spins(m, ws);
 }
 
 double close_passive(const Mechanism& m, const Pose& tip, ClosureWorkspace& ws, VecX& x) {

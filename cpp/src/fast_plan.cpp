@@ -18,18 +18,23 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
   }
   for (const Coordinate& c : m.coordinates) {
     const Index j = static_cast<Index>(&c - m.coordinates.data());
-    d.coordinates.push_back({m.home_coordinates[j], c.lower, c.upper, m.unit(j), 0.0, 0.0, c.friction,
+    d.coordinates.push_back({m.home_coordinates[j], c.lower, c.upper, m.unit(j), 0.0, m.rest[j], c.friction, 0.0, 0,
                              static_cast<std::int32_t>(c.role), c.locked, i32(c.law), c.from_home()});
     d.program.starts_linear |= c.friction != 0;
     if (c.role == Role::passive && c.locked) d.program.flag_always |= flag::free_spin;
+  }
+  for (const Ball& b : m.balls) {
+    CoordinateProgram& c = d.coordinates[static_cast<std::size_t>(b.first + 1)];
+    c.middle = b.middle;
+    c.ball = 1;
   }
   for (std::size_t i = 0; i < m.drives.size(); ++i) {
     const Drive& k = m.drives[i];
     for (const auto& [moves, e] : k.errors)
       d.errors.push_back(
           {i32(moves), i32(k.coordinate), e.offset, e.slope, e.amplitude, e.period, e.phase, e.reference});
-    d.drives.push_back({chains.drives[i].coordinate, chains.drives[i].slot, chains.drives[i].prismatic, k.home,
-                        k.compliance_slope, k.force_limit});
+    d.drives.push_back({chains.drives[i].coordinate, chains.drives[i].slot, chains.drives[i].prismatic,
+                        m.home_coordinates[k.coordinate], k.compliance_slope, k.force_limit});
   }
   for (const ElasticJoint& e : chains.elastic) {
     CoordinateProgram& c = d.coordinates[static_cast<std::size_t>(e.coordinate)];
@@ -63,7 +68,10 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.flag_force = flag::drive_force;
   p.flag_range = flag::drive_range;
   p.flag_limit = flag::joint_limit;
+  p.flag_lock = flag::gimbal_lock;
   p.flag_stepped = flag::load_stepped;
+  p.near_lock = near_lock;
+  p.locked = locked;
   p.length = m.length;
   p.stiffness = m.stiffness;
 }

@@ -84,12 +84,12 @@ void add_external_spring(const Mechanism& m, const NodeSpring& s, Linearization&
 
 /// The two ends of a loop carry opposite wrenches; inside, half of the moment follows the frames,
 /// which makes the tangent symmetric and changes only the meaning of the multiplier (theory E5).
-void add_loops(const Mechanism& m, const State& state, Linearization& out) {
+void add_loops(const Mechanism& m, const Problem& p, const State& state, Linearization& out) {
   for (std::size_t i = 0; i < m.loops.size(); ++i) {
     const Loop& loop = m.loops[i];
     const Index row = 6 * static_cast<Index>(i);
     const Pose &a = out.frames.at(loop.primary), &b = out.frames.at(loop.end);
-    out.e.segment<6>(row) = frame_error(a, b);
+    out.e.segment<6>(row) = frame_error(a, b) - p.misfit.segment<6>(row);
     add_jacobian(m, out.frames, loop.end, b.p, 1.0, out.J.middleRows<6>(row));
     add_jacobian(m, out.frames, loop.primary, a.p, -1.0, out.J.middleRows<6>(row));
     const Vec6 w = state.lambda.segment<6>(row);
@@ -191,7 +191,7 @@ void linearize(const Mechanism& m, const Problem& problem, const State& state, L
   add_springs(m, out);
   add_loads(m, problem, out);
   for (const NodeSpring& s : m.external_springs) add_external_spring(m, s, out);
-  add_loops(m, state, out);
+  add_loops(m, problem, state, out);
   out.r += out.tau;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "stiffmap/check.hpp"
@@ -81,10 +82,12 @@ Index Mechanism::add_joint(const Joint& joint, Index node, const std::string& pr
           "another");
   c.friction = joint.friction;
   c.about_command = joint.about_command;
+  c.rest = joint.rest;
+  if (joint.ball != BallChart::none) charts.emplace_back(size() - 1, joint.ball);
   if (!joint.actuated) return node;
   c.actuator = static_cast<Index>(drives.size());
   c.locked = !joint.law;
-  Drive drive{name, size() - 1, joint.home, joint.compliance_slope, {}, joint.force_limit};
+  Drive drive{name, size() - 1, joint.compliance_slope, {}, joint.force_limit};
   for (const CommandError& e : joint.command_errors) drive.errors.push_back({drive.coordinate, e});
   drives.push_back(drive);
   return add_guide_errors(joint, node, name);
@@ -136,7 +139,7 @@ Index Mechanism::add_block(const Block& block, Index start, const std::string& p
     const Index end = add_chain(chain, start, join(is_legs ? "" : prefix, branch), false);
     if (is_legs) legs.push_back(branch);
     if (primary < 0) primary = end;
-    else loops.push_back({name, branch, primary, end, is_legs});
+    else loops.push_back({name, branch, primary, end, is_legs, join(is_legs ? "" : prefix, branch)});
   }
   if (is_legs) {
     primary = add_node(primary, {}, {});  // the platform: what follows belongs to no leg
@@ -182,7 +185,27 @@ void Mechanism::finish(const std::vector<ExternalSpring>& springs) {
   }
   home_coordinates = VecX::Zero(size());
   for (Index j = 0; j < size(); ++j) home_coordinates[j] = coordinates[static_cast<std::size_t>(j)].home;
+  set_rest();
+  find_balls();
   set_scales();
+}
+
+void Mechanism::set_rest() {
+  rest = home_coordinates;
+  for (Index j = 0; j < size(); ++j) rest[j] = coordinates[static_cast<std::size_t>(j)].rest.value_or(rest[j]);
+}
+
+/// Locked where the third axis, turned about the second by its coordinate, lies along the first.
+void Mechanism::find_balls() {
+  for (const auto& [first, chart] : charts) {
+    const auto axis = [&](Index k) -> const Vec3& {
+      return nodes[static_cast<std::size_t>(coordinates[static_cast<std::size_t>(first + k)].node)].axis;
+    };
+    const Vec3 &a = axis(0), &b = axis(1), &c = axis(2);
+    if (std::abs(a.dot(b)) > 1e-9 || std::abs(b.dot(c)) > 1e-9) continue;  // axes of its own kind: never quite locked
+    const double from_first = std::atan2(b.dot(a.cross(c)), a.dot(c));
+    balls.push_back({first, std::numbers::pi / 2 - from_first, chart == BallChart::free});
+  }
 }
 
 void Mechanism::set_scales() {

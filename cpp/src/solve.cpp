@@ -17,11 +17,11 @@ void command(const Mechanism& m, const VecX& x, Problem& p) {
   p.friction_sign.setZero();
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
-    p.base[j] = c.role == Role::spring ? 0.0 : c.from_home() ? m.home_coordinates[j] : x[j];
+    p.base[j] = c.role == Role::spring ? 0.0 : c.from_home() ? m.rest[j] : x[j];
   }
   for (const Drive& d : m.drives) {
     const double u = x[d.coordinate];
-    p.drive_scale[d.coordinate] = 1 + d.compliance_slope * (u - d.home);
+    p.drive_scale[d.coordinate] = 1 + d.compliance_slope * (u - m.home_coordinates[d.coordinate]);
     for (const auto& [coordinate, e] : d.errors)
       p.base[coordinate] += e.offset + e.slope * (u - e.reference) +
                             e.amplitude * std::sin(2 * std::numbers::pi * (u - e.reference) / e.period + e.phase);
@@ -33,7 +33,7 @@ void start_state(const Mechanism& m, const VecX& x, State& state) {
   state.lambda.setZero();
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
-    if (c.from_home()) state.z[j] = x[j] - m.home_coordinates[j];
+    if (c.from_home()) state.z[j] = x[j] - m.rest[j];
   }
 }
 
@@ -231,8 +231,13 @@ ClosureResult prepare_pose(const Mechanism& m, const PoseInput& in, SolveWorkspa
   const ClosureResult closure =
       in.closed ? given_closure(m, ws.closure, ws.x) : inverse_closure(m, in.commanded, ws.closure, ws.x);
   if (closure.status != Status::converged) return closure;
-  ws.reached = m.task == full_task ? in.commanded : closure.tip;
+  ws.reached = m.task == full_task && closure.exact ? in.commanded : closure.tip;
   forward(m, Geometry::nominal, ws.x, ws.nominal);
+  ws.problem.misfit.setZero();
+  if (!closure.exact)
+    for (std::size_t i = 0; i < m.loops.size(); ++i)
+      ws.problem.misfit.segment<6>(6 * static_cast<Index>(i)) =
+          frame_error(ws.nominal.at(m.loops[i].primary), ws.nominal.at(m.loops[i].end));
   command(m, ws.x, ws.problem);
   start_state(m, ws.x, ws.state);
   ws.problem.gravity = in.gravity;
@@ -249,6 +254,8 @@ void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& opt
   const ClosureResult closure = prepare_pose(m, in, ws);
   reset(m, closure.flags, out);
   if (closure.status != Status::converged) return fail_pose(m, in, Status::unreachable, out);
+  for (const Ball& b : m.balls)  // a direction is lost that the joint has: no stiffness of this chart is the joint's
+    if (b.free && b.spread(ws.x[b.first + 1]) < locked) return fail_pose(m, in, Status::singular, out);
   if (!examine_unloaded(m, in, ws, out)) return;
 
   const EquilibriumResult eq = solve_equilibrium(m, ws.problem, options.equilibrium, ws.equilibrium, ws.state);
@@ -294,10 +301,25 @@ void conclude_pose(const Mechanism& m, const PoseInput& in, int sign_changes, So
   hide_undetermined(m, ws, out);
 }
 
-Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs, const Task& task) {
+Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs, const Task& task,
+                   HomeSearch search, HomeFit* fit) {
   Mechanism m(root, home, springs);
   m.task = task;
-  close_home(m);
+  const HomeFit first = close_home(m, search);
+  if (fit) *fit = first;
+  if (!first.closed) throw HomeMisfit(first);
+  if (!closes_exactly(m)) {
+    Mechanism repaired(corrected(m), m.home, springs);
+    repaired.task = task;
+    repaired.home_coordinates = m.home_coordinates;
+    m = std::move(repaired);
+    close_home(m, HomeSearch::near);
+  }
+  m.set_rest();
+  for (Drive& d : m.drives)
+    for (DriveError& e : d.errors)
+      if (std::isnan(e.error.reference)) e.error.reference = m.home_coordinates[d.coordinate];
+  lock_spins(m);
   return m;
 }
 

@@ -43,15 +43,20 @@ void bind_chain(py::module_& m) {
           [](Chain& c, const std::string& name, bool prismatic, const Array& axis, bool actuated, double home,
              const std::optional<Law>& law, double compliance_slope, const std::vector<CommandError>& errors,
              double lower, double upper, double force_limit, const std::vector<std::pair<Array, CommandError>>& guide,
-             double friction, bool about_command) {
+             double friction, bool about_command, std::optional<double> rest, const std::string& ball) {
             std::vector<GuideError> across;
             for (const auto& [direction, error] : guide) across.push_back({vec3(direction, "axis"), error});
             c.elements.emplace_back(Joint{name, prismatic ? JointType::prismatic : JointType::revolute,
                                           vec3(axis, "axis"), actuated, home, law, compliance_slope, errors, across,
-                                          friction, about_command, lower, upper, force_limit});
+                                          friction, about_command, rest,
+                                          ball.empty()     ? BallChart::none
+                                          : ball == "free" ? BallChart::free
+                                                           : BallChart::meant,
+                                          lower, upper, force_limit});
           },
           "name"_a, "prismatic"_a, "axis"_a, "actuated"_a, "home"_a, "law"_a, "compliance_slope"_a, "errors"_a,
-          "lower"_a, "upper"_a, "force_limit"_a, "guide_errors"_a, "friction"_a, "about_command"_a)
+          "lower"_a, "upper"_a, "force_limit"_a, "guide_errors"_a, "friction"_a, "about_command"_a,
+          "rest"_a = std::nullopt, "ball"_a = "")
       .def(
           "spring",
           [](Chain& c, const std::string& name, const Array& matrix, bool compliance, const Array& rest,

@@ -16,6 +16,14 @@ std::vector<std::string> names(const std::vector<T>& items, Get get) {
   return out;
 }
 
+using PlainGap = std::tuple<std::string, double, double>;  // name, m, rad
+
+std::vector<PlainGap> gaps(const std::vector<Gap>& of) {
+  std::vector<PlainGap> out;
+  for (const Gap& g : of) out.emplace_back(g.name, g.translation, g.rotation);
+  return out;
+}
+
 }  // namespace
 
 void bind_mechanism(py::module_& m) {
@@ -31,7 +39,30 @@ void bind_mechanism(py::module_& m) {
            "mechanism"_a, "low"_a, "high"_a)
       .def_property_readonly("available", &FastPlan::available)
       .def_property_readonly("missing", &FastPlan::missing);
-  mechanism.def(py::init(&assemble), "root"_a, "home"_a, "springs"_a, "task"_a = full_task)
+  // Raised with the words of the core, and the gaps as numbers: (message, declared, closest).
+  static const py::handle misfit = py::exception<HomeMisfit>(m, "HomeMisfit", PyExc_ValueError).release();
+  py::register_exception_translator([](std::exception_ptr raised) {
+    try {
+      if (raised) std::rethrow_exception(raised);
+    } catch (const HomeMisfit& e) {
+      const py::tuple about = py::make_tuple(e.what(), gaps(e.fit.declared), gaps(e.fit.closest));
+      PyErr_SetObject(misfit.ptr(), about.ptr());
+    }
+  });
+  m.def(
+      "home_gaps",
+      [](const Chain& root, const Pose& home, const Task& task, bool search) {
+        HomeFit fit;
+        assemble(root, home, {}, task, search ? HomeSearch::anywhere : HomeSearch::near, &fit);
+        return py::make_tuple(gaps(fit.declared), gaps(fit.closest));
+      },
+      "root"_a, "home"_a, "task"_a = full_task, "search"_a = false);
+  mechanism
+      .def(py::init([](const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs,
+                       const Task& task, bool search) {
+             return assemble(root, home, springs, task, search ? HomeSearch::anywhere : HomeSearch::near);
+           }),
+           "root"_a, "home"_a, "springs"_a, "task"_a = full_task, "search"_a = false)
       .def_property_readonly(
           "coordinates",
           [](const Mechanism& k) { return names(k.coordinates, [](const Coordinate& c) { return c.name; }); })

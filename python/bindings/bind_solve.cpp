@@ -119,6 +119,20 @@ py::tuple frames(const Mechanism& m, const Array& x) {
   return py::make_tuple(p, R);
 }
 
+/// A named point at each row of coordinates, nominal geometry.
+py::array_t<double> point_positions(const Mechanism& m, const std::string& name, const Array& x) {
+  const NodePoint& point = m.points[static_cast<std::size_t>(m.point(name))];
+  const py::ssize_t n = x.ndim() == 2 ? x.shape(0) : 0;
+  const double* const rows = data(x, {n, m.size()}, "coordinates");
+  auto p = empty({n, 3});
+  Frames f(m);
+  for (py::ssize_t i = 0; i < n; ++i) {
+    forward(m, Geometry::nominal, Eigen::Map<const VecX>(rows + m.size() * i, m.size()), f);
+    Eigen::Map<Vec3>(p.mutable_data() + 3 * i) = f.point(point.node, point.offset);
+  }
+  return p;
+}
+
 }  // namespace
 
 void bind_solve(py::module_& m) {
@@ -144,7 +158,8 @@ void bind_solve(py::module_& m) {
            "variants"_a = std::vector<const FastPlan*>{}, "closed"_a = py::none())
       .def("closure", &closure, "plan"_a.none(true), "given"_a, "rotation"_a, "inverse"_a, "threads"_a,
            "start"_a = py::none())
-      .def("frames", &frames, "coordinates"_a);
+      .def("frames", &frames, "coordinates"_a)
+      .def("point_positions", &point_positions, "point"_a, "coordinates"_a);
 }
 
 }  // namespace stiffmap::bindings

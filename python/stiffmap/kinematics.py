@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.branches import Start, start_coordinates
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.compiled import CompiledMachine
+from stiffmap.rotations import as_rotations
 
 if TYPE_CHECKING:
     from stiffmap.machine import Machine
@@ -69,7 +70,7 @@ def close_poses(
     """See `inverse_kinematics`."""
     p = trailing(position, (3,), "position", "positions (m)")
     r = machine.home_rotation if rotation is None else rotation
-    r = trailing(r, (3, 3), "rotation", "rotation matrices")
+    r = as_rotations(trailing(r, (3, 3), "rotation", "rotation matrices"))
     x = None if start is None else start_coordinates(machine, start)
     shape = batch(p.shape[:-1], r.shape[:-2], *(() if x is None else (x.shape[:-1],)))
     from_x = None if x is None else rows(x, shape, x.shape[-1:])

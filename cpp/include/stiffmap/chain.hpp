@@ -35,6 +35,13 @@ struct GuideError {
   CommandError error;
 };
 
+/// What the first of three rotations about one point says of them (theory C8).
+enum class BallChart : std::uint8_t {
+  none,   ///< no ball joint
+  free,   ///< any three axes would do: no force, friction or limit refers to these
+  meant,  ///< laws, friction or limits about these axes
+};
+
 /// One-axis joint. Actuated: `law` is the drive's compliance (none: rigid).
 /// Passive: `law` acts about the home coordinate, or about the commanded one (none: free).
 struct Joint {
@@ -49,6 +56,8 @@ struct Joint {
   std::vector<GuideError> guide_errors;
   double friction = 0;         ///< free passive joint: constant force against its deflection; < 0: with it (theory L3)
   bool about_command = false;  ///< passive: `law` acts about the commanded coordinate
+  std::optional<double> rest;  ///< passive: coordinate at which `law` is free of force; none: as at home
+  BallChart ball = BallChart::none;  ///< this joint and the next two are one ball joint
   double lower = -1e300, upper = 1e300;
   double force_limit = 1e300;
 };

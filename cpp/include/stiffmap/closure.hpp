@@ -23,6 +23,7 @@ struct ClosureResult {
   std::uint32_t flags = 0;
   int iterations = 0;
   double residual = 0;  ///< length of the closure error, m
+  bool exact = true;    ///< closed but for round-off; otherwise as well as the input's digits allow (theory C9)
   Pose tip;
 };
 
@@ -47,10 +48,9 @@ ClosureResult branch_closure(const Mechanism& m, const Pose& pose, ClosureWorksp
 /// What there is to say of coordinates that are closed already: tip pose and limits; NaN is out of reach.
 ClosureResult given_closure(const Mechanism& m, ClosureWorkspace& ws, const VecX& x);
 
-/// Closes the mechanism at home exactly, starting from the declared coordinates, and locks passive
-/// coordinates that spin without effect on any frame that carries load (theory C6).
-/// Throws with the residual of each leg where the home configuration is impossible.
-void close_home(Mechanism& m);
+/// Locks passive coordinates that spin without effect on any frame that carries load (theory C6); the home
+/// configuration must be closed.
+void lock_spins(Mechanism& m);
 
 /// Moves passive coordinates only, tip and actuators held, to close the loops again (Gauss-Newton of
 /// least norm); returns the remaining error.

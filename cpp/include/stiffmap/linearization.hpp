@@ -13,10 +13,14 @@ namespace stiffmap {
 /// Everything that is given: commanded drives, gravity, wrenches (base axes, N and N·m).
 struct Problem {
   explicit Problem(const Mechanism& m)
-      : base(VecX::Zero(m.size())), drive_scale(VecX::Ones(m.size())), friction_sign(VecX::Zero(m.size())) {}
+      : base(VecX::Zero(m.size())),
+        drive_scale(VecX::Ones(m.size())),
+        friction_sign(VecX::Zero(m.size())),
+        misfit(VecX::Zero(m.closures())) {}
   VecX base;           ///< value of each coordinate at zero deflection
   VecX drive_scale;    ///< factor on the compliance of each law
   VecX friction_sign;  ///< of the deflection without friction: set by the linear start, 0 before
+  VecX misfit;         ///< closure error that the digits of the input leave at the command (theory C9)
   Vec3 gravity = Vec3::Zero();
   std::vector<LoadPoint> load_points;
   std::vector<Vec6> wrenches;

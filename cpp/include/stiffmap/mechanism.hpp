@@ -4,6 +4,8 @@
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,10 +36,25 @@ struct Coordinate {
   bool locked = false;  ///< rigid drive, deviation of a guide, or a spin that changes nothing (held at home)
   double friction = 0;  ///< of a free passive joint
   bool about_command = false;
+  std::optional<double> rest;  ///< as declared; none: as at home
 
   /// The law of a passive joint acts about its home coordinate unless it says otherwise.
   bool from_home() const { return role == Role::passive && law >= 0 && !about_command; }
 };
+
+/// A ball joint of which the second axis is perpendicular to the others: its chart locks where the second
+/// coordinate is a right angle from `middle` (theory C8).
+struct Ball {
+  Index first = 0;
+  double middle = 0;
+  bool free = true;
+
+  /// 1 where the three axes are perpendicular, 0 where two coincide.
+  double spread(double second) const { return std::abs(std::cos(second - middle)); }
+};
+
+inline constexpr double near_lock = 0.02;  ///< spread below which a pose carries a flag
+inline constexpr double locked = 1e-5;     ///< spread below which a direction of rotation is lost
 
 /// A coupled spring over coordinates first .. first+5.
 struct SpringGroup {
@@ -56,7 +73,7 @@ struct DriveError {
 struct Drive {
   std::string name;
   Index coordinate = -1;
-  double home = 0, compliance_slope = 0;
+  double compliance_slope = 0;  ///< counted from home
   std::vector<DriveError> errors;
   double force_limit = 1e300;
 };
@@ -66,6 +83,7 @@ struct Loop {
   std::string block, branch;
   Index primary = -1, end = -1;
   bool leg = false;  ///< a loop of the outermost block: its multiplier is the leg's wrench
+  std::string name;  ///< full name of the extra branch
 };
 
 struct NodePoint {
@@ -102,6 +120,7 @@ class Mechanism {
   std::vector<Node> nodes;
   std::vector<Coordinate> coordinates;
   std::vector<SpringGroup> groups;
+  std::vector<Ball> balls;
   std::vector<Law> laws;
   std::vector<Drive> drives;
   std::vector<Loop> loops;
@@ -113,7 +132,8 @@ class Mechanism {
   std::vector<std::vector<Index>> path;  ///< per node: its coordinates from the base outwards
   Task task = full_task;                 ///< commanded pose components
   Pose home;                             ///< tip pose of the home configuration
-  VecX home_coordinates;                 ///< closed exactly at home
+  VecX home_coordinates;                 ///< as declared; once assembled: closed at home
+  VecX rest;                             ///< where laws about a fixed coordinate are free of force
   double length = 1;                     ///< characteristic length: turns angles into lengths in every norm
   double stiffness = 1;                  ///< characteristic stiffness, N/m: turns forces into lengths
   Index tip = -1;
@@ -122,6 +142,7 @@ class Mechanism {
   Index size() const { return static_cast<Index>(coordinates.size()); }
   Index closures() const { return 6 * static_cast<Index>(loops.size()); }
   Index point(const std::string& name) const;  ///< throws with the names that exist
+  void set_rest();                             ///< declared, else as at home: call it when home has closed
 
   /// Length that a unit of coordinate j stands for.
   double unit(Index j) const {
@@ -131,6 +152,7 @@ class Mechanism {
  private:
   Index add_node(Index parent, const Pose& nominal, const Pose& actual);
   Index add_coordinate(Index node, const std::string& name, Role role, JointType type, const Vec3& axis, double home);
+  std::vector<std::pair<Index, BallChart>> charts;  ///< while it is built: first coordinates of ball joints
   std::string outside;  ///< while it is built: prefix of points before (base) and behind (platform) the legs
   Index add_chain(const Chain& chain, Index node, const std::string& prefix, bool outermost);
   Index add_block(const Block& block, Index node, const std::string& prefix, bool outermost);
@@ -139,6 +161,7 @@ class Mechanism {
   Index add_spring(const Spring& spring, Index node, const std::string& prefix);
   void finish(const std::vector<ExternalSpring>& springs);
   void set_scales();
+  void find_balls();
 };
 
 }  // namespace stiffmap

@@ -2,8 +2,8 @@
 // One pose from command to answer: closure, equilibrium, stiffness, and what kind of pose it is.
 #pragma once
 
-#include "stiffmap/closure.hpp"
 #include "stiffmap/equilibrium.hpp"
+#include "stiffmap/home.hpp"
 #include "stiffmap/stiffness.hpp"
 
 namespace stiffmap {
@@ -63,8 +63,9 @@ void conclude_pose(const Mechanism& m, const PoseInput& in, int sign_changes, So
 /// NaN and the status.
 void fail_pose(const Mechanism& m, const PoseInput& in, Status status, PoseResult& out);
 
-/// Mechanism closed at home, spins locked: ready to solve.
+/// Mechanism closed at home but for round-off, spins locked: ready to solve. Throws HomeMisfit; `fit`: how the
+/// declared home configuration closes.
 Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs = {},
-                   const Task& task = full_task);
+                   const Task& task = full_task, HomeSearch search = HomeSearch::near, HomeFit* fit = nullptr);
 
 }  // namespace stiffmap

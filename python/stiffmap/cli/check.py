@@ -11,6 +11,9 @@ from rich.markup import escape
 
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.files import FileCheck, check_file
+from stiffmap.home import gap_text
+
+MOST_CHANGES = 12
 
 
 def check(
@@ -55,6 +58,7 @@ def as_plain(result: FileCheck) -> dict[str, Any]:
         "title": result.description.title,
         "counts": result.counts,
         "home_gaps": {g.name: {"translation": g.translation, "rotation": g.rotation} for g in result.gaps},
+        "home_changes": {c.name: {"declared": c.declared, "closed": c.closed} for c in result.changes},
         "effects": [effect.kind for effect in result.description.effects],
         "warnings": result.warnings,
     }
@@ -66,8 +70,13 @@ def _print(result: FileCheck) -> None:
     machine = result.description
     console.print(f"[bold]{machine.name}[/bold]  {escape(machine.title)}")
     console.print("  " + ", ".join(f"{n} {sort}" for sort, n in result.counts.items() if n))
-    worst = max(result.gaps, key=lambda gap: gap.translation)
-    console.print(f"  home configuration closes within {worst.translation * 1e3:.2g} mm (leg {worst.name})")
+    console.print(f"  declared home configuration is open at {gap_text(machine, result.gaps)}")
+    for change in sorted(result.changes, key=lambda c: -abs(c.closed - c.declared))[:MOST_CHANGES]:
+        console.print(f"  home, closed: {change.text(machine)}")
+    if len(result.changes) > MOST_CHANGES:
+        console.print(
+            f"  home, closed: {len(result.changes) - MOST_CHANGES} smaller changes (--json lists all)"
+        )
     for effect in machine.effects:
         console.print(f"  effect: {effect.kind} of {effect.element} {' '.join(effect.legs)}")
     for warning in result.warnings:

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.description import Joint, Pose
+from stiffmap import _core
+from stiffmap.description import Joint
 from stiffmap.description.pose import IDENTITY
 from stiffmap.errors import StiffmapError
 from stiffmap.rotations import rotation_about
@@ -20,7 +21,7 @@ def any_axes_do(e: Joint) -> bool:
     return e.kind == "spherical" and e.free and e.friction is None and e.limits is None
 
 
-def charted(e: Joint) -> tuple[Joint, Pose | None]:
+def charted(e: Joint) -> tuple[Joint, _core.Pose | None]:
     """The joint with axes that do not lock at home, and the constant rotation before it (None: none).
 
     A free ball joint whose axes are far from perpendicular at home gets three that are. StiffmapError where axes that are meant (with a
@@ -44,7 +45,7 @@ def charted(e: Joint) -> tuple[Joint, Pose | None]:
     spread = abs(float(np.linalg.det(np.array(at_home))))
     if any_axes_do(e) and spread < WIDE:
         flat = replace(e, axes=IDENTITY, home=(0.0, 0.0, 0.0))
-        return flat, Pose.of(rotation=turn)
+        return flat, _core.Pose(np.zeros(3), turn)
     if spread < PARALLEL:
         raise StiffmapError(
             f"joint {e.name}: the first and the last axis of this ball joint coincide at home (gimbal lock); "

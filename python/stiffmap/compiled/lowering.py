@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiffmap import _core
-from stiffmap.compiled.ball import charted
+from stiffmap.compiled.ball import any_axes_do, charted
 from stiffmap.description import (
     TASK,
     Block,
@@ -24,6 +24,7 @@ from stiffmap.description import (
     Spring,
 )
 from stiffmap.errors import StiffmapError
+from stiffmap.home import Gap, misfit_text
 
 UNLIMITED = 1e300
 FAR = 10.0  # rad or m: end of the flat pieces of a stick law
@@ -38,9 +39,17 @@ def build_mechanism(machine: MachineDescription) -> _core.Mechanism:
             _core.ExternalSpring(s.name, s.point, np.array(s.anchor), s.stiffness, s.length, s.tension_only)
             for s in machine.external_springs
         ]
-        return _core.Mechanism(root, pose(machine.home), springs, task(machine))
+        return _core.Mechanism(root, pose(machine.home), springs, task(machine), machine.search_home)
+    except _core.HomeMisfit as problem:
+        raise StiffmapError(f"{machine.name}: {misfit_text(machine, *problem.args[1:])}") from None
     except ValueError as problem:
         raise StiffmapError(f"{machine.name}: {problem}") from None
+
+
+def home_gaps(machine: MachineDescription) -> list[Gap]:
+    """Gap of every leg and branch at the declared home coordinates of a machine that closes."""
+    declared, _ = _core.home_gaps(root_chain(machine), pose(machine.home), task(machine), machine.search_home)
+    return [Gap(*gap) for gap in declared]
 
 
 def root_chain(machine: MachineDescription) -> _core.Chain:
@@ -95,14 +104,14 @@ def add_elements(out: _core.Chain, elements: Sequence[Element]) -> None:
 
 def add_joint(out: _core.Chain, e: Joint) -> None:
     """A joint as elementary joints; several axes get the names ``name.1``, ``name.2`` …"""
-    for what, given in (("home", e.home), ("axis_laws", e.axis_laws or None)):
+    for what, given in (("home", e.home), ("rest", e.rest), ("axis_laws", e.axis_laws or None)):
         if given is not None and len(given) != len(e.axes):
             raise StiffmapError(
                 f"joint {e.name}: expected one entry of {what} per axis ({len(e.axes)}), got {len(given)}"
             )
     e, turn = charted(e)
     if turn is not None:
-        out.offset(f"{e.name}.home", pose(turn), pose(turn))
+        out.offset(f"{e.name}.home", turn, turn)
     range_ = e.drive.range if e.drive and e.drive.range else e.limits
     lower, upper = range_ or (-UNLIMITED, UNLIMITED)
     force = e.drive.force if e.drive and e.drive.force else UNLIMITED
@@ -124,12 +133,15 @@ def add_joint(out: _core.Chain, e: Joint) -> None:
             guide_errors=[(np.array(g.axis), command_error(g.error)) for g in e.guide_errors],
             friction=sliding_friction(e.friction),
             about_command=stuck is not None,
+            rest=None if e.rest is None else e.rest[i],
+            ball="" if e.kind != "spherical" or i else "free" if any_axes_do(e) else "meant",
         )
 
 
 def command_error(c: CommandError) -> _core.CommandError:
     """Compiled error of a commanded coordinate."""
-    return _core.CommandError(c.offset, c.slope, c.amplitude, c.period, c.phase, c.reference)
+    reference = np.nan if c.reference is None else c.reference  # NaN: where home closes
+    return _core.CommandError(c.offset, c.slope, c.amplitude, c.period, c.phase, reference)
 
 
 def sliding_friction(friction: JointFriction | None) -> float:

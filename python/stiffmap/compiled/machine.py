@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 
 from stiffmap import _core
 from stiffmap.broadcasting import Floats
-from stiffmap.compiled.lowering import build_mechanism
+from stiffmap.compiled.lowering import build_mechanism, home_gaps
 from stiffmap.compiled.names import Names, names_of
 from stiffmap.description import MachineDescription
 from stiffmap.errors import StiffmapError
+from stiffmap.home import Gap
 
 
 class CompiledMachine:
@@ -37,6 +38,10 @@ class CompiledMachine:
     def home_rotation(self) -> Floats:
         """(3, 3) orientation of the tcp at home."""
         return self.description.home.r
+
+    def home_gaps(self) -> list[Gap]:
+        """Gap of every leg and of every branch of a block at the declared home coordinates."""
+        return home_gaps(self.description)
 
     @cached_property
     def _plan(self) -> _core.FastPlan:
@@ -138,6 +143,10 @@ class CompiledMachine:
         """The same of (n, actuators) actuator coordinates, continued from home or from `start`."""
         none = np.zeros((0, 3, 3))
         return self._mechanism.closure(None, actuators, none, False, threads, start)  # type: ignore[arg-type]
+
+    def point_positions(self, point: str, coordinates: Floats) -> Floats:
+        """(n, 3) m, base axes, of a named point at (n, coordinates), nominal geometry."""
+        return self._mechanism.point_positions(point, coordinates)
 
     def home_coordinates(self) -> Floats:
         """(coordinates,) at home."""

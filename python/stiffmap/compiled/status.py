@@ -32,3 +32,4 @@ class Flag(IntFlag):
     FREE_PLAY = 1 << 11
     LOAD_STEPPED = 1 << 12
     REFERENCE_PATH = 1 << 13
+    GIMBAL_LOCK = 1 << 14

@@ -51,6 +51,9 @@ class Joint:
         joint with ``law=None`` turns freely, otherwise ``law`` applies to each of its axes.
     axis_laws
         One law per axis of a passive joint, in place of ``law``.
+    rest
+        Coordinates (m, rad), one per axis, at which the laws of a passive joint are free of force;
+        ``None``: those of the closed home configuration.
     compliance_slope
         Relative change of the drive's compliance per metre (or rad) of the commanded coordinate,
         measured from the closed home configuration.
@@ -65,6 +68,7 @@ class Joint:
     actuated: bool = False
     law: Law | None = None
     axis_laws: tuple[Law, ...] = ()
+    rest: tuple[float, ...] | None = None
     compliance_slope: float = 0.0
     command_errors: tuple[CommandError, ...] = ()
     guide_errors: tuple[GuideError, ...] = ()

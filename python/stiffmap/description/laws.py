@@ -47,6 +47,8 @@ class CommandError:
     """Error of a commanded actuator coordinate u (m or rad), added to the command:
 
     ``offset + slope * (u - reference) + amplitude * sin(2 pi (u - reference) / period + phase)``
+
+    ``reference=None``: the coordinate of the closed home configuration.
     """
 
     offset: float = 0.0
@@ -54,7 +56,7 @@ class CommandError:
     amplitude: float = 0.0
     period: float = 1.0
     phase: float = 0.0
-    reference: float = 0.0
+    reference: float | None = 0.0
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Any
 
 from stiffmap.description.elements import Element
 from stiffmap.description.pose import Pose, Vector
+from stiffmap.units import UnitSystem
 
 
 @dataclass(frozen=True)
@@ -52,14 +53,17 @@ class MachineDescription:
     """Base elements, then legs in parallel, then platform elements; the last frame is the TCP.
 
     A serial arm has one leg. ``home`` is the TCP pose of the home configuration, in which every
-    joint has its ``home`` coordinate. ``workspace`` is an axis-aligned box of TCP positions.
+    joint has its ``home`` coordinate; what the file's digits leave open is closed, and the closed
+    configuration is the home that everything counts from (docs/machine_files.md). With ``search_home``
+    the coordinates are a first guess. ``workspace`` is an axis-aligned box of TCP positions.
     ``task`` names the pose components that are commanded, translations along base axes, rotations about
     the axes of the commanded TCP frame; the machine's closure decides the others.
     ``gravity`` (m/s², base axes) applies unless a call says otherwise; ``None`` is none.
     ``uncertainty`` holds a standard uncertainty (SI) beside any number, keyed by
     ``full.element.name/field``; ``notes`` says where numbers come from, by the same keys.
     ``declared`` is the machine before its effects were added (``None``: no effect has been);
-    files save it together with the records in ``effects``. It does not count in comparisons.
+    files save it together with the records in ``effects``. ``units`` are those of the file, for
+    messages. Neither counts in comparisons.
     """
 
     name: str
@@ -67,6 +71,7 @@ class MachineDescription:
     base: tuple[Element, ...] = ()
     platform: tuple[Element, ...] = ()
     home: Pose = field(default_factory=Pose)
+    search_home: bool = False
     workspace: tuple[Vector, Vector] | None = None
     gravity: Vector | None = None
     external_springs: tuple[ExternalSpring, ...] = ()
@@ -78,3 +83,4 @@ class MachineDescription:
     notes: tuple[tuple[str, str], ...] = ()
     extra: tuple[tuple[str, Any], ...] = ()
     declared: MachineDescription | None = field(default=None, compare=False)
+    units: UnitSystem = field(default=UnitSystem(), compare=False)

@@ -39,12 +39,17 @@ def joint_channels(plan: Experiment) -> list[Channel]:
 def _command_error(machine: Machine, channel: Channel, u: Floats) -> Floats:
     joint = dict(all_elements(machine.description)).get(channel.joint)
     errors = joint.command_errors if isinstance(joint, Joint) else ()
-    return np.asarray(sum((_error(e, u) for e in errors), np.zeros_like(u)))
+    if not errors:
+        return np.zeros_like(u)
+    compiled = machine.compiled
+    home = float(compiled.home_coordinates()[compiled.names.joints[channel.joint]])
+    return np.asarray(sum((_error(e, u, home) for e in errors), np.zeros_like(u)))
 
 
-def _error(e: CommandError, u: Floats) -> Floats:
-    wave = np.sin(2 * math.pi * (u - e.reference) / e.period + e.phase)
-    return np.asarray(e.offset + e.slope * (u - e.reference) + e.amplitude * wave)
+def _error(e: CommandError, u: Floats, home: float) -> Floats:
+    travel = u - (home if e.reference is None else e.reference)
+    wave = np.sin(2 * math.pi * travel / e.period + e.phase)
+    return np.asarray(e.offset + e.slope * travel + e.amplitude * wave)
 
 
 def check_joints(machine: Machine, experiment: Experiment) -> None:

@@ -50,12 +50,14 @@ def build(
         base=build_elements(model.base, context.at("base").inside("base")),
         platform=build_elements(model.platform, context.at("platform").inside("platform")),
         home=tried(partial(build_pose, model.home, context.at("home"), "home.")) or Pose(),
+        search_home=model.home is not None and model.home.solve,
         workspace=tried(partial(_workspace, model.workspace, context.at("workspace"))),
         gravity=tried(partial(_gravity, model.gravity, context.at("gravity"))),
         external_springs=tuple(s for s in springs if s is not None),
         title=model.title,
         source=model.source,
         extra=tuple((key, _tuples(value)) for key, value in model.extra.items()),
+        units=units,
     )
     context.raise_problems()
     _check_points(description, context.at("external_springs"))

@@ -113,6 +113,7 @@ def _joint(model: JointModel, context: Context) -> Joint:
         tuple(a for a in axes if a is not None),
         coordinates(home, coordinate, context),
         **_laws(model, angular, context),
+        rest=None if model.rest is None else coordinates(_list(model.rest), coordinate, context, "rest"),
         limits=limits,
     )
 

@@ -10,9 +10,10 @@ from pathlib import Path
 from stiffmap.compiled import CompiledMachine
 from stiffmap.description import Joint, MachineDescription
 from stiffmap.description.tree import all_elements
-from stiffmap.files.home import Gap, home_gaps
+from stiffmap.files.home import HomeChange, home_changes
 from stiffmap.files.load import load_description
 from stiffmap.files.shipped import find
+from stiffmap.home import Gap, gap_text
 
 GAP_LIMIT, TURN_LIMIT = 1e-4, 1e-3
 """Gap of the home over the size of the machine, and rad, beyond which a number was probably mistyped; the
@@ -24,26 +25,26 @@ class FileCheck:
     """Result of `check_file`.
 
     ``counts`` says how many elements of each sort there are (``actuators`` apart from ``joints``);
-    ``gaps`` how well the home configuration closes; ``warnings`` what deserves a second look.
+    ``gaps`` how well the declared home configuration closes, ``changes`` what closing it changes;
+    ``warnings`` what deserves a second look.
     """
 
     path: Path
     description: MachineDescription
     counts: dict[str, int]
     gaps: list[Gap]
+    changes: list[HomeChange]
     warnings: list[str]
 
 
 def check_file(path: str | PathLike[str]) -> FileCheck:
     """Load a machine (by path or shipped name) and look it over; raises `StiffmapError` if unusable."""
     description = load_description(path)
-    machine = CompiledMachine(
-        description
-    )  # refuses a home configuration that does not close, with each leg's gap
-    gaps = home_gaps(description)
-    return FileCheck(
-        find(path), description, _counts(description), gaps, _warnings(description, gaps, machine.length)
-    )
+    # refuses a home configuration that does not close, with each leg's gap
+    compiled = CompiledMachine(description)
+    changes, gaps = home_changes(compiled), compiled.home_gaps()
+    warnings = _warnings(description, gaps, compiled.length)
+    return FileCheck(find(path), description, _counts(description), gaps, changes, warnings)
 
 
 def _counts(description: MachineDescription) -> dict[str, int]:
@@ -57,12 +58,10 @@ def _counts(description: MachineDescription) -> dict[str, int]:
 
 
 def _warnings(description: MachineDescription, gaps: list[Gap], size: float) -> list[str]:
-    warnings = [
-        f"home: {gap.name} is {gap.translation * 1e3:.4g} mm and {gap.rotation:.4g} rad off; "
-        "home coordinates should close the machine"
-        for gap in gaps
-        if gap.translation > GAP_LIMIT * size or gap.rotation > TURN_LIMIT
-    ]
+    wide = [gap for gap in gaps if gap.translation > GAP_LIMIT * size or gap.rotation > TURN_LIMIT]
+    warnings = []
+    if wide and not description.search_home:
+        warnings.append(f"the home coordinates do not close: {gap_text(description, wide)}")
     if not any(isinstance(e, Joint) and e.actuated for _, e in all_elements(description)):
         warnings.append("no actuator: the machine cannot be commanded")
     if description.workspace is None:

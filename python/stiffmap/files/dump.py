@@ -42,7 +42,7 @@ def dump(description: MachineDescription) -> Plain:
         "source": description.source,
         "units": dict(UNITS),
         "gravity": None if declared.gravity is None else floats(declared.gravity),
-        "home": dump_pose(declared.home),
+        "home": {**dump_pose(declared.home), **({"solve": True} if declared.search_home else {})},
         "task": None if declared.task == TASK else list(declared.task),
         "workspace": None if declared.workspace is None else _box(declared.workspace),
         **_legs(declared.legs),

@@ -79,8 +79,11 @@ def _axis(axis: tuple[float, float, float]) -> Any:
 
 def _refuse_unsaved(joint: Joint) -> None:
     """Files hold these as effects only: nothing may be lost in silence."""
-    if joint.guide_errors or joint.friction:
-        raise StiffmapError(f"{joint.name}: friction and straightness are saved as effects; use with_effect")
+    if joint.guide_errors or joint.friction or any(e.reference is None for e in joint.command_errors):
+        raise StiffmapError(
+            f"{joint.name}: friction, straightness and errors counted from home are saved as effects; "
+            "use with_effect"
+        )
 
 
 def _joint(joint: Joint) -> Plain:
@@ -93,6 +96,8 @@ def _joint(joint: Joint) -> Plain:
     plain["home"] = float(joint.home[0]) if len(joint.home) == 1 else floats(joint.home)
     if joint.limits is not None:
         plain["limits"] = floats(joint.limits)
+    if joint.rest is not None:
+        plain["rest"] = float(joint.rest[0]) if len(joint.rest) == 1 else floats(joint.rest)
     return {**plain, **_law(joint.law), **_axis_laws(joint)}
 
 

@@ -1,66 +1,45 @@
-"""Does the declared home configuration close? Plain geometry with all springs at zero."""
+"""What closing the home configuration changes in a machine file."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
-import numpy as np
+from stiffmap.compiled import CompiledMachine
+from stiffmap.compiled.ball import charted
+from stiffmap.description import Joint, MachineDescription
+from stiffmap.description.tree import all_elements
+from stiffmap.units import ANGLE, LENGTH
 
-from stiffmap.description import Block, Element, Joint, MachineDescription, Offset, Pose
-from stiffmap.rotations import rotation_about
+CHANGED = 1e-9  # m, rad
 
 
-@dataclass(frozen=True)
-class Gap:
-    """How far a leg's end is from the home pose, or a branch's end from the first branch (m, rad)."""
+class HomeChange(NamedTuple):
+    """A home coordinate as the file declares it and as it closes (m, rad)."""
 
     name: str
-    translation: float
-    rotation: float
+    declared: float
+    closed: float
+    angular: bool
+
+    def text(self, machine: MachineDescription) -> str:
+        """In the units of the file."""
+        dimension = ANGLE if self.angular else LENGTH
+        say = machine.units.say
+        return (
+            f"{self.name}: {say(self.declared, dimension, 10)} becomes {say(self.closed, dimension, 10)} "
+            f"({say(self.closed - self.declared, dimension, 2)})"
+        )
 
 
-def home_gaps(description: MachineDescription) -> list[Gap]:
-    """Gap of every leg and of every branch of a block, in the home configuration."""
-    gaps: list[Gap] = []
-    start = _end(description.base, "base", gaps)
-    finish = _end(description.platform, "platform", gaps)
-    for leg in description.legs:
-        tcp = start @ _end(leg.elements, leg.name, gaps) @ finish
-        gaps.append(_gap(leg.name, description.home, tcp))
-    return gaps
-
-
-def _end(elements: tuple[Element, ...], name: str, gaps: list[Gap]) -> Pose:
-    """Last frame of a sequence in its first one."""
-    pose = Pose()
-    for element in elements:
-        if isinstance(element, Offset):
-            pose = pose @ element.nominal
-        elif isinstance(element, Joint):
-            pose = pose @ _moved(element)
-        elif isinstance(element, Block):
-            ends = [_end(b.elements, f"{name}.{b.name}", gaps) for b in element.branches]
-            gaps += [
-                _gap(f"{name}.{b.name}", ends[0], e)
-                for b, e in zip(element.branches[1:], ends[1:], strict=True)
-            ]
-            pose = pose @ ends[0]
-    return pose
-
-
-def _moved(joint: Joint) -> Pose:
-    pose = Pose()
-    for axis, value in zip(joint.axes, joint.home, strict=True):
-        direction = np.array(axis)
-        if joint.kind == "prismatic":
-            pose = pose @ Pose.of(value * direction)
-        else:
-            pose = pose @ Pose.of(rotation=rotation_about(direction, value))
-    return pose
-
-
-def _gap(name: str, a: Pose, b: Pose) -> Gap:
-    apart = a.inverse() @ b
-    # |R - 1| = 2 sqrt(2) sin(angle / 2) in the Frobenius norm: exact also for small angles
-    half = np.linalg.norm(apart.r - np.eye(3)) / (2.0 * np.sqrt(2.0))
-    return Gap(name, float(np.linalg.norm(apart.p)), float(2.0 * np.arcsin(min(half, 1.0))))
+def home_changes(machine: CompiledMachine) -> list[HomeChange]:
+    """Joint coordinates that the closed home configuration changes by more than round-off."""
+    closed = dict(zip(machine.names.coordinates, machine.home_coordinates().tolist(), strict=True))
+    changes = []
+    for name, e in all_elements(machine.description):
+        if not isinstance(e, Joint) or charted(e)[1] is not None:  # a free ball joint in axes of our own
+            continue
+        for i, declared in enumerate(e.home):
+            full = name if len(e.home) == 1 else f"{name}.{i + 1}"
+            if abs(closed[full] - declared) > CHANGED:
+                changes.append(HomeChange(full, declared, closed[full], e.kind != "prismatic"))
+    return changes

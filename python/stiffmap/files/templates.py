@@ -122,7 +122,7 @@ class _Substitution:
             return self.values[alone[1]]
         try:
             return evaluate(_REFERENCE.sub(lambda m: repr(self._number(m[1])), data))
-        except (SyntaxError, TypeError, ZeroDivisionError):
+        except (SyntaxError, TypeError, ZeroDivisionError, RecursionError, MemoryError):
             self.fail(path, f"expected $name, or numbers and $names with + - * / ( ); found {describe(data)}")
             return data
 

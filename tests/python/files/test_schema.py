@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from stiffmap.compiled.lowering import home_gaps
 from stiffmap.files import description_from_text
-from stiffmap.files.home import home_gaps
 from stiffmap.files.json_schema import machine_schema, schema_text
 from stiffmap.files.starter import starter_text
 

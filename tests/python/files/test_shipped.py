@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from stiffmap.compiled.lowering import home_gaps
 from stiffmap.description import Block, Body, Joint, MachineDescription, Spring
 from stiffmap.description.tree import all_elements
 from stiffmap.files import load_description, shipped_machines
-from stiffmap.files.home import home_gaps
 
 NAMES = ["orthoglide-original", "orthoglide-revised", "tripteron"]
 

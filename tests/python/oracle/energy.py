@@ -89,10 +89,11 @@ def along(elements: Any, p: Any, r: Any, walk: Walk, name: str) -> Any:
 
 def through_joint(e: Joint, p: Any, r: Any, walk: Walk) -> Any:
     laws = e.axis_laws or (e.law,) * len(e.axes)
-    for axis, home, law in zip(e.axes, e.home, laws, strict=True):
+    for axis, home, law, rest in zip(e.axes, e.home, laws, e.rest or e.home, strict=True):
         a = 0.0 * walk.x[:, 0] if e.actuated and law is None else walk.take(1)[:, 0]
         if law is not None:
-            walk.energy = walk.energy + law.stiffness * a**2 / 2 + law.cubic * a**4 / 4
+            d = a + (home - rest)
+            walk.energy = walk.energy + law.stiffness * d**2 / 2 + law.cubic * d**4 / 4
         if e.kind == "prismatic":
             p = p + (home + a)[:, None] * times(r, np.array(axis))
         else:

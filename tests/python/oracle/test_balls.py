@@ -113,13 +113,14 @@ def test_free_balls_against_energy_minimisation(seed: int, letters: str) -> None
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_one_stiffness_per_axis_against_energy_minimisation(seed: int) -> None:
+def test_one_stiffness_per_axis_and_rest_against_energy_minimisation(seed: int) -> None:
     d, generator = machine_with_a_ball(seed)
     rng = np.random.default_rng(seed)
 
     def sprung(e: Joint) -> tuple[Element, ...]:
         laws = tuple(Law(float(k)) for k in rng.uniform(2e3, 2e4, 3))
-        return (replace(e, axis_laws=laws),)
+        rest = tuple(q + float(a) for q, a in zip(e.home, rng.uniform(-2e-4, 2e-4, 3), strict=True))
+        return (replace(e, axis_laws=laws, rest=rest),)
 
     changed = with_balls(d, sprung)
     for c in compare_machine(changed, generator.loads(d)):
@@ -156,8 +157,16 @@ def test_one_stiffness_per_axis_in_closed_form() -> None:
     assert force[0] == pytest.approx(1e-3 * 0.4**2 / 200.0, rel=1e-6)
 
 
-def test_a_file_keeps_stiffness_per_axis() -> None:
-    d = stand("x, y, z", "stiffness: [1e5, 2e5, 3e5]").description
+def test_rest_is_where_a_joint_is_free_of_force() -> None:
+    m = stand("x, y, z", "stiffness: [1e5, 2e5, 3e5], rest: [0, 0, 0.2]")
+    s = m.solve([0, 0, 0.5])
+    assert s.displacement[3:] == pytest.approx([0, 0, np.radians(0.2)], abs=1e-12)
+    held = m.solve([0, 0, 0.5], [0, 0, 0, 0, 0, -300.0 * np.radians(0.2)])
+    assert held.displacement == pytest.approx(np.zeros(6), abs=1e-12)
+
+
+def test_a_file_keeps_stiffness_per_axis_and_rest() -> None:
+    d = stand("x, y, z", "stiffness: [1e5, 2e5, 3e5], rest: [0, 0.1, 0.2]").description
     back = description_from_text(description_text(d))
     assert back == d
     joint = back.legs[0].elements[1]
@@ -173,3 +182,14 @@ def test_axes_that_are_meant_must_not_lock_at_home(rest: str) -> None:
 def test_neighbouring_axes_must_not_be_parallel() -> None:
     with pytest.raises(sm.StiffmapError, match=r"joint ball: axes 1 and 2 .* must not be parallel"):
         stand("z, z, x")
+
+
+def test_near_lock_is_flagged() -> None:
+    """The second axis, turned by a right angle from home, brings the first and the third together."""
+    m = stand("x, y, z")
+    for angle, flagged in ((80, False), (89.5, True), (-89.5, True)):
+        turn = Rotation.from_euler("y", angle, degrees=True).as_matrix()
+        p = np.array([0, 0, 0.1]) + turn @ [0, 0, 0.4]
+        for method in ("fast", "reference"):
+            s = m.solve(p, rotation=turn, method=method)
+            assert bool(s.flags & sm.Flag.GIMBAL_LOCK) == flagged

@@ -19,7 +19,7 @@ PACKAGE = Path(__file__).parents[3] / "python/stiffmap"
 RANKS = (
     ("_core", "version", "errors", "recent", "units", "html"),
     ("description", "broadcasting", "link"),
-    ("rotations",),
+    ("rotations", "home"),
     ("compiled",),
     ("status", "options"),
     ("solution",),

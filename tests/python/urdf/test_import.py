@@ -135,7 +135,7 @@ BAD_SIDECAR = {
     "name_mot: a machine with closed loops has passive joints": ("[motor_a, motor_b]", "[]"),
     "closed_loop: the loops do not close upon one body": ("closed_loop:", "tip: arm_b\nclosed_loop:"),
     "give exactly one of stiffness and compliance": ("motor_a: {stiffness: 5.0e4}", "motor_a: {}"),
-    "home configuration: expected coordinates that close every leg": ("motor_b: 0.92730", "motor_b: 2.5"),
+    "home configuration does not close": ("motor_b: 0.92730", "motor_b: 2.5"),
 }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from stiffmap.description import CommandError, Element, Joint, MachineDescription
@@ -13,12 +12,12 @@ from stiffmap.effects.types import Placed
 
 
 def add_command_error(
-    description: MachineDescription, placed: Placed, error: Callable[[float], CommandError]
+    description: MachineDescription, placed: Placed, error: CommandError
 ) -> MachineDescription:
-    """One more error on each drive of the place, computed from its home coordinate."""
+    """One more error on each drive of the place."""
 
     def change(e: Element) -> Elements:
         assert isinstance(e, Joint)
-        return (replace(e, command_errors=(*e.command_errors, error(e.home[0]))),)
+        return (replace(e, command_errors=(*e.command_errors, error)),)
 
     return change_sites(description, placed.legs, placed.element, drives, change)

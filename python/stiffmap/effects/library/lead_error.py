@@ -11,7 +11,7 @@ from stiffmap.effects.types import EffectType, Parameter, Placed
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """A command error that grows from the home coordinate."""
     slope = placed.values["slope"]
-    return add_command_error(description, placed, lambda home: CommandError(slope=slope, reference=home))
+    return add_command_error(description, placed, CommandError(slope=slope, reference=None))
 
 
 EFFECT = EffectType(

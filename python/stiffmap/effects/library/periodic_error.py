@@ -32,7 +32,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     return add_command_error(
         description,
         placed,
-        lambda home: CommandError(amplitude=a, period=period, phase=phase, reference=home),
+        CommandError(amplitude=a, period=period, phase=phase, reference=None),
     )
 
 

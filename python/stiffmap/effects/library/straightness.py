@@ -31,7 +31,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
         if abs(along) > 1e-9:
             raise StiffmapError(f"across={placed.options['across']} is not across the guide {e.axes[0]}")
         amplitude, period, phase = (placed.values[p.name] for p in PARAMETERS)
-        error = CommandError(amplitude=amplitude, period=period, phase=phase, reference=e.home[0])
+        error = CommandError(amplitude=amplitude, period=period, phase=phase, reference=None)
         return (replace(e, guide_errors=(*e.guide_errors, GuideError(axis, error))),)
 
     return change_sites(description, placed.legs, placed.element, guides, change)

@@ -14,7 +14,7 @@ ERROR = Parameter("error", "m", -0.1, 0.1, 0.0, 1e-4, "added to the commanded co
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """A constant command error."""
     error = CommandError(offset=placed.values["error"])
-    return add_command_error(description, placed, lambda home: error)
+    return add_command_error(description, placed, error)
 
 
 EFFECT = EffectType(

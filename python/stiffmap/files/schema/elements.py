@@ -25,7 +25,7 @@ class OffsetModel(Frame):
 
 class JointModel(FileModel):
     """Passive joint; it turns or slides freely unless it has a stiffness or a law, for all axes or a list with
-    one per axis."""
+    one per axis. ``rest`` is the coordinate at which these are free of force (left out: as at home)."""
 
     joint: Name
     kind: Literal["revolute", "prismatic", "universal", "spherical"]
@@ -36,6 +36,7 @@ class JointModel(FileModel):
     stiffness: Number | Numbers | None = None
     compliance: Number | Numbers | None = None
     law: LawModel | None = None
+    rest: Number | Numbers | None = None
     note: str = ""
 
     @model_validator(mode="after")
@@ -48,7 +49,7 @@ class JointModel(FileModel):
                 "a {kind} joint needs {what}",
                 {"kind": self.kind, "what": "one axis" if needed == 1 else f"axes: a list of {needed}"},
             )
-        for key in ("home", "stiffness", "compliance"):
+        for key in ("home", "rest", "stiffness", "compliance"):
             value = getattr(self, key)
             whole = key in ("stiffness", "compliance")  # one number then holds for every axis
             if isinstance(value, list) and len(value) != needed:
@@ -59,6 +60,8 @@ class JointModel(FileModel):
                     "per_axis", "{key} needs a list of {n} numbers", {"key": key, "n": needed}
                 )
         one_of(self, ("stiffness", "compliance", "law"))
+        if self.rest is not None and self.stiffness is None and self.compliance is None and self.law is None:
+            raise PydanticCustomError("rest", "rest needs a stiffness, a compliance or a law")
         return self
 
 

@@ -99,6 +99,13 @@ class Frame(FileModel):
         return self
 
 
+class HomeModel(Frame):
+    """TCP pose of the home configuration. With ``solve`` the joints' home coordinates are a first guess,
+    and `stiffmap check` prints those that have been found."""
+
+    solve: bool = False
+
+
 class Box(FileModel):
     """Axis-aligned box of TCP positions."""
 

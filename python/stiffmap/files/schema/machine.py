@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Vector3
 from stiffmap.files.schema.elements import ElementModel
-from stiffmap.files.schema.geometry import Box, Frame
+from stiffmap.files.schema.geometry import Box, Frame, HomeModel
 from stiffmap.files.schema.springs import Material
 
 Component = Literal["x", "y", "z", "rx", "ry", "rz"]
@@ -96,7 +96,7 @@ class MachineFile(FileModel):
     source: str = ""
     units: UnitsModel
     gravity: Annotated[Vector3, Field(description="m/s², base axes; left out: none.")] | None = None
-    home: Annotated[Frame, Field(description="TCP pose of the home configuration.")] | None = None
+    home: HomeModel | None = None
     task: Annotated[
         list[Component],
         Field(
