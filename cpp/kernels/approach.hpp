@@ -13,8 +13,8 @@ struct Approach {
   const Program& P;
   Scratch& s;
 
-  static constexpr int steps = 24, settling = 8;
-  static constexpr double settled = 0.02;   // largest relative fall of the squared error in the last `settling` steps
+  static constexpr int steps = 64, settling = 8;
+  static constexpr double settled = 0.02;   // largest relative fall of the squared error in `settling` steps
   static constexpr double touching = 1e-4;  // error relative to the length: next to the border, the reference decides
 
   /// Lanes of `lanes` whose error settles away from zero. `closing` evaluates errors.
@@ -25,8 +25,15 @@ struct Approach {
     V before[most_unknowns], mu = splat(1e-2), then = splat(1e300);
     closing.closure_errors(leg, chain, start, target, errors);
     V cost = sum(leg, errors);
+    M found{}, rests{};
+    const double near = touching * P.length;
     for (int k = 0; k < steps; ++k) {
-      if (k == steps - settling) then = cost;
+      if (k % settling == 0) {
+        found |= ~(cost > near * near);
+        rests |= cost > (1 - settled) * then;
+        then = cost;
+        if (all(found | rests | ~lanes)) break;
+      }
       NormalEquations equations;
       equations.assemble(P, s, leg, errors, target.R);
       equations.damp(leg.unknowns, mu);
@@ -50,8 +57,7 @@ struct Approach {
       for (int i = 0; i < leg.unknowns; ++i) s.x[unknown[i]] = select(better, s.x[unknown[i]], before[i]);
       closing.closure_errors(leg, chain, start, target, errors);
     }
-    const double near = touching * P.length;
-    return lanes & (cost > near * near) & (cost > (1 - settled) * then);
+    return lanes & rests & (cost > near * near);
   }
 
  private:

@@ -24,28 +24,27 @@ inline V invert_by_rows(V (&m)[6][6], V (&x)[6][6]) {
   for (int k = 0; k < 6; ++k) {
     for (int i = k + 1; i < 6; ++i) {
       const M swap = absolute(m[i][k]) > absolute(m[k][k]);
-      for (int j = 0; j < 6; ++j) {
-        const V a = m[k][j], b = m[i][j], c = x[k][j], d = x[i][j];
+      for (int j = k; j < 6; ++j) {
+        const V a = m[k][j], b = m[i][j];
         m[k][j] = select(swap, b, a);
         m[i][j] = select(swap, a, b);
-        x[k][j] = select(swap, d, c);
-        x[i][j] = select(swap, c, d);
+      }
+      for (int j = 0; j < 6; ++j) {
+        const V a = x[k][j], b = x[i][j];
+        x[k][j] = select(swap, b, a);
+        x[i][j] = select(swap, a, b);
       }
     }
     const V size = absolute(m[k][k]);
     lowest = size < lowest ? size : lowest;
     const V inverse = 1.0 / m[k][k];
-    for (int j = 0; j < 6; ++j) {
-      m[k][j] *= inverse;
-      x[k][j] *= inverse;
-    }
+    for (int j = k + 1; j < 6; ++j) m[k][j] *= inverse;
+    for (int j = 0; j < 6; ++j) x[k][j] *= inverse;
     for (int i = 0; i < 6; ++i) {
       if (i == k) continue;
       const V f = m[i][k];
-      for (int j = 0; j < 6; ++j) {
-        m[i][j] -= f * m[k][j];
-        x[i][j] -= f * x[k][j];
-      }
+      for (int j = k + 1; j < 6; ++j) m[i][j] -= f * m[k][j];
+      for (int j = 0; j < 6; ++j) x[i][j] -= f * x[k][j];
     }
   }
   return lowest;

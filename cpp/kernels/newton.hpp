@@ -260,7 +260,7 @@ struct Newton {
         distrusted |= active & ~settled & ~(norm <= 0.2);
         // The second step makes up for what the first one left out (F11); as long as it is short and the
         // tangent definite, it may be as long as the first.
-        const M second = (way.tries == 1.0) & (norm <= 1.5 * way.previous) & (norm <= 0.02) & (e.lowest > pivot_floor);
+        const M second = (way.tries == 1.0) & (norm <= 5.0 * way.previous) & (norm <= 0.02) & (e.lowest > pivot_floor);
         distrusted |= active & ~settled & ~((norm <= 0.2 * way.previous) | (norm <= 1e-7) | second);
       }
       distrusted |= active & ~settled & (way.tries >= static_cast<double>(in.max_iterations));

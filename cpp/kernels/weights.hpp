@@ -67,10 +67,10 @@ inline void append_weight(Turning& t, double mass, const V3& weight, const V3& c
 /// part in the turn of the whole.
 inline void append_block(Turning& t, Turning block) {
   const V3 w = block.weight, m = splat(0.5) * block.moment, o{};
-  const S3& M = block.M;
+  const S3& turn = block.M;
   const V3 force[3] = {{o.x, -w.z, w.y}, {w.z, o.x, -w.x}, {-w.y, w.x, o.x}};
   const V3 follows[3] = {{o.x, -m.z, m.y}, {m.z, o.x, -m.x}, {-m.y, m.x, o.x}};
-  const V3 column[3] = {{M.xx, M.xy, M.xz}, {M.xy, M.yy, M.yz}, {M.xz, M.yz, M.zz}};
+  const V3 column[3] = {{turn.xx, turn.xy, turn.xz}, {turn.xy, turn.yy, turn.yz}, {turn.xz, turn.yz, turn.zz}};
   for (int k = 0; k < 3; ++k) t.G[k] = t.G[k] + V6{force[k], column[k] + follows[k]};
   restart(block, t.start);
   t.M = t.M + block.M;
