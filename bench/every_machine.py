@@ -22,8 +22,9 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -113,9 +114,19 @@ def cases(machine: sm.Machine) -> Iterator[Case]:
         yield "beyond", solve(wrench=FORCE), np.resize(wide[::3][:256][far], (512, 3))
 
 
+def element_names(elements: Iterable[Any]) -> Iterator[str]:
+    """Names of a chain's elements, with those inside its blocks."""
+    for e in elements:
+        if hasattr(e, "branches"):
+            for branch in e.branches:
+                yield from element_names(branch.elements if hasattr(branch, "elements") else branch[1])
+        else:
+            yield e.name
+
+
 def effect_cases(machine: sm.Machine) -> Iterator[Case]:
     """One case for each effect that some element of the machine takes; all of its elements have it."""
-    names = {e.name for leg in machine.description.legs for e in leg.walk()}
+    names = {n for leg in machine.description.legs for n in element_names(leg.elements)}
     for kind, values in EFFECTS:
         changed, found = machine, 0
         for name in sorted(names):

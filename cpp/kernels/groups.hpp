@@ -9,7 +9,7 @@ namespace stiffmap::kernel {
 
 /// The eliminated joints of a chain up to its `first_stiff`, from the base.
 struct Group {
-  const Op* joint[6];
+  const Op* joint[6] = {};
   Group(const Program& P, const ChainProgram& chain) {
     for (int i = chain.first, k = 0; i <= chain.first_stiff && k < 6; ++i)
       if (P.ops[i].kind <= OpKind::prismatic && P.ops[i].eliminated) joint[k++] = P.ops + i;
