@@ -14,7 +14,7 @@ from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.compensation import compensate as compute
 from stiffmap.compensation import corrected_geometry, dh_list, urdf_text
 from stiffmap.description import MachineDescription
-from stiffmap.errors import FileError
+from stiffmap.errors import FileError, StiffmapError
 from stiffmap.experiment.orientation import against_base
 from stiffmap.experiment.plan_file import load_plan
 from stiffmap.machine import Machine
@@ -56,6 +56,8 @@ def compensate(
 
       [cyan]stiffmap compensate ur10 --effect 'zero_offset elbow error=1mrad' --urdf arm.urdf --dh arm.csv[/cyan]
     """
+    if poses is None and urdf is None and dh is None:
+        raise StiffmapError("compensate: give a CSV of wanted poses, --urdf or --dh")
     m = machine_with(machine, effect)
     out: dict[str, object] = {}
     if urdf is not None or dh is not None:

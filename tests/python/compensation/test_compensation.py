@@ -141,3 +141,5 @@ def test_the_command_line_writes_commands(tmp_path: Path, capsys: pytest.Capture
     assert out.read_text().startswith("wanted_x_mm")
     assert main(["compensate", "linear-delta", "--urdf", str(tmp_path / "a.urdf")]) == 2
     assert "serial arm" in capsys.readouterr().err
+    assert main(["compensate", "linear-delta"]) == 2
+    assert "wanted poses" in capsys.readouterr().err
