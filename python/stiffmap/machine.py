@@ -190,7 +190,7 @@ class Machine:
         gravity: ArrayLike | None = None,
         threads: int | None = None,
     ) -> HoldingWrench:
-        """Wrenches that hold the machine at a `displacement` (..., 6) from the commanded pose, eq. (10).
+        """Wrenches (N, N·m) that hold the machine at a `displacement` (..., 6) m, rad from the commanded pose, eq. (10).
 
         See `stiffmap.holding_wrench.holding_wrench`.
         """

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap.closing import Kinematics
 from stiffmap.compiled import Answer, Flag, Names, Status
-from stiffmap.kinematics import Kinematics
 
 Floats = NDArray[np.float64]
 Slopes = Mapping[str, Mapping[str, Floats]]  # quantity -> name of the variable -> derivative
@@ -88,7 +88,7 @@ class Solution:
 
     @property
     def readings(self) -> Floats:
-        """(..., read points, 6) displacement of every point asked for, `point` first."""
+        """(..., read points, 6) m, rad: displacement of every point asked for, `point` first."""
         read: Floats = self._array("displacement")
         return read if self._order == tuple(range(read.shape[-2])) else read[..., self._order, :]
 
@@ -99,12 +99,12 @@ class Solution:
 
     @property
     def stiffness(self) -> Floats:
-        """(..., 6, 6) small extra twist to small extra dead wrench, both at `point`."""
+        """(..., 6, 6) N/m, N·m/rad: small extra twist to small extra dead wrench, both at `point`."""
         return self._array("stiffness")  # type: ignore[no-any-return]
 
     @property
     def compliance(self) -> Floats:
-        """(..., 6, 6) small extra dead wrench to small extra twist, both at `point`."""
+        """(..., 6, 6) m/N, rad/(N·m): small extra dead wrench to small extra twist, both at `point`."""
         return self._array("compliance")  # type: ignore[no-any-return]
 
     @property
@@ -119,12 +119,12 @@ class Solution:
 
     @property
     def free_twists(self) -> Floats:
-        """(..., 6, 6) columns: twists without stiffness where the platform is singular, else NaN."""
+        """(..., 6, 6) m, rad; columns: twists without stiffness where the platform is singular, else NaN."""
         return self._array("free_twists")  # type: ignore[no-any-return]
 
     @property
     def iterations(self) -> NDArray[np.int32]:
-        """(...) Newton iterations."""
+        """(...) number of Newton iterations."""
         return self._array("iterations")  # type: ignore[no-any-return]
 
     @property
@@ -134,12 +134,12 @@ class Solution:
 
     @property
     def leg_wrench(self) -> Floats:
-        """(..., legs, 6) leg on platform at `point`."""
+        """(..., legs, 6) N, N·m: leg on platform at `point`."""
         return self._array("leg_wrench")  # type: ignore[no-any-return]
 
     @property
     def coordinates(self) -> Floats:
-        """(..., coordinates) all coordinates, in the order of `coordinate_names`."""
+        """(..., coordinates) m or rad: all coordinates, in the order of `coordinate_names`."""
         return self._array("coordinates")  # type: ignore[no-any-return]
 
     @property
@@ -190,17 +190,17 @@ class Solution:
 
     @property
     def derivatives(self) -> Mapping[str, Floats]:
-        """Name of each variable of `Machine.solve(derivatives=...)` -> (..., 6) slope of `displacement`."""
+        """Name of each variable of `Machine.solve(derivatives=...)` -> (..., 6) slope of `displacement`, m and rad per SI unit."""
         return self._slopes.get("displacement", {})
 
     @property
     def stiffness_derivatives(self) -> Mapping[str, Floats]:
-        """The same of `stiffness` (..., 6, 6), where `derivatives_of` names it."""
+        """The same of `stiffness` (..., 6, 6) N/m, N·m/rad per SI unit, where `derivatives_of` names it."""
         return self._slopes.get("stiffness", {})
 
     @property
     def compliance_derivatives(self) -> Mapping[str, Floats]:
-        """The same of `compliance` (..., 6, 6), where `derivatives_of` names it."""
+        """The same of `compliance` (..., 6, 6) m/N, rad/(N·m) per SI unit, where `derivatives_of` names it."""
         return self._slopes.get("compliance", {})
 
     @property

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing, wrench_array
+from stiffmap.closing import Kinematics, close_actuators, close_poses
 from stiffmap.compiled import CompiledMachine
 from stiffmap.compiled.machine import LOAD_TYPES
 from stiffmap.errors import StiffmapError
-from stiffmap.kinematics import Kinematics, close_actuators, close_poses
 from stiffmap.options import SolveOptions
 from stiffmap.rotations import as_rotations
 from stiffmap.solution import Solution

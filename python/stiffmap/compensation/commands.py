@@ -63,7 +63,7 @@ class Commands:
         return np.asarray(np.isfinite(self.actuators).all(axis=1))
 
     def rms(self, errors: Floats) -> float:
-        """Root mean square distance of the tool from where it is wanted, m, over the rows with an answer."""
+        """Root mean square distance (m) of the tool from where it is wanted, over the rows of errors (n, 6) with an answer."""
         return float(np.sqrt(np.mean(np.sum(errors[self.ok, :3] ** 2, axis=1))))
 
     def write(self, path: str | PathLike[str]) -> None:

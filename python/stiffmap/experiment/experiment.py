@@ -163,7 +163,7 @@ class Experiment:
 
     @property
     def zeros(self) -> Floats:
-        """(c,) `zero_sigma` of every channel; none for joints and distances."""
+        """(c,) m, rad: `zero_sigma` of every channel; none for joints and distances."""
         return np.append(self.zero_sigma, np.zeros(len(self.channels) - len(self.zero_sigma)))
 
     @cached_property
@@ -183,13 +183,13 @@ class Experiment:
         return _numbers([self.groups, self.wrench, self.temperature, self.approach, *labels])
 
     def rows(self, keep: NDArray[np.bool_] | Integers) -> Experiment:
-        """The experiment with some of its rows."""
+        """The experiment with some of its rows: (n,) of which to keep, or (k,) their numbers."""
         index = (np.flatnonzero(keep) if np.asarray(keep).dtype == bool else np.asarray(keep)).astype(np.intp)
         picked = {name: _pick(getattr(self, name), index) for name in PER_ROW}
         return replace(self, **picked)
 
     def with_readings(self, reading: Floats) -> Experiment:
-        """The same plan with other readings (n, c)."""
+        """The same plan with other readings (n, c) m, rad."""
         return replace(self, reading=np.where(self.read, reading, np.nan))
 
 

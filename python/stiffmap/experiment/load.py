@@ -18,7 +18,7 @@ from stiffmap.experiment.table import Table, read_table
 from stiffmap.experiment.units import ANGLES, Scales
 from stiffmap.files.report import file_error
 from stiffmap.files.schema.base import suggestion
-from stiffmap.files.yaml_text import Document, read
+from stiffmap.yaml_text import Document, read
 
 
 def load_experiment(path: str | PathLike[str]) -> Experiment:

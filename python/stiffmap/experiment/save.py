@@ -15,7 +15,7 @@ from stiffmap.errors import FileError
 from stiffmap.experiment.columns import APPROACH, POSE, POSE2, SEEN, SEEN_TURNED
 from stiffmap.experiment.experiment import AXES, WRENCH, Channel, Experiment, Floats, Loop
 from stiffmap.experiment.orientation import VECTOR
-from stiffmap.files.yaml_text import text_of
+from stiffmap.yaml_text import text_of
 
 MM = 1e3
 PLAIN = {"unloaded": "centre", "frame": "known", "tool": "known"}

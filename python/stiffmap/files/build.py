@@ -24,8 +24,8 @@ from stiffmap.files.schema import MachineFile
 from stiffmap.files.schema.base import Number, suggestion
 from stiffmap.files.schema.geometry import Box
 from stiffmap.files.schema.machine import EffectModel, ExternalSpringModel
-from stiffmap.files.yaml_text import Document
 from stiffmap.units import LENGTH, NONE, Dimension, UnitSystem
+from stiffmap.yaml_text import Document
 
 GRAVITY_LIMIT = 1000.0  # m/s²; above it, the file gave mm/s²
 

@@ -12,8 +12,8 @@ from stiffmap.errors import FileError, together
 from stiffmap.files.report import key_text
 from stiffmap.files.schema.base import Number
 from stiffmap.files.schema.springs import Material
-from stiffmap.files.yaml_text import Document, KeyPath
 from stiffmap.units import Dimension, UnitSystem
+from stiffmap.yaml_text import Document, KeyPath
 
 T = TypeVar("T")
 

@@ -18,7 +18,7 @@ from stiffmap.files.schema import MachineFile
 from stiffmap.files.schema.base import describe
 from stiffmap.files.shipped import find
 from stiffmap.files.templates import expanded
-from stiffmap.files.yaml_text import Document, parse, read
+from stiffmap.yaml_text import Document, parse, read
 
 
 def load_description(name_or_path: str | PathLike[str]) -> MachineDescription:

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from stiffmap.errors import FileError, together
 from stiffmap.files.schema.base import describe, suggestion
 from stiffmap.files.schema.elements import SORTS
-from stiffmap.files.yaml_text import Document, KeyPath
+from stiffmap.yaml_text import Document, KeyPath
 
 
 def file_error(error: ValidationError, document: Document, file: str) -> FileError:

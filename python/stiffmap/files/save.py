@@ -12,7 +12,7 @@ from stiffmap.description import MachineDescription
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.files.dump import dump
 from stiffmap.files.load import description_from_text
-from stiffmap.files.yaml_text import text_of
+from stiffmap.yaml_text import text_of
 
 
 def save_description(description: MachineDescription, path: str | PathLike[str]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from stiffmap.errors import UnknownMachineError
 from stiffmap.files.schema.base import suggestion
-from stiffmap.files.yaml_text import read
+from stiffmap.yaml_text import read
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from typing import Any
 from stiffmap.errors import FileError, together
 from stiffmap.files.report import key_text
 from stiffmap.files.schema.base import describe, suggestion
-from stiffmap.files.yaml_text import Document, KeyPath
+from stiffmap.yaml_text import Document, KeyPath
 
 _REFERENCE = re.compile(r"\$([A-Za-z_]\w*)")
 _OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {

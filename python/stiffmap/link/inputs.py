@@ -10,11 +10,11 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from stiffmap.errors import StiffmapError
-from stiffmap.files.yaml_text import read
 from stiffmap.link.arrays import Floats
 from stiffmap.link.gmshmesh import UNITS
 from stiffmap.link.shapes import Bar, Foot, ForkBar, HollowBar
 from stiffmap.link.solve import Material
+from stiffmap.yaml_text import read
 
 # Handbook values for a first estimate; a measured modulus belongs in the part file.
 MATERIALS = {

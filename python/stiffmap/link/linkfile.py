@@ -10,8 +10,8 @@ import numpy as np
 import yaml
 
 from stiffmap.errors import StiffmapError
-from stiffmap.files.yaml_text import read
 from stiffmap.link.arrays import Floats
+from stiffmap.yaml_text import read
 
 SYMMETRY = 1e-6  # of sqrt(C_ii C_jj)
 UNITS = {"length": "m", "force": "N", "angle": "rad"}

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from stiffmap.errors import FileError
-from stiffmap.files.yaml_text import read
+from stiffmap.yaml_text import read
 
 Numbers6 = Annotated[list[float], Field(min_length=6, max_length=6)]
 Matrix = Annotated[list[Numbers6], Field(min_length=6, max_length=6)]

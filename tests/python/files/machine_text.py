@@ -7,7 +7,7 @@ from typing import Any
 
 from stiffmap.description import MachineDescription
 from stiffmap.files import description_from_text
-from stiffmap.files.yaml_text import parse, text_of
+from stiffmap.yaml_text import parse, text_of
 
 BASE = """
 name: small

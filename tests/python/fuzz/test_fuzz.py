@@ -12,7 +12,7 @@ from tests.python.fuzz.run import attempt, one_input
 from tests.python.fuzz.targets import TARGETS
 
 import stiffmap as sm
-from stiffmap.files.yaml_text import parse
+from stiffmap.yaml_text import parse
 
 
 @pytest.mark.parametrize("kind", TARGETS)

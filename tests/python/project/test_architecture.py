@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,32 @@ def test_sources_include_no_later_rank() -> None:
     for source in sorted((ROOT / "cpp/src").glob("*.cpp")):
         for name in included(source):
             assert RANK[name] <= RANK[source.stem], f"{source.name} must not include {name}.hpp"
+
+
+def plain_includes(path: Path) -> list[Path]:
+    """Files of the core that a file includes, by either way to name them."""
+    folders = (path.parent, ROOT / "cpp/include")
+    found = re.findall(r'#include "([^"]+)"', text(path))
+    return [next(p for f in folders if (p := (f / name).resolve()).exists()) for name in found]
+
+
+def test_no_circle_of_includes_in_any_folder() -> None:
+    graph = {p.resolve(): plain_includes(p) for p in core_files()}
+    tuple(TopologicalSorter(graph).static_order())  # CycleError names the circle
+
+
+def test_sub_folders_stand_below_what_uses_them() -> None:
+    """Plans are built from the headers that `fast_plan` may use; of the kernels others see the program and the table."""
+    for source in core_files():
+        folder, targets = source.parent.name, plain_includes(source)
+        if folder == "plan":
+            ranks = [RANK[name] for name in included(source)]
+            assert all(r <= RANK["fast_plan"] for r in ranks), source.name
+        if folder == "kernels":
+            assert set(included(source)) <= {"check"}, source.name
+        else:
+            used = {t.name for t in targets if t.parent.name == "kernels"}
+            assert used <= {"program.hpp", "dispatch.hpp"}, f"{source.name}: {used}"
 
 
 def test_threads_only_in_parallel() -> None:

@@ -18,10 +18,11 @@ PACKAGE = Path(__file__).parents[3] / "python/stiffmap"
 # listed (maps, experiments, diagnoses, commands ...) builds on all of them.
 RANKS = (
     ("_core", "version", "errors", "recent", "units", "html"),
-    ("description", "broadcasting", "link"),
-    ("rotations", "home"),
-    ("compiled",),
-    ("status", "options"),
+    ("description", "broadcasting", "yaml_limits"),
+    ("rotations", "yaml_text", "home"),
+    ("compiled", "link"),
+    ("status", "branches"),
+    ("options", "closing"),
     ("solution",),
     ("solving", "holding_wrench"),
     ("variants", "effects"),

@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 
 from stiffmap.errors import FileError
-from stiffmap.files.yaml_limits import check_size
+from stiffmap.yaml_limits import check_size
 
 KeyPath = tuple[str | int, ...]
 LONGEST_INTEGER = 300  # digits: what a float can hold
