@@ -14,9 +14,9 @@ from stiffmap.compiled import Status
 from stiffmap.description import Body, Joint, Spring
 from stiffmap.description.tree import all_elements
 from stiffmap.files.shipped import find
-from stiffmap.files.yaml_text import read
 from stiffmap.machine import Machine
 from stiffmap.units import FORCES, LENGTHS
+from stiffmap.yaml_text import read
 
 TRIAL = 0.01
 """Of the machine's length, how far from home reach is tried."""

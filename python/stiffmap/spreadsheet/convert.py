@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from stiffmap.errors import FileError, StiffmapError
-from stiffmap.files.yaml_text import text_of
 from stiffmap.spreadsheet.guess import FORCES, LENGTHS, READINGS, Column, guess, known_unit
 from stiffmap.spreadsheet.sheet import Sheet
+from stiffmap.yaml_text import text_of
 
 WORDS = ("id", "setup", "branch")
 POSE = ("x", "y", "z")
