@@ -89,7 +89,7 @@ def test_values_agree_with_the_core() -> None:
     assert enum_of(text["load"], "LoadType") == {k.upper(): v for k, v in LOAD_TYPES.items()}
     assert list(enum_of(text["follower"], "PathControl")) == [c.upper() for c in PATH_CONTROLS]
     assert len(enum_of(text["path"], "PathEnd")) == len(ENDS)
-    bits = re.findall(r"uint32_t (\w+) = 1u << (\d+)", text["types"])
+    bits = re.findall(r"uint32_t (\w+) = 1u << (\d+)", "".join(text.values()))
     assert {name.upper(): 1 << int(bit) for name, bit in bits} == {f.name: f.value for f in Flag}
 
 
