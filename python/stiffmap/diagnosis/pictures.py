@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.diagnosis.findings import Findings
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.pictures import vector_cases
 from stiffmap.machine import Machine
 
 UM, MM = 1e6, 1e3
@@ -50,7 +51,16 @@ def left(d: Findings) -> Figure:
 def vectors(d: Findings) -> Figure:
     """Mean residual vector of each pose, before and after, on one scale."""
     figure = Figure(figsize=(10, 4.6), layout="constrained")
-    before, after = (_pose_means(d.experiment, _kept(d, r)) for r in (d.residual_before, d.residual_after))
+
+    # of loads along x, y or z, turned to one sign (else + and - would cancel), those that leave most
+    def seen(values: Floats, weight: Floats) -> Floats:
+        return _pose_means(d.experiment, _kept(d, values) * weight[:, None])
+
+    both = [
+        (name, seen(d.residual_before, w), seen(d.residual_after, w))
+        for name, w in vector_cases(d.experiment)
+    ]
+    case, before, after = max(both, key=lambda b: float(np.nansum(b[1][:, :3] ** 2)))
     at = _pose_means(d.experiment, d.experiment.position) * MM
     longest = max(float(np.linalg.norm(np.nan_to_num(before[:, :3]), axis=1).max()), 1e-12)
     scale = 0.25 * max(float(np.ptp(at)), 1.0) / longest
@@ -62,7 +72,13 @@ def vectors(d: Findings) -> Figure:
         axes.set(
             xlabel="x / mm", ylabel="y / mm", zlabel="z / mm", title=f"{name}: mean residual of each pose"
         )
-    figure.text(0.5, 0.005, f"longest arrow before: {longest * UM:.1f} µm", ha="center", fontsize=9)
+    figure.text(
+        0.5,
+        0.005,
+        f"longest arrow before: {longest * UM:.1f} µm{'; ' + case if case else ''}",
+        ha="center",
+        fontsize=9,
+    )
     return figure
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from stiffmap.diagnosis.findings import Effect, Findings
+from stiffmap.diagnosis.sentences import next_step, opening
 from stiffmap.diagnosis.structure import Pattern
 from stiffmap.diagnosis.words import effect_text, five_lines, separation_text, shown
 from stiffmap.errors import FileError
@@ -21,7 +22,10 @@ STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem a
 table{border-collapse:collapse;margin:.5rem 0}td,th{border:1px solid #ccc;padding:.2rem .6rem;text-align:left}
 th{background:#f3f3f3}img{max-width:100%}
 .verdict{background:#eef4f8;border-left:4px solid #2a6f97;padding:.6rem 1rem}
-small{color:#555}"""
+.answer{font-size:1.15rem;background:#eef4f8;border-left:5px solid #0072B2;padding:.7rem 1rem}
+table{display:block;overflow-x:auto}td{overflow-wrap:anywhere}small{color:#555}
+@media print{@page{size:A4;margin:15mm}body{margin:0;max-width:none;font-size:11px}tr,img{break-inside:avoid}
+h2{break-after:avoid}}"""
 
 
 def write_report(d: Findings, path: str | PathLike[str]) -> None:
@@ -41,6 +45,7 @@ def html(d: Findings) -> str:
         f"<h1>Diagnosis of {escape(d.declared.name)}</h1><p>Experiment {escape(d.experiment.name)}: "
         f"{len(d.experiment)} rows of {d.experiment.quantity}, axes {', '.join(d.experiment.axes)}. "
         "Lengths in mm unless a unit is named; base axes.</p>",
+        f"<p class='answer'>{escape(opening(d))}</p><p><b>What to do next.</b> {escape(next_step(d))}</p>",
         "<div class='verdict'>" + "<br>".join(escape(line) for line in five_lines(d)) + "</div>",
         "<h2>Effects</h2>" + _effects(d),
         "<h2>Before and after, on readings that no fit saw</h2>" + _sizes(d),
@@ -51,7 +56,7 @@ def html(d: Findings) -> str:
         "<h2>What this experiment could have seen</h2>" + _detectable(d),
         "<h2>Limits</h2>" + _list(d.limitations or ["none known"]),
     ]
-    head = f"<meta charset='utf-8'><title>stiffmap diagnosis</title><style>{STYLE}</style>"
+    head = f"<meta charset='utf-8'><link rel='icon' href='data:,'><title>stiffmap diagnosis</title><style>{STYLE}</style>"
     return f"<!doctype html><html lang='en'>{head}{''.join(parts)}</html>"
 
 
