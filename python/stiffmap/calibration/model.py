@@ -160,10 +160,10 @@ def _step(
         moved = values + step
         try:
             prediction = predicted(predictor, s.unknowns, moved)
+            here = problem.residual(prediction)
         except StiffmapError:
             step = step / 2
             continue
-        here = problem.residual(prediction)
         if float(here @ here) / variance + float(moved @ moved) <= before * (1.0 + 1e-6):
             return moved, prediction, here
         step = step / 2

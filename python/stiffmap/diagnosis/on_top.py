@@ -18,7 +18,7 @@ from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.statistics import Sums
 from stiffmap.diagnosis.candidates import Candidate
 from stiffmap.diagnosis.crossval import HeldOut, held_out
-from stiffmap.diagnosis.fit import fit
+from stiffmap.diagnosis.fit import evaluate, fit
 from stiffmap.diagnosis.interval import unseen
 from stiffmap.diagnosis.judge import judge, unexplained, with_model
 from stiffmap.diagnosis.layer import Layer
@@ -35,6 +35,8 @@ CERTIFICATE = {"sensor_gain": 1.0, "sensor_axes": 0.0}
 BEYOND = 100.0
 """Standard uncertainties of its certificate that an instrument is never taken to be off by."""
 AT_BOUND = 1e-6
+WORTH_A_FLOOR = 0.3
+"""Noise variances per pose that no linear explanation takes: effects are then looked for at that floor at once."""
 MEETING = 10.0
 """Nats that each fault beyond the first costs."""
 SURE = 30.0
@@ -78,9 +80,29 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
 
 def _layered(s: Study, found: Calibrator, seed: int, tolerances: Tolerances) -> Answer:
     """Effects on top of a calibration; at the floor of what no model explains, where something is left."""
-    layer = Layer.of(found, found.answer(seed))
-    answer = _searched(s, layer, seed, tolerances)
-    return _at_the_floor(answer, found, seed, tolerances) if answer.left else answer
+    base = _above(s, Layer.of(found, found.answer(seed)), seed)
+    rho = _floor_beside_screen(base)
+    if rho < WORTH_A_FLOOR:
+        answer = _searched(base, tolerances)
+        if not answer.left:
+            return answer
+        rho = floor_of(base, answer.finding)
+    return _at_the_floor(base, found, rho, seed, tolerances)
+
+
+def _above(s: Study, layer: Layer, seed: int) -> Study:
+    """The study of the same readings above a calibration."""
+    straight = copy.copy(s.predictor)  # shares what was solved
+    straight.experiment = layer.straight(s.predictor.experiment)
+    return study(straight, seed, layer, s.clock, s.without)
+
+
+def _floor_beside_screen(s: Study) -> float:
+    """What the calibration and the best few effects, taken as linear, leave per pose, in noise variances."""
+    problem, screen = s.whole
+    left, _ = screened(screen, problem.residual(s.plan.base))
+    blocks = Blocks.of(np.zeros((len(left), 0)), left, pose_labels(problem))
+    return model_form(blocks) * float(np.median(blocks.number))
 
 
 def calibrator(s: Study, tolerances: Tolerances, exclude: tuple[str, ...]) -> Calibrator | None:
@@ -95,12 +117,13 @@ def calibrator(s: Study, tolerances: Tolerances, exclude: tuple[str, ...]) -> Ca
 def leads_by_far(s: Study, found: Calibrator) -> bool:
     """Whether uncertain numbers beat by far what the linear screen promises of any few effects."""
     problem, screen = s.whole
-    few = -0.5 * screened(screen, problem.residual(s.plan.base))
+    left, number = screened(screen, problem.residual(s.plan.base))
+    few = -0.5 * (float(left @ left) + number * float(np.log(max(len(left), 2))))
     return spread_evidence(problem, found) > few + SURE
 
 
-def screened(screen: Screen, residual: Floats) -> float:
-    """chi-square that the best few effects leave, taken as linear, one after the other; Schwarz's penalty added."""
+def screened(screen: Screen, residual: Floats) -> tuple[Floats, int]:
+    """(N,) what the best few effects leave, taken as linear, one after the other, and their directions."""
     left, beside, tangent = residual, screen, np.zeros((len(residual), 0))
     for _ in range(MOST_EFFECTS):
         drops = beside.drops(left[:, None])[:, 0]
@@ -111,7 +134,7 @@ def screened(screen: Screen, residual: Floats) -> float:
         left = left - q @ (q.T @ left)
         tangent = np.column_stack([tangent, q])
         beside = screen.beside(tangent)
-    return float(left @ left) + tangent.shape[1] * float(np.log(max(len(residual), 2)))
+    return left, int(tangent.shape[1])
 
 
 def sparse_evidence(first: Answer) -> float:
@@ -145,42 +168,37 @@ def spread_evidence(problem: Problem, found: Calibrator) -> float:
     return max(sums.scaled(np.full(p, f)).log_evidence for f in SCALES) - float(np.log(len(SCALES)))
 
 
-def _searched(first: Study, layer: Layer, seed: int, tolerances: Tolerances) -> Answer:
-    straight = copy.copy(first.predictor)  # shares what was solved
-    straight.experiment = layer.straight(first.experiment)
-    s = study(straight, seed, layer, first.clock, first.without)
+def _searched(s: Study, tolerances: Tolerances) -> Answer:
+    assert s.layer is not None
     finding, verdict, left = judge(s, find(s))
     model, refused = admissible(finding.model, finding, tolerances)
     if refused:
         finding = with_model(finding, model)
         left = unexplained(s, finding)
         verdict = _word(finding, left)
-    return Answer(s, finding, verdict, left, layer.calibration, refused=refused)
+    return Answer(s, finding, verdict, left, s.layer.calibration, refused=refused)
 
 
-def _at_the_floor(answer: Answer, found: Calibrator, seed: int, tolerances: Tolerances) -> Answer:
-    """The search again where what no model explains counts as noise; only what holds is named."""
-    s = answer.study
-    layer = s.layer
-    assert layer is not None
-    rho = floor_of(s, find(s, finalists=3))
-    raised = Layer.of(found, layer.calibration, rho)
-    straight = copy.copy(s.predictor)
-    again = study(straight, seed, raised, s.clock, s.without)
+def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances: Tolerances) -> Answer:
+    """The search where what no model explains counts as noise; only what holds is named."""
+    assert s.layer is not None
+    raised = Layer.of(found, s.layer.calibration, rho)
+    again = study(s.predictor, seed, raised, s.clock, s.without)
     finding = find(again)
     held = held_out(again, finding.outliers, seed, finding)
     model, refused = admissible(finding.model, finding, tolerances)
     model, more = _shared(model, finding, held)
     finding = with_model(finding, model)
-    left = unexplained(s, _on(s, finding)) or answer.left
-    verdict = "effects+unattributed" if model.candidates else "unattributed"
-    return Answer(again, finding, verdict, left, answer.calibration, held, refused + more)
+    left = unexplained(s, _on(s, finding))
+    return Answer(again, finding, _word(finding, left), left, s.layer.calibration, held, refused + more)
 
 
 def _on(s: Study, finding: Finding) -> Finding:
     """The model of a finding judged at the noise of another study."""
     search = search_on(s, ~finding.outliers, finding.search.finalists)
-    return replace(with_model(finding, fit(finding.model, search.predictor, search.problem)), search=search)
+    return replace(
+        with_model(finding, evaluate(finding.model, search.predictor, search.problem)), search=search
+    )
 
 
 def floor_of(s: Study, finding: Finding) -> float:
