@@ -226,7 +226,8 @@ struct Newton {
   M solve(M usable, bool corners, V& iterations, V& steps) {
     M done = ~usable & usable, failed = ~usable;
     LoadSteps way{P, s};
-    way.begin(unloaded_lanes());
+    // With corners the signs of friction come from the reference's first step, which has the load in its tangent.
+    way.begin(corners ? ~M{} : unloaded_lanes());
     for (int k = 0; k < most_iterations; ++k) {
       const bool secant = corners && k == 0;
       const M first = way.factor > way.acting;
