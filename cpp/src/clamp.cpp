@@ -50,7 +50,9 @@ Clamp::Clamp(const Mechanism& machine, Index point)
       ws_(machine),
       eq_(held_),
       state_(held_),
-      before_(held_) {}
+      before_(held_) {
+  ws_.problem.misfit.setZero(held_.closures());  // the same problem is solved with the clamp's loop
+}
 
 /// Newton with the point at `pose`; false where it does not get there.
 bool Clamp::hold(const Pose& pose, Problem& problem) {

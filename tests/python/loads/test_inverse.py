@@ -95,3 +95,15 @@ def test_bad_input() -> None:
         machine.wrench([0, 0.416, 0], np.zeros(6), point="nose")
     far = machine.wrench([5, 5, 0], np.zeros(6))
     assert far.status == sm.Status.UNREACHABLE and np.isnan(far.wrench).all()
+
+
+@pytest.mark.parametrize("name", ["ur10", "five-bar"])
+def test_a_machine_with_few_loops_is_held(name: str) -> None:
+    """Back to the displacement that the wrench causes; a serial arm has no loop but that of the clamp."""
+    machine = sm.load_machine(name)
+    home = machine.description.home.p
+    d = machine.solve(home, [20.0, 10.0, 0, 0, 0, 0]).displacement
+    held = machine.wrench(home, d)
+    assert held.ok
+    back = machine.solve(home, np.nan_to_num(held.wrench))
+    np.testing.assert_allclose(back.displacement[:3], d[:3], atol=1e-9)
