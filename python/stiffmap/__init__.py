@@ -22,12 +22,34 @@ if TYPE_CHECKING:
     from stiffmap.link import identify_link
     from stiffmap.machine import Machine, load_machine
     from stiffmap.maps import error_map, map_estimate, map_statistics, polar, sweep, uncertainty_ranking
+    from stiffmap.performance import (
+        accuracy_transmission,
+        drive_efforts,
+        force_transmission,
+        largest_box,
+        load_requirements,
+        measures,
+        natural_frequencies,
+        velocity_section,
+        velocity_transmission,
+        worst_deflection,
+    )
     from stiffmap.solution import Solution
 
 # Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
 _HOME = {
     "Commands": "stiffmap.compensation",
     "Calibration": "stiffmap.calibration",
+    "accuracy_transmission": "stiffmap.performance",
+    "drive_efforts": "stiffmap.performance",
+    "force_transmission": "stiffmap.performance",
+    "largest_box": "stiffmap.performance",
+    "load_requirements": "stiffmap.performance",
+    "measures": "stiffmap.performance",
+    "natural_frequencies": "stiffmap.performance",
+    "velocity_section": "stiffmap.performance",
+    "velocity_transmission": "stiffmap.performance",
+    "worst_deflection": "stiffmap.performance",
     "Diagnosis": "stiffmap.diagnosis",
     "compensate": "stiffmap.compensation",
     "Experiment": "stiffmap.experiment",
@@ -70,25 +92,35 @@ __all__ = [
     "Status",
     "StiffmapError",
     "__version__",
+    "accuracy_transmission",
     "assembly_stress",
     "calibrate",
     "compensate",
     "deflection_budget",
     "diagnose",
+    "drive_efforts",
     "error_map",
+    "force_transmission",
     "forward_kinematics",
     "identify_link",
     "inverse_kinematics",
+    "largest_box",
     "load_experiment",
     "load_machine",
+    "load_requirements",
     "machine_names",
     "map_estimate",
     "map_statistics",
+    "measures",
+    "natural_frequencies",
     "polar",
     "residual",
     "simulate",
     "sweep",
     "uncertainty_ranking",
+    "velocity_section",
+    "velocity_transmission",
+    "worst_deflection",
 ]
 
 

@@ -191,6 +191,58 @@ class CompiledMachine:
             self._mechanism, position, rotation, direction, point, gravity, how, limit, steps, cross
         )
 
+    @cached_property
+    def drives(self) -> tuple[int, ...]:
+        """Index of each actuator's coordinate."""
+        return tuple(i for _, i in self._mechanism.actuators)
+
+    @cached_property
+    def bodies(self) -> tuple[tuple[str, int, float], ...]:
+        """Name, frame and mass (kg) of each body."""
+        return tuple(self._mechanism.bodies)
+
+    @cached_property
+    def limits(self) -> tuple[tuple[float, float], ...]:
+        """Lowest and highest value of each coordinate; 1e300 where there is no limit."""
+        return tuple(self._mechanism.limits)
+
+    def rates(
+        self, position: Floats, rotation: Floats, start: Floats | None, *, patient: bool, threads: int
+    ) -> dict[str, Any]:
+        """Arrays by name: closed coordinates and the drives' Jacobian of (n, 3) positions.
+
+        start: (n, coordinates) near the answer, NaN where none is known. Not patient: a pose that straight
+        continuation from home does not reach is out of reach.
+        """
+        begin = np.zeros((0, len(self.names.coordinates))) if start is None else start
+        return self._mechanism.kinematics(position, rotation, begin, False, patient, threads)
+
+    def dynamics(
+        self,
+        inertias: Floats,
+        coordinates: Floats,
+        twist: Floats,
+        twist_rate: Floats,
+        wrench: Floats,
+        gravity: Floats,
+        threads: int,
+    ) -> dict[str, Any]:
+        """Arrays by name: inverse dynamics at (n, coordinates) that are closed, motions of the tcp (n, 6)."""
+        return self._mechanism.dynamics(inertias, coordinates, twist, twist_rate, wrench, gravity, threads)
+
+    def modes(
+        self,
+        inertias: Floats,
+        position: Floats,
+        rotation: Floats,
+        wrench: Floats,
+        gravity: Floats,
+        count: int,
+        threads: int,
+    ) -> dict[str, Any]:
+        """Arrays by name: squares of the lowest angular frequencies and their shapes."""
+        return self._mechanism.modes(inertias, position, rotation, wrench, gravity, count, threads)
+
     def frames(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """(nodes, 3) m and (nodes, 3, 3): all frames at given coordinates, nominal geometry."""
         position, rotation = self._mechanism.frames(coordinates)

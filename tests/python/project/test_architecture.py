@@ -20,10 +20,10 @@ RANKS = (
     ("mechanism",),
     ("kinematics",),
     ("closure", "linearization"),
-    ("saddle", "fast_plan", "home"),
-    ("equilibrium", "stiffness"),
+    ("saddle", "fast_plan", "home", "motion"),
+    ("equilibrium", "stiffness", "dynamics"),
     ("solve",),
-    ("batch", "clamp", "follower"),
+    ("batch", "clamp", "follower", "modes"),
     ("path",),
 )
 RANK = {name: i for i, names in enumerate(RANKS) for name in names}

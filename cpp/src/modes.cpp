@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+#include "stiffmap/modes.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace stiffmap {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double massless = 1e-13;  // relative to the largest inverse square of a frequency
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+/// Columns: motions that springs, laws and joints allow before the loops are closed, as lengths.
+MatX allowed(const Mechanism& m, const Linearization& lin) {
+  const Index n = m.size();
+  MatX out = MatX::Zero(n, n);
+  Index used = 0;
+  std::vector<bool> done(at(n), false);
+  for (const SpringGroup& g : m.groups) {
+    if (!g.matrix.rotated) continue;
+    for (int i = 0; i < 6; ++i) {
+      done[at(g.first + i)] = true;
+      if (g.matrix.rigid[i]) continue;
+      out.col(used++).segment<6>(g.first) = g.matrix.basis.col(i);
+    }
+  }
+  for (Index j = 0; j < n; ++j)
+    if (!done[at(j)] && lin.kind[at(j)] != Kind::fixed) out(j, used++) = 1 / m.unit(j);
+  return out.leftCols(used);
+}
+
+/// Of those, the motions that keep every loop closed.
+MatX closed_motions(const Mechanism& m, const Linearization& lin) {
+  const MatX P = allowed(m, lin);
+  if (m.closures() == 0) return P;
+  MatX C = lin.J * P;
+  for (Index i = 3; i < C.rows(); i += 6) C.middleRows<3>(i) *= m.length;
+  Eigen::ColPivHouseholderQR<MatX> qr;
+  qr.setThreshold(rank_threshold);
+  qr.compute(C.transpose());
+  const MatX Q = qr.householderQ();
+  return P * Q.rightCols(P.cols() - qr.rank());
+}
+
+MatX tangent(const Mechanism& m, const Linearization& lin) {
+  MatX out = lin.K - lin.H;
+  for (Index j = 0; j < m.size(); ++j)
+    if (m.coordinates[at(j)].law >= 0 && lin.da[j] != 0) out(j, j) += lin.dtau[j] / lin.da[j];
+  return out;
+}
+
+void keep(const MatX& Z, const VecX& inverse_square, const MatX& vectors, ModesResult& out) {
+  const double largest = std::max(inverse_square.cwiseAbs().maxCoeff(), 0.0);
+  const Index count = out.square.size();
+  for (Index k = 0; k < std::min<Index>(count, inverse_square.size()); ++k) {
+    const double mu = inverse_square[inverse_square.size() - 1 - k];
+    if (!(mu > massless * largest)) break;
+    out.square[k] = 1 / mu;
+    out.shape.col(k) = Z * vectors.col(vectors.cols() - 1 - k) / std::sqrt(mu);
+  }
+}
+
+/// A tangent that dead moments make unsymmetric: complex frequencies are flutter.
+bool unsymmetric(const MatX& Z, const MatX& K, const MatX& M, ModesResult& out) {
+  const Eigen::EigenSolver<MatX> solver(K.partialPivLu().solve(M));
+  const auto values = solver.eigenvalues();
+  std::vector<Index> order(at(values.size()));
+  std::iota(order.begin(), order.end(), Index{0});
+  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return values[a].real() < values[b].real(); });
+  const double largest = values.cwiseAbs().maxCoeff();
+  VecX mu(values.size());
+  MatX vectors(K.rows(), values.size());
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const Index j = order[k];
+    if (std::abs(values[j].imag()) > 1e-9 * largest || values[j].real() < -1e-9 * largest) return false;
+    const VecX v = solver.eigenvectors().col(j).real();
+    mu[static_cast<Index>(k)] = values[j].real();
+    const double modal = v.dot(M * v);
+    vectors.col(static_cast<Index>(k)) =
+        v * std::sqrt(std::max(mu[static_cast<Index>(k)], 0.0) / std::max(modal, 1e-300));
+  }
+  keep(Z, mu, vectors, out);
+  return true;
+}
+
+}  // namespace
+
+void natural_modes(const Mechanism& m, const Inertias& inertias, const PoseInput& in, Index count, SolveWorkspace& ws,
+                   ModesResult& out) {
+  out.square.setConstant(count, nan);
+  out.shape.setConstant(m.size(), count, nan);
+  out.x.setConstant(m.size(), nan);
+  const ClosureResult closure = prepare_pose(m, in, ws);
+  out.status = closure.status;
+  out.flags = closure.flags;
+  if (closure.status != Status::converged) return;
+  const EquilibriumResult eq = solve_equilibrium(m, ws.problem, {}, ws.equilibrium, ws.state);
+  out.status = eq.status;
+  out.flags |= eq.flags;
+  if (eq.status != Status::converged) return;
+  const Linearization& lin = ws.equilibrium.lin;
+  const MatX Z = closed_motions(m, lin);
+  const MatX K = Z.transpose() * tangent(m, lin) * Z;
+  const MatX M = Z.transpose() * coordinate_mass(m, inertias, lin.frames) * Z;
+  if (K.rows() == 0 || M.isZero(0)) {
+    out.x = lin.x;
+    return;  // nothing moves, or nothing has mass
+  }
+  const MatX S = 0.5 * (K + K.transpose());
+  const Eigen::LLT<MatX> llt(S);
+  const VecX pivots = llt.matrixLLT().diagonal();
+  const bool sound =
+      llt.info() == Eigen::Success && pivots.cwiseAbs2().minCoeff() > 1e-13 * S.diagonal().cwiseAbs().maxCoeff();
+  if (!sound) {
+    const Eigen::SelfAdjointEigenSolver<MatX> values(S, Eigen::EigenvaluesOnly);
+    const double low = values.eigenvalues()[0], high = values.eigenvalues()[K.rows() - 1];
+    if (low <= 1e-12 * high) {
+      out.status = low < -1e-9 * high ? Status::unstable : Status::singular;
+      return;
+    }
+  }
+  out.x = lin.x;
+  if ((K - K.transpose()).norm() > 1e-9 * S.norm()) {
+    if (!unsymmetric(Z, K, M, out)) out.status = Status::unstable;
+    return;
+  }
+  MatX X = llt.matrixL().solve(M);
+  const MatX reduced = llt.matrixL().solve(X.transpose());
+  const Eigen::SelfAdjointEigenSolver<MatX> modes(0.5 * (reduced + reduced.transpose()));
+  keep(Z, modes.eigenvalues(), llt.matrixU().solve(modes.eigenvectors()), out);
+}
+
+}  // namespace stiffmap

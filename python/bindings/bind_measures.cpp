@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: MIT
+// Rates, dynamics and modes of many poses: arrays in, arrays out.
+#include <pybind11/stl.h>
+
+#include <cmath>
+
+#include "arrays.hpp"
+#include "stiffmap/modes.hpp"
+#include "stiffmap/parallel.hpp"
+
+namespace stiffmap::bindings {
+namespace {
+
+using Row3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using RowX = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+/// An array full of NaN.
+py::array_t<double> unknown(const std::vector<py::ssize_t>& shape) {
+  py::array_t<double> out(shape);
+  std::fill_n(out.mutable_data(), out.size(), nan);
+  return out;
+}
+
+py::ssize_t count_of(const Array& a) { return a.ndim() ? a.shape(0) : 0; }
+
+Inertias inertias_of(const Mechanism& m, const Array& values) {
+  const py::ssize_t n = static_cast<py::ssize_t>(m.bodies.size());
+  const double* from = data(values, {n, 3, 3}, "inertias");
+  Inertias out;
+  for (py::ssize_t k = 0; k < n; ++k) out.emplace_back(Eigen::Map<const Row3>(from + 9 * k));
+  return out;
+}
+
+/// Coordinates, drive Jacobian and, where wanted, the rates of all coordinates. `start`: coordinates near
+/// the answer (NaN: none known), or no rows.
+py::dict kinematics(const Mechanism& m, const Array& position, const Array& rotation, const Array& start, bool rates,
+                    bool patient, int threads) {
+  const py::ssize_t n = count_of(position), size = m.size(), drives = static_cast<py::ssize_t>(m.drives.size());
+  const double *p = data(position, {n, 3}, "position"), *R = data(rotation, {n, 3, 3}, "rotation");
+  const double* x0 = count_of(start) ? data(start, {n, size}, "start") : nullptr;
+  auto x_out = unknown({n, size}), J_out = unknown({n, 6, drives}), free_out = unknown({n, 6}), pivot = unknown({n});
+  auto tip_out = unknown({n, 3}), turned = unknown({n, 3, 3}), rates_out = unknown({rates ? n : 0, size, drives});
+  auto misfit = unknown({n});
+  py::array_t<std::uint8_t> status(n);
+  py::array_t<std::uint32_t> flags(n);
+  double *xs = x_out.mutable_data(), *Js = J_out.mutable_data(), *fs = free_out.mutable_data(),
+         *ps = pivot.mutable_data(), *ts = tip_out.mutable_data(), *Rs = turned.mutable_data(),
+         *gs = rates_out.mutable_data(), *ms = misfit.mutable_data();
+  std::uint8_t* states = status.mutable_data();
+  std::uint32_t* bits = flags.mutable_data();
+  {
+    py::gil_scoped_release free;
+    parallel_chunks(n, 64, threads, [&](int, long begin, long end) {
+      PoseCloser closer(m);
+      LoopRates loops(m);
+      Motion motion;
+      VecX x(m.size());
+      for (long i = begin; i < end; ++i) {
+        if (x0) x = Eigen::Map<const VecX>(x0 + size * i, size);
+        else x.setConstant(nan);
+        const ClosureResult r =
+            closer.close(m, {Eigen::Map<const Vec3>(p + 3 * i), Mat3(Eigen::Map<const Row3>(R + 9 * i))}, x, patient);
+        states[i] = static_cast<std::uint8_t>(r.status);
+        bits[i] = r.flags;
+        if (r.status != Status::converged) continue;
+        loops.factorise(m, closer.frames());
+        loops.motion(m, closer.frames(), motion);
+        Eigen::Map<VecX>(xs + size * i, size) = x;
+        Eigen::Map<Vec3>(ts + 3 * i) = r.tip.p;
+        Eigen::Map<Row3>(Rs + 9 * i) = r.tip.R;
+        ps[i] = motion.pivot;
+        ms[i] = motion.misfit;
+        Eigen::Map<Vec6>(fs + 6 * i) = motion.free_twist;
+        if (!motion.free_twist.hasNaN()) {
+          states[i] = static_cast<std::uint8_t>(Status::singular);
+          bits[i] |= flag::platform_singular;
+          continue;
+        }
+        Eigen::Map<RowX>(Js + 6 * drives * i, 6, drives) = motion.J;
+        if (rates) Eigen::Map<RowX>(gs + size * drives * i, size, drives) = motion.rates;
+      }
+    });
+  }
+  py::dict out;
+  out["coordinates"] = x_out;
+  out["position"] = tip_out;
+  out["rotation"] = turned;
+  out["jacobian"] = J_out;
+  out["rates"] = rates_out;
+  out["free_twist"] = free_out;
+  out["pivot"] = pivot;
+  out["misfit"] = misfit;
+  out["status"] = status;
+  out["flags"] = flags;
+  return out;
+}
+
+/// Drive efforts at closed coordinates and tip motions.
+py::dict dynamics(const Mechanism& m, const Array& inertias, const Array& coordinates, const Array& twist,
+                  const Array& twist_rate, const Array& wrench, const Array& gravity, int threads) {
+  const py::ssize_t n = count_of(coordinates), size = m.size(), drives = static_cast<py::ssize_t>(m.drives.size());
+  const double *x = data(coordinates, {n, size}, "coordinates"), *v = data(twist, {n, 6}, "twist"),
+               *a = data(twist_rate, {n, 6}, "twist_rate"), *w = data(wrench, {n, 6}, "wrench");
+  const Vec3 g = Eigen::Map<const Vec3>(data(gravity, {3}, "gravity"));
+  const Inertias I = inertias_of(m, inertias);
+  auto effort = unknown({n, drives}), rate = unknown({n, drives}), acceleration = unknown({n, drives}),
+       mass = unknown({n, drives, drives}), kinetic = unknown({n}), potential = unknown({n}), misfit = unknown({n});
+  double *es = effort.mutable_data(), *rs = rate.mutable_data(), *as = acceleration.mutable_data(),
+         *ms = mass.mutable_data(), *ks = kinetic.mutable_data(), *ps = potential.mutable_data(),
+         *fs = misfit.mutable_data();
+  {
+    py::gil_scoped_release free;
+    parallel_chunks(n, 64, threads, [&](int, long begin, long end) {
+      Frames frames(m);
+      LoopRates loops(m);
+      Motion motion;
+      DynamicsResult r;
+      for (long i = begin; i < end; ++i) {
+        const VecX at = Eigen::Map<const VecX>(x + size * i, size);
+        if (!at.allFinite()) continue;
+        forward(m, Geometry::nominal, at, frames);
+        loops.factorise(m, frames);
+        loops.motion(m, frames, motion);
+        if (!motion.free_twist.hasNaN()) continue;
+        const DynamicsInput in{Eigen::Map<const Vec6>(v + 6 * i), Eigen::Map<const Vec6>(a + 6 * i),
+                               Eigen::Map<const Vec6>(w + 6 * i), g};
+        drive_dynamics(m, I, at, frames, loops, motion, in, r);
+        Eigen::Map<VecX>(es + drives * i, drives) = r.effort;
+        Eigen::Map<VecX>(rs + drives * i, drives) = r.rate;
+        Eigen::Map<VecX>(as + drives * i, drives) = r.acceleration;
+        Eigen::Map<RowX>(ms + drives * drives * i, drives, drives) = r.mass;
+        ks[i] = r.kinetic;
+        ps[i] = r.potential;
+        fs[i] = r.misfit;
+      }
+    });
+  }
+  py::dict out;
+  out["effort"] = effort;
+  out["rate"] = rate;
+  out["acceleration"] = acceleration;
+  out["mass"] = mass;
+  out["kinetic"] = kinetic;
+  out["potential"] = potential;
+  out["misfit"] = misfit;
+  return out;
+}
+
+/// Squares of angular frequencies and shapes of the lowest modes.
+py::dict modes(const Mechanism& m, const Array& inertias, const Array& position, const Array& rotation,
+               const Array& wrench, const Array& gravity, int count, int threads) {
+  const py::ssize_t n = count_of(position), size = m.size();
+  const double *p = data(position, {n, 3}, "position"), *R = data(rotation, {n, 3, 3}, "rotation"),
+               *w = data(wrench, {n, 6}, "wrench");
+  const Vec3 g = Eigen::Map<const Vec3>(data(gravity, {3}, "gravity"));
+  const Inertias I = inertias_of(m, inertias);
+  auto square = unknown({n, count}), shape = unknown({n, count, size}), x_out = unknown({n, size});
+  py::array_t<std::uint8_t> status(n);
+  py::array_t<std::uint32_t> flags(n);
+  double *ss = square.mutable_data(), *hs = shape.mutable_data(), *xs = x_out.mutable_data();
+  std::uint8_t* states = status.mutable_data();
+  std::uint32_t* bits = flags.mutable_data();
+  {
+    py::gil_scoped_release free;
+    parallel_chunks(n, 4, threads, [&](int, long begin, long end) {
+      SolveWorkspace ws(m);
+      ModesResult r;
+      PoseInput in;
+      in.gravity = g;
+      in.load_points = {{m.tip, m.points.front().offset, LoadType::dead}};
+      in.read_points = {0};
+      for (long i = begin; i < end; ++i) {
+        in.commanded = {Eigen::Map<const Vec3>(p + 3 * i), Mat3(Eigen::Map<const Row3>(R + 9 * i))};
+        in.wrenches = {Vec6(Eigen::Map<const Vec6>(w + 6 * i))};
+        natural_modes(m, I, in, count, ws, r);
+        states[i] = static_cast<std::uint8_t>(r.status);
+        bits[i] = r.flags;
+        Eigen::Map<VecX>(ss + count * i, count) = r.square;
+        Eigen::Map<RowX>(hs + count * size * i, count, size) = r.shape.transpose();
+        Eigen::Map<VecX>(xs + size * i, size) = r.x;
+      }
+    });
+  }
+  py::dict out;
+  out["square"] = square;
+  out["shape"] = shape;
+  out["coordinates"] = x_out;
+  out["status"] = status;
+  out["flags"] = flags;
+  return out;
+}
+
+}  // namespace
+
+void bind_measures(py::module_& m) {
+  using namespace py::literals;
+  py::class_<Mechanism>(m.attr("Mechanism"))
+      .def_property_readonly("bodies",
+                             [](const Mechanism& k) {
+                               std::vector<std::tuple<std::string, Index, double>> out;  // name, node, mass
+                               for (const NodeBody& b : k.bodies) out.emplace_back(b.name, b.node, b.mass);
+                               return out;
+                             })
+      .def_property_readonly("limits",
+                             [](const Mechanism& k) {
+                               std::vector<std::pair<double, double>> out;  // per coordinate
+                               for (const Coordinate& c : k.coordinates) out.emplace_back(c.lower, c.upper);
+                               return out;
+                             })
+      .def("kinematics", &kinematics, "position"_a, "rotation"_a, "start"_a, "rates"_a, "patient"_a, "threads"_a)
+      .def("dynamics", &dynamics, "inertias"_a, "coordinates"_a, "twist"_a, "twist_rate"_a, "wrench"_a, "gravity"_a,
+           "threads"_a)
+      .def("modes", &modes, "inertias"_a, "position"_a, "rotation"_a, "wrench"_a, "gravity"_a, "count"_a, "threads"_a);
+}
+
+}  // namespace stiffmap::bindings

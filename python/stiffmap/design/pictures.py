@@ -1,0 +1,73 @@
+"""Pictures of a Pareto set: fronts, parallel coordinates, progress."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from stiffmap.design.search import ParetoSet
+from stiffmap.performance.registry import get_measure
+from stiffmap.plot.style import BLUE, CYCLE, SKY, VERMILLION, new_figure, paper_style
+
+
+def front_figure(found: ParetoSet) -> Figure:
+    """Each pair of objectives; the chosen designs marked."""
+    names = found.design.model.objectives
+    pairs = list(combinations(range(len(names)), 2)) or [(0, 0)]
+    values = np.array([[get_measure(n).factor * j.values[n] for n in names] for j in found.judged])
+    with paper_style():
+        figure = new_figure(3.6 * len(pairs), 3.2)
+        for axes, (a, b) in zip(figure.subplots(1, len(pairs), squeeze=False)[0], pairs, strict=True):
+            axes.plot(values[:, a], values[:, b], "o", color=SKY, markersize=4)
+            for colour, (label, i) in zip(CYCLE[1:], found.chosen().items(), strict=False):
+                axes.plot(values[i, a], values[i, b], "s", color=colour, markersize=6, label=label)
+            axes.set_xlabel(_axis(names[a]))
+            axes.set_ylabel(_axis(names[b]))
+            axes.legend()
+        figure.suptitle(f"{found.design.model.name}: {len(found.x)} designs that no other one betters")
+    return figure
+
+
+def parallel_figure(found: ParetoSet) -> Figure:
+    """Variables and objectives of every design, each scaled to its range in the set."""
+    names = list(found.judged[0].values)
+    table = np.hstack([found.x, [[get_measure(n).factor * j.values[n] for n in names] for j in found.judged]])
+    labels = [*found.design.variables, *names]
+    low, high = table.min(axis=0), table.max(axis=0)
+    scaled = (table - low) / np.where(high > low, high - low, 1)
+    with paper_style():
+        figure = new_figure(max(6.0, 0.9 * len(labels)), 3.4)
+        axes = figure.add_subplot()
+        axes.plot(scaled.T, color=BLUE, alpha=0.25, linewidth=0.8)
+        axes.plot(scaled[found.chosen()["compromise"]], color=VERMILLION, linewidth=1.6, label="compromise")
+        axes.set_xticks(
+            range(len(labels)),
+            [f"{n}\n{a:.4g}…{b:.4g}" for n, a, b in zip(labels, low, high, strict=True)],
+            rotation=60,
+            ha="right",
+        )
+        axes.set_yticks([])
+        axes.legend(loc="upper right")
+        axes.set_title(
+            f"{found.design.model.name}: variables and measures, each from its lowest to its highest"
+        )
+    return figure
+
+
+def progress_figure(found: ParetoSet) -> Figure:
+    """Hypervolume against evaluations."""
+    steps = np.array(found.history)
+    with paper_style():
+        figure = new_figure(4.2, 3.0)
+        axes = figure.add_subplot()
+        axes.plot(steps[:, 1], steps[:, 2], color=BLUE)
+        axes.set_xlabel("designs evaluated")
+        axes.set_ylabel("hypervolume")
+    return figure
+
+
+def _axis(name: str) -> str:
+    m = get_measure(name)
+    return f"{name}, {m.shown}" if m.shown else name

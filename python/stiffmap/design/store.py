@@ -1,0 +1,81 @@
+"""Evaluations kept on disk, so that a search that was killed goes on where it was."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from stiffmap.broadcasting import Floats
+from stiffmap.design.judging import Judged
+from stiffmap.design.problem import Design
+from stiffmap.errors import FileError
+
+
+class Evaluations:
+    """Judged designs by their exact variables; one line of JSON each, written per generation.
+
+    A search is deterministic, so that replaying it from the start with these answers at hand leads to
+    the same state without a single evaluation.
+    """
+
+    def __init__(self, design: Design, path: Path | None) -> None:
+        self.path, self.known = path, dict[bytes, Judged]()
+        self.mark = fingerprint(design)
+        if path is not None and path.exists():
+            self._read(path)
+
+    def _read(self, path: Path) -> None:
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+            try:
+                row = json.loads(line)
+            except json.JSONDecodeError:
+                continue  # the line at which the process was killed
+            if number == 1 and row.get("design") != self.mark:
+                raise FileError("holds evaluations of another design; give another folder", file=str(path))
+            if "x" in row:
+                judged = Judged(np.array(row["f"]), np.array(row["g"]), row["values"], row["reason"])
+                self.known[np.array(row["x"]).tobytes()] = judged
+
+    def missing(self, x: Floats) -> list[int]:
+        """Rows that nobody judged yet."""
+        return [i for i, row in enumerate(x) if row.tobytes() not in self.known]
+
+    def add(self, x: Floats, judged: list[Judged]) -> None:
+        """Keep, and write at once."""
+        for row, one in zip(x, judged, strict=True):
+            self.known[row.tobytes()] = one
+        if self.path is None or not judged:
+            return
+        before = self.path.read_bytes() if self.path.exists() else b""
+        with self.path.open("a", encoding="utf-8") as file:
+            if not before:
+                file.write(json.dumps({"design": self.mark}) + "\n")
+            elif not before.endswith(b"\n"):  # killed while writing
+                file.write("\n")
+            for row, one in zip(x, judged, strict=True):
+                line = {
+                    "x": row.tolist(),
+                    "f": one.objectives.tolist(),
+                    "g": one.violations.tolist(),
+                    "values": one.values,
+                    "reason": one.reason,
+                }
+                file.write(json.dumps(line) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+    def get(self, x: Floats) -> Judged:
+        """The judgement of one row."""
+        return self.known[x.tobytes()]
+
+
+def fingerprint(design: Design) -> str:
+    """Of everything that the answers depend on."""
+    text = json.dumps(
+        [design.model.model_dump(), design.document.data, repr(design.requirements)], default=str
+    )
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

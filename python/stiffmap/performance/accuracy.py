@@ -1,0 +1,89 @@
+"""Accuracy transmission, equation (1) of the paper: encoder errors to tool error (docs/measures.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.broadcasting import Floats
+from stiffmap.kinematics import forward_kinematics
+from stiffmap.machine import Machine
+from stiffmap.maps.inputs import plane_axes
+from stiffmap.performance.closing import DriveKinematics, drive_kinematics
+from stiffmap.performance.scaling import drive_values
+from stiffmap.performance.zonotopes import corners, farthest_vertex, worst_corner
+
+
+@dataclass(frozen=True, eq=False)
+class AccuracyTransmission:
+    """Largest tool error over the box of encoder errors, at poses (...); NaN where the pose failed."""
+
+    translation: Floats
+    """(...) m, largest distance of the TCP from its command, first order, exact over the box."""
+    rotation: Floats
+    """(...) rad, largest rotation of the platform."""
+    plane: Floats
+    """(...) m, largest distance in the plane asked for."""
+    components: Floats
+    """(..., 6) m, rad: largest error of each component of the twist."""
+    corner: Floats
+    """(..., drives) signs of the encoder errors with the largest translation."""
+    nonlinear: Floats | None
+    """(...) m, the largest translation over all corners by forward kinematics; None: not asked for."""
+    errors: Floats
+    """(drives,) m or rad, half-width of each encoder's error."""
+    status: NDArray[np.uint8]
+
+
+def accuracy_transmission(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    errors: ArrayLike | None = None,
+    plane: str = "xy",
+    nonlinear: bool = False,
+    threads: int | None = None,
+) -> AccuracyTransmission:
+    """Worst tool error when every encoder may be wrong by up to ± its error, at poses (..., 3) m.
+
+    The norm being convex, its largest value over the box of errors lies at a corner, so all corners
+    are the exact worst case of the first-order model. `errors`: one or one each, m or rad; None: the
+    machine file's ``encoder_error``. `nonlinear` also closes the machine at every corner, without
+    linearising. Raises StiffmapError for bad input, never for a pose.
+    """
+    k = drive_kinematics(machine, position, rotation, threads=threads)
+    out = accuracy_of(machine, k, errors=errors, plane=plane)
+    if not nonlinear:
+        return out
+    moved = _by_closing(machine, k, out.errors, threads)
+    return AccuracyTransmission(**{**out.__dict__, "nonlinear": moved})
+
+
+def accuracy_of(
+    machine: Machine, k: DriveKinematics, *, errors: ArrayLike | None = None, plane: str = "xy"
+) -> AccuracyTransmission:
+    """The same from kinematics that are at hand, first order."""
+    e = drive_values(machine, "encoder_error", errors, "m or rad")
+    j = k.jacobian * e
+    return AccuracyTransmission(
+        translation=farthest_vertex(j[..., :3, :]),
+        rotation=farthest_vertex(j[..., 3:, :]),
+        plane=farthest_vertex(j[..., list(plane_axes(plane)), :]),
+        components=np.abs(j).sum(axis=-1),
+        corner=worst_corner(j[..., :3, :]),
+        nonlinear=None,
+        errors=e,
+        status=k.status,
+    )
+
+
+def _by_closing(machine: Machine, k: DriveKinematics, errors: Floats, threads: int | None) -> Floats:
+    worst = np.zeros(k.status.shape)
+    signs = corners(len(errors))
+    for s in (*signs, *-signs):
+        there = forward_kinematics(machine, k.actuators + s * errors, threads=threads)
+        worst = np.maximum(worst, np.linalg.norm(there.position - k.position, axis=-1))
+    return worst

@@ -1,0 +1,92 @@
+"""Drive Jacobian and joint coordinates over arrays of poses, springs at rest (docs/theory.md D1-D3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
+from stiffmap.errors import StiffmapError
+from stiffmap.machine import Machine
+from stiffmap.rotations import as_rotations
+
+WORTHWHILE = 256
+"""Poses from which the SIMD kernels' closures are worth asking for as starts."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveKinematics:
+    """First-order kinematics of the rigid machine; NaN where the pose is UNREACHABLE or SINGULAR."""
+
+    jacobian: Floats
+    """(..., 6, drives): TCP twist (base axes) per unit rate of each drive."""
+    coordinates: Floats
+    """(..., coordinates) all coordinates, springs at zero."""
+    actuators: Floats
+    """(..., drives) m or rad."""
+    position: Floats
+    """(..., 3) m, TCP; where the task leaves a component open, the closure's answer."""
+    rotation: Floats
+    """(..., 3, 3)."""
+    free_twist: Floats
+    """(..., 6) with all drives held, the motion of the platform at a SINGULAR pose; else NaN."""
+    pivot: Floats
+    """(...) smallest relative pivot of the loops' elimination: 0 at a pose where passive joints lose rank."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+
+
+def drive_kinematics(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    start: ArrayLike | None = None,
+    patient: bool = True,
+    threads: int | None = None,
+) -> DriveKinematics:
+    """Jacobian from the drives to the TCP at commanded poses (..., 3) m, rotation (..., 3, 3).
+
+    Any machine: passive rates follow from all loops by rank-revealing elimination. `start`
+    (..., coordinates): coordinates near the answer; None: from the neighbouring pose. `patient`: False
+    takes a pose that straight continuation from home does not reach as UNREACHABLE, without the slow
+    second attempt. Raises StiffmapError for bad input, never for a pose.
+    """
+    p = trailing(position, (3,), "position", "positions (m)")
+    r = trailing(
+        machine.description.home.r if rotation is None else rotation,
+        (3, 3),
+        "rotation",
+        "rotation matrices",
+    )
+    if rotation is not None:
+        r = as_rotations(r)
+    if not machine.actuators:
+        raise StiffmapError(f"{machine.name}: no actuator, so there are no drive rates")
+    shape = batch(p.shape[:-1], r.shape[:-2])
+    flat_p, flat_r = rows(p, shape, (3,)), rows(r, shape, (3, 3))
+    compiled, size = machine.compiled, len(machine.compiled.names.coordinates)
+    begin: Floats | None
+    if start is not None:
+        begin = rows(trailing(start, (size,), "start", "coordinates"), shape, (size,))
+    elif not patient:
+        begin = None
+    else:
+        begin = _starts(machine, flat_p, flat_r, thread_count(threads))
+    out = compiled.rates(flat_p, flat_r, begin, patient=patient, threads=thread_count(threads))
+    drives = list(compiled.drives)
+    shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items() if k not in ("rates", "misfit")}
+    return DriveKinematics(actuators=shaped["coordinates"][..., drives], **shaped)
+
+
+def _starts(machine: Machine, position: Floats, rotation: Floats, threads: int) -> Floats | None:
+    """Closed coordinates from the kernels, where they take the machine; the closure checks each."""
+    if len(position) < WORTHWHILE or machine.fast:
+        return None
+    answer = machine.compiled.solve(
+        position, rotation, np.zeros((len(position), 1, 6)), load_points=["tcp"], load_types=["dead"],
+        read_points=["tcp"], gravity=np.zeros(3), fast=True, load_steps=0, threads=threads, stiffness=False,
+    )  # fmt: skip
+    return np.asarray(answer.coordinates)

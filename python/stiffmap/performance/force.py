@@ -1,0 +1,102 @@
+"""Force transmission, equation (2) of the paper: what the drives can hold at the tool (docs/measures.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.broadcasting import Floats
+from stiffmap.machine import Machine
+from stiffmap.maps.inputs import plane_axes
+from stiffmap.performance.closing import DriveKinematics, drive_kinematics
+from stiffmap.performance.inertia import rest_efforts
+from stiffmap.performance.polygons import Polygon, section_polygon
+from stiffmap.performance.scaling import characteristic_length, drive_values, weighted
+from stiffmap.performance.velocity import singular_values
+
+NOTHING = 1e-12
+"""Effort of a drive per unit force below which the drive does not feel the force."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForceTransmission:
+    """Holdable forces at the TCP at poses (...); NaN where the pose failed."""
+
+    sphere_min: Floats
+    """(...) smallest singular value of J^-T, weighted as the velocity's: force per unit norm of efforts."""
+    sphere_max: Floats
+    """(...) largest."""
+    force_min: Floats
+    """(...) N, force that the drives hold in every direction of space, no moment."""
+    plane: Polygon
+    """Forces that the drives hold in the plane: N, or per unit effort."""
+    bias: Floats
+    """(..., drives) N or N·m, effort that each drive needs without a force on the tool."""
+    limits: Floats
+    """(drives,) effort limit of each drive."""
+    status: NDArray[np.uint8]
+
+
+def force_transmission(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    plane: str = "xy",
+    limits: ArrayLike | str = "declared",
+    gravity: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    length: float | None = None,
+    threads: int | None = None,
+) -> ForceTransmission:
+    """Smallest and largest force that the drives hold, at rest or at speed, at poses (..., 3) m.
+
+    A force f on the tool asks the drives for -J^T f (virtual work; the paper's (2) has the force that
+    the machine exerts). Limits: ``declared`` in the machine file, ``unit``, or numbers (N, N·m).
+
+    gravity
+        (3,) m/s²; None: what the machine file says. Its efforts count against the limits.
+    velocity
+        (..., 3) m/s of the TCP, no acceleration, no rotation: inertia and friction at that speed count
+        against the limits too; None: at rest, without friction.
+
+    Raises StiffmapError for bad input, never for a pose.
+    """
+    k = drive_kinematics(machine, position, rotation, threads=threads)
+    return force_of(machine, k, plane=plane, limits=limits, gravity=gravity, velocity=velocity, length=length)
+
+
+def force_of(
+    machine: Machine,
+    k: DriveKinematics,
+    *,
+    plane: str = "xy",
+    limits: ArrayLike | str = "declared",
+    gravity: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    length: float | None = None,
+) -> ForceTransmission:
+    """The same from kinematics that are at hand."""
+    text = limits if isinstance(limits, str) else ""
+    given = np.ones(()) if text == "unit" else None if text == "declared" else limits
+    most = drive_values(machine, "force", given, "N or N·m")
+    bias = rest_efforts(machine, k, gravity=gravity, velocity=velocity)
+    needed = -np.swapaxes(k.jacobian[..., :3, :], -1, -2)  # effort of the drives per force on the tool
+    free = most - np.abs(bias)
+    norms = np.linalg.norm(needed, axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        room = np.where(norms > NOTHING, free / norms, np.where(free >= 0, np.inf, 0.0))
+        s = singular_values(weighted(machine, k.jacobian, characteristic_length(machine, length), "all"))
+        least, largest = 1 / s[..., 0], 1 / s[..., -1]
+    bad = ~np.isfinite(needed).all(axis=(-2, -1))
+    return ForceTransmission(
+        sphere_min=least,
+        sphere_max=largest,
+        force_min=np.where(bad, np.nan, np.maximum(room.min(axis=-1), 0.0)),
+        plane=section_polygon(needed[..., list(plane_axes(plane))], most, k.status, bias),
+        bias=bias,
+        limits=most,
+        status=k.status,
+    )

@@ -1,0 +1,1 @@
+"""One measure per file: each has a `MEASURE`; a new file here is a new measure."""

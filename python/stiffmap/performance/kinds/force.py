@@ -1,0 +1,22 @@
+"""Force on the tool that the drives hold in every direction of a plane, at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiffmap.maps.inputs import plane_axes
+from stiffmap.performance.inertia import rest_efforts
+from stiffmap.performance.polygons import inner_radius
+from stiffmap.performance.registry import Case, Found, Measure, over_poses
+from stiffmap.performance.scaling import drive_values
+
+
+def compute(case: Case) -> Found:
+    """Over all poses of the box, drives within the efforts that the machine file declares."""
+    most = drive_values(case.machine, "force", None, "N or N·m")
+    bias = rest_efforts(case.machine, case.kinematics, gravity=case.gravity, velocity=None)
+    needed = -np.swapaxes(case.kinematics.jacobian[..., list(plane_axes(case.plane)), :], -1, -2)
+    return over_poses(case.positions, inner_radius(needed, most, bias), "high")
+
+
+MEASURE = Measure("force", "force held in every direction of the plane", "N", "high", compute, "N", order=21)

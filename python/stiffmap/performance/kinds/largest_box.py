@@ -1,0 +1,41 @@
+"""First edge of the largest box of the required shape in the workspace, equation (3)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiffmap.performance.box import largest_box
+from stiffmap.performance.limits import Bounds
+from stiffmap.performance.registry import Case, Found, Measure
+
+
+def compute(case: Case) -> Found:
+    """Anywhere; drive ranges, joint limits and the transmission range count."""
+    if case.quick:
+        return concentric(case)
+    b = largest_box(
+        case.machine, case.proportions, transmission=case.transmission, length=case.length,
+        rotation=case.rotation, gap=case.gap, threads=case.threads,
+    )  # fmt: skip
+    note = f"no box of {1e3 * b.edge_upper:.2f} mm; limited by {', '.join(b.limited_by) or 'nothing found'}"
+    return Found(b.edge, b.centre, b.edge, b.centre, note, extra={"box": b})
+
+
+def concentric(case: Case) -> Found:
+    """The largest box about the centre of the case's box whose nodes, and the case's, keep all limits."""
+    bounds = Bounds(
+        case.machine, case.rotation, case.transmission, "sphere", case.length, threads=case.threads
+    )
+    closed, limits = bounds.at(case.positions)
+    good = closed.copy()
+    for limit in limits:
+        good &= limit.value <= limit.most
+    centre, half = (case.low + case.high) / 2, (case.high - case.low) / 2
+    share = (np.abs(case.positions - centre) / half).max(axis=1)
+    kept = 1.0 if good.all() else float(share[~good].min())
+    inner = share[good & (share < kept - 1e-9)] if kept < 1 or not good.all() else np.ones(1)
+    edge = 2 * half[0] * (1.0 if good.all() else 0.5 * (kept + float(inner.max(initial=0.0))))
+    return Found(float(edge), centre, note="about the centre, nodes only")
+
+
+MEASURE = Measure("largest_box", "edge of the largest box", "m", "high", compute, "mm", 1e3, order=5)

@@ -1,0 +1,137 @@
+"""The measures that exist: each is one file in `stiffmap.performance.kinds`, found by being there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from importlib import import_module
+from pkgutil import iter_modules
+
+import numpy as np
+
+from stiffmap.broadcasting import Floats
+from stiffmap.errors import StiffmapError
+from stiffmap.machine import Machine
+from stiffmap.performance import kinds
+from stiffmap.performance.closing import DriveKinematics, drive_kinematics
+from stiffmap.performance.poses import box_nodes
+from stiffmap.performance.velocity import VelocityTransmission, transmission_of
+
+
+@dataclass(eq=False)
+class Case:
+    """What measures are asked about: a machine, a box of poses, a force. Kinematics are shared."""
+
+    machine: Machine
+    low: Floats
+    high: Floats
+    force: float = 100.0
+    plane: str = "xy"
+    transmission: tuple[float, float] = (0.5, 2.0)
+    proportions: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    nodes: int = 51
+    coarse: int = 7
+    gap: float = 1e-4
+    quick: bool = False
+    """Searching among designs: nodes only where a proof or a search would follow."""
+    length: float | None = None
+    gravity: Floats | None = None
+    rotation: Floats | None = None
+    threads: int | None = None
+
+    @cached_property
+    def positions(self) -> Floats:
+        """(nodes³, 3) m."""
+        return box_nodes(self.low, self.high, self.nodes)
+
+    @cached_property
+    def coarse_positions(self) -> Floats:
+        """(coarse³, 3) m, for measures that cost more."""
+        return box_nodes(self.low, self.high, self.coarse)
+
+    @cached_property
+    def kinematics(self) -> DriveKinematics:
+        """At `positions`."""
+        return drive_kinematics(self.machine, self.positions, self.rotation, threads=self.threads)
+
+    @cached_property
+    def factors(self) -> VelocityTransmission:
+        """Velocity transmission at `positions`."""
+        return transmission_of(self.machine, self.kinematics, length=self.length)
+
+    @cached_property
+    def coarse_kinematics(self) -> DriveKinematics:
+        """At `coarse_positions`."""
+        return drive_kinematics(self.machine, self.coarse_positions, self.rotation, threads=self.threads)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A measure of one machine: its decisive values, and the map where there is one."""
+
+    worst: float
+    worst_at: Floats | None = None
+    best: float = float("nan")
+    best_at: Floats | None = None
+    note: str = ""
+    positions: Floats | None = None
+    values: Floats | None = None
+    extra: dict[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One measure of §3: SI `unit`, and its unit and factor in print."""
+
+    name: str
+    title: str
+    unit: str
+    better: str
+    """``high`` or ``low``: which values are good."""
+    compute: Callable[[Case], Found]
+    shown: str = ""
+    factor: float = 1.0
+    order: int = 50
+
+
+def over_poses(positions: Floats, values: Floats, better: str, note: str = "", **extra: object) -> Found:
+    """Worst and best pose of a map; a failed pose (NaN) makes the worst NaN and is said to be so."""
+    good = np.isfinite(values)
+    if not good.any():
+        return Found(
+            float("nan"),
+            note=note or "no pose of the box is within reach",
+            positions=positions,
+            values=values,
+        )
+    sign = 1.0 if better == "high" else -1.0
+    score = np.where(good, sign * values, -np.inf)
+    best = int(np.argmax(score))
+    if good.all():
+        worst = int(np.argmin(score))
+        at, value = positions[worst], float(values[worst])
+    else:
+        first = int(np.argmin(good))
+        at, value = positions[first], float("nan")
+        note = note or f"{int((~good).sum())} of {len(good)} poses fail"
+    return Found(value, at, float(values[best]), positions[best], note, positions, values, dict(extra))
+
+
+@lru_cache
+def all_measures() -> tuple[Measure, ...]:
+    """Every measure, in the order of the table."""
+    found = [
+        import_module(f"{kinds.__name__}.{m.name}").MEASURE
+        for m in iter_modules(kinds.__path__)
+        if not m.name.startswith("_")
+    ]
+    return tuple(sorted(found, key=lambda m: (m.order, m.name)))
+
+
+def get_measure(name: str) -> Measure:
+    """By name; StiffmapError lists those that exist."""
+    for m in all_measures():
+        if m.name == name:
+            return m
+    raise StiffmapError(f"unknown measure '{name}'; known: {', '.join(m.name for m in all_measures())}")

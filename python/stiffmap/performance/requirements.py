@@ -1,0 +1,150 @@
+"""What a task asks of a machine: ``trimming.yaml`` (docs/measures.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, ValidationError
+
+from stiffmap.errors import FileError, StiffmapError
+from stiffmap.files.report import file_error
+from stiffmap.files.schema.base import FileModel, Name
+from stiffmap.files.yaml_text import Document, read
+from stiffmap.performance.quantities import quantity
+from stiffmap.performance.registry import all_measures, get_measure
+
+Written = str | float | int
+
+
+class BoxModel(FileModel):
+    """Edges of the box in which the machine works, with units."""
+
+    x: Written
+    y: Written
+    z: Written
+
+
+class BoundModel(FileModel):
+    """One or both bounds of a measure, with units."""
+
+    at_least: Written | None = None
+    at_most: Written | None = None
+
+
+class RequirementsFile(FileModel):
+    """The keys of a requirements file."""
+
+    name: Name
+    title: str = ""
+    source: str = ""
+    box: BoxModel | None = None
+    plane: Literal["xy", "xz", "yz"] = "xy"
+    force: Written | None = None
+    requirements: dict[str, BoundModel] = Field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A requirement on one measure, SI."""
+
+    at_least: float | None = None
+    at_most: float | None = None
+
+    def margin(self, value: float) -> float:
+        """How far inside the value is (negative: outside), in its own unit."""
+        sides = []
+        if self.at_least is not None:
+            sides.append(value - self.at_least)
+        if self.at_most is not None:
+            sides.append(self.at_most - value)
+        return min(sides)
+
+
+@dataclass(frozen=True)
+class Requirements:
+    """A task: the box, the force on the tool and the bounds, SI."""
+
+    name: str = "none"
+    title: str = ""
+    source: str = ""
+    box: tuple[float, float, float] | None = None
+    plane: str = "xy"
+    force: float | None = None
+    bounds: tuple[tuple[str, Bound], ...] = ()
+
+    def bound(self, measure: str) -> Bound | None:
+        """The bound on a measure, if there is one."""
+        return dict(self.bounds).get(measure)
+
+
+def load_requirements(name_or_path: str | PathLike[str]) -> Requirements:
+    """Requirements from a file, or the shipped ones by name (``trimming``).
+
+    Raises FileError naming file, line, key, what was expected and what was found.
+    """
+    path = Path(name_or_path)
+    shipped = Path(__file__).with_name(path.name if path.suffix else f"{path.name}.yaml")
+    if not path.is_file():
+        if not shipped.is_file() or len(path.parts) > 1:
+            known = ", ".join(sorted(p.stem for p in Path(__file__).parent.glob("*.yaml")))
+            raise FileError(
+                f"no such requirements file, and none of that name is shipped (these are: {known})",
+                file=str(path),
+            )
+        path = shipped
+    document = read(path)
+    return requirements_of(document, str(path))
+
+
+def requirements_of(document: Document, file: str) -> Requirements:
+    """Schema, then units."""
+    if not isinstance(document.data, dict):
+        raise FileError("a requirements file is a mapping with name, box, force and requirements", file=file)
+    try:
+        model = RequirementsFile.model_validate(document.data)
+    except ValidationError as error:
+        raise file_error(error, document, file) from error
+
+    def si(value: Any, unit: str, *path: str) -> float:
+        try:
+            return quantity(value, unit)
+        except StiffmapError as error:
+            raise FileError(str(error), file=file, line=document.line(path), key=".".join(path)) from None
+
+    bounds = []
+    known = {m.name for m in all_measures()}
+    for name, given in model.requirements.items():
+        path = ("requirements", name)
+        if name not in known:
+            raise FileError(
+                f"unknown measure '{name}'; known: {', '.join(sorted(known))}",
+                file=file, line=document.line(path), key=".".join(path),
+            )  # fmt: skip
+        unit = get_measure(name).unit
+        sides = {
+            side: None if value is None else si(value, unit, *path, side)
+            for side, value in (("at_least", given.at_least), ("at_most", given.at_most))
+        }
+        bound = Bound(**sides)
+        if bound.at_least is None and bound.at_most is None:
+            raise FileError(
+                "give at_least or at_most", file=file, line=document.line(path), key=".".join(path)
+            )
+        if bound.at_least is not None and bound.at_most is not None and bound.at_least > bound.at_most:
+            raise FileError(
+                f"at_least ({given.at_least}) is above at_most ({given.at_most})",
+                file=file, line=document.line(path), key=".".join(path),
+            )  # fmt: skip
+        bounds.append((name, bound))
+    box = None
+    if model.box is not None:
+        box = (
+            si(model.box.x, "m", "box", "x"),
+            si(model.box.y, "m", "box", "y"),
+            si(model.box.z, "m", "box", "z"),
+        )
+    force = None if model.force is None else si(model.force, "N", "force")
+    return Requirements(model.name, model.title, model.source, box, model.plane, force, tuple(bounds))

@@ -1,0 +1,151 @@
+"""Velocity transmission of §3.1: sphere, cube and hexagon of Figure 1 (docs/measures.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.broadcasting import Floats
+from stiffmap.machine import Machine
+from stiffmap.maps.inputs import plane_axes
+from stiffmap.performance.closing import DriveKinematics, drive_kinematics
+from stiffmap.performance.polygons import Polygon, section_polygon
+from stiffmap.performance.scaling import characteristic_length, drive_values, weighted
+from stiffmap.performance.zonotopes import farthest_vertex, inscribed_sphere, inverse_rows, inverse_rows_limit
+
+
+@dataclass(frozen=True, eq=False)
+class VelocityTransmission:
+    """Transmission factors at poses (...); NaN where the pose failed, and its status."""
+
+    sphere_min: Floats
+    """(...) smallest singular value of the weighted Jacobian."""
+    sphere_max: Floats
+    """(...) largest singular value."""
+    cube_min: Floats
+    """(...) largest speed that the machine reaches in every direction (the other components of its
+    own motion held at zero), each drive within its limit."""
+    cube_max: Floats
+    """(...) largest speed in any direction, each drive within its limit: the farthest vertex."""
+    condition: Floats
+    """(...) sphere_max / sphere_min."""
+    dexterity: Floats
+    """(...) 1 / condition."""
+    manipulability: Floats
+    """(...) product of the singular values."""
+    jacobian: Floats
+    """(..., 6, drives) as it is, SI."""
+    length: float
+    """m, characteristic length: rotations (of the platform and of drives) count as this arc."""
+    limits: Floats
+    """(drives,) limit of each drive's rate that the cube uses."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+
+
+def velocity_transmission(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    length: float | None = None,
+    limits: ArrayLike | str = "unit",
+    part: str = "all",
+    threads: int | None = None,
+) -> VelocityTransmission:
+    """How fast the tool moves per speed of the drives, at poses (..., 3) m.
+
+    Parameters
+    ----------
+    position, rotation
+        (..., 3) m and (..., 3, 3); None: orientation as at home.
+    length
+        Characteristic length, m, where units mix; None: the machine's own. It changes every factor of a
+        machine whose platform or drives turn, and nothing else.
+    limits
+        ``unit``: each drive within one unit of speed, so that all factors compare; ``declared``: the
+        speeds of the machine file, so that the cube's factors are speeds (m/s); or numbers.
+    part
+        ``all`` components of the twist, or its ``translation`` or ``rotation`` alone.
+
+    Raises StiffmapError for bad input, never for a pose.
+    """
+    k = drive_kinematics(machine, position, rotation, threads=threads)
+    return transmission_of(machine, k, length=length, limits=limits, part=part)
+
+
+def transmission_of(
+    machine: Machine,
+    k: DriveKinematics,
+    *,
+    length: float | None = None,
+    limits: ArrayLike | str = "unit",
+    part: str = "all",
+) -> VelocityTransmission:
+    """The same from kinematics that are at hand."""
+    unit = isinstance(limits, str) and limits == "unit"
+    given = np.ones(()) if unit else None if isinstance(limits, str) and limits == "declared" else limits
+    speeds = drive_values(machine, "speed", given, "m/s or rad/s")
+    size = characteristic_length(machine, length)
+    j = weighted(machine, k.jacobian, size, part)
+    driven = j * (speeds if not unit else 1.0)
+    s = singular_values(j)
+    low, high = s[..., -1], s[..., 0]
+    if part == "all":
+        slowest = inverse_rows_limit(j, speeds)
+    else:
+        slowest = inscribed_sphere(driven) if part == "translation" else inverse_rows_limit(j, speeds)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return VelocityTransmission(
+            sphere_min=low, sphere_max=high, cube_min=slowest, cube_max=farthest_vertex(driven),
+            condition=high / low, dexterity=low / high, manipulability=np.prod(s, axis=-1),
+            jacobian=k.jacobian, length=size, limits=speeds, status=k.status, flags=k.flags,
+        )  # fmt: skip
+
+
+def singular_values(j: Floats) -> Floats:
+    """(..., min(rows, drives)) largest first; NaN rows where the matrix is NaN."""
+    out = np.full((*j.shape[:-2], min(j.shape[-2:])), np.nan)
+    ok = np.isfinite(j).all(axis=(-2, -1))
+    if j.shape[-1] <= j.shape[-2]:  # the small symmetric problem is several times quicker
+        gram = np.swapaxes(j[ok], -1, -2) @ j[ok]
+        values = np.linalg.eigvalsh(gram)[..., ::-1]
+        out[ok] = np.sqrt(np.maximum(values, 0.0))
+        poor = ok & (out[..., -1] < 1e-5 * out[..., 0])  # squaring lost their digits
+        if poor.any():
+            out[poor] = np.linalg.svd(j[poor], compute_uv=False)
+        return out
+    out[ok] = np.linalg.svd(j[ok], compute_uv=False)
+    return out
+
+
+def velocity_section(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    plane: str = "xy",
+    limits: ArrayLike | str = "unit",
+    threads: int | None = None,
+) -> Polygon:
+    """Velocities that the TCP reaches in a plane, all other components of its twist zero (Figure 1c).
+
+    The polygon's vertices (..., 2 drives, 2), inner radius (the speed reached in every direction) and
+    outer radius; m/s with ``limits="declared"`` or numbers, else per unit speed of the drives.
+    """
+    k = drive_kinematics(machine, position, rotation, threads=threads)
+    return velocity_polygon(machine, k, plane=plane, limits=limits)
+
+
+def velocity_polygon(
+    machine: Machine, k: DriveKinematics, *, plane: str = "xy", limits: ArrayLike | str = "unit"
+) -> Polygon:
+    """The same from kinematics that are at hand."""
+    unit = isinstance(limits, str) and limits == "unit"
+    given = np.ones(()) if unit else None if isinstance(limits, str) and limits == "declared" else limits
+    speeds = drive_values(machine, "speed", given, "m/s or rad/s")
+    inverse = inverse_rows(weighted(machine, k.jacobian, 1.0, "all"))
+    axes = list(plane_axes(plane))
+    return section_polygon(inverse[..., axes], speeds, k.status)

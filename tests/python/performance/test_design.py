@@ -1,0 +1,125 @@
+"""Design files, the search, resuming, and machines that are written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.design import load_design, optimize
+from stiffmap.design.expressions import evaluate
+from stiffmap.design.judging import judge
+from stiffmap.performance import moving_mass
+
+pytest.importorskip("pymoo")
+
+FILE = """
+name: small
+machine: orthoglide-revised
+variables:
+  carriage: {low: 1, high: 9}
+  diameter: {low: 1.0e-5, high: 2.0e-4}
+derived: {bar: carriage / 2}
+numbers:
+  templates.leg.body[carriage].mass: carriage
+  templates.leg.block[parallelogram].branches.low.body[bar].mass: bar
+  templates.leg.actuator[actuator].compliance: diameter
+objectives: [mass, frequency]
+constraints: {mass: {at_most: 45 kg}}
+search: {population: 8, generations: 3, seed: 4, nodes: 2}
+"""
+
+
+def write(tmp_path: Path, text: str = FILE) -> Path:
+    path = tmp_path / "small.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_numbers_of_the_machine_file_change(tmp_path):
+    design = load_design(write(tmp_path))
+    machine = design.machine(np.array([4.0, 1e-4]))
+    # three legs: carriage, low bar at half of it, high bar as declared; the platform
+    assert moving_mass(machine) == pytest.approx(3 * (4 + 2 + 2.4) + 6)
+
+
+def test_the_same_seed_finds_the_same_set_also_after_a_kill(tmp_path):
+    path = write(tmp_path)
+    whole = optimize(path, folder=tmp_path / "a", processes=1)
+    lines = (tmp_path / "a/evaluations.jsonl").read_text(encoding="utf-8").splitlines()
+    broken = tmp_path / "b"
+    broken.mkdir()
+    # killed in the middle of writing a line of the second generation
+    (broken / "evaluations.jsonl").write_text("\n".join(lines[:11]) + "\n" + lines[11][:20], encoding="utf-8")
+    again = optimize(path, folder=broken, processes=1)
+    np.testing.assert_array_equal(whole.x, again.x)
+    assert whole.history == again.history
+    assert len(lines) == 1 + 8 * 3 and "x" in json.loads(lines[1])
+
+
+def test_no_design_of_the_set_is_bettered_and_all_hold(tmp_path):
+    found = optimize(write(tmp_path), processes=1)
+    f = np.array([j.objectives for j in found.judged])
+    for i in range(len(f)):
+        assert not ((f <= f[i]).all(axis=1) & (f < f[i]).any(axis=1)).any()
+    assert all((j.violations <= 0).all() for j in found.judged)
+    assert found.history[-1][2] >= found.history[0][2]
+
+
+def test_an_infeasible_problem_says_what_is_missed_and_by_how_much(tmp_path):
+    path = write(tmp_path, FILE.replace("at_most: 45 kg", "at_most: 10 kg"))
+    with pytest.raises(
+        sm.StiffmapError, match=r"none of 24 designs .* mass is .* kg where ≤ 10 is required \(.* % off\)"
+    ):
+        optimize(path, processes=1)
+
+
+def test_a_design_that_cannot_be_is_infeasible_not_an_error(tmp_path):
+    design = load_design(write(tmp_path))
+    judged = judge(design, np.array([4.0, -1.0]))
+    assert judged.reason and (judged.violations > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "[mass, frequency]",
+            "[mass, beauty]",
+            r"unknown objective 'beauty' \(number 2\); known: .*frequency",
+        ),
+        ("low: 1, high: 9", "low: 9, high: 1", r"carriage: low \(9\) must be below high \(1\)"),
+        (
+            "body[carriage]",
+            "body[cart]",
+            r"expected one body named 'cart', found 0; here are: .*body\[carriage\]",
+        ),
+        ("carriage / 2", "cariage / 2", r"derived: unknown name 'cariage'; known: .*carriage"),
+        ("at_most: 45 kg", "at_most: 45", r"constraints: the unit is missing"),
+        (
+            "templates.leg.actuator[actuator].compliance",
+            "templates.leg.actuator[actuator].complianse",
+            r"no 'complianse' there",
+        ),
+    ],
+)
+def test_bad_design_files(tmp_path, old, new, words):
+    with pytest.raises(sm.StiffmapError, match=words):
+        load_design(write(tmp_path, FILE.replace(old, new)))
+
+
+def test_expressions_run_arithmetic_only():
+    assert evaluate("-(r + L)/2 + sqrt(4)*pi**0", {"r": 1.0, "L": 3.0}) == 0.0
+    for text in ("__import__('os')", "a.b", "[1]", "1/0", "f(2)"):
+        with pytest.raises(sm.StiffmapError):
+            evaluate(text, {"a": 1.0})
+
+
+def test_the_shipped_redesign_starts_from_a_sound_machine():
+    design = load_design("redesign")
+    low, high = design.bounds
+    judged = judge(design, (low + high) / 2)
+    assert not judged.reason and np.isfinite(judged.violations).all()
