@@ -19,11 +19,11 @@ from stiffmap.files.load import describe_document
 from stiffmap.files.report import file_error
 from stiffmap.files.schema.base import FileModel, Name
 from stiffmap.files.shipped import find
-from stiffmap.files.yaml_text import Document, read
 from stiffmap.machine import Machine
 from stiffmap.performance.quantities import quantity
 from stiffmap.performance.registry import all_measures, get_measure
 from stiffmap.performance.requirements import Bound, Requirements, load_requirements
+from stiffmap.yaml_text import Document, read
 
 
 class VariableModel(FileModel):

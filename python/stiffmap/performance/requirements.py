@@ -12,9 +12,9 @@ from pydantic import Field, ValidationError
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.files.report import file_error
 from stiffmap.files.schema.base import FileModel, Name
-from stiffmap.files.yaml_text import Document, read
 from stiffmap.performance.quantities import quantity
 from stiffmap.performance.registry import all_measures, get_measure
+from stiffmap.yaml_text import Document, read
 
 Written = str | float | int
 
