@@ -85,7 +85,7 @@ def test_strict_makes_warnings_count(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert run(capsys, "check", str(file))[0] == 0
     code, out, _ = run(capsys, "check", str(file), "--strict")
     assert code == 1
-    assert "left is" in out
+    assert "left by" in out
 
 
 def test_unwritable(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
