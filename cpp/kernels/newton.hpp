@@ -272,6 +272,7 @@ struct Newton {
       way.tries += 1.0;
       way.acting = way.factor;
       const M arrived = active & ~whole & ~first & ~distrusted & (norm < in.tolerance);
+      failed |= arrived & ~(e.lowest > pivot_floor);  // stability may change on the way: the reference looks closer
       if (any(arrived)) way.advance(arrived);
       if (any(distrusted)) failed |= corners ? distrusted : way.halve(distrusted);
       if (all(done | failed)) break;

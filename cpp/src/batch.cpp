@@ -132,6 +132,7 @@ bool takes(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const
   const NodePoint& reading = m.points[at(in.read_points.front())];
   if (load.type != LoadType::dead || load.node != m.tip || reading.node != m.tip) return false;
   if (load.offset != reading.offset) return false;
+  if (plan.heavy_spins() && !in.gravity.isZero(0)) return false;
   return in.gravity.isZero(0) || plan.program().exact_weights || !options.stiffness;
 }
 

@@ -31,15 +31,6 @@ Mechanism with_clamp(Mechanism m, const NodePoint& point) {
 
 Vec6 loop_wrench(const State& state, Index loop) { return state.lambda.segment<6>(6 * loop); }
 
-/// With the point held, energy is a minimum where the tangent has as many negative eigenvalues as there
-/// are independent closures (theory K4).
-bool is_minimum(const SaddleSystem& saddle) {
-  MatX A = saddle.matrix();
-  A = (0.5 * (A + A.transpose())).eval();
-  return symmetric_inertia(A, rank_threshold).negative <=
-         (saddle.regular() ? saddle.closures() : saddle.closure_rank());
-}
-
 }  // namespace
 
 Clamp::Clamp(const Mechanism& machine, Index point)
@@ -169,9 +160,11 @@ void Clamp::solve(PoseInput in, const Vec6& displacement, ClampResult& out) {
   linearize(machine_, ws_.problem, ws_.state, ws_.equilibrium.lin);
   ws_.equilibrium.saddle.assemble(machine_, ws_.equilibrium.lin);
   ws_.equilibrium.saddle.factorize();
-  conclude_pose(machine_, in, 0, ws_, out.pose);
+  EquilibriumResult free;
+  free.falling = ws_.equilibrium.stability.falling(ws_.equilibrium.saddle);
+  conclude_pose(machine_, in, free, ws_, out.pose);
   out.flags = out.pose.flags;
-  out.status = is_minimum(eq_.saddle) ? Status::converged : Status::unstable;
+  out.status = eq_.stability.falling(eq_.saddle) == 0 ? Status::converged : Status::unstable;
   leg_stiffness(out);
   hide_undetermined(out);
 }

@@ -7,9 +7,14 @@
 namespace stiffmap {
 namespace {
 
-constexpr double trusted_contraction = 0.2;  // of the second against the first Newton step
+constexpr double trusted_contraction = 0.2;  // of a Newton step against the last one
+constexpr double steady_contraction = 0.1;   // of the second against the first: no further proof is needed
 constexpr double largest_step = 0.2;         // of a trusted load step, relative to the length
-constexpr double shortest_load_step = 1.0 / 1024;
+constexpr double shortest_load_step = 1.0 / 16384;
+constexpr double crossing_step = 1.0 / 1024;  // a change of stability is looked at this closely
+constexpr double trusted_bend = 0.1;          // of a load step: its chord against the tangents at its ends
+constexpr double crossing_bend = 1e-3, bend_noise = 1e-9;
+constexpr int most_load_steps = 400;
 constexpr int patient_steps = 8;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
@@ -92,6 +97,7 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
                EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
   const bool knots = has_knots(m);
   double first = 0, previous = 0;
+  out.contraction = 0;
   p.secant_laws = cold && knots;
   linearize(m, p, state, ws.lin);
   for (int k = 0; k < opt.max_iterations; ++k) {
@@ -111,6 +117,7 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
       linearize(m, p, state, ws.lin);
       continue;
     }
+    if (first > 0 && out.contraction == 0) out.contraction = norm / first;
     if (norm < opt.tolerance) {
       if (knots && !ws.saddle.regular() && leave_gaps(m, p, ws.lin, state)) {
         linearize(m, p, state, ws.lin);
@@ -152,8 +159,100 @@ Outcome equal_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& op
   return Outcome::converged;
 }
 
-Outcome adaptive_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
-                       State& state, EquilibriumResult& out) {
+/// d z / d (share of the load) at the last linearisation, which must be factorised.
+void load_slope(const Mechanism& m, const Problem& p, EquilibriumWorkspace& ws, VecX& slope) {
+  ws.force.setZero();
+  const auto add = [&](Index node, const Vec3& at_point, const Vec3& f, const Vec3& moment) {
+    for (const Index j : m.path[at(node)]) {
+      const Vec6 c = column(m, ws.lin.frames, j, at_point);
+      ws.force[j] += c.head<3>().dot(f) + c.tail<3>().dot(moment);
+    }
+  };
+  for (std::size_t i = 0; i < p.load_points.size(); ++i) {
+    const LoadPoint& load = p.load_points[i];
+    const Vec6 w = p.wrench_at(i, ws.lin.frames.at(load.node).R);
+    add(load.node, ws.lin.frames.point(load.node, load.offset), w.head<3>(), w.tail<3>());
+  }
+  for (const NodeBody& b : m.bodies) add(b.node, ws.lin.frames.point(b.node, b.com), b.mass * p.gravity, Vec3::Zero());
+  for (Index j = 0; j < m.size(); ++j) ws.force[j] *= ws.lin.kind[at(j)] == Kind::fixed ? 0.0 : ws.lin.da[j];
+  ws.saddle.solve(ws.force, ws.no_closure, slope, ws.dlambda);
+}
+
+/// Steps of the load from the unloaded equilibrium, each proven to stay on the path (theory E9).
+class LoadPath {
+ public:
+  LoadPath(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws, State& state,
+           EquilibriumResult& out)
+      : m_(m), p_(p), opt_(opt), ws_(ws), state_(state), out_(out), by_sign_(p.has_dead_moment()) {}
+
+  /// All of the load at once, where Newton's steps shrink so fast that there is no doubt.
+  bool at_once() {
+    p_.factor = 1;
+    if (newton(m_, p_, opt_, true, true, ws_, state_, out_) != Outcome::converged) return false;
+    out_.falling = ws_.stability.falling(ws_.saddle);
+    return out_.falling == 0 && out_.contraction <= steady_contraction;
+  }
+
+  Outcome follow() {
+    out_.flags |= flag::load_stepped;
+    p_.factor = 0;
+    if (newton(m_, p_, opt_, true, false, ws_, state_, out_) != Outcome::converged) return Outcome::failed;
+    note(stable_, ws_.slope_before);
+    double done = 0, step = 0.5;
+    for (int k = 0; k < most_load_steps; ++k) {
+      p_.factor = std::min(1.0, done + step);
+      if (advance(p_.factor - done)) {
+        if (done = p_.factor; done == 1) return Outcome::converged;
+        step *= 2;
+        continue;
+      }
+      state_ = ws_.step_start;
+      step = 0.5 * (p_.factor - done);
+      if (step < shortest_load_step) return Outcome::failed;
+    }
+    return Outcome::failed;
+  }
+
+ private:
+  const Mechanism& m_;
+  Problem& p_;
+  const EquilibriumOptions& opt_;
+  EquilibriumWorkspace& ws_;
+  State& state_;
+  EquilibriumResult& out_;
+  bool by_sign_;       ///< stability by the determinant's sign
+  double stable_ = 0;  ///< at the start of the step: falling directions, or the determinant's sign
+
+  void note(double& stable, VecX& slope) {
+    load_slope(m_, p_, ws_, slope);
+    out_.falling = ws_.stability.falling(ws_.saddle);
+    if (!by_sign_) stable = static_cast<double>(out_.falling);
+    else stable = ws_.saddle.regular() ? ws_.saddle.determinant_sign() : stable_;
+  }
+
+  bool advance(double step) {
+    ws_.step_start = state_;
+    if (newton(m_, p_, opt_, false, true, ws_, state_, out_) != Outcome::converged) return false;
+    double stable = 0;
+    note(stable, ws_.slope);
+    // The chord against the mean of the tangents at both ends: on another branch they disagree.
+    ws_.dz = state_.z - ws_.step_start.z;
+    const double chord = ws_.saddle.step_norm(m_, ws_.dz);
+    ws_.dz -= 0.5 * step * (ws_.slope + ws_.slope_before);
+    const double bend = ws_.saddle.step_norm(m_, ws_.dz);
+    const bool crossed = stable != stable_;
+    if (crossed && step > crossing_step) return false;
+    if (!(bend <= bend_noise + (crossed ? crossing_bend : trusted_bend) * chord)) return false;
+    out_.sign_changes += by_sign_ && crossed;
+    stable_ = stable;
+    ws_.slope_before = ws_.slope;
+    return true;
+  }
+};
+
+/// Laws with corners: the path has corners too, so that only convergence is asked of a step.
+Outcome steps_with_corners(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
+                           State& state, EquilibriumResult& out) {
   double done = 0, step = 1, sign = unloaded_sign(m, p, ws, state);
   while (done < 1) {
     p.factor = std::min(1.0, done + step);
@@ -167,9 +266,19 @@ Outcome adaptive_steps(const Mechanism& m, Problem& p, const EquilibriumOptions&
     out.flags |= flag::load_stepped;
     state = ws.step_start;
     step *= 0.5;
-    if (step < shortest_load_step) return Outcome::failed;
+    if (step < 1.0 / 1024) return Outcome::failed;
   }
+  out.falling = ws.stability.falling(ws.saddle);
   return Outcome::converged;
+}
+
+Outcome adaptive_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
+                       State& state, EquilibriumResult& out) {
+  if (has_knots(m)) return steps_with_corners(m, p, opt, ws, state, out);
+  LoadPath path(m, p, opt, ws, state, out);
+  if (path.at_once()) return Outcome::converged;
+  state = ws.start;
+  return path.follow();
 }
 
 }  // namespace
@@ -191,7 +300,10 @@ EquilibriumWorkspace::EquilibriumWorkspace(const Mechanism& m)
       before(m),
       dz(VecX::Zero(m.size())),
       dlambda(VecX::Zero(m.closures())),
-      force(VecX::Zero(m.size())) {}
+      force(VecX::Zero(m.size())),
+      slope(VecX::Zero(m.size())),
+      slope_before(VecX::Zero(m.size())),
+      no_closure(VecX::Zero(m.closures())) {}
 
 EquilibriumResult solve_equilibrium(const Mechanism& m, Problem& problem, const EquilibriumOptions& options,
                                     EquilibriumWorkspace& ws, State& state) {
@@ -199,6 +311,7 @@ EquilibriumResult solve_equilibrium(const Mechanism& m, Problem& problem, const 
   Outcome how;
   if (options.load_steps > 0) {
     how = equal_steps(m, problem, options, options.load_steps, ws, state, out);
+    out.falling = -1;
   } else {
     ws.start = state;
     how = adaptive_steps(m, problem, options, ws, state, out);
@@ -207,6 +320,7 @@ EquilibriumResult solve_equilibrium(const Mechanism& m, Problem& problem, const 
       out.sign_changes = 0;
       how = equal_steps(m, problem, options, patient_steps, ws, state, out);
       out.flags |= flag::branch_unverified;
+      out.falling = -1;
     }
   }
   problem.factor = 1;
@@ -214,6 +328,7 @@ EquilibriumResult solve_equilibrium(const Mechanism& m, Problem& problem, const 
   linearize(m, problem, state, ws.lin);
   ws.saddle.assemble(m, ws.lin);
   ws.saddle.factorize();
+  if (out.falling < 0) out.falling = ws.stability.falling(ws.saddle);
   out.status = Status::converged;
   return out;
 }

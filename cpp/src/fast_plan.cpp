@@ -5,6 +5,7 @@
 
 #include "plan/chains.hpp"
 #include "plan/closure.hpp"
+#include "stiffmap/spins.hpp"
 
 namespace stiffmap {
 namespace {
@@ -84,6 +85,7 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high) : data
   if (missing_.empty()) missing_ = chains.missing;
   if (data_->program.legs_op < 0) missing_ = "no legs";
   if (!missing_.empty()) return;
+  heavy_spins_ = Spins(m).heavy();
   fill_tables(m, chains, *data_);
   const bool box = (high - low).minCoeff() >= 0 && high.allFinite();
   const bool leg_by_leg = m.task == full_task && only_legs_have_joints(m, *data_) && compile_closure(m, *data_);

@@ -139,20 +139,12 @@ bool Follower::correct(const Constraint& c, LoadedState& y) {
     move(y, step);
     if (norm > tolerance || std::abs(load_unit_ * step[size_]) > 1e-9 * (std::abs(y.load) + load_unit_)) continue;
     evaluate(y);
-    y.unstable = unstable_directions();
+    ws_.equilibrium.saddle.factorize();
+    y.unstable = static_cast<int>(ws_.equilibrium.stability.falling(ws_.equilibrium.saddle));
     // Closure errors that no step mends: the path would need a motion that is rigid.
     return lin.e.size() == 0 || lin.e.cwiseAbs().maxCoeff() < 1e-8 * m_.length;
   }
   return false;
-}
-
-/// Negative eigenvalues of the tangent beyond those of the independent closures (theory K4).
-int Follower::unstable_directions() {
-  SaddleSystem& saddle = ws_.equilibrium.saddle;
-  saddle.factorize();
-  MatX A = 0.5 * (saddle.matrix() + saddle.matrix().transpose());
-  const Index closures = saddle.regular() ? saddle.closures() : saddle.closure_rank();
-  return static_cast<int>(std::max<Index>(0, symmetric_inertia(A, 1e-14).negative - closures));
 }
 
 VecX Follower::tangent(const VecX& row) {

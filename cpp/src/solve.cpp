@@ -196,7 +196,7 @@ void report(const Mechanism& m, const PoseInput& in, const SolveWorkspace& ws, P
   leg_wrenches(m, in, ws, lin.frames.point(first.node, first.offset), out);
   out.x = lin.x;
   for (Index j = 0; j < m.size(); ++j)
-    if (m.coordinates[at(j)].locked && m.coordinates[at(j)].role == Role::passive) {
+    if (m.coordinates[at(j)].locked && m.coordinates[at(j)].role == Role::passive && !ws.spins.decided(j)) {
       out.flags |= flag::free_spin;
       out.indeterminate[at(j)] = true;
     }
@@ -224,7 +224,7 @@ void hide_undetermined(const Mechanism& m, const SolveWorkspace& ws, PoseResult&
 }  // namespace
 
 SolveWorkspace::SolveWorkspace(const Mechanism& m)
-    : closure(m), equilibrium(m), stiffness(m), problem(m), state(m), nominal(m), x(VecX::Zero(m.size())) {}
+    : closure(m), equilibrium(m), stiffness(m), spins(m), problem(m), state(m), nominal(m), x(VecX::Zero(m.size())) {}
 
 ClosureResult prepare_pose(const Mechanism& m, const PoseInput& in, SolveWorkspace& ws) {
   if (in.closed) ws.x = Eigen::Map<const VecX>(in.closed, m.size());
@@ -251,6 +251,7 @@ ClosureResult prepare_pose(const Mechanism& m, const PoseInput& in, SolveWorkspa
 void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& options, SolveWorkspace& ws,
                 PoseResult& out) {
   out.iterations = 0;
+  ws.spins.hold();
   const ClosureResult closure = prepare_pose(m, in, ws);
   reset(m, closure.flags, out);
   if (closure.status != Status::converged) return fail_pose(m, in, Status::unreachable, out);
@@ -258,11 +259,14 @@ void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& opt
     if (b.free && b.spread(ws.x[b.first + 1]) < locked) return fail_pose(m, in, Status::singular, out);
   if (!examine_unloaded(m, in, ws, out)) return;
 
-  const EquilibriumResult eq = solve_equilibrium(m, ws.problem, options.equilibrium, ws.equilibrium, ws.state);
+  EquilibriumResult eq = solve_equilibrium(m, ws.problem, options.equilibrium, ws.equilibrium, ws.state);
+  if (eq.status == Status::converged && ws.spins.loaded(ws.problem) &&
+      !ws.spins.settle(ws.problem, options.equilibrium, ws.equilibrium, ws.state, eq))
+    eq.status = Status::not_converged;
   out.iterations = eq.iterations;
   out.flags |= eq.flags;
   if (eq.status != Status::converged) return fail_pose(m, in, eq.status, out);
-  conclude_pose(m, in, eq.sign_changes, ws, out);
+  conclude_pose(m, in, eq, ws, out);
 }
 
 void fail_pose(const Mechanism& m, const PoseInput& in, Status status, PoseResult& out) {
@@ -276,21 +280,21 @@ void fail_pose(const Mechanism& m, const PoseInput& in, Status status, PoseResul
   out.x.setConstant(m.size(), nan);
 }
 
-void conclude_pose(const Mechanism& m, const PoseInput& in, int sign_changes, SolveWorkspace& ws, PoseResult& out) {
+void conclude_pose(const Mechanism& m, const PoseInput& in, const EquilibriumResult& eq, SolveWorkspace& ws,
+                   PoseResult& out) {
   out.status = Status::converged;
   report(m, in, ws, out);
 
   const NodePoint& p = m.points[at(in.read_points.front())];
   const EquilibriumWorkspace& done = ws.equilibrium;
   out.point = point_stiffness(m, done.lin, done.saddle, p.node, p.offset, ws.stiffness);
+  ws.spins.release(p, ws.equilibrium, out.point);
   out.flags |= out.point.flags;
   if (out.flags & flag::rigid_direction) out.point.compliance = compliance_of(m, p, ws.equilibrium);
-  if (ws.problem.has_dead_moment()) {
-    out.flags |= flag::nonconservative;
-    if (sign_changes > 0) out.status = Status::unstable;
-  } else if (!is_stable(done.saddle, out.point)) {
-    out.status = Status::unstable;
-  }
+  const bool nonconservative = ws.problem.has_dead_moment();
+  if (nonconservative) out.flags |= flag::nonconservative;
+  // No falling direction is enough under any load; a moment may leave some without harm.
+  if (eq.falling > 0 && (!nonconservative || eq.sign_changes > 0)) out.status = Status::unstable;
   if (out.point.free > 0 && out.status == Status::converged) {
     out.status = Status::singular;
     bool gap = false;

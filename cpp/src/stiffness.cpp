@@ -9,17 +9,30 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double pivot_alarm = 1e-5;
+constexpr double safe_pivot = 1e-3;  // of the scaled elastic block
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-/// Splits the unknowns into elastic coordinates theta and free ones q.
-void partition(const SaddleSystem& saddle, StiffnessWorkspace& ws) {
+/// Splits the unknowns into elastic coordinates theta and free ones q. Near a pole of k_theta^F, or if
+/// `whole`, all are left among q: then (K1) is the whole bordered tangent.
+void partition(const SaddleSystem& saddle, bool whole, StiffnessWorkspace& ws) {
   ws.theta.clear();
   ws.q.clear();
-  for (std::size_t j = 0; j < saddle.kind().size(); ++j) {
-    if (saddle.kind()[j] == Kind::elastic) ws.theta.push_back(static_cast<Index>(j));
-    if (saddle.kind()[j] == Kind::free) ws.q.push_back(static_cast<Index>(j));
-  }
+  const auto& kind = saddle.kind();
+  for (std::size_t j = 0; j < kind.size(); ++j)
+    if (kind[j] == Kind::elastic) ws.theta.push_back(static_cast<Index>(j));
+  const Index n = static_cast<Index>(ws.theta.size());
+  const MatX& A = saddle.matrix();
+  ws.sub.resize(n, n);
+  for (Index b = 0; b < n; ++b)
+    for (Index a = 0; a < n; ++a) {
+      const Index i = ws.theta[at(a)], j = ws.theta[at(b)];
+      ws.sub(a, b) = 0.5 * (A(i, j) + A(j, i));
+    }
+  whole = whole || (n > 0 && (!cholesky(ws.sub) || ws.sub.diagonal().cwiseAbs2().minCoeff() < safe_pivot));
+  if (whole) ws.theta.clear();
+  for (std::size_t j = 0; j < kind.size(); ++j)
+    if (kind[j] == Kind::free || (whole && kind[j] == Kind::elastic)) ws.q.push_back(static_cast<Index>(j));
 }
 
 bool well_conditioned(const Lu& lu) {
@@ -58,12 +71,15 @@ StiffnessWorkspace::StiffnessWorkspace(const Mechanism& m) {
   M.setZero(6 + nl + n, 6 + nl + n);
 }
 
-StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, Index node,
-                                const Vec3& offset, StiffnessWorkspace& ws) {
+namespace {
+
+/// Equation (K1); `whole`: with no coordinate eliminated before.
+StiffnessResult bordered(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, Index node,
+                         const Vec3& offset, bool whole, StiffnessWorkspace& ws) {
   StiffnessResult out;
   const Index n = m.size(), nl = m.closures(), rows = 6 + nl;
   const MatX& A = saddle.matrix();
-  partition(saddle, ws);
+  partition(saddle, whole, ws);
   const Index nt = static_cast<Index>(ws.theta.size()), nq = static_cast<Index>(ws.q.size());
 
   // Stacked Jacobian: the point, then the loops; dimensionless like the tangent.
@@ -84,10 +100,13 @@ StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, co
   }
   for (Index b = 0; b < nq; ++b)
     for (Index a = 0; a < nt; ++a) ws.Hq(a, b) = -A(ws.theta[at(a)], ws.q[at(b)]);
-  ws.lu_theta.compute(ws.K);  // k_theta^F = (K_theta - H_thetatheta)^-1
-  ws.B.resize(nt, rows + nq);
-  ws.B << ws.Jt, ws.Hq;
-  ws.lu_theta.solve(ws.B, ws.X);  // k_theta^F [J_theta^T, H_thetaq]
+  ws.X.resize(nt, rows + nq);
+  if (nt > 0) {
+    ws.lu_theta.compute(ws.K);  // k_theta^F = (K_theta - H_thetatheta)^-1
+    ws.B.resize(nt, rows + nq);
+    ws.B << ws.Jt, ws.Hq;
+    ws.lu_theta.solve(ws.B, ws.X);  // k_theta^F [J_theta^T, H_thetaq]
+  }
   ws.M.resize(rows + nq, rows + nq);
   ws.M.topLeftCorner(rows, rows).noalias() = ws.Jt.transpose() * ws.X.leftCols(rows);
   ws.M.topRightCorner(rows, nq).noalias() = ws.Jt.transpose() * ws.X.rightCols(nq);
@@ -102,13 +121,6 @@ StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, co
     for (Index a = 0; a < nq; ++a) ws.M(rows + a, rows + b) -= A(ws.q[at(a)], ws.q[at(b)]);
   }
 
-  // Inertia of the whole tangent from its parts: theory (K4).
-  ws.sub = ws.K;
-  ws.sub = 0.5 * (ws.sub + ws.sub.transpose()).eval();
-  out.elastic_definite = nt == 0 || cholesky(ws.sub);
-  ws.sub = 0.5 * (ws.M.bottomRightCorner(nl + nq, nl + nq) + ws.M.bottomRightCorner(nl + nq, nl + nq).transpose());
-  out.positive = symmetric_inertia(ws.sub, rank_threshold).positive;
-
   // K_F is the block of the inverse that belongs to the point: (25).
   const double soft = std::sqrt(std::max(1.0, ws.M.diagonal().head(rows).cwiseAbs().maxCoeff()));
   ws.M.topRows(rows) /= soft;
@@ -120,6 +132,8 @@ StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, co
   if (well_conditioned(ws.lu)) {
     ws.lu.solve(ws.B, ws.X);
     scaled = ws.X.topRows<6>() / (soft * soft);
+  } else if (nt > 0 && saddle.regular()) {  // a wide range of compliances: nothing is singular but the elimination
+    return bordered(m, lin, saddle, node, offset, true, ws);
   } else {
     Orthogonal cod(ws.M.rows(), ws.M.cols());
     cod.compute(ws.M, rank_threshold);
@@ -139,9 +153,11 @@ StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, co
   return out;
 }
 
-bool is_stable(const SaddleSystem& saddle, const StiffnessResult& k) {
-  const Index closures = saddle.regular() ? saddle.closures() : saddle.closure_rank();
-  return k.elastic_definite && k.positive <= closures;
+}  // namespace
+
+StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, Index node,
+                                const Vec3& offset, StiffnessWorkspace& ws) {
+  return bordered(m, lin, saddle, node, offset, false, ws);
 }
 
 }  // namespace stiffmap

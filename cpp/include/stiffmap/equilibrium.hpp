@@ -2,7 +2,7 @@
 // Loaded equilibrium: Newton on the exact tangent with line search and load continuation.
 #pragma once
 
-#include "stiffmap/saddle.hpp"
+#include "stiffmap/stability.hpp"
 
 namespace stiffmap {
 
@@ -17,7 +17,9 @@ struct EquilibriumResult {
   std::uint32_t flags = 0;
   int iterations = 0;
   double last_step = 0;
-  int sign_changes = 0;  ///< of the tangent's determinant, from one load step to the next
+  double contraction = 0;  ///< of the second Newton step against the first, at the last load
+  int sign_changes = 0;    ///< of the tangent's determinant, from one load step to the next
+  Index falling = 0;       ///< directions in which the energy falls at the answer (theory K4)
 };
 
 /// Scratch of one thread.
@@ -25,8 +27,9 @@ struct EquilibriumWorkspace {
   explicit EquilibriumWorkspace(const Mechanism& m);
   Linearization lin;
   SaddleSystem saddle;
+  Stability stability;
   State start, step_start, before;
-  VecX dz, dlambda, force;
+  VecX dz, dlambda, force, slope, slope_before, no_closure;
 };
 
 /// Right-hand side of the force balance; a stuck coordinate follows its own law alone.
@@ -34,7 +37,7 @@ void force_balance(const Mechanism& m, const Linearization& lin, const SaddleSys
 
 /// From `state` (usually the commanded configuration, all zero) to the equilibrium under `problem`.
 /// On success `ws.lin` and `ws.saddle` hold the linearisation there. Status is converged or
-/// not_converged; stability is judged by `judge_stability` in stiffness.hpp.
+/// not_converged; who asks judges stability by `falling` and `sign_changes`.
 EquilibriumResult solve_equilibrium(const Mechanism& m, Problem& problem, const EquilibriumOptions& options,
                                     EquilibriumWorkspace& ws, State& state);
 

@@ -24,6 +24,8 @@ class FastPlan {
 
   bool available() const { return missing_.empty(); }
   const std::string& missing() const { return missing_; }
+  /// Under gravity the reference path turns the spins (theory C9).
+  bool heavy_spins() const { return heavy_spins_; }
   const Program& program() const;
 
   /// Coordinates of the nearest node of the grid of closure starts and the tip pose there; false
@@ -33,6 +35,7 @@ class FastPlan {
  private:
   std::unique_ptr<FastPlanData> data_;
   std::string missing_;
+  bool heavy_spins_ = false;
 };
 
 }  // namespace stiffmap

@@ -87,7 +87,6 @@ class Follower {
   void evaluate(LoadedState& y);
   void border(const VecX& row);
   VecX residual(const Constraint& c, const LoadedState& y, VecX& row);
-  int unstable_directions();
 };
 
 }  // namespace stiffmap

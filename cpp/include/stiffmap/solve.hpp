@@ -2,9 +2,8 @@
 // One pose from command to answer: closure, equilibrium, stiffness, and what kind of pose it is.
 #pragma once
 
-#include "stiffmap/equilibrium.hpp"
 #include "stiffmap/home.hpp"
-#include "stiffmap/stiffness.hpp"
+#include "stiffmap/spins.hpp"
 
 namespace stiffmap {
 
@@ -41,6 +40,7 @@ struct SolveWorkspace {
   ClosureWorkspace closure;
   EquilibriumWorkspace equilibrium;
   StiffnessWorkspace stiffness;
+  Spins spins;
   Problem problem;
   State state;
   Frames nominal;
@@ -56,9 +56,10 @@ void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& opt
 /// and the unloaded state.
 ClosureResult prepare_pose(const Mechanism& m, const PoseInput& in, SolveWorkspace& ws);
 
-/// Everything reported of an equilibrium whose state and linearisation are in `ws`; `sign_changes` of
-/// the tangent's determinant on the way to it.
-void conclude_pose(const Mechanism& m, const PoseInput& in, int sign_changes, SolveWorkspace& ws, PoseResult& out);
+/// Everything reported of an equilibrium whose state and linearisation are in
+/// `ws`.
+void conclude_pose(const Mechanism& m, const PoseInput& in, const EquilibriumResult& eq, SolveWorkspace& ws,
+                   PoseResult& out);
 
 /// NaN and the status.
 void fail_pose(const Mechanism& m, const PoseInput& in, Status status, PoseResult& out);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Stiffness of a point at an equilibrium: equation (25) of the paper, theory (K1), and what rank and
-// inertia say of it.
+// Stiffness of a point at an equilibrium: equation (25) of the paper, theory (K1), and what its rank says.
 #pragma once
 
 #include "stiffmap/saddle.hpp"
@@ -8,11 +7,9 @@
 namespace stiffmap {
 
 struct StiffnessResult {
-  Mat6 stiffness, compliance;    ///< compliance is NaN where a twist is free
-  Mat6 free_twists;              ///< columns; NaN beyond the last
-  int free = 0;                  ///< number of free twists
-  Index positive = 0;            ///< positive eigenvalues of the reduced closure block, for stability
-  bool elastic_definite = true;  ///< K_theta - H_thetatheta is positive definite
+  Mat6 stiffness, compliance;  ///< compliance is NaN where a twist is free
+  Mat6 free_twists;            ///< columns; NaN beyond the last
+  int free = 0;                ///< number of free twists
   std::uint32_t flags = 0;
 };
 
@@ -28,8 +25,5 @@ struct StiffnessWorkspace {
 /// and a small extra twist, base axes.
 StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, Index node,
                                 const Vec3& offset, StiffnessWorkspace& ws);
-
-/// False where the energy of a conservatively loaded equilibrium is not a minimum (theory K4).
-bool is_stable(const SaddleSystem& saddle, const StiffnessResult& k);
 
 }  // namespace stiffmap

@@ -25,9 +25,11 @@ class Comparison:
     compliance: float
     residual: float
     truth: str
-    """Of the minimiser: found, ends, singular."""
+    """Of the minimiser: found, ends, given up, singular."""
     stable: bool
-    """Of the minimiser: a minimum of the energy."""
+    """Of the minimiser: no eigenvalue of the reduced Hessian is negative."""
+    crossed: bool
+    """Of the minimiser: the path went through a bifurcation."""
     flags: sm.Flag
 
     @property
@@ -68,5 +70,7 @@ def compare_machine(
         rotation = np.abs(s.displacement[3:] - turned).max() / np.abs(turned).max()
         found = (float(translation), float(rotation), float(gap.max()), truth.residual)
         flags = sm.Flag(int(s.flags))
-        out.append(Comparison(sm.Status(int(s.status)), *found, truth.kind, truth.stable, flags))
+        out.append(
+            Comparison(sm.Status(int(s.status)), *found, truth.kind, truth.stable, truth.crossed, flags)
+        )
     return out

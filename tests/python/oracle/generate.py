@@ -1,7 +1,10 @@
-"""Random machines that close at home: legs, nested blocks, joints of every kind, springs, laws, bodies,
-points, errors, preload; and random loads on them."""
+"""Random machines that close at home: legs, nested blocks, joints of every kind and chart, elastic and free,
+springs, laws, bodies, points, errors, preload; crooked hexapods; and random loads on them, far beyond what
+some of them bear."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -35,13 +38,55 @@ class Generator:
         self.rng = np.random.default_rng(seed)
 
     def machine(self) -> MachineDescription:
-        """Two or three legs, all ending in one random platform pose."""
+        """A crooked hexapod, or two or three legs that all end in one random platform pose."""
+        if self.rng.random() < 0.3:
+            return self._hexapod()
         home = self._pose(0.6)
         legs = tuple(Leg(f"leg{i}", self._leg(home)) for i in range(self.rng.integers(2, 4)))
         platform: tuple[Element, ...] = (Body("platform", float(self.rng.uniform(1, 8)), self._vector(0.1)),)
         if self.rng.random() < 0.4:
             platform = (self._spring("tool"), *platform)
         return MachineDescription("random", legs, platform=platform, home=home)
+
+    def _hexapod(self) -> MachineDescription:
+        """Six legs universal - prismatic drive - spherical between uneven circles, every axis askew."""
+        tilt = Rotation.from_rotvec(self.rng.uniform(-0.3, 0.3, 3)).as_matrix()
+        home = Pose.of((*self.rng.uniform(-0.1, 0.1, 2), self.rng.uniform(0.5, 0.8)), tilt)
+        legs = []
+        for i in range(6):
+            pair = 2 * np.pi * (i // 2) / 3
+            low = pair + (0.25 if i % 2 else -0.25) + self.rng.normal(scale=0.1)
+            high = pair + (0.8 if i % 2 else -0.8) + self.rng.normal(scale=0.1)
+            foot = self.rng.uniform(0.4, 0.6) * np.array([np.cos(low), np.sin(low), 0.0])
+            head = self.rng.uniform(0.2, 0.3) * np.array([np.cos(high), np.sin(high), 0.0])
+            legs.append(Leg(f"leg{i}", self._strut(home, foot, np.array(home.p) + np.array(home.r) @ head)))
+        platform = (Body("platform", float(self.rng.uniform(1, 8)), self._vector(0.1)),)
+        return MachineDescription("random", tuple(legs), platform=platform, home=home)
+
+    def _strut(self, home: Pose, foot: np.ndarray, head: np.ndarray) -> tuple[Element, ...]:
+        x = (head - foot) / np.linalg.norm(head - foot)
+        y = np.cross(self.rng.normal(size=3), x)
+        y /= np.linalg.norm(y)
+        frame = np.column_stack([x, y, np.cross(x, y)])
+        crook = Rotation.from_rotvec(self.rng.uniform(-0.2, 0.2, 3)).as_matrix()
+        out: list[Element] = [Offset("foot", Pose.of(foot, frame @ crook))]
+        out += [
+            self._passive("cardan", "universal", ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))),
+            self._offset("crook"),
+        ]
+        along = np.array(end_of(out).r).T @ x
+        law = Law(float(self.rng.uniform(2e6, 2e7)))
+        axis = (float(along[0]), float(along[1]), float(along[2]))
+        out += [Joint("drive", "prismatic", (axis,), (0.2,), actuated=True, law=law), self._spring("rod")]
+        out += (
+            [Body("rod", float(self.rng.uniform(0.5, 4)), self._vector(0.1))]
+            if self.rng.random() < 0.5
+            else []
+        )
+        turn = np.array(end_of(out).r).T @ Rotation.random(random_state=self.rng).as_matrix()
+        out.append(Offset("reach", end_of(out).inverse() @ Pose.of(head, np.array(end_of(out).r) @ turn)))
+        out.append(self._joint("ball", "spherical"))
+        return (*out, Offset("attach", end_of(out).inverse() @ home))
 
     def _vector(self, size: float) -> tuple[float, float, float]:
         x, y, z = self.rng.uniform(-size, size, 3)
@@ -77,15 +122,32 @@ class Generator:
         moment = moment if self.rng.random() < 1 / 3 else np.zeros(3)
         gravity = GRAVITY if self.rng.random() < 0.5 else np.zeros(3)
         named = [n for n in point_names(description) if self.rng.random() < 0.7]
-        return Loads(force, moment, gravity, {n: self.rng.normal(size=3) * 100 for n in named})
+        factor = float(self.rng.choice([1.0, 1.0, 10.0, 100.0]))
+        at = {n: factor * self.rng.normal(size=3) * 100 for n in named}
+        return Loads(factor * force, factor * moment, gravity, at)
 
     def _joint(self, name: str, kind: str) -> Joint:
         n = AXES[kind]
         axes = [np.array(self._axis()) for _ in range(n)]
-        if n > 1:  # consecutive axes at right angles, the third away from the first
+        home = self.rng.uniform(-0.4, 0.4, n)
+        if n > 1:  # consecutive axes at right angles; the third is another one, or the first again
             axes = list(Rotation.random(random_state=self.rng).as_matrix()[:n])
-        home = tuple(float(v) for v in self.rng.uniform(-0.4, 0.4, n))
-        return Joint(name, kind, tuple((float(a[0]), float(a[1]), float(a[2])) for a in axes), home)
+        if n == 3 and self.rng.random() < 0.5:
+            axes[2] = axes[0]
+            home[1] = self.rng.choice([-1, 1]) * self.rng.uniform(0.4, 1.4)
+        return self._passive(name, kind, tuple((float(a[0]), float(a[1]), float(a[2])) for a in axes), home)
+
+    def _passive(
+        self, name: str, kind: str, axes: tuple[tuple[float, float, float], ...], home: Any = None
+    ) -> Joint:
+        """Free, or elastic about (along) each of its axes."""
+        at = self.rng.uniform(-0.4, 0.4, len(axes)) if home is None else home
+        law = None
+        if self.rng.random() < 0.35:
+            law = Law(
+                float(10 ** self.rng.uniform(4, 7) if kind == "prismatic" else 10 ** self.rng.uniform(1, 4))
+            )
+        return Joint(name, kind, axes, tuple(float(v) for v in at), law=law)
 
     def _joints(self, freedoms: int) -> list[str]:
         """Kinds of passive joints with so many freedoms together."""

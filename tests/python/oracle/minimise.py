@@ -1,20 +1,22 @@
-"""Stationary energy under closure: Newton on the Lagrangian, all derivatives by autograd."""
+"""Stationary energy under closure along a growing load: Newton on the Lagrangian, exact derivatives. A load
+step is accepted only if Newton's steps shrink fast, if no eigenvalue of the reduced Hessian changes its
+sign unless the step is tiny, and if the chord fits the path's tangents at both ends."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-import autograd.numpy as anp
 import numpy as np
-from autograd import grad
 
 from stiffmap.description import MachineDescription
 
-from .energy import Loads, gaps, whole
+from .energy import Frame, Loads, gap, whole
 
 ITERATIONS = 40
-SHORTEST = 1 / 512  # step of the load
+SHORTEST = 1 / 8192  # step of the load
+CROSSING = 1 / 1024  # step across a change of stability
+MOST = 80  # load steps tried; beyond, the path is given up as too crooked
+SINGULAR = 1e-9  # smallest singular value of the scaled system; that of a sound machine is near 0.1
 
 
 @dataclass(frozen=True)
@@ -24,18 +26,62 @@ class Answer:
     compliance: np.ndarray
     """(6, 3): twist of the tip per unit of force."""
     residual: float
-    stable: bool
-    """The energy is a minimum among the configurations that close."""
+    falling: int
+    """Negative eigenvalues of the energy's Hessian over the motions that keep the loops closed."""
+    lowest: float
+    """The lowest of them over the largest, coordinates scaled to unit stiffness."""
+    crossed: bool
+    """The path went through a change of stability."""
     kind: str = "found"
-    """Or ``ends``: no equilibrium further along the path of loads; ``singular``: free without load."""
+    """Or ``ends``: no equilibrium further along the path of loads; ``given up``: too many steps; ``singular``:
+    free without load."""
 
-
-SINGULAR = 1e-9  # smallest singular value of the scaled system; that of a sound machine is near 0.1
+    @property
+    def stable(self) -> bool:
+        return self.falling == 0
 
 
 def nothing(kind: str) -> Answer:
     """No equilibrium."""
-    return Answer(np.full(3, np.nan), np.eye(3), np.full((6, 3), np.nan), np.nan, False, kind)
+    return Answer(np.full(3, np.nan), np.eye(3), np.full((6, 3), np.nan), np.nan, 0, np.nan, False, kind)
+
+
+@dataclass(frozen=True)
+class System:
+    """All derivatives at one configuration."""
+
+    slope: np.ndarray
+    curve: np.ndarray
+    closures: np.ndarray
+    jacobian: np.ndarray
+    tip: Frame
+    matrix: np.ndarray
+    scale: np.ndarray
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        s = self.scale.reshape(-1, *[1] * (right.ndim - 1))
+        return np.asarray(s * np.linalg.solve(self.scale[:, None] * self.matrix * self.scale, s * right))
+
+    def reduced(self) -> np.ndarray:
+        """Eigenvalues, rising, of the Hessian over the closed motions, coordinates scaled to unit stiffness."""
+        n = len(self.slope)
+        s = self.scale[:n]
+        a, h = self.jacobian * s, s[:, None] * self.curve * s
+        values, vt = np.linalg.svd(a)[1:] if len(a) else (np.zeros(0), np.eye(n))
+        rank = int((values > 1e-9 * values.max(initial=1e-300)).sum())
+        z = vt[rank:]
+        return np.asarray(np.linalg.eigvalsh(z @ h @ z.T))
+
+
+@dataclass
+class Point:
+    """An equilibrium of the path."""
+
+    x: np.ndarray
+    multipliers: np.ndarray
+    slope: np.ndarray
+    """d x / d share of the load."""
+    falling: int
 
 
 class Oracle:
@@ -43,75 +89,89 @@ class Oracle:
 
     def __init__(self, description: MachineDescription, loads: Loads) -> None:
         self.d, self.loads = description, loads
-        walk = whole(description, np.zeros((1, 10_000)), loads)[2]
-        self.size, self.closures = walk.used, 6 * len(walk.loops)
+        self.size, self.closures = self._count()
 
-    def _outputs(self, x: Any) -> Any:
-        """Closures, tip, rotation (batch, m + 12): everything whose Jacobian is wanted."""
-        p, r, walk = whole(self.d, x, self.loads)
-        return anp.concatenate([gaps(walk), p, anp.reshape(r, (len(x), 9))], axis=1)
+    def _count(self) -> tuple[int, int]:
+        size = 1
+        while True:
+            try:
+                walk = whole(self.d, np.zeros(size), self.loads)[1]
+                return walk.used, 6 * len(walk.loops)
+            except IndexError:
+                size *= 2
 
-    def _jacobian(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Outputs and their Jacobian, one row of the batch per output."""
-        count = self.closures + 12
-        rows = grad(lambda y: anp.sum(self._outputs(y) * np.eye(count)))(np.tile(x, (count, 1)))
-        return self._outputs(x[None])[0], rows
+    def _system(self, x: np.ndarray, multipliers: np.ndarray, loads: Loads) -> System:
+        n = self.size
+        tip, walk = whole(self.d, x, loads)
+        slope, curve = walk.energy.slope, walk.energy.curve
+        stiffness = np.maximum(np.diag(curve).copy(), 1.0)
+        parts = [gap(a, b, m, n) for (a, b), m in zip(walk.loops, multipliers.reshape(-1, 6), strict=True)]
+        values = np.concatenate([np.zeros(0), *[v for v, _, _ in parts]])
+        a = np.vstack([np.zeros((0, n)), *[rows for _, rows, _ in parts]])
+        curve = sum((c for _, _, c in parts), start=curve)
+        matrix = np.block([[curve, a.T], [a, np.zeros((len(a), len(a)))]])
+        scale = np.concatenate(
+            [1 / np.sqrt(np.maximum(stiffness, np.abs(np.diag(curve)))), np.full(len(a), 1e3)]
+        )
+        return System(slope + multipliers @ a, curve, values, a, tip, matrix, scale)
 
-    def _curve(self, x: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient and Hessian of the Lagrangian in x, one row of the batch per unit vector."""
+    def _load(self, x: np.ndarray) -> np.ndarray:
+        """Gradient of the loads' potential at their full size."""
+        return np.asarray(
+            whole(self.d, x, self.loads)[1].energy.slope
+            - whole(self.d, x, self.loads.times(0.0))[1].energy.slope
+        )
 
-        def lagrangian(y: Any) -> Any:
-            _, _, walk = whole(self.d, y, self.loads)
-            return anp.sum(walk.energy) + anp.sum(anp.dot(gaps(walk), multipliers))
-
-        many = np.tile(x, (self.size, 1))
-        slope = grad(lagrangian)
-        hessian = grad(lambda y: anp.sum(slope(y) * np.eye(self.size)))(many)
-        return slope(x[None])[0], (hessian + hessian.T) / 2
-
-    def _system(self, x: np.ndarray, multipliers: np.ndarray) -> tuple[Any, ...]:
-        slope, curve = self._curve(x, multipliers)
-        values, jacobian = self._jacobian(x)
-        a, n = jacobian[: self.closures], self.closures
-        system = np.block([[curve, a.T], [a, np.zeros((n, n))]])
-        scale = np.sqrt(1 / np.maximum(np.abs(np.diag(system)), 1.0))
-        scale[self.size :] = 1e3
-        return slope, curve, values, jacobian, system, scale
+    def _point(self, x: np.ndarray, multipliers: np.ndarray, share: float) -> Point:
+        system = self._system(x, multipliers, self.loads.times(share))
+        right = np.concatenate([-self._load(x), np.zeros(self.closures)])
+        return Point(x, multipliers, system.solve(right)[: self.size], int((system.reduced() < 0).sum()))
 
     def solve(self) -> Answer:
-        """Along the path from no load to all of it; a Newton solve whose steps do not shrink is not trusted
-        as its continuation, and the step of the load is halved."""
-        full, done, share = self.loads, 0.0, 1.0
-        if self._free():
+        """Along the path from no load to all of it."""
+        zero = np.zeros(self.size), np.zeros(self.closures)
+        system = self._system(*zero, self.loads.times(0.0))
+        if np.linalg.svd(system.scale[:, None] * system.matrix * system.scale)[1][-1] < SINGULAR:
             return nothing("singular")
-        start = self._newton(np.zeros(self.size), np.zeros(self.closures), 0.0, full, ITERATIONS)
-        while done < 1 and share > SHORTEST and start is not None:
+        start = self._newton(*zero, 0.0, ITERATIONS)
+        if start is None:
+            return nothing("ends")
+        at, done, share, crossed = self._point(*start, 0.0), 0.0, 1.0, False
+        for _ in range(MOST):
+            if done == 1:
+                return self._answer(at, crossed)
             share = min(share, 1 - done)
-            found = self._newton(*start, done + share, full)
-            if found is None:
+            step = self._step(at, done, share)
+            if step is None:
                 share /= 2
+                if share < SHORTEST:
+                    return nothing("ends")
             else:
-                start, done, share = found, done + share, 2 * share
-        self.loads = full
-        return nothing("ends") if start is None or done < 1 else self._answer(*start)
+                crossed |= step.falling != at.falling
+                at, done, share = step, min(1.0, done + share), 2 * share
+        return nothing("given up")
 
-    def _free(self) -> bool:
-        """Something moves without load."""
-        self.loads, full = self.loads.times(0.0), self.loads
-        *_, system, scale = self._system(np.zeros(self.size), np.zeros(self.closures))
-        self.loads = full
-        return bool(np.linalg.svd(scale[:, None] * system * scale)[1][-1] < SINGULAR)
+    def _step(self, at: Point, done: float, share: float) -> Point | None:
+        # the tangent predicts, so that Newton starts from the path's own direction
+        found = self._newton(at.x + share * at.slope, at.multipliers, done + share)
+        if found is None:
+            return None
+        to = self._point(*found, done + share)
+        chord = to.x - at.x
+        bend = np.abs(chord - share * (at.slope + to.slope) / 2).max()
+        crossing = to.falling != at.falling
+        if crossing and share > CROSSING:
+            return None
+        return to if bend <= 1e-9 + (1e-3 if crossing else 0.1) * np.abs(chord).max() else None
 
     def _newton(
-        self, x: np.ndarray, multipliers: np.ndarray, share: float, full: Loads, free: int = 0
+        self, x: np.ndarray, multipliers: np.ndarray, share: float, free: int = 0
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Solution under a share of the loads; the first `free` steps may be of any length."""
-        self.loads = full.times(share)
-        last = np.inf
+        loads, last = self.loads.times(share), np.inf
         for k in range(ITERATIONS):
-            slope, _, values, _, system, scale = self._system(x, multipliers)
-            right = -np.concatenate([slope, values[: self.closures]])
-            step = scale * np.linalg.solve(scale[:, None] * system * scale, scale * right)
+            system = self._system(x, multipliers, loads)
+            step = system.solve(-np.concatenate([system.slope, system.closures]))
             x, multipliers = x + step[: self.size], multipliers + step[self.size :]
             size = np.abs(step[: self.size]).max()
             if size < 1e-13 or (size < 1e-11 and size > last / 4):
@@ -121,15 +181,17 @@ class Oracle:
             last = size
         return None
 
-    def _answer(self, x: np.ndarray, multipliers: np.ndarray) -> Answer:
-        slope, curve, values, jacobian, system, scale = self._system(x, multipliers)
-        a, jp, jr = np.split(jacobian, [self.closures, self.closures + 3])
-        p, r = values[self.closures : self.closures + 3], values[self.closures + 3 :].reshape(3, 3)
-        w = np.einsum("ikn,jk->ijn", jr.reshape(3, 3, -1), r)  # dR R^T
-        spin = 0.5 * np.stack([w[2, 1] - w[1, 2], w[0, 2] - w[2, 0], w[1, 0] - w[0, 1]])
-        right = np.vstack([jp.T, np.zeros((self.closures, 3))])
-        moved = scale[:, None] * np.linalg.solve(scale[:, None] * system * scale, scale[:, None] * right)
-        left = np.abs(slope).max() + np.abs(values[: self.closures]).max(initial=0)
-        motions = np.linalg.svd(a)[2][self.closures :] if self.closures else np.eye(self.size)
-        lowest = np.linalg.eigvalsh(motions @ curve @ motions.T).min()
-        return Answer(p, r, np.vstack([jp, spin]) @ moved[: self.size], float(left), bool(lowest > 0))
+    def _answer(self, at: Point, crossed: bool) -> Answer:
+        system = self._system(at.x, at.multipliers, self.loads)
+        tip, n = system.tip, self.size
+        jp, jw = np.zeros((3, n)), np.zeros((3, n))
+        jp[:, tip.of] = tip.d[:, :3, 3].T
+        w = np.einsum("kab,cb->kac", tip.d[:, :3, :3], tip.t[:3, :3])  # dR R^T
+        jw[:, tip.of] = np.stack([w[:, 2, 1], w[:, 0, 2], w[:, 1, 0]])
+        moved = system.solve(np.vstack([jp.T, np.zeros((self.closures, 3))]))[:n]
+        left = np.abs(system.slope).max() + np.abs(system.closures).max(initial=0)
+        values = system.reduced()
+        return Answer(
+            tip.t[:3, 3], tip.t[:3, :3], np.vstack([jp, jw]) @ moved, float(left), int((values < 0).sum()),
+            float(values[0] / values[-1]), crossed,
+        )  # fmt: skip

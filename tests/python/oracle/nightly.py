@@ -42,12 +42,18 @@ def main() -> int:
 
 
 def agrees(c: Comparison) -> bool:
-    """Same equilibrium, same compliance, same word on stability; singular for both; or the path of loads
-    ends for both (the core may find an equilibrium beyond the end, if it says so)."""
+    """Same equilibrium, same compliance, and a status that agrees with the eigenvalues of the reduced Hessian;
+    singular for both; or the path of loads ends for both (the core may find an equilibrium beyond the end, or
+    on another branch, if it says so). Nothing is asked where the oracle gave up."""
+    if c.truth == "given up":
+        return True
     if c.truth == "singular":
         return c.status == Status.SINGULAR
+    unverified = c.status == Status.NOT_CONVERGED or bool(c.flags & Flag.BRANCH_UNVERIFIED)
     if c.truth == "ends":
-        return c.status == Status.NOT_CONVERGED or bool(c.flags & Flag.BRANCH_UNVERIFIED)
+        return unverified
+    if c.crossed and unverified:
+        return True  # beyond a bifurcation: refused, or flagged
     found = c.status in (Status.CONVERGED, Status.UNSTABLE)
     return found and c.gap < LIMIT and c.stable == (c.status == Status.CONVERGED)
 

@@ -20,9 +20,11 @@ RANKS = (
     ("mechanism",),
     ("kinematics",),
     ("closure", "linearization"),
-    ("saddle", "fast_plan", "home", "motion"),
+    ("saddle", "home", "motion"),
+    ("stability",),
     ("equilibrium", "stiffness", "dynamics"),
-    ("solve",),
+    ("spins",),
+    ("solve", "fast_plan"),
     ("batch", "clamp", "follower", "modes"),
     ("path",),
 )

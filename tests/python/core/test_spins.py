@@ -1,0 +1,79 @@
+"""A rod on two ball joints whose centre of mass is off its axis hangs like a pendulum (theory C9)."""
+
+from __future__ import annotations
+
+import builders as b
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import stiffmap as sm
+from stiffmap.description import Body, Joint, Leg, MachineDescription, Offset, Pose
+
+SPAN, MASS, OFF, G = 0.4, 2.0, 0.05, 9.81
+GRAVITY = (0.0, 0.0, -G)
+BALL = (b.AXES["x"], b.AXES["y"], b.AXES["z"])
+
+
+def machine(angle: float, first: str = "xyz", rod: np.ndarray | None = None) -> sm.Machine:
+    """A platform on a spring at the end of a rod along `rod` (x without), the rod's centre of mass turned by
+    `angle` about it; `first`: the sequence of axes of the ball at the base."""
+    r = np.eye(3) if rod is None else rod
+    end = r @ (SPAN, 0, 0)
+    axes = tuple(b.AXES[a] for a in first)
+    swing = (
+        Offset("turn", Pose.of((0, 0, 0), r)),
+        Joint("low", "spherical", axes, home=(0.0, 0.0, 0.0)),
+        Body("rod", MASS, (SPAN / 2, OFF * np.cos(angle), OFF * np.sin(angle))),
+        b.shift("length", (SPAN, 0, 0)),
+        b.stiff("yield", np.diag([1e6, 1e6, 1e6, 1e4, 1e4, 1e4])),
+        Joint("high", "spherical", BALL, home=(0.0, 0.0, 0.0)),
+        Offset("back", Pose.of((0, 0, 0), r.T)),
+    )
+    hold = (b.shift("to", end), b.stiff("hold", np.diag([1e6, 1e6, 1e6, 1e4, 1e4, 1e4])))
+    legs = (Leg("hold", hold), Leg("swing", swing))
+    return sm.Machine(MachineDescription("rod", legs, home=Pose.of(end)))
+
+
+@pytest.mark.parametrize("method", ["reference", "fast"])
+@pytest.mark.parametrize("angle", [-2.5, -1.0, 0.0, 0.7, 1.57, 3.0])
+def test_the_centre_of_mass_hangs_below_a_level_rod(angle: float, method: str) -> None:
+    s = machine(angle).solve((SPAN, 0, 0), gravity=GRAVITY, method=method)
+    assert s.status == sm.Status.CONVERGED
+    # half of the weight at either end, nothing across, no moment about the rod
+    assert s.displacement[2] == pytest.approx(-MASS * G / 2 / 1e6, rel=1e-3)
+    assert abs(s.displacement[1]) < 1e-3 * abs(s.displacement[2])
+    assert abs(s.displacement[3]) * 1e4 < 1e-6 * MASS * G * OFF
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_answer_does_not_depend_on_the_turn_that_was_declared(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    r = Rotation.random(random_state=rng).as_matrix()
+    at, force = r @ (SPAN, 0, 0), [*rng.normal(size=3) * 50, 0, 0, 0]
+    answers = [
+        machine(a, first, r).solve(at, force, gravity=GRAVITY)
+        for a, first in ((0, "xyz"), (2.1, "yzx"), (-1.3, "zyx"))
+    ]
+    for s in answers[1:]:
+        assert s.status == answers[0].status == sm.Status.CONVERGED
+        scale = np.abs(answers[0].displacement).max()
+        np.testing.assert_allclose(s.displacement, answers[0].displacement, atol=1e-9 * scale)
+        scale = np.sqrt(np.outer(*[np.diag(answers[0].compliance)] * 2))
+        np.testing.assert_allclose(s.compliance / scale, answers[0].compliance / scale, atol=1e-8)
+
+
+def test_compliance_is_the_derivative_with_the_rod_free_to_turn() -> None:
+    r = Rotation.from_rotvec((0.3, -0.5, 0.2)).as_matrix()
+    m, at, base = machine(0.4, "xyz", r), r @ (SPAN, 0, 0), np.array([30.0, -20, 40, 0, 0, 0])
+    s = m.solve(at, base, gravity=GRAVITY)
+    for i in range(3):
+        step = np.eye(6)[i] * 0.5
+        both = m.solve(at, np.stack([base + step, base - step]), gravity=GRAVITY).displacement
+        np.testing.assert_allclose((both[0] - both[1]) / 1.0, s.compliance[:, i], rtol=1e-5, atol=1e-12)
+
+
+def test_a_centred_rod_stays_indifferent() -> None:
+    m = sm.load_machine("linear-delta")
+    s = m.solve((0, 0, 0.3), gravity=GRAVITY)
+    assert s.status == sm.Status.CONVERGED and s.flags & sm.Flag.FREE_SPIN
