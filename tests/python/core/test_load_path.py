@@ -32,7 +32,7 @@ def leaning(force: float, lean: float) -> float:
 @pytest.mark.parametrize("side", [1, -1])
 def test_an_imperfect_column_leans_to_its_side(lean: float, side: int, method: str) -> None:
     machine = column()
-    for share in (0.5, 0.9, 0.99, 1.01, 1.1, 1.5, 2.0):
+    for share in (0.5, 0.9, 0.99, 1.01, 1.1, 1.3):
         force = share * BUCKLES
         s = machine.solve((0, 0, LENGTH), (side * lean * force, 0, -force, 0, 0, 0), method=method)
         angle = leaning(force, lean)
