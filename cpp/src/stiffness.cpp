@@ -13,9 +13,9 @@ constexpr double safe_pivot = 1e-3;  // of the scaled elastic block
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-/// Splits the unknowns into elastic coordinates theta and free ones q. Near a pole of k_theta^F, or if
-/// `whole`, all are left among q: then (K1) is the whole bordered tangent.
-void partition(const SaddleSystem& saddle, bool whole, StiffnessWorkspace& ws) {
+/// Splits the unknowns into elastic coordinates theta and free ones q. Near a pole of k_theta^F all are
+/// left among q: then (K1) is the whole bordered tangent.
+void partition(const SaddleSystem& saddle, StiffnessWorkspace& ws) {
   ws.theta.clear();
   ws.q.clear();
   const auto& kind = saddle.kind();
@@ -29,7 +29,7 @@ void partition(const SaddleSystem& saddle, bool whole, StiffnessWorkspace& ws) {
       const Index i = ws.theta[at(a)], j = ws.theta[at(b)];
       ws.sub(a, b) = 0.5 * (A(i, j) + A(j, i));
     }
-  whole = whole || (n > 0 && (!cholesky(ws.sub) || ws.sub.diagonal().cwiseAbs2().minCoeff() < safe_pivot));
+  const bool whole = n > 0 && (!cholesky(ws.sub) || ws.sub.diagonal().cwiseAbs2().minCoeff() < safe_pivot);
   if (whole) ws.theta.clear();
   for (std::size_t j = 0; j < kind.size(); ++j)
     if (kind[j] == Kind::free || (whole && kind[j] == Kind::elastic)) ws.q.push_back(static_cast<Index>(j));
@@ -71,15 +71,12 @@ StiffnessWorkspace::StiffnessWorkspace(const Mechanism& m) {
   M.setZero(6 + nl + n, 6 + nl + n);
 }
 
-namespace {
-
-/// Equation (K1); `whole`: with no coordinate eliminated before.
-StiffnessResult bordered(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, Index node,
-                         const Vec3& offset, bool whole, StiffnessWorkspace& ws) {
+StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, Index node,
+                                const Vec3& offset, StiffnessWorkspace& ws) {
   StiffnessResult out;
   const Index n = m.size(), nl = m.closures(), rows = 6 + nl;
   const MatX& A = saddle.matrix();
-  partition(saddle, whole, ws);
+  partition(saddle, ws);
   const Index nt = static_cast<Index>(ws.theta.size()), nq = static_cast<Index>(ws.q.size());
 
   // Stacked Jacobian: the point, then the loops; dimensionless like the tangent.
@@ -132,8 +129,6 @@ StiffnessResult bordered(const Mechanism& m, const Linearization& lin, const Sad
   if (well_conditioned(ws.lu)) {
     ws.lu.solve(ws.B, ws.X);
     scaled = ws.X.topRows<6>() / (soft * soft);
-  } else if (nt > 0 && saddle.regular()) {  // a wide range of compliances: nothing is singular but the elimination
-    return bordered(m, lin, saddle, node, offset, true, ws);
   } else {
     Orthogonal cod(ws.M.rows(), ws.M.cols());
     cod.compute(ws.M, rank_threshold);
@@ -151,13 +146,6 @@ StiffnessResult bordered(const Mechanism& m, const Linearization& lin, const Sad
   out.stiffness = unscale(scaled, s);
   invert(scaled, s, out);
   return out;
-}
-
-}  // namespace
-
-StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, Index node,
-                                const Vec3& offset, StiffnessWorkspace& ws) {
-  return bordered(m, lin, saddle, node, offset, false, ws);
 }
 
 }  // namespace stiffmap

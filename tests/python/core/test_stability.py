@@ -30,7 +30,7 @@ def root(kind: str, stiff: float) -> tuple[Element, ...]:
 def strut(kind: str, guided: bool) -> sm.Machine:
     """Upright on its elastic root. A ball joint at its top carries the platform, which the guide holds
     upright; a guide without sideways stiffness only holds its direction."""
-    sideways, stiff = (GUIDE, 1e9) if guided else (1e-3, 1e7)
+    sideways, stiff = (GUIDE, GUIDE) if guided else (1e-3, 1e7)
     column = (
         *root(kind, stiff),
         b.shift("strut", (0, 0, LENGTH)),
