@@ -31,6 +31,8 @@ class Comparison:
     crossed: bool
     """Of the minimiser: the path went through a bifurcation."""
     flags: sm.Flag
+    moved: float
+    """Motion of the tip by the minimiser, m."""
 
     @property
     def gap(self) -> float:
@@ -71,6 +73,14 @@ def compare_machine(
         found = (float(translation), float(rotation), float(gap.max()), truth.residual)
         flags = sm.Flag(int(s.flags))
         out.append(
-            Comparison(sm.Status(int(s.status)), *found, truth.kind, truth.stable, truth.crossed, flags)
+            Comparison(
+                sm.Status(int(s.status)),
+                *found,
+                truth.kind,
+                truth.stable,
+                truth.crossed,
+                flags,
+                float(np.linalg.norm(moved)),
+            )
         )
     return out

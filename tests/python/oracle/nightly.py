@@ -14,6 +14,7 @@ from stiffmap import Flag, Status
 from .compare import Comparison, compare
 
 LIMIT = 1e-8
+FAR = 0.1  # m
 
 
 def main() -> int:
@@ -27,7 +28,8 @@ def main() -> int:
     bad, worst = 0, 0.0
     for done, seed in enumerate(range(given.first, given.first + given.count), 1):
         for c in compare(seed):
-            states[f"{c.truth}: {c.status.name}"] += 1
+            told = " flagged" if c.flags & Flag.BRANCH_UNVERIFIED else ""
+            states[f"{c.truth}{' beyond a bifurcation' if c.crossed else ''}: {c.status.name}{told}"] += 1
             if c.truth == "found" and agrees(c):
                 worst = max(worst, c.gap)
             if not agrees(c):
@@ -52,8 +54,8 @@ def agrees(c: Comparison) -> bool:
     unverified = c.status == Status.NOT_CONVERGED or bool(c.flags & Flag.BRANCH_UNVERIFIED)
     if c.truth == "ends":
         return unverified
-    if c.crossed and unverified:
-        return True  # beyond a bifurcation: refused, or flagged
+    if unverified and (c.crossed or c.moved > FAR):
+        return True  # beyond a bifurcation, or deformed out of all proportion: refused, or flagged
     found = c.status in (Status.CONVERGED, Status.UNSTABLE)
     return found and c.gap < LIMIT and c.stable == (c.status == Status.CONVERGED)
 
