@@ -31,13 +31,6 @@ def test_a_box_that_sticks_out_is_not_proven():
     assert not proof.holds and len(proof.broken)
 
 
-def test_drive_ranges_bound_the_box():
-    """Without transmission bounds the linear delta's box is limited by what its carriages travel."""
-    b = sm.largest_box(sm.load_machine("linear-delta"), transmission=None, gap=1e-3)
-    assert b.proven and b.gap < 0.02
-    assert any("range of" in name for name in b.limited_by)
-
-
 @pytest.mark.parametrize(
     ("options", "words"),
     [
