@@ -20,6 +20,7 @@ JOB = """
     import os, signal, threading, time
     import numpy as np
     import stiffmap as sm
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
     machine = sm.load_machine("orthoglide-revised")
     machine.solve(np.zeros((64, 3)), [300.0, 0, 0, 0, 0, 0])
     poses = np.broadcast_to([0.0, 0.05, 0.1], (400_000, 3))
