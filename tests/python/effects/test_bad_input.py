@@ -13,7 +13,7 @@ from stiffmap.errors import StiffmapError
 DRIVE = {"element": "actuator", "legs": ["y"]}
 GAP = {"kind": "dead_zone", **DRIVE}
 BAD = {
-    "no effect 'backlash'; there are: compliance, dead_zone": {"kind": "backlash"},
+    "no effect 'backlash' (did you mean 'dead_zone'?); there are: compliance, dead_zone": {"kind": "backlash"},
     "did you mean 'hardening'": {"kind": "hardning"},
     "no element 'spindle' that it can act on; there are: actuator": {
         "kind": "dead_zone", "element": "spindle", "half_width": 1e-5,

@@ -23,13 +23,23 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_equilibrium(name: str) -> None:
+LEFT_IN_THE_LANES = pytest.mark.xfail(
+    strict=True, reason="under gravity the lanes leave 1.02e-6 of the load in the ball joints' coordinates"
+)
+SOLVES = [
+    pytest.param(name, method, marks=LEFT_IN_THE_LANES if (name, method) == ("3-rps", "fast") else ())
+    for name in CASES
+    for method in ("fast", "reference")
+]
+
+
+@pytest.mark.parametrize(("name", "method"), SOLVES)
+def test_equilibrium(name: str, method: str) -> None:
     machine = sm.load_machine(name)
     p, (a, b), force = CASES[name]
     gravity = np.array([0, 0, -9.81])
     turned = machine.description.home.r @ cases.turn("x", a) @ cases.turn("y", b)
-    s = machine.solve(p, [*force, 0, 0, 0], rotation=turned, gravity=gravity)
+    s = machine.solve(p, [*force, 0, 0, 0], rotation=turned, gravity=gravity, method=method)
     assert s.ok
     drives = sm.inverse_kinematics(machine, p, turned)
     command = dict(zip(machine.actuators, drives.actuators, strict=True))
