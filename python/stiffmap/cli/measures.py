@@ -60,7 +60,7 @@ def measures(
 ) -> None:
     """All performance measures of a machine over a box: worst and best pose, requirement, margin.
 
-    With -o: the table (JSON), the maps (NetCDF) and pictures.
+    With -o: the table (JSON) and pictures.
 
     Exit codes: 0 done, 1 a requirement does not hold, 2 bad input.
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
+
+from stiffmap.errors import StiffmapError
 
 WORDS = {"machine_digest": "the machine's description", "stiffmap_version": "the version of stiffmap"}
 LEFT_OUT = (
@@ -18,6 +21,15 @@ LEFT_OUT = (
 )
 """What follows from another attribute."""
 LONG = 60
+
+
+def refuse_another_map(folder: Path, kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+    """StiffmapError, by what differs, where an unfinished map in `folder` is not the one wanted."""
+    found = difference(kept, wanted)
+    if found:
+        raise StiffmapError(
+            f"{folder}: holds part of another map: {found}; delete it, or choose another file"
+        )
 
 
 def difference(kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.lib.format import open_memmap
 from numpy.typing import NDArray
 
-from stiffmap.errors import StiffmapError
+from stiffmap.maps.differences import refuse_another_map
 from stiffmap.maps.plan import MapPlan
 
 BLOCKS_PER_FLUSH = 32
@@ -61,12 +61,10 @@ def memory_store(plan: MapPlan) -> Store:
 
 def folder_store(plan: MapPlan, folder: Path, resume: bool) -> Store:
     """A map that lives in a folder; taken up again where an earlier run of the same call left it."""
-    key = json.dumps(plan.attrs, sort_keys=True, default=lambda v: v.tolist())
-    if not (resume and (folder / "key.json").exists()):
-        return _new(plan, folder, key)
-    if (folder / "key.json").read_text(encoding="utf-8") != key:
-        raise StiffmapError(f"{folder}: holds part of another map (another machine, grid, load or option, "
-                            "or another version of stiffmap); delete it, or choose another file")  # fmt: skip
+    key = folder / "key.json"
+    if not (resume and key.exists()):
+        return _new(plan, folder, json.dumps(plan.attrs, sort_keys=True, default=lambda v: v.tolist()))
+    refuse_another_map(folder, json.loads(key.read_text(encoding="utf-8")), plan.attrs)
     return _mapped(plan, folder, "r+")
 
 

@@ -21,8 +21,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiffmap.errors import FileError, MissingPartError, StiffmapError
-from stiffmap.maps.differences import difference
+from stiffmap.errors import FileError, MissingPartError
+from stiffmap.maps.differences import refuse_another_map
 from stiffmap.maps.files import zarr_strings
 from stiffmap.maps.plan import MapPlan
 from stiffmap.maps.store import FILL
@@ -104,11 +104,7 @@ class ZarrMap:
         StiffmapError where it belongs to another map, FileError for a chunk that is damaged.
         """
         kept = json.loads((self.folder / "zarr.json").read_text(encoding="utf-8"))["attributes"]
-        found = difference(kept, self.plan.attrs)
-        if found:
-            raise StiffmapError(
-                f"{self.folder}: holds part of another map: {found}; delete it, or choose another file"
-            )
+        refuse_another_map(self.folder, kept, self.plan.attrs)
         for entry in entries(self.folder / JOURNAL):
             checks = {self.chunk(n, entry["tile"]): value for n, value in entry["crc"].items()}
             for path, value in checks.items():

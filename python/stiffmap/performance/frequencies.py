@@ -45,9 +45,8 @@ def natural_frequencies(
 
     Mass matrix over all elastic coordinates, passive joints following, against the exact tangent at
     the loaded equilibrium: `wrench` (..., 6) N, N·m dead at the TCP and `gravity` (3,) m/s² (None: what
-    the machine file says) change the stiffness. Bodies are rigid, as the machine file declares them;
-    `stiffmap.performance.divided` distributes a link's mass and spring. A dead moment makes the tangent
-    unsymmetric: complex frequencies are flutter, status UNSTABLE.
+    the machine file says) change the stiffness. Bodies are rigid, as the machine file declares
+    them. A dead moment makes the tangent unsymmetric: complex frequencies are flutter, status UNSTABLE.
     Raises StiffmapError for bad input (a machine without masses), never for a pose.
     """
     need_masses(machine, "a natural frequency")
