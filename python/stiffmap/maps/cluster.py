@@ -41,7 +41,7 @@ def on_cluster(
 
         threads = max(1, sum(client.nthreads().values()))
         first = [submit(i) for _, i in zip(range(WAITING_PER_THREAD * threads), left, strict=False)]
-        running: Any = as_completed(first)  # type: ignore[no-untyped-call]
+        running: Any = as_completed(first, loop=client.loop)  # type: ignore[no-untyped-call]
         for future in running:
             values = future.result()
             yield number.pop(future), values

@@ -225,7 +225,7 @@ def cluster() -> Iterator[Any]:
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
         ) as here,
-        distributed.Client(here) as client,
+        distributed.Client(here, set_as_default=False) as client,
     ):
         yield client
 
