@@ -20,16 +20,16 @@ from zlib import crc32
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.diagnosis.alias import same_way
-from stiffmap.diagnosis.candidates import Candidate
-from stiffmap.diagnosis.describe import named_effects
-from stiffmap.diagnosis.explain import Explanation, explain
-from stiffmap.diagnosis.judge import judge
-from stiffmap.diagnosis.screen import Screen
-from stiffmap.diagnosis.search import Search
-from stiffmap.diagnosis.study import Study, find, study
+from stiffmap.diagnosis.candidates.candidates import Candidate
+from stiffmap.diagnosis.decision.judge import judge
+from stiffmap.diagnosis.report.describe import named_effects
+from stiffmap.diagnosis.rivals.explain import Explanation, explain
+from stiffmap.diagnosis.search.alias import same_way
+from stiffmap.diagnosis.search.screen import Screen
+from stiffmap.diagnosis.search.selection import Search
+from stiffmap.diagnosis.search.study import Study, find, study
 from stiffmap.experiment import Experiment, Predictor, random_plan, simulate
-from stiffmap.experiment.problem import Problem
+from stiffmap.experiment.noise.whitening import Problem
 
 SIZES = (6.0, 12.0, 3.0, 20.0, 2.0, 1.0)
 CHUNK = 25

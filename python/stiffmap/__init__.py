@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from stiffmap.compensation import Commands, compensate
     from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, Residual, load_experiment
-    from stiffmap.experiment.residual import residual
-    from stiffmap.experiment.simulate import simulate
+    from stiffmap.experiment.comparison.residual import residual
+    from stiffmap.experiment.virtual.simulate import simulate
     from stiffmap.files.shipped import machine_names
     from stiffmap.internal_wrenches import assembly_stress
     from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics

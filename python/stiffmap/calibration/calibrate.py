@@ -21,15 +21,15 @@ from stiffmap.calibration.statistics import Sums, directions, independent
 from stiffmap.calibration.unknowns import GROUPS, Unknown, unknowns
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.channels import metres
+from stiffmap.experiment.comparison.limitations import refuse
+from stiffmap.experiment.comparison.summary import rms
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
-from stiffmap.experiment.folds import folds
-from stiffmap.experiment.limits import refuse
-from stiffmap.experiment.load import load_experiment
-from stiffmap.experiment.noise import Noise, noise_of
-from stiffmap.experiment.outliers import outliers
-from stiffmap.experiment.predict import Predictor
-from stiffmap.experiment.problem import Problem, nuisance_part
-from stiffmap.experiment.summary import rms
+from stiffmap.experiment.files.load import load_experiment
+from stiffmap.experiment.noise.folds import folds
+from stiffmap.experiment.noise.level import Noise, noise_of
+from stiffmap.experiment.noise.outliers import outliers
+from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
 
 BASE = ("zeros", "tool")

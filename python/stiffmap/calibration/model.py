@@ -14,8 +14,8 @@ from stiffmap.calibration.unknowns import Unknown
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
-from stiffmap.experiment.predict import Predictor
-from stiffmap.experiment.problem import Problem
+from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine
 
 STEP = 0.1

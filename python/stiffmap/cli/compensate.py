@@ -15,8 +15,8 @@ from stiffmap.compensation import compensate as compute
 from stiffmap.compensation import corrected_geometry, dh_list, urdf_text
 from stiffmap.description import MachineDescription
 from stiffmap.errors import FileError, StiffmapError
-from stiffmap.experiment.orientation import against_base
-from stiffmap.experiment.plan_file import load_plan
+from stiffmap.experiment.files.orientation import against_base
+from stiffmap.experiment.files.plan_file import load_plan
 from stiffmap.machine import Machine
 
 MM = 1e3

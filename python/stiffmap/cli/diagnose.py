@@ -70,7 +70,7 @@ def _say(what: str) -> None:
 
 def write(result: Diagnosis, folder: Path) -> None:
     """All files of a diagnosis; raises `FileError` where the folder cannot be written."""
-    from stiffmap.diagnosis.pictures import figures
+    from stiffmap.diagnosis.report.pictures import figures
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

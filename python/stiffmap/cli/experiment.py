@@ -97,7 +97,7 @@ def experiment(
 
 
 def _show(console: Console, made: object) -> None:
-    from stiffmap.experiment.told import experiment_rows
+    from stiffmap.experiment.notebook import experiment_rows
 
     head, rows = experiment_rows(made)
     table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood")

@@ -15,7 +15,7 @@ from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.experiment import simulate
-from stiffmap.experiment.save import plan_columns
+from stiffmap.experiment.files.save import plan_columns
 from stiffmap.machine import Machine, load_machine
 from stiffmap.planning import Design, design, follow
 from stiffmap.planning.estimate import fitted

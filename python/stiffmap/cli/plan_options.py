@@ -12,10 +12,10 @@ import numpy as np
 from stiffmap.cli.inputs import numbers
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment import load_experiment
-from stiffmap.experiment import plans as make
 from stiffmap.experiment.channels import AXES, SIDES, Channel
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.plan_file import load_plan
+from stiffmap.experiment.files.plan_file import load_plan
+from stiffmap.experiment.virtual import plans as make
 from stiffmap.machine import Machine
 
 GRID = re.compile(r"^grid:(\d+)x(\d+)x(\d+)$")

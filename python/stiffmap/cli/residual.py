@@ -56,8 +56,8 @@ def _write(r: Residual, rows: int, output: Path) -> None:
     import json
 
     from stiffmap.cli.inputs import folder
-    from stiffmap.experiment.pictures import figures
-    from stiffmap.experiment.residual_table import write_table
+    from stiffmap.experiment.comparison.pictures import figures
+    from stiffmap.experiment.comparison.table import write_table
 
     place = folder(output)
     write_table(r, place / "residual.csv")

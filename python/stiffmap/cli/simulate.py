@@ -12,8 +12,8 @@ from stiffmap.cli import plan_options as plans
 from stiffmap.cli.inputs import placed
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment import Loop, save_experiment
-from stiffmap.experiment import plans as make
 from stiffmap.experiment import simulate as run
+from stiffmap.experiment.virtual import plans as make
 from stiffmap.machine import load_machine
 
 Effects = Annotated[

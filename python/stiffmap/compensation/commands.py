@@ -19,10 +19,10 @@ from scipy.spatial.transform import Rotation
 from stiffmap.broadcasting import Floats, trailing, wrench_array
 from stiffmap.description import TASK
 from stiffmap.errors import FileError, StiffmapError
-from stiffmap.experiment.configuration import coordinates_of
 from stiffmap.experiment.experiment import AXES, Experiment
-from stiffmap.experiment.rest import drive_jacobian
-from stiffmap.experiment.solving import motions
+from stiffmap.experiment.poses.configuration import coordinates_of
+from stiffmap.experiment.prediction.equilibria import motions
+from stiffmap.experiment.prediction.unloaded_state import drive_jacobian
 from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
 from stiffmap.machine import Machine
 

@@ -11,29 +11,29 @@ import numpy as np
 from scipy.stats import chi2
 
 from stiffmap.calibration import GROUPS, Tolerances
-from stiffmap.diagnosis.candidates import check_kinds
+from stiffmap.diagnosis.candidates.candidates import check_kinds
 from stiffmap.diagnosis.clock import Clock, Progress
-from stiffmap.diagnosis.crossval import HeldOut, held_out
-from stiffmap.diagnosis.describe import aliases_of, as_place, named_effects
-from stiffmap.diagnosis.detect import detectable
-from stiffmap.diagnosis.empirical import empirical
-from stiffmap.diagnosis.explain import Explanation, explain
-from stiffmap.diagnosis.findings import Detectability, NoiseReport
-from stiffmap.diagnosis.judge import after_checks
-from stiffmap.diagnosis.locate import located
-from stiffmap.diagnosis.model import Model
-from stiffmap.diagnosis.on_top import Answer, find_effects
-from stiffmap.diagnosis.result import Diagnosis
-from stiffmap.diagnosis.separate import separation
-from stiffmap.diagnosis.stability import explained
-from stiffmap.diagnosis.study import Finding, Study, study
-from stiffmap.experiment.checks import checks
+from stiffmap.diagnosis.decision.beside_calibration import Answer, find_effects
+from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
+from stiffmap.diagnosis.decision.empirical import empirical
+from stiffmap.diagnosis.decision.judge import after_checks
+from stiffmap.diagnosis.decision.largest_residual import located
+from stiffmap.diagnosis.decision.stability import explained
+from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.diagnosis.report.describe import aliases_of, as_place, named_effects
+from stiffmap.diagnosis.report.findings import Detectability, NoiseReport
+from stiffmap.diagnosis.report.result import Diagnosis
+from stiffmap.diagnosis.rivals.explain import Explanation, explain
+from stiffmap.diagnosis.rivals.separation import separation
+from stiffmap.diagnosis.search.detectability import detectable
+from stiffmap.diagnosis.search.study import Finding, Study, study
+from stiffmap.experiment.comparison.limitations import limitations, refuse
+from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.limits import limitations, refuse
-from stiffmap.experiment.load import load_experiment
-from stiffmap.experiment.noise import Mask
-from stiffmap.experiment.predict import Predictor
-from stiffmap.experiment.summary import Summary, summary
+from stiffmap.experiment.files.load import load_experiment
+from stiffmap.experiment.noise.checks import checks
+from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
 
 LISTED = 20

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
-from stiffmap.experiment.told import experiment_html
+from stiffmap.experiment.notebook import experiment_html
 
 __all__ = ["AXES", "BRANCHES", "WRENCH", "Channel", "Experiment", "Floats", "Integers", "Loop"]
 

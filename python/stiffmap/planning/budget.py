@@ -16,9 +16,9 @@ from stiffmap.broadcasting import Floats
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment
-from stiffmap.experiment.noise import noise_of
-from stiffmap.experiment.predict import Predictor
-from stiffmap.experiment.problem import Problem
+from stiffmap.experiment.noise.level import noise_of
+from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine
 from stiffmap.planning.estimate import Estimate, fitted, slopes
 

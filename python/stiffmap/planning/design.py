@@ -20,9 +20,9 @@ from stiffmap.broadcasting import Floats
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Integers
-from stiffmap.experiment.nuisance import nuisance_columns
-from stiffmap.experiment.plans import load_set, plan_of_poses, random_poses
-from stiffmap.experiment.predict import Predictor
+from stiffmap.experiment.noise.nuisance import nuisance_columns
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.experiment.virtual.plans import load_set, plan_of_poses, random_poses
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 from stiffmap.planning.estimate import Estimate, estimate, fitted, slopes

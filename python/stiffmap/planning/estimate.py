@@ -12,9 +12,9 @@ from stiffmap.broadcasting import Floats
 from stiffmap.description import AppliedEffect, MachineDescription
 from stiffmap.effects.types import Parameter
 from stiffmap.experiment.experiment import Experiment
-from stiffmap.experiment.noise import noise_of
-from stiffmap.experiment.predict import Predictor
-from stiffmap.experiment.problem import Problem
+from stiffmap.experiment.noise.level import noise_of
+from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine
 
 STEP = 1e-3

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.diagnosis.interval import NEAR, RISE, profile_end
+from stiffmap.diagnosis.fitting.interval import NEAR, RISE, profile_end
 from stiffmap.experiment import Predictor, random_plan, simulate
-from stiffmap.experiment.problem import Problem
+from stiffmap.experiment.noise.whitening import Problem
 
 
 @pytest.mark.parametrize("curvature", [1.0, 0.01, 40.0])

@@ -10,8 +10,8 @@ from stiffmap.calibration import unknowns
 from stiffmap.calibration.model import predicted
 from stiffmap.description import AppliedEffect
 from stiffmap.experiment import Experiment, Predictor, random_plan
-from stiffmap.experiment.noise import noise_of
-from stiffmap.experiment.problem import Problem
+from stiffmap.experiment.noise.level import noise_of
+from stiffmap.experiment.noise.whitening import Problem
 
 LEAD = AppliedEffect("lead_error", "carriage", ("a",), (("slope", 5e-3),))
 

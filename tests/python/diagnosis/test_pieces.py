@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.diagnosis.candidates import Candidate, candidates
-from stiffmap.diagnosis.interval import seen_alone
-from stiffmap.diagnosis.locate import located
-from stiffmap.diagnosis.model import Model
-from stiffmap.diagnosis.rivals import Rival, lost_by_chance
-from stiffmap.diagnosis.structure import Pattern
+from stiffmap.diagnosis.candidates.candidates import Candidate, candidates
+from stiffmap.diagnosis.decision.largest_residual import located
+from stiffmap.diagnosis.decision.patterns import Pattern
+from stiffmap.diagnosis.fitting.interval import seen_alone
+from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.diagnosis.rivals.rivals import Rival, lost_by_chance
 from stiffmap.effects import Parameter
 from stiffmap.experiment import Experiment, random_plan
 from stiffmap.experiment.experiment import Floats

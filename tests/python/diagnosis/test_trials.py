@@ -9,15 +9,15 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.description import AppliedEffect
-from stiffmap.diagnosis.candidates import Candidate, candidates, clash
-from stiffmap.diagnosis.fit import evaluate, fit
-from stiffmap.diagnosis.model import Model
-from stiffmap.diagnosis.screen import Screen
-from stiffmap.diagnosis.search import Search, additions, backward
-from stiffmap.diagnosis.sensitivity import Variant, difference
+from stiffmap.diagnosis.candidates.candidates import Candidate, candidates, clash
+from stiffmap.diagnosis.candidates.sensitivity import Variant, difference
+from stiffmap.diagnosis.fitting.fit import evaluate, fit
+from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.diagnosis.search.screen import Screen
+from stiffmap.diagnosis.search.selection import Search, additions, backward
 from stiffmap.experiment import Predictor, random_plan, simulate
-from stiffmap.experiment.noise import noise_of
-from stiffmap.experiment.problem import Problem
+from stiffmap.experiment.noise.level import noise_of
+from stiffmap.experiment.noise.whitening import Problem
 
 TRUTH = [AppliedEffect("tilt", "actuator", ("x",), (("angle_y", 5e-4), ("angle_z", -4e-4)))]
 

@@ -11,7 +11,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.description import AppliedEffect
-from stiffmap.diagnosis.sensitivity import plan_of
+from stiffmap.diagnosis.candidates.sensitivity import plan_of
 from stiffmap.experiment import Predictor, random_plan, simulate
 
 SETS = Path(__file__).parents[3] / "examples" / "experiments"

@@ -11,8 +11,8 @@ from scipy.stats import kstest
 import stiffmap as sm
 from stiffmap.cli.inputs import placed
 from stiffmap.experiment import Experiment, simulate
-from stiffmap.experiment.checks import Check, checks
-from stiffmap.experiment.plans import load_set, plan_of_poses, random_poses, with_branches
+from stiffmap.experiment.noise.checks import Check, checks
+from stiffmap.experiment.virtual.plans import load_set, plan_of_poses, random_poses, with_branches
 
 ALL = ("linearity", "sign reversal", "superposition", "return to zero", "reciprocity")
 

@@ -11,7 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.description import AppliedEffect
 from stiffmap.experiment import Predictor, load_experiment, random_plan, simulate
-from stiffmap.experiment.plans import with_command
+from stiffmap.experiment.virtual.plans import with_command
 
 DH = (
     (0.1273, 0.0, np.pi / 2),

@@ -10,9 +10,9 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor
-from stiffmap.experiment.columns import KNOWN
-from stiffmap.experiment.orientation import MATRIX, TURNED2
-from stiffmap.experiment.schema import ExperimentFile
+from stiffmap.experiment.files.columns import KNOWN
+from stiffmap.experiment.files.orientation import MATRIX, TURNED2
+from stiffmap.experiment.files.schema import ExperimentFile
 
 PAGE = (Path(__file__).parents[3] / "docs" / "experiments.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```yaml\n([^`]*)```\n```csv\n([^`]*)```", PAGE)

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 import stiffmap as sm
 from stiffmap.cli.inputs import placed
 from stiffmap.experiment import Predictor, load_experiment
-from stiffmap.experiment.history import deflection, spring_force
+from stiffmap.experiment.prediction.history import deflection, spring_force
 from stiffmap.planning import estimate
 
 ONE_JOINT = """

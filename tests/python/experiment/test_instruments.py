@@ -13,7 +13,7 @@ import stiffmap as sm
 from stiffmap.cli.app import main
 from stiffmap.description import AppliedEffect
 from stiffmap.experiment import Predictor, load_experiment, random_plan, residual
-from stiffmap.experiment.resolve import resolved
+from stiffmap.experiment.poses.against_command import resolved
 
 COUNT = 40
 

@@ -13,7 +13,7 @@ import stiffmap as sm
 from stiffmap.cli.inputs import placed
 from stiffmap.description import Point
 from stiffmap.experiment import Experiment, Loop, predict, random_plan
-from stiffmap.experiment.where import point_positions
+from stiffmap.experiment.poses.point_kinematics import point_positions
 
 OFFSET = (0.01, 0.02, 0.03)
 

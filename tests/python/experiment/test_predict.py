@@ -10,10 +10,10 @@ import pytest
 import stiffmap as sm
 from stiffmap.description import AppliedEffect
 from stiffmap.experiment import Predictor, predict, random_plan, simulate
-from stiffmap.experiment.checks import checks
-from stiffmap.experiment.measurement import readings, true_wrench
-from stiffmap.experiment.noise import noise_of
-from stiffmap.experiment.outliers import outliers, suspects
+from stiffmap.experiment.noise.checks import checks
+from stiffmap.experiment.noise.level import noise_of
+from stiffmap.experiment.noise.outliers import outliers, suspects
+from stiffmap.experiment.prediction.measurement import readings, true_wrench
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import stiffmap as sm
-from stiffmap.diagnosis.findings import Effect
-from stiffmap.diagnosis.sentences import measured, sentence
+from stiffmap.diagnosis.report.findings import Effect
+from stiffmap.diagnosis.report.sentences import measured, sentence
 from stiffmap.report.page import write_page
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -1,0 +1,1 @@
+"""What might be wrong with the machine, and how each of it would show in the readings."""

@@ -1,0 +1,141 @@
+"""Sensitivities of every candidate at the null, by differences of predictions; kept per plan."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stiffmap.diagnosis.candidates.cable import cable_variants, is_cable
+from stiffmap.diagnosis.candidates.candidates import Candidate, candidates
+from stiffmap.diagnosis.candidates.periodic import is_periodic, periodic_variants
+from stiffmap.diagnosis.candidates.shapes import Shape, shapes
+from stiffmap.effects import Parameter
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.prediction.predict import Predictor
+
+# Share of a parameter's scale for a difference: laws that only grow from their null take all of it
+SMOOTH, ONE_SIDED = 0.1, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """Linear model of a candidate at the null.
+
+    columns
+        (n, 6, p) change of the readings per `scale` of each linear parameter.
+    shape
+        Values of the parameters without a null at which the columns hold.
+    sign
+        (p,) +1 where the parameter can only grow from its null, -1 only fall, 0 both.
+    """
+
+    candidate: Candidate
+    columns: Floats
+    sign: Floats
+    shape: Shape = ()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What does not depend on the readings."""
+
+    base: Floats
+    """(n, 6) prediction of the declared machine."""
+    variants: tuple[Variant, ...]
+    failed: tuple[tuple[Candidate, str], ...]
+    digest: str = ""
+    """Of the machine and the plan."""
+
+
+_PLANS: OrderedDict[str, Plan] = OrderedDict()
+
+
+def plan_of(predictor: Predictor) -> Plan:
+    """Sensitivities of a machine under a plan; the last eight are kept."""
+    key = _digest(predictor)
+    if key not in _PLANS:
+        _PLANS[key] = replace(_compute(predictor), digest=key)
+        if len(_PLANS) > 8:
+            _PLANS.popitem(last=False)
+    _PLANS.move_to_end(key)
+    return _PLANS[key]
+
+
+def _digest(predictor: Predictor) -> str:
+    e = predictor.experiment
+    parts = [
+        predictor.machine.description,
+        e.quantity,
+        e.branch,
+        e.setup,
+        e.point,
+        e.load_point,
+        e.gravity,
+        e.loop,
+    ]
+    parts += [e.reference_temperature, e.extra, e.points, e.load_points, e.unloaded]
+    parts += [e.frame, e.tool, e.instrument, e.target, e.surface, e.normal, e.joint_names]
+    arrays = [e.position, e.wrench, e.rotation, e.other, e.other_rotation, e.approach, e.order, e.temperature]
+    arrays += [e.joints, e.other_joints, e.gravity_of, e.hours]
+    raw = repr(parts).encode() + b"".join(
+        b"-" if a is None else np.ascontiguousarray(a).tobytes() for a in arrays
+    )
+    return hashlib.sha256(raw).hexdigest()
+
+
+def _compute(predictor: Predictor) -> Plan:
+    base = predictor()
+    good: list[Variant] = []
+    failed: list[tuple[Candidate, str]] = []
+    for candidate in candidates(predictor.machine.description, predictor.experiment):
+        try:
+            found = list(variants(candidate, predictor, base))
+        except StiffmapError as problem:
+            failed.append((candidate, str(problem)))
+            continue
+        good += [v for v in found if _usable(v, base)]
+        if not any(_usable(v, base) for v in found):
+            failed.append((candidate, "the machine fails with it"))
+    return Plan(base, tuple(good), tuple(failed))
+
+
+def _usable(variant: Variant, base: Floats) -> bool:
+    return bool(np.isfinite(variant.columns[np.isfinite(base)]).all())
+
+
+def variants(candidate: Candidate, predictor: Predictor, base: Floats) -> Iterator[Variant]:
+    """One linear model per shape of a candidate."""
+    if is_periodic(candidate):
+        for columns, shape in periodic_variants(candidate, predictor, base):
+            yield Variant(candidate, columns, np.zeros(columns.shape[-1]), shape)
+        return
+    if is_cable(candidate, predictor.experiment):
+        for columns, shape in cable_variants(candidate, predictor, base):
+            yield Variant(candidate, columns, np.ones(1), shape)
+        return
+    linear = candidate.linear
+    sign = np.array([side(p) for p in linear])
+    for shape in shapes(candidate, predictor):
+        single = [difference(candidate, p, shape, predictor, base) for p in linear]
+        yield Variant(candidate, np.stack(single, axis=-1), sign, shape)
+
+
+def side(p: Parameter) -> int:
+    """+1 where the parameter can only grow from its null, -1 only fall, 0 both."""
+    return int(p.lower == p.null) - int(p.upper == p.null)
+
+
+def difference(
+    candidate: Candidate, p: Parameter, shape: Shape, predictor: Predictor, base: Floats
+) -> Floats:
+    """(n, 6) change of the readings per scale of parameter p, one-sided from the null."""
+    step = (side(p) * ONE_SIDED or SMOOTH) * p.scale
+    given = dict(shape) | {p.name: float(p.null or 0.0) + step}
+    values = [given.get(q.name, float(q.null or 0.0)) for q in candidate.parameters]
+    raw = predictor([candidate.term(values)]) - base
+    return np.asarray(raw / (step / p.scale))

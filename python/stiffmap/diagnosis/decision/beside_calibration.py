@@ -1,0 +1,286 @@
+"""Effects on top of a calibration: a real machine is off in many small ways before it has one fault.
+
+One fault on an exact machine, and a machine whose every number is a little off, are compared by their evidence. Where
+the second explains the readings better, effects are looked for beside it, all uncertain numbers integrated
+out, and named only at the floor of what no model explains, where folds share them and held-out readings gain.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stiffmap.calibration import Calibration, Calibrator, Tolerances, unknowns
+from stiffmap.calibration.calibrate import pose_labels
+from stiffmap.calibration.floor import Blocks, model_form
+from stiffmap.calibration.statistics import Sums
+from stiffmap.diagnosis.candidates.candidates import Candidate
+from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
+from stiffmap.diagnosis.decision.judge import judge, unexplained, with_model
+from stiffmap.diagnosis.decision.patterns import Pattern
+from stiffmap.diagnosis.fitting.fit import evaluate, fit
+from stiffmap.diagnosis.fitting.interval import unseen
+from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.diagnosis.search.calibrated import Layer
+from stiffmap.diagnosis.search.screen import Screen
+from stiffmap.diagnosis.search.selection import MOST_EFFECTS
+from stiffmap.diagnosis.search.study import Finding, Study, find, search_on, study
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.whitening import Problem
+
+CERTIFICATE = {"sensor_gain": 1.0, "sensor_axes": 0.0}
+"""Parameters of an instrument, and where they vanish."""
+BEYOND = 100.0
+"""Standard uncertainties of its certificate that an instrument is never taken to be off by."""
+AT_BOUND = 1e-6
+WORTH_A_FLOOR = 0.3
+"""Noise variances per pose that no linear explanation takes: effects are then looked for at that floor at once."""
+MEETING = 10.0
+"""Nats that each fault beyond the first costs."""
+SURE = 30.0
+"""Nats by which uncertain numbers must lead before single effects on an exact machine are not fitted at all."""
+SCALES = (1.0, 0.3, 0.1, 0.03, 0.01)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a diagnosis found, with or without a calibration below it."""
+
+    study: Study
+    finding: Finding
+    verdict: str
+    left: list[Pattern]
+    calibration: Calibration | None = None
+    held: HeldOut | None = None
+    refused: tuple[str, ...] = ()
+    """Effects that the readings seemed to demand and that are not named, and why."""
+
+
+def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str, ...] = ()) -> Answer:
+    """Effects on the declared machine, or on a calibrated one where that explains the readings better."""
+    found: Calibrator | None = None
+    positions = s.experiment.quantity == "position"
+    if positions:
+        found = calibrator(s, tolerances, exclude)
+        if found is not None and leads_by_far(s, found):
+            return _layered(s, found, seed, tolerances)
+    finding, verdict, left = judge(s, find(s))
+    first = Answer(s, finding, verdict, left)
+    if s.clock.over or not (left or (finding.model.candidates and positions)):
+        return first
+    found = found or calibrator(s, tolerances, exclude)
+    if found is None:
+        return first
+    if not left and sparse_evidence(first) >= spread_evidence(finding.search.problem, found):
+        return first
+    return _layered(s, found, seed, tolerances)
+
+
+def _layered(s: Study, found: Calibrator, seed: int, tolerances: Tolerances) -> Answer:
+    """Effects on top of a calibration; at the floor of what no model explains, where something is left."""
+    base = _above(s, Layer.of(found, found.answer(seed)), seed)
+    rho = _floor_beside_screen(base)
+    if rho < WORTH_A_FLOOR:
+        answer = _searched(base, tolerances)
+        if not answer.left:
+            return answer
+        rho = floor_of(base, answer.finding)
+    return _at_the_floor(base, found, rho, seed, tolerances)
+
+
+def _above(s: Study, layer: Layer, seed: int) -> Study:
+    """The study of the same readings above a calibration."""
+    straight = copy.copy(s.predictor)  # shares what was solved
+    straight.experiment = layer.straight(s.predictor.experiment)
+    return study(straight, seed, layer, s.clock, s.without)
+
+
+def _floor_beside_screen(s: Study) -> float:
+    """What the calibration and the best few effects, taken as linear, leave per pose, in noise variances."""
+    problem, screen = s.whole
+    left, _ = screened(screen, problem.residual(s.plan.base))
+    blocks = Blocks.of(np.zeros((len(left), 0)), left, pose_labels(problem))
+    return model_form(blocks) * float(np.median(blocks.number))
+
+
+def calibrator(s: Study, tolerances: Tolerances, exclude: tuple[str, ...]) -> Calibrator | None:
+    """The calibration of a study's readings; None where the readings feel no uncertain number."""
+    s.clock.say("calibration: every uncertain number at once")
+    p = s.predictor
+    names = [u for u in unknowns(p.machine.description, p.experiment, tolerances) if u.group not in exclude]
+    found = Calibrator.of(p, names, s.clock.until)
+    return found if found.sensitivity.unknowns else None
+
+
+def leads_by_far(s: Study, found: Calibrator) -> bool:
+    """Whether uncertain numbers beat by far what the linear screen promises of any few effects."""
+    problem, screen = s.whole
+    left, number = screened(screen, problem.residual(s.plan.base))
+    few = -0.5 * (float(left @ left) + number * float(np.log(max(len(left), 2))))
+    return spread_evidence(problem, found) > few + SURE
+
+
+def screened(screen: Screen, residual: Floats) -> tuple[Floats, int]:
+    """(N,) what the best few effects leave, taken as linear, one after the other, and their directions."""
+    left, beside, tangent = residual, screen, np.zeros((len(residual), 0))
+    for _ in range(MOST_EFFECTS):
+        drops = beside.drops(left[:, None])[:, 0]
+        best = int(np.argmax(drops)) if len(drops) else -1
+        if best < 0 or drops[best] <= 0.0:
+            break
+        q = beside.basis(best)
+        left = left - q @ (q.T @ left)
+        tangent = np.column_stack([tangent, q])
+        beside = screen.beside(tangent)
+    return left, int(tangent.shape[1])
+
+
+def sparse_evidence(first: Answer) -> float:
+    """ln of the evidence of a few effects on an exact machine.
+
+    Each parameter pays for how finely it had to be tuned (a normal prior of its own size), each effect for
+    the choice among all candidates, each further one that several faults meet on one machine.
+    """
+    model, search = first.finding.model, first.finding.search
+    if not model.candidates:
+        return -0.5 * model.chi2
+    assert model.jacobian is not None
+    null = np.array([float(p.null or 0.0) / p.scale for c in model.candidates for p in c.parameters])
+    sized = model.jacobian * np.abs(model.values - null)
+    volume = float(np.linalg.slogdet(np.eye(sized.shape[1]) + sized.T @ sized)[1])
+    number = len(model.candidates)
+    price = 0.5 * (volume + model.freedom) + number * float(np.log(max(search.searches, 1.0)))
+    return -0.5 * model.chi2 - price - MEETING * (number - 1)
+
+
+def spread_evidence(problem: Problem, found: Calibrator) -> float:
+    """ln of the evidence of a machine whose every number is uncertain, on the same rows.
+
+    Machines may be better than their tolerances: of a few scales of all uncertainties the best counts.
+    """
+    fit = found.fit
+    columns = problem.white(found.sensitivity.columns)
+    residual = problem.residual(fit.prediction) + columns @ fit.values
+    sums = Sums.of(columns, residual)
+    p = len(sums.right)
+    return max(sums.scaled(np.full(p, f)).log_evidence for f in SCALES) - float(np.log(len(SCALES)))
+
+
+def _searched(s: Study, tolerances: Tolerances) -> Answer:
+    assert s.layer is not None
+    finding, verdict, left = judge(s, find(s))
+    model, refused = admissible(finding.model, finding, tolerances)
+    if refused:
+        finding = with_model(finding, model)
+        left = unexplained(s, finding)
+        verdict = _word(finding, left)
+    return Answer(s, finding, verdict, left, s.layer.calibration, refused=refused)
+
+
+def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances: Tolerances) -> Answer:
+    """The search where what no model explains counts as noise; only what holds is named."""
+    assert s.layer is not None
+    raised = Layer.of(found, s.layer.calibration, rho)
+    again = study(s.predictor, seed, raised, s.clock, s.without)
+    finding = find(again)
+    held = held_out(again, finding.outliers, seed, finding)
+    model, refused = admissible(finding.model, finding, tolerances)
+    model, more = _shared(model, finding, held)
+    finding = with_model(finding, model)
+    left = unexplained(s, _on(s, finding))
+    return Answer(again, finding, _word(finding, left), left, s.layer.calibration, held, refused + more)
+
+
+def _on(s: Study, finding: Finding) -> Finding:
+    """The model of a finding judged at the noise of another study."""
+    search = search_on(s, ~finding.outliers, finding.search.finalists)
+    return replace(
+        with_model(finding, evaluate(finding.model, search.predictor, search.problem)), search=search
+    )
+
+
+def floor_of(s: Study, finding: Finding) -> float:
+    """What no model explains, in noise variances of one reading: REML per pose, beside calibration and effects."""
+    assert s.layer is not None
+    problem = s.problem_of(~finding.outliers).exact
+    columns = problem.white(s.layer.columns)
+    residual = problem.residual(s.predictor(finding.model.terms()))
+    blocks = Blocks.of(columns, residual, pose_labels(problem))
+    return model_form(blocks) * float(np.median(blocks.number))
+
+
+def _word(finding: Finding, left: list[Pattern]) -> str:
+    named = bool(finding.model.candidates)
+    if left:
+        return "effects+unattributed" if named else "unattributed"
+    return "effects" if named else "none"
+
+
+def admissible(model: Model, finding: Finding, tolerances: Tolerances) -> tuple[Model, tuple[str, ...]]:
+    """The model without effects that are never named, and why they are not."""
+    refused: list[str] = []
+    while model.candidates:
+        why = [
+            (i, w)
+            for i, w in ((i, _why_not(model, i, tolerances)) for i in range(len(model.candidates)))
+            if w
+        ]
+        if not why:
+            break
+        i, word = why[0]
+        refused.append(f"{model.candidates[i]}: {word}")
+        model = fit(model.without(i), finding.search.predictor, finding.search.problem)
+    return model, tuple(refused)
+
+
+def _why_not(model: Model, i: int, tolerances: Tolerances) -> str:
+    """Why an effect is never named beside a calibration; empty: it may be."""
+    part, candidate = model.parts()[i], model.candidates[i]
+    low, high = (b[part] for b in model.bounds())
+    x = model.values[part]
+    held = {k - part.start for k in model.held}
+    span = high - low
+    at = [
+        p.name
+        for k, p in enumerate(candidate.parameters)
+        if k not in held
+        and (
+            (x[k] - low[k] < AT_BOUND * span[k] and p.lower != p.null)
+            or (high[k] - x[k] < AT_BOUND * span[k] and p.upper != p.null)
+        )
+    ]
+    if at:
+        return f"{at[0]} is at its bound"
+    blind = [
+        p.name for k, p in enumerate(candidate.parameters) if k not in held and unseen(model, part.start + k)
+    ]
+    if len(blind) == len(candidate.parameters) - len(held):
+        return f"the readings do not determine {blind[0]}" if blind else ""
+    if candidate.kind in CERTIFICATE:
+        off = np.abs(model.si[part] - CERTIFICATE[candidate.kind]).max()
+        if off > BEYOND * tolerances.instrument:
+            return f"{off:.2g} is beyond the instrument's certificate ({tolerances.instrument:.2g}) a hundred times"
+    return ""
+
+
+def _shared(model: Model, finding: Finding, held: HeldOut | None) -> tuple[Model, tuple[str, ...]]:
+    """The model without effects that the folds do not share; nothing where held-out readings do not gain."""
+    if held is None:
+        return model, ()
+    refused: list[str] = []
+
+    def drop(c: Candidate, why: str) -> None:
+        refused.append(f"{c}: {why}")
+
+    for c in model.candidates:
+        if not held.shared(str(c)):
+            drop(c, f"chosen in {held.chosen.get(str(c), 0)} of {held.folds} folds only")
+    if not refused and not held.pays and model.candidates and held.gain is not None:
+        for c in model.candidates:
+            drop(c, f"held-out readings gain {held.gain[0]:.2g} ± {held.gain[1]:.2g} noise variances")
+    for name in refused:
+        i = next(k for k, c in enumerate(model.candidates) if name.startswith(f"{c}: "))
+        model = fit(model.without(i), finding.search.predictor, finding.search.problem)
+    return model, tuple(refused)

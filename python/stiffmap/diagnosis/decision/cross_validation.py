@@ -1,0 +1,133 @@
+"""Nested cross-validation by groups: outliers, selection and fit repeated inside every fold."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.diagnosis.fitting.fit import evaluate, fit
+from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.diagnosis.search.selection import Search, surprise_of
+from stiffmap.diagnosis.search.study import Finding, Study, alone, find, search_on
+from stiffmap.experiment.comparison.summary import Summary, summary
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.folds import folds
+from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.noise.whitening import basis
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Readings that no fit saw."""
+
+    before: Summary
+    after: Summary
+    residual: Floats
+    """(n, 6) reading minus prediction of the model found without the row's group, `Study.free` of
+    frames and zeros."""
+    chosen: dict[str, int]
+    """How many of the folds chose each effect."""
+    folds: int
+    by: str
+    """``poses`` or ``set-ups``."""
+    calibrated: Summary | None = None
+    """With the calibration alone, no effect; None where the declared numbers are taken as exact."""
+    gain: tuple[float, float] | None = None
+    """What the effects take off the squared residual beside the calibration, in noise variances per
+    reading: mean over the folds and its standard error."""
+
+    def shared(self, effect: str) -> bool:
+        """Whether more than half of the folds chose the effect."""
+        return 2 * self.chosen.get(effect, 0) > self.folds
+
+    @property
+    def pays(self) -> bool:
+        """Whether the effects gain more on held-out readings than one standard error."""
+        return self.gain is None or self.gain[0] > self.gain[1]
+
+
+def held_out(study: Study, listed: Mask, seed: int, known: Finding | None = None) -> HeldOut | None:
+    """Residuals before and after on held-out groups; None where there are not two groups.
+
+    Rows in `listed` (outliers of the whole experiment) and rows that the fold's own model finds
+    standing alone count neither before nor after. A fold whose rows demand each effect of the `known`
+    finding, and no other, is not searched again: the effects' values are fitted to its rows.
+    """
+    e = study.experiment
+    label, by = folds(e, seed)
+    if label.max() == 0:
+        return None
+    after = np.full_like(e.reading, np.nan)
+    alone_only = np.full_like(e.reading, np.nan)
+    chosen: Counter[str] = Counter()
+    for fold in range(int(label.max()) + 1):
+        if study.clock.over:
+            return None
+        study.clock.say(f"held-out fold {fold + 1} of {int(label.max()) + 1}")
+        test = label == fold
+        model = _kept(study, known, ~test) or find(study, ~test, finalists=3).model
+        chosen.update(map(str, model.candidates))
+        residual = study.free(e.reading - study.predictor(model.terms()), listed, ~test)
+        gone = alone(study, np.where(test[:, None], residual, np.nan)) & listed
+        after[test & ~gone] = residual[test & ~gone]
+        if study.layer is not None:
+            bare = study.free(e.reading - study.plan.base, listed, ~test)
+            alone_only[test & ~gone] = bare[test & ~gone]
+    declared = study.free(e.reading - study.plan.base, listed, calibrated=False)
+    before = np.where(np.isfinite(after), declared, np.nan)
+    sigma = study.noise.sigma
+    calibrated = gain = None
+    if study.layer is not None:
+        calibrated = summary(alone_only, sigma, e.channels)
+        gain = _gain(alone_only / sigma, after / sigma, label)
+    return HeldOut(
+        summary(before, sigma, e.channels),
+        summary(after, sigma, e.channels),
+        after,
+        dict(chosen),
+        int(label.max()) + 1,
+        by,
+        calibrated,
+        gain,
+    )
+
+
+def _kept(study: Study, known: Finding | None, rows: Mask) -> Model | None:
+    """The effects of a finding refitted to some rows; None where these might choose otherwise."""
+    if known is None or not known.model.usable:
+        return None
+    search = search_on(study, rows & ~known.outliers, 3)
+    model = known.model
+    if model.candidates:
+        model = fit(model, search.predictor, search.problem)
+        if not model.usable or not _demanded(search, model):
+            return None
+    else:
+        model = evaluate(model, search.predictor, search.problem)
+    assert model.residual is not None
+    beside = search.screen.beside(model.tangent())
+    more = beside.surprise(beside.drops(model.residual[:, None])[:, 0])
+    return model if float(more.max(initial=0.0)) < search.threshold else None
+
+
+def _demanded(search: Search, model: Model) -> bool:
+    """Whether each effect would be missed, to first order."""
+    assert model.jacobian is not None and model.residual is not None
+    null = np.array([float(p.null or 0.0) / p.scale for c in model.candidates for p in c.parameters])
+    for part, size in zip(model.parts(), model.sizes(), strict=True):
+        others = basis(np.delete(model.jacobian, part, axis=1))
+        own = model.jacobian[:, part] @ (model.values - null)[part]
+        left = model.residual - own
+        drop = float(np.sum((left - others @ (others.T @ left)) ** 2) - model.chi2)
+        if surprise_of(drop, size) < search.threshold:
+            return False
+    return True
+
+
+def _gain(before: Floats, after: Floats, label: NDArray[np.intp]) -> tuple[float, float]:
+    """Mean over folds of the drop of the squared residual per reading, and its standard error."""
+    each = np.array([np.nanmean(before[label == k] ** 2 - after[label == k] ** 2) for k in np.unique(label)])
+    return float(each.mean()), float(each.std(ddof=1) / np.sqrt(len(each)))

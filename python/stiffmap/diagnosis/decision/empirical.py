@@ -1,0 +1,66 @@
+"""An empirical correction of what nothing explains: a Gaussian process, labelled as such.
+
+Position: a smooth field over the commanded position per axis. Deflection: a smooth compliance, i.e. a
+field per force component times that component, plus a smooth field. Judged by poses it has not seen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stiffmap.diagnosis.decision.patterns import unit
+from stiffmap.experiment.comparison.summary import rms
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
+from stiffmap.experiment.noise.folds import folds
+
+LENGTHS = (0.5, 1.0, 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Empirical:
+    """What the correction leaves on held-out poses."""
+
+    before: float
+    after: float
+    """rms of the linear readings, m."""
+    length: float
+    """Correlation length as a share of half the plan's extent."""
+    field: Floats
+    """(n, c) correction at every row, predicted without its pose."""
+
+
+def empirical(experiment: Experiment, residual: Floats, sigma: Floats, seed: int) -> Empirical | None:
+    """The best of a few correlation lengths; None where poses are too few to judge."""
+    label, _ = folds(experiment, seed)
+    if label.max() == 0:
+        return None
+    fields = [(_held(experiment, residual, sigma, label, s), s) for s in LENGTHS]
+    field, length = min(fields, key=lambda f: rms((residual - f[0])[:, :3]))
+    return Empirical(rms(residual[:, :3]), rms((residual - field)[:, :3]), length, field)
+
+
+def _held(e: Experiment, residual: Floats, sigma: Floats, label: Integers, length: float) -> Floats:
+    kernel = covariance(e, length)
+    out = np.full_like(residual, np.nan)
+    for axis in np.flatnonzero(np.isfinite(residual).any(axis=0)):
+        for fold in np.unique(label):
+            train = np.flatnonzero((label != fold) & np.isfinite(residual[:, axis]))
+            test = np.flatnonzero(label == fold)
+            y, noise = residual[train, axis], sigma[train, axis]
+            size = max(float(np.var(y) - np.mean(noise**2)), 0.01 * float(np.mean(noise**2)))
+            v = size * kernel[np.ix_(train, train)] + np.diag(noise**2)
+            out[test, axis] = size * kernel[np.ix_(test, train)] @ np.linalg.solve(v, y)
+    return out
+
+
+def covariance(e: Experiment, length: float) -> Floats:
+    """(n, n) correlation of the field between rows."""
+    x = unit(e.position)
+    distance = ((x[:, None, :] - x[None, :, :]) ** 2).sum(axis=-1)
+    smooth = np.exp(-0.5 * distance / length**2)
+    if e.quantity == "position":
+        return np.asarray(smooth)
+    w = e.wrench / max(float(np.abs(e.wrench).max()), 1e-300)
+    return np.asarray(smooth * (0.2 + w @ w.T))

@@ -1,0 +1,1 @@
+"""Effects with values: fitted by least squares through the full equilibrium, with intervals."""

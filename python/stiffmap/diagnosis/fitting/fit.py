@@ -1,0 +1,149 @@
+"""Weighted nonlinear least squares through the full equilibrium.
+
+Gauss–Newton with bounds; the Jacobian comes from differences once and is kept up to date by Broyden's
+rank-one formula, since readings are nearly linear in the parameters and predictions are what costs.
+It is taken afresh where a step does not pay or the fit was not nearly linear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from stiffmap.diagnosis.fitting.model import Model, tangent_step
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.prediction.predict import Predictor
+
+PAYS = 1e-3
+"""Change of chi-square that is not worth another step."""
+STEPS, FRESH = 12, 3
+DAMPING = 0.01
+"""Levenberg's term, per scale: a parameter that the readings hardly feel stays where it is."""
+
+Residual = Callable[[Floats], Floats]
+
+
+def fit(model: Model, predictor: Predictor, problem: Problem, *, fixed: Sequence[int] = ()) -> Model:
+    """The model with the values that minimise chi-square; `fixed` indices stay.
+
+    Its residual and Jacobian belong to these values. Where the machine cannot be built or solved with
+    them chi2 is infinite, residual and Jacobian are None and `problem` says why; values stay within
+    their bounds.
+    """
+    free = np.array([i for i in range(len(model.values)) if i not in {*fixed, *model.held}], dtype=np.intp)
+    model = replace(model, values=np.clip(model.values, *model.bounds()))
+    try:
+        return _descend(model, predictor, problem, free)
+    except StiffmapError as error:
+        return replace(model, chi2=np.inf, residual=None, jacobian=None, failure=str(error))
+
+
+def evaluate(model: Model, predictor: Predictor, problem: Problem) -> Model:
+    """Residual, Jacobian and chi2 of the model as it is."""
+    r = problem.residual(predictor(model.terms()))
+    free = np.array([i for i in range(len(model.values)) if i not in model.held], dtype=np.intp)
+    j = np.zeros((len(r), len(model.values)))
+    j[:, free] = jacobian(model, model.values, predictor, problem, free)
+    return replace(model, chi2=float(r @ r), residual=r, jacobian=j)
+
+
+def _descend(model: Model, predictor: Predictor, problem: Problem, free: NDArray[np.intp]) -> Model:
+    low, high = model.bounds()
+    x = model.values
+
+    def residual(values: Floats) -> Floats:
+        return problem.residual(predictor(model.terms(values)))
+
+    def tried_residual(values: Floats) -> Floats:
+        """A step to where the machine cannot be built is one that does not pay."""
+        try:
+            return residual(values)
+        except StiffmapError:
+            return np.full(len(problem), np.inf)
+
+    r, j, age = residual(x), jacobian(model, x, predictor, problem, free), 0
+    for _ in range(STEPS if free.size else 0):
+        step = np.zeros_like(x)
+        step[free] = _bounded(j, r, (low - x)[free], (high - x)[free])
+        if promised(j, r, step[free]) < PAYS:
+            break
+        moved, tried = _shorten(tried_residual, x, step, r)
+        gain = float(r @ r - tried @ tried)
+        if gain > 0:
+            s = (moved - x)[free]
+            j, x, r, age = j + np.outer(tried - r - j @ s, s) / (s @ s), moved, tried, age + 1
+        if gain > PAYS and age < FRESH:
+            continue
+        if age == 0 or (gain <= PAYS and age < 2):
+            break
+        j, age = jacobian(model, x, predictor, problem, free), 0
+    full = np.zeros((len(r), len(x)))
+    full[:, free] = j
+    return replace(model, values=x, chi2=float(r @ r), residual=r, jacobian=full, failure="")
+
+
+def _bounded(j: Floats, r: Floats, low: Floats, high: Floats) -> Floats:
+    """Step that minimises |r + J step| within the bounds."""
+    norm = np.linalg.norm(j, axis=0)
+    unit = np.where(norm > 0, norm, 1.0)
+    margin = 1e-12 * (1.0 + np.abs(low) + np.abs(high))
+    damped = np.vstack([j / unit, np.diag(DAMPING / unit)])
+    found = lsq_linear(
+        damped,
+        -np.append(r, np.zeros(len(norm))),
+        (np.minimum(low, 0) * unit - margin, np.maximum(high, 0) * unit + margin),
+    )
+    return np.asarray(np.clip(found.x / unit, low, high))
+
+
+def promised(j: Floats, r: Floats, step: Floats) -> float:
+    """Drop of chi-square that the linear model promises of a step."""
+    return float(r @ r - np.sum((r + j @ step) ** 2))
+
+
+def _shorten(residual: Residual, x: Floats, step: Floats, r: Floats) -> tuple[Floats, Floats]:
+    """The step, halved until it does not make things worse; the old place where none helps."""
+    before = float(r @ r)
+    for _ in range(4):
+        moved = x + step
+        tried = residual(moved)
+        if float(tried @ tried) < before:
+            return moved, tried
+        step = step / 2
+    return x, r
+
+
+def jacobian(
+    model: Model, values: Floats, predictor: Predictor, problem: Problem, which: NDArray[np.intp]
+) -> Floats:
+    """(N, len(which)) change of the whitened residual per unit of each value."""
+    here = problem.check(predictor(model.terms(values)))
+    _, high = model.bounds()
+    columns = []
+    for i in which:
+        step = tangent_step(values, int(i), high[i])
+        there, step = _beside(model, values, int(i), step, predictor, problem)
+        columns.append(-problem.white((there - here) / step))
+    return np.column_stack(columns) if columns else np.zeros((len(problem), 0))
+
+
+def _beside(
+    model: Model, values: Floats, i: int, step: float, predictor: Predictor, problem: Problem
+) -> tuple[Floats, float]:
+    """Prediction with value i moved by the step, or by its opposite where the machine cannot be built or solved."""
+    low, _ = model.bounds()
+    moved = values.copy()
+    moved[i] += step
+    try:
+        return problem.check(predictor(model.terms(moved))), step
+    except StiffmapError:
+        moved[i] -= 2 * step
+        if moved[i] < low[i]:
+            raise
+        return problem.check(predictor(model.terms(moved))), -step

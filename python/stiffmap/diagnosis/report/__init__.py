@@ -1,0 +1,1 @@
+"""What a diagnosis returns, in words, pictures and one HTML page."""

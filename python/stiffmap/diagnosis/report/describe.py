@@ -1,0 +1,103 @@
+"""Models to named effects with intervals, aliases and definitions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stiffmap.diagnosis.candidates.candidates import Candidate
+from stiffmap.diagnosis.fitting.fit import fit
+from stiffmap.diagnosis.fitting.interval import intervals
+from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.diagnosis.report.findings import Effect
+from stiffmap.diagnosis.search.alias import AliasClass
+from stiffmap.diagnosis.search.selection import Search, surprise_of
+from stiffmap.diagnosis.search.significance import global_p
+from stiffmap.diagnosis.search.study import Study
+from stiffmap.effects import Placed, registry
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.level import Mask
+
+
+def named_effects(study: Study, search: Search, model: Model, inflation: float = 1.0) -> list[Effect]:
+    """The effects of a model, values and 95 % intervals in SI."""
+    if not model.candidates:
+        return []
+    ends = intervals(model, search.predictor, search.problem, inflation)
+    limits = ends.values * model.scales[:, None]
+    return [
+        Effect(
+            candidate.kind,
+            candidate.element,
+            candidate.legs,
+            _parameters(study, candidate, model.si[part], limits[part]),
+            aliases_of(study.classes, candidate),
+            _evidence(search, model, i),
+            definition(candidate),
+            _open_ends(candidate, ends.found[part]),
+        )
+        for i, (candidate, part) in enumerate(zip(model.candidates, model.parts(), strict=True))
+    ]
+
+
+def _open_ends(candidate: Candidate, found: Mask) -> tuple[str, ...]:
+    """Ends of intervals that were not found: ``scale upper``."""
+    names = [f"{p.name} {side}" for p in candidate.parameters for side in ("lower", "upper")]
+    return tuple(n for n, ok in zip(names, found.ravel(), strict=True) if not ok)
+
+
+def _parameters(
+    study: Study, candidate: Candidate, values: Floats, limits: Floats
+) -> dict[str, tuple[float, float, float, str]]:
+    out = {
+        p.name: (float(v), float(low), float(high), p.unit)
+        for p, v, (low, high) in zip(candidate.parameters, values, limits, strict=True)
+    }
+    return out | _derived(study, candidate, np.column_stack([values, limits]))
+
+
+def _derived(study: Study, candidate: Candidate, rows: Floats) -> dict[str, tuple[float, float, float, str]]:
+    effect = registry.get(candidate.kind)
+    if effect.derived is None or len(rows) != 1:
+        return {}
+    found = [
+        effect.derived(
+            study.description,
+            Placed(candidate.kind, candidate.element, candidate.legs, {candidate.parameters[0].name: v}, {}),
+        )
+        for v in rows[0]
+    ]
+    at = effect.parameters_at(study.description, candidate.element, candidate.legs)
+    units = {p.name: p.unit for p in at}
+    return {
+        n: (found[0][n], min(found[1][n], found[2][n]), max(found[1][n], found[2][n]), units.get(n, ""))
+        for n in found[0]
+    }
+
+
+def _evidence(search: Search, model: Model, i: int) -> dict[str, float]:
+    reduced = fit(model.without(i), search.predictor, search.problem)
+    drop = reduced.chi2 - model.chi2
+    surprise = surprise_of(drop, len(model.candidates[i].parameters))
+    return {"chi2_drop": drop, "minus_ln_p": surprise, "p_global": global_p(surprise, search.searches)}
+
+
+def aliases_of(classes: Sequence[AliasClass], candidate: Candidate) -> list[dict[str, Any]]:
+    """Members of the candidate's class, then candidates with more parameters that contain it."""
+    for c in classes:
+        if c.representative == candidate:
+            return [as_place(m) for m in (*c.members, *c.generalisations)]
+    return []
+
+
+def as_place(candidate: Candidate) -> dict[str, Any]:
+    """Kind, element, legs."""
+    return {"kind": candidate.kind, "element": candidate.element, "legs": list(candidate.legs)}
+
+
+def definition(candidate: Candidate) -> str:
+    """What the effect is, its pivot, frame and what moves with it."""
+    e = registry.get(candidate.kind)
+    return f"{e.doc} Pivot: {e.pivot}. Frame: {e.frame}. Moves: {e.moves}."

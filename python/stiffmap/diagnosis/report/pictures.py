@@ -1,0 +1,203 @@
+"""Figures of a diagnosis, each with its units."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from stiffmap.diagnosis.report.findings import Findings
+from stiffmap.experiment.comparison.pictures import vector_cases
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.machine import Machine
+
+UM, MM = 1e6, 1e3
+BEFORE, AFTER = "#c1432e", "#2a6f97"
+
+
+def figures(d: Findings) -> dict[str, Figure]:
+    """All figures by the names of their files."""
+    made = {"residual_vectors": vectors(d)} if d.experiment.axis_read[:3].any() else {}
+    made |= {"residual_trends": trends(d), "residual_histogram": histogram(d)}
+    if d.effects:
+        made["maps"] = maps(d)
+    if d.unexplained and d.empirical:
+        made["unexplained"] = left(d)
+    return made
+
+
+def left(d: Findings) -> Figure:
+    """What is left of the worst axis over the workspace, and the empirical field that would remove it."""
+    assert d.empirical is not None
+    names = [c.name for c in d.experiment.channels]
+    named = [p.axis for p in d.unexplained if p.axis in names[:3]]
+    axis = names.index(named[0]) if named else 0
+    figure = Figure(figsize=(11, 6.4), layout="constrained")
+    at = _pose_means(d.experiment, d.experiment.position) * MM
+    shown = [
+        _pose_means(d.experiment, _kept(d, v))[:, axis] * UM for v in (d.residual_after, d.empirical.field)
+    ]
+    top = max(float(np.nanmax(np.abs(v))) for v in shown)
+    titles = (f"left in {names[axis]}, mean of each pose", "empirical field, from the other poses")
+    grid = figure.subplots(2, 3)
+    for row, (title, values) in enumerate(zip(titles, shown, strict=True)):
+        for column, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
+            ax = grid[row, column]
+            dots = ax.scatter(at[:, a], at[:, b], c=values, cmap="coolwarm", vmin=-top, vmax=top, s=36)
+            ax.set(xlabel=f"{'xyz'[a]} / mm", ylabel=f"{'xyz'[b]} / mm", title=title if column == 1 else "")
+        figure.colorbar(dots, ax=list(grid[row]), label=f"{names[axis]} / µm")
+    return figure
+
+
+def vectors(d: Findings) -> Figure:
+    """Mean residual vector of each pose, before and after, on one scale."""
+    figure = Figure(figsize=(10, 4.6), layout="constrained")
+
+    # of loads along x, y or z, turned to one sign (else + and - would cancel), those that leave most
+    def seen(values: Floats, weight: Floats) -> Floats:
+        return _pose_means(d.experiment, _kept(d, values) * weight[:, None])
+
+    both = [
+        (name, seen(d.residual_before, w), seen(d.residual_after, w))
+        for name, w in vector_cases(d.experiment)
+    ]
+    case, before, after = max(both, key=lambda b: float(np.nansum(b[1][:, :3] ** 2)))
+    at = _pose_means(d.experiment, d.experiment.position) * MM
+    longest = max(float(np.linalg.norm(np.nan_to_num(before[:, :3]), axis=1).max()), 1e-12)
+    scale = 0.25 * max(float(np.ptp(at)), 1.0) / longest
+    for i, (name, r, colour) in enumerate((("before", before, BEFORE), ("after", after, AFTER))):
+        axes = figure.add_subplot(1, 2, i + 1, projection="3d")
+        v = np.nan_to_num(r[:, :3]) * scale
+        axes.quiver(*at.T, *v.T, color=colour, linewidth=1.2)
+        axes.scatter(*at.T, s=6, color="0.4")
+        axes.set(
+            xlabel="x / mm", ylabel="y / mm", zlabel="z / mm", title=f"{name}: mean residual of each pose"
+        )
+    figure.text(
+        0.5,
+        0.005,
+        f"longest arrow before: {longest * UM:.1f} µm{'; ' + case if case else ''}",
+        ha="center",
+        fontsize=9,
+    )
+    return figure
+
+
+def trends(d: Findings) -> Figure:
+    """Residual of each channel against what may drive it."""
+    against = _drivers(d.experiment)
+    axes_read = [int(i) for i in np.flatnonzero(d.experiment.axis_read)]
+    channels = d.experiment.channels
+    figure = Figure(figsize=(2.6 * len(against), 2.2 * len(axes_read) + 0.6), layout="constrained")
+    grid = figure.subplots(len(axes_read), len(against), squeeze=False, sharex="col", sharey="row")
+    for row, axis in enumerate(axes_read):
+        for column, (name, x) in enumerate(against):
+            ax = grid[row][column]
+            for values, colour, label in (
+                (d.residual_before, BEFORE, "before"),
+                (d.residual_after, AFTER, "after"),
+            ):
+                ax.plot(x, _kept(d, values)[:, axis] * UM, ".", ms=3, color=colour, alpha=0.6, label=label)
+            ax.axhline(0, color="0.5", lw=0.6)
+            if column == 0:
+                ax.set_ylabel(f"{channels[axis].name} / {'µm' if channels[axis].unit == 'm' else 'µrad'}")
+            if row == len(axes_read) - 1:
+                ax.set_xlabel(name)
+    grid[0][0].legend(fontsize=8)
+    figure.suptitle("Residual: reading minus prediction")
+    return figure
+
+
+def _drivers(e: Experiment) -> list[tuple[str, Floats]]:
+    out = [(f"{c} / mm", e.position[:, i] * MM) for i, c in enumerate("xyz")]
+    out += [(f"f{c} / N", e.wrench[:, i]) for i, c in enumerate("xyz") if e.wrench[:, i].any()]
+    out += [("order", e.order)] if e.order is not None else []
+    out += [("temperature", e.temperature)] if e.temperature is not None else []
+    out += (
+        [("branch: 0 loading, 1 unloading", np.array([b == "unloading" for b in e.branch], float))]
+        if e.branch
+        else []
+    )
+    return out
+
+
+def histogram(d: Findings) -> Figure:
+    """Residuals over the noise floor, beside the normal distribution that noise alone would give."""
+    figure = Figure(figsize=(6, 3.4), layout="constrained")
+    ax = figure.subplots()
+    floor = np.array([d.noise.floor.get(c.name, np.nan) for c in d.experiment.channels])
+    both = [(_kept(d, r) / floor) for r in (d.residual_before, d.residual_after)]
+    width = min(12.0, max(4.0, float(np.nanpercentile(np.abs(both[0]), 99))))
+    bins = np.linspace(-width, width, 61)
+    for z, colour, label in zip(both, (BEFORE, AFTER), ("before", "after"), strict=True):
+        ax.hist(
+            np.clip(z[np.isfinite(z)], bins[0], bins[-1]),
+            bins.tolist(),
+            density=True,
+            histtype="step",
+            color=colour,
+            label=label,
+            lw=1.5,
+        )
+    ax.plot(bins, np.exp(-(bins**2) / 2) / np.sqrt(2 * np.pi), color="0.4", ls="--", label="noise alone")
+    ax.set(xlabel="residual / noise floor (standard deviations)", ylabel="density")
+    ax.legend()
+    return figure
+
+
+def maps(d: Findings) -> Figure:
+    """Error over a z-plane: declared machine, corrected machine, and what changes."""
+    x, y, force, one, other = plane_errors(d)
+    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    axes = figure.subplots(1, 3)
+    top = float(np.nanmax([np.nanmax(np.linalg.norm(v, axis=-1)) for v in (one, other)])) * MM
+    titles = ("declared machine", "corrected machine", "difference of the two")
+    for ax, title, v in zip(axes, titles, (one, other, other - one), strict=True):
+        size = np.linalg.norm(v, axis=-1) * MM
+        limit = {} if title.startswith("difference") else {"vmin": 0.0, "vmax": top}
+        shade = ax.pcolormesh(x * MM, y * MM, size, shading="nearest", cmap="viridis", **limit)
+        figure.colorbar(shade, ax=ax, label="|error| / mm")
+        ax.set(title=title, xlabel="x / mm", ylabel="y / mm", aspect="equal")
+    load = "no force" if not force.any() else "force (" + ", ".join(f"{f:.0f}" for f in force[:3]) + ") N"
+    figure.suptitle(f"Error of the TCP over the plane z = {_middle(d.declared)[2] * MM:.0f} mm, {load}")
+    return figure
+
+
+def plane_errors(d: Findings, count: int = 25) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """x, y (count), the force (6,), and errors (count, count, 3) m before and after."""
+    low, high = d.declared.workspace
+    x, y = np.linspace(low[0], high[0], count), np.linspace(low[1], high[1], count)
+    gx, gy = np.meshgrid(x, y)
+    position = np.stack([gx, gy, np.full_like(gx, _middle(d.declared)[2])], axis=-1)
+    one, other, force = _worst_force(d, position)
+    return x, y, force, one, other
+
+
+def _worst_force(d: Findings, position: Floats) -> tuple[Floats, Floats, Floats]:
+    """Of the forces used, along x, y or z, the one under which the machines differ most."""
+    size = float(np.abs(d.experiment.wrench[:, :3]).max())
+    tried = [np.append(size * axis, np.zeros(3)) for axis in np.eye(3)] if size > 0 else [np.zeros(6)]
+    pairs = [(_errors(d.declared, position, w), _errors(d.machine, position, w), w) for w in tried]
+    return max(pairs, key=lambda p: float(np.nanmax(np.abs(p[1] - p[0]))))
+
+
+def _errors(machine: Machine, position: Floats, wrench: Floats) -> Floats:
+    solution = machine.solve(position, wrench)
+    return np.where(solution.ok[..., None], solution.displacement[..., :3], np.nan)
+
+
+def _middle(machine: Machine) -> Floats:
+    return np.asarray(machine.workspace.mean(axis=0))
+
+
+def _kept(d: Findings, values: Floats) -> Floats:
+    return np.where(d.set_aside[:, None], np.nan, values)
+
+
+def _pose_means(e: Experiment, values: Floats) -> Floats:
+    number = int(e.groups.max()) + 1
+    good = np.isfinite(values)
+    sums = np.stack(
+        [np.bincount(e.groups, np.where(good, values, 0.0)[:, i], number) for i in range(values.shape[1])]
+    )
+    counts = np.stack([np.bincount(e.groups, good[:, i], number) for i in range(values.shape[1])])
+    return np.asarray(np.where(counts > 0, sums / np.maximum(counts, 1), np.nan).T)

@@ -1,0 +1,34 @@
+"""What `stiffmap.diagnose` returns: the findings, in words and as a report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from os import PathLike
+
+from stiffmap.diagnosis.report.findings import Findings
+from stiffmap.diagnosis.report.sentences import next_step, opening
+from stiffmap.diagnosis.report.wording import five_lines
+from stiffmap.html import titled
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis(Findings):
+    """What a diagnosis found; every number in SI, base axes. Printed, it is the verdict in five lines."""
+
+    def lines(self) -> list[str]:
+        """The verdict in five lines."""
+        return five_lines(self)
+
+    def report(self, path: str | PathLike[str]) -> None:
+        """Write one self-contained HTML file."""
+        from stiffmap.diagnosis.report.page import write_report  # draws, so it loads matplotlib
+
+        write_report(self, path)
+
+    def _repr_html_(self) -> str:
+        lines = "".join(f"<li>{escape(line)}</li>" for line in self.lines())
+        return titled(opening(self), f"<p>{escape(next_step(self))}</p><ul>{lines}</ul>")
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())

@@ -1,0 +1,122 @@
+"""The verdict in plain sentences, in mm, deg and N."""
+
+from __future__ import annotations
+
+from stiffmap.diagnosis.decision.patterns import Pattern
+from stiffmap.diagnosis.report.findings import Effect, Findings
+from stiffmap.diagnosis.rivals.separation import Separation
+
+SHOWN = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
+VERDICTS = {
+    "none": "no effect above the limits of this experiment",
+    "effects": "the declared model lacks the effects below",
+    "ambiguous": "explained, but not by one explanation alone",
+    "unattributed": "real structure that no known effect explains",
+    "effects+unattributed": "explained in part; real structure remains",
+}
+
+
+def five_lines(d: Findings) -> list[str]:
+    """Verdict, effects, before and after, noise, and what could not be seen; then the calibration, if any."""
+    return [
+        f"verdict: {d.verdict} - {VERDICTS[d.verdict]}",
+        "effects: " + ("; ".join(effect_text(e) for e in d.effects) or "none") + _others(d),
+        f"held-out readings: rms {1e3 * d.before.rms:.4f} mm before, {1e3 * d.after.rms:.4f} mm after "
+        f"(noise floor {1e3 * d.noise.rms:.4f} mm, ratio {d.after.ratio:.3f}, n = {d.after.n})",
+        _left(d),
+        _limits(d),
+        *_more(d),
+    ]
+
+
+def _more(d: Findings) -> list[str]:
+    """Share explained beside a rest, the calibration below the effects, what is not named and why."""
+    out = []
+    if d.unexplained:
+        h = d.held_out
+        gain = ""
+        if h is not None and h.gain is not None and d.effects:
+            gain = f"; held-out gain {h.gain[0]:.3g} ± {h.gain[1]:.2g} noise variances per reading"
+        all_ = 1.0 - (d.after.rms / d.before.rms) ** 2 if d.before.rms > 0 else 0.0
+        out.append(
+            f"explained: {100 * all_:.1f} % of the squares as declared, {100 * d.explained:.1f} % of the misfit "
+            f"by effects{gain}"
+        )
+    if d.calibration is not None:
+        c = d.calibration
+        out += [f"calibration: {c.verdict}, {c.rank} directions told", *c.lines()[1 : 1 + len(c.beyond)]]
+        out += [line for line in c.lines() if line.startswith(("groups:", "model-form"))]
+    out += [f"not named: {why}" for why in d.refused]
+    if d.stopped:
+        out.append("stopped early: this is the best so far")
+    return out
+
+
+def shown(value: float, unit: str) -> str:
+    """A number in the units of the screen."""
+    factor, name = SHOWN.get(unit, (1.0, unit))
+    return f"{value * factor:.4g} {name}" if name != "1" else f"{value:.4g}"
+
+
+def effect_text(e: Effect) -> str:
+    """``compliance of actuator, leg z: scale 2.148 [2.137, 2.159]``."""
+    legs = f", leg{'s' if len(e.legs) > 1 else ''} {', '.join(e.legs)}" if e.legs else ""
+    values = []
+    for name, (value, low, high, unit) in e.parameters.items():
+        factor, label = SHOWN.get(unit, (1.0, unit))
+        text = f"{name} {value * factor:.4g} [{low * factor:.4g}, {high * factor:.4g}]"
+        values.append(text if label == "1" else f"{text} {label}")
+    n = len(e.aliases)
+    same = f" (cannot be told from {n} {'alias' if n == 1 else 'aliases'})" if n else ""
+    return f"{e.kind} of {e.element}{legs}: {', '.join(values)}{same}"
+
+
+def separation_text(s: Separation) -> str:
+    """Where, load, axis, how many."""
+    where = ", ".join(f"{1e3 * v:.0f}" for v in s.position)
+    load = ", ".join(f"{v:.0f}" for v in s.force)
+    many = (
+        f"{s.readings} reading{'s' if s.readings != 1 else ''}"
+        if s.readings
+        else "no sensible number of readings"
+    )
+    gap = f"{1e3 * s.difference:.4f} mm"
+    return f"read {s.axis} at ({where}) mm under force ({load}) N: they differ by {gap}, {many}"
+
+
+def _others(d: Findings) -> str:
+    if not d.alternatives:
+        return ""
+    other = " or ".join(
+        " + ".join(f"{e.kind} of {e.element} {' '.join(e.legs)}" for e in a) for a in d.alternatives
+    )
+    return f" -- or instead: {other}"
+
+
+def _left(d: Findings) -> str:
+    if d.unexplained:
+        p = d.unexplained[0]
+        more = (
+            f"; an empirical correction would leave {1e3 * d.empirical.after:.4f} mm" if d.empirical else ""
+        )
+        detail = f", {p.detail}" if p.detail else ""
+        return f"unexplained: {p.what} in {p.axis} (chance {p.p:.1g}){detail}{_place(p)}{more}"
+    if d.separations:
+        return f"to separate: {separation_text(d.separations[0])}"
+    out = f"{len(d.outliers)} outliers listed" if d.outliers else "no outliers"
+    return f"nothing unexplained: lack of fit p = {d.noise.lack_of_fit_after:.2g}; {out}"
+
+
+def _place(p: Pattern) -> str:
+    if p.position is None:
+        return ""
+    where = ", ".join(f"{1e3 * v:.0f}" for v in p.position)
+    return f"; largest at ({where}) mm, {shown(p.size, 'rad' if p.axis.startswith('r') else 'm')} rms"
+
+
+def _limits(d: Findings) -> str:
+    if d.limitations:
+        return "limits: " + "; ".join(d.limitations[:3])
+    return (
+        f"could see: {len(d.detectable)} effects; could not see: {len(d.unobservable)} (listed in the report)"
+    )

@@ -1,0 +1,58 @@
+"""The calibration below the effects: declared numbers are uncertain, and effects come on top of them."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stiffmap.calibration import Calibration, Calibrator
+from stiffmap.calibration.statistics import Sums
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.noise.level import Mask, Noise
+from stiffmap.experiment.noise.whitening import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Uncertain numbers of a machine under a plan, and what is known of the noise above them."""
+
+    columns: Floats
+    """(n, c, p) change of the readings per standard uncertainty of each."""
+    bent: Floats
+    """(n, c) what the calibrated prediction has beyond the linear one; taken out of the readings."""
+    noise: Noise
+    """With the model-form floor in it."""
+    out: Mask
+    """(n,) rows set aside by the calibration."""
+    calibration: Calibration
+
+    @staticmethod
+    def of(found: Calibrator, calibration: Calibration, floor: float = 0.0) -> Layer:
+        """The layer of a calibration; `floor` is the variance of what no model explains, in noise variances."""
+        s, fit = found.sensitivity, found.fit
+        bent = fit.prediction - s.base - s.columns @ fit.values
+        noise = raised(found.noise, floor)
+        return Layer(s.columns, np.nan_to_num(bent), noise, found.out, calibration)
+
+    @property
+    def digest(self) -> str:
+        """Of the uncertain numbers, for what is kept per plan."""
+        return hashlib.sha256(np.ascontiguousarray(self.columns).tobytes()).hexdigest()
+
+    def straight(self, experiment: Experiment) -> Experiment:
+        """The readings less what is not linear in the uncertain numbers."""
+        return experiment.with_readings(experiment.reading - self.bent)
+
+    def part(self, problem: Problem, residual: Floats) -> Floats:
+        """(n, c) what the uncertain numbers say best of a residual, from the rows of the problem."""
+        bare = problem.exact
+        white = bare.white(self.columns)
+        return np.asarray(self.columns @ Sums.of(white, bare.white(np.nan_to_num(residual))).estimate)
+
+
+def raised(noise: Noise, floor: float) -> Noise:
+    """The noise with what no model explains added, `floor` noise variances."""
+    factor = float(np.sqrt(1.0 + floor))
+    return replace(noise, floor=noise.floor * factor, sigma=noise.sigma * factor)

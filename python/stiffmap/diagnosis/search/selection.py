@@ -1,0 +1,214 @@
+"""Selection of effects: forward, exchange, backward; significance over the whole search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.diagnosis.candidates.candidates import Candidate, clash
+from stiffmap.diagnosis.candidates.periodic import is_periodic
+from stiffmap.diagnosis.candidates.sensitivity import Variant
+from stiffmap.diagnosis.clock import Clock
+from stiffmap.diagnosis.fitting.fit import evaluate, fit
+from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.diagnosis.search.screen import Screen, log_surprise
+from stiffmap.diagnosis.search.significance import ALPHA, needed
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.prediction.predict import Predictor
+
+MOST_EFFECTS = 4
+LARGE = 10.0
+"""Scales beyond which parameters without a slope at the null get starts of their own."""
+WORTH = 0.5
+"""Share of the surprise demanded that screening must promise before anything is fitted."""
+MARGIN, CLOSE = 15.0, 0.05
+"""What linear screening may be wrong by: candidates this near the best get a full fit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What a selection works with."""
+
+    predictor: Predictor
+    problem: Problem
+    screen: Screen
+    """Representatives of the alias classes only, beside an empty model."""
+    searches: float
+    """Number of independent tests that the search is worth."""
+    finalists: int = 5
+    alpha: float = ALPHA
+    clock: Clock = field(default_factory=Clock)
+    failed: dict[str, str] = field(default_factory=dict)
+    """Candidates whose fit failed, and why; the search goes on without them."""
+
+    @property
+    def threshold(self) -> float:
+        """Surprise that an effect must have."""
+        return needed(self.searches, self.alpha)
+
+
+@dataclass(frozen=True, eq=False)
+class Finalist:
+    """A candidate tried through the full equilibrium beside the effects in the model."""
+
+    model: Model
+    drop: float
+    surprise: float
+    """-ln of the chance of such a drop under the model without it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The model chosen, and what was tried on the way."""
+
+    model: Model
+    null: Model
+    steps: tuple[str, ...] = field(default=())
+
+
+def select(search: Search) -> Selection:
+    """Effects that the readings demand, one after the other."""
+    null = evaluate(Model(), search.predictor, search.problem)
+    model = null
+    steps: list[str] = []
+    try:
+        for _ in range(MOST_EFFECTS):
+            if search.clock.over:
+                break
+            search.clock.say(f"an effect beside {steps[-1]}" if steps else "a first effect")
+            best = best_addition(search, model)
+            if best is None or best.surprise < search.threshold:
+                break
+            model = best.model
+            model = backward(search, exchange(search, model))
+            steps.append(" + ".join(map(str, model.candidates)))
+            if steps.count(steps[-1]) > 1:
+                break
+    except KeyboardInterrupt:  # the best so far is an answer
+        search.clock.stop()
+    return Selection(model, null, tuple(steps))
+
+
+def best_addition(search: Search, model: Model) -> Finalist | None:
+    """The candidate that explains most beside the model, judged by full fits of the best few."""
+    found = [f for f in additions(search, model, search.finalists) if f.model.usable]
+    return max(found, key=lambda f: f.surprise, default=None)
+
+
+def additions(search: Search, model: Model, number: int, margin: float = MARGIN) -> list[Finalist]:
+    """Full fits of what screening puts first: within `margin` (or `CLOSE`) of the best."""
+    if model.residual is None:
+        return []
+    screen = search.screen.beside(model.tangent())
+    surprise = screen.surprise(screen.drops(model.residual[:, None])[:, 0])
+    best_of: dict[Candidate, int] = {}
+    for i in np.argsort(-surprise):
+        v = screen.variants[i]
+        if (
+            surprise[i] > 0
+            and v.candidate not in model.candidates
+            and not clash(v.candidate, model.candidates)
+        ):
+            best_of.setdefault(v.candidate, int(i))
+    top = max(surprise, default=0.0)
+    if top < WORTH * search.threshold:
+        return []
+    picked = [i for i in best_of.values() if surprise[i] > top - max(margin, CLOSE * top)]
+    return [_finalist(search, model, screen, i) for i in picked[:number]]
+
+
+def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
+    assert model.residual is not None
+    variant = screen.variants[i]
+    estimate = screen.estimate(i, model.residual)
+    flat = ~np.any(screen.columns(i) != 0.0, axis=0)
+    starts = start_values(variant, estimate, flat)
+    held = np.flatnonzero(flat).tolist() if len(starts) == 1 else []
+    begun = [model.plus(variant.candidate, s, held) for s in starts]
+    fits = [fit(b, search.predictor, search.problem) for b in begun]
+    best = min(fits, key=lambda m: m.chi2)
+    if not best.usable:
+        beside = f" beside {' + '.join(map(str, model.candidates))}" if model.candidates else ""
+        search.failed[f"{variant.candidate}{beside}"] = best.failure
+    drop = model.chi2 - best.chi2
+    return Finalist(best, drop, surprise_of(drop, best.sizes()[-1]))
+
+
+def surprise_of(drop: float, freedom: int) -> float:
+    """-ln of the chance of such a drop of chi-square."""
+    if not np.isfinite(drop):
+        return 0.0
+    return float(log_surprise(np.array(max(drop, 0.0)), np.array(freedom, dtype=np.intp)))
+
+
+def start_values(variant: Variant, estimate: Floats, flat: NDArray[np.bool_]) -> list[Floats]:
+    """Values of all parameters (in scales) to start fits from: null plus the linear estimate.
+
+    `flat` (p,) are parameters that the readings do not feel at the null; beside large values of the
+    others they may, to second order, and to either side.
+    """
+    c = variant.candidate
+    if is_periodic(c):
+        sine, cosine = estimate
+        amplitude, phase = float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
+        given = {"amplitude": amplitude * c.parameters[0].scale, "phase": phase, **dict(variant.shape)}
+        return [np.array([given[p.name] / p.scale for p in c.parameters])]
+    if variant.shape:
+        return [shaped(variant, estimate)]
+    null = np.array([float(p.null or 0.0) / p.scale for p in c.parameters])
+    size = float(np.abs(estimate).max(initial=0.0))
+    aside = [sign * 0.3 * size * flat for sign in (1.0, -1.0)] if flat.any() and size > LARGE else []
+    return [null + estimate, *(null + estimate + a for a in aside)]
+
+
+def shaped(variant: Variant, estimate: Floats) -> Floats:
+    """Linear parameters at null plus estimate, the others as the variant has them (in scales)."""
+    given = dict(variant.shape)
+    given |= {
+        p.name: float(p.null or 0.0) + float(v) * p.scale
+        for p, v in zip(variant.candidate.linear, estimate, strict=True)
+    }
+    return np.array([given[p.name] / p.scale for p in variant.candidate.parameters])
+
+
+def backward(search: Search, model: Model) -> Model:
+    """Drop effects that the others make unnecessary, the least necessary first."""
+    while len(model.candidates) > 1:
+        trials = [
+            fit(model.without(i), search.predictor, search.problem) for i in range(len(model.candidates))
+        ]
+        sizes = model.sizes()
+        surprise = [
+            surprise_of(t.chi2 - model.chi2, n) if t.usable else np.inf
+            for t, n in zip(trials, sizes, strict=True)
+        ]
+        worst = int(np.argmin(surprise))
+        if surprise[worst] > search.threshold:
+            return model
+        model = trials[worst]
+    return model
+
+
+def exchange(search: Search, model: Model) -> Model:
+    """Replace single effects by others while that explains clearly more."""
+    for _ in range(3 if len(model.candidates) > 1 else 0):
+        if search.clock.over:
+            return model
+        better = model
+        for i in range(len(model.candidates)):
+            reduced = fit(model.without(i), search.predictor, search.problem)
+            found = best_addition(search, reduced) if reduced.usable else None
+            if found and score(found.model, search.problem) > score(better, search.problem) + 1.0:
+                better = found.model
+        if better is model:
+            return model
+        model = better
+    return model
+
+
+def score(model: Model, problem: Problem) -> float:
+    """Log-likelihood less Schwarz's penalty for the number of parameters."""
+    return -0.5 * model.chi2 - 0.5 * model.freedom * float(np.log(max(len(problem), 2)))

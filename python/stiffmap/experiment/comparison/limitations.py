@@ -1,0 +1,81 @@
+"""What makes an experiment unusable, and what it cannot tell."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.noise.level import Noise
+from stiffmap.machine import Machine
+
+FEWEST = 6
+"""Readings: as many as the parameters of the largest effect."""
+
+
+def refuse(experiment: Experiment, base: Floats) -> None:
+    """Raises StiffmapError for poses that the machine cannot reach and for too few readings."""
+    refuse_unreachable(experiment, base)
+    number = int(experiment.read.sum())
+    if number < FEWEST:
+        raise StiffmapError(
+            f"{experiment.name}: {number} readings are fewer than the parameters of an effect "
+            f"and its test need ({FEWEST})"
+        )
+
+
+def refuse_unreachable(experiment: Experiment, base: Floats) -> None:
+    """Raises StiffmapError naming the rows whose readings `base` (n, c) has no prediction for."""
+    failed = np.flatnonzero((experiment.read & ~np.isfinite(base)).any(axis=1))
+    if not failed.size:
+        return
+    rows = ", ".join(experiment.ids[i] for i in failed[:5]) + (" ..." if failed.size > 5 else "")
+    where = ", ".join(f"{1e3 * v:.1f}" for v in experiment.position[failed[0]])
+    raise StiffmapError(
+        f"{experiment.name}: the machine has no equilibrium at {failed.size} row"
+        f"{'s' if failed.size > 1 else ''} (id {rows}; first at ({where}) mm): "
+        "out of reach, or units are wrong"
+    )
+
+
+def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[str]:
+    """What the reader must know, in sentences."""
+    e = experiment
+    out = [f"set aside: {told}" for told in e.out_of_reach]
+    out += [f"contradictory repeats: {c}" for c in noise.contradictions()]
+    if int(e.read.sum()) < FEWEST:
+        out.append(
+            f"{int(e.read.sum())} readings show a residual, but are too few for a diagnosis ({FEWEST})"
+        )
+    if e.groups.max() == 0:
+        out.append(
+            "all rows are one pose: what changes over the workspace cannot be told, nothing is held out"
+        )
+    if not (noise.freedom > 0).any():
+        out.append("no repeats: the declared noise is believed")
+    outside = _outside(e, machine)
+    if outside:
+        out.append(f"{outside} row{'s lie' if outside > 1 else ' lies'} outside the declared workspace")
+    if e.quantity == "deflection" and not e.branch:
+        out.append("no branch column: friction is judged as if every load came from zero")
+    return out + _inside_the_loop(e)
+
+
+def _inside_the_loop(e: Experiment) -> list[str]:
+    """What the metrology loop hides."""
+    out = []
+    if e.loop.instrument_on == "base":
+        out.append("the instrument stands on the base: the base's compliance cannot be seen")
+    elif e.loop.force_against == "base" and e.wrench.any():
+        out.append("the force reacts on the base: the base's compliance cannot be seen")
+    if e.loop.target_on == "platform":
+        out.append("the target is on the platform: the tool holder's compliance cannot be seen")
+    return out
+
+
+def _outside(e: Experiment, machine: Machine) -> int:
+    box = machine.description.workspace
+    if box is None:
+        return 0
+    low, high = np.array(box)
+    return int(((e.position < low - 1e-9) | (e.position > high + 1e-9)).any(axis=1).sum())

@@ -1,0 +1,182 @@
+"""Pictures of a residual: vectors in the workspace, and against what may drive it."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from stiffmap.experiment.comparison.residual import Residual
+from stiffmap.experiment.experiment import Experiment, Floats
+
+UM, MM = 1e6, 1e3
+COLOUR, NOISE, ASIDE = "#2a6f97", "#d9d9d9", "#c1432e"
+MOST_LABELS = 12
+
+Driver = tuple[str, Floats, list[str]]
+"""Label, value of each row, and names of the values where they are classes."""
+
+
+def figures(r: Residual) -> dict[str, Figure]:
+    """All figures by the names of their files; those of columns that the experiment lacks are left out."""
+    drawn = [i for i, any_ in enumerate(r.experiment.axis_read) if any_]
+    groups = {
+        "residual_pose": pose_drivers(r.experiment),
+        "residual_force": force_drivers(r.experiment),
+        "residual_history": history_drivers(r.experiment),
+    }
+    made = {name: against(r, drivers, drawn) for name, drivers in groups.items() if drivers}
+    vector = np.isfinite(_mean(r.experiment, r.values)[:, :3]).all(axis=1).any()
+    return {"residual_vectors": vectors(r)} | made if vector else made
+
+
+def vectors(r: Residual) -> Figure:
+    """Mean residual vector of each pose in three views of the workspace, on one scale.
+
+    Deflections: a row for the loads along x, y and z each, residuals turned with the sign of the force.
+    """
+    e = r.experiment
+    at = _mean(e, e.position) * MM
+    means = [(name, _mean(e, _kept(r)[:, :3] * weight[:, None])) for name, weight in vector_cases(e)]
+    longest = max(1e-12, *(float(np.nanmax(np.linalg.norm(m, axis=1), initial=0.0)) for _, m in means))
+    scale = 0.2 * max(float(np.ptp(at, axis=0).max()), 1.0) / longest
+    figure = Figure(figsize=(11, 3.7 * len(means) + 0.3), layout="constrained")
+    grid = figure.subplots(len(means), 3, squeeze=False)
+    for row, (name, mean) in zip(grid, means, strict=True):
+        for ax, view in zip(row, ((0, 1), (0, 2), (1, 2)), strict=True):
+            _arrows(ax, at, np.nan_to_num(mean) * scale, view)
+        row[1].set_title(name)
+    figure.suptitle(f"{e.name}: mean residual of each pose; longest arrow {longest * UM:.1f} µm")
+    return figure
+
+
+def vector_cases(e: Experiment) -> list[tuple[str, Floats]]:
+    """Name and (n,) weight of the rows, +1 or -1, NaN where a row does not count."""
+    force = e.wrench[:, :3]
+    if e.quantity == "position" or not force.any():
+        return [("", np.ones(len(e)))]
+    main = np.argmax(np.abs(force), axis=1)
+    out = []
+    for a in range(3):
+        value = np.where(main == a, force[:, a], 0.0)
+        if value.any():
+            weight = np.where(value != 0, np.sign(value), np.nan)
+            out.append((f"loads mainly along {'xyz'[a]}, signs turned to +{'xyz'[a]}", weight))
+    return out
+
+
+def _arrows(ax: Any, at: Floats, arrow: Floats, view: tuple[int, int]) -> None:
+    a, b = view
+    ax.quiver(
+        *(at[:, a], at[:, b], arrow[:, a], arrow[:, b]),
+        angles="xy", scale_units="xy", scale=1, color=COLOUR, width=0.006,
+    )  # fmt: skip
+    ax.plot(at[:, a], at[:, b], ".", ms=3, color="0.4")
+    ax.set(xlabel=f"{'xyz'[a]} / mm", ylabel=f"{'xyz'[b]} / mm", aspect="equal")
+    ax.margins(0.15)
+
+
+def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:
+    """Residual of each channel against each driver; the band is two noise floors wide to each side."""
+    figure = Figure(figsize=(2.5 * len(drivers) + 1.0, 1.7 * len(channels) + 0.9), layout="constrained")
+    grid = figure.subplots(len(channels), len(drivers), squeeze=False, sharex="col", sharey="row")
+    for row, channel in enumerate(channels):
+        for column, driver in enumerate(drivers):
+            _scatter(grid[row][column], r, channel, driver)
+        grid[row][0].set_ylabel(_label(r, channel))
+    for column, (name, _, _) in enumerate(drivers):
+        grid[-1][column].set_xlabel(name)
+    aside = "; crosses: rows set aside" if r.set_aside.any() else ""
+    title = (
+        f"{r.experiment.name}: reading minus prediction\ngrey: two standard deviations of the noise{aside}"
+    )
+    figure.suptitle(title, fontsize=9)
+    return figure
+
+
+def _scatter(ax: Any, r: Residual, channel: int, driver: Driver) -> None:
+    _, x, labels = driver
+    values, floor = r.values[:, channel], float(r.noise.floor[channel])
+    scale = UM if r.experiment.channels[channel].unit == "m" else 1e6
+    ax.axhspan(-2 * floor * scale, 2 * floor * scale, color=NOISE, lw=0)
+    ax.axhline(0, color="0.5", lw=0.6)
+    spread = 0.12 * np.sin(np.arange(len(x)) * 2.4) if labels else 0.0
+    ax.plot((x + spread)[~r.set_aside], values[~r.set_aside] * scale, ".", ms=3, color=COLOUR, alpha=0.6)
+    ax.plot((x + spread)[r.set_aside], values[r.set_aside] * scale, "x", ms=5, color=ASIDE)
+    if labels:
+        ax.set_xticks(range(len(labels)), labels, fontsize=7, rotation=30 if len(labels) > 3 else 0)
+        ax.set_xlim(-0.5, len(labels) - 0.5)
+
+
+def _label(r: Residual, channel: int) -> str:
+    c = r.experiment.channels[channel]
+    return f"{c.name} / {'µm' if c.unit == 'm' else 'µrad'}"
+
+
+def pose_drivers(e: Experiment) -> list[Driver]:
+    """Commanded coordinates; actuator coordinates where they are commanded."""
+    out: list[Driver] = [(f"{c} / mm", e.position[:, i] * MM, []) for i, c in enumerate("xyz")]
+    if e.other is not None:
+        out.append(("distance / mm", np.linalg.norm(e.other - e.position, axis=1) * MM, []))
+    for i, c in enumerate(e.command_of):
+        assert e.command is not None
+        unit, scale = ("mm", MM) if c.unit == "m" else ("deg", 180 / np.pi)
+        out.append((f"{c.joint} / {unit}", e.command[:, i] * scale, []))
+    return out
+
+
+def force_drivers(e: Experiment) -> list[Driver]:
+    """Components and size of the force, its direction, and moments."""
+    if not e.wrench.any():
+        return []
+    force = e.wrench[:, :3]
+    out: list[Driver] = [(f"f{c} / N", force[:, i], []) for i, c in enumerate("xyz") if force[:, i].any()]
+    moments = [i for i in range(3, 6) if e.wrench[:, i].any()]
+    out += [(f"m{'xyz'[i - 3]} / N·m", e.wrench[:, i], []) for i in moments]
+    if not force.any():
+        return out
+    out.append(("size of the force / N", np.linalg.norm(force, axis=1), []))
+    return out + _directions(force)
+
+
+def _directions(force: Floats) -> list[Driver]:
+    top = np.abs(force).max(axis=1, keepdims=True)
+    ratio = np.round(force / np.where(top > 0, top, 1.0), 2) + 0.0
+    kinds, at = np.unique(ratio, axis=0, return_inverse=True)
+    if len(kinds) > MOST_LABELS:
+        turn = np.degrees(np.arctan2(force[:, 1], force[:, 0]))
+        return [("direction in the xy plane / deg", turn, [])]
+    return [("direction of the force", at.reshape(-1).astype(float), [direction_name(k) for k in kinds])]
+
+
+def direction_name(ratio: Floats) -> str:
+    """``x``, ``-x+0.5y``, ``none``, from components over the largest."""
+    parts = [f"{v:+g}{a}" for v, a in zip(ratio, "xyz", strict=True) if v]
+    text = re.sub(r"([+-])1([xyz])", r"\1\2", "".join(parts))
+    return text.removeprefix("+") or "none"
+
+
+def history_drivers(e: Experiment) -> list[Driver]:
+    """Order, temperature, branch, set-up."""
+    series = (("order", e.order), ("temperature", e.temperature))
+    out: list[Driver] = [(name, x, []) for name, x in series if x is not None]
+    for name, words in (("branch", e.branch), ("set-up", e.setup)):
+        if words:
+            labels, at = np.unique(words, return_inverse=True)
+            out.append((name, at.reshape(-1).astype(float), [str(w) or "none" for w in labels]))
+    return out
+
+
+def _kept(r: Residual) -> Floats:
+    return np.where(r.set_aside[:, None], np.nan, r.values)
+
+
+def _mean(e: Experiment, values: Floats) -> Floats:
+    """(groups, k) mean of what is finite of each pose."""
+    number, good = int(e.groups.max()) + 1, np.isfinite(values)
+    sums = [np.bincount(e.groups, v, number) for v in np.where(good, values, 0.0).T]
+    counts = [np.bincount(e.groups, g, number) for g in good.T]
+    total, n = np.array(sums).T, np.array(counts).T
+    return np.asarray(np.where(n > 0, total / np.maximum(n, 1), np.nan))

@@ -1,0 +1,1 @@
+"""Experiment files and tables: schema, columns, units, rotations; reading and writing."""

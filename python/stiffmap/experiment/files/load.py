@@ -1,0 +1,204 @@
+"""Reading an experiment folder."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from stiffmap.errors import FileError
+from stiffmap.experiment.channels import AXIS_CHANNELS, DISTANCE, HEIGHT, Channel
+from stiffmap.experiment.experiment import AXES, WRENCH, Experiment, Floats, Loop
+from stiffmap.experiment.files import columns as read_columns
+from stiffmap.experiment.files.orientation import rotations
+from stiffmap.experiment.files.schema import ExperimentFile
+from stiffmap.experiment.files.table import Table, read_table
+from stiffmap.experiment.files.units import ANGLES, Scales
+from stiffmap.files.report import file_error
+from stiffmap.files.schema.base import suggestion
+from stiffmap.yaml_text import Document, read
+
+
+def load_experiment(path: str | PathLike[str]) -> Experiment:
+    """Experiment from a folder with ``experiment.yaml`` and its CSV file, or from the YAML file.
+
+    Raises `FileError` naming file, row, column or key, what was expected and what was found.
+    """
+    place = Path(path)
+    file = place / "experiment.yaml" if place.is_dir() else place
+    if not file.is_file():
+        raise FileError(
+            "there is no such experiment (expected a folder with experiment.yaml)", file=str(place)
+        )
+    document = read(file)
+    model = _validate(document, str(file))
+    table = _rename(read_table(file.parent / model.data), model.columns)
+    seconds = [f"{c}2" for c in model.command if f"{c}2" in table]
+    _known_columns(table, (*model.joints, *model.command, *seconds))
+    return _assemble(model, table, Scales.of(model, str(file)), file)
+
+
+def _validate(document: Document, file: str) -> ExperimentFile:
+    if not isinstance(document.data, dict):
+        raise FileError("an experiment file is a mapping with machine, quantity and units", file=file)
+    try:
+        return ExperimentFile.model_validate(document.data)
+    except ValidationError as error:
+        raise file_error(error, document, file) from error
+
+
+def _rename(table: Table, columns: dict[str, str]) -> Table:
+    """Header with the file's own names replaced: ``columns: {dx: DEFL_X}``."""
+    back = {theirs: ours for ours, theirs in columns.items()}
+    for theirs in back:
+        table.text(theirs)
+    return Table(table.file, tuple(back.get(c, c) for c in table.header), table.rows, table.lines)
+
+
+def _known_columns(table: Table, own: tuple[str, ...]) -> None:
+    for column in own:
+        if column in read_columns.KNOWN:
+            raise FileError(
+                f"joints, command: '{column}' has a meaning of its own; give the column another name",
+                file=table.file,
+                line=1,
+            )
+    known = [*read_columns.KNOWN, *own, *(f"u_{c}" for c in own)]
+    for column in table.header:
+        if column not in known:
+            near = suggestion(column, known)
+            raise FileError(
+                f"unknown column '{column}'{near}; known: {', '.join(known)}", file=table.file, line=1
+            )
+    for column in own:
+        table.text(column)
+
+
+def extra_channels(model: ExperimentFile, table: Table) -> tuple[Channel, ...]:
+    """Distance and joints that the file reads."""
+    joints = [
+        Channel(name, "rad" if j.unit in ANGLES else "m", j.joint, j.side) for name, j in model.joints.items()
+    ]
+    distance = DISTANCE.name in table or "distance" in table
+    height = HEIGHT.name in table or "contact" in table
+    return (*([DISTANCE] if distance else []), *([HEIGHT] if height else []), *joints)
+
+
+def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -> Experiment:
+    extra = extra_channels(model, table)
+    channels = (*AXIS_CHANNELS, *extra)
+    for column in AXES[3:]:
+        for name in (column, f"u_{column}"):
+            if name in table:
+                scales.angle(column)
+    reading = scales.motion(channels) * read_columns.block(table, [c.name for c in channels], blank=True)
+    seen, seen_rotation = read_columns.seen(table, scales), read_columns.seen_rotation(model, table, scales)
+    contact = scales.length * table.numbers("contact", blank=True) if "contact" in table else None
+    apart = scales.length * table.numbers("distance", blank=True) if "distance" in table else None
+    _promise(reading, channels, table, seen, seen_rotation, contact, apart)
+    if not np.isfinite(reading).any():
+        raise FileError(
+            "missing column: no reading (dx, dy, dz, rx, ry, rz, dd, hh, px, py, pz, contact, distance, joints)",
+            file=table.file,
+        )
+    if model.quantity != "position":
+        absolute = [c for c in (*read_columns.ABSOLUTE, HEIGHT.name) if c in table]
+        if absolute:
+            raise FileError(f"column '{absolute[0]}': is a position, no deflection", file=table.file, line=1)
+    gravity, gravity_of = read_columns.gravities(model, table)
+    normal = np.array(model.surface.normal)
+    if not np.linalg.norm(normal) > 0:
+        raise FileError("surface: normal: expected a direction, got three zeros", file=str(file))
+    normal = normal / np.linalg.norm(normal)
+    sigma = read_columns.sigma(model, table, scales, channels)
+    rotation, other_rotation = rotations(table, scales, model.orientation)
+    experiment = Experiment(
+        name=file.parent.name if file.name == "experiment.yaml" else file.stem,
+        machine=model.machine,
+        quantity=model.quantity,
+        ids=read_columns.ids(table),
+        position=read_columns.position(table, scales, bool(model.command)),
+        wrench=_wrench(model, table, scales),
+        reading=reading,
+        sigma=np.where(np.isfinite(reading), sigma, np.nan),
+        extra=extra,
+        rotation=rotation,
+        other=read_columns.other(model, table, scales, reading, channels),
+        other_rotation=other_rotation,
+        rotation_against=model.orientation.against,
+        command=read_columns.command(model, table, scales),
+        command_of=tuple(
+            Channel(n, "rad" if c.unit in ANGLES else "m", c.actuator) for n, c in model.command.items()
+        ),
+        approach=read_columns.approach(table),
+        repeat=read_columns.whole(table, "repeat"),
+        order=table.numbers("order") if "order" in table else None,
+        hours=table.numbers("hours") if "hours" in table else None,
+        temperature=table.numbers("temperature") if "temperature" in table else None,
+        reference_temperature=model.reference_temperature,
+        branch=read_columns.branch(table),
+        setup=read_columns.labels(table, "setup"),
+        instrument=read_columns.labels(table, "instrument"),
+        target=read_columns.labels(table, "target"),
+        other_command=read_columns.other_command(model, table, scales),
+        seen=seen,
+        seen_rotation=seen_rotation,
+        contact=contact,
+        apart=apart,
+        normal=(float(normal[0]), float(normal[1]), float(normal[2])),
+        surface=model.surface.shape,
+        gravity_of=gravity_of,
+        point=model.point,
+        load_point=model.load_point or model.point,
+        points=read_columns.named(table, "point", model.point),
+        load_points=read_columns.named(table, "load_point", model.load_point or model.point),
+        gravity=gravity,
+        zero_sigma=np.nan_to_num(read_columns.declared(model.zero_noise, scales, AXIS_CHANNELS)),
+        unloaded=model.unloaded,
+        frame=model.frame,
+        tool=model.tool,
+        loop=Loop(**model.metrology.model_dump()),
+        title=model.title,
+        source=str(file),
+    )
+    if experiment.unloaded == "approach" and experiment.approach is None:
+        raise FileError(
+            "unloaded: approach needs the columns approach_x, approach_y, approach_z", file=str(file)
+        )
+    return experiment
+
+
+def _promise(
+    reading: Floats,
+    channels: tuple[Channel, ...],
+    table: Table,
+    seen: Floats | None,
+    seen_rotation: Floats | None,
+    contact: Floats | None,
+    apart: Floats | None,
+) -> None:
+    """Marks what absolute columns will read once poses are known; FileError where both forms are given."""
+    at = {c.name: i for i, c in enumerate(channels)}
+    parts = [(seen, AXES[:3]), (seen_rotation, AXES[3:]), (contact, ("hh",)), (apart, ("dd",))]
+    for values, names in parts:
+        if values is None:
+            continue
+        twice = [n for n in names if n in table]
+        if twice:
+            raise FileError(
+                f"column '{twice[0]}': the file has the same reading in coordinates of its own as well; give one",
+                file=table.file,
+                line=1,
+            )
+        good = np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+        for n in names:
+            reading[good, at[n]] = 0.0
+
+
+def _wrench(model: ExperimentFile, table: Table, scales: Scales) -> Floats:
+    given = [c for c in WRENCH if c in table]
+    if model.quantity == "deflection" and not given:
+        raise FileError("missing column: a deflection needs a load (fx, fy, fz, mx, my, mz)", file=table.file)
+    return np.asarray(scales.wrench(given) * read_columns.block(table, WRENCH, blank=False, missing=0.0))

@@ -1,0 +1,125 @@
+"""Commanded orientations of data.csv: rotation vector, quaternion, Euler angles or matrix.
+
+They are rotations *against home* in base axes: a row without them stands as at home, and the commanded
+orientation is R = turn · R_home. A file that gives orientations of the tool itself says
+``orientation: {against: base}``. Only the machine knows its home, so `against_base` comes later.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.errors import FileError
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.files.schema import OrientationModel
+from stiffmap.experiment.files.table import Table
+from stiffmap.experiment.files.units import Scales
+
+VECTOR = ("rotx", "roty", "rotz")
+QUATERNION = ("qw", "qx", "qy", "qz")
+EULER = ("euler1", "euler2", "euler3")
+MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
+FORMS = (VECTOR, QUATERNION, EULER, MATRIX)
+TURNED = tuple(c for form in FORMS for c in form)
+TURNED2 = tuple(f"{c}2" if form is not MATRIX else f"{c}_2" for form in FORMS for c in form)
+UNIT_LENGTH, ORTHONORMAL = 1e-3, 1e-4
+"""How far a quaternion's length, or a matrix from a rotation, may be off: printed digits, no more."""
+
+
+def rotations(
+    table: Table, scales: Scales, model: OrientationModel | None = None
+) -> tuple[Floats | None, Floats | None]:
+    """Orientations (n, 3, 3) of a row and of its second pose, against what `model` says; the second is
+    as the first where the file does not say. Raises `FileError` naming column and row."""
+    given = model or OrientationModel()
+    first, second = (_orientation(table, scales, given, second) for second in (False, True))
+    if second is not None and first is None:
+        first = np.tile(np.eye(3), (len(table.rows), 1, 1))
+    return first, first if second is None else second
+
+
+def against_base(experiment: Experiment, home: Floats) -> Experiment:
+    """The experiment with its orientations as those of the TCP; `home` (3, 3) is that at home."""
+    if experiment.rotation is None or experiment.rotation_against == "base":
+        return replace(experiment, rotation_against="base")
+    second = experiment.other_rotation
+    return replace(
+        experiment,
+        rotation=experiment.rotation @ home,
+        other_rotation=None if second is None else second @ home,
+        rotation_against="base",
+    )
+
+
+def _orientation(table: Table, scales: Scales, model: OrientationModel, second: bool) -> Floats | None:
+    names = dict(zip(TURNED, TURNED2 if second else TURNED, strict=True))
+    forms = [f for f in FORMS if any(names[c] in table for c in f)]
+    if not forms:
+        return None
+    if len(forms) > 1:
+        one, two = names[forms[0][0]], next(names[c] for c in forms[1] if names[c] in table)
+        raise FileError(
+            f"column '{two}': orientations are given twice, as {one} … and as {two} …; keep one",
+            file=table.file,
+            line=1,
+        )
+    form = forms[0]
+    if form is VECTOR:
+        return _vectors(table, scales, [names[c] for c in form], second)
+    cells = np.column_stack([table.numbers(names[c], blank=second) for c in form])
+    empty: Mask = np.asarray(~np.isfinite(cells).all(axis=1))
+    if form is EULER:
+        angles = scales.angle(names[form[0]]) * np.nan_to_num(cells)
+        out = Rotation.from_euler(_sequence(table, model, names[form[0]]), angles).as_matrix()
+    else:
+        out = (_quaternions if form is QUATERNION else _matrices)(table, cells, empty)
+    out[empty] = np.eye(3)
+    return np.ascontiguousarray(out)
+
+
+def _vectors(table: Table, scales: Scales, names: list[str], second: bool) -> Floats:
+    n = len(table.rows)
+    cells = [table.numbers(c, blank=second) if c in table else np.zeros(n) for c in names]
+    vectors = scales.angle(names[0]) * np.nan_to_num(np.column_stack(cells))
+    return np.ascontiguousarray(Rotation.from_rotvec(vectors).as_matrix())
+
+
+def _sequence(table: Table, model: OrientationModel, column: str) -> str:
+    if model.euler is None:
+        raise FileError(
+            f"column '{column}': Euler angles need their convention: orientation: {{euler: XYZ}} for turns "
+            "about x, the turned y, the twice turned z; {euler: xyz} for turns about fixed axes",
+            file=table.file,
+            line=1,
+        )
+    return model.euler
+
+
+def _quaternions(table: Table, cells: Floats, empty: Mask) -> Floats:
+    length = np.linalg.norm(cells, axis=1)
+    wrong = np.flatnonzero(~empty & ~(np.abs(length - 1.0) < UNIT_LENGTH))
+    if wrong.size:
+        raise FileError(
+            f"column 'qw': expected a quaternion of length 1, found {length[wrong[0]]:.6g}",
+            file=table.file,
+            line=table.lines[wrong[0]],
+        )
+    cells = np.where(empty[:, None], [1.0, 0.0, 0.0, 0.0], cells)
+    return np.asarray(Rotation.from_quat(cells[:, [1, 2, 3, 0]]).as_matrix())
+
+
+def _matrices(table: Table, cells: Floats, empty: Mask) -> Floats:
+    r = np.where(empty[:, None], np.eye(3).reshape(-1), cells).reshape(-1, 3, 3)
+    off = np.abs(r @ r.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+    wrong = np.flatnonzero((off > ORTHONORMAL) | (np.linalg.det(r) < 0.0))
+    if wrong.size:
+        raise FileError(
+            f"column 'r11': expected a rotation matrix, found one that is off by {off[wrong[0]]:.2g} "
+            f"(determinant {np.linalg.det(r[wrong[0]]):.3g})",
+            file=table.file,
+            line=table.lines[wrong[0]],
+        )
+    return np.asarray(Rotation.from_matrix(r).as_matrix())

@@ -1,0 +1,191 @@
+"""Writing an experiment as experiment.yaml and data.csv (mm, N, rad)."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.errors import FileError
+from stiffmap.experiment.experiment import AXES, WRENCH, Channel, Experiment, Floats, Loop
+from stiffmap.experiment.files.columns import APPROACH, POSE, POSE2, SEEN, SEEN_TURNED
+from stiffmap.experiment.files.orientation import VECTOR
+from stiffmap.yaml_text import text_of
+
+MM = 1e3
+PLAIN = {"unloaded": "centre", "frame": "known", "tool": "known"}
+WORDS = {
+    "branch": "branch",
+    "setup": "setup",
+    "instrument": "instrument",
+    "target": "target",
+    "point": "points",
+    "load_point": "load_points",
+}
+
+
+def save_experiment(experiment: Experiment, folder: str | PathLike[str], title: str = "") -> None:
+    """Write the folder; raises `FileError` where it cannot be written."""
+    place = Path(folder)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        (place / "experiment.yaml").write_text(text_of(_head(experiment, title)), encoding="utf-8")
+        with (place / "data.csv").open("w", newline="", encoding="utf-8") as stream:
+            columns = _columns(experiment)
+            writer = csv.writer(stream)
+            writer.writerow(columns)
+            writer.writerows(zip(*columns.values(), strict=True))
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror}", file=str(place)) from error
+
+
+def _head(e: Experiment, title: str) -> dict[str, Any]:
+    head: dict[str, Any] = {"title": title or e.title, "machine": e.machine, "quantity": e.quantity}
+    head |= {"point": e.point} | ({"load_point": e.load_point} if e.load_point != e.point else {})
+    head |= {"units": {"length": "mm", "force": "N", "angle": "rad"}}
+    head |= _noise(e) | _own_columns(e)
+    optional = {
+        "gravity": _gravity(e),
+        "reference_temperature": e.reference_temperature,
+    }
+    head |= {k: v for k, v in optional.items() if v is not None}
+    head |= {k: getattr(e, k) for k, plain in PLAIN.items() if getattr(e, k) != plain}
+    if e.rotation is not None and e.rotation_against == "base" and e.command is None:
+        head["orientation"] = {"against": "base"}
+    if any(c.name == "hh" for c in e.extra):
+        head["surface"] = {"normal": list(e.normal), "shape": e.surface}
+    if e.loop != Loop():
+        head["metrology"] = {k: getattr(e.loop, k) for k in ("instrument_on", "target_on", "force_against")}
+    return head
+
+
+def _gravity(e: Experiment) -> Any:
+    """Of all rows, or of each set-up."""
+    if e.gravity_of is None:
+        return None if e.gravity is None else list(e.gravity)
+    return {s: [float(v) for v in g] for s, g in zip(e.setup, e.gravity_of, strict=True)}
+
+
+def _noise(e: Experiment) -> dict[str, Any]:
+    """Declared noise; one that differs from row to row is a column instead."""
+    common = {
+        c.name: float(f"{e.sigma[e.read[:, i], i][0] * _scale(c):.6g}")
+        for i, c in enumerate(e.channels)
+        if not c.joint and e.axis_read[i] and _alike(e, i)
+    }
+    zero = {
+        a: float(f"{s * _scale(c):.6g}") for a, c, s in zip(AXES, e.channels, e.zero_sigma, strict=False) if s
+    }
+    return ({"noise": common} if common else {}) | ({"zero_noise": zero} if zero else {})
+
+
+def _alike(e: Experiment, i: int) -> bool:
+    s = e.sigma[e.read[:, i], i]
+    return bool(np.isfinite(s).all() and np.ptp(s) == 0 and s[0] > 0)
+
+
+def _own_columns(e: Experiment) -> dict[str, Any]:
+    """What an encoder reads and what actuators are commanded by."""
+    joints: dict[str, Any] = {}
+    for i, c in enumerate(e.channels):
+        if c.joint:
+            joints[c.name] = {"joint": c.joint, "unit": _unit(c), "side": c.side}
+            if _alike(e, i):
+                joints[c.name]["noise"] = float(f"{e.sigma[e.read[:, i], i][0] * _scale(c):.6g}")
+    command = {c.name: {"actuator": c.joint, "unit": _unit(c)} for c in e.command_of}
+    return ({"joints": joints} if joints else {}) | ({"command": command} if command else {})
+
+
+def _unit(c: Channel) -> str:
+    return "mm" if c.unit == "m" else "rad"
+
+
+def _scale(c: Channel) -> float:
+    return MM if c.unit == "m" else 1.0
+
+
+def _columns(e: Experiment) -> dict[str, list[Any]]:
+    columns: dict[str, list[Any]] = {"id": list(e.ids)}
+    columns |= _commanded(e) | _loads(e)
+    absolute, told = _absolute(e)
+    columns |= absolute
+    for i, c in enumerate(e.channels):
+        if e.axis_read[i] and c.name not in told:
+            columns[c.name] = _text(e.reading[:, i] * _scale(c))
+            if not _alike(e, i) and np.isfinite(e.sigma[:, i]).any():
+                columns[f"u_{c.name}"] = _text(e.sigma[:, i] * _scale(c))
+    for name, values in (
+        ("repeat", e.repeat),
+        ("order", e.order),
+        ("hours", e.hours),
+        ("temperature", e.temperature),
+    ):
+        if values is not None:
+            columns[name] = _text(np.asarray(values, dtype=float))
+    words = {n: getattr(e, field) for n, field in WORDS.items()}
+    return columns | {n: list(v) for n, v in words.items() if v}
+
+
+def plan_columns(e: Experiment) -> dict[str, list[Any]]:
+    """Columns of a plan's rows, without readings, as `stiffmap simulate --plan` reads them (mm, N, rad)."""
+    loads = {c: v for c, v in _loads(e).items() if e.quantity == "deflection" or any(float(x) for x in v)}
+    words = {n: list(getattr(e, field)) for n, field in WORDS.items() if getattr(e, field)}
+    return {"id": list(e.ids)} | _commanded(e) | loads | words
+
+
+def _absolute(e: Experiment) -> tuple[dict[str, list[Any]], tuple[str, ...]]:
+    """Columns of readings in coordinates of their own, and the channels that they stand for."""
+    columns: dict[str, list[Any]] = {}
+    told: tuple[str, ...] = ()
+    if e.seen is not None:
+        columns |= {c: _text(e.seen[:, i] * MM) for i, c in enumerate(SEEN)}
+        told += AXES[:3]
+    if e.seen_rotation is not None:
+        good = np.asarray(np.isfinite(e.seen_rotation).all(axis=(1, 2)))
+        turns = Rotation.from_matrix(np.where(good[:, None, None], e.seen_rotation, np.eye(3))).as_rotvec()
+        columns |= {c: _text(np.where(good, turns[:, i], np.nan)) for i, c in enumerate(SEEN_TURNED)}
+        told += AXES[3:]
+    for name, values, channel in (("contact", e.contact, "hh"), ("distance", e.apart, "dd")):
+        if values is not None:
+            columns[name] = _text(values * MM)
+            told += (channel,)
+    return columns, told
+
+
+def _commanded(e: Experiment) -> dict[str, list[Any]]:
+    if e.command is not None:
+        out = {c.name: _text(e.command[:, i] * _scale(c)) for i, c in enumerate(e.command_of)}
+        if e.other_command is not None:
+            out |= {
+                f"{c.name}2": _text(e.other_command[:, i] * _scale(c)) for i, c in enumerate(e.command_of)
+            }
+    else:
+        out = {c: _text(e.position[:, i] * MM) for i, c in enumerate(POSE)} | _rotvec(e.rotation, VECTOR)
+    if e.other is not None and e.command is None:
+        out |= {c: _text(e.other[:, i] * MM) for i, c in enumerate(POSE2)}
+        out |= _rotvec(e.other_rotation, [f"{c}2" for c in VECTOR])
+    if e.approach is not None:
+        out |= {c: _text(e.approach[:, i]) for i, c in enumerate(APPROACH)}
+    return out
+
+
+def _rotvec(rotation: Floats | None, names: Sequence[str]) -> dict[str, list[Any]]:
+    if rotation is None:
+        return {}
+    vectors = Rotation.from_matrix(rotation).as_rotvec()
+    return {c: _text(vectors[:, i]) for i, c in enumerate(names)}
+
+
+def _loads(e: Experiment) -> dict[str, list[Any]]:
+    units = [1.0] * 3 + [MM] * 3
+    used = [i for i in range(6) if e.wrench[:, i].any() or (i < 3 and e.quantity == "deflection")]
+    return {WRENCH[i]: _text(e.wrench[:, i] * units[i]) for i in used}
+
+
+def _text(values: Any) -> list[str]:
+    return ["" if np.isnan(v) else f"{v:.9g}" for v in values]

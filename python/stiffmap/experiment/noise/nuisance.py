@@ -1,0 +1,107 @@
+"""What the experiment leaves open and nobody wants to know: frames and zeros, linear columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from stiffmap.experiment.channels import DISTANCE, HEIGHT
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.poses.against_command import setups_of, targets_of
+
+
+def nuisance_columns(experiment: Experiment, base: Floats) -> Floats:
+    """(n, c, q) changes of the readings; `base` (n, c) is the declared machine's prediction."""
+    columns = [c for part in (_zeros, _frames, _tools, _surfaces) for c in part(experiment, base)]
+    return np.stack(columns, axis=-1) if columns else np.zeros((*experiment.reading.shape, 0))
+
+
+def _zeros(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+    """An unknown zero per pose and channel."""
+    if experiment.quantity == "deflection" and experiment.unloaded == "unknown":
+        for group in np.unique(experiment.groups):
+            yield from _per_axis((experiment.groups == group).astype(float), experiment)
+
+
+def _setups(experiment: Experiment) -> Iterator[Floats]:
+    """(n,) 1 where a row belongs to the set-up of an instrument."""
+    label = setups_of(experiment)[0]
+    yield from ((label == s).astype(float) for s in np.unique(label))
+
+
+def _frames(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+    """The instrument's frame, one per set-up; distances and joints do not know it."""
+    if experiment.frame == "known":
+        return
+    for here in _setups(experiment):
+        if experiment.quantity == "position":
+            yield from _per_axis(here, experiment, 6)
+        if experiment.frame == "unknown":
+            yield from _turns(here, experiment, base)
+
+
+def _turns(here: Floats, experiment: Experiment, base: Floats) -> Iterator[Floats]:
+    position = experiment.quantity == "position"
+    for axis in np.eye(3):
+        linear = np.cross(axis, experiment.position if position else base[:, :3])
+        angular = np.broadcast_to(axis, linear.shape) if position else np.cross(axis, base[:, 3:6])
+        yield _wide(experiment, here[:, None] * np.hstack([linear, angular]))
+
+
+def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+    """Where targets sit on the tool: off by a vector that turns with the tool, and turned if that is unknown."""
+    if experiment.tool == "known":
+        return
+    label = targets_of(experiment)[0]
+    for here in ((label == t).astype(float) for t in np.unique(label)):
+        for k in range(3):
+            arm = _tool_axis(experiment.rotation, len(experiment), k)
+            moved = np.cross(np.nan_to_num(base[:, 3:6]), arm)
+            linear = moved + arm if experiment.quantity == "position" else moved
+            column = _wide(experiment, np.hstack([linear, np.zeros_like(linear)]))
+            if DISTANCE in experiment.extra:
+                column[:, experiment.channels.index(DISTANCE)] = _stretch(experiment, arm, k)
+            yield here[:, None] * column
+            if experiment.tool == "unknown" and experiment.quantity == "position":
+                yield here[:, None] * _wide(experiment, np.hstack([np.zeros_like(arm), arm]))
+
+
+def _surfaces(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+    """Height and tilts of the surface that heights are measured against, one per set-up."""
+    if HEIGHT not in experiment.extra or experiment.surface == "known":
+        return
+    across = np.linalg.svd(np.array([experiment.normal]))[2][1:]
+    for here in _setups(experiment):
+        shapes = [np.ones(len(experiment))]
+        if experiment.surface == "unknown":
+            shapes += [experiment.position @ a for a in across]
+        for shape in shapes:
+            column = np.zeros_like(experiment.reading)
+            column[:, experiment.channels.index(HEIGHT)] = here * shape
+            yield column
+
+
+def _tool_axis(rotation: Floats | None, n: int, k: int) -> Floats:
+    return np.tile(np.eye(3)[k], (n, 1)) if rotation is None else np.asarray(rotation[:, :, k])
+
+
+def _stretch(experiment: Experiment, arm: Floats, k: int) -> Floats:
+    """(n,) change of a distance per length of the tool's offset: none where both poses turn alike."""
+    assert experiment.other is not None
+    apart = experiment.other - experiment.position
+    way = apart / np.linalg.norm(apart, axis=1, keepdims=True)
+    change = _tool_axis(experiment.other_rotation, len(experiment), k) - arm
+    return np.asarray(np.nan_to_num(np.sum(way * change, axis=1)))
+
+
+def _wide(experiment: Experiment, axes: Floats) -> Floats:
+    """(n, c) with zero for what is not an axis."""
+    return np.hstack([axes, np.zeros((len(experiment), len(experiment.extra)))])
+
+
+def _per_axis(pattern: Floats, experiment: Experiment, most: int | None = None) -> Iterator[Floats]:
+    for axis in np.flatnonzero(experiment.axis_read[:most]):
+        column = np.zeros_like(experiment.reading)
+        column[:, axis] = pattern
+        yield column

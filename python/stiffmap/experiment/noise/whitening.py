@@ -1,0 +1,162 @@
+"""The readings of an experiment as one whitened vector, nuisances projected out.
+
+Generalised least squares: with the covariance V = L Lᵀ of the readings (independent noise, plus the
+zero that the readings of one pose share) everything is multiplied by L⁻¹, and the nuisances (unknown
+frame, unknown zero of a pose) are projected out once and for all. What is left is unit white noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.noise.nuisance import nuisance_columns
+
+Mask = NDArray[np.bool_]
+FELT = 1e-3
+"""Singular value below which an uncertain number changes no reading."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Kept readings, in the order of rows and axes; N of them."""
+
+    experiment: Experiment
+    sigma: Floats
+    """(n, c) noise floor of each reading."""
+    keep: Mask
+    """(n,) rows in use."""
+    index: tuple[NDArray[np.intp], NDArray[np.intp]]
+    """Row and axis of each of the N readings."""
+    nuisance: Floats
+    """(N, q) orthonormal basis of the whitened nuisances."""
+    blocks: tuple[tuple[NDArray[np.intp], Floats], ...]
+    """Readings that share a zero, and the inverse Cholesky factor of their covariance."""
+    base: Floats
+    """(n, c) prediction of the declared machine."""
+    uncertain: Floats | None = None
+    """(N, k) W: declared numbers that are uncertain make the covariance I + AAᵀ, whose inverse root is
+    I - WWᵀ; None: they are taken as exact."""
+
+    @staticmethod
+    def of(
+        experiment: Experiment,
+        sigma: Floats,
+        base: Floats,
+        keep: Mask | None = None,
+        uncertain: Floats | None = None,
+    ) -> Problem:
+        """Problem of the rows in `keep`; `base` (n, c) is the declared machine's prediction.
+
+        uncertain
+            (n, c, p) change of the readings per standard uncertainty of each number that is uncertain: the
+            readings are then judged with all of them integrated out (docs/theory.md (M1)).
+        """
+        rows = np.ones(len(experiment), bool) if keep is None else keep
+        used = experiment.read & rows[:, None] & np.isfinite(base)
+        at, axis = np.nonzero(used)
+        index = (at.astype(np.intp), axis.astype(np.intp))
+        none = np.zeros((len(index[0]), 0))
+        bare = Problem(experiment, sigma, rows, index, none, _blocks(experiment, sigma, index), base)
+        columns = nuisance_columns(experiment, base)
+        if columns.shape[-1]:
+            q = basis(np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])]))
+            bare = replace(bare, nuisance=q)
+        if uncertain is None or not uncertain.shape[-1]:
+            return bare
+        return replace(bare, uncertain=_root(bare.white(uncertain)))
+
+    def __len__(self) -> int:
+        return len(self.index[0])
+
+    @property
+    def freedom(self) -> int:
+        """Readings minus nuisances."""
+        return len(self) - int(self.nuisance.shape[1])
+
+    @property
+    def groups(self) -> NDArray[np.intp]:
+        """(N,) pose number of each reading."""
+        return self.experiment.groups[self.index[0]]
+
+    def white(self, values: Floats) -> Floats:
+        """(n, c, ...) -> (N, ...): whitened, nuisances projected out."""
+        sigma = self.sigma[self.index]
+        out = values[self.index] / sigma.reshape(-1, *(1,) * (values.ndim - 2))
+        for where, inverse in self.blocks:
+            out[where] = inverse @ values[self.index][where]
+        out = out - self.nuisance @ (self.nuisance.T @ out)
+        if self.uncertain is not None:
+            out = out - self.uncertain @ (self.uncertain.T @ out)
+        return np.asarray(out)
+
+    @property
+    def exact(self) -> Problem:
+        """The problem with the declared numbers taken as exact."""
+        return replace(self, uncertain=None)
+
+    def check(self, prediction: Floats) -> Floats:
+        """The prediction; StiffmapError where a pose that the problem reads could not be solved."""
+        failed = np.isnan(prediction[self.index])
+        if failed.any():
+            rows = np.unique(self.index[0][failed])
+            first = self.experiment.ids[int(rows[0])]
+            raise StiffmapError(
+                f"{len(rows)} rows of the experiment have no equilibrium, the first is '{first}'"
+            )
+        return prediction
+
+    def residual(self, prediction: Floats) -> Floats:
+        """(N,) whitened reading minus prediction; StiffmapError where a pose that it reads failed."""
+        return self.white(self.experiment.reading - self.check(prediction))
+
+
+def nuisance_part(problem: Problem, values: Floats) -> Floats:
+    """(n, c) what the nuisances of best fit say of `values` (n, c); NaN where they are."""
+    columns = nuisance_columns(problem.experiment, problem.base)
+    if not columns.shape[-1]:
+        return np.zeros_like(values)
+    bare = replace(problem.exact, nuisance=np.zeros((len(problem), 0)))
+    white = np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])])
+    size = np.linalg.norm(white, axis=0)
+    scaled = white / np.where(size > 0, size, 1.0)
+    found = np.linalg.lstsq(scaled, bare.white(np.nan_to_num(values)), rcond=1e-9)[0]
+    return np.asarray(columns @ (found / np.where(size > 0, size, 1.0)))
+
+
+def _root(columns: Floats) -> Floats:
+    """(N, k) W with (I - WWᵀ)² = (I + AAᵀ)⁻¹ for whitened columns A (N, p)."""
+    size, vectors = np.linalg.eigh(columns.T @ columns)
+    felt = size > FELT**2
+    q = columns @ (vectors[:, felt] / np.sqrt(size[felt]))
+    return np.asarray(q * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + size[felt])))
+
+
+def basis(columns: Floats, tolerance: float = 1e-9) -> Floats:
+    """Orthonormal basis of the span of columns (N, p), p ≥ rank."""
+    if not columns.shape[1]:
+        return columns
+    norms = np.linalg.norm(columns, axis=0)
+    u, s, _ = np.linalg.svd(columns / np.where(norms > 0, norms, 1.0), full_matrices=False)
+    return np.asarray(u[:, s > tolerance])
+
+
+def _blocks(
+    experiment: Experiment, sigma: Floats, index: tuple[NDArray[np.intp], NDArray[np.intp]]
+) -> tuple[tuple[NDArray[np.intp], Floats], ...]:
+    zero, width = experiment.zeros, len(experiment.channels)
+    if experiment.quantity != "deflection" or not zero.any():
+        return ()
+    out = []
+    key = experiment.groups[index[0]] * width + index[1]
+    for k in np.unique(key):
+        where = np.flatnonzero(key == k)
+        s = zero[k % width]
+        if s > 0:
+            v = np.diag(sigma[index][where] ** 2) + s**2
+            out.append((where, np.linalg.inv(np.linalg.cholesky(v))))
+    return tuple(out)

@@ -1,0 +1,1 @@
+"""Where the machine is commanded in each row, and absolute readings against that."""

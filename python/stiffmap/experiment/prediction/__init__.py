@@ -1,0 +1,1 @@
+"""What the instruments should show: one equilibrium for each different pose and wrench."""

@@ -1,0 +1,208 @@
+"""Motions that every row of a plan would show a perfect instrument."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.description.strain import rests_at_command
+from stiffmap.experiment.channels import DISTANCE, HEIGHT
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.poses.configuration import coordinates_of, in_reach
+from stiffmap.experiment.poses.point_kinematics import point_positions
+from stiffmap.experiment.prediction.joints import joint_channels, joint_motions
+from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
+from stiffmap.experiment.prediction.unloaded_state import lagging, lags, signs
+from stiffmap.machine import Machine
+from stiffmap.options import SolveOptions
+from stiffmap.solution import Solution
+from stiffmap.status import Flag, Status
+
+
+def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> tuple[Floats, int]:
+    """(n, c) m, rad of every row and channel, and how many equilibria were solved.
+
+    Deflection: the loaded minus the unloaded state of the same commanded pose.
+    """
+    if plan.gravity_of is not None:
+        return _by_gravity(machine, plan, threads)
+    if DISTANCE in plan.extra:
+        return _with_distance(machine, plan, threads)
+    if HEIGHT in plan.extra:
+        return _with_height(machine, plan, threads)
+    solver = Solver(rigged(machine, plan.loop), plan, threads)
+    if plan.quantity == "position":
+        return solver.rest() if not plan.wrench.any() else solver.loaded()
+    out, count = solver.loaded()
+    rest, more = solver.rest()
+    return out - rest, count + more
+
+
+def _by_gravity(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
+    """Every row under its own gravity."""
+    assert plan.gravity_of is not None
+    out, count = np.full((len(plan), len(plan.channels)), np.nan), 0
+    for g in np.unique(plan.gravity_of, axis=0):
+        here = np.flatnonzero((plan.gravity_of == g).all(axis=1))
+        part = replace(plan.rows(here), gravity=(float(g[0]), float(g[1]), float(g[2])), gravity_of=None)
+        out[here], more = motions(machine, part, threads)
+        count += more
+    return out, count
+
+
+def _with_height(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
+    """Heights are the motion of the point along the surface's normal."""
+    bare = replace(plan, extra=tuple(c for c in plan.extra if c != HEIGHT))
+    motion, count = motions(machine, bare, threads)
+    at = plan.channels.index(HEIGHT)
+    return np.insert(motion, at, motion[:, :3] @ np.array(plan.normal), axis=1), count
+
+
+def _with_distance(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
+    bare = replace(plan, extra=tuple(c for c in plan.extra if c != DISTANCE), other=None, other_joints=None)
+    here, count = motions(machine, bare, threads)
+    assert plan.other is not None
+    rows = np.flatnonzero(np.isfinite(plan.other).all(axis=1))
+    pair = replace(
+        bare,
+        position=plan.other,
+        rotation=plan.other_rotation,
+        command=plan.other_command,
+        joints=plan.other_joints,
+    ).rows(rows)
+    there, more = motions(machine, pair, threads)
+    start, end = (positions_of(machine, p, targets(machine, p)) for p in (bare.rows(rows), pair))
+    apart = end - start
+    nominal = np.linalg.norm(apart, axis=1)
+    length = np.linalg.norm(apart + there[:, :3] - here[rows, :3], axis=1)
+    out = np.full((len(plan), len(plan.channels)), np.nan)
+    out[:, [plan.channels.index(c) for c in bare.channels]] = here
+    out[rows, plan.channels.index(DISTANCE)] = length - nominal
+    return out, count + more
+
+
+@dataclass(frozen=True, eq=False)
+class Solver:
+    """States of one machine under one plan."""
+
+    machine: Machine
+    plan: Experiment
+    threads: int | None
+
+    def loaded(self) -> tuple[Floats, int]:
+        """(n, c) under the wrenches of the plan."""
+        return self._equilibria(self.machine, self.plan)
+
+    def rest(self) -> tuple[Floats, int]:
+        """(n, c) without the wrenches: in the centre of every gap, or on the side of the approach."""
+        bare = replace(self.plan, wrench=np.zeros_like(self.plan.wrench))
+        sided = self.plan.quantity == "position" or self.plan.unloaded == "approach"
+        if sided and self.plan.approach is not None and lags(self.machine.description):
+            return self._sided(bare)
+        return self._equilibria(self.machine, bare)
+
+    def _sided(self, bare: Experiment) -> tuple[Floats, int]:
+        sign = signs(self.machine, bare)
+        out, count = np.full((len(bare), len(bare.channels)), np.nan), 0
+        for s in np.unique(sign, axis=0):
+            here = np.flatnonzero((sign == s).all(axis=1))
+            out[here], more = self._equilibria(lagging(self.machine, s, bool(bare.gravity)), bare.rows(here))
+            count += more
+        return out, count
+
+    def _equilibria(self, machine: Machine, plan: Experiment) -> tuple[Floats, int]:
+        if not plan.wrench.any() and not _moves_unloaded(machine, plan):
+            return _at_command(machine, plan), 0
+        labels = np.array(plan.load_points or (plan.load_point,) * len(plan))
+        out, count = np.full((len(plan), len(plan.channels)), np.nan), 0
+        for point in np.unique(labels):
+            here = np.flatnonzero(labels == point)
+            out[here], more = self._unique(machine, plan.rows(here), str(point))
+            count += more
+        return out, count
+
+    def _unique(self, machine: Machine, plan: Experiment, load_point: str) -> tuple[Floats, int]:
+        """Each different (pose, wrench) is solved once."""
+        key = np.hstack([plan.groups[:, None], plan.wrench])
+        _, first, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        back = back.reshape(-1)
+        once = plan.rows(first)
+        read = targets(machine, plan)
+        on = carrier(machine, plan.loop.instrument_on)
+        wanted = list(dict.fromkeys([*read, *([on] if on else [])]))
+        against = carrier(machine, plan.loop.force_against)
+        options = SolveOptions(
+            point=load_point,
+            wrenches=_reaction(machine, once, load_point, against) if against else {},
+            read_points=wanted,
+            gravity=once.gravity,
+            stiffness=bool(joint_channels(plan)),
+            threads=self.threads,
+        )
+        solution = _solved(machine, once, options)
+        ok = solution.ok | _in_play(solution, once)
+        moved = np.where(ok[:, None, None], solution.readings[:, 1:], np.nan)
+        linear = moved[back, [wanted.index(r) for r in read]]
+        if on:
+            linear = seen_from(machine, plan, read, on, linear, moved[back, wanted.index(on)])
+        if not joint_channels(plan):
+            return linear, len(first)
+        joints = joint_motions(machine, once, solution.coordinates, solution.coordinate_names)
+        joints = np.where(ok[:, None], joints, np.nan)
+        return np.hstack([linear, joints[back]]), len(first)
+
+
+def _solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solution:
+    """Each row at its pose, or at its joints in the branch in which they are commanded."""
+    if plan.joints is None:
+        return machine.solve(plan.position, plan.wrench, options=replace(options, rotation=plan.rotation))
+    start = coordinates_of(machine, plan)
+    drives = [machine.compiled.names.joints[a] for a in machine.actuators]
+    return machine.solve_joints(start[:, drives], plan.wrench, options=replace(options, start=start))
+
+
+def _in_play(solution: Solution, plan: Experiment) -> Mask:
+    """Rows without load where nothing but play is loose: the drives stand in the middle of their gaps."""
+    loose = (solution.status == Status.SINGULAR) & (solution.flags & Flag.FREE_PLAY > 0)
+    return np.asarray(loose & ~plan.wrench.any(axis=1))
+
+
+def positions_of(machine: Machine, plan: Experiment, read: tuple[str, ...]) -> Floats:
+    """(n, 3) m, where the point of each row is as commanded."""
+    at = {p: point_positions(machine, p, plan) for p in set(read)}
+    return np.stack([at[p][i] for i, p in enumerate(read)])
+
+
+def _reaction(machine: Machine, plan: Experiment, load_point: str, against: str) -> dict[str, Floats]:
+    """The opposite of the wrench on the body that takes it, about that body's point."""
+    arm = point_positions(machine, load_point, plan) - point_positions(machine, against, plan)
+    force, moment = plan.wrench[:, :3], plan.wrench[:, 3:]
+    return {against: -np.hstack([force, moment + np.cross(arm, force)])}
+
+
+def seen_from(
+    machine: Machine, plan: Experiment, read: tuple[str, ...], on: str, motion: Floats, carrier_motion: Floats
+) -> Floats:
+    """(n, 6) motion of the points read, in the axes of the body that carries the instrument."""
+    origin = point_positions(machine, on, plan)
+    arm = positions_of(machine, plan, read) - origin
+    turn = Rotation.from_rotvec(np.nan_to_num(carrier_motion[:, 3:]))
+    linear = turn.inv().apply(arm + motion[:, :3] - carrier_motion[:, :3]) - arm
+    angular = (turn.inv() * Rotation.from_rotvec(np.nan_to_num(motion[:, 3:]))).as_rotvec()
+    return np.where(np.isfinite(motion), np.hstack([linear, angular]), np.nan)
+
+
+def _at_command(machine: Machine, plan: Experiment) -> Floats:
+    """(n, c) zero where the pose can be reached, else NaN."""
+    _, first, back = np.unique(plan.groups, return_index=True, return_inverse=True)
+    zero = np.zeros((len(plan), len(plan.channels)))
+    return np.where(in_reach(machine, plan.rows(first))[back.reshape(-1), None], zero, np.nan)
+
+
+def _moves_unloaded(machine: Machine, plan: Experiment) -> bool:
+    """Without load only errors, preload or weight move a machine from its command."""
+    d = machine.description
+    return bool(plan.gravity or d.gravity) or not rests_at_command(d)

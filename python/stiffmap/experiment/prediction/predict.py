@@ -1,0 +1,132 @@
+"""Prediction of every reading, solving each different (pose, wrench) once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stiffmap import effects
+from stiffmap.description import AppliedEffect
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.poses.against_command import resolved
+from stiffmap.experiment.poses.commanded import located, without
+from stiffmap.experiment.prediction.equilibria import motions
+from stiffmap.experiment.prediction.history import KINDS as HISTORY
+from stiffmap.experiment.prediction.history import Drives, drives_of, history_motion
+from stiffmap.experiment.prediction.joints import check_joints
+from stiffmap.experiment.prediction.measurement import LOAD_SIDE, SENSOR_SIDE, readings, true_wrench
+from stiffmap.experiment.prediction.temperature import at_temperatures, uses_temperature
+from stiffmap.machine import Machine
+
+Terms = tuple[AppliedEffect, ...]
+ELSEWHERE = LOAD_SIDE + SENSOR_SIDE + HISTORY
+"""Kinds that are no part of the machine."""
+
+
+class Predictor:
+    """Readings of one plan for any set of effects; remembers what it has solved.
+
+    machine
+        The declared machine; `terms` of a call come on top of the effects that it already has.
+    """
+
+    def __init__(self, machine: Machine, experiment: Experiment, *, threads: int | None = None) -> None:
+        check_points(machine, experiment)
+        check_joints(machine, experiment)
+        self.threads = threads
+        self.machine, self.experiment = resolved(machine, located(machine, experiment))
+        self.solved = 0
+        self._memory: dict[tuple[Terms, Terms], Floats] = {}
+        self._drives: dict[tuple[Terms, Terms], Drives] = {}
+        self._set_aside()
+
+    def __call__(self, terms: Sequence[AppliedEffect] = ()) -> Floats:
+        """(n, c) m, rad predicted readings; NaN where a pose fails."""
+        mechanical = tuple(t for t in terms if t.kind not in ELSEWHERE)
+        load = tuple(t for t in terms if t.kind in LOAD_SIDE)
+        key = (mechanical, load)
+        if key not in self._memory:
+            if len(self._memory) > 2000:
+                self._memory.clear()
+            self._memory[key] = self._motion(mechanical, load)
+        motion = self._memory[key]
+        remembering = tuple(t for t in terms if t.kind in HISTORY)
+        if remembering:
+            plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
+            if key not in self._drives:
+                self._drives = {key: drives_of(self.with_terms(mechanical), plan)}
+            motion = motion + history_motion(self._drives[key], plan, remembering)
+        return readings(self.experiment, motion, [t for t in terms if t.kind in SENSOR_SIDE])
+
+    def _set_aside(self) -> None:
+        """Leaves out the rows that the declared machine has no equilibrium for, and names them."""
+        e = self.experiment
+        failed = np.asarray((e.read & ~np.isfinite(self())).any(axis=1))
+        if failed.any():
+            self._memory.clear()
+            self.experiment = without(e, failed, "the machine has no equilibrium at")
+
+    def with_terms(self, terms: Sequence[AppliedEffect]) -> Machine:
+        """The machine with the mechanical terms added."""
+        machine = self.machine
+        for t in terms:
+            if t.kind not in ELSEWHERE:
+                given = {**dict(t.parameters), **dict(t.options)}
+                machine = machine.with_effect(t.kind, element=t.element, legs=t.legs or None, **given)
+        return machine
+
+    def _motion(self, mechanical: Terms, load: Terms) -> Floats:
+        plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
+        if any(uses_temperature(t.kind) for t in mechanical):
+            return at_temperatures(plan, mechanical, self._branches)
+        return self._branches(plan, mechanical)
+
+    def _branches(self, plan: Experiment, terms: Terms) -> Floats:
+        if not any(_has_branch(t) for t in terms):
+            return self._solve(plan, terms)
+        out = np.full((len(plan), len(plan.channels)), np.nan)
+        branch = np.array(plan.branch or ("loading",) * len(plan))
+        branch = np.where(branch == "", "loading", branch)
+        for name in np.unique(branch):
+            here = np.flatnonzero(branch == name)
+            out[here] = self._solve(plan.rows(here), tuple(_on_branch(t, str(name)) for t in terms))
+        return out
+
+    def _solve(self, plan: Experiment, terms: Terms) -> Floats:
+        out, count = motions(self.with_terms(terms), plan, self.threads)
+        self.solved += count
+        return out
+
+
+def predict(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEffect] = ()) -> Floats:
+    """(n, c) m, rad: what the instrument would show of a machine with `terms` added.
+
+    Raises StiffmapError for an unknown point or effect.
+    """
+    return Predictor(machine, experiment)(terms)
+
+
+def check_points(machine: Machine, experiment: Experiment) -> None:
+    """Raises StiffmapError where the experiment names a point that the machine does not have."""
+    loop = experiment.loop
+    bodies = [b for b in (loop.instrument_on, loop.force_against) if b not in ("floor", "base")]
+    own = (*experiment.points, *experiment.load_points)
+    for name in dict.fromkeys((experiment.point, experiment.load_point, *own, *bodies)):
+        if name not in machine.points:
+            raise StiffmapError(
+                f"{experiment.name}: machine {machine.name} has no point '{name}'; "
+                f"it has {', '.join(machine.points)} (a machine file names more with 'point')"
+            )
+
+
+def _has_branch(term: AppliedEffect) -> bool:
+    return any(o.name == "branch" for o in effects.get(term.kind).options)
+
+
+def _on_branch(term: AppliedEffect, branch: str) -> AppliedEffect:
+    if not _has_branch(term):
+        return term
+    return replace(term, options=tuple({**dict(term.options), "branch": branch}.items()))

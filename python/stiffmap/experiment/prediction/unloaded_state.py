@@ -1,0 +1,105 @@
+"""Where drives with play or dry friction stand without load: on the side from which they came."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.description import CommandError, Element, Joint, Leg, MachineDescription
+from stiffmap.description.tree import edit_sequences
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.poses.configuration import coordinates_of
+from stiffmap.kinematics import forward_kinematics, inverse_kinematics
+from stiffmap.machine import Machine
+
+TRAVEL = 1e-3
+"""m along the approach over which drives are asked for their direction."""
+STILL = 1e-3
+"""Share of the fastest drive's travel below which a drive counts as not moved."""
+
+
+def lag(joint: Joint) -> float:
+    """How far a drive without load stays behind its motor: half the gap, and friction over stiffness."""
+    law = joint.law
+    if not joint.actuated or law is None:
+        return 0.0
+    return float(max((a for a, f in law.knots if f == 0.0), default=0.0) + law.friction / law.stiffness)
+
+
+def lags(description: MachineDescription) -> bool:
+    """Whether any drive stays behind."""
+    return any(lag(e) > 0 for leg in description.legs for e in _joints(leg.elements))
+
+
+def _joints(elements: tuple[Element, ...]) -> Iterator[Joint]:
+    yield from (e for e in elements if isinstance(e, Joint))
+
+
+def signs(machine: Machine, experiment: Experiment) -> Floats:
+    """(n, actuators) direction of each drive's last travel, +1, -1, or 0 where it did not move."""
+    assert experiment.approach is not None
+    length = np.linalg.norm(experiment.approach, axis=1, keepdims=True)
+    back = TRAVEL * experiment.approach / np.where(length > 0, length, 1.0)
+    moved = np.nan_to_num(_travels(machine, experiment, back))
+    top = np.abs(moved).max(axis=1, keepdims=True)
+    return np.asarray(np.where(np.abs(moved) > STILL * np.where(top > 0, top, 1.0), np.sign(moved), 0.0))
+
+
+def _travels(machine: Machine, experiment: Experiment, back: Floats) -> Floats:
+    """(n, actuators) travel of each drive over the last way `back` (n, 3) m to the pose."""
+    if experiment.joints is None:
+        here = inverse_kinematics(machine, experiment.position, experiment.rotation).actuators
+        there = inverse_kinematics(machine, experiment.position - back, experiment.rotation).actuators
+        return np.asarray(here - there)
+    twist = np.hstack([back, np.zeros_like(back)])
+    return np.asarray(np.einsum("nai,ni->na", np.linalg.pinv(drive_jacobian(machine, experiment)), twist))
+
+
+def drive_jacobian(machine: Machine, plan: Experiment, step: float = 1e-6) -> Floats:
+    """(n, 6, actuators) twist of the TCP per unit of each drive of the rigid machine, in the plan's branch."""
+    start = coordinates_of(machine, plan)
+    drives = [machine.compiled.names.joints[a] for a in machine.actuators]
+    columns = []
+    for k in range(len(drives)):
+        unit = step * np.eye(len(drives))[k]
+        up, down = (forward_kinematics(machine, start[:, drives] + s * unit, start=start) for s in (1, -1))
+        between = up.rotation @ np.swapaxes(down.rotation, 1, 2)
+        lost = ~np.asarray(np.isfinite(between).all(axis=(1, 2)))[:, None, None]
+        turn = Rotation.from_matrix(np.where(lost, np.eye(3), between)).as_rotvec()
+        columns.append(np.hstack([up.position - down.position, turn]) / (2 * step))
+    return np.stack(columns, axis=-1)
+
+
+def lagging(machine: Machine, sign: Floats, weighs: bool = False) -> Machine:
+    """The machine with each drive (actuators,) behind by its lag and free of play and friction.
+
+    Where the machine `weighs`, its weight closes the gaps: only friction is behind then.
+    """
+    way = dict(zip(machine.actuators, sign.tolist(), strict=True))
+    d = machine.description
+    legs = tuple(replace(leg, elements=_behind(leg, way, weighs)) for leg in d.legs)
+    return Machine(replace(d, legs=legs, effects=(), declared=None))
+
+
+def _behind(leg: Leg, way: dict[str, float], weighs: bool) -> tuple[Element, ...]:
+    def edit(elements: tuple[Element, ...]) -> tuple[Element, ...]:
+        return tuple(
+            _drive(e, way.get(f"{leg.name}.{e.name}", 0.0), weighs)
+            if isinstance(e, Joint) and lag(e) > 0
+            else e
+            for e in elements
+        )
+
+    return edit_sequences(leg.elements, edit)
+
+
+def _drive(joint: Joint, sign: float, weighs: bool) -> Joint:
+    law = joint.law
+    assert law is not None
+    behind = law.friction / law.stiffness if weighs else lag(joint)
+    free = replace(law, friction=0.0) if weighs else replace(law, friction=0.0, knots=())
+    errors = (*joint.command_errors, CommandError(offset=-sign * behind))
+    return replace(joint, law=free, command_errors=errors)

@@ -1,0 +1,1 @@
+"""Plans, and readings simulated for them."""
