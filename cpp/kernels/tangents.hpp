@@ -82,6 +82,8 @@ inline void prepend_joint(Elimination& el, const Op& op, const V6& F, const V6& 
       d += dot(j.w, Mw) - 2.0 * dot(s, j.w);
       s = s - Mw + splat(0.5) * cross(j.w, t.turning.moment);  // the turns follow one another
       j.u = j.u - about(t.turning, j.w);
+    } else {
+      s = s + cross(j.w, t.turning.weight);  // what slides is heavy
     }
   }
   eliminate(el, op, j, d, s, el.heavy ? dot(j.J, hung) : splat(0), t);
