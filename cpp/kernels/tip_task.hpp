@@ -2,7 +2,7 @@
 // The commanded components of the tip's closure error: translations along base axes, rotations about the axes of
 // the commanded frame. An open rotation may be far from the commanded one, so the sine of the error is
 // differentiated exactly: a turn w of the end changes the sine vector from the end a to the target b by -D w,
-// D w = (tr(Q) w - Q w) / 2, Q = R_b R_a^T.
+// D w = (tr(Q) w - Q^T w) / 2, Q = R_b R_a^T.
 #pragma once
 
 #include "program.hpp"
@@ -25,7 +25,10 @@ struct TipTask {
     return e;
   }
   V6 error(const V6& e) const { return only({e.a, target % e.b}); }
-  V6 column(const V6& j) const { return only({j.a, splat(0.5) * (trace * (target % j.b) - end % j.b)}); }
+  V6 column(const V6& j) const {
+    const V3 w = target % j.b;
+    return only({j.a, splat(0.5) * (trace * w - target % (end * w))});
+  }
 
   static bool any_rotation_open(const Program& P) { return !P.task[3] || !P.task[4] || !P.task[5]; }
 };

@@ -34,7 +34,8 @@ class Energy:
     gravity: np.ndarray
     value: float = 0.0
     gaps: list[np.ndarray] = field(default_factory=list)
-    tcp: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    """Of the TCP frame."""
 
     def __call__(self, x: dict[str, float]) -> tuple[float, np.ndarray, np.ndarray]:
         """Energy, closure gaps, TCP."""
@@ -43,7 +44,7 @@ class Energy:
         at: Frame = self.along(d.base, (np.zeros(3), np.eye(3)), "", x)
         ends = [self.along(leg.elements, at, f"{leg.name}.", x) for leg in d.legs]
         self.close(ends)
-        p, _ = self.along(d.platform, ends[0], "", x)
+        p, self.rotation = self.along(d.platform, ends[0], "", x)
         return self.value - self.force @ p, np.concatenate([*self.gaps, np.zeros(0)]), p
 
     def close(self, ends: list[Frame]) -> None:
