@@ -31,7 +31,7 @@ Scratch lay_out(const Program& P, void* memory, std::int64_t* bytes) {
   s.groups = take<GroupSlot>(at, P.group_slots);
   s.branches = take<BranchSlot>(at, P.chain_count);
   const int n = P.coordinate_count;
-  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.rubs, &s.kept})
+  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.friction_sign, &s.kept})
     *v = take<V>(at, n);
   if (bytes) *bytes = at - begin + 64;
   return s;
@@ -127,7 +127,7 @@ struct Block {
       s.closed[q] = s.x[q];
       s.z[q] = k.from_home ? s.x[q] - k.rest : splat(0);
       s.da[q] = splat(1);
-      s.tau[q] = s.dtau[q] = s.rubs[q] = splat(0);
+      s.tau[q] = s.dtau[q] = s.friction_sign[q] = splat(0);
     }
     set_base(P);
   }

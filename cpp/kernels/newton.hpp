@@ -30,7 +30,7 @@ struct Newton {
   void law_at(const LawProgram& law, int q) {
     const V k = law.stiffness / s.scale[q], z = s.z[q];
     if (law.count == 0) {
-      s.tau[q] = (k + law.cubic * z * z) * z + law.friction * s.rubs[q];
+      s.tau[q] = (k + law.cubic * z * z) * z + law.friction * s.friction_sign[q];
       s.da[q] = splat(1);
       s.dtau[q] = k + 3 * law.cubic * z * z;
       s.x[q] = s.a_base[q] + z;
@@ -56,7 +56,7 @@ struct Newton {
       da = select(here, splat((u[3] - u[0]) / width), da);
       dtau = select(here, splat((u[4] - u[1]) / width), dtau);
     }
-    s.tau[q] = tau + law.friction * s.rubs[q];
+    s.tau[q] = tau + law.friction * s.friction_sign[q];
     s.da[q] = da;
     s.dtau[q] = dtau;
     s.x[q] = s.a_base[q] + a;
@@ -98,7 +98,7 @@ struct Newton {
           s.tau[q] = k.stiffness * (s.x[q] - k.rest);
           s.dtau[q] = splat(k.stiffness);
         }
-        if (k.friction != 0) s.tau[q] = k.friction * s.rubs[q];
+        if (k.friction != 0) s.tau[q] = k.friction * s.friction_sign[q];
         continue;
       }
       const LawProgram& law = P.laws[k.law];
@@ -123,13 +123,13 @@ struct Newton {
         const double linear = s.z[q][i];
         const bool bears = __builtin_fabs(linear) * k.unit > unloaded * P.length;
         if (k.law < 0) {
-          s.rubs[q][i] = !bears ? 0 : linear > 0 ? 1 : -1;
+          s.friction_sign[q][i] = !bears ? 0 : linear > 0 ? 1 : -1;
           continue;
         }
         const LawProgram& law = P.laws[k.law];
         const double tau = bears ? law.stiffness / s.scale[q][i] * linear : 0.0;
         const double sign = tau > 0 ? 1 : tau < 0 ? -1 : 0;
-        s.rubs[q][i] = sign;
+        s.friction_sign[q][i] = sign;
         s.z[q][i] = bears ? from_force(law, tau - law.friction * sign, s.scale[q][i]) : 0.0;
       }
     }

@@ -48,8 +48,8 @@ struct Scratch {
   StiffSlot* stiff;
   GroupSlot* groups;
   BranchSlot* branches;  ///< per chain
-  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *rubs,
-      *kept;  ///< rubs: sign of dry friction; kept: z at the last load step in equilibrium
+  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *friction_sign,
+      *kept;  ///< friction_sign: sign of dry friction; kept: z at the last load step in equilibrium
 };
 
 }  // namespace stiffmap::kernel

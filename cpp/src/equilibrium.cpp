@@ -21,8 +21,8 @@ std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// Laws with corners or with dry friction: Newton starts from the solution with all laws linear.
 bool has_knots(const Mechanism& m) {
-  const auto rubs = [](const Coordinate& c) { return c.friction != 0; };
-  if (std::any_of(m.coordinates.begin(), m.coordinates.end(), rubs)) return true;
+  const auto has_friction = [](const Coordinate& c) { return c.friction != 0; };
+  if (std::any_of(m.coordinates.begin(), m.coordinates.end(), has_friction)) return true;
   return std::any_of(m.laws.begin(), m.laws.end(),
                      [](const Law& law) { return law.has_knots() || law.friction() != 0; });
 }

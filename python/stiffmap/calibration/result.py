@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from stiffmap.calibration.facts import Facts
-from stiffmap.calibration.words import lines, table
+from stiffmap.calibration.wording import lines, table
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,7 @@ def residual(
     """Prediction for every reading: rms, per axis, worst rows, noise floor, lack of fit, model-free checks.
 
     With -o: residual.csv (mm, rad), residual.json (SI) and pictures. Exit codes: 0 the readings are as
-    predicted, 1 they are not (chance below 1e-3), 2 bad input.
+    predicted, 1 they are not (p-value below 1e-3), 2 bad input.
 
     Examples:
 
@@ -104,14 +104,12 @@ def lines(r: Residual, rows: int) -> list[str]:
         f"  {a}: rms {_shown(units[a], v)}, noise floor {_shown(units[a], _floor(r, a))}"
         for a, v in s.per_axis.items()
     ]
-    out.append(
-        f"  rms / noise floor {s.ratio:.2f}; chance of this residual under noise {_chance(r.lack_of_fit)}"
-    )
+    out.append(f"  rms / noise floor {s.ratio:.2f}; p-value of this residual {_p_value(r.lack_of_fit)}")
     out += [f"  unknown frames and zeros fitted: {r.nuisances}"] if r.nuisances else []
     out.append(f"  poses beyond noise: {r.groups_off} of {int(e.groups.max()) + 1}")
-    out.append(f"  rows set aside: {', '.join(aside) or 'none'}")
+    out.append(f"  outliers (rows): {', '.join(aside) or 'none'}")
     for c in r.checks:
-        told = f"rms/noise {c.rms:.2f}, chance {_chance(c.p)}" if c.contrasts else c.note
+        told = f"rms/noise {c.rms:.2f}, p = {_p_value(c.p)}" if c.contrasts else c.note
         out.append(f"  {c.name} ({c.meaning}): {told}")
     worst = [f"{i} ({a} {_shown(units[a], v)})" for i, a, v in r.worst(rows)]
     out.append(f"  worst rows: {', '.join(worst) or 'none'}")
@@ -128,7 +126,7 @@ def _registered(e: Experiment) -> list[str]:
     return out
 
 
-def _chance(p: float) -> str:
+def _p_value(p: float) -> str:
     return f"{p:.2g}" if p > 1e-99 else "below 1e-99"
 
 

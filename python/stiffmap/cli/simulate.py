@@ -57,7 +57,7 @@ def simulate(
     angle_noise: Annotated[float, typer.Option(help="The same of an angle, mrad.")] = 0.01,
     zero_noise: Annotated[float, typer.Option(help="Of the zero that a pose's readings share, mm.")] = 0.0,
     branches: Annotated[bool, typer.Option(help="Read every load loading and unloading.")] = False,
-    shuffle: Annotated[bool, typer.Option(help="Visit the poses in an order of chance.")] = False,
+    shuffle: Annotated[bool, typer.Option(help="Visit the poses in random order.")] = False,
     temperature: Annotated[str | None, typer.Option(help="First and last temperature, °C, as 20,26.")] = None,
     setups: Annotated[int, typer.Option(help="Set-ups that the poses are dealt to.")] = 1,
     frame: Annotated[

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from stiffmap.compiled import CompiledMachine
-from stiffmap.derivatives.near import Neighbours
+from stiffmap.derivatives.neighbours import Neighbours
 from stiffmap.derivatives.requests import Requests, parameter_name
 from stiffmap.derivatives.stencil import Stencil, within
 from stiffmap.effects import get

@@ -148,7 +148,11 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
             located(p, e, np.where(keep[:, None], after, np.nan), s.noise.sigma) for p in left[:LISTED]
         ],
         limitations=limitations(e, s.noise, s.predictor.machine),
-        significance={"searches": s.searches, "alpha": search.alpha, "needed_minus_ln_p": search.threshold},
+        significance={
+            "effective_trials": s.effective_trials,
+            "alpha": search.alpha,
+            "needed_minus_ln_p": search.threshold,
+        },
         machine=predicted_machine(s, model),
         declared=s.predictor.machine,
         experiment=e,

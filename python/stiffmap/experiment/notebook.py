@@ -43,5 +43,5 @@ def residual_html(r: Any) -> str:
     unit = {c.name: ("µm", 1e6) if c.unit == "m" else ("mrad", 1e3) for c in r.experiment.channels}
     rows = [(a, f"{v * unit[a][1]:.3g} {unit[a][0]}") for a, v in r.summary.per_axis.items()]
     worst = [(i, a, f"{v * unit[a][1]:.3g} {unit[a][0]}") for i, a, v in r.worst(20)]
-    head = f"{r.experiment.name}: rms {1e6 * r.summary.rms:.3g} µm, chance under noise {r.lack_of_fit:.2g}"
+    head = f"{r.experiment.name}: rms {1e6 * r.summary.rms:.3g} µm, p = {r.lack_of_fit:.2g}"
     return titled(head, table(("axis", "rms"), rows), table(("worst row", "axis", "residual"), worst))

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from stiffmap.broadcasting import Floats
+from stiffmap.maps.direction_sweep import DirectionSweep, even_directions
 from stiffmap.maps.extremes import find_extreme
-from stiffmap.maps.fan import Fan, even_fan
+from stiffmap.maps.fixed_order_sums import norm
 from stiffmap.maps.limit import force_limit
 from stiffmap.maps.loading import without_failed
 from stiffmap.maps.plan import MapPlan
-from stiffmap.maps.sums import norm
 from stiffmap.maps.uncertainty_block import load_deviations, worst_deviations
 
 ALL = (0, 1, 2)
@@ -25,10 +25,10 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
     if plan.uncertain is not None:
         out |= load_deviations(plan, plan.uncertain, position)
     if plan.turning:
-        fan = even_fan(plan.loading, position, plan.force, plan.axes, plan.directions)
-        out["direction_status"] = fan.status.max(axis=1)
+        directions = even_directions(plan.loading, position, plan.force, plan.axes, plan.directions)
+        out["direction_status"] = directions.status.max(axis=1)
         for suffix, parts in (("", ALL), (f"_{plan.shown_plane}", plan.axes)):
-            values, status = _extremes(plan, position, fan, parts, suffix)
+            values, status = _extremes(plan, position, directions, parts, suffix)
             out |= values
             out["direction_status"] = np.maximum(out["direction_status"], status)
         if plan.uncertain is not None:
@@ -52,10 +52,11 @@ def _loads(plan: MapPlan, position: Floats) -> dict[str, Any]:
 
 
 def _extremes(
-    plan: MapPlan, position: Floats, fan: Fan, parts: tuple[int, ...], suffix: str
+    plan: MapPlan, position: Floats, directions: DirectionSweep, parts: tuple[int, ...], suffix: str
 ) -> tuple[dict[str, Floats], Any]:
     worst, best = (
-        find_extreme(plan.loading, position, plan.force, plan.axes, fan, parts, sign) for sign in (1, -1)
+        find_extreme(plan.loading, position, plan.force, plan.axes, directions, parts, sign)
+        for sign in (1, -1)
     )
     limit = force_limit(plan.loading, position, plan.force, plan.axes, worst, parts, plan.tolerance)
     values = {

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.broadcasting import Floats
-from stiffmap.maps.fan import Fan, even_angles, solve_fan
+from stiffmap.maps.direction_sweep import DirectionSweep, even_angles, solve_directions
+from stiffmap.maps.fixed_order_sums import dot, norm
 from stiffmap.maps.loading import Loading
-from stiffmap.maps.sums import dot, norm
 
 SCAN = 72
 MAX_DEGREE = 11
@@ -43,27 +43,27 @@ def find_extreme(
     position: Floats,
     force: float,
     axes: tuple[int, int],
-    fan: Fan,
+    directions: DirectionSweep,
     parts: tuple[int, ...],
     sign: int,
 ) -> Extreme:
     """Largest (sign 1) or smallest (-1) norm of the components `parts` of the translation."""
-    d, rate = fan.translation[..., parts], fan.turning[..., parts]
+    d, rate = directions.translation[..., parts], directions.turning[..., parts]
     angle = peak_angle(sign * dot(d, d), sign * 2 * dot(d, rate))
-    both = fan.join(solve_fan(loading, position, angle[:, None], force, axes))
+    both = directions.join(solve_directions(loading, position, angle[:, None], force, axes))
     return most_extreme(both, parts, sign)
 
 
-def most_extreme(fan: Fan, parts: tuple[int, ...], sign: int) -> Extreme:
-    """The direction of a fan whose components `parts` are largest or smallest."""
-    value = norm(fan.translation[..., parts])
-    best = fan.pick(np.argmax(np.where(np.isnan(value), -np.inf, sign * value), axis=1))
+def most_extreme(directions: DirectionSweep, parts: tuple[int, ...], sign: int) -> Extreme:
+    """The direction whose components `parts` are largest or smallest."""
+    value = norm(directions.translation[..., parts])
+    best = directions.pick(np.argmax(np.where(np.isnan(value), -np.inf, sign * value), axis=1))
     failed = np.isnan(value).any(axis=1)
     size = norm(best.translation[..., parts])[:, 0]
     growth = value_growth(best.translation[..., parts], best.growing[..., parts])[:, 0]
     angle = np.mod(best.angle[:, 0] + np.pi, 2 * np.pi) - np.pi
     angle, size, growth = (np.where(failed, np.nan, a) for a in (angle, size, growth))
-    return Extreme(angle, size, growth, fan.status.max(axis=1))
+    return Extreme(angle, size, growth, directions.status.max(axis=1))
 
 
 def value_growth(d: Floats, growing: Floats) -> Floats:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.broadcasting import Floats
+from stiffmap.maps.direction_sweep import solve_directions
 from stiffmap.maps.extremes import Extreme, value_growth
-from stiffmap.maps.fan import solve_fan
+from stiffmap.maps.fixed_order_sums import norm
 from stiffmap.maps.loading import Loading
-from stiffmap.maps.sums import norm
 
 STEPS = 8
 CLOSE = 1e-3
@@ -35,7 +35,7 @@ def force_limit(
         rows = np.flatnonzero(open_ & (limit > 0))
         if rows.size == 0:
             return limit
-        f = solve_fan(loading, position[rows], worst.angle[rows, None], limit[rows], axes)
+        f = solve_directions(loading, position[rows], worst.angle[rows, None], limit[rows], axes)
         value = norm(f.translation[..., parts])[:, 0]
         growth = value_growth(f.translation[..., parts], f.growing[..., parts])[:, 0]
         limit[rows] = newton_step(limit[rows], value, growth, tolerance)

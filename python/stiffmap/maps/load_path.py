@@ -12,9 +12,9 @@ from stiffmap.broadcasting import Floats
 from stiffmap.compiled.machine import PATH_CONTROLS as CONTROLS
 from stiffmap.errors import StiffmapError
 from stiffmap.maps.critical import critical_variables
+from stiffmap.maps.fixed_order_sums import norm
 from stiffmap.maps.loading import Loading
 from stiffmap.maps.provenance import describe
-from stiffmap.maps.sums import norm
 from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, meaning, status_attrs
 from stiffmap.status import Status
 

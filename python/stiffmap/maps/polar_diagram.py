@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
+from stiffmap.maps.direction_sweep import DirectionSweep, direction, direction_sweep_of, even_angles
 from stiffmap.maps.extremes import find_extreme
-from stiffmap.maps.fan import Fan, direction, even_angles, fan_of
+from stiffmap.maps.fixed_order_sums import norm
 from stiffmap.maps.inputs import magnitude, place, plane_axes
 from stiffmap.maps.loading import Loading, without_failed
 from stiffmap.maps.provenance import describe
-from stiffmap.maps.sums import norm
 from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
 from stiffmap.options import LoadingKeywords, SolveOptions
 
@@ -50,7 +50,7 @@ def polar(
     angle = even_angles(directions)
     wrench = np.concatenate([force * direction(angle, axes), np.zeros((directions, 3))], axis=1)
     s = loading.solve(p[None, None], wrench[None])
-    fan = fan_of(s, angle[None], np.full((1, directions), force), axes)
+    swept = direction_sweep_of(s, angle[None], np.full((1, directions), force), axes)
     d, status = without_failed(s.displacement, s.status)[0], s.status[0]
     data = {
         "displacement": (
@@ -62,7 +62,7 @@ def polar(
         f"deflection_{plane}": ("angle", norm(d[:, axes]), meaning("m", f"norm in the {plane} plane")),
         "status": ("angle", status, status_attrs("the equilibrium")),
         "flags": ("angle", s.flags[0], flag_attrs()),
-    } | _extremes(loading, p[None], force, plane, fan)
+    } | _extremes(loading, p[None], force, plane, swept)
     coords = {
         "angle": (
             "angle",
@@ -78,11 +78,13 @@ def polar(
     return xr.Dataset(data, coords, describe(loading, "polar diagram", call))
 
 
-def _extremes(loading: Loading, position: Floats, force: float, plane: str, fan: Fan) -> dict[str, Any]:
+def _extremes(
+    loading: Loading, position: Floats, force: float, plane: str, swept: DirectionSweep
+) -> dict[str, Any]:
     axes, out = plane_axes(plane), {}
     for suffix, parts in (("", (0, 1, 2)), (f"_{plane}", axes)):
         for word, size, sign in (("worst", "largest", 1), ("best", "smallest", -1)):
-            e = find_extreme(loading, position, force, axes, fan, parts, sign)
+            e = find_extreme(loading, position, force, axes, swept, parts, sign)
             what = f"{size} deflection over the force directions of the {plane} plane"
             out[f"{word}_deflection{suffix}"] = ((), e.value[0], meaning("m", what))
             out[f"{word}_direction{suffix}"] = ((), e.angle[0], meaning("rad", "direction of that force"))

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
+from stiffmap.maps.fixed_order_sums import dot, norm
 from stiffmap.maps.inputs import force_list, place, unit
 from stiffmap.maps.load_path import check_control, load_path
 from stiffmap.maps.loading import Loading, without_failed
 from stiffmap.maps.provenance import describe
-from stiffmap.maps.sums import dot, norm
 from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
 from stiffmap.options import LoadingKeywords, SolveOptions
 

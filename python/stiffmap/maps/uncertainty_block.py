@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from stiffmap.broadcasting import Floats
-from stiffmap.maps.fan import direction
+from stiffmap.maps.direction_sweep import direction
+from stiffmap.maps.fixed_order_sums import norm
 from stiffmap.maps.loading import Loading, without_failed
 from stiffmap.maps.plan import MapPlan
-from stiffmap.maps.sums import norm
 from stiffmap.maps.uncertainty import Uncertain
 from stiffmap.solution import Solution
 

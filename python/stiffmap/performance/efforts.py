@@ -61,14 +61,14 @@ def drive_efforts(
             f"{machine.name}: the trajectory asks for a motion that the machine cannot do at "
             f"{place_text(t.position[i])}, t = {t.time[i]:.4g} s (its drives leave {out['misfit'][i]:.1e} of it open)"
         )
-    rub = friction_efforts(machine, out["rate"]) if friction else np.zeros_like(out["rate"])
-    return _dataset(machine, t, k, out, rub)
+    friction_effort = friction_efforts(machine, out["rate"]) if friction else np.zeros_like(out["rate"])
+    return _dataset(machine, t, k, out, friction_effort)
 
 
 def _dataset(
-    machine: Machine, t: Trajectory, k: DriveKinematics, out: dict[str, Floats], rub: Floats
+    machine: Machine, t: Trajectory, k: DriveKinematics, out: dict[str, Floats], friction_effort: Floats
 ) -> xr.Dataset:
-    effort = out["effort"] + rub
+    effort = out["effort"] + friction_effort
     power = effort * out["rate"]
     span = t.time[-1] - t.time[0]
     drives = drive_table(machine)
@@ -80,7 +80,7 @@ def _dataset(
     return xr.Dataset(
         {
             "effort": (over, effort, {"units": "N or N m"}),
-            "friction": (over, rub, {"units": "N or N m"}),
+            "friction": (over, friction_effort, {"units": "N or N m"}),
             "rate": (over, out["rate"], {"units": "m/s or rad/s"}),
             "acceleration": (over, out["acceleration"]),
             "coordinate": (over, k.actuators, {"units": "m or rad"}),

@@ -14,7 +14,7 @@ from stiffmap.machine import Machine
 from stiffmap.planning.estimate import Estimate, estimate
 
 ALPHA = 0.01
-"""Chance of a change in any number where there is none."""
+"""Probability of naming a change in any number where there is none."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class Change:
     u: float
     """Standard uncertainty of the difference, misfit of both fits included."""
     p: float
-    """Chance of such a difference if nothing changed, corrected for the number of numbers (Bonferroni)."""
+    """p-value of such a difference if nothing changed, corrected for the number of numbers (Bonferroni)."""
 
     @property
     def changed(self) -> bool:
-        """Whether it is beyond chance."""
+        """Whether it is significant."""
         return self.p < ALPHA
 
     def __str__(self) -> str:
@@ -40,7 +40,7 @@ class Change:
         step = self.after - self.before
         return (
             f"{self.name}: {word}, {self.before:.5g} -> {self.after:.5g} {self.unit} "
-            f"({step:+.3g} ± {2 * self.u:.2g}, chance {self.p:.2g})"
+            f"({step:+.3g} ± {2 * self.u:.2g}, p = {self.p:.2g})"
         )
 
 
@@ -52,7 +52,7 @@ class Comparison:
     second: Estimate
     changes: tuple[Change, ...]
     p: float
-    """Chance of all differences together if the numbers are common."""
+    """p-value of all differences together if the numbers are common."""
 
     @property
     def common(self) -> bool:
@@ -61,7 +61,7 @@ class Comparison:
 
     def __str__(self) -> str:
         word = "one set of numbers serves both" if self.common else "the two differ"
-        return "\n".join([f"{word} (chance {self.p:.2g})", *map(str, self.changes)])
+        return "\n".join([f"{word} (p = {self.p:.2g})", *map(str, self.changes)])
 
 
 def compare(

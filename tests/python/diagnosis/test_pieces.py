@@ -13,7 +13,7 @@ from stiffmap.diagnosis.decision.largest_residual import located
 from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.fitting.interval import seen_alone
 from stiffmap.diagnosis.fitting.model import Model
-from stiffmap.diagnosis.rivals.rivals import Rival, lost_by_chance
+from stiffmap.diagnosis.rivals.rivals import Rival, p_of_loss
 from stiffmap.effects import Parameter
 from stiffmap.experiment import Experiment, random_plan
 from stiffmap.experiment.experiment import Floats
@@ -37,13 +37,13 @@ def test_a_true_rival_is_hardly_ever_refused() -> None:
     rng = np.random.default_rng(5)
     true, false = rng.standard_normal((2, 200))
     false = true + 0.5 * false
-    chances = []
+    p_values = []
     for _ in range(2000):
         reading = 0.6 * true + rng.standard_normal(200)
         chosen, other = fitted(false, reading), fitted(true, reading)
         gap = float(np.linalg.norm(chosen.residual - other.residual))  # type: ignore[operator]
-        chances.append(lost_by_chance(chosen, Rival(other, 0, 0.5, gap, 8.0, False), 199))
-    refused = np.mean(np.array(chances) < 0.05)
+        p_values.append(p_of_loss(chosen, Rival(other, 0, 0.5, gap, 8.0, False), 199))
+    refused = np.mean(np.array(p_values) < 0.05)
     assert refused < 0.07  # the level, within four standard deviations of 2000 draws
 
 
@@ -53,7 +53,7 @@ def test_a_false_rival_is_refused_where_the_gap_is_wide() -> None:
     reading = true + rng.standard_normal(200)
     chosen, other = fitted(true, reading), fitted(false, reading)
     gap = float(np.linalg.norm(chosen.residual - other.residual))  # type: ignore[operator]
-    assert lost_by_chance(chosen, Rival(other, 0, 0.5, gap, 14.0, False), 199) < 1e-6
+    assert p_of_loss(chosen, Rival(other, 0, 0.5, gap, 14.0, False), 199) < 1e-6
 
 
 def test_what_others_can_undo_is_not_seen() -> None:

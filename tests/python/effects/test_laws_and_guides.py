@@ -51,9 +51,9 @@ def test_laws_of_a_link_direction() -> None:
     bent = C * FORCES + LINK * (inside + 3.0 * (FORCES - inside))
     assert deflection(knee, FORCES) == pytest.approx(bent, abs=1e-15)
     for branch, sign in (("loading", -1.0), ("unloading", 1.0)):
-        rub = slider().with_effect("friction", element="link.k11", force=10.0, branch=branch)
+        with_friction = slider().with_effect("friction", element="link.k11", force=10.0, branch=branch)
         shifted = (C + LINK) * FORCES + sign * LINK * 10.0 * np.sign(FORCES)
-        assert deflection(rub, FORCES) == pytest.approx(shifted, abs=1e-15)
+        assert deflection(with_friction, FORCES) == pytest.approx(shifted, abs=1e-15)
 
 
 def test_only_directions_that_stand_alone_are_offered() -> None:

@@ -111,8 +111,8 @@ def test_reciprocity_needs_force_and_reading_at_one_point(orthoglide: sm.Machine
     assert made(replace(twin, load_point="elsewhere"))["reciprocity"].contrasts == 0
 
 
-def test_chances_are_even_under_noise(orthoglide: sm.Machine, full: Experiment) -> None:
-    """Contrasts share readings; with their covariance the chance of each check is uniform."""
+def test_p_values_are_uniform_under_noise(orthoglide: sm.Machine, full: Experiment) -> None:
+    """Contrasts share readings; with their covariance the p-value of each check is uniform."""
     exact = simulate(orthoglide, replace(full, sigma=full.sigma * 1e-9), seed=0)
     rng = np.random.default_rng(5)
     seen: dict[str, list[float]] = {n: [] for n in ALL}

@@ -106,7 +106,7 @@ def test_wild_rows_are_as_many_as_asked(twin: Twin, orthoglide: sm.Machine) -> N
     assert 5 <= residual(orthoglide, e).set_aside.sum() <= 30
 
 
-def test_order_of_chance_keeps_poses_together(twin: Twin) -> None:
+def test_random_order_keeps_poses_together(twin: Twin) -> None:
     e = twin("--poses", "6", "--loads", "3", "--shuffle")
     assert e.order is not None
     changes = np.flatnonzero(np.diff(e.groups[np.argsort(e.order)]))

@@ -93,13 +93,13 @@ def test_outliers_are_found_and_never_a_whole_pose(machine: sm.Machine, plan: sm
 def test_model_free_checks_see_what_they_should(machine: sm.Machine, plan: sm.Experiment) -> None:
     keep = np.ones(len(plan), bool)
 
-    def chances(*terms: AppliedEffect) -> dict[str, float]:
+    def p_values(*terms: AppliedEffect) -> dict[str, float]:
         twin = simulate(machine, plan, terms, seed=5)
         return {c.name: c.p for c in checks(twin, twin.reading, twin.sigma, keep) if c.contrasts}
 
-    clean = chances()
+    clean = p_values()
     assert min(clean.values()) > 1e-3
-    slack = chances(AppliedEffect("dead_zone", "actuator", ("y",), (("half_width", 1.2e-5),)))
+    slack = p_values(AppliedEffect("dead_zone", "actuator", ("y",), (("half_width", 1.2e-5),)))
     assert slack["linearity"] < 1e-6 and slack["sign reversal"] > 1e-3
-    turned = chances(AppliedEffect("load_direction", "load", (), (("angle_z", 0.1),)))
+    turned = p_values(AppliedEffect("load_direction", "load", (), (("angle_z", 0.1),)))
     assert turned["reciprocity"] < 1e-6 and turned["linearity"] > 1e-3

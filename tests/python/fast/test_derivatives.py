@@ -10,7 +10,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap import _core
-from stiffmap.derivatives.near import Neighbours, with_requests
+from stiffmap.derivatives.neighbours import Neighbours, with_requests
 from stiffmap.derivatives.stencil import central, within
 from stiffmap.effects import get, kinds
 

@@ -1,4 +1,4 @@
-"""Changes against chance, budgets against the law of propagation, figures of the standards worked by hand."""
+"""Changes against noise, budgets against the law of propagation, figures of the standards worked by hand."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def test_a_change_is_seen_and_none_is_invented(orthoglide: sm.Machine, plan: sm.
     assert not moved.common
     assert moved.changes[0].changed
     assert moved.changes[0].after - moved.changes[0].before == pytest.approx(0.2, abs=4 * moved.changes[0].u)
-    chances = [compare(orthoglide, first, twin(orthoglide, plan, 1.3, s), term).p for s in range(2, 14)]
-    assert min(chances) > 1e-4
+    p_values = [compare(orthoglide, first, twin(orthoglide, plan, 1.3, s), term).p for s in range(2, 14)]
+    assert min(p_values) > 1e-4
 
 
 def test_the_command_line(

@@ -126,9 +126,9 @@ def screened(screen: Screen, residual: Floats) -> tuple[Floats, int]:
     """(N,) what the best few effects leave, taken as linear, one after the other, and their directions."""
     left, beside, tangent = residual, screen, np.zeros((len(residual), 0))
     for _ in range(MOST_EFFECTS):
-        drops = beside.drops(left[:, None])[:, 0]
-        best = int(np.argmax(drops)) if len(drops) else -1
-        if best < 0 or drops[best] <= 0.0:
+        reductions = beside.delta_chi2(left[:, None])[:, 0]
+        best = int(np.argmax(reductions)) if len(reductions) else -1
+        if best < 0 or reductions[best] <= 0.0:
             break
         q = beside.basis(best)
         left = left - q @ (q.T @ left)
@@ -151,7 +151,7 @@ def sparse_evidence(first: Answer) -> float:
     sized = model.jacobian * np.abs(model.values - null)
     volume = float(np.linalg.slogdet(np.eye(sized.shape[1]) + sized.T @ sized)[1])
     number = len(model.candidates)
-    price = 0.5 * (volume + model.freedom) + number * float(np.log(max(search.searches, 1.0)))
+    price = 0.5 * (volume + model.freedom) + number * float(np.log(max(search.effective_trials, 1.0)))
     return -0.5 * model.chi2 - price - MEETING * (number - 1)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from stiffmap.diagnosis.fitting.fit import evaluate, fit
 from stiffmap.diagnosis.fitting.model import Model
-from stiffmap.diagnosis.search.selection import Search, surprise_of
+from stiffmap.diagnosis.search.selection import Search, minus_log_p_of
 from stiffmap.diagnosis.search.study import Finding, Study, alone, find, search_on
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Floats
@@ -109,7 +109,7 @@ def _kept(study: Study, known: Finding | None, rows: Mask) -> Model | None:
         model = evaluate(model, search.predictor, search.problem)
     assert model.residual is not None
     beside = search.screen.beside(model.tangent())
-    more = beside.surprise(beside.drops(model.residual[:, None])[:, 0])
+    more = beside.minus_log_p(beside.delta_chi2(model.residual[:, None])[:, 0])
     return model if float(more.max(initial=0.0)) < search.threshold else None
 
 
@@ -121,8 +121,8 @@ def _demanded(search: Search, model: Model) -> bool:
         others = basis(np.delete(model.jacobian, part, axis=1))
         own = model.jacobian[:, part] @ (model.values - null)[part]
         left = model.residual - own
-        drop = float(np.sum((left - others @ (others.T @ left)) ** 2) - model.chi2)
-        if surprise_of(drop, size) < search.threshold:
+        delta_chi2 = float(np.sum((left - others @ (others.T @ left)) ** 2) - model.chi2)
+        if minus_log_p_of(delta_chi2, size) < search.threshold:
             return False
     return True
 

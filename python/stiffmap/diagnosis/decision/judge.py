@@ -15,7 +15,7 @@ from stiffmap.diagnosis.search.study import Finding, Study, alone, search_on
 from stiffmap.experiment.noise.checks import Check, checks
 
 VIOLATED = 1e-6
-"""Chance below which a model-free check, applied to what the effects leave, refuses the verdict."""
+"""p-value below which a model-free check, applied to what the effects leave, refuses the verdict."""
 
 
 def judge(s: Study, finding: Finding) -> tuple[Finding, str, list[Pattern]]:

@@ -22,12 +22,12 @@ Features = list[tuple[str, Floats]]
 
 @dataclass(frozen=True)
 class Pattern:
-    """A pattern in the residual of one axis: how surprising, and its share of the excess."""
+    """A pattern in the residual of one axis: its p-value, and its share of the excess."""
 
     axis: str
     what: str
     p: float
-    """Chance under noise, corrected for all patterns tried."""
+    """p-value, corrected for all patterns tried."""
     removed: float
     """Drop of chi-square."""
     detail: str = ""
@@ -42,7 +42,7 @@ def patterns(problem: Problem, residual: Floats, tangent: Floats) -> list[Patter
     """Significant patterns, those first that explain most by least; `residual` (N,) and `tangent` (N, k)
     whitened."""
     tested = [
-        (axis, name, *_drop(problem, residual, tangent, axis, columns))
+        (axis, name, *_reduction(problem, residual, tangent, axis, columns))
         for name, columns in features(problem)
         for axis in range(len(problem.experiment.channels))
         if problem.experiment.read[:, axis].any()
@@ -54,15 +54,15 @@ def patterns(problem: Problem, residual: Floats, tangent: Floats) -> list[Patter
         Pattern(
             problem.experiment.channels[axis].name,
             name,
-            float(min(1.0, number * chi2.sf(drop, max(rank, 1)))),
-            float(drop),
+            float(min(1.0, number * chi2.sf(delta_chi2, max(rank, 1)))),
+            float(delta_chi2),
         )
-        for axis, name, drop, rank in tested
+        for axis, name, delta_chi2, rank in tested
     ]
     return [p for p in out if p.p < ALPHA]
 
 
-def _drop(
+def _reduction(
     problem: Problem, residual: Floats, tangent: Floats, axis: int, columns: Floats
 ) -> tuple[float, int]:
     on_axis = np.zeros((columns.shape[1], *problem.sigma.shape))

@@ -13,7 +13,7 @@ from stiffmap.diagnosis.fitting.interval import intervals
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.report.findings import Effect
 from stiffmap.diagnosis.search.alias import AliasClass
-from stiffmap.diagnosis.search.selection import Search, surprise_of
+from stiffmap.diagnosis.search.selection import Search, minus_log_p_of
 from stiffmap.diagnosis.search.significance import global_p
 from stiffmap.diagnosis.search.study import Study
 from stiffmap.effects import Placed, registry
@@ -79,9 +79,13 @@ def _derived(study: Study, candidate: Candidate, rows: Floats) -> dict[str, tupl
 
 def _evidence(search: Search, model: Model, i: int) -> dict[str, float]:
     reduced = fit(model.without(i), search.predictor, search.problem)
-    drop = reduced.chi2 - model.chi2
-    surprise = surprise_of(drop, len(model.candidates[i].parameters))
-    return {"chi2_drop": drop, "minus_ln_p": surprise, "p_global": global_p(surprise, search.searches)}
+    delta_chi2 = reduced.chi2 - model.chi2
+    minus_log_p = minus_log_p_of(delta_chi2, len(model.candidates[i].parameters))
+    return {
+        "delta_chi2": delta_chi2,
+        "minus_ln_p": minus_log_p,
+        "p_global": global_p(minus_log_p, search.effective_trials),
+    }
 
 
 def aliases_of(classes: Sequence[AliasClass], candidate: Candidate) -> list[dict[str, Any]]:

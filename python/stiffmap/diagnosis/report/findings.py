@@ -61,7 +61,7 @@ class NoiseReport:
     repeats: dict[str, float]
     declared: dict[str, float]
     consistency: dict[str, float]
-    """Chance of repeats that differ so much from the declaration."""
+    """p-value of repeats that differ so much from the stated noise."""
     lack_of_fit_before: float
     lack_of_fit_after: float
     rms: float

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.report.findings import Effect, Findings
 from stiffmap.diagnosis.report.sentences import next_step, opening
-from stiffmap.diagnosis.report.wording import effect_text, five_lines, separation_text, shown
+from stiffmap.diagnosis.report.wording import effect_text, five_lines, in_display_units, separation_text
 from stiffmap.errors import FileError
 from stiffmap.experiment.noise.checks import Check
 
@@ -89,7 +89,10 @@ def _effects(d: Findings) -> str:
 
 
 def _effect(e: Effect) -> str:
-    rows = [(n, shown(v, u), shown(a, u), shown(b, u)) for n, (v, a, b, u) in e.parameters.items()]
+    rows = [
+        (n, in_display_units(v, u), in_display_units(a, u), in_display_units(b, u))
+        for n, (v, a, b, u) in e.parameters.items()
+    ]
     same = "; ".join(f"{a['kind']} of {a['element']} {' '.join(a['legs'])}" for a in e.aliases)
     alias = f"<p>This plan cannot tell it from: {escape(same)}.</p>" if same else ""
     legs = f", leg {', '.join(e.legs)}" if e.legs else ""
@@ -97,8 +100,8 @@ def _effect(e: Effect) -> str:
         f"<h3>{escape(f'{e.kind} of {e.element}{legs}')}</h3>"
         + table(("parameter", "value", "95 % from", "to"), rows)
         + alias
-        + f"<p><small>{escape(e.definition)} Drop of chi-square {e.evidence['chi2_drop']:.0f}; "
-        f"chance over the whole search {e.evidence['p_global']:.2g}.</small></p>"
+        + f"<p><small>{escape(e.definition)} Chi-square falls by {e.evidence['delta_chi2']:.0f}; "
+        f"p-value over the whole search {e.evidence['p_global']:.2g}.</small></p>"
     )
 
 
@@ -124,7 +127,7 @@ def _noise(d: Findings) -> str:
     ]
     listed = ", ".join(d.outliers) or "none"
     return (
-        table(("axis", "floor / m (rad)", "from repeats", "declared", "chance of the difference"), rows)
+        table(("axis", "floor / m (rad)", "from repeats", "stated", "p-value of the difference"), rows)
         + f"<p>Lack of fit: p = {n.lack_of_fit_before:.2g} before, {n.lack_of_fit_after:.2g} after. "
         f"Outliers listed (rows): {escape(listed)}.</p>"
     )
@@ -137,7 +140,7 @@ def _checks(before: Sequence[Check], after: Sequence[Check]) -> str:
         (b.name, b.meaning, b.contrasts, *(("-",) * 4 if not b.contrasts else _pair(b, a)))
         for b, a in zip(before, after, strict=True)
     ]
-    head = ("check", "means", "contrasts", "rms / noise", "chance", "rms of what effects leave", "chance")
+    head = ("check", "means", "contrasts", "rms / noise", "p-value", "rms of what effects leave", "p-value")
     return table(head, rows)
 
 
@@ -149,7 +152,7 @@ def _left(d: Findings) -> str:
     if not d.unexplained:
         return "<p>Nothing beyond noise.</p>"
     rows = [(p.axis, p.what, p.detail, _at(p), f"{p.p:.2g}") for p in d.unexplained[:12]]
-    out = table(("axis", "pattern", "how", "largest at", "chance"), rows)
+    out = table(("axis", "pattern", "how", "largest at", "p-value"), rows)
     if d.empirical:
         out += (
             "<p>An <b>empirical</b> correction (Gaussian process, no physical cause claimed) would bring "

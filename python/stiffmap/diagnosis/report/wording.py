@@ -6,10 +6,10 @@ from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.report.findings import Effect, Findings
 from stiffmap.diagnosis.rivals.separation import Separation
 
-SHOWN = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
+DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
 VERDICTS = {
     "none": "no effect above the limits of this experiment",
-    "effects": "the declared model lacks the effects below",
+    "effects": "the nominal model lacks the effects below",
     "ambiguous": "explained, but not by one explanation alone",
     "unattributed": "real structure that no known effect explains",
     "effects+unattributed": "explained in part; real structure remains",
@@ -52,9 +52,9 @@ def _more(d: Findings) -> list[str]:
     return out
 
 
-def shown(value: float, unit: str) -> str:
+def in_display_units(value: float, unit: str) -> str:
     """A number in the units of the screen."""
-    factor, name = SHOWN.get(unit, (1.0, unit))
+    factor, name = DISPLAY_UNITS.get(unit, (1.0, unit))
     return f"{value * factor:.4g} {name}" if name != "1" else f"{value:.4g}"
 
 
@@ -63,7 +63,7 @@ def effect_text(e: Effect) -> str:
     legs = f", leg{'s' if len(e.legs) > 1 else ''} {', '.join(e.legs)}" if e.legs else ""
     values = []
     for name, (value, low, high, unit) in e.parameters.items():
-        factor, label = SHOWN.get(unit, (1.0, unit))
+        factor, label = DISPLAY_UNITS.get(unit, (1.0, unit))
         text = f"{name} {value * factor:.4g} [{low * factor:.4g}, {high * factor:.4g}]"
         values.append(text if label == "1" else f"{text} {label}")
     n = len(e.aliases)
@@ -100,7 +100,7 @@ def _left(d: Findings) -> str:
             f"; an empirical correction would leave {1e3 * d.empirical.after:.4f} mm" if d.empirical else ""
         )
         detail = f", {p.detail}" if p.detail else ""
-        return f"unexplained: {p.what} in {p.axis} (chance {p.p:.1g}){detail}{_place(p)}{more}"
+        return f"unexplained: {p.what} in {p.axis} (p = {p.p:.1g}){detail}{_place(p)}{more}"
     if d.separations:
         return f"to separate: {separation_text(d.separations[0])}"
     out = f"{len(d.outliers)} outliers listed" if d.outliers else "no outliers"
@@ -111,7 +111,9 @@ def _place(p: Pattern) -> str:
     if p.position is None:
         return ""
     where = ", ".join(f"{1e3 * v:.0f}" for v in p.position)
-    return f"; largest at ({where}) mm, {shown(p.size, 'rad' if p.axis.startswith('r') else 'm')} rms"
+    return (
+        f"; largest at ({where}) mm, {in_display_units(p.size, 'rad' if p.axis.startswith('r') else 'm')} rms"
+    )
 
 
 def _limits(d: Findings) -> str:

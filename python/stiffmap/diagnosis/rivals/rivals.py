@@ -27,7 +27,7 @@ from stiffmap.experiment.noise.whitening import Problem
 LEVEL, RARE = 0.01, 1e-3
 ODDS = 100.0
 MARGIN = 30.0
-"""Rivals whose surprise is this much below the chosen effect's are refused without a full fit."""
+"""Rivals whose -ln p is this much below the chosen effect's are refused without a full fit."""
 SAME, PARALLEL, NESTED = 3.0, 0.1, 1.0
 """Predictions less than 3 standard deviations apart in all readings together are the same to this plan;
 at different places also their signatures must agree in 99 % of their squares. Less than one apart, a
@@ -36,7 +36,7 @@ model with more parameters is only a longer form."""
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """Another model, and the chance that it only looks worse."""
+    """Another model, and the p-value of the test that it is worse."""
 
     model: Model
     replaces: int
@@ -72,7 +72,7 @@ def rivals(search: Search, model: Model, classes: Sequence[AliasClass], number: 
             if new == replaced or new in longer.get(replaced, set()) or not f.model.usable:
                 continue
             rival = compare(search, model, i, f.model, float(np.sqrt(max(reduced.chi2 - model.chi2, 0.0))))
-            if f.surprise > search.threshold and stays(search, model, rival):
+            if f.minus_log_p > search.threshold and stays(search, model, rival):
                 found.append(rival)
     return sorted(found, key=lambda r: -r.p)
 
@@ -98,13 +98,13 @@ def stays(search: Search, model: Model, rival: Rival) -> bool:
         return two_words(model.candidates[rival.replaces], rival.candidate)
     if rival.same and two_words(model.candidates[rival.replaces], rival.candidate):
         return True
-    if lost_by_chance(model, rival, search.problem.freedom) < RARE:
+    if p_of_loss(model, rival, search.problem.freedom) < RARE:
         return False
     return rival.p > LEVEL and not too_long(search, model, rival)
 
 
-def lost_by_chance(chosen: Model, rival: Rival, freedom: int) -> float:
-    """Chance that the rival, were it true, would lose by so much (Cox 1961).
+def p_of_loss(chosen: Model, rival: Rival, freedom: int) -> float:
+    """p-value of the loss: were the rival true, how often it would lose by so much (Cox 1961).
 
     Then the difference of log-likelihoods is normal, mean -gap²/2, standard deviation gap; each side's
     parameters take half of one unit each. In units of what is left unexplained where that is more than noise.

@@ -24,7 +24,7 @@ class Detectable:
 
 
 def detectable(screen: Screen, threshold: float) -> list[Detectable]:
-    """One entry per candidate; `threshold` is the surprise that the whole search demands."""
+    """One entry per candidate; `threshold` is the -ln p that the whole search demands."""
     out: dict[Candidate, list[dict[str, float | None]]] = {}
     for i, v in enumerate(screen.variants):
         rank = max(1, int(screen.rank[i]))

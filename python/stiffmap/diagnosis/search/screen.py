@@ -1,7 +1,7 @@
 """Screening: how much of the residual each candidate's sensitivities can take away.
 
 All candidates at once: their whitened columns, freed of nuisances and of the effects that are already
-in the model, are orthonormalised; the drop of chi-square is then the squared projection.
+in the model, are orthonormalised; the reduction of chi-square is then the squared projection.
 """
 
 from __future__ import annotations
@@ -92,30 +92,30 @@ class Screen:
                 return np.asarray(w[int(np.searchsorted(m, i))])
         raise IndexError(i)
 
-    def drops(self, residual: Floats) -> Floats:
-        """(V, S) drop of chi-square of each variant for residuals (N, S); nothing for one-parameter
+    def delta_chi2(self, residual: Floats) -> Floats:
+        """(V, S) reduction of chi-square of each variant for residuals (N, S); nothing for one-parameter
         effects that would have to grow backwards."""
         out = np.zeros((len(self.variants), residual.shape[1]))
         for m, w, b in zip(self.members, self.white, self.bases, strict=True):
             v, n, p = b.shape
             projected = (b.transpose(0, 2, 1).reshape(v * p, n) @ residual).reshape(v, p, -1)
-            drop = (projected**2).sum(axis=1)
+            reduction = (projected**2).sum(axis=1)
             if p == 1:
                 direction = np.sign(np.einsum("vn,vn->v", w[:, :, 0], b[:, :, 0]))
                 sign = direction * np.array([self.variants[i].sign[0] for i in m])
-                drop = np.where(projected[:, 0] * sign[:, None] >= 0, drop, 0.0)
-            out[m] = drop
+                reduction = np.where(projected[:, 0] * sign[:, None] >= 0, reduction, 0.0)
+            out[m] = reduction
         return out
 
-    def surprise(self, drops: Floats) -> Floats:
-        """(V,) -ln of the chance of such drops (V,) without the effects."""
-        return log_surprise(drops, np.maximum(self.rank, 1))
+    def minus_log_p(self, delta_chi2: Floats) -> Floats:
+        """(V,) -ln p of such reductions (V,) of chi-square without the effects."""
+        return chi2_minus_log_p(delta_chi2, np.maximum(self.rank, 1))
 
-    def most_surprising(self, residual: Floats) -> Floats:
-        """(S,) surprise of the best variant for residuals (N, S)."""
-        drops = self.drops(residual)
+    def largest_minus_log_p(self, residual: Floats) -> Floats:
+        """(S,) -ln p of the best variant for residuals (N, S)."""
+        delta_chi2 = self.delta_chi2(residual)
         best = [
-            log_surprise(drops[self.rank == r].max(axis=0), np.full(residual.shape[1], r))
+            chi2_minus_log_p(delta_chi2[self.rank == r].max(axis=0), np.full(residual.shape[1], r))
             for r in np.unique(self.rank[self.rank > 0])
         ]
         return np.asarray(np.max(best, axis=0)) if best else np.zeros(residual.shape[1])
@@ -125,11 +125,11 @@ class Screen:
         return np.asarray(np.linalg.lstsq(self.columns(i), residual, rcond=RANK)[0])
 
 
-def log_surprise(drops: Floats, freedom: NDArray[np.intp]) -> Floats:
-    """-ln P(chi-square >= drop); by its asymptote where the chance is below the smallest double."""
+def chi2_minus_log_p(delta_chi2: Floats, freedom: NDArray[np.intp]) -> Floats:
+    """-ln p(chi-square >= delta_chi2); by its asymptote where p is below the smallest double."""
     with np.errstate(divide="ignore"):
-        out = -chi2.logsf(drops, freedom)
-    half = np.maximum(drops, 1.0) / 2
+        out = -chi2.logsf(delta_chi2, freedom)
+    half = np.maximum(delta_chi2, 1.0) / 2
     far = half - (freedom / 2 - 1) * np.log(half) + gammaln(freedom / 2)
     return np.asarray(np.where(np.isfinite(out), out, far))
 

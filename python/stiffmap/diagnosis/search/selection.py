@@ -13,7 +13,7 @@ from stiffmap.diagnosis.candidates.sensitivity import Variant
 from stiffmap.diagnosis.clock import Clock
 from stiffmap.diagnosis.fitting.fit import evaluate, fit
 from stiffmap.diagnosis.fitting.model import Model
-from stiffmap.diagnosis.search.screen import Screen, log_surprise
+from stiffmap.diagnosis.search.screen import Screen, chi2_minus_log_p
 from stiffmap.diagnosis.search.significance import ALPHA, needed
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
@@ -23,7 +23,7 @@ MOST_EFFECTS = 4
 LARGE = 10.0
 """Scales beyond which parameters without a slope at the null get starts of their own."""
 WORTH = 0.5
-"""Share of the surprise demanded that screening must promise before anything is fitted."""
+"""Share of the demanded -ln p that screening must promise before anything is fitted."""
 MARGIN, CLOSE = 15.0, 0.05
 """What linear screening may be wrong by: candidates this near the best get a full fit."""
 
@@ -36,7 +36,7 @@ class Search:
     problem: Problem
     screen: Screen
     """Representatives of the alias classes only, beside an empty model."""
-    searches: float
+    effective_trials: float
     """Number of independent tests that the search is worth."""
     finalists: int = 5
     alpha: float = ALPHA
@@ -46,8 +46,8 @@ class Search:
 
     @property
     def threshold(self) -> float:
-        """Surprise that an effect must have."""
-        return needed(self.searches, self.alpha)
+        """-ln p that an effect must have."""
+        return needed(self.effective_trials, self.alpha)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +55,9 @@ class Finalist:
     """A candidate tried through the full equilibrium beside the effects in the model."""
 
     model: Model
-    drop: float
-    surprise: float
-    """-ln of the chance of such a drop under the model without it."""
+    delta_chi2: float
+    minus_log_p: float
+    """-ln p of such a reduction of chi-square under the model without it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ def select(search: Search) -> Selection:
                 break
             search.clock.say(f"an effect beside {steps[-1]}" if steps else "a first effect")
             best = best_addition(search, model)
-            if best is None or best.surprise < search.threshold:
+            if best is None or best.minus_log_p < search.threshold:
                 break
             model = best.model
             model = backward(search, exchange(search, model))
@@ -95,7 +95,7 @@ def select(search: Search) -> Selection:
 def best_addition(search: Search, model: Model) -> Finalist | None:
     """The candidate that explains most beside the model, judged by full fits of the best few."""
     found = [f for f in additions(search, model, search.finalists) if f.model.usable]
-    return max(found, key=lambda f: f.surprise, default=None)
+    return max(found, key=lambda f: f.minus_log_p, default=None)
 
 
 def additions(search: Search, model: Model, number: int, margin: float = MARGIN) -> list[Finalist]:
@@ -103,20 +103,20 @@ def additions(search: Search, model: Model, number: int, margin: float = MARGIN)
     if model.residual is None:
         return []
     screen = search.screen.beside(model.tangent())
-    surprise = screen.surprise(screen.drops(model.residual[:, None])[:, 0])
+    minus_log_p = screen.minus_log_p(screen.delta_chi2(model.residual[:, None])[:, 0])
     best_of: dict[Candidate, int] = {}
-    for i in np.argsort(-surprise):
+    for i in np.argsort(-minus_log_p):
         v = screen.variants[i]
         if (
-            surprise[i] > 0
+            minus_log_p[i] > 0
             and v.candidate not in model.candidates
             and not clash(v.candidate, model.candidates)
         ):
             best_of.setdefault(v.candidate, int(i))
-    top = max(surprise, default=0.0)
+    top = max(minus_log_p, default=0.0)
     if top < WORTH * search.threshold:
         return []
-    picked = [i for i in best_of.values() if surprise[i] > top - max(margin, CLOSE * top)]
+    picked = [i for i in best_of.values() if minus_log_p[i] > top - max(margin, CLOSE * top)]
     return [_finalist(search, model, screen, i) for i in picked[:number]]
 
 
@@ -133,15 +133,15 @@ def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
     if not best.usable:
         beside = f" beside {' + '.join(map(str, model.candidates))}" if model.candidates else ""
         search.failed[f"{variant.candidate}{beside}"] = best.failure
-    drop = model.chi2 - best.chi2
-    return Finalist(best, drop, surprise_of(drop, best.sizes()[-1]))
+    delta_chi2 = model.chi2 - best.chi2
+    return Finalist(best, delta_chi2, minus_log_p_of(delta_chi2, best.sizes()[-1]))
 
 
-def surprise_of(drop: float, freedom: int) -> float:
-    """-ln of the chance of such a drop of chi-square."""
-    if not np.isfinite(drop):
+def minus_log_p_of(delta_chi2: float, freedom: int) -> float:
+    """-ln p of such a reduction of chi-square."""
+    if not np.isfinite(delta_chi2):
         return 0.0
-    return float(log_surprise(np.array(max(drop, 0.0)), np.array(freedom, dtype=np.intp)))
+    return float(chi2_minus_log_p(np.array(max(delta_chi2, 0.0)), np.array(freedom, dtype=np.intp)))
 
 
 def start_values(variant: Variant, estimate: Floats, flat: NDArray[np.bool_]) -> list[Floats]:
@@ -181,12 +181,12 @@ def backward(search: Search, model: Model) -> Model:
             fit(model.without(i), search.predictor, search.problem) for i in range(len(model.candidates))
         ]
         sizes = model.sizes()
-        surprise = [
-            surprise_of(t.chi2 - model.chi2, n) if t.usable else np.inf
+        minus_log_p = [
+            minus_log_p_of(t.chi2 - model.chi2, n) if t.usable else np.inf
             for t, n in zip(trials, sizes, strict=True)
         ]
-        worst = int(np.argmin(surprise))
-        if surprise[worst] > search.threshold:
+        worst = int(np.argmin(minus_log_p))
+        if minus_log_p[worst] > search.threshold:
             return model
         model = trials[worst]
     return model

@@ -7,14 +7,14 @@ import numpy as np
 from stiffmap.diagnosis.search.screen import Screen
 
 ALPHA = 1e-4
-"""Chance of naming anything where there is nothing, over the whole search."""
+"""Probability of naming anything where there is nothing, over the whole search."""
 DRAWS = 1000
 
 
-def number_of_searches(screen: Screen, seed: int, draws: int = DRAWS) -> float:
+def effective_number_of_trials(screen: Screen, seed: int, draws: int = DRAWS) -> float:
     """How many independent tests the search is worth (parametric bootstrap of the whole search).
 
-    Under the null the smallest of the candidates' p-values is below p with a chance of
+    Under the null the smallest of the candidates' p-values is below p with probability
     1 - exp(-M p). M follows from the median over simulated noise and holds for smaller p, where
     simulating would need millions of draws. Bounds and unidentified parameters are in, since every
     draw runs the same signed search over all variants.
@@ -23,18 +23,18 @@ def number_of_searches(screen: Screen, seed: int, draws: int = DRAWS) -> float:
         return 1.0
     rng = np.random.default_rng(seed)
     best = [
-        screen.most_surprising(rng.standard_normal((screen.readings, 100)))
+        screen.largest_minus_log_p(rng.standard_normal((screen.readings, 100)))
         for _ in range(max(1, draws // 100))
     ]
     median = float(np.median(np.concatenate(best)))
     return max(1.0, float(np.log(2.0) * np.exp(median)))
 
 
-def global_p(surprise: float, searches: float) -> float:
-    """Chance that noise alone gives a best candidate as surprising as this."""
-    return float(-np.expm1(-searches * np.exp(-surprise)))
+def global_p(minus_log_p: float, trials: float) -> float:
+    """p-value over the whole search: that noise alone gives some candidate such a -ln p."""
+    return float(-np.expm1(-trials * np.exp(-minus_log_p)))
 
 
-def needed(searches: float, alpha: float = ALPHA) -> float:
-    """Surprise at which the whole search has the chance `alpha` of a false alarm."""
-    return float(np.log(searches / -np.log1p(-alpha)))
+def needed(trials: float, alpha: float = ALPHA) -> float:
+    """-ln p at which the whole search has the false-alarm rate `alpha`."""
+    return float(np.log(trials / -np.log1p(-alpha)))

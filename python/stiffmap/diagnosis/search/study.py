@@ -15,7 +15,7 @@ from stiffmap.diagnosis.search.alias import AliasClass, alias_classes
 from stiffmap.diagnosis.search.calibrated import Layer
 from stiffmap.diagnosis.search.screen import Screen
 from stiffmap.diagnosis.search.selection import Search, Selection, select
-from stiffmap.diagnosis.search.significance import number_of_searches
+from stiffmap.diagnosis.search.significance import effective_number_of_trials
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.level import Mask, Noise, noise_of
 from stiffmap.experiment.noise.outliers import outliers, suspects
@@ -31,7 +31,7 @@ class Study:
     plan: Plan
     noise: Noise
     classes: tuple[AliasClass, ...]
-    searches: float
+    effective_trials: float
     whole: tuple[Problem, Screen]
     """All rows, and the representatives on them."""
     layer: Layer | None = None
@@ -90,7 +90,7 @@ class Finding:
 TYPICAL = 1.2
 """Robust spread of residuals, in noise floors, that still counts as a model that fits."""
 
-_SEARCHES: dict[tuple[str, int, bytes], float] = {}
+_TRIALS: dict[tuple[str, int, bytes], float] = {}
 
 
 def study(
@@ -126,15 +126,15 @@ def study(
     sizes = np.round(np.log(first.sigma), 2).tobytes()
     key = (plan.digest + ("" if layer is None else layer.digest), seed, sizes)
     prepared = time.perf_counter()
-    if key not in _SEARCHES:
-        _SEARCHES[key] = number_of_searches(named, seed)
+    if key not in _TRIALS:
+        _TRIALS[key] = effective_number_of_trials(named, seed)
     seconds = {"sensitivities": prepared - start, "null bootstrap": time.perf_counter() - prepared}
     return Study(
         predictor,
         plan,
         first,
         classes,
-        _SEARCHES[key],
+        _TRIALS[key],
         (problem, named),
         layer,
         clock or Clock(),
@@ -183,10 +183,10 @@ def _held(residual: Floats, allowed: Mask) -> Floats:
 def search_on(study: Study, keep: Mask, finalists: int) -> Search:
     """The search on some of the rows."""
     if keep.all():
-        return Search(study.predictor, *study.whole, study.searches, finalists, clock=study.clock)
+        return Search(study.predictor, *study.whole, study.effective_trials, finalists, clock=study.clock)
     problem = study.problem_of(keep)
     screen = _representatives(Screen.of(problem, study.plan.variants), study.classes)
-    return Search(study.predictor, problem, screen, study.searches, finalists, clock=study.clock)
+    return Search(study.predictor, problem, screen, study.effective_trials, finalists, clock=study.clock)
 
 
 def _representatives(screen: Screen, classes: tuple[AliasClass, ...]) -> Screen:

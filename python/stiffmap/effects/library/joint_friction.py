@@ -26,8 +26,8 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
     def change(e: Element) -> Elements:
         assert isinstance(e, Joint)
-        rubs = JointFriction(level, placed.options["branch"]) if level > 0.0 else None
-        return (replace(e, friction=rubs),)
+        friction = JointFriction(level, placed.options["branch"]) if level > 0.0 else None
+        return (replace(e, friction=friction),)
 
     return change_sites(description, placed.legs, placed.element, free_joints, change)
 

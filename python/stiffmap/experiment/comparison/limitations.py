@@ -41,7 +41,7 @@ def refuse_unreachable(experiment: Experiment, base: Floats) -> None:
 def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[str]:
     """What the reader must know, in sentences."""
     e = experiment
-    out = [f"set aside: {told}" for told in e.out_of_reach]
+    out = [f"left out: {told}" for told in e.out_of_reach]
     out += [f"contradictory repeats: {c}" for c in noise.contradictions()]
     if int(e.read.sum()) < FEWEST:
         out.append(
@@ -52,7 +52,7 @@ def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[
             "all rows are one pose: what changes over the workspace cannot be told, nothing is held out"
         )
     if not (noise.freedom > 0).any():
-        out.append("no repeats: the declared noise is believed")
+        out.append("no repeats: the stated noise is believed")
     outside = _outside(e, machine)
     if outside:
         out.append(f"{outside} row{'s lie' if outside > 1 else ' lies'} outside the declared workspace")

@@ -88,7 +88,7 @@ def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:
         grid[row][0].set_ylabel(_label(r, channel))
     for column, (name, _, _) in enumerate(drivers):
         grid[-1][column].set_xlabel(name)
-    aside = "; crosses: rows set aside" if r.set_aside.any() else ""
+    aside = "; crosses: outliers" if r.set_aside.any() else ""
     title = (
         f"{r.experiment.name}: reading minus prediction\ngrey: two standard deviations of the noise{aside}"
     )

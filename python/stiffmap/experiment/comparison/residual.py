@@ -40,12 +40,12 @@ class Residual:
     """(n,) rows that contradict their repeats or stand alone; not in `summary` nor `lack_of_fit`."""
     summary: Summary
     lack_of_fit: float
-    """Chance of a residual this large if the machine were as declared; nuisances and shared zeros
+    """p-value of a residual this large if the machine were as its file says; nuisances and shared zeros
     taken into account."""
     nuisances: int
     """How many unknown frames and zeros were fitted."""
     groups_off: int
-    """Poses whose residuals alone are beyond noise (chance below 1e-3 that any pose is)."""
+    """Poses whose residuals alone are beyond noise (p-value below 1e-3 over all poses)."""
     checks: list[Check]
     limitations: list[str]
     """What this experiment cannot tell, in sentences."""

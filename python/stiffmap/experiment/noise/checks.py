@@ -19,12 +19,12 @@ from stiffmap.experiment.noise.contrasts import CONTRASTS
 from stiffmap.experiment.noise.level import Mask
 
 BROKEN = 1e-4
-"""Chance of the linearity below which reciprocity says nothing: it holds for linear machines only."""
+"""p-value of the linearity below which reciprocity says nothing: it holds for linear machines only."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One check: how many contrasts the plan allows (0: it cannot be made), their rms and chance."""
+    """One check: how many contrasts the plan allows (0: it cannot be made), their rms and p-value."""
 
     name: str
     meaning: str
@@ -33,7 +33,7 @@ class Check:
     """Root mean square of the contrasts over their standard deviations; 1 is noise."""
     p: float
     note: str = ""
-    """Why it could not be made, or why its chance says nothing."""
+    """Why it could not be made, or why its p-value says nothing."""
 
 
 def checks(experiment: Experiment, values: Floats, sigma: Floats, keep: Mask) -> list[Check]:

@@ -29,7 +29,7 @@ class Noise:
     freedom: NDArray[np.intp]
     """Degrees of freedom of `repeats`."""
     consistency: Floats
-    """Chance of repeats that differ at least this much from the declaration (two-sided chi-square)."""
+    """p-value of repeats that differ at least this much from what is stated (two-sided chi-square)."""
     floor: Floats
     """The larger of the two."""
     sigma: Floats
@@ -45,7 +45,7 @@ class Noise:
     def contradictions(self) -> list[str]:
         """Axes whose repeats scatter more than the declaration allows, told in words."""
         return [
-            f"{c.name}: repeats scatter by {s:.3g}, {d:.3g} declared (SI, chance {p:.1g})"
+            f"{c.name}: repeats scatter by {s:.3g}, {d:.3g} stated (SI, p = {p:.1g})"
             for c, s, d, p in zip(self.channels, self.repeats, self.declared, self.consistency, strict=True)
             if p < CONTRADICTION and s > d
         ]

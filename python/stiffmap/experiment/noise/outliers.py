@@ -10,9 +10,9 @@ from stiffmap.experiment.experiment import Experiment, Floats
 
 Mask = NDArray[np.bool_]
 FALSE = 0.01
-"""Chance of listing any row of a clean experiment."""
+"""Probability of listing any row of a clean experiment."""
 GROSS = 8.0
-"""Robust standard deviations beyond which a reading is set aside before any effect is known."""
+"""Robust standard deviations beyond which a reading is an outlier before any effect is known."""
 
 
 def row_scores(residual: Floats, sigma: Floats) -> tuple[Floats, NDArray[np.intp]]:
@@ -28,13 +28,13 @@ def outliers(experiment: Experiment, residual: Floats, sigma: Floats) -> Mask:
     A pose, or a branch, of which half or more would go is no outlier: it stays whole.
     """
     score, count = row_scores(residual, sigma)
-    chance = chi2.sf(score, np.maximum(count, 1))
-    found = (chance < FALSE / max(len(experiment), 1)) & (count > 0)
+    p = chi2.sf(score, np.maximum(count, 1))
+    found = (p < FALSE / max(len(experiment), 1)) & (count > 0)
     return whole_stays(experiment, found)
 
 
 def suspects(experiment: Experiment, residual: Floats, sigma: Floats) -> Mask:
-    """(n,) rows to set aside before any effect is known, when residuals are structured.
+    """(n,) outliers before any effect is known, when residuals are structured.
 
     Repeats that contradict each other, the one farther from its condition's or the model's middle;
     and rows beyond `GROSS` robust standard deviations of all residuals of their axis.

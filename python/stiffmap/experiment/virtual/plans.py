@@ -141,7 +141,7 @@ def with_branches(plan: Experiment) -> Experiment:
 
 
 def shuffled(plan: Experiment, seed: int) -> Experiment:
-    """The plan with its poses visited in an order of chance: what drifts is then no trend in space."""
+    """The plan with its poses visited in random order: what drifts is then no trend in space."""
     rank = np.random.default_rng(seed).permutation(int(plan.groups.max()) + 1)
     index = np.argsort(rank[plan.groups], kind="stable")
     moved = plan.rows(index.astype(np.intp))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from stiffmap.calibration.facts import Beyond, Facts
 
-SHOWN = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm"), "ln": (1e2, "%")}
+DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm"), "ln": (1e2, "%")}
 
 
-def shown(value: float, unit: str) -> str:
+def in_display_units(value: float, unit: str) -> str:
     """A number in the units of the screen."""
-    factor, name = SHOWN[unit]
+    factor, name = DISPLAY_UNITS[unit]
     return f"{value * factor:.4g} {name}"
 
 
@@ -20,18 +20,20 @@ def lines(c: Facts) -> list[str]:
     out.append(f"told by the readings: {c.rank} directions of {len(c.rows)} unknowns")
     out.append("groups: " + _groups(c))
     out.append(
-        f"misfit: rms {shown(c.rms_before, c.unit)} as declared, {shown(c.rms_after, c.unit)} calibrated; "
-        f"{100 * c.explained:.1f} % explained (noise {shown(c.noise, c.unit)})"
+        f"misfit: rms {in_display_units(c.rms_before, c.unit)} as declared, {in_display_units(c.rms_after, c.unit)} calibrated; "
+        f"{100 * c.explained:.1f} % explained (noise {in_display_units(c.noise, c.unit)})"
     )
     if c.held_out:
         h = c.held_out
         out.append(
-            f"held-out {h.by}: rms {shown(h.before, c.unit)} as declared, {shown(h.after, c.unit)} with all "
-            f"unknowns, {shown(h.chosen, c.unit)} with the chosen groups"
+            f"held-out {h.by}: rms {in_display_units(h.before, c.unit)} as declared, {in_display_units(h.after, c.unit)} with all "
+            f"unknowns, {in_display_units(h.chosen, c.unit)} with the chosen groups"
         )
     if c.floor > 0.0:
-        where = ", ".join(f"{k} {shown(v, _unit(k, c.unit))}" for k, v in c.rest.items())
-        out.append(f"model-form floor: {shown(c.floor, c.unit)} per pose beyond noise; left: {where}")
+        where = ", ".join(f"{k} {in_display_units(v, _unit(k, c.unit))}" for k, v in c.rest.items())
+        out.append(
+            f"model-form floor: {in_display_units(c.floor, c.unit)} per pose beyond noise; left: {where}"
+        )
     return out
 
 
@@ -42,7 +44,7 @@ def _unit(name: str, unit: str) -> str:
 def _beyond(b: Beyond) -> str:
     other = f"; or instead: {', '.join(b.rivals[:3])}" if b.rivals else ""
     more = f" and {len(b.rivals) - 3} more" if len(b.rivals) > 3 else ""
-    return f"{b.name}: {shown(b.value, b.unit)} ± {shown(b.sigma, b.unit)} ({b.nats:.0f} nats){other}{more}"
+    return f"{b.name}: {in_display_units(b.value, b.unit)} ± {in_display_units(b.sigma, b.unit)} ({b.nats:.0f} nats){other}{more}"
 
 
 def _groups(c: Facts) -> str:
@@ -60,7 +62,7 @@ def table(c: Facts, most: int | None = None) -> list[str]:
     out = [f"{'unknown':{width}}  {'value':>12}  {'u':>11}  {'sigma':>11}  {'pull':>6}  {'u/sigma':>8}  told"]
     for r in sorted(c.rows, key=lambda r: -r.observability)[:most]:
         told = ("minimal" if r.minimal else "yes") if r.identifiable else "no"
-        cells = (shown(v, r.unit) for v in (r.value, r.u, r.sigma))
+        cells = (in_display_units(v, r.unit) for v in (r.value, r.u, r.sigma))
         value, u, sigma = cells
         out.append(
             f"{r.name:{width}}  {value:>12}  {u:>11}  {sigma:>11}  {r.pull:6.1f}  {r.observability:8.1f}  {told}"

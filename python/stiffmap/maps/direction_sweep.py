@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.broadcasting import Floats
+from stiffmap.maps.fixed_order_sums import apply
 from stiffmap.maps.loading import Loading, without_failed
-from stiffmap.maps.sums import apply
 from stiffmap.solution import Solution
 
 
 @dataclass(frozen=True)
-class Fan:
+class DirectionSweep:
     """Equilibria of poses (p) under force directions (k)."""
 
     angle: Floats
@@ -28,15 +28,15 @@ class Fan:
     status: NDArray[np.uint8]
     """(p, k)."""
 
-    def join(self, other: Fan) -> Fan:
+    def join(self, other: DirectionSweep) -> DirectionSweep:
         """Directions of both."""
         pairs = ((getattr(self, n), getattr(other, n)) for n in self.__dataclass_fields__)
-        return Fan(*(np.concatenate(pair, axis=1) for pair in pairs))
+        return DirectionSweep(*(np.concatenate(pair, axis=1) for pair in pairs))
 
-    def pick(self, column: NDArray[np.intp]) -> Fan:
+    def pick(self, column: NDArray[np.intp]) -> DirectionSweep:
         """One direction per pose, column (p,)."""
         row = np.arange(len(column))
-        return Fan(*(getattr(self, n)[row, column][:, None] for n in self.__dataclass_fields__))
+        return DirectionSweep(*(getattr(self, n)[row, column][:, None] for n in self.__dataclass_fields__))
 
 
 def direction(angle: Floats, axes: tuple[int, int]) -> Floats:
@@ -46,21 +46,21 @@ def direction(angle: Floats, axes: tuple[int, int]) -> Floats:
     return out
 
 
-def solve_fan(
+def solve_directions(
     loading: Loading, position: Floats, angle: Floats, force: float | Floats, axes: tuple[int, int]
-) -> Fan:
+) -> DirectionSweep:
     """Equilibria at positions (p, 3) under pure forces (N; one, or one per pose) at angles (p, k)."""
     size = np.broadcast_to(np.reshape(force, (-1, 1)), angle.shape)
     along = direction(angle, axes)
     wrench = np.concatenate([size[..., None] * along, np.zeros_like(along)], axis=-1)
-    return fan_of(loading.solve(position[:, None], wrench), angle, size, axes)
+    return direction_sweep_of(loading.solve(position[:, None], wrench), angle, size, axes)
 
 
-def fan_of(s: Solution, angle: Floats, size: Floats, axes: tuple[int, int]) -> Fan:
+def direction_sweep_of(s: Solution, angle: Floats, size: Floats, axes: tuple[int, int]) -> DirectionSweep:
     """Equilibria (p, k) that have been solved for forces of those sizes (N) and angles."""
     along, across = direction(angle, axes), direction(angle + np.pi / 2, axes)
     c = s.compliance[..., :3, :3]
-    return Fan(
+    return DirectionSweep(
         angle=angle,
         translation=without_failed(s.displacement[..., :3], s.status),
         turning=size[..., None] * apply(c, across),
@@ -74,7 +74,9 @@ def even_angles(count: int) -> Floats:
     return np.asarray(2 * np.pi / count * np.arange(count), dtype=float)
 
 
-def even_fan(loading: Loading, position: Floats, force: float, axes: tuple[int, int], count: int) -> Fan:
+def even_directions(
+    loading: Loading, position: Floats, force: float, axes: tuple[int, int], count: int
+) -> DirectionSweep:
     """Equilibria under `count` equally spaced directions, the first along the plane's first axis."""
     angle = np.broadcast_to(even_angles(count), (len(position), count))
-    return solve_fan(loading, position, angle, force, axes)
+    return solve_directions(loading, position, angle, force, axes)
