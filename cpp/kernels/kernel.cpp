@@ -130,6 +130,11 @@ struct Block {
       s.tau[q] = s.dtau[q] = s.friction_sign[q] = splat(0);
     }
     set_base(P);
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      if (!P.coordinates[q].by_force || !P.coordinates[q].from_home) continue;
+      const LawProgram& law = P.laws[P.coordinates[q].law];
+      s.z[q] += law.cubic / law.stiffness * s.scale[q] * s.z[q] * s.z[q] * s.z[q];
+    }
   }
 
   /// Lanes in which a ball joint's axes are less than `least` from coinciding.

@@ -42,6 +42,20 @@ inline V load(const double* x) {
   return out;
 }
 
+/// The real root of u^3 + u = y. From above the root Newton's steps on the convex function fall to it: from y, or from
+/// a cube root by the exponent (at most 6 % too large) where that is smaller.
+inline V cubic_root(V y) {
+  const V size = absolute(y);
+  M bits;
+  __builtin_memcpy(&bits, &size, sizeof bits);
+  bits = __builtin_convertvector(__builtin_convertvector(bits, V) * (1.0 / 3), M) + 0x2AA0000000000000;
+  V u;
+  __builtin_memcpy(&u, &bits, sizeof u);
+  u = u < size ? u : size;
+  for (int k = 0; k < 6; ++k) u = (2.0 * u * u * u + size) / (3.0 * u * u + 1.0);
+  return y < 0.0 ? -u : u;
+}
+
 /// Sine and cosine: reduction to |r| <= pi/4 in three parts, then the Taylor-like minimax polynomials
 /// of degree 13 and 14; error below 2 ulp for |x| < 1e4.
 inline void sincos(V x, V& s, V& c) {

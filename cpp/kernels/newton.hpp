@@ -29,6 +29,15 @@ struct Newton {
   // ---- laws -----------------------------------------------------------------------------------
   void law_at(const LawProgram& law, int q) {
     const V k = law.stiffness / s.scale[q], z = s.z[q];
+    if (P.coordinates[q].by_force) {
+      // k z = k a + c a^3: in a, Newton's steps on the stiff part shrink by a third only.
+      const V g = law.cubic / k, size = root(g), a = cubic_root(size * z) / size;
+      s.tau[q] = k * z + law.friction * s.friction_sign[q];
+      s.da[q] = 1.0 / (1.0 + 3 * g * a * a);
+      s.dtau[q] = k;
+      s.x[q] = s.a_base[q] + a;
+      return;
+    }
     if (law.count == 0) {
       s.tau[q] = (k + law.cubic * z * z) * z + law.friction * s.friction_sign[q];
       s.da[q] = splat(1);
@@ -130,7 +139,10 @@ struct Newton {
         const double tau = bears ? law.stiffness / s.scale[q][i] * linear : 0.0;
         const double sign = tau > 0 ? 1 : tau < 0 ? -1 : 0;
         s.friction_sign[q][i] = sign;
-        s.z[q][i] = bears ? from_force(law, tau - law.friction * sign, s.scale[q][i]) : 0.0;
+        const double spring = tau - law.friction * sign;
+        s.z[q][i] = !bears       ? 0.0
+                    : k.by_force ? spring * s.scale[q][i] / law.stiffness
+                                 : from_force(law, spring, s.scale[q][i]);
       }
     }
   }
@@ -264,6 +276,9 @@ struct Newton {
         const M second = (way.tries == 1.0) & (norm <= 5.0 * way.previous) & (norm <= 0.02) & (e.lowest > pivot_floor);
         distrusted |= active & ~settled & ~((norm <= 0.2 * way.previous) | (norm <= 1e-7) | second);
       }
+      // A gap that nothing closes: free play is the reference's to find (it has no step out of it).
+      else
+        distrusted |= active & (absolute(e.lowest) < 1e-12);
       distrusted |= active & ~settled & (way.tries >= static_cast<double>(in.max_iterations));
       move(active & ~kept & ~distrusted);
       done |= settled & ~failed;
@@ -307,7 +322,7 @@ struct Newton {
   }
 
   static constexpr int most_iterations = 96;
-  static constexpr double pivot_floor = 1e-5;
+  const double pivot_floor = 1e-5 * P.softest;
   static constexpr double small = 1e-13;  ///< step that changes the tangent by no more than that
   static constexpr double nothing = 1e-15;
   static constexpr double unloaded = 1e-11;

@@ -63,6 +63,7 @@ struct CoordinateProgram {
   double middle;           ///< of a ball joint's second coordinate: its axes are perpendicular there
   std::int32_t ball;       ///< it is one
   std::int32_t role, locked, law, from_home;
+  std::int32_t by_force;  ///< a hardening law of a joint: its parameter is the deflection that its force has without it
 };
 
 /// One closure equation set of a leg: the leg's end or a loop inside it.
@@ -123,6 +124,7 @@ struct Program {
   std::int32_t grid_n[3], grid_row;  ///< nodes along each axis; numbers per node, a multiple of 8
   double grid_low[3], grid_step[3];
   double length, stiffness, near_lock, locked;
+  double softest;               ///< lowest stiffness of a spring or drive, in multiples of `stiffness`; at most 1
   double home_p[3], home_R[9];  ///< tip pose at home, R by columns
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/fast_plan.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "plan/chains.hpp"
@@ -20,7 +21,7 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
   for (const Coordinate& c : m.coordinates) {
     const Index j = static_cast<Index>(&c - m.coordinates.data());
     d.coordinates.push_back({m.home_coordinates[j], c.lower, c.upper, m.unit(j), 0.0, m.rest[j], c.friction, 0.0, 0,
-                             static_cast<std::int32_t>(c.role), c.locked, i32(c.law), c.from_home()});
+                             static_cast<std::int32_t>(c.role), c.locked, i32(c.law), c.from_home(), 0});
     d.program.starts_linear |= c.friction != 0;
     if (c.role == Role::passive && c.locked) d.program.flag_always |= flag::free_spin;
   }
@@ -42,6 +43,24 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
     c.stiffness = e.stiffness;
     c.rest = e.rest;
   }
+  for (const Op& op : d.ops) {
+    if (op.kind > OpKind::prismatic || !op.eliminated || op.law < 0) continue;
+    const Law& law = m.laws[static_cast<std::size_t>(op.law)];
+    d.coordinates[static_cast<std::size_t>(op.coordinate)].by_force = !law.has_knots() && law.cubic() > 0;
+  }
+}
+
+/// Pivots of a sound machine are not far below its softest spring, however stiff the others are.
+double softest(const Mechanism& m) {
+  double least = m.stiffness;
+  const auto add = [&](double k) { least = k > 0 ? std::min(least, k) : least; };
+  for (const SpringGroup& g : m.groups)
+    for (int i = 0; i < 6; ++i) add(g.matrix.stiffness(i, i) / (i < 3 || g.matrix.rotated ? 1.0 : m.length * m.length));
+  for (Index j = 0; j < m.size(); ++j) {
+    const Index law = m.coordinates[static_cast<std::size_t>(j)].law;
+    if (law >= 0) add(m.laws[static_cast<std::size_t>(law)].stiffness() / (m.unit(j) * m.unit(j)));
+  }
+  return std::max(1e-4, least / m.stiffness);
 }
 
 void link(const Mechanism& m, FastPlanData& d) {
@@ -75,6 +94,7 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.locked = locked;
   p.length = m.length;
   p.stiffness = m.stiffness;
+  p.softest = softest(m);
 }
 
 }  // namespace

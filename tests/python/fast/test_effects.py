@@ -83,3 +83,28 @@ def test_displacements_alone_under_gravity(effects: list[Effect]) -> None:
     size = np.abs(reference.displacement).max(axis=1, keepdims=True)
     assert np.abs(fast.displacement - reference.displacement).max() < TOLERANCE * size.max()
     assert np.isnan(fast.stiffness).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "effect"),
+    [
+        ("linear-delta", ("joint_compliance", {"element": "rod", "translation": 1e-9, "rotation": 1e-7})),
+        ("rotary-delta", ("joint_compliance", {"element": "rod", "translation": 1e-9, "rotation": 1e-7})),
+        ("five-bar", ("hardening", {"element": "motor", "cubic": 1e13})),
+        ("ur10", ("hardening", {"element": "elbow", "cubic": 1e13})),
+    ],
+)
+def test_soft_and_stiff_parts_stay_in_the_kernels(name: str, effect: Effect) -> None:
+    machine = sm.load_machine(name).with_effect(effect[0], **effect[1])
+    position, wrench = draw(machine, 40, seed=24)
+    assert machine.solve(position, wrench).reference_share == 0
+    found = gap(machine, position[:10], wrench[:10])
+    assert found.statuses == 0
+    assert found.worst() < TOLERANCE
+
+
+def test_free_play_that_bears_nothing_is_singular() -> None:
+    machine = sm.load_machine("ur10").with_effect("dead_zone", element="wrist_3", half_width=5e-6)
+    position, _ = draw(machine, 20, seed=25)
+    force = np.array([30.0, 20.0, -40.0, 0.0, 0.0, 0.0])  # no moment about the last axis, but for round-off
+    assert (machine.solve(position, force).status == sm.Status.SINGULAR).all()
