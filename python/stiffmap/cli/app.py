@@ -46,7 +46,7 @@ def one_line(error: Exception) -> str:
 
 def build_app(arguments: Sequence[str]) -> typer.Typer:
     """App in which only the command that ``arguments`` name is imported; the others are their summaries."""
-    wanted = next((a for a in arguments if not a.startswith("-")), None)
+    wanted = next((a for a in _without_effects(arguments) if not a.startswith("-")), None)
     app = typer.Typer(
         help=HELP,
         no_args_is_help=True,
@@ -95,12 +95,29 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _without_effects(arguments: Sequence[str]) -> list[str]:
+    """The arguments less the files of ``--effects-from``."""
+    return [a for before, a in zip(["", *arguments], arguments, strict=False) if before != "--effects-from"]
+
+
+def _register(files: list[str]) -> None:
+    if files:
+        from stiffmap.effects import load_effects
+
+        for file in files:
+            load_effects(file)
+
+
 def _root(
+    effects_from: Annotated[
+        list[str],
+        typer.Option(metavar="FILE", help="Python file that defines a kind of effect; may be repeated."),
+    ] = [],  # noqa: B006 - typer never changes it
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    pass
+    _register(effects_from)
 
 
 _root.__doc__ = HELP

@@ -2,7 +2,7 @@
 
 from stiffmap.effects.apply import add_effect, apply_records, place_text
 from stiffmap.effects.parse import effect_text, parse_effect
-from stiffmap.effects.registry import get, kinds
+from stiffmap.effects.registry import get, kinds, load_effects, register, unregister
 from stiffmap.effects.types import EffectType, Option, Parameter, Placed
 
 __all__ = [
@@ -15,6 +15,9 @@ __all__ = [
     "effect_text",
     "get",
     "kinds",
+    "load_effects",
     "parse_effect",
     "place_text",
+    "register",
+    "unregister",
 ]

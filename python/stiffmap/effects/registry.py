@@ -1,20 +1,29 @@
-"""All kinds of effects that are known, by name."""
+"""All kinds of effects that are known, by name: those of the library, and those that users register."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from difflib import get_close_matches
 from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
+from os import PathLike
+from pathlib import Path
 
+from stiffmap.effects.evidence import RECORDS
 from stiffmap.effects.synonyms import found_by
 from stiffmap.effects.types import EffectType
-from stiffmap.errors import StiffmapError
+from stiffmap.errors import FileError, StiffmapError
 
 
 @cache
 def _known() -> dict[str, EffectType]:
     from stiffmap.effects.library import EFFECTS
 
-    return {effect.kind: effect for effect in EFFECTS}
+    return {effect.kind: effect for effect in sorted(EFFECTS, key=_order)}
+
+
+def _order(effect: EffectType) -> tuple[bool, int, str]:
+    return (effect.measurement, effect.precedence, effect.kind)
 
 
 def kinds() -> tuple[str, ...]:
@@ -29,3 +38,70 @@ def get(kind: str) -> EffectType:
         hint = f" (did you mean {' or '.join(map(repr, dict.fromkeys(near)))}?)" if near else ""
         raise StiffmapError(f"no effect {kind!r}{hint}; there are: {', '.join(kinds())}")
     return _known()[kind]
+
+
+def register(effect: EffectType) -> EffectType:
+    """Make a kind known to everything: machines, files, command line, diagnosis. Returns it.
+
+    Raises StiffmapError where the library has a kind of that name, or where the definition contradicts itself. A
+    kind that was registered before is replaced.
+    """
+    from stiffmap.effects.library import EFFECTS
+
+    if effect.kind in {e.kind for e in EFFECTS}:
+        raise StiffmapError(f"effect {effect.kind!r}: the library has a kind of that name")
+    _check(effect)
+    known = [e for e in _known().values() if e.kind != effect.kind]
+    _replace([*known, effect])
+    return effect
+
+
+def unregister(kind: str) -> None:
+    """Forget a kind that was registered."""
+    _replace(e for e in _known().values() if e.kind != kind)
+
+
+def load_effects(path: str | PathLike[str]) -> tuple[EffectType, ...]:
+    """Run a Python file and register its ``EFFECT``, or each of its ``EFFECTS``.
+
+    Raises `FileError` where it cannot be run or defines none.
+    """
+    file = Path(path)
+    spec = spec_from_file_location(f"stiffmap_effect_{file.stem}", file)
+    if spec is None or spec.loader is None or not file.is_file():
+        raise FileError("cannot be read as a Python file that defines an effect", file=str(path))
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise FileError(f"cannot be run: {type(error).__name__}: {error}", file=str(path)) from error
+    found = defined(module)
+    if not found:
+        raise FileError("defines no effect: expected EFFECT = EffectType(...)", file=str(path))
+    return tuple(register(e) for e in found)
+
+
+def defined(module: object) -> tuple[EffectType, ...]:
+    """The kinds that a module defines as ``EFFECT`` or ``EFFECTS``."""
+    one = getattr(module, "EFFECT", None)
+    return tuple(getattr(module, "EFFECTS", ())) or ((one,) if isinstance(one, EffectType) else ())
+
+
+def _replace(effects: Iterable[EffectType]) -> None:
+    ordered = {e.kind: e for e in sorted(effects, key=_order)}
+    known = _known()
+    known.clear()
+    known.update(ordered)
+
+
+def _check(effect: EffectType) -> None:
+    unknown = [n for n in (*effect.needs, *effect.better_with) if n not in RECORDS]
+    if unknown:
+        raise StiffmapError(f"effect {effect.kind!r}: needs {unknown[0]!r}; known: {', '.join(RECORDS)}")
+    if effect.apply is None and not (effect.load or effect.reading or effect.drive):
+        raise StiffmapError(f"effect {effect.kind!r}: give one of apply, load, reading, drive")
+    for p in effect.parameters:
+        if not p.lower <= (p.lower if p.null is None else p.null) <= p.upper or not p.scale > 0:
+            raise StiffmapError(
+                f"effect {effect.kind!r}: {p.name}: expected lower ≤ null ≤ upper and a positive scale"
+            )

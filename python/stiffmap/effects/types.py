@@ -3,45 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from stiffmap.description import MachineDescription
+from stiffmap.effects.evidence import Drive, Load, Plan, Reading, Signatures
+from stiffmap.effects.parameter import Option, Parameter
+
+__all__ = [
+    "Apply",
+    "Derived",
+    "EffectType",
+    "Option",
+    "Parameter",
+    "ParametersAt",
+    "Place",
+    "Placed",
+    "Places",
+]
 
 Place = tuple[str, tuple[str, ...]]
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One number of an effect, in SI.
-
-    ``null`` is the value at which the effect vanishes (``None``: there is no fixed one), ``scale`` a
-    typical size for steps and plots, ``default`` the value of a parameter that is left out (``None``:
-    it must be given). A parameter that is not ``fitted`` says how the effect is meant (a pivot, a
-    recorded temperature) and is known beforehand. ``angular`` is the unit on a joint that turns, with an upper
-    bound and a typical size of its own where those of a length mean nothing.
-    """
-
-    name: str
-    unit: str
-    lower: float
-    upper: float
-    null: float | None
-    scale: float
-    doc: str
-    default: float | None = None
-    fitted: bool = True
-    angular: str = ""
-    angular_upper: float | None = None
-    angular_scale: float | None = None
-
-
-@dataclass(frozen=True)
-class Option:
-    """A choice in words; the first one is the default."""
-
-    name: str
-    choices: tuple[str, ...]
-    doc: str
 
 
 @dataclass(frozen=True)
@@ -70,16 +50,30 @@ class EffectType:
     places
         Every (element, legs) of a machine where it makes physical sense: each leg alone, then all.
     apply
-        The machine with the effect; a pure function. ``None`` for what lives in the measurement
-        (``measurement``), which the diagnosis applies to the readings.
+        The machine with the effect; a pure function. ``None`` for what lives in the measurement.
+    load, reading
+        What it does to the wrench that acts, and to what is read (`evidence`).
+    drive
+        A drive's deflection while its force runs, for effects that remember earlier rows.
     one_of
         Parameters of which exactly one is given. ``vector``: at least one is given, the rest are null.
     excludes
         Kinds that cannot share an element and leg with it; with its own name it cannot be repeated.
     stage
         Effects are applied by ascending stage, so that the order in which they were added is no matter.
+    precedence
+        Of two kinds that readings cannot tell apart the lower one is named; kinds are listed in this order.
     needs
-        What an experiment must record beside pose, load and reading (``temperature``, ``order``).
+        What an experiment must record beside pose, load and reading, from `evidence.RECORDS`. ``better_with``: what
+        it should record.
+    hidden
+        Whether a plan cannot show it: its metrology loop leaves it out, or an unknown frame takes it up.
+    behind_platform
+        Whether its elements sit between the platform, which may carry the target, and the tool.
+    certified
+        Whether it is an error of an instrument whose certificate bounds it.
+    signature
+        How it shows in readings; None: by differences, with parameters that have no null on a grid.
     at
         Parameters with the units and bounds of one place (a revolute drive counts in rad).
     tried
@@ -102,12 +96,24 @@ class EffectType:
     vector: tuple[str, ...] = ()
     excludes: tuple[str, ...] = ()
     stage: int = 0
+    precedence: int = 1000
     needs: tuple[str, ...] = ()
-    measurement: bool = False
+    better_with: tuple[str, ...] = ()
+    load: Load | None = None
+    reading: Reading | None = None
+    drive: Drive | None = None
+    signature: Signatures | None = None
+    hidden: Callable[[Plan], bool] | None = None
+    behind_platform: bool = False
+    certified: bool = False
     at: ParametersAt | None = None
     derived: Derived | None = None
     tried: Places | None = None
-    default_element: str | None = field(default=None)
+
+    @property
+    def measurement(self) -> bool:
+        """Whether it lives in the measurement, not in the machine."""
+        return self.apply is None
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name; KeyError where there is none."""
@@ -123,8 +129,3 @@ class EffectType:
         """The unit of a parameter, and the one that it has on a joint that turns."""
         p = self.parameter(name)
         return (p.unit, p.angular) if p.angular else (p.unit,)
-
-    @property
-    def fitted(self) -> tuple[Parameter, ...]:
-        """Parameters that a fit may move; of alternatives the first one."""
-        return tuple(p for p in self.parameters if p.fitted and p.name not in self.one_of[1:])

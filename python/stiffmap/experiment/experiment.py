@@ -166,6 +166,13 @@ class Experiment:
         """(c,) m, rad: `zero_sigma` of every channel; none for joints and distances."""
         return np.append(self.zero_sigma, np.zeros(len(self.channels) - len(self.zero_sigma)))
 
+    @property
+    def recorded(self) -> frozenset[str]:
+        """What the experiment records beside pose, load and reading, in the words of effects."""
+        columns = ("temperature", "order", "hours", "approach", "branch", "setup")
+        given = {c for c in columns if getattr(self, c) is not None and len(getattr(self, c))}
+        return frozenset(given | {c.side for c in self.extra if c.joint})
+
     @cached_property
     def groups(self) -> Integers:
         """(n,) number of the commanded pose (or pair of poses) of each row."""

@@ -10,8 +10,8 @@ from scipy.optimize import minimize_scalar
 
 import stiffmap as sm
 from stiffmap.cli.inputs import placed
+from stiffmap.effects.library.hysteresis import deflection, spring_force
 from stiffmap.experiment import Predictor, load_experiment
-from stiffmap.experiment.prediction.history import deflection, spring_force
 from stiffmap.planning import estimate
 
 ONE_JOINT = """

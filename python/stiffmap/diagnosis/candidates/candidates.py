@@ -11,8 +11,6 @@ from stiffmap.effects import EffectType, Parameter, registry
 from stiffmap.experiment.experiment import Experiment
 
 Names = tuple[str, ...]
-PLAUSIBLE = {("thermal_growth", "coefficient"): (-5e-5, 5e-5)}
-"""Ranges narrower than an effect's own, for explanations: 1/K of metals, ceramics and composites."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +58,8 @@ def candidates(description: MachineDescription, experiment: Experiment) -> list[
     found = []
     for kind in registry.kinds():
         effect = effects.get(kind)
-        if recorded(effect, experiment):
-            found += [c for c in of_kind(effect, description) if in_loop(c, experiment)]
+        if recorded(effect, experiment) and not (effect.hidden and effect.hidden(experiment)):
+            found += of_kind(effect, description)
     return found
 
 
@@ -73,8 +71,8 @@ def of_kind(effect: EffectType, description: MachineDescription) -> list[Candida
             p for p in effect.parameters_at(description, element, legs) if p.fitted or _unknown(p)
         )
         parameters = tuple(p for p in parameters if not _later_alternative(effect, p, parameters))
-        parameters = tuple(_plausible(effect.kind, p) for p in parameters)
-        if parameters and any(p.null is not None for p in parameters):
+        parameters = tuple(map(_plausible, parameters))
+        if parameters and (effect.signature or any(p.null is not None for p in parameters)):
             out += [Candidate(effect.kind, element, legs, part) for part in meanings(parameters)]
     return out
 
@@ -87,8 +85,8 @@ def meanings(parameters: tuple[Parameter, ...]) -> list[tuple[Parameter, ...]]:
     return [common, tuple(p for p in parameters if p not in common)] if common else [parameters]
 
 
-def _plausible(kind: str, p: Parameter) -> Parameter:
-    lower, upper = PLAUSIBLE.get((kind, p.name), (p.lower, p.upper))
+def _plausible(p: Parameter) -> Parameter:
+    lower, upper = p.plausible or (p.lower, p.upper)
     return replace(p, lower=max(lower, p.lower), upper=min(upper, p.upper))
 
 
@@ -103,14 +101,8 @@ def _later_alternative(effect: EffectType, p: Parameter, among: Sequence[Paramet
 
 
 def recorded(effect: EffectType, experiment: Experiment) -> bool:
-    """Whether the data hold what the effect needs. Without a branch column every load counts as
-    approached from zero; then friction is still a candidate."""
-    have = {
-        "temperature": experiment.temperature is not None,
-        "order": experiment.order is not None,
-        "motor": any(c.side == "motor" for c in experiment.extra),
-    }
-    return all(have.get(need, True) for need in effect.needs)
+    """Whether the data hold what the effect needs."""
+    return experiment.recorded.issuperset(effect.needs)
 
 
 def check_kinds(names: Iterable[str]) -> frozenset[str]:
@@ -127,17 +119,3 @@ def _excludes(one: Candidate, other: Candidate) -> bool:
     legs = set(one.legs) & set(other.legs) or not one.legs or not other.legs
     named = other.kind in effects.get(one.kind).excludes or one.kind in effects.get(other.kind).excludes
     return bool(one.element == other.element and legs and named)
-
-
-def in_loop(candidate: Candidate, experiment: Experiment) -> bool:
-    """Whether the metrology loop lets the effect be seen."""
-    loop = experiment.loop
-    if candidate.kind == "base_compliance" and "base" in (loop.instrument_on, loop.force_against):
-        return False
-    if candidate.kind == "tool_compliance" and loop.target_on == "platform":
-        return False
-    nuisance = {
-        "frame_offset": experiment.frame != "known",
-        "sensor_axes": experiment.frame == "unknown",
-    }
-    return not nuisance.get(candidate.kind, False)

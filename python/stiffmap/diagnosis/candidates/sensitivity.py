@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stiffmap.diagnosis.candidates.cable import cable_variants, is_cable
 from stiffmap.diagnosis.candidates.candidates import Candidate, candidates
-from stiffmap.diagnosis.candidates.periodic import is_periodic, periodic_variants
-from stiffmap.diagnosis.candidates.shapes import Shape, shapes
-from stiffmap.effects import Parameter
+from stiffmap.diagnosis.candidates.probe import PlanProbe
+from stiffmap.effects import Parameter, get, kinds
+from stiffmap.effects.evidence import Tried, signatures_on_a_grid
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.prediction.predict import Predictor
 
+Shape = tuple[tuple[str, float], ...]
 # Share of a parameter's scale for a difference: laws that only grow from their null take all of it
 SMOOTH, ONE_SIDED = 0.1, 1.0
 
@@ -32,12 +32,15 @@ class Variant:
         Values of the parameters without a null at which the columns hold.
     sign
         (p,) +1 where the parameter can only grow from its null, -1 only fall, 0 both.
+    start
+        Values of further parameters from the strengths of the columns.
     """
 
     candidate: Candidate
     columns: Floats
     sign: Floats
     shape: Shape = ()
+    start: Callable[[Floats], Mapping[str, float]] | None = None
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,7 @@ def _digest(predictor: Predictor) -> str:
         e.gravity,
         e.loop,
     ]
+    parts += [[(k, id(get(k))) for k in kinds()]]  # users may register more
     parts += [e.reference_temperature, e.extra, e.points, e.load_points, e.unloaded]
     parts += [e.frame, e.tool, e.instrument, e.target, e.surface, e.normal, e.joint_names]
     arrays = [e.position, e.wrench, e.rotation, e.other, e.other_rotation, e.approach, e.order, e.temperature]
@@ -109,20 +113,19 @@ def _usable(variant: Variant, base: Floats) -> bool:
 
 
 def variants(candidate: Candidate, predictor: Predictor, base: Floats) -> Iterator[Variant]:
-    """One linear model per shape of a candidate."""
-    if is_periodic(candidate):
-        for columns, shape in periodic_variants(candidate, predictor, base):
-            yield Variant(candidate, columns, np.zeros(columns.shape[-1]), shape)
-        return
-    if is_cable(candidate, predictor.experiment):
-        for columns, shape in cable_variants(candidate, predictor, base):
-            yield Variant(candidate, columns, np.ones(1), shape)
-        return
+    """One linear model per signature of a candidate."""
+    tried = Tried(candidate.element, candidate.legs, candidate.parameters)
     linear = candidate.linear
-    sign = np.array([side(p) for p in linear])
-    for shape in shapes(candidate, predictor):
+    for s in (get(candidate.kind).signature or signatures_on_a_grid)(PlanProbe(predictor, base), tried):
+        shape = tuple(s.values.items())
+        if s.columns is not None:
+            sign = np.full(s.columns.shape[-1], float(s.grows))
+            yield Variant(candidate, s.columns, sign, shape, s.start)
+            continue
         single = [difference(candidate, p, shape, predictor, base) for p in linear]
-        yield Variant(candidate, np.stack(single, axis=-1), sign, shape)
+        yield Variant(
+            candidate, np.stack(single, axis=-1), np.array([side(p) for p in linear]), shape, s.start
+        )
 
 
 def side(p: Parameter) -> int:

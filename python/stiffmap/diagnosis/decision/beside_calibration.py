@@ -27,11 +27,10 @@ from stiffmap.diagnosis.search.calibrated import Layer
 from stiffmap.diagnosis.search.screen import Screen
 from stiffmap.diagnosis.search.selection import MOST_EFFECTS
 from stiffmap.diagnosis.search.study import Finding, Study, find, search_on, study
+from stiffmap.effects import get
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 
-CERTIFICATE = {"sensor_gain": 1.0, "sensor_axes": 0.0}
-"""Parameters of an instrument, and where they vanish."""
 BEYOND = 100.0
 """Standard uncertainties of its certificate that an instrument is never taken to be off by."""
 AT_BOUND = 1e-6
@@ -258,8 +257,9 @@ def _why_not(model: Model, i: int, tolerances: Tolerances) -> str:
     ]
     if len(blind) == len(candidate.parameters) - len(held):
         return f"the readings do not determine {blind[0]}" if blind else ""
-    if candidate.kind in CERTIFICATE:
-        off = np.abs(model.si[part] - CERTIFICATE[candidate.kind]).max()
+    if get(candidate.kind).certified:
+        exact = np.array([p.null or 0.0 for p in candidate.parameters])
+        off = np.abs(model.si[part] - exact).max()
         if off > BEYOND * tolerances.instrument:
             return f"{off:.2g} is beyond the instrument's certificate ({tolerances.instrument:.2g}) a hundred times"
     return ""

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.diagnosis.candidates.candidates import Candidate, clash
-from stiffmap.diagnosis.candidates.periodic import is_periodic
 from stiffmap.diagnosis.candidates.sensitivity import Variant
 from stiffmap.diagnosis.clock import Clock
 from stiffmap.diagnosis.fitting.fit import evaluate, fit
@@ -151,10 +150,8 @@ def start_values(variant: Variant, estimate: Floats, flat: NDArray[np.bool_]) ->
     others they may, to second order, and to either side.
     """
     c = variant.candidate
-    if is_periodic(c):
-        sine, cosine = estimate
-        amplitude, phase = float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
-        given = {"amplitude": amplitude * c.parameters[0].scale, "phase": phase, **dict(variant.shape)}
+    if variant.start is not None:
+        given = {**variant.start(estimate), **dict(variant.shape)}
         return [np.array([given[p.name] / p.scale for p in c.parameters])]
     if variant.shape:
         return [shaped(variant, estimate)]

@@ -1,76 +1,9 @@
-"""One file per kind of effect, and the list of all of them.
+"""One file per kind of effect: every module here that has an ``EFFECT`` is a kind of the library."""
 
-To add one: write a file here with an ``EFFECT``, and name it in this list.
-"""
+from importlib import import_module
+from pkgutil import iter_modules
 
-from stiffmap.effects.library import (
-    axis_tilt,
-    base_compliance,
-    bilinear,
-    compliance,
-    dead_zone,
-    external_spring,
-    friction,
-    gravity,
-    hardening,
-    hysteresis,
-    joint_clearance,
-    joint_compliance,
-    joint_friction,
-    lead_error,
-    leg_tilt,
-    length,
-    length_difference,
-    measurement,
-    parallelogram_parallelism,
-    parallelogram_width,
-    payload,
-    periodic_error,
-    position_dependent_compliance,
-    position_offset,
-    preload,
-    straightness,
-    tabulated,
-    tcp_offset,
-    thermal_growth,
-    tilt,
-    tool_compliance,
-    zero_offset,
-)
 from stiffmap.effects.types import EffectType
 
-MACHINE = (
-    compliance,
-    dead_zone,
-    hardening,
-    bilinear,
-    tabulated,
-    friction,
-    hysteresis,
-    position_dependent_compliance,
-    zero_offset,
-    lead_error,
-    periodic_error,
-    straightness,
-    length,
-    length_difference,
-    thermal_growth,
-    position_offset,
-    tilt,
-    axis_tilt,
-    leg_tilt,
-    parallelogram_width,
-    parallelogram_parallelism,
-    tcp_offset,
-    joint_compliance,
-    joint_clearance,
-    joint_friction,
-    base_compliance,
-    tool_compliance,
-    preload,
-    gravity,
-    payload,
-    external_spring,
-)
-
-EFFECTS: tuple[EffectType, ...] = (*(module.EFFECT for module in MACHINE), *measurement.EFFECTS)
+_MODULES = [import_module(f"{__name__}.{m.name}") for m in iter_modules(__path__)]
+EFFECTS: tuple[EffectType, ...] = tuple(m.EFFECT for m in _MODULES if hasattr(m, "EFFECT"))

@@ -26,6 +26,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="axis_tilt",
+    precedence=180,
     title="direction of a guide or joint axis alone",
     doc=(
         "The axis of a guide or joint is turned, and nothing else: at its zero (a guide: at the carriage's "

@@ -19,6 +19,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="base_compliance",
+    precedence=260,
     title="compliance of the base",
     doc=(
         "An isotropic spring in translation and rotation between the ground, from which readings are taken, "
@@ -33,4 +34,5 @@ EFFECT = EffectType(
     vector=("translation", "rotation"),
     excludes=("base_compliance",),
     stage=50,
+    hidden=lambda plan: "base" in (plan.loop.instrument_on, plan.loop.force_against),
 )

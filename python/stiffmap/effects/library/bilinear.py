@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+import numpy as np
+
 from stiffmap.description import Law, MachineDescription
+from stiffmap.effects.evidence import Probe, Signature, Tried
 from stiffmap.effects.library.drive_law import change_law, in_unit_of_joint, linear
 from stiffmap.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter, Placed
 
+KNEES = (0.1, 0.25, 0.5, 0.8)
+"""Shares of the largest load at which the compliance may change."""
 PARAMETERS = (
     Parameter("ratio", "1", 1e-3, 1e3, 1.0, 0.1, "compliance beyond the knee over the declared one"),
     Parameter("knee", "N", 1e-3, 1e6, None, 100.0, "force at which the compliance changes", angular="N·m"),
@@ -24,8 +31,18 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     return change_law(description, placed, law)
 
 
+def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
+    """A knee at a few shares of the largest load."""
+    knee = next(p for p in tried.parameters if p.name == "knee")
+    part = slice(3, 6) if knee.unit == "N·m" else slice(0, 3)
+    largest = float(np.abs(probe.plan.wrench[:, part]).max())
+    for share in KNEES if largest > 0.0 else ():
+        yield Signature({"knee": share * largest})
+
+
 EFFECT = EffectType(
     kind="bilinear",
+    precedence=40,
     title="spring whose stiffness changes at a force",
     doc=(
         "The declared compliance up to the force `knee` in both directions, `ratio` times it for the force "
@@ -35,6 +52,7 @@ EFFECT = EffectType(
     parameters=PARAMETERS,
     places=at_sites(elastic_directions),
     apply=apply,
+    signature=signature,
     tried=at_sites(elastic_drives),
     frame="the coordinate",
     excludes=("bilinear", "dead_zone", "hardening", "friction", "position_dependent_compliance", "tabulated"),

@@ -131,6 +131,7 @@ def derived(description: MachineDescription, placed: Placed) -> dict[str, float]
 
 EFFECT = EffectType(
     kind="compliance",
+    precedence=10,
     title="compliance other than declared",
     doc=(
         "The declared compliance of a drive, an elastic joint or a link times `scale`; on a 6x6 spring the "

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
+
+import numpy as np
 
 from stiffmap.description import ExternalSpring, MachineDescription
 from stiffmap.description.tree import point_names
+from stiffmap.effects.evidence import Floats, Probe, Signature, Tried
 from stiffmap.effects.types import EffectType, Option, Parameter, Place, Placed
+from stiffmap.errors import StiffmapError
 
+SLACK = (0.0, 0.7)
+"""Free length as a share of the distance to the middle of the plan."""
 ANCHOR = tuple(
     Parameter(f"anchor_{a}", "m", -100.0, 100.0, None, 0.1, f"fixed end, {a}", fitted=False) for a in "xyz"
 )
@@ -32,8 +40,42 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     return replace(description, external_springs=(*description.external_springs, spring))
 
 
+def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
+    """To first order a force at the point, whatever the anchor: the readings' compliance there gives the change for
+    every anchor and free length."""
+    plan = probe.plan
+    if tried.element != plan.load_point:
+        raise StiffmapError(f"a spring is tried where forces act only ({plan.load_point})")
+    scale, yields = tried.parameters[0].scale, probe.compliance()
+    for anchor, length in anchors(plan.position):
+        pull = _force(plan.position + probe.base[:, :3], anchor, length)
+        if plan.quantity == "deflection":
+            pull = pull - _force(plan.position, anchor, length)
+        column = np.einsum("nij,nj->ni", yields, pull) * scale
+        named = zip(("anchor_x", "anchor_y", "anchor_z"), anchor.tolist(), strict=True)
+        yield Signature({"length": length, **dict(named)}, column[..., None], grows=True)
+
+
+def anchors(position: Floats) -> Iterator[tuple[Floats, float]]:
+    """Faces and corners of a cube of twice the plan's extent, each with the free lengths."""
+    low, high = position.min(axis=0), position.max(axis=0)
+    reach = max(float((high - low).max()), 0.1)
+    for way in product((-1.0, 0.0, 1.0), repeat=3):
+        if sum(map(abs, way)) in (1.0, 3.0):
+            away = np.array(way) * reach
+            for share in SLACK:
+                yield (low + high) / 2 + away, share * float(np.linalg.norm(away))
+
+
+def _force(at: Floats, anchor: Floats, length: float) -> Floats:
+    line = anchor - at
+    distance = np.linalg.norm(line, axis=1, keepdims=True)
+    return np.asarray((distance - length) * line / distance)
+
+
 EFFECT = EffectType(
     kind="external_spring",
+    precedence=310,
     title="cable, hose or counterbalance",
     doc=(
         "A straight spring pulls the point towards an anchor fixed in the base: force stiffness·(distance - "
@@ -46,6 +88,7 @@ EFFECT = EffectType(
     ),
     places=points,
     apply=apply,
+    signature=signature,
     pivot="the anchor",
     frame="base axes",
     moves="nothing",

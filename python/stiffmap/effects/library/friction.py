@@ -52,6 +52,7 @@ def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> 
 
 EFFECT = EffectType(
     kind="friction",
+    precedence=60,
     title="dry friction of a drive, an elastic joint or a spring's direction",
     doc=(
         "Coulomb friction beside the spring of a drive, an elastic joint or an uncoupled direction of a link spring "
@@ -67,10 +68,14 @@ EFFECT = EffectType(
     apply=apply,
     tried=at_sites(elastic_drives),
     frame="the coordinate",
-    options=(Option("branch", ("loading", "unloading", "loading_stuck"), "how the load was reached"),),
+    options=(
+        Option(
+            "branch", ("loading", "unloading", "loading_stuck"), "how the load was reached", recorded=True
+        ),
+    ),
     one_of=("force", "torque"),
     excludes=("friction", "hardening", "position_dependent_compliance", "tabulated"),
     stage=20,
-    needs=("branch",),
+    better_with=("branch",),
     at=at,
 )

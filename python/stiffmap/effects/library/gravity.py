@@ -58,6 +58,7 @@ def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> 
 
 EFFECT = EffectType(
     kind="gravity",
+    precedence=290,
     title="weight of the machine's bodies",
     doc=(
         "The bodies weigh: 9.81 m/s² along base -z. On `machine` all declared masses times `scale`; on a "

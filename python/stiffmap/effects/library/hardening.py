@@ -31,6 +31,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="hardening",
+    precedence=30,
     title="spring that stiffens with load",
     doc=(
         "Force = a/c + cubic·a³ at the deflection a, with the declared compliance c, of a drive, an elastic joint or "

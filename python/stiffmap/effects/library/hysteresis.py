@@ -1,8 +1,19 @@
-"""What a drive remembers: friction, play and stiffening along a sequence of loads."""
+"""What a drive remembers: friction, play and stiffening along a sequence of loads.
+
+Theory L5. The spring's force s follows the drive's force F as a play operator does, |F - s| <= level; deflection is a
+function of s. That is Coulomb friction beside a spring, exactly, for any monotone law; many elements with levels of their
+own are a Prandtl-Ishlinskii model, which obeys Masing's rule.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
 from stiffmap.description import MachineDescription
+from stiffmap.effects.evidence import Floats
 from stiffmap.effects.library.drive_law import in_unit_of_joint
 from stiffmap.effects.sites import at_sites, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter, Place
@@ -23,6 +34,37 @@ PARAMETERS = (
 )  # fmt: skip
 
 
+ELEMENTS = 16
+"""Elements that stand for a spread of levels."""
+
+
+def spring_force(force: Floats, level: ArrayLike, breakaway: float = 1.0) -> Floats:
+    """(n, ...) force s that the spring feels while the drive's `force` (n,) runs, from rest at s = 0, with
+    elements of these levels (...)."""
+    levels = np.asarray(level, dtype=float)
+    s, sliding = np.zeros(levels.shape), np.zeros(levels.shape)
+    out = np.empty((len(force), *levels.shape))
+    for i, f in enumerate(force):
+        gap = f - s
+        reach = np.where(sliding * gap > 0, levels, levels * breakaway)
+        moves = np.abs(gap) > reach
+        rests = ~moves & (sliding * gap < levels * (1 - 1e-12))
+        sliding = np.where(moves, np.sign(gap), np.where(rests, 0.0, sliding))
+        s = np.where(moves, f - sliding * levels, s)
+        out[i] = s
+    return out
+
+
+def deflection(force: Floats, compliance: float, values: Mapping[str, float]) -> Floats:
+    """(n,) deflection of a drive while `force` (n,) runs, theory L5."""
+    level, spread = values["level"], values["spread"]
+    levels = level * (1 + spread * np.linspace(-1, 1, ELEMENTS)) if spread > 0 else np.array([level])
+    ratio, knee = values["ratio"], values["knee"]
+    s = spring_force(force, levels, values["breakaway"])
+    bent = ratio * s + (1 - ratio) * knee * np.tanh(s / knee)
+    return np.asarray((compliance * bent + values["half_width"] * np.tanh(s / values["seat"])).mean(axis=1))
+
+
 def nowhere(description: MachineDescription) -> list[Place]:
     """A diagnosis does not try it by itself: it needs rows in order of time."""
     return []
@@ -30,6 +72,7 @@ def nowhere(description: MachineDescription) -> list[Place]:
 
 EFFECT = EffectType(
     kind="hysteresis",
+    precedence=70,
     title="friction, play and stiffening of a drive along a sequence of loads",
     doc=(
         "Rows in order of time; a set-up starts afresh. The force s that the drive's spring feels follows the drive's "
@@ -46,6 +89,6 @@ EFFECT = EffectType(
     moves="what the drive moves",
     excludes=("hysteresis", "friction"),
     needs=("order",),
-    measurement=True,
+    drive=deflection,
     at=in_unit_of_joint(*PARAMETERS),
 )

@@ -60,6 +60,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="joint_compliance",
+    precedence=230,
     title="compliance of passive joints (pins, bearings)",
     doc=(
         "An isotropic spring in translation and rotation between a passive joint and the link that it "

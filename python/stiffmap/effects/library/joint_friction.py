@@ -40,6 +40,7 @@ def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> 
 
 EFFECT = EffectType(
     kind="joint_friction",
+    precedence=250,
     title="dry friction of a passive joint",
     doc=(
         "Coulomb friction about each axis of a free passive joint, level L, against its motion q from the commanded "
@@ -52,10 +53,14 @@ EFFECT = EffectType(
     places=at_sites(free_joints),
     apply=apply,
     frame="the joint's axes",
-    options=(Option("branch", ("loading_stuck", "loading", "unloading"), "how the load was reached"),),
+    options=(
+        Option(
+            "branch", ("loading_stuck", "loading", "unloading"), "how the load was reached", recorded=True
+        ),
+    ),
     one_of=("force", "torque"),
     excludes=("joint_friction",),
     stage=20,
-    needs=("branch",),
+    better_with=("branch",),
     at=at,
 )

@@ -16,6 +16,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="lead_error",
+    precedence=100,
     title="lead error of a drive",
     doc="The drive travels `slope` more per unit of commanded travel; no error at its home coordinate.",
     parameters=(

@@ -31,6 +31,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="leg_tilt",
+    precedence=190,
     title="whole leg mounted askew",
     doc="The whole leg is mounted on the base turned about the origin of its frame.",
     parameters=PARAMETERS,

@@ -32,6 +32,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="length",
+    precedence=130,
     title="length of a link",
     doc=(
         "The link is built `error` longer than declared (both bars of a parallelogram alike); the "

@@ -42,6 +42,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="length_difference",
+    precedence=140,
     title="rods of unequal length",
     doc=(
         "The second rod of a parallelogram is built longer by half of `difference`, the first one shorter by "

@@ -1,11 +1,22 @@
-"""What the measurement adds to the machine: definitions only. The diagnosis applies them to readings."""
+"""What the effects of a measurement share.
+
+Load side: the wrench that acts is ``R G w``. Reading, ``deflection``: it is ``G Rᵀ u``, the sensor's axes being turned
+by R; ``position``: instruments give coordinates, so gain and axes act on commanded position plus displacement and the
+commanded position is subtracted again. R is Rx(angle_x)·Ry(angle_y)·Rz(angle_z) everywhere. They act on the six axes
+of a pose; joints and distances are read by other instruments.
+"""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable, Mapping
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.description import AppliedEffect
+from stiffmap.effects.evidence import Floats, Load, Plan, Reading
 from stiffmap.effects.library.geometry import AXES, names_of, rotations
-from stiffmap.effects.sites import at, at_sites, elastic_drives
+from stiffmap.effects.sites import at
 from stiffmap.effects.types import EffectType, Option, Parameter
 
 ANGLES: tuple[Parameter, ...] = rotations("rotation")
@@ -22,16 +33,62 @@ def positions(doc: str, size: float) -> tuple[Parameter, ...]:
     return tuple(Parameter(a, "m", -1.0, 1.0, 0.0, size, f"{doc} along {a}") for a in AXES)
 
 
+def rotation(parameters: Mapping[str, float]) -> Floats:
+    """(3, 3) Rx·Ry·Rz of ``angle_x`` …"""
+    angles = [parameters.get(f"angle_{a}", 0.0) for a in AXES]
+    return np.asarray(Rotation.from_euler("XYZ", angles).as_matrix())
+
+
+def turned(values: Floats, r: Floats) -> Floats:
+    """(n, 6) with linear and angular part turned by r (3, 3)."""
+    return np.hstack([values[:, :3] @ r.T, values[:, 3:] @ r.T])
+
+
+def scaled(values: Floats, parameters: Mapping[str, float]) -> Floats:
+    """(n, 6) times ``gain`` and ``gain_x`` … (linear and angular part alike)."""
+    common = parameters.get("gain", 1.0)
+    own = np.array([parameters.get(f"gain_{a}", 1.0) for a in AXES])
+    return np.asarray(values * common * np.tile(own, 2))
+
+
+def of_coordinates(change: Callable[[Floats, Mapping[str, float]], Floats]) -> Reading:
+    """A change (n, 6) of what an instrument shows, as a reading: of coordinates where positions are read."""
+
+    def reading(read: Floats, motion: Floats, plan: Plan, term: AppliedEffect) -> Floats:
+        where = np.zeros((len(read), 6))
+        if plan.quantity == "position":
+            where[:, :3] = plan.position
+        axes = change(read[:, :6] + where, dict(term.parameters)) - where
+        return np.hstack([axes, read[:, 6:]])
+
+    return reading
+
+
+def added(part: Callable[[Plan, AppliedEffect], Floats]) -> Reading:
+    """What is added (n, 6) to the six axes, as a reading."""
+
+    def reading(read: Floats, motion: Floats, plan: Plan, term: AppliedEffect) -> Floats:
+        return np.hstack([read[:, :6] + part(plan, term), read[:, 6:]])
+
+    return reading
+
+
 def measured(
     kind: str,
     title: str,
     doc: str,
     element: str,
     parameters: tuple[Parameter, ...],
+    precedence: int,
+    *,
     frame: str = "base axes",
     pivot: str = "none",
     options: tuple[Option, ...] = (),
     needs: tuple[str, ...] = (),
+    load: Load | None = None,
+    reading: Reading | None = None,
+    hidden: Callable[[Plan], bool] | None = None,
+    certified: bool = False,
 ) -> EffectType:
     """A kind that lives in the measurement."""
     return EffectType(
@@ -41,6 +98,7 @@ def measured(
         parameters=parameters,
         places=at(element),
         apply=None,
+        precedence=precedence,
         pivot=pivot,
         frame=frame,
         moves="nothing of the machine",
@@ -48,87 +106,8 @@ def measured(
         vector=names_of(parameters),
         excludes=(kind,),
         needs=needs,
-        measurement=True,
+        load=load,
+        reading=reading,
+        hidden=hidden,
+        certified=certified,
     )
-
-
-LOAD_DIRECTION = measured(
-    "load_direction",
-    "direction of the applied force",
-    "The force that acts is the declared one turned: f = Rx·Ry·Rz f_declared.",
-    "load",
-    ANGLES,
-    frame="base axes; about x, then the turned y, then the twice turned z",
-    pivot="the point where the force acts",
-)
-LOAD_GAIN = measured(
-    "load_gain",
-    "gain of the force measurement",
-    "The force that acts is the declared one times gain, per axis times gain·gain_axis.",
-    "load",
-    gains("acting force over declared force"),
-)
-SENSOR_GAIN = measured(
-    "sensor_gain",
-    "gain of the displacement sensor",
-    "The reading is the displacement times gain, per axis times gain·gain_axis.",
-    "sensor",
-    gains("reading over displacement"),
-    frame="axes of the reading",
-)
-SENSOR_AXES = measured(
-    "sensor_axes",
-    "orientation of the displacement sensor",
-    "The sensor's axes are turned against the declared ones: reading = (Rx·Ry·Rz)^T displacement.",
-    "sensor",
-    ANGLES,
-    frame="declared axes of the reading; about x, then the turned y, then the twice turned z",
-)
-_SHIFTS = (
-    *positions("shift of every reading", 1e-4),
-    *(
-        Parameter(
-            f"angle_{a}", "rad", -math.pi, math.pi, 0.0, 1e-4, f"turn of the instrument's frame about {a}"
-        )
-        for a in AXES
-    ),
-)
-FRAME_OFFSET = measured(
-    "frame_offset",
-    "position and orientation of the instrument's frame",
-    (
-        "The instrument's frame is not where it is believed: a measured position p reads as shift + "
-        "Rx·Ry·Rz p, so that an error of position gains shift + (Rx·Ry·Rz - 1) p."
-    ),
-    "sensor",
-    _SHIFTS,
-    pivot="origin of the base",
-)
-DRIFT = measured(
-    "drift",
-    "drift of the instrument",
-    "The reading gains the drift times (order - first order), or times the hours since the first reading.",
-    "sensor",
-    tuple(Parameter(a, "m", -1e-3, 1e-3, 0.0, 1e-8, f"per reading or per hour, {a}") for a in AXES),
-    frame="axes of the reading",
-    options=(Option("per", ("order", "hour"), "what the drift goes with"),),
-    needs=("order",),
-)
-SERVO_SHARE = EffectType(
-    kind="servo_share",
-    title="yield of a drive before its motor's encoder",
-    doc=(
-        "The motor side of a drive reads `share` of the drive's deflection: what its position control "
-        "yields. At 0 the motor stands and all yields behind it, at 1 behind the encoder nothing does. The "
-        "machine at the tool is the same."
-    ),
-    parameters=(Parameter("share", "1", 0.0, 1.0, 0.0, 0.1, "share of the drive's deflection"),),
-    places=at_sites(elastic_drives),
-    apply=None,
-    frame="the drive's coordinate",
-    moves="nothing of the machine",
-    excludes=("servo_share",),
-    needs=("motor",),
-    measurement=True,
-)
-EFFECTS = (LOAD_DIRECTION, LOAD_GAIN, SENSOR_GAIN, SENSOR_AXES, FRAME_OFFSET, DRIFT, SERVO_SHARE)

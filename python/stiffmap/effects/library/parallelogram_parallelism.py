@@ -35,6 +35,7 @@ def _turned(b: Branch, placed: Placed, share: float) -> Branch:
 
 EFFECT = EffectType(
     kind="parallelogram_parallelism",
+    precedence=210,
     title="parallelism of a parallelogram's pins",
     doc=(
         "The axes of the two pins at one `end` are not parallel: the second branch's pin is turned by half "

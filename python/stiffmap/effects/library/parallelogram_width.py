@@ -37,6 +37,7 @@ def _moved(block: Block, b: Branch, end: str, step: float) -> Branch:
 
 EFFECT = EffectType(
     kind="parallelogram_width",
+    precedence=200,
     title="width of a parallelogram",
     doc=(
         "The two pins at one `end` of a parallelogram (proximal: nearer the base) stand `error` further "

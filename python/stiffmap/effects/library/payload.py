@@ -46,6 +46,7 @@ def _weight(point: str, mass: float) -> ExternalSpring:
 
 EFFECT = EffectType(
     kind="payload",
+    precedence=300,
     title="load carried on the platform",
     doc=(
         "A mass on the platform that the declaration leaves out; it weighs along the machine's gravity. In a "

@@ -33,6 +33,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="position_dependent_compliance",
+    precedence=80,
     title="drive compliance that depends on the stroke",
     doc=(
         "Drive compliance times 1 + slope·(u - u_home) at the commanded coordinate u (a screw that yields "

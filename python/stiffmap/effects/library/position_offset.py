@@ -52,6 +52,7 @@ def add_end(elements: Elements, new: Element, near: bool) -> Elements:
 
 EFFECT = EffectType(
     kind="position_offset",
+    precedence=160,
     title="line of a guide or joint axis; base and platform joint points",
     doc=(
         "A joint (guide) stands displaced on the part that carries it. On `base` the leg's beginning stands "

@@ -28,6 +28,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="preload",
+    precedence=280,
     title="link mounted under tension",
     doc=(
         "The link is free of force not at zero deflection but at `rest`: mounted, it pulls the machine. In a "

@@ -39,6 +39,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="straightness",
+    precedence=120,
     title="straightness of a guide",
     doc=(
         "The carriage stands amplitude·sin(2π(u - u_home)/period + phase) off its guide at the commanded coordinate u, "

@@ -51,6 +51,7 @@ def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> 
 
 EFFECT = EffectType(
     kind="tabulated",
+    precedence=50,
     title="spring with a measured force-deflection curve",
     doc=(
         "Force of a drive, an elastic joint or an uncoupled direction of a link spring (element `foot.k22`) by a "

@@ -21,6 +21,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="tcp_offset",
+    precedence=220,
     title="position of the tool on the platform",
     doc="The tool (TCP) sits displaced on the platform; the external wrench acts at the displaced TCP.",
     parameters=PARAMETERS,

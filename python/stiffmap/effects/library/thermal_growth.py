@@ -10,7 +10,16 @@ from stiffmap.effects.sites import at_sites, lengths
 from stiffmap.effects.types import EffectType, Parameter, Placed
 
 PARAMETERS = (
-    Parameter("coefficient", "1/K", -1e-3, 1e-3, 0.0, 1e-5, "growth per length and kelvin"),
+    Parameter(
+        "coefficient",
+        "1/K",
+        -1e-3,
+        1e-3,
+        0.0,
+        1e-5,
+        "growth per length and kelvin",
+        plausible=(-5e-5, 5e-5),  # metals, ceramics and composites
+    ),
     Parameter(
         "temperature_difference",
         "K",
@@ -21,6 +30,7 @@ PARAMETERS = (
         "temperature above that of the declared length; left out, the coefficient is the strain",
         default=1.0,
         fitted=False,
+        recorded="temperature",
     ),
 )
 
@@ -37,6 +47,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="thermal_growth",
+    precedence=150,
     title="thermal growth of a link",
     doc="The link is longer by coefficient·temperature_difference times its declared length.",
     parameters=PARAMETERS,

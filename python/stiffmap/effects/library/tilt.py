@@ -24,6 +24,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="tilt",
+    precedence=170,
     title="tilt of a guide or joint with what it carries",
     doc=(
         "Guide tilt: the guide, its carriage and the joint axes that the carriage carries turn together "

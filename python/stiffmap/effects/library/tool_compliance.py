@@ -19,6 +19,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="tool_compliance",
+    precedence=270,
     title="compliance of tool and holder",
     doc=(
         "An isotropic spring in translation and rotation between the platform and the tool, on which the "
@@ -33,4 +34,6 @@ EFFECT = EffectType(
     vector=("translation", "rotation"),
     excludes=("tool_compliance",),
     stage=50,
+    behind_platform=True,
+    hidden=lambda plan: plan.loop.target_on == "platform",
 )

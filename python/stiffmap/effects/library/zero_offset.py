@@ -19,6 +19,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 EFFECT = EffectType(
     kind="zero_offset",
+    precedence=90,
     title="zero of a drive",
     doc="The drive stands `error` further along (or about) its axis than commanded, at every stroke.",
     parameters=(ERROR,),

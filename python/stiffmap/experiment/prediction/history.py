@@ -1,9 +1,6 @@
-"""Readings that depend on the rows before: drives with friction, play and stiffening (effect `hysteresis`).
+"""Readings that depend on the rows before: effects with a `drive`, such as `hysteresis`.
 
-Theory L5. The spring's force s follows the drive's force F as a play operator does, |F - s| <= level; deflection is a
-function of s. That is Coulomb friction beside a spring, exactly, for any monotone law; many elements with levels of their
-own are a Prandtl-Ishlinskii model, which obeys Masing's rule. The drive's extra deflection moves the tool by the rigid
-machine's Jacobian.
+The drive's extra deflection moves the tool by the rigid machine's Jacobian.
 """
 
 from __future__ import annotations
@@ -12,11 +9,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from stiffmap.description import AppliedEffect, Joint
 from stiffmap.description.tree import all_elements
 from stiffmap.effects.check import values_at
+from stiffmap.effects.evidence import Drive
 from stiffmap.effects.registry import get
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.channels import DISTANCE
@@ -27,37 +24,6 @@ from stiffmap.experiment.prediction.metrology_loop import targets
 from stiffmap.experiment.prediction.unloaded_state import drive_jacobian
 from stiffmap.machine import Machine
 from stiffmap.options import SolveOptions
-
-KINDS = ("hysteresis",)
-ELEMENTS = 16
-"""Elements that stand for a spread of levels."""
-
-
-def spring_force(force: Floats, level: ArrayLike, breakaway: float = 1.0) -> Floats:
-    """(n, ...) force s that the spring feels while the drive's `force` (n,) runs, from rest at s = 0, with
-    elements of these levels (...)."""
-    levels = np.asarray(level, dtype=float)
-    s, sliding = np.zeros(levels.shape), np.zeros(levels.shape)
-    out = np.empty((len(force), *levels.shape))
-    for i, f in enumerate(force):
-        gap = f - s
-        reach = np.where(sliding * gap > 0, levels, levels * breakaway)
-        moves = np.abs(gap) > reach
-        rests = ~moves & (sliding * gap < levels * (1 - 1e-12))
-        sliding = np.where(moves, np.sign(gap), np.where(rests, 0.0, sliding))
-        s = np.where(moves, f - sliding * levels, s)
-        out[i] = s
-    return out
-
-
-def deflection(force: Floats, compliance: float, values: Mapping[str, float]) -> Floats:
-    """(n,) deflection of a drive while `force` (n,) runs, theory L5."""
-    level, spread = values["level"], values["spread"]
-    levels = level * (1 + spread * np.linspace(-1, 1, ELEMENTS)) if spread > 0 else np.array([level])
-    ratio, knee = values["ratio"], values["knee"]
-    s = spring_force(force, levels, values["breakaway"])
-    bent = ratio * s + (1 - ratio) * knee * np.tanh(s / knee)
-    return np.asarray((compliance * bent + values["half_width"] * np.tanh(s / values["seat"])).mean(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,21 +43,25 @@ def drives_of(machine: Machine, plan: Experiment) -> Drives:
 
 
 def history_motion(drives: Drives, plan: Experiment, terms: tuple[AppliedEffect, ...]) -> Floats:
-    """(n, c) m, rad that the terms of `KINDS` add to the motions of the machine under a plan.
+    """(n, c) m, rad that terms with a `drive` add to the motions of the machine under a plan.
 
     Raises StiffmapError without an order of time, and for distances.
     """
     if plan.order is None:
-        raise StiffmapError(f"{plan.name}: hysteresis needs the column 'order': rows in order of time")
+        raise StiffmapError(f"{plan.name}: {terms[0].kind} needs the column 'order': rows in order of time")
     if DISTANCE in plan.extra:
-        raise StiffmapError(f"{plan.name}: hysteresis cannot be predicted for distances between two poses")
+        raise StiffmapError(
+            f"{plan.name}: {terms[0].kind} cannot be predicted for distances between two poses"
+        )
     machine = drives.machine
     out = np.zeros((len(plan), len(plan.channels)))
     for term in terms:
-        values = values_at(get(term.kind), machine.description.declared or machine.description, term)
+        effect = get(term.kind)
+        assert effect.drive is not None
+        values = values_at(effect, machine.description.declared or machine.description, term)
         for name in _drives(machine, term):
             k = machine.actuators.index(name)
-            more = _extra(machine, plan, name, -drives.effort[:, k], values)
+            more = _extra(machine, plan, name, -drives.effort[:, k], values, effect.drive)
             out += _seen(machine, plan, name, drives.jacobian[:, :, k], more)
     return out
 
@@ -117,7 +87,7 @@ def _drives(machine: Machine, term: AppliedEffect) -> list[str]:
 
 
 def _extra(
-    machine: Machine, plan: Experiment, name: str, force: Floats, values: Mapping[str, float]
+    machine: Machine, plan: Experiment, name: str, force: Floats, values: Mapping[str, float], drive: Drive
 ) -> Floats:
     """(n,) deflection beyond that of the machine's own spring, set-up by set-up in order of time."""
     joint = dict(all_elements(machine.description))[name]
@@ -130,7 +100,7 @@ def _extra(
     for setup in np.unique(label):
         here = np.flatnonzero(label == setup)
         run = here[np.argsort(plan.order[here], kind="stable")]
-        out[run] = deflection(force[run], compliance, values) - compliance * force[run]
+        out[run] = drive(force[run], compliance, values) - compliance * force[run]
     return out
 
 

@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.description import Element, Point, Spring
+from stiffmap.effects import get, kinds
 from stiffmap.experiment.experiment import Experiment, Loop
 from stiffmap.machine import Machine
 
 BASE, PLATFORM = "base.rig_on_base", "platform.rig_on_platform"
-HOLDER = "tool_compliance"
+
+
+def _holders() -> tuple[str, ...]:
+    """Beginnings of the names of elements that sit between the platform and the tool."""
+    return tuple(k for k in kinds() if get(k).behind_platform)
 
 
 def rigged(machine: Machine, loop: Loop) -> Machine:
@@ -19,7 +24,8 @@ def rigged(machine: Machine, loop: Loop) -> Machine:
     if "base" in (loop.instrument_on, loop.force_against) and _yields(d.base):
         d = replace(d, base=(*d.base, Point(BASE.removeprefix("base."))))
     if loop.target_on == "platform" and _yields(d.platform):
-        at = next((i for i, e in enumerate(d.platform) if e.name.startswith(HOLDER)), len(d.platform))
+        holders = _holders()
+        at = next((i for i, e in enumerate(d.platform) if e.name.startswith(holders)), len(d.platform))
         d = replace(
             d, platform=(*d.platform[:at], Point(PLATFORM.removeprefix("platform.")), *d.platform[at:])
         )

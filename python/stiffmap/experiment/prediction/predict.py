@@ -14,16 +14,13 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.against_command import resolved
 from stiffmap.experiment.poses.commanded import located, without
 from stiffmap.experiment.prediction.equilibria import motions
-from stiffmap.experiment.prediction.history import KINDS as HISTORY
 from stiffmap.experiment.prediction.history import Drives, drives_of, history_motion
 from stiffmap.experiment.prediction.joints import check_joints
-from stiffmap.experiment.prediction.measurement import LOAD_SIDE, SENSOR_SIDE, readings, true_wrench
-from stiffmap.experiment.prediction.temperature import at_temperatures, uses_temperature
+from stiffmap.experiment.prediction.measurement import readings, true_wrench
+from stiffmap.experiment.prediction.recorded import at_records
 from stiffmap.machine import Machine
 
 Terms = tuple[AppliedEffect, ...]
-ELSEWHERE = LOAD_SIDE + SENSOR_SIDE + HISTORY
-"""Kinds that are no part of the machine."""
 
 
 class Predictor:
@@ -45,21 +42,22 @@ class Predictor:
 
     def __call__(self, terms: Sequence[AppliedEffect] = ()) -> Floats:
         """(n, c) m, rad predicted readings; NaN where a pose fails."""
-        mechanical = tuple(t for t in terms if t.kind not in ELSEWHERE)
-        load = tuple(t for t in terms if t.kind in LOAD_SIDE)
+        kinds = [(t, effects.get(t.kind)) for t in terms]
+        mechanical = tuple(t for t, kind in kinds if kind.apply)
+        load = tuple(t for t, kind in kinds if kind.load)
         key = (mechanical, load)
         if key not in self._memory:
             if len(self._memory) > 2000:
                 self._memory.clear()
             self._memory[key] = self._motion(mechanical, load)
         motion = self._memory[key]
-        remembering = tuple(t for t in terms if t.kind in HISTORY)
+        remembering = tuple(t for t, kind in kinds if kind.drive)
         if remembering:
             plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
             if key not in self._drives:
                 self._drives = {key: drives_of(self.with_terms(mechanical), plan)}
             motion = motion + history_motion(self._drives[key], plan, remembering)
-        return readings(self.experiment, motion, [t for t in terms if t.kind in SENSOR_SIDE])
+        return readings(self.experiment, motion, terms)
 
     def _set_aside(self) -> None:
         """Leaves out the rows that the declared machine has no equilibrium for, and names them."""
@@ -73,16 +71,14 @@ class Predictor:
         """The machine with the mechanical terms added."""
         machine = self.machine
         for t in terms:
-            if t.kind not in ELSEWHERE:
+            if effects.get(t.kind).apply:
                 given = {**dict(t.parameters), **dict(t.options)}
                 machine = machine.with_effect(t.kind, element=t.element, legs=t.legs or None, **given)
         return machine
 
     def _motion(self, mechanical: Terms, load: Terms) -> Floats:
         plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
-        if any(uses_temperature(t.kind) for t in mechanical):
-            return at_temperatures(plan, mechanical, self._branches)
-        return self._branches(plan, mechanical)
+        return at_records(plan, mechanical, self._branches)
 
     def _branches(self, plan: Experiment, terms: Terms) -> Floats:
         if not any(_has_branch(t) for t in terms):
@@ -123,7 +119,7 @@ def check_points(machine: Machine, experiment: Experiment) -> None:
 
 
 def _has_branch(term: AppliedEffect) -> bool:
-    return any(o.name == "branch" for o in effects.get(term.kind).options)
+    return any(o.name == "branch" and o.recorded for o in effects.get(term.kind).options)
 
 
 def _on_branch(term: AppliedEffect, branch: str) -> AppliedEffect:
