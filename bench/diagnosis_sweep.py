@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import time
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from itertools import islice
@@ -20,14 +21,15 @@ from zlib import crc32
 import numpy as np
 
 import stiffmap as sm
+from stiffmap.calibration import Tolerances
 from stiffmap.diagnosis.candidates.candidates import Candidate
-from stiffmap.diagnosis.decision.judge import judge
+from stiffmap.diagnosis.decision.beside_calibration import find_effects
 from stiffmap.diagnosis.report.describe import named_effects
 from stiffmap.diagnosis.rivals.explain import Explanation, explain
 from stiffmap.diagnosis.search.alias import same_way
 from stiffmap.diagnosis.search.screen import Screen
 from stiffmap.diagnosis.search.selection import Search
-from stiffmap.diagnosis.search.study import Study, find, study
+from stiffmap.diagnosis.search.study import Study, study
 from stiffmap.experiment import Experiment, Predictor, random_plan, simulate
 from stiffmap.experiment.noise.whitening import Problem
 
@@ -44,6 +46,9 @@ def main() -> None:
     parser.add_argument("--machine", default="orthoglide-revised")
     parser.add_argument("--null", type=int, default=160, help="null sets per quantity")
     parser.add_argument("--seeds", type=int, default=1, help="seeds per effect and size")
+    parser.add_argument("--every", type=int, default=1, help="every so manyth effect of each size only")
+    parser.add_argument("--minutes", type=float, default=np.inf, help="no new set begins after")
+    parser.add_argument("--size", type=float, action="append", help="default: all sizes")
     parser.add_argument("--quantity", action="append", choices=("position", "deflection"))
     parser.add_argument("--out", type=Path, default=Path("bench/diagnosis_sweep.jsonl"))
     parser.add_argument("--threads", type=int, default=2)
@@ -63,15 +68,20 @@ def run(options: argparse.Namespace, quantity: str) -> None:
     plan = random_plan(machine, quantity, poses=number, loads=6, seed=1)
     s = study(Predictor(machine, plan, threads=options.threads), 0)
     done = {r["case"] for r in load(options.out)}
+    until = time.monotonic() + 60.0 * options.minutes
     with options.out.open("a", encoding="utf-8") as stream:
         for case, effect, size in cases(s, plan, options):
+            if time.monotonic() > until:
+                break
             if case not in done:
+                begun = time.perf_counter()
                 result = one(machine, plan, effect, crc32(case.encode()), options.threads)
                 record = {
                     "case": case,
                     "quantity": quantity,
                     "size": size,
                     "commit": options.commit,
+                    "seconds": round(time.perf_counter() - begun, 2),
                     **result,
                 }
                 stream.write(json.dumps(record) + "\n")
@@ -97,8 +107,8 @@ def effect_cases(s: Study, plan: Experiment, options: argparse.Namespace) -> Ite
     """Each class's representative at each size."""
     screen = Screen.of(Problem.of(plan, s.noise.sigma, s.plan.base), s.plan.variants)
     named = [i for i, v in enumerate(s.plan.variants) if v.candidate in {c.representative for c in s.classes}]
-    for size in SIZES:
-        for i in named:
+    for turn, size in enumerate(options.size or SIZES):
+        for i in named[turn % options.every :: options.every]:
             variant = screen.variants[i]
             if not variant.shape:
                 for seed in range(options.seeds):
@@ -149,9 +159,11 @@ def one(machine: sm.Machine, plan: Experiment, effect: Any, seed: int, threads: 
     except sm.StiffmapError as problem:
         return {"outcome": "not simulated", "why": str(problem)}
     s = study(Predictor(machine, twin, threads=threads), 0)
-    finding, verdict, _ = judge(s, find(s))
+    found = find_effects(s, 0, Tolerances())
+    s, finding, verdict = found.study, found.finding, found.verdict
+    layered = {"layer": found.calibration is not None}
     if not finding.model.candidates:
-        return {"verdict": verdict, "outcome": outcome(effect, [], [], verdict)}
+        return {"verdict": verdict, "outcome": outcome(effect, [], [], verdict), **layered}
     why = explain(s, finding.search, finding.model)
     named = [aliases(s, c, why) for c in why.model.candidates]
     instead = [c for m in why.others for c in m.candidates]
@@ -160,6 +172,7 @@ def one(machine: sm.Machine, plan: Experiment, effect: Any, seed: int, threads: 
         "names": [str(c) for c in why.model.candidates],
         "instead": [str(c) for c in instead],
         "outcome": outcome(effect, named, instead, verdict),
+        **layered,
         "inside": inside(s, finding.search, why, effect),
     }
 

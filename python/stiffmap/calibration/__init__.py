@@ -1,6 +1,7 @@
 """Calibration: every uncertain number of a machine from readings, at once; effects come on top of it."""
 
 from stiffmap.calibration.calibrate import Calibrator, calibrate
+from stiffmap.calibration.certificate import certified
 from stiffmap.calibration.defaults import Tolerances
 from stiffmap.calibration.result import Calibration
 from stiffmap.calibration.unknowns import GEOMETRY, GROUPS, Unknown, unknowns
@@ -13,5 +14,6 @@ __all__ = [
     "Tolerances",
     "Unknown",
     "calibrate",
+    "certified",
     "unknowns",
 ]

@@ -10,6 +10,7 @@ from os import PathLike
 import numpy as np
 
 from stiffmap.calibration.beyond import beyond_tolerance
+from stiffmap.calibration.certificate import certified
 from stiffmap.calibration.defaults import Tolerances
 from stiffmap.calibration.edit import edited
 from stiffmap.calibration.facts import Beyond, HeldOut, Row
@@ -81,7 +82,9 @@ def calibrate(
     predictor = Predictor(machine, data, threads=threads)
     refuse(predictor.experiment, predictor())
     wanted = [
-        p for p in unknowns(machine.description, predictor.experiment, tolerances) if p.group not in exclude
+        p
+        for p in unknowns(machine.description, predictor.experiment, certified(tolerances, data))
+        if p.group not in exclude
     ]
     until = time.monotonic() + budget if budget else np.inf
     return Calibrator.of(predictor, wanted, until, progress).answer(seed)

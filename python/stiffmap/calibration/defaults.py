@@ -23,6 +23,8 @@ class Tolerances:
         Scale of the instrument that reads positions: a laser tracker's certificate says 1e-5.
     tool
         The point that is read, in the tool's axes (m).
+    frame, frame_direction
+        Place and turn of an instrument's frame that the experiment calls known (m, rad); 0: exact.
     """
 
     position: float = 2e-4
@@ -36,8 +38,11 @@ class Tolerances:
     mass: float = 0.05
     instrument: float = 1e-5
     tool: float = 5e-4
+    frame: float = 0.0
+    frame_direction: float = 0.0
 
     def scaled(self, factor: float) -> Tolerances:
-        """All but the instrument's, times a factor."""
-        values = {f.name: getattr(self, f.name) * factor for f in fields(self) if f.name != "instrument"}
-        return Tolerances(**values, instrument=self.instrument)
+        """All but the instrument's own, times a factor."""
+        own = ("instrument", "frame", "frame_direction")
+        scale = {f.name: 1.0 if f.name in own else factor for f in fields(self)}
+        return Tolerances(**{name: getattr(self, name) * s for name, s in scale.items()})

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import copy
 import time
+from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from stiffmap.calibration.certificate import INSTRUMENT, SCALE, frame_columns
 from stiffmap.calibration.edit import edited
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine
 
@@ -41,23 +44,29 @@ class Sensitivity:
     """Whether a time budget ended the differences before all unknowns had their turn."""
 
 
+MOST_KEPT = 4
+_KEPT: OrderedDict[tuple[str, tuple[Unknown, ...]], Sensitivity] = OrderedDict()
+
+
 def predicted(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats) -> Floats:
     """(n, c) readings of the machine with unknowns at `values` (p,), in standard uncertainties."""
     moves: dict[tuple[str, str], float] = {}
-    scale = 0.0
     for unknown, value in zip(unknowns, values, strict=True):
-        if value == 0.0:
-            continue
-        scale += unknown.u * value if unknown.of_instrument else 0.0
-        for place, weight in unknown.moves:
+        for place, weight in unknown.moves if value != 0.0 else ():
             moves[place] = moves.get(place, 0.0) + weight * unknown.u * float(value)
+    own = {what: moves.pop((at, what)) for at, what in list(moves) if at == INSTRUMENT}
+    scale = own.pop(SCALE, 0.0)
     beside = predictor
     if moves:
         beside = copy.copy(predictor)
         beside.machine = Machine(edited(predictor.machine.description, moves))
         beside._memory = {}
     gain = AppliedEffect("sensor_gain", "sensor", (), (("gain", 1.0 + scale),))
-    return beside([gain] if scale else [])
+    found = beside([gain] if scale else [])
+    if own:
+        columns = frame_columns(predictor.experiment, predictor())
+        found = found + sum(columns[what] * by for what, by in own.items())
+    return found
 
 
 def sensitivity(
@@ -67,7 +76,25 @@ def sensitivity(
     until: float = np.inf,
     progress: Progress | None = None,
 ) -> Sensitivity:
-    """Differences of variants of the machine, one per unknown; `until` (s, of time.monotonic) ends them."""
+    """Differences of variants of the machine, one per unknown; `until` (s, of time.monotonic) ends them.
+
+    The last few are kept: they do not depend on the readings.
+    """
+    key = (fingerprint(predictor), tuple(unknowns))
+    if key not in _KEPT:
+        found = _differences(predictor, unknowns, until, progress)
+        if found.stopped:
+            return found
+        _KEPT[key] = found
+        if len(_KEPT) > MOST_KEPT:
+            _KEPT.popitem(last=False)
+    _KEPT.move_to_end(key)
+    return _KEPT[key]
+
+
+def _differences(
+    predictor: Predictor, unknowns: Sequence[Unknown], until: float, progress: Progress | None
+) -> Sensitivity:
     base = predictor()
     found: list[Unknown] = []
     columns: list[Floats] = []

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stiffmap.calibration.certificate import INSTRUMENT, SCALE, frame_names
+from stiffmap.calibration.declared import Declared, Run
 from stiffmap.calibration.defaults import Tolerances
 from stiffmap.calibration.edit import END, FRAME
 from stiffmap.description import Block, Body, Element, Joint, MachineDescription, Offset, Spring
-from stiffmap.experiment.experiment import Experiment
+from stiffmap.experiment.experiment import Experiment, Floats
 
-INSTRUMENT = "instrument"
 GROUPS = (
     "zeros",
     "gains",
@@ -44,7 +45,7 @@ class Unknown:
     """One number that may be off by a normal error with standard uncertainty `u` (SI or relative).
 
     moves
-        (full name, what is moved) -> weight, see `edit.edited`; empty for the instrument's scale.
+        (full name, what is moved) -> weight, see `edit.edited` and, of the instrument, `certificate.seen`.
     """
 
     name: str
@@ -69,19 +70,35 @@ def unknowns(
     """
     t = tolerances or Tolerances()
     bare = description.declared or description
-    given = dict(bare.uncertainty)
+    given = Declared.of(bare)
     loaded = bool(experiment.wrench.any() or experiment.gravity or bare.gravity)
     weighs = bool(experiment.gravity or bare.gravity)
     out: list[Unknown] = []
     for leg in bare.legs:
-        out += _of_sequence(leg.elements, leg.name, leg.name, t, given)
+        found, run = _of_sequence(leg.elements, leg.name, leg.name, t, given)
+        out += found
         if len(bare.legs) > 1:
-            out += _frame(f"{leg.name}.{END}", leg.name, FRAME, t.position, t.direction, "axis positions")
-    out += _of_sequence(bare.base, "base", "", t, given)
-    out += _of_sequence(bare.platform, "platform", "", t, given)
-    out += _frame(f"platform.{END}", "", FRAME, t.tool, t.direction, "tool", "tool")
+            place = given.position(run, t.position)
+            out += _frame(f"{leg.name}.{END}", leg.name, FRAME, place, t.direction, "axis positions")
+    out += _of_sequence(bare.base, "base", "", t, given)[0]
+    found, run = _of_sequence(bare.platform, "platform", "", t, given)
+    out += found
+    out += _frame(f"platform.{END}", "", FRAME, given.position(run, t.tool), t.direction, "tool", "tool")
     if experiment.quantity == "position":
-        out.append(Unknown("scale of the instrument", INSTRUMENT, "1", t.instrument))
+        out.append(
+            Unknown("scale of the instrument", INSTRUMENT, "1", t.instrument, (((INSTRUMENT, SCALE), 1.0),))
+        )
+    out += [
+        Unknown(
+            f"{'turn' if unit == 'rad' else 'shift'} of the instrument's frame, {name}",
+            INSTRUMENT,
+            unit,
+            t.frame_direction if unit == "rad" else t.frame,
+            (((INSTRUMENT, name), 1.0),),
+        )
+        for name, unit in frame_names(experiment)
+        if (t.frame_direction if unit == "rad" else t.frame) > 0.0
+    ]
     if not loaded:
         out = [p for p in out if p.group not in ("drive compliance", "link compliance")]
     if not weighs:
@@ -90,28 +107,36 @@ def unknowns(
 
 
 def _of_sequence(
-    elements: tuple[Element, ...], path: str, leg: str, t: Tolerances, given: dict[str, float]
-) -> list[Unknown]:
+    elements: tuple[Element, ...], path: str, leg: str, t: Tolerances, given: Declared
+) -> tuple[list[Unknown], Run]:
+    """The unknowns, and the offsets behind the last joint."""
     out: list[Unknown] = []
+    run: list[tuple[str, Offset]] = []
     for e in elements:
         name = f"{path}.{e.name}"
         if isinstance(e, Block):
-            out += _of_block(e, path, leg, t)
+            out += _of_block(e, path, leg, t, given)
+            run = []
         elif isinstance(e, Joint):
-            out += _of_joint(e, name, leg, t, given)
+            out += _of_joint(e, name, leg, t, given, given.position(run, t.position))
+            run = []
+        elif isinstance(e, Offset):
+            run.append((name, e))
         elif isinstance(e, Spring) and not e.laws:
-            out.append(_relative(name, leg, "link compliance", "compliance", t.compliance))
+            u = given.spring(name, e, t.compliance)
+            out.append(_relative(name, leg, "link compliance", "compliance", u))
         elif isinstance(e, Body) and e.mass > 0.0:
-            u = given.get(f"{name}/mass")
-            out.append(_relative(name, leg, "masses", "mass", u / e.mass if u else t.mass))
-    return out
+            out.append(_relative(name, leg, "masses", "mass", given.mass(name, e.mass, t.mass)))
+    return out, run
 
 
 def _relative(name: str, leg: str, group: str, what: str, u: float) -> Unknown:
     return Unknown(f"{what} of {name}", group, "ln", u, (((name, what), 1.0),), leg)
 
 
-def _of_joint(e: Joint, name: str, leg: str, t: Tolerances, given: dict[str, float]) -> Iterator[Unknown]:
+def _of_joint(
+    e: Joint, name: str, leg: str, t: Tolerances, given: Declared, place: Floats
+) -> Iterator[Unknown]:
     """Frame errors that the joint's own motion does not take up; of a drive its zero and gain."""
     slides = e.kind == "prismatic"
     kept = list(FRAME)
@@ -123,41 +148,41 @@ def _of_joint(e: Joint, name: str, leg: str, t: Tolerances, given: dict[str, flo
     if e.kind == "spherical":
         kept = [k for k in kept if k in FRAME[:3]]
     turned = "guide lean" if slides else "axis directions"
-    yield from _frame(name, leg, tuple(kept), t.position, t.direction, "axis positions", turned)
+    yield from _frame(name, leg, tuple(kept), place, t.direction, "axis positions", turned)
     if e.actuated:
         unit, u = ("m", t.zero) if slides else ("rad", t.turning_zero)
-        yield Unknown(f"zero of {name}", "zeros", unit, u, (((name, "zero"), 1.0),), leg)
-        yield Unknown(f"gain of {name}", "gains", "1", t.gain, (((name, "gain"), 1.0),), leg)
-    if e.law is not None and not e.law.cubic and not e.law.knots:
-        u_law = given.get(f"{name}/compliance")
-        relative = u_law * e.law.stiffness if u_law else t.compliance
-        yield _relative(
-            name, leg, "drive compliance" if e.actuated else "link compliance", "compliance", relative
+        yield Unknown(f"zero of {name}", "zeros", unit, given.zero(name, u), (((name, "zero"), 1.0),), leg)
+        yield Unknown(
+            f"gain of {name}", "gains", "1", given.gain(name, t.gain), (((name, "gain"), 1.0),), leg
         )
+    if e.law is not None and not e.law.cubic and not e.law.knots:
+        group = "drive compliance" if e.actuated else "link compliance"
+        yield _relative(name, leg, group, "compliance", given.law(name, e, t.compliance))
 
 
 def _frame(
     name: str,
     leg: str,
     axes: tuple[str, ...],
-    position: float,
+    place: Floats,
     direction: float,
     moved: str,
     turned: str = "axis directions",
 ) -> Iterator[Unknown]:
+    """`place` (3,) are the standard uncertainties along x, y, z."""
     for a in axes:
         turns = a in FRAME[3:]
         yield Unknown(
             f"{'turn' if turns else 'shift'} of {name} {'about' if turns else 'along'} {a[-1]}",
             turned if turns else moved,
             "rad" if turns else "m",
-            direction if turns else position,
+            direction if turns else float(place[FRAME.index(a)]),
             (((name, a), 1.0),),
             leg,
         )
 
 
-def _of_block(block: Block, path: str, leg: str, t: Tolerances) -> Iterator[Unknown]:
+def _of_block(block: Block, path: str, leg: str, t: Tolerances, given: Declared) -> Iterator[Unknown]:
     """Lengths of the offsets of a parallel block: their mean, and how its branches differ."""
     lengths = [
         [e for e in b.elements if isinstance(e, Offset) and np.linalg.norm(e.nominal.p) > 0]
@@ -167,19 +192,22 @@ def _of_block(block: Block, path: str, leg: str, t: Tolerances) -> Iterator[Unkn
     longest = max((float(np.linalg.norm(e.nominal.p)) for e in lengths[0]), default=0.0)
     for element in names:
         at = [(f"{path}.{b.name}.{element}", "length") for b in block.branches]
-        size = float(np.linalg.norm(next(e for e in lengths[0] if e.name == element).nominal.p))
+        offset = next(e for e in lengths[0] if e.name == element)
+        size = float(np.linalg.norm(offset.nominal.p))
+        single = given.length([name for name, _ in at], offset)
         rod = size > 0.5 * longest
         place = f"{path}.{block.name}.{element}"
         if rod:
             common = tuple((a, 1.0) for a in at)
-            yield Unknown(f"length of {place}", "link lengths", "m", t.length, common, leg)
+            u = single / float(np.sqrt(len(at))) if single else t.length
+            yield Unknown(f"length of {place}", "link lengths", "m", u, common, leg)
         for i, other in enumerate(at[1:]):
             between = f"{block.branches[0].name} and {block.branches[i + 1].name}"
             yield Unknown(
                 f"difference of {place} between {between}",
                 "rod mismatch" if rod else "width",
                 "m",
-                t.mismatch,
+                single * float(np.sqrt(2.0)) if single else t.mismatch,
                 ((at[0], -0.5), (other, 0.5)),
                 leg,
             )
@@ -187,6 +215,8 @@ def _of_block(block: Block, path: str, leg: str, t: Tolerances) -> Iterator[Unkn
         for e in branch.elements:
             if isinstance(e, Spring) and not e.laws:
                 name = f"{path}.{branch.name}.{e.name}"
-                yield _relative(name, leg, "link compliance", "compliance", t.compliance)
+                u = given.spring(name, e, t.compliance)
+                yield _relative(name, leg, "link compliance", "compliance", u)
             elif isinstance(e, Body) and e.mass > 0.0:
-                yield _relative(f"{path}.{branch.name}.{e.name}", leg, "masses", "mass", t.mass)
+                name = f"{path}.{branch.name}.{e.name}"
+                yield _relative(name, leg, "masses", "mass", given.mass(name, e.mass, t.mass))

@@ -10,7 +10,7 @@ from os import PathLike
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.calibration import GROUPS, Tolerances
+from stiffmap.calibration import GROUPS, Tolerances, certified
 from stiffmap.diagnosis.candidates.candidates import check_kinds
 from stiffmap.diagnosis.clock import Clock, Progress
 from stiffmap.diagnosis.decision.beside_calibration import Answer, find_effects
@@ -88,7 +88,7 @@ def diagnose(
     groups = tuple(n for n in exclude if n in GROUPS)
     s = study(predictor, seed, None, clock, check_kinds(n for n in exclude if n not in GROUPS))
     times = [time.perf_counter()]
-    found = find_effects(s, seed, tolerances or Tolerances(), groups)
+    found = find_effects(s, seed, certified(tolerances, data), groups)
     times.append(time.perf_counter())
     held = found.held
     if held is None and cross_validate:

@@ -131,6 +131,9 @@ class Experiment:
     frame: str = "known"
     tool: str = "known"
     """Point on the tool: ``known``, off by an ``offset_unknown`` in the tool's axes, or ``unknown`` with a turn."""
+    certificate: tuple[tuple[str, float], ...] = ()
+    """Standard uncertainties of the instrument: of its ``scale`` (1), ``tool`` point and known ``frame`` (m),
+    ``frame_direction`` (rad)."""
     loop: Loop = Loop()
     title: str = ""
     source: str = ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from stiffmap.effects import Parameter, get, kinds
 from stiffmap.effects.evidence import Tried, signatures_on_a_grid
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.predict import Predictor
 
 Shape = tuple[tuple[str, float], ...]
@@ -60,36 +60,13 @@ _PLANS: OrderedDict[str, Plan] = OrderedDict()
 
 def plan_of(predictor: Predictor) -> Plan:
     """Sensitivities of a machine under a plan; the last eight are kept."""
-    key = _digest(predictor)
+    key = fingerprint(predictor) + repr([(k, id(get(k))) for k in kinds()])  # users may register more
     if key not in _PLANS:
         _PLANS[key] = replace(_compute(predictor), digest=key)
         if len(_PLANS) > 8:
             _PLANS.popitem(last=False)
     _PLANS.move_to_end(key)
     return _PLANS[key]
-
-
-def _digest(predictor: Predictor) -> str:
-    e = predictor.experiment
-    parts = [
-        predictor.machine.description,
-        e.quantity,
-        e.branch,
-        e.setup,
-        e.point,
-        e.load_point,
-        e.gravity,
-        e.loop,
-    ]
-    parts += [[(k, id(get(k))) for k in kinds()]]  # users may register more
-    parts += [e.reference_temperature, e.extra, e.points, e.load_points, e.unloaded]
-    parts += [e.frame, e.tool, e.instrument, e.target, e.surface, e.normal, e.joint_names]
-    arrays = [e.position, e.wrench, e.rotation, e.other, e.other_rotation, e.approach, e.order, e.temperature]
-    arrays += [e.joints, e.other_joints, e.gravity_of, e.hours]
-    raw = repr(parts).encode() + b"".join(
-        b"-" if a is None else np.ascontiguousarray(a).tobytes() for a in arrays
-    )
-    return hashlib.sha256(raw).hexdigest()
 
 
 def _compute(predictor: Predictor) -> Plan:

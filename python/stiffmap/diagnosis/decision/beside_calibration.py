@@ -67,7 +67,7 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
             return _layered(s, found, seed, tolerances)
     finding, verdict, left = judge(s, find(s))
     first = Answer(s, finding, verdict, left)
-    if s.clock.over or not (left or (finding.model.candidates and positions)):
+    if s.clock.over or not (left or finding.model.candidates):
         return first
     found = found or calibrator(s, tolerances, exclude)
     if found is None:

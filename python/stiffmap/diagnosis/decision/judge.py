@@ -78,6 +78,8 @@ def unexplained(s: Study, finding: Finding) -> list[Pattern]:
 
 
 def after_checks(s: Study, finding: Finding) -> list[Check]:
-    """Model-free checks of the residual."""
+    """Model-free checks of the residual, of what the calibrated numbers leave of it where there are some."""
     residual = s.experiment.reading - s.predictor(finding.model.terms())
+    if s.layer is not None:
+        residual = residual - s.layer.part(s.problem_of(~finding.outliers), residual)
     return checks(s.experiment, residual, s.noise.sigma, ~finding.outliers)

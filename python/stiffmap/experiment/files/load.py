@@ -159,6 +159,7 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
         unloaded=model.unloaded,
         frame=model.frame,
         tool=model.tool,
+        certificate=_certificate(model, scales, file),
         loop=Loop(**model.metrology.model_dump()),
         title=model.title,
         source=str(file),
@@ -168,6 +169,26 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
             "unloaded: approach needs the columns approach_x, approach_y, approach_z", file=str(file)
         )
     return experiment
+
+
+def _certificate(model: ExperimentFile, scales: Scales, file: Path) -> tuple[tuple[str, float], ...]:
+    """The instrument's standard uncertainties in SI."""
+    given = {k: v for k, v in model.certificate.model_dump(exclude_none=True).items() if v > 0.0}
+    for key in ("frame", "frame_direction"):
+        if key in given and model.frame == "unknown":
+            raise FileError(
+                f"certificate: {key}: of a frame that is known; found frame: unknown, which is fitted freely",
+                file=str(file),
+            )
+    si = {
+        "scale": 1.0,
+        "frame": scales.length,
+        "tool": scales.length,
+        "frame_direction": scales.angle("certificate: frame_direction")
+        if "frame_direction" in given
+        else 1.0,
+    }
+    return tuple((k, v * si[k]) for k, v in given.items())
 
 
 def _promise(

@@ -59,6 +59,9 @@ def _head(e: Experiment, title: str) -> dict[str, Any]:
         head["orientation"] = {"against": "base"}
     if any(c.name == "hh" for c in e.extra):
         head["surface"] = {"normal": list(e.normal), "shape": e.surface}
+    if e.certificate:
+        mm = ("frame", "tool")
+        head["certificate"] = {k: float(f"{v * (MM if k in mm else 1.0):.6g}") for k, v in e.certificate}
     if e.loop != Loop():
         head["metrology"] = {k: getattr(e.loop, k) for k in ("instrument_on", "target_on", "force_against")}
     return head

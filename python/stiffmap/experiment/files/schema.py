@@ -131,6 +131,19 @@ class SurfaceModel(FileModel):
     shape: Literal["known", "offset_unknown", "unknown"] = "known"
 
 
+class CertificateModel(FileModel):
+    """Standard uncertainties of the instrument and of how it was set up, in the units of the file.
+
+    ``scale``: relative, of all it reads. ``frame``, ``frame_direction``: of a frame that is called known.
+    ``tool``: of the point that is read, in the tool's axes. docs/calibration.md
+    """
+
+    scale: Annotated[float, Field(gt=0.0, lt=1.0, strict=False)] | None = None
+    frame: Positive | None = None
+    frame_direction: Positive | None = None
+    tool: Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=False)] | None = None
+
+
 class ExperimentFile(FileModel):
     """One experiment."""
 
@@ -154,6 +167,7 @@ class ExperimentFile(FileModel):
     gravity: Axes3 | dict[str, Axes3] | None = None
     reference_temperature: Finite | None = None
     metrology: LoopModel = LoopModel()
+    certificate: CertificateModel = CertificateModel()
     orientation: OrientationModel = OrientationModel()
     columns: dict[str, str] = Field(default_factory=dict)
     notes: str = ""

@@ -69,6 +69,7 @@ def _contradicting(experiment: Experiment, residual: Floats, sigma: Floats) -> M
 
 
 def _worst(rows: NDArray[np.intp], z: Floats) -> NDArray[np.intp]:
+    z = z[:, np.isfinite(z[rows]).any(axis=0)]
     middle = np.nanmedian(z[rows], axis=0)
     score = np.nansum((z[rows] - middle) ** 2, axis=1)
     freedom = max(1, int(np.isfinite(z[rows]).sum() - np.isfinite(middle).sum()))

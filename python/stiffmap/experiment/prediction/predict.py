@@ -9,6 +9,7 @@ import numpy as np
 
 from stiffmap import effects
 from stiffmap.description import AppliedEffect
+from stiffmap.effects import apply_records
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.against_command import resolved
@@ -69,12 +70,10 @@ class Predictor:
 
     def with_terms(self, terms: Sequence[AppliedEffect]) -> Machine:
         """The machine with the mechanical terms added."""
-        machine = self.machine
-        for t in terms:
-            if effects.get(t.kind).apply:
-                given = {**dict(t.parameters), **dict(t.options)}
-                machine = machine.with_effect(t.kind, element=t.element, legs=t.legs or None, **given)
-        return machine
+        mechanical = [t for t in terms if effects.get(t.kind).apply]
+        if not mechanical:
+            return self.machine
+        return Machine(apply_records(self.machine.description, mechanical))  # compiled once, not per effect
 
     def _motion(self, mechanical: Terms, load: Terms) -> Floats:
         plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
