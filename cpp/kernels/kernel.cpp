@@ -7,6 +7,7 @@
 #include "closing.hpp"
 #include "newton.hpp"
 #include "residual.hpp"
+#include "strokes.hpp"
 
 #ifndef STIFFMAP_LEVEL
 #define STIFFMAP_LEVEL "base"
@@ -29,6 +30,7 @@ Scratch lay_out(const Program& P, void* memory, std::int64_t* bytes) {
   s.joints = take<JointSlot>(at, P.joint_slots);
   s.stiff = take<StiffSlot>(at, P.stiff_slots);
   s.groups = take<GroupSlot>(at, P.group_slots);
+  s.strokes = take<StrokeSlot>(at, P.stroke_count);
   s.branches = take<BranchSlot>(at, P.chain_count);
   const int n = P.coordinate_count;
   for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.friction_sign, &s.kept})
@@ -101,8 +103,9 @@ struct Block {
     return ok;
   }
 
-  /// Drives and guides with their errors; every coordinate's value at zero deflection (theory G1-G3).
-  void set_base(const Program& of) {
+  /// Drives and guides with their errors; every coordinate's value at zero deflection (theory G1-G3); springs at
+  /// their stroke (S3). Lanes in which these are declared.
+  M set_base(const Program& of) {
     for (int q = 0; q < of.coordinate_count; ++q) {
       const CoordinateProgram& k = of.coordinates[q];
       s.a_base[q] = k.role == 2 ? splat(0) : k.from_home ? splat(k.rest) : s.closed[q];
@@ -119,9 +122,10 @@ struct Block {
       if (k.amplitude != 0) sincos(u * (2 * 3.14159265358979323846 / k.period) + k.phase, wave, unused);
       s.a_base[k.coordinate] += k.offset + k.slope * u + k.amplitude * wave;
     }
+    return set_strokes(of, s);
   }
 
-  void set_start() {
+  M set_start() {
     for (int q = 0; q < P.coordinate_count; ++q) {
       const CoordinateProgram& k = P.coordinates[q];
       s.closed[q] = s.x[q];
@@ -129,12 +133,13 @@ struct Block {
       s.da[q] = splat(1);
       s.tau[q] = s.dtau[q] = s.friction_sign[q] = splat(0);
     }
-    set_base(P);
+    const M known = set_base(P);
     for (int q = 0; q < P.coordinate_count; ++q) {
       if (!P.coordinates[q].by_force || !P.coordinates[q].from_home) continue;
       const LawProgram& law = P.laws[P.coordinates[q].law];
       s.z[q] += law.cubic / law.stiffness * s.scale[q] * s.z[q] * s.z[q] * s.z[q];
     }
+    return known;
   }
 
   /// Lanes in which a ball joint's axes are less than `least` from coinciding.
@@ -191,7 +196,7 @@ struct Block {
 
   void run() {
     M usable = read();
-    set_start();
+    usable &= set_start();
     usable &= ~locked(P.locked);
     for (int k = 0; k < P.chain_count; ++k) s.branches[k].F = V6{};
     const double f = __builtin_sqrt(P.stiffness), g = f * P.length;

@@ -25,6 +25,8 @@ struct Op {
   std::int32_t wrench;        ///< block: index of the wrench of its second branch
   std::int32_t start_moves;   ///< block: its start frame is not fixed to the base
   std::int32_t slot;          ///< place of its intermediate results
+  std::int32_t stroke;        ///< spring: index into strokes, -1: K holds everywhere
+  std::int32_t unused;        ///< no padding: operations are compared by their bytes
   double direction[3];
   double K[36], rest[6];     ///< spring
   double mass, com[3];       ///< load: a body's weight
@@ -44,6 +46,15 @@ struct LawProgram {
   double stiffness, cubic, friction;
   std::int32_t first, count;  ///< knots
 };
+
+/// A spring that varies with a coordinate: theory S3. A table's rows: coordinate, then the compliance.
+struct StrokeProgram {
+  std::int32_t op, coordinate;
+  std::int32_t along;         ///< beam: its axis
+  std::int32_t first, count;  ///< table: rows; none: a beam
+  double at, length, rate, slack;
+};
+inline constexpr int stroke_row = 37;
 
 /// Error of the commanded coordinate `of`, which moves `coordinate`: the same, or a deviation of its guide.
 struct CommandErrorProgram {
@@ -102,6 +113,8 @@ struct Program {
   const ChainProgram* chains;
   const LawProgram* laws;
   const double* knots;  ///< (a, tau, z) triples
+  const StrokeProgram* strokes;
+  const double* stroke_rows;
   const CommandErrorProgram* errors;
   const DriveProgram* drives;
   const CoordinateProgram* coordinates;
@@ -114,7 +127,7 @@ struct Program {
   const double* grid;            ///< closure starts: nodes x row of unknowns of all legs, NaN where unreachable
   std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count;
   std::int32_t root, legs_op;  ///< root chain; the legs' block operation
-  std::int32_t joint_slots, stiff_slots, group_slots;
+  std::int32_t joint_slots, stiff_slots, group_slots, stroke_count;
   std::int32_t closes;         ///< 1: leg by leg, 2: all at once (`legs` is then the whole machine)
   std::int32_t task[6];        ///< commanded pose components, rotations about the axes of the commanded frame
   std::int32_t open_task;      ///< some are not
@@ -160,7 +173,7 @@ struct KernelOutput {
 inline constexpr std::int64_t program_layout =
     sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) + 41 * sizeof(Op) +
     43 * sizeof(CoordinateProgram) + 47 * sizeof(DriveProgram) + 53 * sizeof(LawProgram) + 59 * sizeof(ClosureTerm) +
-    67 * sizeof(ChainProgram) + 61 * sizeof(PlanarLeg);
+    67 * sizeof(ChainProgram) + 61 * sizeof(PlanarLeg) + 71 * sizeof(StrokeProgram);
 
 /// The one symbol that each level exports. Poses begin .. end-1; `scratch` of scratch_size() bytes.
 struct KernelTable {

@@ -42,11 +42,17 @@ struct GroupSlot {
   V3 p;             ///< its end
 };
 
+/// Stiffness of a spring that varies with a coordinate, row-major.
+struct StrokeSlot {
+  V K[36];
+};
+
 /// All scratch of a thread, laid out once in one piece of memory.
 struct Scratch {
   JointSlot* joints;
   StiffSlot* stiff;
   GroupSlot* groups;
+  StrokeSlot* strokes;
   BranchSlot* branches;  ///< per chain
   V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *friction_sign,
       *kept;  ///< friction_sign: sign of dry friction; kept: z at the last load step in equilibrium

@@ -11,6 +11,27 @@
 namespace stiffmap {
 namespace {
 
+/// Strokes in the order of their operations' numbers.
+void add_strokes(const Mechanism& m, FastPlanData& d) {
+  for (std::size_t i = 0; i < d.ops.size(); ++i) {
+    const Op& op = d.ops[i];
+    if (op.kind != OpKind::spring || op.stroke < 0) continue;
+    for (const SpringGroup& g : m.groups) {
+      if (g.first != op.coordinate) continue;
+      const Stroke& t = *g.stroke;
+      StrokeProgram p{i32(i), i32(g.varies_with), t.along, i32(d.stroke_rows.size() / stroke_row), i32(t.table.size()),
+                      t.at,   t.length,           t.rate,  0.0};
+      if (!t.table.empty()) p.slack = Stroke::slack * (t.table.back().first - t.table.front().first);
+      for (const auto& [u, C] : t.table) {
+        d.stroke_rows.push_back(u);
+        d.stroke_rows.insert(d.stroke_rows.end(), C.data(), C.data() + 36);
+      }
+      d.ops[i].stroke = i32(d.strokes.size());
+      d.strokes.push_back(p);
+    }
+  }
+}
+
 void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData& d) {
   for (const Law& law : m.laws) {
     d.laws.push_back({law.stiffness(), law.cubic(), law.friction(), i32(d.knots.size() / 3), i32(law.knots().size())});
@@ -38,6 +59,7 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
     d.drives.push_back({chains.drives[i].coordinate, chains.drives[i].slot, chains.drives[i].prismatic,
                         m.home_coordinates[k.coordinate], k.compliance_slope, k.force_limit});
   }
+  add_strokes(m, d);
   for (const ElasticJoint& e : chains.elastic) {
     CoordinateProgram& c = d.coordinates[static_cast<std::size_t>(e.coordinate)];
     c.stiffness = e.stiffness;
@@ -69,6 +91,9 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.chains = d.chains.data();
   p.laws = d.laws.data();
   p.knots = d.knots.data();
+  p.strokes = d.strokes.data();
+  p.stroke_rows = d.stroke_rows.data();
+  p.stroke_count = i32(d.strokes.size());
   p.errors = d.errors.data();
   p.drives = d.drives.data();
   p.coordinates = d.coordinates.data();

@@ -124,17 +124,18 @@ void evaluate_laws(const Mechanism& m, const Problem& p, const State& state, Lin
   }
 }
 
-void add_springs(const Mechanism& m, Linearization& out) {
-  for (const SpringGroup& g : m.groups) {
+void add_springs(const Mechanism& m, const Problem& p, Linearization& out) {
+  for (std::size_t i = 0; i < m.groups.size(); ++i) {
+    const SpringGroup& g = m.groups[i];
     const Vec6 d = out.x.segment<6>(g.first) - g.rest;
     const Mat6& V = g.matrix.basis;
-    const Mat6 K = g.matrix.rotated ? Mat6(V * g.matrix.stiffness * V.transpose()) : g.matrix.stiffness;
+    const Mat6 K = g.matrix.rotated ? Mat6(V * p.springs[i] * V.transpose()) : p.springs[i];
     out.tau.segment<6>(g.first) += K * d;
     out.K.block<6, 6>(g.first, g.first) += K;
-    for (int i = 0; i < 6; ++i) {
-      const bool law = m.coordinates[at(g.first + i)].law >= 0;
-      if (g.matrix.rigid[i] && !g.matrix.rotated) out.kind[at(g.first + i)] = Kind::fixed;
-      else if (!law && K(i, i) > 0) out.kind[at(g.first + i)] = Kind::elastic;
+    for (int k = 0; k < 6; ++k) {
+      const bool law = m.coordinates[at(g.first + k)].law >= 0;
+      if (g.matrix.rigid[k] && !g.matrix.rotated) out.kind[at(g.first + k)] = Kind::fixed;
+      else if (!law && K(k, k) > 0) out.kind[at(g.first + k)] = Kind::elastic;
     }
   }
 }
@@ -188,7 +189,7 @@ void linearize(const Mechanism& m, const Problem& problem, const State& state, L
   out.H.setZero();
   out.J.setZero();
   out.r.setZero();
-  add_springs(m, out);
+  add_springs(m, problem, out);
   add_loads(m, problem, out);
   for (const NodeSpring& s : m.external_springs) add_external_spring(m, s, out);
   add_loops(m, problem, state, out);

@@ -108,7 +108,7 @@ Index Mechanism::add_guide_errors(const Joint& joint, Index node, const std::str
 
 Index Mechanism::add_spring(const Spring& spring, Index node, const std::string& prefix) {
   const std::string name = join(prefix, spring.name);
-  SpringGroup group{name, size(), spring.matrix, spring.rest};
+  SpringGroup group{name, size(), spring.matrix, spring.rest, spring.stroke};
   static const char* axes[] = {"tx", "ty", "tz", "rx", "ry", "rz"};
   for (int i = 0; i < 6; ++i) {
     node = add_coordinate(node, name + "." + axes[i], Role::spring, i < 3 ? JointType::prismatic : JointType::revolute,
@@ -123,6 +123,10 @@ Index Mechanism::add_spring(const Spring& spring, Index node, const std::string&
     group.matrix.rigid[direction] = false;
     coordinates[static_cast<std::size_t>(group.first + direction)].law = static_cast<Index>(laws.size());
     laws.push_back(law);
+  }
+  if (spring.stroke) {
+    require(spring.laws.empty(), name + ".stroke", "a spring without laws", spring.laws.size());
+    check_stroke(*spring.stroke, spring.matrix, name);
   }
   groups.push_back(group);
   return node;
@@ -175,6 +179,25 @@ Index Mechanism::point(const std::string& name) const {
   return -1;
 }
 
+/// The joint of a stroke: in the spring's own sequence, else in the nearest around it.
+void Mechanism::find_strokes() {
+  for (SpringGroup& g : groups) {
+    if (!g.stroke) continue;
+    const bool whole = g.stroke->joint.front() == '.';  // a full name outside the legs
+    const std::string joint = whole ? g.stroke->joint.substr(1) : g.stroke->joint;
+    std::string scope = whole ? "outside" : g.name;
+    while (g.varies_with < 0 && !scope.empty()) {
+      const std::size_t dot = scope.rfind('.');
+      scope = dot == std::string::npos ? "" : scope.substr(0, dot);
+      for (Index j = 0; j < size(); ++j) {
+        const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
+        if (c.role != Role::spring && c.name == join(scope, joint)) g.varies_with = j;
+      }
+    }
+    require(g.varies_with >= 0, g.name + ".stroke", "a joint of one axis", g.stroke->joint);
+  }
+}
+
 void Mechanism::finish(const std::vector<ExternalSpring>& springs) {
   std::set<std::string> names;
   for (const Coordinate& c : coordinates)
@@ -186,6 +209,7 @@ void Mechanism::finish(const std::vector<ExternalSpring>& springs) {
   home_coordinates = VecX::Zero(size());
   for (Index j = 0; j < size(); ++j) home_coordinates[j] = coordinates[static_cast<std::size_t>(j)].home;
   set_rest();
+  find_strokes();
   find_balls();
   set_scales();
 }

@@ -12,8 +12,9 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-/// Drive and guide coordinates with their errors, and the drive compliance at that stroke (theory G1-G3).
-void command(const Mechanism& m, const VecX& x, Problem& p) {
+/// Drive and guide coordinates with their errors, compliances of drives and links at that stroke (theory G1-G3, S3);
+/// false where a link has none.
+bool command(const Mechanism& m, const VecX& x, Problem& p) {
   p.friction_sign.setZero();
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
@@ -26,6 +27,12 @@ void command(const Mechanism& m, const VecX& x, Problem& p) {
       p.base[coordinate] += e.offset + e.slope * (u - e.reference) +
                             e.amplitude * std::sin(2 * std::numbers::pi * (u - e.reference) / e.period + e.phase);
   }
+  bool known = true;
+  for (std::size_t i = 0; i < m.groups.size(); ++i) {
+    const SpringGroup& g = m.groups[i];
+    if (g.stroke) known = stiffness_at(*g.stroke, g.matrix, x[g.varies_with], p.springs[i]) && known;
+  }
+  return known;
 }
 
 void start_state(const Mechanism& m, const VecX& x, State& state) {
@@ -99,7 +106,7 @@ bool configuration_undetermined(const Mechanism& m, const PoseInput& in, const V
   for (Index j = 0; j < m.size(); ++j) kept = std::max(kept, std::abs(x[j] - ws.x[j]) * m.unit(j) / m.length);
   if (kept < 0.5 * stride) return false;  // came back: only an infinitesimal freedom
   Problem p(m);
-  command(m, x, p);
+  if (!command(m, x, p)) return true;
   p.secant_laws = true;
   State state(m);
   start_state(m, x, state);
@@ -228,7 +235,7 @@ SolveWorkspace::SolveWorkspace(const Mechanism& m)
 
 ClosureResult prepare_pose(const Mechanism& m, const PoseInput& in, SolveWorkspace& ws) {
   if (in.closed) ws.x = Eigen::Map<const VecX>(in.closed, m.size());
-  const ClosureResult closure =
+  ClosureResult closure =
       in.closed ? given_closure(m, ws.closure, ws.x) : inverse_closure(m, in.commanded, ws.closure, ws.x);
   if (closure.status != Status::converged) return closure;
   ws.reached = m.task == full_task && closure.exact ? in.commanded : closure.tip;
@@ -238,7 +245,10 @@ ClosureResult prepare_pose(const Mechanism& m, const PoseInput& in, SolveWorkspa
     for (std::size_t i = 0; i < m.loops.size(); ++i)
       ws.problem.misfit.segment<6>(6 * static_cast<Index>(i)) =
           frame_error(ws.nominal.at(m.loops[i].primary), ws.nominal.at(m.loops[i].end));
-  command(m, ws.x, ws.problem);
+  if (!command(m, ws.x, ws.problem)) {
+    closure.status = Status::unreachable;  // a ram that is not there
+    return closure;
+  }
   start_state(m, ws.x, ws.state);
   ws.problem.gravity = in.gravity;
   ws.problem.load_points = in.load_points;

@@ -75,6 +75,50 @@ SpringMatrix spring_from_compliance(const Mat6& C, const std::string& name) {
   return out;
 }
 
+void check_stroke(const Stroke& stroke, const SpringMatrix& matrix, const std::string& name) {
+  require(!stroke.joint.empty(), name + ".stroke", "a joint's name", "none");
+  require(!matrix.rotated, name + ".stroke", "a compliance without a hidden rank defect", "one");
+  if (stroke.table.empty()) {
+    require(stroke.length > 0, name + ".stroke", "a positive length", stroke.length);
+    return;
+  }
+  require(stroke.table.size() > 1, name + ".stroke", "two rows or more", stroke.table.size());
+  for (std::size_t k = 0; k < stroke.table.size(); ++k) {
+    const auto& [u, C] = stroke.table[k];
+    if (k) require(u > stroke.table[k - 1].first, name + ".stroke", "rising coordinates", u);
+    const SpringMatrix row = spring_from_compliance(C, name + ".stroke");
+    require(!row.rotated && (row.rigid == matrix.rigid).all(), name + ".stroke",
+            "the same rigid directions in every row, and no hidden ones", "row " + std::to_string(k + 1));
+  }
+}
+
+bool stiffness_at(const Stroke& stroke, const SpringMatrix& matrix, double u, Mat6& stiffness) {
+  if (stroke.table.empty()) {
+    const double longer = 1 + stroke.rate * (u - stroke.at) / stroke.length;
+    if (!(longer > 0)) return false;
+    const double power[] = {1 / longer, 1 / (longer * longer), 1 / (longer * longer * longer)};
+    for (int i = 0; i < 6; ++i)
+      for (int k = 0; k < 6; ++k)
+        stiffness(i, k) = matrix.stiffness(i, k) * power[stroke_power(stroke.along, i, k) - 1];
+    return true;
+  }
+  const auto& rows = stroke.table;
+  const double slack = Stroke::slack * (rows.back().first - rows.front().first);
+  if (!(u >= rows.front().first - slack && u <= rows.back().first + slack)) return false;
+  std::size_t k = 0;
+  while (k + 2 < rows.size() && u >= rows[k + 1].first) ++k;
+  const double share = (u - rows[k].first) / (rows[k + 1].first - rows[k].first);
+  Mat6 C = (1 - share) * rows[k].second + share * rows[k + 1].second;
+  for (int i = 0; i < 6; ++i)
+    if (matrix.rigid[i]) C(i, i) = 1;
+  const Vec6 s = unit_diagonal(C);
+  stiffness = s.asDiagonal() * inverse(Mat6(s.asDiagonal() * C * s.asDiagonal())) * s.asDiagonal();
+  stiffness = (0.5 * (stiffness + stiffness.transpose())).eval();
+  for (int i = 0; i < 6; ++i)
+    if (matrix.rigid[i]) stiffness(i, i) = 0;
+  return true;
+}
+
 Mat6 beam_compliance(double L, const BeamSection& b) {
   require(L > 0, "beam.length", "a positive length", L);
   require(b.EA > 0 && b.EIy > 0 && b.EIz > 0 && b.GJ > 0, "beam.section", "positive rigidities EA, EIy, EIz, GJ",

@@ -30,6 +30,14 @@ void bind_chain(py::module_& m) {
              return CommandError{offset, slope, amplitude, period, phase, reference};
            }),
            "offset"_a, "slope"_a, "amplitude"_a, "period"_a, "phase"_a, "reference"_a);
+  py::class_<Stroke>(m, "Stroke")
+      .def(py::init([](const std::string& joint, int along, double at, double length, double rate,
+                       const std::vector<std::pair<double, Array>>& table) {
+             Stroke out{joint, along, at, length, rate, {}};
+             for (const auto& [u, compliance] : table) out.table.emplace_back(u, mat6(compliance, "stroke"));
+             return out;
+           }),
+           "joint"_a, "along"_a, "at"_a, "length"_a, "rate"_a, "table"_a);
   py::class_<Chain>(m, "Chain")
       .def(py::init<>())
       .def(
@@ -60,13 +68,13 @@ void bind_chain(py::module_& m) {
       .def(
           "spring",
           [](Chain& c, const std::string& name, const Array& matrix, bool compliance, const Array& rest,
-             const std::vector<std::pair<int, Law>>& laws) {
+             const std::vector<std::pair<int, Law>>& laws, const std::optional<Stroke>& stroke) {
             const Mat6 M = mat6(matrix, "spring");
             c.elements.emplace_back(
                 Spring{name, compliance ? spring_from_compliance(M, name) : spring_from_stiffness(M, name),
-                       Eigen::Map<const Vec6>(data(rest, {6}, "rest")), laws});
+                       Eigen::Map<const Vec6>(data(rest, {6}, "rest")), laws, stroke});
           },
-          "name"_a, "matrix"_a, "compliance"_a, "rest"_a, "laws"_a)
+          "name"_a, "matrix"_a, "compliance"_a, "rest"_a, "laws"_a, "stroke"_a = std::nullopt)
       .def(
           "body",
           [](Chain& c, const std::string& name, double mass, const Array& com) {

@@ -63,12 +63,13 @@ struct Joint {
 };
 
 /// Virtual spring of six coordinates (t, phi): p + R t, R Rx Ry Rz (theory S2). `laws` replace single
-/// uncoupled directions; `rest` is the deflection without force.
+/// uncoupled directions; `rest` is the deflection without force; `stroke`: `matrix` is where it counts from.
 struct Spring {
   std::string name;
   SpringMatrix matrix;
   Vec6 rest = Vec6::Zero();
   std::vector<std::pair<int, Law>> laws;
+  std::optional<Stroke> stroke;
 };
 
 struct Body {

@@ -62,6 +62,8 @@ struct SpringGroup {
   Index first = 0;
   SpringMatrix matrix;
   Vec6 rest = Vec6::Zero();
+  std::optional<Stroke> stroke;
+  Index varies_with = -1;  ///< coordinate of the stroke
 };
 
 /// Error of a drive's commanded coordinate, which moves `coordinate`: its own, or one across the guide.
@@ -159,6 +161,7 @@ class Mechanism {
   Index add_joint(const Joint& joint, Index node, const std::string& prefix);
   Index add_guide_errors(const Joint& joint, Index node, const std::string& name);
   Index add_spring(const Spring& spring, Index node, const std::string& prefix);
+  void find_strokes();
   void finish(const std::vector<ExternalSpring>& springs);
   void set_scales();
   void find_balls();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "chains.hpp"
 
+#include <algorithm>
+
 #include "stiffmap/dense.hpp"
 
 namespace stiffmap {
@@ -90,7 +92,7 @@ class Compiler {
   Op& push(OpKind kind, Way& way, std::vector<Op>& ops) {
     Op op{};
     op.kind = kind;
-    op.coordinate = op.law = op.wrench = -1;
+    op.coordinate = op.law = op.wrench = op.stroke = -1;
     op.nominal = constant(way.nominal);
     op.actual = constant(way.actual);
     way.nominal = way.actual = Pose{};
@@ -142,6 +144,7 @@ class Compiler {
     const bool deficient = s.matrix.rotated || s.matrix.rigid.any() ||
                            symmetric_eigen(Mat6(d.asDiagonal() * whole * d.asDiagonal())).values[0] < 1e-9;
     if (deficient || corners) {
+      if (s.stroke) found_.missing = "a link spring with rigid or free directions that varies with a joint";
       if (s.matrix.rotated || !Mat6(K.diagonal().asDiagonal()).isApprox(K, 1e-14))
         found_.missing = "a coupled link spring with rigid or free directions or with gaps";
       elastic_joints(s, K, way, ops);
@@ -154,6 +157,10 @@ class Compiler {
     for (int i = 0; i < 6; ++i) {
       op.rest[i] = s.rest[i];
       for (int k = 0; k < 6; ++k) op.K[6 * i + k] = K(i, k);
+    }
+    if (s.stroke) {
+      op.stroke = 0;  // numbered once all operations are known
+      if (!s.stroke->table.empty()) std::fill(op.K, op.K + 36, 1.0);  // any entry may be there somewhere
     }
     way.rigid = false;
     way.moves = true;

@@ -20,6 +20,8 @@ struct FastPlanData {
   std::vector<ChainProgram> chains;
   std::vector<LawProgram> laws;
   std::vector<double> knots;
+  std::vector<StrokeProgram> strokes;
+  std::vector<double> stroke_rows;
   std::vector<CommandErrorProgram> errors;
   std::vector<DriveProgram> drives;
   std::vector<CoordinateProgram> coordinates;

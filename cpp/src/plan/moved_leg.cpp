@@ -42,6 +42,15 @@ bool same_law(const Program& p, std::int32_t a, const Program& q, std::int32_t b
   return bytes == 0 || std::memcmp(p.knots + 3 * x.first, q.knots + 3 * y.first, bytes) == 0;
 }
 
+bool same_stroke(const Program& p, std::int32_t a, const Program& q, std::int32_t b) {
+  if (a < 0 || b < 0) return a == b;
+  const StrokeProgram &x = p.strokes[a], &y = q.strokes[b];
+  const auto bytes = static_cast<std::size_t>(stroke_row * x.count) * sizeof(double);
+  return x.coordinate == y.coordinate && x.along == y.along && x.count == y.count && x.at == y.at &&
+         x.length == y.length && x.rate == y.rate &&
+         (bytes == 0 || std::memcmp(p.stroke_rows + stroke_row * x.first, q.stroke_rows + stroke_row * y.first, bytes) == 0);
+}
+
 /// The one leg that was named, or nobody once two were.
 struct One {
   std::int32_t leg = 0;
@@ -62,7 +71,8 @@ std::int32_t moved_leg(const Program& p, const Program& q) {
   const auto of = [&](std::int32_t coordinate) { return owners.coordinate[static_cast<std::size_t>(coordinate)]; };
   One one;
   for (std::int32_t i = 0; i < p.op_count; ++i)
-    if (!same(p.ops[i], q.ops[i])) one.name(owners.op[static_cast<std::size_t>(i)]);
+    if (!same(p.ops[i], q.ops[i]) || !same_stroke(p, p.ops[i].stroke, q, q.ops[i].stroke))
+      one.name(owners.op[static_cast<std::size_t>(i)]);
   for (std::int32_t i = 0; i < p.chain_count; ++i)
     if (!same(p.chains[i], q.chains[i]))
       one.name(i == p.root ? nobody : owners.op[static_cast<std::size_t>(p.chains[i].first)]);

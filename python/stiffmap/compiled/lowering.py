@@ -10,6 +10,7 @@ from stiffmap import _core
 from stiffmap.compiled.ball import any_axes_do, charted
 from stiffmap.description import (
     TASK,
+    BeamStroke,
     Block,
     Body,
     CommandError,
@@ -23,6 +24,8 @@ from stiffmap.description import (
     Pose,
     Spring,
 )
+from stiffmap.description.strokes import present_rows
+from stiffmap.description.tree import ENDS
 from stiffmap.errors import StiffmapError
 from stiffmap.home import Gap, misfit_text
 
@@ -163,4 +166,20 @@ def add_spring(out: _core.Chain, e: Spring) -> None:
         raise StiffmapError(f"spring {e.name}: expected either a compliance or a stiffness matrix")
     matrix = e.compliance if e.compliance is not None else e.stiffness
     laws = [(i, law(entry)) for i, entry in e.laws]
-    out.spring(e.name, np.array(matrix), e.compliance is not None, np.array(e.rest), laws)
+    out.spring(e.name, np.array(matrix), e.compliance is not None, np.array(e.rest), laws, stroke(e))
+
+
+def stroke(e: Spring) -> _core.Stroke | None:
+    """How the spring varies; rows of a table as what has been changed of its first row leaves them."""
+    if e.stroke is None:
+        return None
+    if e.compliance is None:
+        raise StiffmapError(f"spring {e.name}: only a compliance varies with a joint")
+    s, joint = e.stroke, e.stroke.joint
+    sequence, _, inside = joint.partition(".")
+    if sequence in ENDS:
+        joint = f".{inside}"
+    if isinstance(s, BeamStroke):
+        return _core.Stroke(joint, s.along, s.at, s.length, s.rate, [])
+    rows = zip(s.at, present_rows(s, e.compliance), strict=True)
+    return _core.Stroke(joint, 0, 0.0, 0.0, 0.0, [(u, np.array(row)) for u, row in rows])

@@ -20,10 +20,12 @@ from stiffmap.description.machine import (
     MachineDescription,
 )
 from stiffmap.description.pose import Pose
+from stiffmap.description.strokes import BeamStroke, TableStroke
 
 __all__ = [
     "TASK",
     "AppliedEffect",
+    "BeamStroke",
     "Block",
     "Body",
     "Branch",
@@ -41,4 +43,5 @@ __all__ = [
     "Point",
     "Pose",
     "Spring",
+    "TableStroke",
 ]

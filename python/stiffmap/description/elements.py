@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 
 from stiffmap.description.laws import CommandError, GuideError, JointFriction, Law
 from stiffmap.description.pose import IDENTITY, Pose, Rows, Vector
-
-Matrix6 = tuple[tuple[float, ...], ...]
+from stiffmap.description.strokes import BeamStroke, Matrix6, TableStroke
 
 
 @dataclass(frozen=True)
@@ -97,6 +96,7 @@ class Spring:
     rigid, one of a stiffness is free. ``laws`` replaces single *diagonal* directions by nonlinear
     laws, ((direction index, law), ...): allowed where that direction is not coupled.
     ``rest`` is the deflection (6,) at which the spring is free of force (preload).
+    ``stroke`` says how a ``compliance`` varies with a joint's coordinate (None: not at all).
     """
 
     name: str
@@ -104,6 +104,7 @@ class Spring:
     stiffness: Matrix6 | None = None
     laws: tuple[tuple[int, Law], ...] = ()
     rest: tuple[float, ...] = (0.0,) * 6
+    stroke: BeamStroke | TableStroke | None = None
 
 
 @dataclass(frozen=True)
@@ -145,6 +146,7 @@ Element = Offset | Joint | Spring | Body | Point | Block
 
 __all__ = [
     "IDENTITY",
+    "BeamStroke",
     "Block",
     "Body",
     "Branch",
@@ -155,4 +157,5 @@ __all__ = [
     "Offset",
     "Point",
     "Spring",
+    "TableStroke",
 ]

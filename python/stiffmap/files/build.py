@@ -18,6 +18,7 @@ from stiffmap.description.tree import point_names
 from stiffmap.files.build_elements import build_elements, build_range
 from stiffmap.files.build_geometry import build_pose, build_vector
 from stiffmap.files.build_legs import build_leg
+from stiffmap.files.build_strokes import with_strokes
 from stiffmap.files.context import Context, Gathered
 from stiffmap.files.link_covariance import with_links
 from stiffmap.files.schema import MachineFile
@@ -60,8 +61,10 @@ def build(
         units=units,
     )
     context.raise_problems()
-    _check_points(description, context.at("external_springs"))
     gathered = context.gathered
+    description = with_strokes(description, gathered)
+    context.raise_problems()
+    _check_points(description, context.at("external_springs"))
     return replace(
         description,
         uncertainty=tuple({**gathered.uncertainty, **model.uncertainty}.items()),

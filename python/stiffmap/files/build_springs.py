@@ -11,7 +11,7 @@ from stiffmap.description import Law, Spring
 from stiffmap.description.elements import Matrix6
 from stiffmap.files import sections
 from stiffmap.files.cantilever import cantilever_compliance
-from stiffmap.files.context import Context, LinkUse
+from stiffmap.files.context import Context, LinkUse, StrokeUse
 from stiffmap.files.matrix_checks import asymmetry, lowest_eigenvalue
 from stiffmap.files.schema.base import Number
 from stiffmap.files.schema.elements import SpringModel
@@ -41,6 +41,8 @@ def build_spring(model: SpringModel, context: Context) -> Spring:
                 f"the {word} couples this direction to others; it has no law alone"
             )
     stiffness, compliance = (matrix, None) if word == "stiffness" else (None, matrix)
+    if model.stroke is not None:
+        context.gathered.strokes.append(StrokeUse(context.full, model, context.at("stroke")))
     return Spring(model.spring, compliance, stiffness, laws, rest or (0.0,) * 6)
 
 
@@ -51,7 +53,10 @@ def _spring_matrix(model: SpringModel, context: Context) -> Matrix6:
         return load_link(model.link, context.at("link"))
     if model.stiffness is not None:
         return build_matrix(model.stiffness, "stiffness", context.at("stiffness"))
-    assert model.compliance is not None  # the schema asks for one of the four
+    if model.compliance is None:  # the schema asks for one of the four, or a table
+        assert model.stroke is not None and model.stroke.table is not None
+        here = context.at("stroke", "table", 0, "compliance")
+        return build_matrix(model.stroke.table[0].compliance, "compliance", here)
     return build_matrix(model.compliance, "compliance", context.at("compliance"))
 
 

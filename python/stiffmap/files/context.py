@@ -11,6 +11,7 @@ from typing import NoReturn, TypeVar
 from stiffmap.errors import FileError, together
 from stiffmap.files.report import key_text
 from stiffmap.files.schema.base import Number
+from stiffmap.files.schema.elements import SpringModel
 from stiffmap.files.schema.springs import Material
 from stiffmap.units import Dimension, UnitSystem
 from stiffmap.yaml_text import Document, KeyPath
@@ -27,12 +28,22 @@ class LinkUse:
 
 
 @dataclass
+class StrokeUse:
+    """A spring with a stroke, by its full name: built when all joints are known."""
+
+    full: str
+    model: SpringModel
+    context: Context
+
+
+@dataclass
 class Gathered:
     """What belongs to the whole machine, in the order of the file, keyed ``full.name/field``."""
 
     uncertainty: dict[str, float] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
     links: dict[str, LinkUse] = field(default_factory=dict)
+    strokes: list[StrokeUse] = field(default_factory=list)
     problems: list[FileError] = field(default_factory=list)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.description import (
+    BeamStroke,
     Block,
     Body,
     CommandError,
@@ -17,8 +18,10 @@ from stiffmap.description import (
     Point,
     Pose,
     Spring,
+    TableStroke,
 )
 from stiffmap.description.pose import IDENTITY, Rows
+from stiffmap.description.strokes import present_rows
 from stiffmap.errors import StiffmapError
 from stiffmap.files.schema.geometry import NAMED
 from stiffmap.files.schema.springs import DIRECTIONS
@@ -160,13 +163,27 @@ def _law_terms(law: Law) -> Plain:
 def _spring(spring: Spring) -> Plain:
     plain: Plain = {"spring": spring.name}
     for word in ("compliance", "stiffness"):
-        if getattr(spring, word) is not None:
+        if getattr(spring, word) is not None and not isinstance(spring.stroke, TableStroke):
             plain[word] = dump_matrix(getattr(spring, word))
     if spring.laws:
         plain["laws"] = {DIRECTIONS[i]: _law_terms(law) for i, law in spring.laws}
     if any(spring.rest):
         plain["rest"] = floats(spring.rest)
-    return plain
+    return {**plain, **_stroke(spring)}
+
+
+def _stroke(spring: Spring) -> Plain:
+    match spring.stroke:
+        case BeamStroke() as s:
+            beam = {"at": s.at, "length": s.length, "along": "xyz"[s.along], "rate": s.rate}
+            return {"stroke": {"joint": s.joint, **beam}}
+        case TableStroke() as s:
+            assert spring.compliance is not None
+            rows = zip(s.at, present_rows(s, spring.compliance), strict=True)
+            return {
+                "stroke": {"joint": s.joint, "table": [{"at": u, "compliance": dump_matrix(c)} for u, c in rows]}
+            }
+    return {}
 
 
 def dump_matrix(rows: Any) -> Any:

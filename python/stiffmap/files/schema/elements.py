@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Pair, Vector3
 from stiffmap.files.schema.geometry import Axis, Frame
-from stiffmap.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix
+from stiffmap.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix, Stroke
 
 SORTS = ("offset", "joint", "actuator", "spring", "body", "point", "block")
 AXES_OF = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 3}
@@ -120,11 +120,27 @@ class SpringModel(FileModel):
     link: Annotated[str, Field(description="Identified link file, relative to this file.")] | None = None
     laws: dict[Literal[DIRECTIONS], LawModel] | None = None  # type: ignore[valid-type]
     rest: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = None
+    stroke: Stroke | None = None
     note: str = ""
 
     @model_validator(mode="after")
     def _one_form(self) -> SpringModel:
-        one_of(self, ("compliance", "stiffness", "beam", "link"), required=True)
+        table = self.stroke is not None and self.stroke.table is not None
+        one_of(self, ("compliance", "stiffness", "beam", "link"), required=not table)
+        also = [
+            k for k in ("compliance", "stiffness", "beam", "link", "laws") if getattr(self, k) is not None
+        ]
+        refused = also if table else [k for k in ("stiffness", "laws") if self.stroke and k in also]
+        if refused:
+            what = "a table" if table else "length and joint"
+            message = "a stroke by {what} does not go with {keys}"
+            raise PydanticCustomError("stroke", message, {"what": what, "keys": ", ".join(refused)})
+        if self.stroke is not None and not table and self.beam is None:
+            missing = [k for k in ("length", "along") if getattr(self.stroke, k) is None]
+            if missing:
+                raise PydanticCustomError(
+                    "stroke", "without a beam, a stroke needs {keys}", {"keys": " and ".join(missing)}
+                )
         return self
 
 

@@ -173,3 +173,31 @@ class LawModel(FileModel):
         if self.cubic is not None and self.knots is not None:
             raise PydanticCustomError("law", "cubic and knots do not combine")
         return self
+
+
+class StrokeRow(FileModel):
+    """Compliance of a link where a joint is at a coordinate."""
+
+    at: Number
+    compliance: Matrix
+
+
+class Stroke(FileModel):
+    """How a link's compliance varies with the coordinate of ``joint``: as a beam that is ``length`` long at
+    coordinate ``at`` and grows by ``rate`` per unit of it (0: it does not), or as a ``table``, linear in between."""
+
+    joint: Annotated[str, Field(description="Name in the same sequence or one around it, or a full name.")]
+    at: Number | None = None
+    length: Annotated[Number | None, Field(description="Left out: that of the beam.")] = None
+    along: Annotated[
+        Literal["x", "y", "z", "-x", "-y", "-z"] | None, Field(description="Left out: that of the beam.")
+    ] = None
+    rate: Annotated[Number | None, Field(description="Left out: 1.")] = None
+    table: Annotated[list[StrokeRow] | None, Field(min_length=2)] = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Stroke:
+        also = [k for k in ("at", "length", "along", "rate") if getattr(self, k) is not None]
+        if self.table is not None and also:
+            raise PydanticCustomError("stroke", "a table has no {keys} beside it", {"keys": ", ".join(also)})
+        return self

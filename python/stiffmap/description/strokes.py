@@ -1,0 +1,56 @@
+"""Springs that vary with a joint's coordinate: rams, cross-beams, columns on which a head travels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+Matrix6 = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class BeamStroke:
+    """A beam that is ``length`` (m) long where joint ``joint`` is at ``at``, and ``rate`` longer per unit of its
+    coordinate; it lies along local axis ``along`` (0, 1, 2).
+
+    The coordinate is that of the commanded pose, before any load. ``joint`` is a joint of one axis in the
+    spring's own sequence, else in the nearest around it, else a full name.
+    """
+
+    joint: str
+    length: float
+    along: int = 0
+    at: float = 0.0
+    rate: float = 1.0
+
+
+@dataclass(frozen=True)
+class TableStroke:
+    """Compliances (6x6, SI) at coordinates ``at`` of joint ``joint``, linear in between; outside there is none.
+
+    The spring's ``compliance`` stands for the first row: where it has been changed, all rows are (`present_rows`).
+    Coordinate and name of the joint are as for `BeamStroke`.
+    """
+
+    joint: str
+    at: tuple[float, ...]
+    rows: tuple[Matrix6, ...]
+
+
+def present_rows(stroke: TableStroke, compliance: Matrix6) -> tuple[Matrix6, ...]:
+    """Rows of a table of which the first is now ``compliance``: every entry changes in the ratio in which that
+    of the first row did, one that is zero there as the two diagonal terms beside it."""
+    first = stroke.rows[0]
+    if compliance == first:
+        return stroke.rows
+
+    def ratio(i: int, j: int) -> float:
+        if first[i][j] != 0.0:
+            return compliance[i][j] / first[i][j]
+        return math.sqrt(ratio(i, i) * ratio(j, j)) if i != j else 1.0
+
+    factors = [[ratio(i, j) for j in range(6)] for i in range(6)]
+    return tuple(
+        tuple(tuple(v * f for v, f in zip(*both, strict=True)) for both in zip(row, factors, strict=True))
+        for row in stroke.rows
+    )
