@@ -19,8 +19,15 @@ void add_strokes(const Mechanism& m, FastPlanData& d) {
     for (const SpringGroup& g : m.groups) {
       if (g.first != op.coordinate) continue;
       const Stroke& t = *g.stroke;
-      StrokeProgram p{i32(i), i32(g.varies_with), t.along, i32(d.stroke_rows.size() / stroke_row), i32(t.table.size()),
-                      t.at,   t.length,           t.rate,  0.0};
+      StrokeProgram p{i32(i),
+                      i32(g.varies_with),
+                      t.along,
+                      i32(d.stroke_rows.size() / stroke_row),
+                      i32(t.table.size()),
+                      t.at,
+                      t.length,
+                      t.rate,
+                      0.0};
       if (!t.table.empty()) p.slack = Stroke::slack * (t.table.back().first - t.table.front().first);
       for (const auto& [u, C] : t.table) {
         d.stroke_rows.push_back(u);

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Answer', 'Chain', 'CommandError', 'ExternalSpring', 'FastPlan', 'HomeMisfit', 'Law', 'Mechanism', 'OneAnswer', 'OneCall', 'Pose', 'clamp', 'home_gaps', 'kernel_level', 'kernel_levels', 'path', 'reactions']
+__all__: list[str] = ['Answer', 'Chain', 'CommandError', 'ExternalSpring', 'FastPlan', 'HomeMisfit', 'Law', 'Mechanism', 'OneAnswer', 'OneCall', 'Pose', 'Stroke', 'clamp', 'home_gaps', 'kernel_level', 'kernel_levels', 'path', 'reactions']
 class Pose:
     def __init__(self, translation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         ...
@@ -15,6 +15,9 @@ class Law:
         ...
 class CommandError:
     def __init__(self, offset: typing.SupportsFloat | typing.SupportsIndex, slope: typing.SupportsFloat | typing.SupportsIndex, amplitude: typing.SupportsFloat | typing.SupportsIndex, period: typing.SupportsFloat | typing.SupportsIndex, phase: typing.SupportsFloat | typing.SupportsIndex, reference: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class Stroke:
+    def __init__(self, joint: str, along: typing.SupportsInt | typing.SupportsIndex, at: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex, table: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]]) -> None:
         ...
 class Chain:
     def __init__(self) -> None:
@@ -29,7 +32,7 @@ class Chain:
         ...
     def point(self, name: str, offset: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         ...
-    def spring(self, name: str, matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], compliance: bool, rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], laws: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, Law]]) -> None:
+    def spring(self, name: str, matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], compliance: bool, rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], laws: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, Law]], stroke: Stroke | None = None) -> None:
         ...
 class ExternalSpring:
     def __init__(self, name: str, point: str, anchor: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], stiffness: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex, tension_only: bool) -> None:

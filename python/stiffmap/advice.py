@@ -34,6 +34,7 @@ def advice(machine: Machine, path: str | PathLike[str]) -> list[str]:
         *_limits(machine),
         *_rigid(machine),
         *_numbers(machine, path),
+        *_rams(machine, path),
     ]
 
 
@@ -160,6 +161,42 @@ def _long_beams(key: str, sequence: list[Any]) -> Iterator[str]:
         length = _plain(beam.get("length")) if isinstance(beam, dict) else None
         if length is not None and span and length > 1.5 * span:
             yield f"{key}: the beam of '{e.get('spring')}' is {length:g} long, the offset before it spans {span:g}"
+
+
+def _rams(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
+    """Beams of constant length that slide along themselves, where no passive joint keeps them from bending."""
+    description = machine.description
+    if any(isinstance(e, Joint) and not e.actuated for _, e in all_elements(description)):
+        return
+    for key, sequence in _sequences(read(find(path)).data, ""):
+        slide: tuple[str, Floats] | None = None
+        for e in sequence:
+            if e.get("kind") == "prismatic":
+                axis = _along(e.get("axis"))
+                slide = None if axis is None else (str(e.get("actuator")), axis)
+            beam = e.get("beam")
+            if not isinstance(beam, dict) or slide is None or "stroke" in e:
+                continue
+            ram = _along(beam.get("along", "x"))
+            if ram is not None and abs(ram @ slide[1]) > 0.99:
+                yield (
+                    f"{key}: '{slide[0]}' slides along the beam of '{e.get('spring')}', whose length stays "
+                    f"{_plain(beam.get('length')):g}: if it is a ram or column that gets longer, write "
+                    f"stroke: {{joint: {slide[0]}}}; if not, with rate: 0"
+                )
+
+
+def _along(value: Any) -> Floats | None:
+    """Unit vector of an axis as a file writes it."""
+    if isinstance(value, str) and value.strip("-") in tuple(NAMES):
+        return (-1.0 if value.startswith("-") else 1.0) * np.eye(3)[NAMES.index(value[-1])]
+    numbers = [_plain(v) for v in value] if isinstance(value, list) else []
+    if len(numbers) != 3 or None in numbers:
+        return None
+    vector: Floats = np.array(numbers, dtype=float)
+    size = float(np.linalg.norm(vector))
+    unit: Floats = vector / (size or 1.0)
+    return unit if size else None
 
 
 def _plain(value: Any) -> float | None:

@@ -19,11 +19,11 @@ struct Problem {
         misfit(VecX::Zero(m.closures())) {
     for (const SpringGroup& g : m.groups) springs.push_back(g.matrix.stiffness);
   }
-  VecX base;           ///< value of each coordinate at zero deflection
-  VecX drive_scale;    ///< factor on the compliance of each law
-  VecX friction_sign;  ///< of the deflection without friction: set by the linear start, 0 before
+  VecX base;                  ///< value of each coordinate at zero deflection
+  VecX drive_scale;           ///< factor on the compliance of each law
+  VecX friction_sign;         ///< of the deflection without friction: set by the linear start, 0 before
   std::vector<Mat6> springs;  ///< stiffness of each link at the command (in its own basis)
-  VecX misfit;         ///< closure error that the digits of the input leave at the command (theory C9)
+  VecX misfit;                ///< closure error that the digits of the input leave at the command (theory C9)
   Vec3 gravity = Vec3::Zero();
   std::vector<LoadPoint> load_points;
   std::vector<Vec6> wrenches;

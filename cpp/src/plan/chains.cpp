@@ -159,7 +159,7 @@ class Compiler {
       for (int k = 0; k < 6; ++k) op.K[6 * i + k] = K(i, k);
     }
     if (s.stroke) {
-      op.stroke = 0;  // numbered once all operations are known
+      op.stroke = 0;                                                  // numbered once all operations are known
       if (!s.stroke->table.empty()) std::fill(op.K, op.K + 36, 1.0);  // any entry may be there somewhere
     }
     way.rigid = false;

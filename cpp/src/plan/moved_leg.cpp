@@ -48,7 +48,8 @@ bool same_stroke(const Program& p, std::int32_t a, const Program& q, std::int32_
   const auto bytes = static_cast<std::size_t>(stroke_row * x.count) * sizeof(double);
   return x.coordinate == y.coordinate && x.along == y.along && x.count == y.count && x.at == y.at &&
          x.length == y.length && x.rate == y.rate &&
-         (bytes == 0 || std::memcmp(p.stroke_rows + stroke_row * x.first, q.stroke_rows + stroke_row * y.first, bytes) == 0);
+         (bytes == 0 ||
+          std::memcmp(p.stroke_rows + stroke_row * x.first, q.stroke_rows + stroke_row * y.first, bytes) == 0);
 }
 
 /// The one leg that was named, or nobody once two were.

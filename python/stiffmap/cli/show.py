@@ -189,7 +189,8 @@ def describe(e: Element) -> str:
         case Joint():
             return f"{e.name}: {_joint(e)}"
         case Spring():
-            return f"{e.name}: link spring, by {'compliance' if e.compliance is not None else 'stiffness'}"
+            varies = f", varies with {e.stroke.joint}" if e.stroke else ""
+            return f"{e.name}: link spring, by {'compliance' if e.compliance is not None else 'stiffness'}{varies}"
         case Body():
             return f"{e.name}: body of {e.mass:g} kg"
         case Point():

@@ -91,6 +91,7 @@ def stroke_joint(description: MachineDescription, full: str, name: str, context:
             return found
     own = full.partition(".")[0]
     near = [n.partition(".")[2] if n.partition(".")[0] == own else n for n in joints]
-    context.at("joint").fail(
-        f"no joint of one axis '{name}'{suggestion(name, near)}; there are: {', '.join(near) or 'none'}"
+    there = ", ".join(near) or "none"
+    raise context.at("joint").error(
+        f"no joint of one axis '{name}'{suggestion(name, near)}; there are: {there}"
     )

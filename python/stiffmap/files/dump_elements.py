@@ -181,7 +181,10 @@ def _stroke(spring: Spring) -> Plain:
             assert spring.compliance is not None
             rows = zip(s.at, present_rows(s, spring.compliance), strict=True)
             return {
-                "stroke": {"joint": s.joint, "table": [{"at": u, "compliance": dump_matrix(c)} for u, c in rows]}
+                "stroke": {
+                    "joint": s.joint,
+                    "table": [{"at": u, "compliance": dump_matrix(c)} for u, c in rows],
+                }
             }
     return {}
 

@@ -24,6 +24,7 @@ LOADS = {
     "five-bar": (50.0, 1.0),
     "swing-table": (50.0, 1.0),
     "3-rps": (300.0, 20.0),
+    "travelling-column": (1000.0, 60.0),
 }
 
 

@@ -22,7 +22,14 @@ def test_shipped_machines_are_left_in_peace(name: str) -> None:
     assert advice(sm.load_machine(name), name) == []
 
 
+COLUMN = (machine_folder() / "travelling-column.yaml").read_text(encoding="utf-8")
 CASES = {
+    "ram": (
+        COLUMN,
+        "        stroke: {joint: ram_drive}\n",
+        "",
+        "'ram_drive' slides along the beam of 'ram', whose length stays 120",
+    ),
     "modulus": (
         STARTER,
         "E: 2.1e5",

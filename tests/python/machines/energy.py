@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.description import Block, Body, Element, Joint, Offset, Spring
+from stiffmap.description import BeamStroke, Block, Body, Element, Joint, Offset, Spring
 
 Frame = tuple[np.ndarray, np.ndarray]
 
@@ -67,7 +67,7 @@ class Energy:
                 p, r = self.joint(e, name, p, r, x)
             elif isinstance(e, Spring):
                 t = np.array([x[f"{name}.{c}"] for c in ("tx", "ty", "tz", "rx", "ry", "rz")])
-                k = np.array(e.stiffness) if e.stiffness else np.linalg.inv(np.array(e.compliance))
+                k = np.array(e.stiffness) if e.stiffness else np.linalg.inv(self.compliance(e, prefix))
                 self.value += 0.5 * (t - e.rest) @ k @ (t - e.rest)
                 p = p + r @ t[:3]
                 for axis, angle in zip(np.eye(3), t[3:], strict=True):
@@ -79,6 +79,18 @@ class Energy:
                 self.close(ends)
                 p, r = ends[0]
         return p, r
+
+    def compliance(self, e: Spring, prefix: str) -> np.ndarray:
+        """At the commanded length: a beam's deflections go with its length to the power of 1/2 or 3/2, the wrench
+        that causes them with the same."""
+        c = np.array(e.compliance)
+        if isinstance(e.stroke, BeamStroke):
+            u = self.command[prefix + e.stroke.joint]
+            longer = (e.stroke.length + e.stroke.rate * (u - e.stroke.at)) / e.stroke.length
+            d = np.full(6, longer**0.5)
+            d[[i for i in range(3) if i != e.stroke.along]] = longer**1.5
+            c = d[:, None] * c * d
+        return c
 
     def joint(self, e: Joint, name: str, p: np.ndarray, r: np.ndarray, x: dict[str, float]) -> Frame:
         for i, axis in enumerate(e.axes):

@@ -18,6 +18,7 @@ FLAGS = {
     "five-bar": Flag(0),
     "swing-table": Flag(0),
     "3-rps": Flag(0),
+    "travelling-column": Flag(0),
 }
 SPINS = {"hexapod": 6, "linear-delta": 6, "rotary-delta": 6, "hybrid": 6}
 

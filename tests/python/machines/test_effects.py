@@ -10,7 +10,10 @@ import pytest
 import stiffmap as sm
 from stiffmap.effects import get, kinds
 
-NEW = ("hexapod", "linear-delta", "rotary-delta", "hybrid", "ur10", "five-bar", "swing-table", "3-rps")
+NEW = (
+    *("hexapod", "linear-delta", "rotary-delta", "hybrid", "ur10", "five-bar", "swing-table", "3-rps"),
+    "travelling-column",
+)
 
 ASKS = (
     "bilinear",

@@ -20,6 +20,7 @@ CASES = {
     "five-bar": ([0.07, 0.41, 0], (0, 0), [50, -40, 30]),
     "swing-table": ([0.12, 0, 0.4], (0, 0), [40, 100, -300]),
     "3-rps": ([0, 0, 0.62], (0.2, -0.15), [200, 100, -400]),
+    "travelling-column": ([0.3, 1.25, 0.8], (0, 0), [900, 400, -700]),
     "orthoglide-revised": ([0.1, -0.1, 0.15], (0, 0), [300, 200, -100]),
 }
 
@@ -73,7 +74,9 @@ def test_the_commanded_components_are_reached(name: str, method: str) -> None:
     np.testing.assert_allclose(off[commanded], 0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["hexapod", "hybrid", "linear-delta", "five-bar", "3-rps"])
+@pytest.mark.parametrize(
+    "name", ["hexapod", "hybrid", "linear-delta", "five-bar", "3-rps", "travelling-column"]
+)
 def test_loaded_compliance_is_a_difference_quotient(name: str) -> None:
     machine = sm.load_machine(name)
     p, _, force = CASES[name]
