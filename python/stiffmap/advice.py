@@ -189,7 +189,8 @@ def _rams(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
 def _along(value: Any) -> Floats | None:
     """Unit vector of an axis as a file writes it."""
     if isinstance(value, str) and value.strip("-") in tuple(NAMES):
-        return (-1.0 if value.startswith("-") else 1.0) * np.eye(3)[NAMES.index(value[-1])]
+        named: Floats = np.eye(3)[NAMES.index(value[-1])]
+        return -named if value.startswith("-") else named
     numbers = [_plain(v) for v in value] if isinstance(value, list) else []
     if len(numbers) != 3 or None in numbers:
         return None
