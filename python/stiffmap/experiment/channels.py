@@ -28,10 +28,6 @@ class Channel:
 
 
 AXIS_CHANNELS = tuple(Channel(a, "m" if a[0] == "d" else "rad") for a in AXES)
-DISTANCE = Channel("dd", "m")
-"""Distance between the point at two commanded poses, measured minus commanded."""
-HEIGHT = Channel("hh", "m")
-"""Height of the point along the normal of a surface, measured minus commanded."""
 
 
 def metres(channels: tuple[Channel, ...]) -> NDArray[np.bool_]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -23,7 +24,7 @@ PER_ROW = (
     *("ids", "position", "wrench", "reading", "sigma", "rotation", "other", "other_rotation", "command"),
     *("approach", "repeat", "order", "hours", "temperature", "branch", "setup", "points", "load_points"),
     *("joints", "other_command", "other_joints", "gravity_of", "instrument", "target"),
-    *("seen", "seen_rotation", "contact", "apart"),
+    *("seen", "seen_rotation"),
 )
 """Fields with one entry per row; None or empty where the experiment has none."""
 
@@ -65,7 +66,7 @@ class Experiment:
     sigma: Floats
     """(n, c) declared standard deviation of one reading; NaN where none is declared."""
     extra: tuple[Channel, ...] = ()
-    """Channels after the six axes: a distance, joint coordinates."""
+    """Channels after the six axes: kinds of readings, joint coordinates."""
     rotation: Floats | None = None
     """(n, 3, 3) commanded orientation, of the TCP or against home; None: as at home."""
     other: Floats | None = None
@@ -87,10 +88,8 @@ class Experiment:
     """(n, 3) m: coordinates of the target in the instrument's own frame; NaN where not seen."""
     seen_rotation: Floats | None = None
     """(n, 3, 3) of the target in the instrument's own frame."""
-    contact: Floats | None = None
-    """(n,) m: height above the surface at which the command touched it; NaN where nothing was touched."""
-    apart: Floats | None = None
-    """(n,) m: measured distance between the point at both commands."""
+    absolute: Mapping[str, Floats] = field(default_factory=dict)
+    """(n,) readings in coordinates of their own by the name of their channel, as a distance; NaN where unread."""
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
     """Of the surface that heights are measured against, base axes."""
     surface: str = "known"
@@ -196,7 +195,7 @@ class Experiment:
         """The experiment with some of its rows: (n,) of which to keep, or (k,) their numbers."""
         index = (np.flatnonzero(keep) if np.asarray(keep).dtype == bool else np.asarray(keep)).astype(np.intp)
         picked = {name: _pick(getattr(self, name), index) for name in PER_ROW}
-        return replace(self, **picked)
+        return replace(self, **picked, absolute={k: v[index] for k, v in self.absolute.items()})
 
     def with_readings(self, reading: Floats) -> Experiment:
         """The same plan with other readings (n, c) m, rad."""

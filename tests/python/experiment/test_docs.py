@@ -10,7 +10,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor
-from stiffmap.experiment.files.columns import KNOWN
+from stiffmap.experiment.files.columns import known
 from stiffmap.experiment.files.orientation import MATRIX, TURNED2
 from stiffmap.experiment.files.schema import ExperimentFile
 
@@ -37,6 +37,6 @@ def test_every_key_and_column_is_explained() -> None:
     for key in ExperimentFile.model_fields:
         if key not in ("title", "data", "axes", "notes"):
             assert f"`{key}`" in PAGE or f"{key}:" in PAGE, key
-    for column in KNOWN:
+    for column in known():
         if not column.startswith(("u_", *TURNED2, *MATRIX[2:])):
             assert re.search(rf"[` ]{column}[` ]", PAGE), column

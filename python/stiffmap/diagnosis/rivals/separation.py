@@ -8,9 +8,9 @@ import numpy as np
 
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.study import Study
-from stiffmap.experiment.channels import DISTANCE
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.experiment.readings import kind_of
 
 WANTED = 5.0
 """Standard deviations between the two predictions that the measurement must reach."""
@@ -58,8 +58,8 @@ def _trial(study: Study, seed: int) -> Experiment:
 
 
 def _kept(e: Experiment) -> list[int]:
-    """Channels that a single pose reads: no distances."""
-    return [i for i, c in enumerate(e.channels) if c != DISTANCE]
+    """Axes of a pose and joints."""
+    return [i for i, c in enumerate(e.channels) if kind_of(c) is None]
 
 
 def _loaded(e: Experiment, poses: Floats) -> Experiment:

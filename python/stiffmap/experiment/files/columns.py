@@ -8,24 +8,36 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.errors import FileError
-from stiffmap.experiment.channels import DISTANCE, HEIGHT, Channel
+from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import AXES, BRANCHES, WRENCH, Floats, Integers
 from stiffmap.experiment.files.orientation import TURNED, TURNED2
 from stiffmap.experiment.files.schema import ExperimentFile, NoiseModel
 from stiffmap.experiment.files.table import Table
 from stiffmap.experiment.files.units import Scales
+from stiffmap.experiment.readings import kind_of, kinds
 
 WORDS = ("id", "branch", "setup", "point", "load_point", "instrument", "target")
 SEEN, SEEN_TURNED, SEEN_QUATERNION = ("px", "py", "pz"), ("prx", "pry", "prz"), ("pqx", "pqy", "pqz", "pqw")
-ABSOLUTE = (*SEEN, *SEEN_TURNED, *SEEN_QUATERNION, "contact", "distance")
 POSE, POSE2 = ("x", "y", "z"), ("x2", "y2", "z2")
 APPROACH = ("approach_x", "approach_y", "approach_z")
-READ = (*AXES, DISTANCE.name, HEIGHT.name)
-KNOWN = (
-    *(*WORDS, *POSE, *TURNED, *POSE2, *TURNED2, *APPROACH, *WRENCH, *READ, *(f"u_{a}" for a in READ)),
-    *("repeat", "order", "hours", "temperature"),
-    *ABSOLUTE,
-)
+COUNTED = ("repeat", "order", "hours", "temperature")
+PLAN = (*WORDS, *POSE, *TURNED, *POSE2, *TURNED2, *APPROACH, *WRENCH, *COUNTED)
+"""Columns of a plan: all but readings."""
+
+
+def read() -> tuple[str, ...]:
+    """Columns of readings, measured minus commanded."""
+    return (*AXES, *(k.name for k in kinds()))
+
+
+def absolute() -> tuple[str, ...]:
+    """Columns of readings in coordinates of their own."""
+    return (*SEEN, *SEEN_TURNED, *SEEN_QUATERNION, *(k.absolute for k in kinds() if k.absolute))
+
+
+def known() -> tuple[str, ...]:
+    """All columns that have a meaning."""
+    return (*PLAN, *read(), *(f"u_{a}" for a in read()), *absolute())
 
 
 def block(table: Table, names: Sequence[str], *, blank: bool, missing: float = np.nan) -> Floats:
@@ -133,27 +145,26 @@ def other(
     model: ExperimentFile, table: Table, scales: Scales, reading: Floats, channels: tuple[Channel, ...]
 ) -> Floats | None:
     """(n, 3) m, second pose of the rows that read a distance."""
-    if DISTANCE not in channels:
+    at = [i for i, c in enumerate(channels) if (kind := kind_of(c)) and kind.pair]
+    if not at:
         return None
+    kind = kind_of(channels[at[0]])
+    assert kind is not None
     if model.command:
         if not all(f"{c}2" in table for c in model.command):
             raise FileError(
-                "column 'dd' or 'distance': actuators are commanded, so the second pose needs the columns "
+                f"column '{kind.name}' or '{kind.absolute}': actuators are commanded, so the second pose needs the columns "
                 + ", ".join(f"{c}2" for c in model.command),
                 file=table.file,
             )
         return np.full((len(table.rows), 3), np.nan)
-    if model.quantity != "position":
-        raise FileError(
-            "column 'dd': a distance between two poses is a position, no deflection", file=table.file
-        )
     out = scales.lengths(POSE2) * np.column_stack([table.numbers(c, blank=True) for c in POSE2])
-    lost = np.isfinite(reading[:, channels.index(DISTANCE)]) & ~np.isfinite(out).all(axis=1)
+    lost = np.isfinite(reading[:, at]).any(axis=1) & ~np.isfinite(out).all(axis=1)
     same = np.abs(out - scales.lengths(POSE) * block(table, POSE, blank=True)).max(axis=1) < 1e-9
     for wrong, why in ((lost, "has no second pose (x2, y2, z2)"), (same, "is between a pose and itself")):
         if wrong.any():
             line = table.lines[int(np.flatnonzero(wrong)[0])]
-            raise FileError(f"column 'dd': the distance {why}", file=table.file, line=line)
+            raise FileError(f"column '{kind.name}': {kind.title} {why}", file=table.file, line=line)
     return np.asarray(out)
 
 

@@ -9,13 +9,14 @@ import numpy as np
 from pydantic import ValidationError
 
 from stiffmap.errors import FileError
-from stiffmap.experiment.channels import AXIS_CHANNELS, DISTANCE, HEIGHT, Channel
+from stiffmap.experiment.channels import AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import AXES, WRENCH, Experiment, Floats, Loop
 from stiffmap.experiment.files import columns as read_columns
 from stiffmap.experiment.files.orientation import rotations
-from stiffmap.experiment.files.schema import ExperimentFile
+from stiffmap.experiment.files.schema import ExperimentFile, file_model
 from stiffmap.experiment.files.table import Table, read_table
 from stiffmap.experiment.files.units import ANGLES, Scales
+from stiffmap.experiment.readings import kinds
 from stiffmap.files.report import file_error
 from stiffmap.files.schema.base import suggestion
 from stiffmap.yaml_text import Document, read
@@ -44,7 +45,7 @@ def _validate(document: Document, file: str) -> ExperimentFile:
     if not isinstance(document.data, dict):
         raise FileError("an experiment file is a mapping with machine, quantity and units", file=file)
     try:
-        return ExperimentFile.model_validate(document.data)
+        return file_model().model_validate(document.data)
     except ValidationError as error:
         raise file_error(error, document, file) from error
 
@@ -59,13 +60,13 @@ def _rename(table: Table, columns: dict[str, str]) -> Table:
 
 def _known_columns(table: Table, own: tuple[str, ...]) -> None:
     for column in own:
-        if column in read_columns.KNOWN:
+        if column in read_columns.known():
             raise FileError(
                 f"joints, command: '{column}' has a meaning of its own; give the column another name",
                 file=table.file,
                 line=1,
             )
-    known = [*read_columns.KNOWN, *own, *(f"u_{c}" for c in own)]
+    known = [*read_columns.known(), *own, *(f"u_{c}" for c in own)]
     for column in table.header:
         if column not in known:
             near = suggestion(column, known)
@@ -77,13 +78,12 @@ def _known_columns(table: Table, own: tuple[str, ...]) -> None:
 
 
 def extra_channels(model: ExperimentFile, table: Table) -> tuple[Channel, ...]:
-    """Distance and joints that the file reads."""
+    """Kinds of readings and joints that the file reads."""
     joints = [
         Channel(name, "rad" if j.unit in ANGLES else "m", j.joint, j.side) for name, j in model.joints.items()
     ]
-    distance = DISTANCE.name in table or "distance" in table
-    height = HEIGHT.name in table or "contact" in table
-    return (*([DISTANCE] if distance else []), *([HEIGHT] if height else []), *joints)
+    given = [k.channel for k in kinds() if k.name in table or (k.absolute and k.absolute in table)]
+    return (*given, *joints)
 
 
 def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -> Experiment:
@@ -95,18 +95,18 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
                 scales.angle(column)
     reading = scales.motion(channels) * read_columns.block(table, [c.name for c in channels], blank=True)
     seen, seen_rotation = read_columns.seen(table, scales), read_columns.seen_rotation(model, table, scales)
-    contact = scales.length * table.numbers("contact", blank=True) if "contact" in table else None
-    apart = scales.length * table.numbers("distance", blank=True) if "distance" in table else None
-    _promise(reading, channels, table, seen, seen_rotation, contact, apart)
+    absolute = {
+        k.name: float(scales.motion((k.channel,))[0]) * table.numbers(k.absolute, blank=True)
+        for k in kinds()
+        if k.absolute and k.absolute in table
+    }
+    _promise(reading, channels, table, seen, seen_rotation, absolute)
     if not np.isfinite(reading).any():
         raise FileError(
-            "missing column: no reading (dx, dy, dz, rx, ry, rz, dd, hh, px, py, pz, contact, distance, joints)",
+            f"missing column: no reading ({', '.join((*read_columns.read(), *read_columns.absolute()))}, joints)",
             file=table.file,
         )
-    if model.quantity != "position":
-        absolute = [c for c in (*read_columns.ABSOLUTE, HEIGHT.name) if c in table]
-        if absolute:
-            raise FileError(f"column '{absolute[0]}': is a position, no deflection", file=table.file, line=1)
+    _fits(model.quantity, table)
     gravity, gravity_of = read_columns.gravities(model, table)
     normal = np.array(model.surface.normal)
     if not np.linalg.norm(normal) > 0:
@@ -145,8 +145,7 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
         other_command=read_columns.other_command(model, table, scales),
         seen=seen,
         seen_rotation=seen_rotation,
-        contact=contact,
-        apart=apart,
+        absolute=absolute,
         normal=(float(normal[0]), float(normal[1]), float(normal[2])),
         surface=model.surface.shape,
         gravity_of=gravity_of,
@@ -191,18 +190,28 @@ def _certificate(model: ExperimentFile, scales: Scales, file: Path) -> tuple[tup
     return tuple((k, v * si[k]) for k, v in given.items())
 
 
+def _fits(quantity: str, table: Table) -> None:
+    """FileError for a column that an experiment of this quantity cannot have."""
+    wrong = [(c, "") for c in (*read_columns.SEEN, *read_columns.SEEN_TURNED, *read_columns.SEEN_QUATERNION)]
+    wrong = [] if quantity == "position" else wrong
+    wrong += [(c, k.title) for k in kinds() if quantity not in k.quantities for c in (k.name, k.absolute)]
+    for column, title in wrong:
+        if column and column in table:
+            raise FileError(f"column '{column}': {title or 'it'} is no {quantity}", file=table.file, line=1)
+
+
 def _promise(
     reading: Floats,
     channels: tuple[Channel, ...],
     table: Table,
     seen: Floats | None,
     seen_rotation: Floats | None,
-    contact: Floats | None,
-    apart: Floats | None,
+    absolute: dict[str, Floats],
 ) -> None:
     """Marks what absolute columns will read once poses are known; FileError where both forms are given."""
     at = {c.name: i for i, c in enumerate(channels)}
-    parts = [(seen, AXES[:3]), (seen_rotation, AXES[3:]), (contact, ("hh",)), (apart, ("dd",))]
+    parts: list[tuple[Floats | None, tuple[str, ...]]] = [(seen, AXES[:3]), (seen_rotation, AXES[3:])]
+    parts += [(values, (name,)) for name, values in absolute.items()]
     for values, names in parts:
         if values is None:
             continue

@@ -19,9 +19,7 @@ from stiffmap.experiment.virtual.plans import MICRO
 from stiffmap.files.schema.base import suggestion
 from stiffmap.machine import Machine
 
-KNOWN = tuple(
-    c for c in columns.KNOWN if c not in (*columns.READ, *EULER, *TURNED2) and not c.startswith("u_")
-)
+KNOWN = tuple(c for c in columns.PLAN if c not in (*EULER, *TURNED2))
 
 
 def load_plan(

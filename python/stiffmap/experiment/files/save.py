@@ -15,6 +15,7 @@ from stiffmap.errors import FileError
 from stiffmap.experiment.experiment import AXES, WRENCH, Channel, Experiment, Floats, Loop
 from stiffmap.experiment.files.columns import APPROACH, POSE, POSE2, SEEN, SEEN_TURNED
 from stiffmap.experiment.files.orientation import VECTOR
+from stiffmap.experiment.readings import kinds
 from stiffmap.yaml_text import text_of
 
 MM = 1e3
@@ -57,7 +58,7 @@ def _head(e: Experiment, title: str) -> dict[str, Any]:
     head |= {k: getattr(e, k) for k, plain in PLAIN.items() if getattr(e, k) != plain}
     if e.rotation is not None and e.rotation_against == "base" and e.command is None:
         head["orientation"] = {"against": "base"}
-    if any(c.name == "hh" for c in e.extra):
+    if (e.normal, e.surface) != ((0.0, 0.0, 1.0), "known"):
         head["surface"] = {"normal": list(e.normal), "shape": e.surface}
     if e.certificate:
         mm = ("frame", "tool")
@@ -153,10 +154,10 @@ def _absolute(e: Experiment) -> tuple[dict[str, list[Any]], tuple[str, ...]]:
         turns = Rotation.from_matrix(np.where(good[:, None, None], e.seen_rotation, np.eye(3))).as_rotvec()
         columns |= {c: _text(np.where(good, turns[:, i], np.nan)) for i, c in enumerate(SEEN_TURNED)}
         told += AXES[3:]
-    for name, values, channel in (("contact", e.contact, "hh"), ("distance", e.apart, "dd")):
-        if values is not None:
-            columns[name] = _text(values * MM)
-            told += (channel,)
+    for kind in kinds():
+        if kind.name in e.absolute:
+            columns[kind.absolute] = _text(e.absolute[kind.name] * _scale(kind.channel))
+            told += (kind.name,)
     return columns, told
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from functools import cache
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, create_model
 
+from stiffmap.experiment.readings import kinds
 from stiffmap.files.schema.base import FileModel
 
 Positive = Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=False)]
@@ -38,7 +40,6 @@ class UnitsModel(FileModel):
     dx: Length | None = None
     dy: Length | None = None
     dz: Length | None = None
-    dd: Length | None = None
     rx: Angle | None = None
     ry: Angle | None = None
     rz: Angle | None = None
@@ -67,8 +68,6 @@ class NoiseModel(FileModel):
     rx: Positive | None = None
     ry: Positive | None = None
     rz: Positive | None = None
-    dd: Positive | None = None
-    hh: Positive | None = None
 
 
 LengthOrAngle = Literal["m", "cm", "mm", "um", "µm", "in", "rad", "mrad", "deg"]
@@ -171,3 +170,23 @@ class ExperimentFile(FileModel):
     orientation: OrientationModel = OrientationModel()
     columns: dict[str, str] = Field(default_factory=dict)
     notes: str = ""
+
+
+def file_model() -> type[ExperimentFile]:
+    """The keys of the file with the noise and the unit of every known kind of reading."""
+    return _with_kinds(tuple((k.name, k.unit) for k in kinds()))
+
+
+@cache
+def _with_kinds(readings: tuple[tuple[str, str], ...]) -> type[ExperimentFile]:
+    units: dict[str, Any] = {
+        n: (Length | None if unit == "m" else Angle | None, None) for n, unit in readings
+    }
+    sizes: dict[str, Any] = {n: (Positive | None, None) for n, _ in readings}
+    noise = create_model("NoiseModel", __base__=NoiseModel, **sizes)
+    fields: dict[str, Any] = {
+        "units": (create_model("UnitsModel", __base__=UnitsModel, **units), ...),
+        "noise": (noise, noise()),
+        "zero_noise": (noise, noise()),
+    }
+    return create_model("ExperimentFile", __base__=ExperimentFile, **fields)

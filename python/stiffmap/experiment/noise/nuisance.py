@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stiffmap.experiment.channels import DISTANCE, HEIGHT
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.against_command import setups_of, targets_of
+from stiffmap.experiment.poses.setups import setups_of, targets_of
+from stiffmap.experiment.readings import kind_of
 
 
 def nuisance_columns(experiment: Experiment, base: Floats) -> Floats:
     """(n, c, q) changes of the readings; `base` (n, c) is the declared machine's prediction."""
-    columns = [c for part in (_zeros, _frames, _tools, _surfaces) for c in part(experiment, base)]
+    columns = [c for part in (_zeros, _frames, _tools, _readings) for c in part(experiment, base)]
     return np.stack(columns, axis=-1) if columns else np.zeros((*experiment.reading.shape, 0))
 
 
@@ -60,39 +60,25 @@ def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
             moved = np.cross(np.nan_to_num(base[:, 3:6]), arm)
             linear = moved + arm if experiment.quantity == "position" else moved
             column = _wide(experiment, np.hstack([linear, np.zeros_like(linear)]))
-            if DISTANCE in experiment.extra:
-                column[:, experiment.channels.index(DISTANCE)] = _stretch(experiment, arm, k)
+            for i, kind in ((i, kind_of(c)) for i, c in enumerate(experiment.channels)):
+                if kind and kind.tool_offset:
+                    column[:, i] = kind.tool_offset(experiment, arm, k)
             yield here[:, None] * column
             if experiment.tool == "unknown" and experiment.quantity == "position":
                 yield here[:, None] * _wide(experiment, np.hstack([np.zeros_like(arm), arm]))
 
 
-def _surfaces(experiment: Experiment, base: Floats) -> Iterator[Floats]:
-    """Height and tilts of the surface that heights are measured against, one per set-up."""
-    if HEIGHT not in experiment.extra or experiment.surface == "known":
-        return
-    across = np.linalg.svd(np.array([experiment.normal]))[2][1:]
-    for here in _setups(experiment):
-        shapes = [np.ones(len(experiment))]
-        if experiment.surface == "unknown":
-            shapes += [experiment.position @ a for a in across]
-        for shape in shapes:
+def _readings(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+    """What nobody knows of a kind of reading, as the height of a surface."""
+    for i, kind in ((i, kind_of(c)) for i, c in enumerate(experiment.channels)):
+        for change in kind.nuisance(experiment) if kind and kind.nuisance else ():
             column = np.zeros_like(experiment.reading)
-            column[:, experiment.channels.index(HEIGHT)] = here * shape
+            column[:, i] = change
             yield column
 
 
 def _tool_axis(rotation: Floats | None, n: int, k: int) -> Floats:
     return np.tile(np.eye(3)[k], (n, 1)) if rotation is None else np.asarray(rotation[:, :, k])
-
-
-def _stretch(experiment: Experiment, arm: Floats, k: int) -> Floats:
-    """(n,) change of a distance per length of the tool's offset: none where both poses turn alike."""
-    assert experiment.other is not None
-    apart = experiment.other - experiment.position
-    way = apart / np.linalg.norm(apart, axis=1, keepdims=True)
-    change = _tool_axis(experiment.other_rotation, len(experiment), k) - arm
-    return np.asarray(np.nan_to_num(np.sum(way * change, axis=1)))
 
 
 def _wide(experiment: Experiment, axes: Floats) -> Floats:

@@ -8,9 +8,10 @@ import numpy as np
 
 from stiffmap.description import Point
 from stiffmap.errors import StiffmapError
-from stiffmap.experiment.channels import DISTANCE, HEIGHT
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.poses.handeye import Sighting, as_commanded, find_frames, unmoved
+from stiffmap.experiment.poses.setups import setups_of, targets_of
+from stiffmap.experiment.readings import kinds
 from stiffmap.machine import Machine
 
 SEEN = "seen_target_"
@@ -24,13 +25,10 @@ def resolved(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
     point there, so that the target moves as its place on the tool does.
     """
     reading = e.reading.copy()
-    if e.contact is not None:
-        height = e.position @ np.array(e.normal)
-        reading[:, e.channels.index(HEIGHT)] = e.contact - height
-    if e.apart is not None and e.other is not None:
-        nominal = np.linalg.norm(e.other - e.position, axis=1)
-        reading[:, e.channels.index(DISTANCE)] = e.apart - nominal
-    e = replace(e, reading=reading, contact=None, apart=None)
+    for kind in kinds():
+        if kind.commanded and kind.name in e.absolute:
+            reading[:, e.channels.index(kind.channel)] = e.absolute[kind.name] - kind.commanded(e)
+    e = replace(e, reading=reading, absolute={})
     if e.seen is None and e.seen_rotation is None:
         return machine, e
     return _sighted(machine, e)
@@ -78,23 +76,6 @@ def _sighting(machine: Machine, e: Experiment) -> tuple[Sighting, tuple[list[str
         tool_unknown=e.tool != "known",
         turn_unknown=e.tool == "unknown",
     ), (places, targets)
-
-
-def setups_of(e: Experiment) -> tuple[Integers, list[str]]:
-    """(n,) number of each row's instrument in its set-up, and their names."""
-    return _labelled(e, e.setup, e.instrument)
-
-
-def targets_of(e: Experiment) -> tuple[Integers, list[str]]:
-    """(n,) number of each row's target, and their names; one per set-up where none is named."""
-    return _labelled(e, e.target or e.setup)
-
-
-def _labelled(e: Experiment, *words: tuple[str, ...]) -> tuple[Integers, list[str]]:
-    told = [w for w in words if w] or [("",) * len(e)]
-    joined = [" ".join(parts) for parts in zip(*told, strict=True)]
-    names, number = np.unique(joined, return_inverse=True)
-    return number.reshape(-1).astype(np.intp), [str(n) or "1" for n in names]
 
 
 def _enough(e: Experiment, s: Sighting) -> None:

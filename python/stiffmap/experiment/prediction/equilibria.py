@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.description.strain import rests_at_command
-from stiffmap.experiment.channels import DISTANCE, HEIGHT
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.level import Mask
 from stiffmap.experiment.poses.configuration import coordinates_of, in_reach
 from stiffmap.experiment.poses.point_kinematics import point_positions
 from stiffmap.experiment.prediction.joints import joint_channels, joint_motions
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
 from stiffmap.experiment.prediction.unloaded_state import lagging, lags, signs
+from stiffmap.experiment.readings import Seen, kind_of
 from stiffmap.machine import Machine
 from stiffmap.options import SolveOptions
 from stiffmap.solution import Solution
@@ -29,10 +30,8 @@ def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> t
     """
     if plan.gravity_of is not None:
         return _by_gravity(machine, plan, threads)
-    if DISTANCE in plan.extra:
-        return _with_distance(machine, plan, threads)
-    if HEIGHT in plan.extra:
-        return _with_height(machine, plan, threads)
+    if any(kind_of(c) for c in plan.extra):
+        return _with_kinds(machine, plan, threads)
     solver = Solver(rigged(machine, plan.loop), plan, threads)
     if plan.quantity == "position":
         return solver.rest() if not plan.wrench.any() else solver.loaded()
@@ -53,35 +52,50 @@ def _by_gravity(machine: Machine, plan: Experiment, threads: int | None) -> tupl
     return out, count
 
 
-def _with_height(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
-    """Heights are the motion of the point along the surface's normal."""
-    bare = replace(plan, extra=tuple(c for c in plan.extra if c != HEIGHT))
+def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
+    """The motions of the point that is read, and what the kinds of readings make of them."""
+    plain = tuple(c for c in plan.extra if kind_of(c) is None)
+    bare = replace(plan, extra=plain, other=None, other_joints=None)
     motion, count = motions(machine, bare, threads)
-    at = plan.channels.index(HEIGHT)
-    return np.insert(motion, at, motion[:, :3] @ np.array(plan.normal), axis=1), count
+    out = np.full((len(plan), len(plan.channels)), np.nan)
+    out[:, [plan.channels.index(c) for c in bare.channels]] = motion
+    here = Seen(bare, motion[:, :6], partial(_places, machine, bare))
+    pairs: tuple[Integers, Seen, Seen] | None = None
+    for i, kind in ((i, kind_of(c)) for i, c in enumerate(plan.channels)):
+        if kind is None:
+            continue
+        if not kind.pair:
+            out[:, i] = kind.change(here, None)
+            continue
+        if pairs is None:
+            pairs, more = _pairs(machine, plan, bare, motion, threads)
+            count += more
+        rows, start, end = pairs
+        out[rows, i] = kind.change(start, end)
+    return out, count
 
 
-def _with_distance(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
-    bare = replace(plan, extra=tuple(c for c in plan.extra if c != DISTANCE), other=None, other_joints=None)
-    here, count = motions(machine, bare, threads)
+def _pairs(
+    machine: Machine, plan: Experiment, bare: Experiment, motion: Floats, threads: int | None
+) -> tuple[tuple[Integers, Seen, Seen], int]:
+    """Rows with a second commanded pose, and what is seen at both."""
     assert plan.other is not None
     rows = np.flatnonzero(np.isfinite(plan.other).all(axis=1))
-    pair = replace(
+    second = replace(
         bare,
         position=plan.other,
         rotation=plan.other_rotation,
         command=plan.other_command,
         joints=plan.other_joints,
     ).rows(rows)
-    there, more = motions(machine, pair, threads)
-    start, end = (positions_of(machine, p, targets(machine, p)) for p in (bare.rows(rows), pair))
-    apart = end - start
-    nominal = np.linalg.norm(apart, axis=1)
-    length = np.linalg.norm(apart + there[:, :3] - here[rows, :3], axis=1)
-    out = np.full((len(plan), len(plan.channels)), np.nan)
-    out[:, [plan.channels.index(c) for c in bare.channels]] = here
-    out[rows, plan.channels.index(DISTANCE)] = length - nominal
-    return out, count + more
+    there, count = motions(machine, second, threads)
+    first = bare.rows(rows)
+    start = Seen(first, motion[rows, :6], partial(_places, machine, first))
+    return (rows, start, Seen(second, there[:, :6], partial(_places, machine, second))), count
+
+
+def _places(machine: Machine, plan: Experiment) -> Floats:
+    return positions_of(machine, plan, targets(machine, plan))
 
 
 @dataclass(frozen=True, eq=False)

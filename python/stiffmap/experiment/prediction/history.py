@@ -16,12 +16,12 @@ from stiffmap.effects.check import values_at
 from stiffmap.effects.evidence import Drive
 from stiffmap.effects.registry import get
 from stiffmap.errors import StiffmapError
-from stiffmap.experiment.channels import DISTANCE
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.poses.point_kinematics import point_positions
 from stiffmap.experiment.prediction.metrology_loop import targets
 from stiffmap.experiment.prediction.unloaded_state import drive_jacobian
+from stiffmap.experiment.readings import Seen, kind_of
 from stiffmap.machine import Machine
 from stiffmap.options import SolveOptions
 
@@ -49,7 +49,7 @@ def history_motion(drives: Drives, plan: Experiment, terms: tuple[AppliedEffect,
     """
     if plan.order is None:
         raise StiffmapError(f"{plan.name}: {terms[0].kind} needs the column 'order': rows in order of time")
-    if DISTANCE in plan.extra:
+    if any(kind.pair for c in plan.extra if (kind := kind_of(c))):
         raise StiffmapError(
             f"{plan.name}: {terms[0].kind} cannot be predicted for distances between two poses"
         )
@@ -114,8 +114,8 @@ def _seen(machine: Machine, plan: Experiment, name: str, column: Floats, more: F
     out = np.zeros((len(plan), len(plan.channels)))
     out[:, :6] = np.hstack([linear, twist[:, 3:]])
     for i, c in enumerate(plan.channels):
-        if c.name == "hh":
-            out[:, i] = linear @ np.array(plan.normal)
+        if kind := kind_of(c):
+            out[:, i] = kind.change(Seen(plan, out[:, :6], lambda: plan.position + arm), None)
         elif c.joint == name and c.side == "load":
             out[:, i] = more
     return out

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from stiffmap.errors import StiffmapError
-from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, DISTANCE, Channel
+from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.readings.library.distance import READING
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 
@@ -177,7 +178,7 @@ def with_distances(plan: Experiment, sigma: float) -> Experiment:
     kept = plan.reading[:, len(AXES) :], plan.sigma[:, len(AXES) :]
     return replace(
         plan,
-        extra=(DISTANCE, *plan.extra),
+        extra=(READING.channel, *plan.extra),
         other=there,
         other_rotation=plan.rotation,
         reading=np.hstack([unread, column, kept[0]]),

@@ -1,0 +1,24 @@
+"""Instruments and targets: which row belongs to which."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiffmap.experiment.experiment import Experiment, Integers
+
+
+def setups_of(e: Experiment) -> tuple[Integers, list[str]]:
+    """(n,) number of each row's instrument in its set-up, and their names."""
+    return _labelled(e, e.setup, e.instrument)
+
+
+def targets_of(e: Experiment) -> tuple[Integers, list[str]]:
+    """(n,) number of each row's target, and their names; one per set-up where none is named."""
+    return _labelled(e, e.target or e.setup)
+
+
+def _labelled(e: Experiment, *words: tuple[str, ...]) -> tuple[Integers, list[str]]:
+    told = [w for w in words if w] or [("",) * len(e)]
+    joined = [" ".join(parts) for parts in zip(*told, strict=True)]
+    names, number = np.unique(joined, return_inverse=True)
+    return number.reshape(-1).astype(np.intp), [str(n) or "1" for n in names]

@@ -1,0 +1,1 @@
+"""One file per kind of reading: every module here has a ``READING``."""

@@ -1,0 +1,46 @@
+"""Height of the point along the normal of a surface, as a probe or a dial gauge reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.poses.setups import setups_of
+from stiffmap.experiment.readings.types import ReadingKind, Seen
+
+
+def change(here: Seen, there: Seen | None) -> Floats:
+    """(n,) m along the normal."""
+    return np.asarray(here.motion[:, :3] @ np.array(here.plan.normal))
+
+
+def commanded(e: Experiment) -> Floats:
+    """(n,) m."""
+    return np.asarray(e.position @ np.array(e.normal))
+
+
+def nuisance(e: Experiment) -> Iterator[Floats]:
+    """Height and tilts of the surface, one of each per set-up."""
+    if e.surface == "known":
+        return
+    across = np.linalg.svd(np.array([e.normal]))[2][1:]
+    label = setups_of(e)[0]
+    for here in ((label == s).astype(float) for s in np.unique(label)):
+        shapes = [np.ones(len(e))]
+        if e.surface == "unknown":
+            shapes += [e.position @ a for a in across]
+        yield from (here * shape for shape in shapes)
+
+
+READING = ReadingKind(
+    name="hh",
+    unit="m",
+    title="a height against a surface",
+    change=change,
+    quantities=("position",),
+    absolute="contact",
+    commanded=commanded,
+    nuisance=nuisance,
+)

@@ -1,0 +1,69 @@
+"""All kinds of readings that are known: those of this package, and those that users register."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+from os import PathLike
+from pathlib import Path
+from pkgutil import iter_modules
+
+import stiffmap.experiment.readings.library as library
+from stiffmap.errors import FileError, StiffmapError
+from stiffmap.experiment.channels import AXES, Channel
+from stiffmap.experiment.readings.types import ReadingKind
+
+_LIBRARY: dict[str, ReadingKind] = {
+    kind.name: kind
+    for m in iter_modules(library.__path__)
+    for kind in [import_module(f"{library.__name__}.{m.name}").READING]
+}
+_KNOWN = dict(_LIBRARY)
+
+
+def kinds() -> tuple[ReadingKind, ...]:
+    """All kinds, those of the library first."""
+    return tuple(_KNOWN.values())
+
+
+def kind_of(channel: Channel) -> ReadingKind | None:
+    """The kind that a channel is of; None for the axes of a pose and for joints."""
+    return None if channel.joint else _KNOWN.get(channel.name)
+
+
+def register(kind: ReadingKind) -> ReadingKind:
+    """Make a kind known to files, prediction and diagnosis; returns it. One that was registered before is replaced.
+
+    Raises StiffmapError for a name that is taken, or a unit other than m and rad.
+    """
+    if kind.name in (*AXES, *_LIBRARY) or not kind.name.isidentifier():
+        raise StiffmapError(f"reading {kind.name!r}: expected a name of its own, as a column may have")
+    if kind.unit not in ("m", "rad"):
+        raise StiffmapError(f"reading {kind.name!r}: unit: expected m or rad, got {kind.unit!r}")
+    if bool(kind.absolute) != (kind.commanded is not None):
+        raise StiffmapError(f"reading {kind.name!r}: absolute and commanded go together")
+    _KNOWN[kind.name] = kind
+    return kind
+
+
+def unregister(name: str) -> None:
+    """Forget a kind that was registered."""
+    if name not in _LIBRARY:
+        _KNOWN.pop(name, None)
+
+
+def load_readings(path: str | PathLike[str]) -> ReadingKind:
+    """Run a Python file and register its ``READING``; raises `FileError` where it has none."""
+    file = Path(path)
+    spec = spec_from_file_location(f"stiffmap_reading_{file.stem}", file)
+    if spec is None or spec.loader is None or not file.is_file():
+        raise FileError("cannot be read as a Python file that defines a kind of reading", file=str(path))
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise FileError(f"cannot be run: {type(error).__name__}: {error}", file=str(path)) from error
+    kind = getattr(module, "READING", None)
+    if not isinstance(kind, ReadingKind):
+        raise FileError("defines no reading: expected READING = ReadingKind(...)", file=str(path))
+    return register(kind)
