@@ -26,12 +26,12 @@ struct Closing {
   M never = {};  ///< lanes whose pose is out of reach, as far as descents from here and from home can tell
 
   /// Closes the legs to `tip`, whose position is at[lane]; returns the lanes that closed, coordinates
-  /// in s.x. Where the start was too far, the nearest node is continued in leaps.
-  M close(const Frame& tip, const double* const (&at)[W]) {
+  /// in s.x. Where the start was too far and there is patience, the nearest node is continued in leaps.
+  M close(const Frame& tip, const double* const (&at)[W], bool patient) {
     for (int q = 0; q < P.coordinate_count; ++q) s.x[q] = splat(P.coordinates[q].role == 2 ? 0 : P.coordinates[q].home);
     const M usable = start(tip, at);
     const M ok = reach(tip, usable);
-    if (P.planar || all(ok)) return ok;
+    if (P.planar || !patient || all(ok)) return ok;
     return ok | leap(tip, at, ~ok);
   }
 

@@ -5,6 +5,7 @@
 #include <initializer_list>
 
 #include "closing.hpp"
+#include "load_path.hpp"
 #include "newton.hpp"
 #include "residual.hpp"
 #include "strokes.hpp"
@@ -33,7 +34,8 @@ Scratch lay_out(const Program& P, void* memory, std::int64_t* bytes) {
   s.strokes = take<StrokeSlot>(at, P.stroke_count);
   s.branches = take<BranchSlot>(at, P.chain_count);
   const int n = P.coordinate_count;
-  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.friction_sign, &s.kept})
+  for (V** v :
+       {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.friction_sign, &s.kept, &s.slope})
     *v = take<V>(at, n);
   if (bytes) *bytes = at - begin + 64;
   return s;
@@ -57,7 +59,10 @@ struct Block {
   V6 load;
   M never = {};  ///< lanes out of reach
 
-  std::int64_t pose(int lane) const { return first + (lane < count ? lane : count - 1); }
+  M unstable = {}, ended = {};
+
+  std::int64_t place(int lane) const { return first + (lane < count ? lane : count - 1); }
+  std::int64_t pose(int lane) const { return in.index ? in.index[place(lane)] : place(lane); }
 
   /// What the poses ask; where they are given, the closed coordinates too: lanes without are not usable.
   M read() {
@@ -67,10 +72,10 @@ struct Block {
                         &load.b.x,         &load.b.y,         &load.b.z};
     alignas(64) double value[18][W];
     for (int i = 0; i < W; ++i) {
-      const std::int64_t k = pose(i);
+      const std::int64_t k = in.start ? place(i) : pose(i);
       for (int c = 0; c < 3; ++c) value[c][i] = in.position[3 * k + c];
       for (int c = 0; c < 9; ++c) value[3 + c][i] = in.rotation[9 * k + c];
-      for (int c = 0; c < 6; ++c) value[12 + c][i] = in.wrench[6 * k + c];
+      for (int c = 0; c < 6; ++c) value[12 + c][i] = in.wrench[6 * pose(i) + c];
     }
     for (int c = 0; c < 18; ++c) *lanes[c] = kernel::load(value[c]);
     return in.start ? given() : close();
@@ -79,7 +84,7 @@ struct Block {
   M given() {
     M usable{};
     for (int i = 0; i < W; ++i) {
-      const double* x = in.start + P.coordinate_count * pose(i);
+      const double* x = in.start + P.coordinate_count * place(i);
       bool finite = true;
       for (int q = 0; q < P.coordinate_count; ++q) {
         s.x[q][i] = x[q];
@@ -94,7 +99,7 @@ struct Block {
     const double* at[W];
     for (int i = 0; i < W; ++i) at[i] = in.position + 3 * pose(i);
     Closing closing{P, s};
-    const M ok = closing.close(command, at);
+    const M ok = closing.close(command, at, in.patient);
     never = closing.never & ~ok;
     if (P.open_task) {  // the closed machine completes the command
       command = Closing::base_frame();
@@ -127,19 +132,25 @@ struct Block {
 
   M set_start() {
     for (int q = 0; q < P.coordinate_count; ++q) {
-      const CoordinateProgram& k = P.coordinates[q];
       s.closed[q] = s.x[q];
-      s.z[q] = k.from_home ? s.x[q] - k.rest : splat(0);
       s.da[q] = splat(1);
       s.tau[q] = s.dtau[q] = s.friction_sign[q] = splat(0);
     }
     const M known = set_base(P);
-    for (int q = 0; q < P.coordinate_count; ++q) {
-      if (!P.coordinates[q].by_force || !P.coordinates[q].from_home) continue;
-      const LawProgram& law = P.laws[P.coordinates[q].law];
-      s.z[q] += law.cubic / law.stiffness * s.scale[q] * s.z[q] * s.z[q] * s.z[q];
-    }
+    stand_at_start(~M{});
     return known;
+  }
+
+  /// The closed configuration, no wrench in any branch.
+  void stand_at_start(M lanes) {
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      const CoordinateProgram& k = P.coordinates[q];
+      V z = splat(0);
+      if (k.from_home) z = s.closed[q] - k.rest;
+      if (k.from_home && k.by_force) z += P.laws[k.law].cubic / P.laws[k.law].stiffness * s.scale[q] * z * z * z;
+      s.z[q] = select(lanes, z, s.z[q]);
+    }
+    for (int k = 0; k < P.chain_count; ++k) s.branches[k].F = select(lanes, V6{}, s.branches[k].F);
   }
 
   /// Lanes in which a ball joint's axes are less than `least` from coinciding.
@@ -190,7 +201,7 @@ struct Block {
       put(d, c);
       for (int i = 0; i < count; ++i)
         if (done[i])
-          for (int r = 0; r < 6; ++r) out.perturbed[6 * (in.perturbed_count * (first + i) + v) + r] = c[r][i];
+          for (int r = 0; r < 6; ++r) out.perturbed[6 * (in.perturbed_count * pose(i) + v) + r] = c[r][i];
     }
   }
 
@@ -198,20 +209,32 @@ struct Block {
     M usable = read();
     usable &= set_start();
     usable &= ~locked(P.locked);
-    for (int k = 0; k < P.chain_count; ++k) s.branches[k].F = V6{};
     const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
     Elimination e{
         P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
     e.heavy = in.gravity[0] != 0 || in.gravity[1] != 0 || in.gravity[2] != 0;
     Newton newton{P, in, s, e, load, e.gravity};
     V iterations = splat(0), steps;
-    const M done = newton.solve(usable, P.starts_linear, iterations, steps);
+    M done = newton.solve(usable, P.starts_linear, iterations, steps);
+    if (in.patient && !P.starts_linear && any(usable & ~done))
+      done |= follow(usable & ~done, newton, iterations, steps);
     V K[6][6];
     newton.dense(newton.answer, K);
     write(done, newton, K, newton.compliance, iterations, steps);
     if (in.perturbed_count == 0) return;
     newton.linearize();  // lanes that settled early have lost their factors
-    vary(done, newton, newton.compliance);
+    vary(done & ~unstable, newton, newton.compliance);
+  }
+
+  M follow(M lanes, Newton& newton, V& iterations, V& steps) {
+    stand_at_start(lanes);
+    LoadPath path{newton};
+    const M done = path.follow(lanes, iterations);
+    unstable = path.unstable;
+    ended = path.ended;
+    steps = select(lanes, splat(1), steps);
+    newton.settle();
+    return done;
   }
 
   void write(M done, const Newton& newton, const V (&K)[6][6], const V (&C)[6][6], V iterations, V steps) {
@@ -220,8 +243,12 @@ struct Block {
     V moved[6];
     put(d, moved);
     for (int i = 0; i < count; ++i) {
-      const std::int64_t k = first + i;
-      out.done[k] = done[i] ? pose_solved : never[i] ? pose_unreachable : pose_left;
+      const std::int64_t k = pose(i);
+      out.done[k] = done[i]      ? (unstable[i] ? pose_unstable : pose_solved)
+                    : never[i]   ? pose_unreachable
+                    : ended[i]   ? pose_ended
+                    : in.patient ? pose_left
+                                 : pose_slow;
       if (!done[i]) continue;
       for (int r = 0; r < 6; ++r) out.displacement[6 * k + r] = moved[r][i];
       if (out.stiffness)
@@ -247,7 +274,7 @@ struct Block {
       high = select(absolute(effort) > k.force_limit, splat(1), high);
       if (out.effort)
         for (int i = 0; i < count; ++i)
-          if (done[i]) out.effort[P.drive_count * (first + i) + d] = effort[i];
+          if (done[i]) out.effort[P.drive_count * pose(i) + d] = effort[i];
     }
     for (int q = 0; q < P.coordinate_count; ++q) {
       const CoordinateProgram& k = P.coordinates[q];
@@ -258,9 +285,9 @@ struct Block {
     const M lock = locked(P.near_lock);
     for (int i = 0; i < count; ++i)
       if (done[i])
-        out.flags[first + i] = (lock[i] ? P.flag_lock : 0u) | (high[i] > 0 ? P.flag_force : 0u) |
-                               (range[i] > 0 ? P.flag_range : 0u) | (limit[i] > 0 ? P.flag_limit : 0u) |
-                               (steps[i] > 0 ? P.flag_stepped : 0u) | P.flag_always;
+        out.flags[pose(i)] = (lock[i] ? P.flag_lock : 0u) | (high[i] > 0 ? P.flag_force : 0u) |
+                             (range[i] > 0 ? P.flag_range : 0u) | (limit[i] > 0 ? P.flag_limit : 0u) |
+                             (steps[i] > 0 ? P.flag_stepped : 0u) | P.flag_always;
     if (!out.leg_wrench || P.legs_op < 0) return;
     const Op& block = P.ops[P.legs_op];
     for (int b = 0; b < block.count; ++b) {
@@ -269,7 +296,7 @@ struct Block {
       const V w[6] = {-branch.F.a.x, -branch.F.a.y, -branch.F.a.z, -m.x, -m.y, -m.z};
       for (int i = 0; i < count; ++i)
         if (done[i])
-          for (int r = 0; r < 6; ++r) out.leg_wrench[6 * (block.count * (first + i) + b) + r] = w[r][i];
+          for (int r = 0; r < 6; ++r) out.leg_wrench[6 * (block.count * pose(i) + b) + r] = w[r][i];
     }
   }
 };

@@ -41,7 +41,7 @@ struct LoadSteps {
   }
 
  private:
-  static constexpr double shortest = 1.0 / 64;  // beyond that the reference path is patient
+  static constexpr double shortest = 1.0 / 4;  // beyond that the path is followed in proven steps (load_path.hpp)
 
   void next(M lanes) {
     const V goal = reached + stride;

@@ -190,6 +190,7 @@ struct Newton {
     for (int k = 0; k < 6; ++k) {
       const V relative = m[k][k] * (1 / (e.scale[k] * e.scale[k]));
       e.lowest = e.lowest < relative ? e.lowest : relative;
+      if (e.counts) e.count(relative);
       const V inverse = 1.0 / m[k][k];
       for (int j = 0; j < 6; ++j) {
         if (j > k) m[k][j] *= inverse;
@@ -292,13 +293,17 @@ struct Newton {
       if (any(distrusted)) failed |= corners ? distrusted : way.halve(distrusted);
       if (all(done | failed)) break;
     }
-    put_load(splat(1), splat(1));
     steps = way.halved;
-    if (!fresh) {
-      evaluate(false);
-      frames_and_wrenches();
-    }
+    if (fresh) put_load(splat(1), splat(1));
+    else settle();
     return done & ~failed;
+  }
+
+  /// Frames and wrenches under the whole load at the coordinates found.
+  void settle() {
+    put_load(splat(1), splat(1));
+    evaluate(false);
+    frames_and_wrenches();
   }
 
   /// The share that acts, and the one whose equilibrium is sought.
@@ -315,6 +320,11 @@ struct Newton {
     const V sum = absolute(w.a.x) + absolute(w.a.y) + absolute(w.a.z) + absolute(w.b.x) + absolute(w.b.y) +
                   absolute(w.b.z) + (e.heavy ? splat(1) : splat(0));
     return sum == 0.0;
+  }
+
+  M moment_lanes() const {
+    const V6& w = whole_load;
+    return absolute(w.b.x) + absolute(w.b.y) + absolute(w.b.z) > 0.0;
   }
 
   void move(M lanes) {

@@ -150,6 +150,9 @@ struct KernelInput {
   const double* start;     ///< count x coordinates: closed configurations; null: interpolate the grid
   double gravity[3];
   double point[3];  ///< reference point in the tip frame
+  const std::int64_t*
+      index;             ///< the poses to solve, null: all; start, position and rotation go by place if start is given
+  std::int32_t patient;  ///< nothing is left for a second look
   std::int32_t want_stiffness, max_iterations;
   double tolerance;
   const Program* const* perturbed;    ///< variants of the program with the same operations
@@ -158,9 +161,12 @@ struct KernelInput {
 };
 
 /// How a pose left the kernels.
-inline constexpr std::uint8_t pose_left = 0, pose_solved = 1, pose_unreachable = 2;  // left: to the reference path
+inline constexpr std::uint8_t pose_left = 0;  ///< to the reference path
+inline constexpr std::uint8_t pose_solved = 1, pose_unstable = 2, pose_unreachable = 3;
+inline constexpr std::uint8_t pose_ended = 4;  ///< the path of equilibria ends before the whole load
+inline constexpr std::uint8_t pose_slow = 5;   ///< to be looked at patiently, together with others
 
-/// Row-major answers; null: not wanted. `done`: pose_left, pose_solved or pose_unreachable.
+/// Row-major answers; null: not wanted. `done`: how the pose left the kernels.
 struct KernelOutput {
   double *displacement, *stiffness, *compliance, *effort, *leg_wrench, *coordinates;
   double* perturbed;  ///< count x variants x 6: displacement after one step from the base's answer

@@ -54,8 +54,9 @@ struct Scratch {
   GroupSlot* groups;
   StrokeSlot* strokes;
   BranchSlot* branches;  ///< per chain
-  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *friction_sign,
-      *kept;  ///< friction_sign: sign of dry friction; kept: z at the last load step in equilibrium
+  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *friction_sign, *kept,
+      *slope;  ///< friction_sign: sign of dry friction; kept: z at the last load step in equilibrium; slope: by the
+               ///< load
 };
 
 }  // namespace stiffmap::kernel

@@ -159,6 +159,8 @@ inline void factorise(Elimination& el, StiffSlot& k, const Sym6& K, const Tangen
   }
   unpack(D, k.L);
   ldlt(k.L, k.inverse, el.lowest, el.scale);
+  if (el.counts)
+    for (int i = 0; i < 6; ++i) el.count(k.L[i][i] * (1 / (el.scale[i] * el.scale[i])));
 }
 
 /// X = K + [0, S(f); 0, S(m)/2] and y, both times L^-1.

@@ -18,6 +18,7 @@ using RowMajor6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 
 constexpr long reference_chunk = 16;
 constexpr long fast_chunk = 256;
+constexpr long patient_chunk = 64;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -51,12 +52,14 @@ void write(const Mechanism& m, Index i, const PoseResult& r, const BatchOutput& 
 class Reference {
  public:
   void solve(const Mechanism& m, const BatchInput& in, const SolveOptions& options, Index i, const BatchOutput& out,
-             std::uint32_t flags = 0) {
+             std::uint32_t flags = 0, bool path_ends = false) {
     prepare(m, in);
     if (!ws_) ws_ = std::make_unique<SolveWorkspace>(m);
     read(in, i, pose_);
     pose_.closed = in.closed ? in.closed + m.size() * i : nullptr;
-    solve_pose(m, pose_, options, *ws_, result_);
+    SolveOptions how = options;
+    how.equilibrium.path_ends = path_ends;
+    solve_pose(m, pose_, how, *ws_, result_);
     result_.flags |= flags;
     write(m, i, result_, out);
   }
@@ -101,17 +104,19 @@ class Reference {
   PoseResult result_;
 };
 
-/// A chunk of poses closed by the reference path, as the kernels read them.
+/// Poses closed by the reference path, as the kernels read them: by their places begin .. end-1.
 class ClosedPoses {
  public:
-  void put(const Mechanism& m, const BatchInput& in, Index begin, Index end, Reference& reference, KernelInput& out) {
+  template <class PoseAt>
+  void put(const Mechanism& m, const BatchInput& in, Index begin, Index end, const PoseAt& pose_at,
+           Reference& reference, KernelInput& out) {
     start_.resize(at(m.size() * fast_chunk));
     position_.resize(at(3 * fast_chunk));
     rotation_.resize(at(9 * fast_chunk));
     Pose reached;
     for (Index i = begin; i < end; ++i) {
       const Index k = i - begin;
-      reference.close(m, in, i, start_.data() + m.size() * k, reached);
+      reference.close(m, in, pose_at(i), start_.data() + m.size() * k, reached);
       Eigen::Map<Vec3>(position_.data() + 3 * k) = reached.p;
       Eigen::Map<RowMajor3>(rotation_.data() + 9 * k) = reached.R;
     }
@@ -163,17 +168,128 @@ void* kernel_scratch(std::int64_t bytes) {
   return memory.get();
 }
 
-/// Fills what the kernels leave out for the poses that they did.
-void complete(const Mechanism& m, Index i, const BatchOutput& out) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  if (out.status) out.status[i] = static_cast<std::uint8_t>(Status::converged);
-  if (out.free_twists) Eigen::Map<VecX>(out.free_twists + 36 * i, 36).setConstant(nan);
-  if (out.indeterminate)
-    for (Index j = 0; j < m.size(); ++j) {
-      const Coordinate& c = m.coordinates[at(j)];
-      out.indeterminate[m.size() * i + j] = c.locked && c.role == Role::passive;
+/// One call of the fast path: all poses in one quick pass, what that leaves packed into a patient one, the rest to the
+/// reference path.
+class FastBatch {
+ public:
+  FastBatch(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const SolveOptions& options, int threads,
+            const BatchOutput& out)
+      : m_(m),
+        program_(plan.program()),
+        in_(in),
+        options_(options),
+        out_(out),
+        threads_(threads),
+        done_(at(in.count), pose_slow),
+        flags_(at(in.count), 0),
+        scratch_(at(std::max(1, threads))) {
+    for (const FastPlan* v : in.variants) {
+      require(v->available() && v->program().op_count == program_.op_count &&
+                  v->program().coordinate_count == program_.coordinate_count,
+              "variants", "plans of the same elements", v->missing());
+      variants_.push_back(&v->program());
+      moved_.push_back(moved_leg(program_, v->program()));
     }
-}
+  }
+
+  void run() {
+    kernels(in_.count, fast_chunk, nullptr);
+    std::vector<std::int64_t> left;
+    const auto collect = [&](auto&& wanted) {
+      left.clear();
+      for (Index i = 0; i < in_.count; ++i)
+        if (wanted(done_[at(i)])) left.push_back(i);
+    };
+    collect([](std::uint8_t how) { return how == pose_slow; });
+    if (!left.empty()) kernels(static_cast<Index>(left.size()), patient_chunk, left.data());
+    collect([](std::uint8_t how) { return how == pose_left || how == pose_ended; });
+    parallel_chunks(static_cast<long>(left.size()), 1, threads_, [&](int thread, long begin, long end) {
+      for (long k = begin; k < end; ++k) {
+        poll(thread);
+        const std::int64_t i = left[at(k)];
+        scratch_[at(thread)].reference.solve(m_, in_, options_, i, out_, flag::reference_path,
+                                             done_[at(i)] == pose_ended);
+        forget_variants(i);
+      }
+    });
+  }
+
+ private:
+  struct Scratch {
+    ClosedPoses closed;
+    Reference reference;
+  };
+  const Mechanism& m_;
+  const Program& program_;
+  const BatchInput& in_;
+  const SolveOptions& options_;
+  const BatchOutput& out_;
+  int threads_;
+  std::vector<std::uint8_t> done_;
+  std::vector<std::uint32_t> flags_;
+  std::vector<Scratch> scratch_;
+  std::vector<const Program*> variants_;
+  std::vector<std::int32_t> moved_;
+
+  void poll(int thread) const {
+    if (thread == 0 && in_.poll) in_.poll();
+  }
+
+  /// `index`: the poses of a patient pass; null: a quick pass over all.
+  void kernels(Index count, long chunk, const std::int64_t* index) {
+    const KernelTable& table = kernel(count);
+    const KernelOutput answer{out_.displacement,
+                              options_.stiffness ? out_.stiffness : nullptr,
+                              options_.stiffness ? out_.compliance : nullptr,
+                              out_.effort,
+                              out_.leg_wrench,
+                              out_.coordinates,
+                              out_.variants,
+                              done_.data(),
+                              flags_.data(),
+                              out_.iterations};
+    const auto pose_at = [&](Index place) { return index ? index[place] : place; };
+    parallel_chunks(count, chunk, threads_, [&](int thread, long begin, long end) {
+      poll(thread);
+      Scratch& s = scratch_[at(thread)];
+      KernelInput input = kernel_input(m_, in_, options_);
+      input.index = index;
+      input.patient = index != nullptr;
+      input.perturbed = variants_.data();
+      input.perturbed_leg = moved_.data();
+      input.perturbed_count = out_.variants ? static_cast<std::int32_t>(variants_.size()) : 0;
+      if (in_.closed || !program_.closes) s.closed.put(m_, in_, begin, end, pose_at, s.reference, input);
+      table.run(&program_, &input, &answer, begin, end, kernel_scratch(table.scratch_size(&program_)));
+      for (long place = begin; place < end; ++place) {
+        const Index i = pose_at(place);
+        const std::uint8_t how = done_[at(i)];
+        if (how == pose_solved || how == pose_unstable) complete(i, how);
+        else if (how == pose_unreachable) s.reference.unreachable(m_, in_, i, out_);
+        if (how != pose_solved) forget_variants(i);
+      }
+    });
+  }
+
+  /// Fills what the kernels leave out for a pose that they did.
+  void complete(Index i, std::uint8_t how) const {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const Status status = how == pose_unstable ? Status::unstable : Status::converged;
+    if (out_.status) out_.status[i] = static_cast<std::uint8_t>(status);
+    if (out_.free_twists) Eigen::Map<VecX>(out_.free_twists + 36 * i, 36).setConstant(nan);
+    if (out_.indeterminate)
+      for (Index j = 0; j < m_.size(); ++j) {
+        const Coordinate& c = m_.coordinates[at(j)];
+        out_.indeterminate[m_.size() * i + j] = c.locked && c.role == Role::passive;
+      }
+    const bool moment = !Eigen::Map<const Vec3>(in_.wrench + 6 * i + 3).isZero(0);
+    if (out_.flags) out_.flags[i] = flags_[at(i)] | (moment ? flag::nonconservative : 0u);
+  }
+
+  void forget_variants(Index i) const {
+    const Index n = 6 * static_cast<Index>(variants_.size());
+    if (out_.variants) Eigen::Map<VecX>(out_.variants + n * i, n).setConstant(std::nan(""));
+  }
+};
 
 }  // namespace
 
@@ -197,60 +313,7 @@ void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, 
     for (Index i = 0; out.flags && i < in.count; ++i) out.flags[i] |= flag::reference_path;
     return;
   }
-  const KernelTable& table = kernel(in.count);
-  const Program& program = plan.program();
-  std::vector<const Program*> variants;
-  std::vector<std::int32_t> moved;
-  for (const FastPlan* v : in.variants) {
-    require(v->available() && v->program().op_count == program.op_count &&
-                v->program().coordinate_count == program.coordinate_count,
-            "variants", "plans of the same elements", v->missing());
-    variants.push_back(&v->program());
-    moved.push_back(moved_leg(program, v->program()));
-  }
-  std::vector<std::uint8_t> done(at(in.count), 0);
-  std::vector<std::uint32_t> flags(at(in.count), 0);
-  const KernelOutput answer{out.displacement,
-                            options.stiffness ? out.stiffness : nullptr,
-                            options.stiffness ? out.compliance : nullptr,
-                            out.effort,
-                            out.leg_wrench,
-                            out.coordinates,
-                            out.variants,
-                            done.data(),
-                            flags.data(),
-                            out.iterations};
-  struct Scratch {
-    ClosedPoses closed;
-    Reference reference;
-  };
-  std::vector<Scratch> scratch(at(std::max(1, threads)));
-  parallel_chunks(in.count, fast_chunk, threads, [&](int thread, long begin, long end) {
-    if (thread == 0 && in.poll) in.poll();
-    Scratch& s = scratch[static_cast<std::size_t>(thread)];
-    KernelInput input = kernel_input(m, in, options);
-    input.perturbed = variants.data();
-    input.perturbed_leg = moved.data();
-    input.perturbed_count = out.variants ? static_cast<std::int32_t>(variants.size()) : 0;
-    if (in.closed || !program.closes) s.closed.put(m, in, begin, end, s.reference, input);
-    table.run(&program, &input, &answer, begin, end, kernel_scratch(table.scratch_size(&program)));
-    for (long i = begin; i < end; ++i) {
-      const std::uint8_t how = done[static_cast<std::size_t>(i)];
-      if (how != pose_solved) {
-        if (thread == 0 && in.poll) in.poll();
-        if (how == pose_unreachable) s.reference.unreachable(m, in, i, out);
-        else s.reference.solve(m, in, options, i, out, flag::reference_path);
-        if (out.variants) {
-          const Index n = 6 * static_cast<Index>(variants.size());
-          Eigen::Map<VecX>(out.variants + n * i, n).setConstant(std::nan(""));
-        }
-        continue;
-      }
-      complete(m, i, out);
-      const bool moment = !Eigen::Map<const Vec3>(in.wrench + 6 * i + 3).isZero(0);
-      if (out.flags) out.flags[i] = flags[static_cast<std::size_t>(i)] | (moment ? flag::nonconservative : 0u);
-    }
-  });
+  FastBatch(m, plan, in, options, threads, out).run();
 }
 
 }  // namespace stiffmap

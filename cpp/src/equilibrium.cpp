@@ -314,7 +314,8 @@ EquilibriumResult solve_equilibrium(const Mechanism& m, Problem& problem, const 
     out.falling = -1;
   } else {
     ws.start = state;
-    how = adaptive_steps(m, problem, options, ws, state, out);
+    how = options.path_ends ? Outcome::failed : adaptive_steps(m, problem, options, ws, state, out);
+    if (options.path_ends) out.flags |= flag::load_stepped;
     if (how != Outcome::converged) {  // next to a singular pose Newton is slow but finds its way
       state = ws.start;
       out.sign_changes = 0;

@@ -9,6 +9,7 @@ namespace stiffmap {
 struct EquilibriumOptions {
   int load_steps = 0;        ///< 0: adaptive continuation; n: n equal steps
   int max_iterations = 40;   ///< per load step
+  bool path_ends = false;    ///< the kernels found that the path of equilibria ends before the whole load
   double tolerance = 1e-10;  ///< last Newton step, in multiples of the mechanism's length
 };
 

@@ -1,0 +1,51 @@
+"""Poses whose load needs proven steps: same statuses, same unstable equilibria, same bits in any company."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from agreement import TOLERANCE, displacement_gap
+
+import stiffmap as sm
+
+FORCE = np.array([100.0, 50.0, -200.0, 0.0, 0.0, 0.0])
+MOMENT = np.array([60.0, -40.0, -150.0, 4.0, -3.0, 5.0])
+
+
+def poses(machine: sm.Machine, n: int) -> np.ndarray:
+    """Positions (n, 3) m in the workspace box and around it, up to 1.6 times its size."""
+    low, high = machine.workspace
+    return (low + high) / 2 + 0.8 * (high - low) * np.random.default_rng(41).uniform(-1, 1, (n, 3))
+
+
+@pytest.mark.parametrize("wrench", [FORCE, MOMENT], ids=["force", "moment"])
+def test_rods_that_buckle(wrench: np.ndarray) -> None:
+    machine = sm.load_machine("linear-delta")
+    position = poses(machine, 150)
+    fast = machine.solve(position, wrench)
+    stepped = np.flatnonzero(fast.flags & sm.Flag.LOAD_STEPPED)[:12]
+    assert len(stepped) >= 5
+    reference = machine.solve(position[stepped], wrench, method="reference")
+    np.testing.assert_array_equal(fast.status[stepped], reference.status)
+    same = np.isfinite(reference.displacement).all(axis=1)
+    gap = displacement_gap(fast.displacement[stepped][same], reference.displacement[same])
+    assert gap < TOLERANCE
+    if wrench is FORCE:
+        assert (reference.status == sm.Status.UNSTABLE).sum() >= 3
+        assert fast.reference_share < 0.02
+
+
+def test_the_same_bits_in_any_company() -> None:
+    machine = sm.load_machine("linear-delta")
+    position = poses(machine, 120)
+    whole = machine.solve(position, FORCE)
+    order = np.random.default_rng(42).permutation(len(position))
+    mixed = machine.solve(position[order], FORCE, threads=1)
+    np.testing.assert_array_equal(mixed.displacement, whole.displacement[order])
+    np.testing.assert_array_equal(mixed.compliance, whole.compliance[order])
+    np.testing.assert_array_equal(mixed.flags, whole.flags[order])
+    stepped = np.flatnonzero(whole.flags & sm.Flag.LOAD_STEPPED)[:3]
+    for i in stepped:
+        alone = machine.solve(position[i : i + 1], FORCE)
+        np.testing.assert_array_equal(alone.displacement[0], whole.displacement[i])
+        assert alone.iterations[0] == whole.iterations[i]
