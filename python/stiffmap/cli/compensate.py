@@ -11,13 +11,22 @@ import typer
 from stiffmap.cli.inputs import EffectsOption, machine_with, numbers
 from stiffmap.cli.inputs import gravity as gravity_of
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.compensation import (
+    axis_errors,
+    axis_errors_of_map,
+    compensation_table,
+    corrected_geometry,
+    dh_list,
+    urdf_text,
+    write_table,
+)
 from stiffmap.compensation import compensate as compute
-from stiffmap.compensation import corrected_geometry, dh_list, urdf_text
 from stiffmap.description import MachineDescription
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.experiment.files.orientation import against_base
 from stiffmap.experiment.files.plan_file import load_plan
 from stiffmap.machine import Machine
+from stiffmap.maps.files import read_dataset
 
 MM = 1e3
 
@@ -41,6 +50,19 @@ def compensate(
     dh: Annotated[
         Path | None, typer.Option(help="Write it as a list of Denavit-Hartenberg rows (CSV).")
     ] = None,
+    axis: Annotated[
+        str | None, typer.Option(help="Instead of poses: a controller's table of this axis, x, y or z.")
+    ] = None,
+    form: Annotated[
+        str, typer.Option("--format", help="Of the table: csv, linuxcnc, siemens or heidenhain.")
+    ] = "csv",
+    points: Annotated[int, typer.Option(help="Positions of the table, over the workspace.")] = 21,
+    through: Annotated[
+        str | None, typer.Option(help="A point of the table's line, mm. [default: home]")
+    ] = None,
+    zero: Annotated[
+        float | None, typer.Option(help="Position (mm) of the reference point: the table is zero there.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Commands at which a deflected machine with errors stands where it is wanted.
@@ -54,21 +76,77 @@ def compensate(
 
       [cyan]stiffmap compensate orthoglide-revised poses.csv --effect 'length bar x error=0.1mm' --force 0,0,-300 -o c.csv[/cyan]
 
+      [cyan]stiffmap compensate travelling-column --axis z --gravity 0,0,-9.81 --format linuxcnc -o z.comp[/cyan]
+
+      [cyan]stiffmap compensate results/map.nc --axis x --format siemens -o x.mpf[/cyan]
+
       [cyan]stiffmap compensate ur10 --effect 'zero_offset elbow error=1mrad' --urdf arm.urdf --dh arm.csv[/cyan]
     """
-    if poses is None and urdf is None and dh is None:
-        raise StiffmapError("compensate: give a CSV of wanted poses, --urdf or --dh")
-    m = machine_with(machine, effect)
     out: dict[str, object] = {}
+    if axis is not None:
+        out = _table(machine, effect, axis, form, points, through, zero, output, force, gravity)
+        _say(out, as_json)
+        return
+    if poses is None and urdf is None and dh is None:
+        raise StiffmapError("compensate: give a CSV of wanted poses, --axis, --urdf or --dh")
+    m = machine_with(machine, effect)
     if urdf is not None or dh is not None:
         out |= _geometry(m, urdf, dh)
     if poses is not None:
         out |= _commands(m, poses, output, force, gravity)
+    _say(out, as_json)
+
+
+def _say(out: dict[str, object], as_json: bool) -> None:
     if as_json:
         print_json(out)
         return
     for key, value in out.items():
         print(f"{key}: {value}")
+
+
+def _table(
+    machine: str,
+    effect: list[str] | None,
+    axis: str,
+    form: str,
+    points: int,
+    through: str | None,
+    zero: float | None,
+    output: Path | None,
+    force: str,
+    gravity: str | None,
+) -> dict[str, object]:
+    """Table of an axis, from a machine or from a map that has been written."""
+    point = None if through is None else np.array(numbers(through, "through", 3)) / MM
+    if machine.endswith((".nc", ".zarr")):
+        errors = axis_errors_of_map(read_dataset(machine), axis, through=point)
+    else:
+        m = machine_with(machine, effect)
+        low, high = (
+            (np.asarray(end)["xyz".index(axis)] for end in m.workspace) if axis in "xyz" else (0.0, 1.0)
+        )
+        errors = axis_errors(
+            m,
+            axis,
+            np.linspace(low, high, max(points, 2)),
+            through=point,
+            wrench=[*numbers(force, "force", 3), 0.0, 0.0, 0.0],
+            gravity=gravity_of(gravity),
+        )
+    errors = errors if zero is None else errors.zeroed(zero / MM)
+    text = compensation_table(errors, form)
+    if output is not None:
+        write_table(errors, output, form)
+    forward, backward = errors.positioning
+    return {
+        "positions": len(errors.position),
+        f"{errors.names['xyz'.index(axis)]}, um": f"{1e6 * min(forward.min(), backward.min()):.3f} "
+        f"to {1e6 * max(forward.max(), backward.max()):.3f}",
+        "largest reversal value, um": round(1e6 * float(np.abs(errors.reversal).max()), 3),
+        "linear interpolation leaves, um": round(1e6 * errors.interpolation, 3),
+        "file" if output is not None else "table": str(output) if output is not None else "\n" + text,
+    }
 
 
 def _commands(

@@ -33,6 +33,7 @@ from stiffmap.cli.map_uncertainty import draw_deviations, print_uncertainty, unc
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
+from stiffmap.maps.table import write_map_table
 
 
 def map_command(
@@ -72,6 +73,9 @@ def map_command(
     formats: Annotated[
         str, typer.Option("--format", help="Formats of the pictures: png, svg, pdf, or several as png,pdf.")
     ] = "png",
+    tables: Annotated[
+        str | None, typer.Option("--table", help="Write the map as a table too: csv, xlsx, or csv,xlsx.")
+    ] = None,
     own_scales: Annotated[
         bool, typer.Option("--own-scales", help="A colour scale for each plane instead of a common one.")
     ] = False,
@@ -114,13 +118,16 @@ def map_command(
 
       [cyan]stiffmap map orthoglide-revised --gravity 0,0,-9.81 --tolerance 0.1 --json[/cyan]
 
+      [cyan]stiffmap map orthoglide-revised --points 21 --table csv,xlsx -o results[/cyan]
+
       [cyan]stiffmap map orthoglide-revised --points 2001 --estimate[/cyan]
 
       [cyan]stiffmap map orthoglide-revised --points 51 --statistics[/cyan]
     """
     import stiffmap
 
-    kinds = picture_formats(formats)
+    kinds = named_formats(formats, "--format", ("png", "svg", "pdf"))
+    sheets = named_formats(tables, "--table", ("csv", "xlsx")) if tables else []
     m = machine_with(machine, effect)
     call: dict[str, Any] = {
         **grid(m, {"x": x, "y": y, "z": z}, points),
@@ -150,6 +157,7 @@ def map_command(
         resume=resume,
     )
     files = [target, *(draw(ds, output, plane, MM * tolerance, kinds, own_scales) if pictures else [])]
+    files += [write_map_table(ds, output / f"map.{kind}") for kind in sheets]
     band = uncertainty_data(ds, plane) if uncertainty else None
     files += draw_deviations(ds, output, plane) if uncertainty and pictures else []
     rows = summary(ds, plane, MM * tolerance)
@@ -190,11 +198,12 @@ def grid(machine: Machine, planes: dict[str, list[float] | None], points: int) -
     return out
 
 
-def picture_formats(text: str) -> list[str]:
-    """Endings of the pictures' names."""
+def named_formats(text: str, option: str, known: Sequence[str]) -> list[str]:
+    """Endings of files, separated by commas."""
     kinds = [k.strip().lower() for k in text.split(",")]
-    if not set(kinds) <= {"png", "svg", "pdf"}:
-        raise StiffmapError(f"--format: expected png, svg, pdf, or several as png,pdf; got '{text}'")
+    if not set(kinds) <= set(known):
+        several = ",".join(known[:2])
+        raise StiffmapError(f"{option}: expected {', '.join(known)}, or several as {several}; got '{text}'")
     return kinds
 
 
