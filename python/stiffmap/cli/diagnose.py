@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +32,7 @@ def diagnose_command(
     tolerance: Annotated[
         float, typer.Option(min=1e-3, help="Factor on the default standard uncertainties of the machine.")
     ] = 1.0,
+    date: Annotated[str | None, typer.Option(help="Date that the report bears, as you write it.")] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing of what is being tried.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -43,6 +45,8 @@ def diagnose_command(
     Examples:
 
       [cyan]stiffmap diagnose orthoglide-revised experiments/servo -o result[/cyan]
+
+      [cyan]stiffmap diagnose my.yaml dial_gauges --date 2025-03-14 -o result[/cyan]
 
       [cyan]stiffmap diagnose ur10 tracker --exclude sensor_gain --budget 60[/cyan]
     """
@@ -58,7 +62,7 @@ def diagnose_command(
         progress=None if silent else _say,
     )
     if output is not None:
-        write(result, output)
+        write(result, output, date, [p for p in (Path(machine), Path(data)) if p.exists()])
     print(result.to_json() if as_json else result)
     if result.verdict != "none":
         raise typer.Exit(1)
@@ -68,7 +72,7 @@ def _say(what: str) -> None:
     print(f"trying: {what}", file=sys.stderr)
 
 
-def write(result: Diagnosis, folder: Path) -> None:
+def write(result: Diagnosis, folder: Path, date: str | None = None, inputs: Sequence[Path] = ()) -> None:
     """All files of a diagnosis; raises `FileError` where the folder cannot be written."""
     from stiffmap.diagnosis.report.pictures import figures
 
@@ -79,7 +83,7 @@ def write(result: Diagnosis, folder: Path) -> None:
             figure.savefig(folder / f"{name}.png", dpi=130)
     except OSError as error:
         raise FileError(f"cannot be written: {error.strerror}", file=str(folder)) from error
-    result.report(folder / "report.html")
+    result.report(folder / "report.html", date=date, inputs=inputs)
     result.machine.save(folder / "machine.yaml")
     if result.calibration is not None:
         result.calibration.machine.save(folder / "calibrated.yaml")

@@ -163,6 +163,7 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
         calibration=found.calibration,
         refused=list(found.refused),
         stopped=s.clock.stopped,
+        seed=seed,
         explained=explained(finding.selection.null, model, search.problem.freedom)
         if model.candidates
         else 0.0,

@@ -118,6 +118,8 @@ class Findings:
     """Whether a time budget or Ctrl-C ended it early: the answer is the best so far."""
     explained: float = 0.0
     """Share of the misfit beyond noise (and calibration) that the effects take away."""
+    seed: int | None = None
+    """Of folds and simulated noise."""
     seconds: dict[str, float] = field(default_factory=dict)
     """What each step took; ``null bootstrap`` is done once per plan and kept while the process lives."""
 

@@ -1,63 +1,99 @@
-"""One self-contained HTML file: verdict, numbers, pictures inside, nothing from the network."""
+"""A diagnosis as one self-contained HTML file: the answer, the evidence, pictures inside, nothing from the network."""
 
 from __future__ import annotations
 
 import base64
+import hashlib
 from collections.abc import Iterable, Sequence
-from html import escape
 from io import BytesIO
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
+from stiffmap.budget import deflection_budget
+from stiffmap.description import Joint
+from stiffmap.description.tree import all_elements
 from stiffmap.diagnosis.decision.patterns import Pattern
-from stiffmap.diagnosis.report.findings import Effect, Findings
-from stiffmap.diagnosis.report.sentences import next_step, opening
-from stiffmap.diagnosis.report.wording import effect_text, five_lines, in_display_units, separation_text
+from stiffmap.diagnosis.report.findings import Detectability, Effect, Findings
+from stiffmap.diagnosis.report.sentences import UNITS, next_step, opening
+from stiffmap.diagnosis.report.wording import effect_text, five_lines, separation_text
+from stiffmap.effects import registry
 from stiffmap.errors import FileError
 from stiffmap.experiment.noise.checks import Check
+from stiffmap.machine import Machine
 
-STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
-table{border-collapse:collapse;margin:.5rem 0}td,th{border:1px solid #ccc;padding:.2rem .6rem;text-align:left}
-th{background:#f3f3f3}img{max-width:100%}
-.verdict{background:#eef4f8;border-left:4px solid #2a6f97;padding:.6rem 1rem}
-.answer{font-size:1.15rem;background:#eef4f8;border-left:5px solid #0072B2;padding:.7rem 1rem}
-table{display:block;overflow-x:auto}td{overflow-wrap:anywhere}small{color:#555}
-@media print{@page{size:A4;margin:15mm}body{margin:0;max-width:none;font-size:11px}tr,img{break-inside:avoid}
-h2{break-after:avoid}}"""
+SHOWN = 12
+"""Detectable effects above the fold."""
+PARTS = 8
+"""Elements in the table of shares."""
 
 
-def write_report(d: Findings, path: str | PathLike[str]) -> None:
+def write_report(
+    d: Findings,
+    path: str | PathLike[str],
+    *,
+    date: str | None = None,
+    inputs: Iterable[str | PathLike[str]] = (),
+) -> None:
     """Write the file; raises `FileError` where it cannot be written."""
+    text = html(d, date=date, inputs=inputs)
     try:
-        Path(path).write_text(html(d), encoding="utf-8")
+        Path(path).write_text(text, encoding="utf-8")
     except OSError as error:
         raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
 
 
-def html(d: Findings) -> str:
+def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLike[str]] = ()) -> str:
     """The report as text."""
-    from stiffmap.diagnosis.report.pictures import figures
+    from stiffmap.diagnosis.report.pictures import CAPTIONS, figures
+    from stiffmap.report.provenance import provenance
+    from stiffmap.report.templates import render
 
-    pictures = "".join(f"<p><img alt='{name}' src='{inline(f)}'></p>" for name, f in figures(d).items())
-    parts = [
-        f"<h1>Diagnosis of {escape(d.declared.name)}</h1><p>Experiment {escape(d.experiment.name)}: "
-        f"{len(d.experiment)} rows of {d.experiment.quantity}, axes {', '.join(d.experiment.axes)}. "
-        "Lengths in mm unless a unit is named; base axes.</p>",
-        f"<p class='answer'>{escape(opening(d))}</p><p><b>What to do next.</b> {escape(next_step(d))}</p>",
-        "<div class='verdict'>" + "<br>".join(escape(line) for line in five_lines(d)) + "</div>",
-        "<h2>Effects</h2>" + _effects(d),
-        "<h2>Before and after, on readings that no fit saw</h2>" + _sizes(d),
-        "<h2>Noise and fit</h2>" + _noise(d),
-        "<h2>Model-free checks</h2>" + _checks(d.checks_before, d.checks_after),
-        "<h2>What is left</h2>" + _left(d),
-        "<h2>Pictures</h2>" + pictures,
-        "<h2>What this experiment could have seen</h2>" + _detectable(d),
-        "<h2>Limits</h2>" + _list(d.limitations or ["none known"]),
-    ]
-    head = f"<meta charset='utf-8'><link rel='icon' href='data:,'><title>stiffmap diagnosis</title><style>{STYLE}</style>"
-    return f"<!doctype html><html lang='en'>{head}{''.join(parts)}</html>"
+    return render(
+        "diagnosis.html",
+        machine=d.declared.name,
+        experiment=d.experiment.name,
+        rows=len(d.experiment),
+        quantity=d.experiment.quantity,
+        axes=", ".join(d.experiment.axes),
+        opening=opening(d),
+        next=next_step(d),
+        lines=five_lines(d),
+        effects=[_effect(e) for e in d.effects],
+        rivals=[
+            ("; ".join(map(effect_text, other)), separation_text(s))
+            for other, s in zip(d.alternatives, d.separations, strict=True)
+        ],
+        pictures=[{"caption": CAPTIONS[n], "data": inline(f)} for n, f in figures(d).items()],
+        budget=_budget(d),
+        sizes=[
+            (n, *(f"{1e6 * v:.2f}" for v in (s.rms, s.p95, s.max)), f"{s.ratio:.3f}", s.n)
+            for n, s in (("before", d.before), ("after", d.after))
+        ],
+        per_axis=[
+            (a, in_axis_units(a, d.before.per_axis[a]), in_axis_units(a, v))
+            for a, v in d.after.per_axis.items()
+        ],
+        folds=_folds(d),
+        noise=_noise(d),
+        fit=f"Lack of fit: p-value {p_text(d.noise.lack_of_fit_before)} before, "
+        f"{p_text(d.noise.lack_of_fit_after)} after. "
+        f"Outliers listed (rows): {', '.join(d.outliers) or 'none'}.",
+        checks=_checks(d.checks_before, d.checks_after),
+        left=[(p.axis, p.what, p.detail, _at(p), f"{p.p:.2g}") for p in d.unexplained[:12]],
+        empirical=d.unexplained
+        and d.empirical
+        and f"would bring held-out readings from {1e6 * d.empirical.before:.2f} µm to "
+        f"{1e6 * d.empirical.after:.2f} µm rms.",
+        seen=_seen(d),
+        shown=SHOWN,
+        unseen=d.unobservable,
+        limits=d.limitations,
+        provenance=provenance(date, d.seed, inputs, _digests(d)),
+    )
 
 
 def inline(figure: Figure) -> str:
@@ -67,120 +103,125 @@ def inline(figure: Figure) -> str:
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """HTML table; cells are escaped."""
-    top = "".join(f"<th>{escape(h)}</th>" for h in head)
-    body = "".join("<tr>" + "".join(f"<td>{escape(str(c))}</td>" for c in row) + "</tr>" for row in rows)
-    return f"<table><tr>{top}</tr>{body}</table>"
+def in_axis_units(axis: str, value: float) -> str:
+    """A reading's size: µm, µrad for a rotation."""
+    return f"{1e6 * value:.2f} {'µrad' if axis.startswith('r') else 'µm'}"
 
 
-def _list(items: Iterable[str]) -> str:
-    return "<ul>" + "".join(f"<li>{escape(i)}</li>" for i in items) + "</ul>"
+def in_shop_units(value: float, unit: str) -> str:
+    """A number of an effect: µm, µm/N, mrad."""
+    factor, name = UNITS.get(unit, (1.0, unit))
+    return f"{factor * value:.4g} {name}".rstrip()
 
 
-def _effects(d: Findings) -> str:
-    if not d.effects:
-        return "<p>No effect is named.</p>"
-    out = "".join(_effect(e) for e in d.effects)
-    for other, s in zip(d.alternatives, d.separations, strict=True):
-        named = escape("; ".join(map(effect_text, other)))
-        out += f"<p><b>Or instead:</b> {named}. To decide: {escape(separation_text(s))}.</p>"
-    return out
+def p_text(p: float) -> str:
+    """A p-value; 0 is what no double holds."""
+    return f"{p:.2g}" if p > 0 else "below 1e-300"
 
 
-def _effect(e: Effect) -> str:
-    rows = [
-        (n, in_display_units(v, u), in_display_units(a, u), in_display_units(b, u))
-        for n, (v, a, b, u) in e.parameters.items()
-    ]
-    same = "; ".join(f"{a['kind']} of {a['element']} {' '.join(a['legs'])}" for a in e.aliases)
-    alias = f"<p>This plan cannot tell it from: {escape(same)}.</p>" if same else ""
+def _effect(e: Effect) -> dict[str, Any]:
     legs = f", leg {', '.join(e.legs)}" if e.legs else ""
-    return (
-        f"<h3>{escape(f'{e.kind} of {e.element}{legs}')}</h3>"
-        + table(("parameter", "value", "95 % from", "to"), rows)
-        + alias
-        + f"<p><small>{escape(e.definition)} Chi-square falls by {e.evidence['delta_chi2']:.0f}; "
-        f"p-value over the whole search {e.evidence['p_global']:.2g}.</small></p>"
-    )
+    return {
+        "name": f"{registry.get(e.kind).title}: {e.element}{legs}",
+        "rows": [
+            (n.replace("_", " "), in_shop_units(v, u), in_shop_units(a, u), in_shop_units(b, u))
+            for n, (v, a, b, u) in e.parameters.items()
+        ],
+        "same": "; ".join(f"{a['kind']} of {a['element']} {' '.join(a['legs'])}" for a in e.aliases),
+        "definition": e.definition,
+        "evidence": f"Chi-square falls by {e.evidence['delta_chi2']:.0f}; p-value over the whole search "
+        f"{p_text(e.evidence['p_global'])}.",
+    }
 
 
-def _sizes(d: Findings) -> str:
-    names = [("before", d.before), ("after", d.after)]
-    rows = [(n, *(f"{1e3 * v:.4f}" for v in (s.rms, s.p95, s.max)), f"{s.ratio:.3f}", s.n) for n, s in names]
-    axes = [(a, f"{1e3 * d.before.per_axis[a]:.4f}", f"{1e3 * v:.4f}") for a, v in d.after.per_axis.items()]
-    held = d.held_out
-    how = f"{held.folds} folds by {held.by}; " if held else "not held out; "
-    chosen = ", ".join(f"{k} in {v}" for k, v in held.chosen.items()) if held else ""
-    return (
-        table(("", "rms / mm", "95 % / mm", "largest / mm", "rms / noise floor", "readings"), rows)
-        + table(("axis", "rms before / mm (rad)", "after"), axes)
-        + f"<p>{how}chosen in the folds: {escape(chosen or 'nothing')}.</p>"
-    )
+def _budget(d: Findings) -> dict[str, Any] | None:
+    """Shares of the corrected machine's deflection at the worst pose of the map in the pictures."""
+    from stiffmap.diagnosis.report.pictures import plane_errors
+
+    if not d.effects:
+        return None
+    x, y, force, _, errors = plane_errors(d)
+    size = np.linalg.norm(errors, axis=-1)
+    if not force.any() or not np.isfinite(size).any():
+        return None
+    row, column = np.unravel_index(int(np.nanargmax(size)), size.shape)
+    p = np.array([x[column], y[row], d.declared.workspace.mean(axis=0)[2]])
+    found = deflection_budget(d.machine, p, force)
+    whole = 1e6 * float(np.linalg.norm(found.displacement[:3]))
+    return {
+        "at": ", ".join(f"{1e3 * v:.0f}" for v in p),
+        "force": ", ".join(f"{v:.0f}" for v in force[:3]),
+        "size": whole,
+        "rows": [(n, whole * s, 100 * s) for n, _, s in found.ranked()[:PARTS]],
+    }
 
 
-def _noise(d: Findings) -> str:
+def _folds(d: Findings) -> str:
+    if d.held_out is None:
+        return "Not held out."
+    chosen = ", ".join(f"{k} in {v}" for k, v in d.held_out.chosen.items())
+    return f"{d.held_out.folds} folds by {d.held_out.by}; chosen in the folds: {chosen or 'nothing'}."
+
+
+def _noise(d: Findings) -> list[tuple[str, ...]]:
     n = d.noise
-    rows = [
-        (a, f"{n.floor[a]:.3g}", f"{n.repeats[a]:.3g}", f"{n.declared[a]:.3g}", f"{n.consistency[a]:.2g}")
+    return [
+        (a, *(in_axis_units(a, v[a]) for v in (n.floor, n.repeats, n.declared)), f"{n.consistency[a]:.2g}")
         for a in n.floor
     ]
-    listed = ", ".join(d.outliers) or "none"
-    return (
-        table(("axis", "floor / m (rad)", "from repeats", "stated", "p-value of the difference"), rows)
-        + f"<p>Lack of fit: p = {n.lack_of_fit_before:.2g} before, {n.lack_of_fit_after:.2g} after. "
-        f"Outliers listed (rows): {escape(listed)}.</p>"
-    )
 
 
-def _checks(before: Sequence[Check], after: Sequence[Check]) -> str:
-    if not before:
-        return "<p>Only deflections allow them.</p>"
-    rows = [
+def _checks(before: Sequence[Check], after: Sequence[Check]) -> list[tuple[object, ...]]:
+    return [
         (b.name, b.meaning, b.contrasts, *(("-",) * 4 if not b.contrasts else _pair(b, a)))
         for b, a in zip(before, after, strict=True)
     ]
-    head = ("check", "means", "contrasts", "rms / noise", "p-value", "rms of what effects leave", "p-value")
-    return table(head, rows)
 
 
 def _pair(b: Check, a: Check) -> tuple[str, str, str, str]:
     return (f"{b.rms:.2f}", f"{b.p:.2g}", f"{a.rms:.2f}", f"{a.p:.2g}")
 
 
-def _left(d: Findings) -> str:
-    if not d.unexplained:
-        return "<p>Nothing beyond noise.</p>"
-    rows = [(p.axis, p.what, p.detail, _at(p), f"{p.p:.2g}") for p in d.unexplained[:12]]
-    out = table(("axis", "pattern", "how", "largest at", "p-value"), rows)
-    if d.empirical:
-        out += (
-            "<p>An <b>empirical</b> correction (Gaussian process, no physical cause claimed) would bring "
-            f"held-out readings from {1e3 * d.empirical.before:.4f} mm "
-            f"to {1e3 * d.empirical.after:.4f} mm rms.</p>"
-        )
-    return out
-
-
 def _at(p: Pattern) -> str:
     if p.position is None:
         return ""
-    return "(" + ", ".join(f"{1e3 * v:.0f}" for v in p.position) + f") mm: {p.size:.2g} m (rad) rms"
+    where = ", ".join(f"{1e3 * v:.0f}" for v in p.position)
+    return f"({where}) mm: {in_axis_units(p.axis, p.size)} rms"
 
 
-def _detectable(d: Findings) -> str:
-    rows = [
-        (
-            x.kind,
-            x.element,
-            " ".join(x.legs),
-            ", ".join(f"{n} {v:.3g}" for n, v in x.sizes.items() if v is not None),
+def _seen(d: Findings) -> list[tuple[str, str, str]]:
+    """What could have been found, the easiest first."""
+    turning = {
+        n for n, e in all_elements(d.declared.description) if isinstance(e, Joint) and e.kind != "prismatic"
+    }
+    return [row for _, row in sorted((_one_seen(x, turning) for x in d.detectable), key=lambda pair: pair[0])]
+
+
+def _one_seen(x: Detectability, turning: set[str]) -> tuple[float, tuple[str, str, str]]:
+    numbers = {p.name: p for p in registry.get(x.kind).parameters}
+    turns = any(f"{leg}.{x.element}" in turning for leg in x.legs) or x.element in turning
+    sizes, ease = [], float("inf")
+    for name, value in x.sizes.items():
+        if value is None:
+            continue
+        p = numbers[name]
+        sizes.append(
+            f"{name.replace('_', ' ')} {in_shop_units(value, p.angular if turns and p.angular else p.unit)}"
         )
-        for x in d.detectable
-    ]
-    return (
-        "<p>Smallest change from the null value that is found with 95 % power (SI).</p>"
-        + table(("kind", "element", "legs", "size"), rows)
-        + "<p>Not observable here, or only as an alias:</p>"
-        + f"<details><summary>{len(d.unobservable)} effects</summary>{_list(d.unobservable)}</details>"
-    )
+        ease = min(ease, abs(value) / p.scale)
+    legs = f" of {', '.join(x.legs)}" if x.legs else ""
+    return ease, (registry.get(x.kind).title, f"{x.element}{legs}", ", ".join(sizes))
+
+
+def _digests(d: Findings) -> dict[str, str]:
+    """Of the machine and the readings as they were used."""
+    e = d.experiment
+    readings = b"".join(np.ascontiguousarray(a).tobytes() for a in (e.position, e.wrench, e.reading, e.sigma))
+    return {
+        f"machine {d.declared.name}, as loaded": _digest(d.declared),
+        f"readings of {e.name}, SI": hashlib.sha256(readings).hexdigest(),
+    }
+
+
+def _digest(machine: Machine) -> str:
+    return hashlib.sha256(repr(machine.description).encode()).hexdigest()

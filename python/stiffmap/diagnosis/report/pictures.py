@@ -11,6 +11,14 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.machine import Machine
 
 UM, MM = 1e6, 1e3
+CAPTIONS = {
+    "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the declared machine and with the "
+    "corrected one; both enlarged alike.",
+    "residual_trends": "Residual of every reading against what may drive it. What depends on nothing here is noise.",
+    "residual_histogram": "Residuals over the noise floor. With the right machine they follow the dashed line.",
+    "maps": "Error of the tool over a plane of the workspace: the file's machine, the corrected one, and what the finding changes.",
+    "unexplained": "What no effect explains, over the workspace, and the empirical field that would remove it.",
+}
 BEFORE, AFTER = "#c1432e", "#2a6f97"
 
 
@@ -43,14 +51,14 @@ def left(d: Findings) -> Figure:
         for column, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
             ax = grid[row, column]
             dots = ax.scatter(at[:, a], at[:, b], c=values, cmap="coolwarm", vmin=-top, vmax=top, s=36)
-            ax.set(xlabel=f"{'xyz'[a]} / mm", ylabel=f"{'xyz'[b]} / mm", title=title if column == 1 else "")
-        figure.colorbar(dots, ax=list(grid[row]), label=f"{names[axis]} / µm")
+            ax.set(xlabel=f"{'xyz'[a]}, mm", ylabel=f"{'xyz'[b]}, mm", title=title if column == 1 else "")
+        figure.colorbar(dots, ax=list(grid[row]), label=f"{names[axis]}, µm")
     return figure
 
 
 def vectors(d: Findings) -> Figure:
     """Mean residual vector of each pose, before and after, on one scale."""
-    figure = Figure(figsize=(10, 4.6), layout="constrained")
+    figure = Figure(figsize=(10, 5.0))
 
     # of loads along x, y or z, turned to one sign (else + and - would cancel), those that leave most
     def seen(values: Floats, weight: Floats) -> Floats:
@@ -69,16 +77,13 @@ def vectors(d: Findings) -> Figure:
         v = np.nan_to_num(r[:, :3]) * scale
         axes.quiver(*at.T, *v.T, color=colour, linewidth=1.2)
         axes.scatter(*at.T, s=6, color="0.4")
-        axes.set(
-            xlabel="x / mm", ylabel="y / mm", zlabel="z / mm", title=f"{name}: mean residual of each pose"
-        )
-    figure.text(
-        0.5,
-        0.005,
-        f"longest arrow before: {longest * UM:.1f} µm{'; ' + case if case else ''}",
-        ha="center",
-        fontsize=9,
-    )
+        axes.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm", title=f"{name}: mean residual of each pose")
+        axes.tick_params(labelsize=8)
+        axes.locator_params(nbins=5)
+        axes.set_box_aspect(None, zoom=0.85)  # room for the label of z
+    figure.subplots_adjust(left=0.02, right=0.95, bottom=0.1, top=0.93, wspace=0.12)
+    told = f"longest arrow before: {longest * UM:.1f} µm{'; ' + case if case else ''}"
+    figure.text(0.5, 0.025, told, ha="center", fontsize=9)
     return figure
 
 
@@ -87,10 +92,11 @@ def trends(d: Findings) -> Figure:
     against = _drivers(d.experiment)
     axes_read = [int(i) for i in np.flatnonzero(d.experiment.axis_read)]
     channels = d.experiment.channels
-    figure = Figure(figsize=(2.6 * len(against), 2.2 * len(axes_read) + 0.6), layout="constrained")
-    grid = figure.subplots(len(axes_read), len(against), squeeze=False, sharex="col", sharey="row")
-    for row, axis in enumerate(axes_read):
-        for column, (name, x) in enumerate(against):
+    # a row per driver fits an upright page; its columns are the channels
+    figure = Figure(figsize=(max(6.0, 3.0 * len(axes_read)), 1.9 * len(against) + 0.6), layout="constrained")
+    grid = figure.subplots(len(against), len(axes_read), squeeze=False, sharex="row", sharey="col")
+    for row, (name, x) in enumerate(against):
+        for column, axis in enumerate(axes_read):
             ax = grid[row][column]
             for values, colour, label in (
                 (d.residual_before, BEFORE, "before"),
@@ -98,18 +104,19 @@ def trends(d: Findings) -> Figure:
             ):
                 ax.plot(x, _kept(d, values)[:, axis] * UM, ".", ms=3, color=colour, alpha=0.6, label=label)
             ax.axhline(0, color="0.5", lw=0.6)
-            if column == 0:
-                ax.set_ylabel(f"{channels[axis].name} / {'µm' if channels[axis].unit == 'm' else 'µrad'}")
-            if row == len(axes_read) - 1:
-                ax.set_xlabel(name)
+            ax.set_xlabel(name, fontsize=9)
+            ax.tick_params(labelsize=8)
+            ax.set_ylabel(
+                f"{channels[axis].name}, {'µm' if channels[axis].unit == 'm' else 'µrad'}", fontsize=9
+            )
     grid[0][0].legend(fontsize=8)
     figure.suptitle("Residual: reading minus prediction")
     return figure
 
 
 def _drivers(e: Experiment) -> list[tuple[str, Floats]]:
-    out = [(f"{c} / mm", e.position[:, i] * MM) for i, c in enumerate("xyz")]
-    out += [(f"f{c} / N", e.wrench[:, i]) for i, c in enumerate("xyz") if e.wrench[:, i].any()]
+    out = [(f"{c}, mm", e.position[:, i] * MM) for i, c in enumerate("xyz")]
+    out += [(f"f{c}, N", e.wrench[:, i]) for i, c in enumerate("xyz") if e.wrench[:, i].any()]
     out += [("order", e.order)] if e.order is not None else []
     out += [("temperature", e.temperature)] if e.temperature is not None else []
     out += (
@@ -155,8 +162,8 @@ def maps(d: Findings) -> Figure:
         size = np.linalg.norm(v, axis=-1) * MM
         limit = {} if title.startswith("difference") else {"vmin": 0.0, "vmax": top}
         shade = ax.pcolormesh(x * MM, y * MM, size, shading="nearest", cmap="viridis", **limit)
-        figure.colorbar(shade, ax=ax, label="|error| / mm")
-        ax.set(title=title, xlabel="x / mm", ylabel="y / mm", aspect="equal")
+        figure.colorbar(shade, ax=ax, label="|error|, mm")
+        ax.set(title=title, xlabel="x, mm", ylabel="y, mm", aspect="equal")
     load = "no force" if not force.any() else "force (" + ", ".join(f"{f:.0f}" for f in force[:3]) + ") N"
     figure.suptitle(f"Error of the TCP over the plane z = {_middle(d.declared)[2] * MM:.0f} mm, {load}")
     return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
 from os import PathLike
@@ -20,11 +21,18 @@ class Diagnosis(Findings):
         """The verdict in five lines."""
         return five_lines(self)
 
-    def report(self, path: str | PathLike[str]) -> None:
-        """Write one self-contained HTML file."""
+    def report(
+        self,
+        path: str | PathLike[str],
+        *,
+        date: str | None = None,
+        inputs: Iterable[str | PathLike[str]] = (),
+    ) -> None:
+        """Write one self-contained HTML file. ``date`` (the caller's, as text) and digests of the files or folders
+        ``inputs`` stand under its provenance."""
         from stiffmap.diagnosis.report.page import write_report  # draws, so it loads matplotlib
 
-        write_report(self, path)
+        write_report(self, path, date=date, inputs=inputs)
 
     def _repr_html_(self) -> str:
         lines = "".join(f"<li>{escape(line)}</li>" for line in self.lines())

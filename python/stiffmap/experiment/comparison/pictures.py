@@ -74,7 +74,7 @@ def _arrows(ax: Any, at: Floats, arrow: Floats, view: tuple[int, int]) -> None:
         angles="xy", scale_units="xy", scale=1, color=COLOUR, width=0.006,
     )  # fmt: skip
     ax.plot(at[:, a], at[:, b], ".", ms=3, color="0.4")
-    ax.set(xlabel=f"{'xyz'[a]} / mm", ylabel=f"{'xyz'[b]} / mm", aspect="equal")
+    ax.set(xlabel=f"{'xyz'[a]}, mm", ylabel=f"{'xyz'[b]}, mm", aspect="equal")
     ax.margins(0.15)
 
 
@@ -112,18 +112,18 @@ def _scatter(ax: Any, r: Residual, channel: int, driver: Driver) -> None:
 
 def _label(r: Residual, channel: int) -> str:
     c = r.experiment.channels[channel]
-    return f"{c.name} / {'µm' if c.unit == 'm' else 'µrad'}"
+    return f"{c.name}, {'µm' if c.unit == 'm' else 'µrad'}"
 
 
 def pose_drivers(e: Experiment) -> list[Driver]:
     """Commanded coordinates; actuator coordinates where they are commanded."""
-    out: list[Driver] = [(f"{c} / mm", e.position[:, i] * MM, []) for i, c in enumerate("xyz")]
+    out: list[Driver] = [(f"{c}, mm", e.position[:, i] * MM, []) for i, c in enumerate("xyz")]
     if e.other is not None:
-        out.append(("distance / mm", np.linalg.norm(e.other - e.position, axis=1) * MM, []))
+        out.append(("distance, mm", np.linalg.norm(e.other - e.position, axis=1) * MM, []))
     for i, c in enumerate(e.command_of):
         assert e.command is not None
         unit, scale = ("mm", MM) if c.unit == "m" else ("deg", 180 / np.pi)
-        out.append((f"{c.joint} / {unit}", e.command[:, i] * scale, []))
+        out.append((f"{c.joint}, {unit}", e.command[:, i] * scale, []))
     return out
 
 
@@ -132,12 +132,12 @@ def force_drivers(e: Experiment) -> list[Driver]:
     if not e.wrench.any():
         return []
     force = e.wrench[:, :3]
-    out: list[Driver] = [(f"f{c} / N", force[:, i], []) for i, c in enumerate("xyz") if force[:, i].any()]
+    out: list[Driver] = [(f"f{c}, N", force[:, i], []) for i, c in enumerate("xyz") if force[:, i].any()]
     moments = [i for i in range(3, 6) if e.wrench[:, i].any()]
-    out += [(f"m{'xyz'[i - 3]} / N·m", e.wrench[:, i], []) for i in moments]
+    out += [(f"m{'xyz'[i - 3]}, N·m", e.wrench[:, i], []) for i in moments]
     if not force.any():
         return out
-    out.append(("size of the force / N", np.linalg.norm(force, axis=1), []))
+    out.append(("size of the force, N", np.linalg.norm(force, axis=1), []))
     return out + _directions(force)
 
 
@@ -147,7 +147,7 @@ def _directions(force: Floats) -> list[Driver]:
     kinds, at = np.unique(ratio, axis=0, return_inverse=True)
     if len(kinds) > MOST_LABELS:
         turn = np.degrees(np.arctan2(force[:, 1], force[:, 0]))
-        return [("direction in the xy plane / deg", turn, [])]
+        return [("direction in the xy plane, deg", turn, [])]
     return [("direction of the force", at.reshape(-1).astype(float), [direction_name(k) for k in kinds])]
 
 
