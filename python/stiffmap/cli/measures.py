@@ -92,7 +92,7 @@ def measures(
 def show(table: MeasuresTable, files: list[str]) -> None:
     """The table as text."""
     console = Console(highlight=False)
-    console.print(as_table(table))
+    console.print(as_table(table, narrow=console.width < WIDE))
     for note in (*table.notes, *remarks(table)):
         console.print(f"[dim]{note}[/dim]", soft_wrap=True)
     if table.requirements.bounds:
@@ -103,14 +103,20 @@ def show(table: MeasuresTable, files: list[str]) -> None:
         console.print(f"wrote {', '.join(files)}", soft_wrap=True)
 
 
-def as_table(table: MeasuresTable) -> Table:
-    """A row per measure."""
+WIDE = 100
+"""Columns of a terminal from which on there is room between those of the table."""
+
+
+def as_table(table: MeasuresTable, narrow: bool = False) -> Table:
+    """A row per measure; narrow: whole within 80 columns."""
     c = table.case
     spans = ", ".join(
         f"{a} {1e3 * lo:.4g}…{1e3 * hi:.4g}" for a, lo, hi in zip("xyz", c.low, c.high, strict=True)
     )
     out = Table(
         box=borders.SIMPLE,
+        padding=(0, 0 if narrow else 1),
+        pad_edge=not narrow,
         title=f"{table.machine.name} over {spans} mm; plane {c.plane}, {c.force:.4g} N",
     )
     for name in ("measure", "worst", "unit", "at (mm)", "best", "required", "margin", ""):
@@ -135,7 +141,7 @@ def cells(r: Row) -> tuple[str, ...]:
         r.measure.name,
         "–" if np.isnan(r.found.worst) else f"{f * r.found.worst:.5g}",
         unit,
-        "" if r.found.worst_at is None else ", ".join(f"{1e3 * v:.0f}" for v in r.found.worst_at),
+        "" if r.found.worst_at is None else " ".join(f"{1e3 * v:.0f}" for v in r.found.worst_at),
         "" if np.isnan(r.found.best) else f"{f * r.found.best:.5g}",
         required(r),
         "" if np.isnan(r.margin) else f"{f * r.margin:+.4g}",

@@ -164,6 +164,9 @@ def _plane(axes, measure: Measure, row: Row, x: Floats, y: Floats, values: Float
         inside = limit is not None and np.nanmin(values) < measure.factor * limit < np.nanmax(values)
         if inside and limit is not None:
             axes.contour(MM * x, MM * y, values.T, levels=[measure.factor * limit], colors=[VERMILLION])
+            told = f"required: {measure.factor * limit:.4g} {measure.shown}".rstrip()
+            axes.plot([], [], color=VERMILLION, label=told)
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.24), frameon=False, fontsize="small")
     else:
         line = values.ravel()
         axes.scatter(

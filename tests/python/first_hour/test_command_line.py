@@ -135,3 +135,21 @@ def test_planes_across_another_axis(capsys: pytest.CaptureFixture[str], tmp_path
     assert "planes across one axis" in capsys.readouterr().err
     assert main(["map", NAME, "--format", "gif"]) == 2
     assert "--format: expected png, svg, pdf" in capsys.readouterr().err
+
+
+def test_a_table_is_whole_on_80_columns(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert (
+        main(["measures", "five-bar", "--only", "transmission_min,transmission_max,velocity", "--nodes", "5"])
+        == 0
+    )
+    rows = [line for line in capsys.readouterr().out.splitlines()[1:] if line.startswith(" ")]
+    assert not any("…" in row for row in rows)
+    assert {row.split()[0] for row in rows if row.strip()} >= {
+        "transmission_min",
+        "transmission_max",
+        "velocity",
+    }
+    assert max(map(len, rows)) <= 80
