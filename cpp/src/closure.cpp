@@ -159,6 +159,15 @@ void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace&
 
 namespace {
 
+constexpr double finite_turn = 0.2;  // rad, or that share of the length
+
+/// Joints that nothing but the closure holds: what a spring resists is no spin.
+void select_free(const Mechanism& m, ClosureWorkspace& ws) {
+  select_unknowns(m, false, ws);
+  const auto sprung = [&](Index j) { return m.coordinates[at(j)].law >= 0; };
+  ws.unknown.erase(std::remove_if(ws.unknown.begin(), ws.unknown.end(), sprung), ws.unknown.end());
+}
+
 /// Null directions of the closure over the passive coordinates, tip held, at the frames of the last residual.
 MatX still_directions(const Mechanism& m, const Target& target, ClosureWorkspace& ws) {
   newton_step(m, target, ws);
@@ -179,7 +188,7 @@ bool still_off_home(const Mechanism& m, ClosureWorkspace& ws, MatX& out) {
   int iterations = 0;
   const bool ok = close(m, Target{}, Pace::damped, ws, x, iterations);
   const Pose tip = ws.frames.at(m.tip);
-  select_unknowns(m, false, ws);
+  select_free(m, ws);
   if (!ok) return false;
   const Target target{&tip};
   residual(m, x, target, ws);
@@ -189,14 +198,29 @@ bool still_off_home(const Mechanism& m, ClosureWorkspace& ws, MatX& out) {
 
 }  // namespace
 
+/// Whether a null direction at home is a finite motion: with one coordinate held elsewhere the others close again.
+bool goes_on(Mechanism& m, const Target& target, const VecX& direction, Index coordinate, ClosureWorkspace& ws) {
+  VecX x = m.home_coordinates;
+  for (std::size_t k = 0; k < ws.unknown.size(); ++k)
+    x[ws.unknown[k]] += finite_turn * m.length / m.unit(ws.unknown[k]) * direction[static_cast<Index>(k)];
+  bool& locked = m.coordinates[at(coordinate)].locked;
+  locked = true;
+  select_free(m, ws);
+  int iterations = 0;
+  const bool ok = close(m, target, Pace::damped, ws, x, iterations) && residual(m, x, target, ws) < round_off;
+  locked = false;
+  select_free(m, ws);
+  return ok;
+}
+
 /// A spin moves passive coordinates and nothing that the closure sees, at home as anywhere: its null
-/// direction stays one where it is turned along, and has its like off home (axes that coincide at home only
+/// direction is the tangent of a finite motion, and has its like off home (axes that coincide at home only
 /// have not: a gimbal lock). One coordinate of it is held.
 void lock_spins(Mechanism& m) {
   ClosureWorkspace ws(m);
   const Target target{&m.home};
   for (;;) {
-    select_unknowns(m, false, ws);
+    select_free(m, ws);
     residual(m, m.home_coordinates, target, ws);
     const MatX still = still_directions(m, target, ws);
     if (still.cols() == 0) return;
@@ -207,12 +231,9 @@ void lock_spins(Mechanism& m) {
       // the direction at home that is nearest to a spin elsewhere
       spin = (still * (still.transpose() * off_home.rightCols<1>())).normalized();
     }
-    const Index n = spin.size();
-    VecX turned = m.home_coordinates;
-    for (Index k = 0; k < n; ++k) turned[ws.unknown[at(k)]] += 0.3 * spin[k];
-    if (residual(m, turned, target, ws) > 1e-9) return;  // singular at home, but no spin
     Index held = 0;
     spin.cwiseAbs().maxCoeff(&held);
+    if (!goes_on(m, target, spin / spin[held], ws.unknown[at(held)], ws)) return;  // singular at home, but no spin
     m.coordinates[at(ws.unknown[at(held)])].locked = true;
   }
 }

@@ -14,6 +14,7 @@ constexpr double shortest_load_step = 1.0 / 16384;
 constexpr double crossing_step = 1.0 / 1024;  // a change of stability is looked at this closely
 constexpr double trusted_bend = 0.1;          // of a load step: its chord against the tangents at its ends
 constexpr double crossing_bend = 1e-3, bend_noise = 1e-9;
+constexpr double balanced = 1e-9;  // merit of an equilibrium, in unit deflections of the machine's stiffness and length
 constexpr int most_load_steps = 400;
 constexpr int patient_steps = 8;
 
@@ -58,6 +59,11 @@ bool leave_gaps(const Mechanism& m, const Problem& p, const Linearization& lin, 
     left = true;
   }
   return left;
+}
+
+/// Forces balance and loops are closed: a vanishing step alone says nothing where the tangent is singular.
+bool in_balance(const Mechanism& m, const EquilibriumWorkspace& ws) {
+  return ws.saddle.merit(ws.lin) < balanced * std::sqrt(m.stiffness) * m.length;
 }
 
 enum class Outcome { converged, failed, distrusted };
@@ -123,6 +129,7 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
         linearize(m, p, state, ws.lin);
         continue;
       }
+      if (!ws.saddle.regular() && !in_balance(m, ws)) return trusting ? Outcome::distrusted : Outcome::failed;
       state.z += ws.dz;
       state.lambda += ws.dlambda;
       return Outcome::converged;
@@ -329,6 +336,7 @@ EquilibriumResult solve_equilibrium(const Mechanism& m, Problem& problem, const 
   linearize(m, problem, state, ws.lin);
   ws.saddle.assemble(m, ws.lin);
   ws.saddle.factorize();
+  if (!in_balance(m, ws)) return out;
   if (out.falling < 0) out.falling = ws.stability.falling(ws.saddle);
   out.status = Status::converged;
   return out;

@@ -298,9 +298,10 @@ void conclude_pose(const Mechanism& m, const PoseInput& in, const EquilibriumRes
   const NodePoint& p = m.points[at(in.read_points.front())];
   const EquilibriumWorkspace& done = ws.equilibrium;
   out.point = point_stiffness(m, done.lin, done.saddle, p.node, p.offset, ws.stiffness);
+  if (out.point.flags & flag::rigid_direction)
+    by_compliance(m, compliance_of(m, p, ws.equilibrium), done.saddle.regular(), out.point);
   ws.spins.release(p, ws.equilibrium, out.point);
   out.flags |= out.point.flags;
-  if (out.flags & flag::rigid_direction) out.point.compliance = compliance_of(m, p, ws.equilibrium);
   const bool nonconservative = ws.problem.has_dead_moment();
   if (nonconservative) out.flags |= flag::nonconservative;
   // No falling direction is enough under any load; a moment may leave some without harm.

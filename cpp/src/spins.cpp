@@ -10,7 +10,9 @@ namespace {
 constexpr double round_off = 1e-11;  // of a moment, against all loads at the machine's length
 constexpr double centred = 1e-9;     // of the length: a spin that moves a body's centre less leaves it
 constexpr double longest_turn = 0.4;
+constexpr double small_turn = 1e-12;
 constexpr int most_turns = 100;
+constexpr int most_polishing = 2;  // steps below the noise that is told from a moment
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -107,6 +109,7 @@ bool Spins::settle(Problem& p, const EquilibriumOptions& options, EquilibriumWor
                    EquilibriumResult& out) {
   EquilibriumOptions near = options;
   near.load_steps = 1;
+  int polished = 0;
   for (int k = 0; k < most_turns; ++k) {
     measure(p, eq);
     const Index n = static_cast<Index>(turning_.size());
@@ -115,15 +118,16 @@ bool Spins::settle(Problem& p, const EquilibriumOptions& options, EquilibriumWor
     const double least = noise(p);
     // Downhill along every eigenvector; from the top of the hill to either side.
     VecX turn = VecX::Zero(n);
-    bool downhill = true;
+    bool downhill = true, at_rest = true;
     for (Index i = 0; i < n; ++i) {
       const double slope = eigen.vectors.col(i).dot(moment_), curve = eigen.values[i];
       if (std::abs(slope) <= least && curve < -1e3 * least) turn += longest_turn * eigen.vectors.col(i);
-      else if (std::abs(slope) > least) turn -= slope / std::max(std::abs(curve), least) * eigen.vectors.col(i);
+      else turn -= slope / std::max(std::abs(curve), least) * eigen.vectors.col(i);
       downhill = downhill && curve > 0;
+      at_rest = at_rest && std::abs(slope) <= least;
     }
     const double size = turn.cwiseAbs().maxCoeff();
-    if (size < 1e-10 && downhill) return true;
+    if (downhill && (size < small_turn || (at_rest && ++polished > most_polishing))) return true;
     if (size > longest_turn) turn *= longest_turn / size;
     for (Index i = 0; i < n; ++i) p.base[turning_[at(i)]] += turn[i];
     for (Index j = 0; j < m_.size(); ++j)
@@ -133,14 +137,14 @@ bool Spins::settle(Problem& p, const EquilibriumOptions& options, EquilibriumWor
     out.iterations += next.iterations;
     if (next.status != Status::converged) return false;
     out.falling = next.falling;
-    if (size < 1e-10) return downhill;
+    if (size < small_turn) return downhill;
   }
   return false;
 }
 
 void Spins::release(const NodePoint& point, EquilibriumWorkspace& eq, StiffnessResult& k) {
   const Index n = static_cast<Index>(turning_.size());
-  if (n == 0 || !k.stiffness.allFinite()) return;
+  if (n == 0 || !(k.stiffness.allFinite() || k.compliance.allFinite())) return;
   MatX J(6, m_.size());
   eq.lin.point_jacobian(m_, point.node, point.offset, J);
   const MatX V = J * motion_;  // twist of the point by a unit of each spin
@@ -154,6 +158,14 @@ void Spins::release(const NodePoint& point, EquilibriumWorkspace& eq, StiffnessR
       const Index j = turning_[at(a)];
       U(a, c) = J(c, j) - (eq.lin.K.row(j) - eq.lin.H.row(j)).dot(eq.dz) + eq.lin.J.col(j).dot(eq.dlambda);
     }
+  }
+  if (!k.stiffness.allFinite()) {  // a rigid direction
+    MatX turned;
+    Lu lu(n);
+    lu.compute(curve_);
+    lu.solve(U, turned);
+    k.compliance += V * turned;
+    return;
   }
   // (C + V S^-1 U)^-1
   const MatX left = curve_ + U * k.stiffness * V, right = U * k.stiffness;

@@ -26,4 +26,8 @@ struct StiffnessWorkspace {
 StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, Index node,
                                 const Vec3& offset, StiffnessWorkspace& ws);
 
+/// Where no stiffness was found by (K1): the same from the compliance C of the force-driven tangent. RIGID_DIRECTION
+/// stays where C, free of noise, has a direction without motion.
+void by_compliance(const Mechanism& m, const Mat6& C, bool regular, StiffnessResult& out);
+
 }  // namespace stiffmap

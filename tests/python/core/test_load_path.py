@@ -32,7 +32,7 @@ def leaning(force: float, lean: float) -> float:
 @pytest.mark.parametrize("side", [1, -1])
 def test_an_imperfect_column_leans_to_its_side(lean: float, side: int, method: str) -> None:
     machine = column()
-    for share in (0.5, 0.9, 0.99, 1.01, 1.1, 1.3):
+    for share in (0.5, 0.9, 0.99, 1 - 1e-9, 1.0, 1 + 1e-9, 1.01, 1.1, 1.3):
         force = share * BUCKLES
         s = machine.solve((0, 0, LENGTH), (side * lean * force, 0, -force, 0, 0, 0), method=method)
         angle = leaning(force, lean)
@@ -40,6 +40,16 @@ def test_an_imperfect_column_leans_to_its_side(lean: float, side: int, method: s
         np.testing.assert_allclose(
             s.displacement[0], side * (LENGTH * np.sin(angle) + lean * force / SHIFT), rtol=1e-6
         )
+
+
+@pytest.mark.parametrize("method", ["reference", "fast"])
+@pytest.mark.parametrize("share", [1 - 1e-9, 1.0, 1 + 1e-9])
+def test_at_the_critical_load_every_number_is_that_of_an_equilibrium(share: float, method: str) -> None:
+    """Exactly upright: indifferent, shorter by F/k, and nothing else."""
+    force = share * BUCKLES
+    s = column().solve((0, 0, LENGTH), (0, 0, -force, 0, 0, 0), method=method)
+    assert s.status in (sm.Status.SINGULAR, sm.Status.UNSTABLE)
+    np.testing.assert_allclose(s.displacement, [0, 0, -force / SHIFT, 0, 0, 0], atol=1e-12)
 
 
 CASES = [

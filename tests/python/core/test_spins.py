@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import builders as b
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
-from stiffmap.description import Body, Joint, Leg, MachineDescription, Offset, Pose
+from stiffmap.description import Body, Joint, Law, Leg, MachineDescription, Offset, Pose
 
 SPAN, MASS, OFF, G = 0.4, 2.0, 0.05, 9.81
 GRAVITY = (0.0, 0.0, -G)
@@ -77,3 +80,43 @@ def test_a_centred_rod_stays_indifferent() -> None:
     m = sm.load_machine("linear-delta")
     s = m.solve((0, 0, 0.3), gravity=GRAVITY)
     assert s.status == sm.Status.CONVERGED and s.flags & sm.Flag.FREE_SPIN
+
+
+def slanted(axes: np.ndarray, sprung: float = 0.0) -> sm.Machine:
+    """The rod of `machine(0.4)`, the coordinates of both its ball joints about other axes (rows): none of them is
+    along the rod. `sprung`: N·m/rad about each axis of the lower ball."""
+    d = machine(0.4).description
+
+    def change(e: object) -> object:
+        if not isinstance(e, Joint):
+            return e
+        law = Law(sprung) if sprung and e.name == "low" else None
+        return replace(e, axes=tuple(tuple(float(v) for v in a) for a in axes), law=law)
+
+    legs = tuple(replace(leg, elements=tuple(change(e) for e in leg.elements)) for leg in d.legs)
+    return sm.Machine(replace(d, legs=legs))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_spin_is_found_about_a_line_that_is_no_axis(seed: int) -> None:
+    axes = Rotation.random(random_state=seed).as_matrix()
+    force = [20.0, -30, 40, 0, 0, 0]
+    expected = machine(0.4).solve((SPAN, 0, 0), force, gravity=GRAVITY)
+    s = slanted(axes).solve((SPAN, 0, 0), force, gravity=GRAVITY)
+    assert s.status == sm.Status.CONVERGED and s.flags == expected.flags
+    np.testing.assert_allclose(s.displacement, expected.displacement, atol=1e-12)
+    scale = np.sqrt(np.outer(*[np.diag(expected.compliance)] * 2))
+    np.testing.assert_allclose(s.compliance / scale, expected.compliance / scale, atol=1e-8)
+    weightless = slanted(axes).solve((SPAN, 0, 0), force)
+    assert weightless.status == sm.Status.CONVERGED and weightless.flags & sm.Flag.FREE_SPIN
+
+
+def test_a_spring_about_the_rod_decides_how_far_it_turns() -> None:
+    """A soft ball resists the spin: the weight turns the rod against it, by the pendulum's own equation."""
+    stiff = MASS * G * OFF  # N·m/rad
+    s = slanted(np.eye(3), stiff).solve((SPAN, 0, 0), gravity=GRAVITY)
+    assert s.status == sm.Status.CONVERGED and not s.flags & sm.Flag.FREE_SPIN
+    turn = s.coordinates[[n.startswith("swing.low") for n in s.coordinate_names]]
+    # about x alone, but for the sag: the weight's moment against the spring
+    angle = brentq(lambda t: stiff * t + MASS * G * OFF * np.cos(0.4 + t), -2, 2)
+    assert turn[0] == pytest.approx(angle, abs=1e-4)

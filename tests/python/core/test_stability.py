@@ -15,11 +15,11 @@ BUCKLES = ROOT / LENGTH  # N, without the guide
 METHODS = ["reference", "fast"]
 
 
-def root(kind: str, stiff: float) -> tuple[Element, ...]:
+def root(kind: str, stiff: float, turn: float = ROOT) -> tuple[Element, ...]:
     """Turns elastically about x and y: by a spring, or by joints between rigid springs."""
     if kind == "spring":
-        return (b.stiff("root", np.diag([stiff, stiff, stiff, ROOT, ROOT, 1e6])),)
-    law = Law(ROOT)
+        return (b.stiff("root", np.diag([stiff, stiff, stiff, turn, turn, 1e6])),)
+    law = Law(turn)
     ball = Joint("root", "universal", (b.AXES["x"], b.AXES["y"]), home=(0.0, 0.0), law=law)
     joints = (
         (ball,) if kind == "universal" else (b.revolute("rx", "x", law=law), b.revolute("ry", "y", law=law))
@@ -27,12 +27,12 @@ def root(kind: str, stiff: float) -> tuple[Element, ...]:
     return (b.stiff("foot", np.diag([stiff] * 6)), *joints)
 
 
-def strut(kind: str, guided: bool) -> sm.Machine:
+def strut(kind: str, guided: bool, guide_stiffness: float = GUIDE, turn: float = ROOT) -> sm.Machine:
     """Upright on its elastic root. A ball joint at its top carries the platform, which the guide holds
     upright; a guide without sideways stiffness only holds its direction."""
-    sideways, stiff = (GUIDE, GUIDE) if guided else (1e-3, 1e7)
+    sideways, stiff = (guide_stiffness, GUIDE) if guided else (1e-3, 1e7)
     column = (
-        *root(kind, stiff),
+        *root(kind, stiff, turn),
         b.shift("strut", (0, 0, LENGTH)),
         b.revolute("tx", "x"),
         b.revolute("ty", "y"),
@@ -56,6 +56,23 @@ def test_a_guided_strut_does_not_buckle(kind: str, method: str, share: float) ->
     # guide and strut side by side: the strut's share falls with the force and goes on below zero
     want = GUIDE + (ROOT / LENGTH - share * BUCKLES) / LENGTH
     np.testing.assert_allclose(np.diag(s.stiffness)[:2], want, rtol=1e-4)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("kind", ["spring", "universal", "revolutes"])
+@pytest.mark.parametrize("turn", [0.1, 10.0, 1e3, 1e5])
+@pytest.mark.parametrize("guide", [1e5, 1e8, 1e11])
+def test_next_to_the_pole_nothing_is_rigid(guide: float, turn: float, kind: str, method: str) -> None:
+    """Stiffness contrasts up to 1e12, loads within 1e-9 of the one at which the strut alone is indifferent."""
+    machine = strut(kind, True, guide, turn)
+    if guide * LENGTH**2 < 100 * turn:
+        pytest.skip("the guide holds no longer what the root does not")
+    for share in (1 - 1e-3, 1 - 1e-6, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-6, 1 + 1e-3, 3.0):
+        force = share * turn / LENGTH
+        s = machine.solve((0, 0, LENGTH), (0.01 * force, 0, -force, 0, 0, 0), method=method)
+        assert s.status == sm.Status.CONVERGED and not s.flags & sm.Flag.RIGID_DIRECTION, share
+        np.testing.assert_allclose(np.diag(s.stiffness)[:2], guide, rtol=0.03)
+        np.testing.assert_allclose(s.stiffness @ s.compliance, np.eye(6), atol=1e-3)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -85,12 +85,14 @@ class Walk:
     x: np.ndarray
     loads: Loads
     energy: Sum
-    used: int = 0
+    names: list[str] = field(default_factory=list)
+    """Of the coordinates, as `Solution.coordinate_names` has them."""
     loops: list[tuple[Frame, Frame]] = field(default_factory=list)
 
-    def take(self) -> tuple[int, float]:
-        self.used += 1
-        return self.used - 1, float(self.x[self.used - 1])
+    def take(self, name: str) -> tuple[int, float]:
+        self.names.append(name.removeprefix("base.").removeprefix("platform."))
+        j = len(self.names) - 1
+        return j, float(self.x[j])
 
 
 def homogeneous(r: np.ndarray, p: Any = (0.0, 0.0, 0.0)) -> np.ndarray:
@@ -130,9 +132,9 @@ def along(elements: Any, f: Frame, walk: Walk, name: str) -> Frame:
             t = e.actual or e.nominal
             f = f.fixed(homogeneous(np.array(t.r), t.p))
         elif isinstance(e, Joint):
-            f = through_joint(e, f, walk)
+            f = through_joint(e, f, walk, f"{name}.{e.name}")
         elif isinstance(e, Spring):
-            f = through_spring(e, f, walk)
+            f = through_spring(e, f, walk, f"{name}.{e.name}")
         elif isinstance(e, Body):
             walk.energy.linear(f, at_point(e.com, -e.mass * walk.loads.gravity))
         elif isinstance(e, Point):
@@ -146,9 +148,9 @@ def along(elements: Any, f: Frame, walk: Walk, name: str) -> Frame:
     return f
 
 
-def through_joint(e: Joint, f: Frame, walk: Walk) -> Frame:
+def through_joint(e: Joint, f: Frame, walk: Walk, name: str) -> Frame:
     laws = e.axis_laws or (e.law,) * len(e.axes)
-    for axis, home, law, rest in zip(e.axes, e.home, laws, e.rest or e.home, strict=True):
+    for i, (axis, home, law, rest) in enumerate(zip(e.axes, e.home, laws, e.rest or e.home, strict=True)):
         if e.actuated and law is None:
             m = np.eye(4)
             if e.kind == "prismatic":
@@ -157,7 +159,7 @@ def through_joint(e: Joint, f: Frame, walk: Walk) -> Frame:
                 m = turned(Frame.base(), axis, home, 0, 0.0).t
             f = f.fixed(m)
             continue
-        j, a = walk.take()
+        j, a = walk.take(name if len(e.axes) == 1 else f"{name}.{i + 1}")
         if law is not None:
             d = a + (home - rest)
             walk.energy.slope[j] += law.stiffness * d + law.cubic * d**3
@@ -166,9 +168,9 @@ def through_joint(e: Joint, f: Frame, walk: Walk) -> Frame:
     return f
 
 
-def through_spring(e: Spring, f: Frame, walk: Walk) -> Frame:
+def through_spring(e: Spring, f: Frame, walk: Walk, name: str) -> Frame:
     """Translation, then rotations about x, y and z in sequence."""
-    taken = [walk.take() for _ in range(6)]
+    taken = [walk.take(f"{name}.{c}") for c in ("tx", "ty", "tz", "rx", "ry", "rz")]
     of, k = [j for j, _ in taken], np.array(e.stiffness)
     walk.energy.slope[of] += k @ (np.array([a for _, a in taken]) - np.array(e.rest))
     walk.energy.curve[np.ix_(of, of)] += k

@@ -1,12 +1,14 @@
 """Stationary energy under closure along a growing load: Newton on the Lagrangian, exact derivatives. A load
 step is accepted only if Newton's steps shrink fast, if no eigenvalue of the reduced Hessian changes its
-sign unless the step is tiny, and if the chord fits the path's tangents at both ends."""
+sign unless the step is tiny, and if the chord fits the path's tangents at both ends. What turns freely without
+load is held on the way, and then let go downhill."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import qr
 
 from stiffmap.description import MachineDescription
 
@@ -17,6 +19,20 @@ SHORTEST = 1 / 8192  # step of the load
 CROSSING = 1 / 1024  # step across a change of stability
 MOST = 80  # load steps tried; beyond, the path is given up as too crooked
 SINGULAR = 1e-9  # smallest singular value of the scaled system; that of a sound machine is near 0.1
+STILL = 1e-9  # motion of the tip beside that of the joints
+LONGEST = 0.3  # rad, of a free turn downhill
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the energy says of a configuration."""
+
+    off: float
+    """Newton's step to the next equilibrium, largest of m and rad."""
+    falling: int
+    """Negative eigenvalues of the energy's Hessian over the motions that keep the loops closed."""
+    lowest: float
+    """The lowest eigenvalue over the largest, coordinates scaled to unit stiffness."""
 
 
 @dataclass(frozen=True)
@@ -24,12 +40,11 @@ class Answer:
     position: np.ndarray
     rotation: np.ndarray
     compliance: np.ndarray
-    """(6, 3): twist of the tip per unit of force."""
+    """(6, 6): twist of the tip per unit of a dead wrench."""
     residual: float
     falling: int
-    """Negative eigenvalues of the energy's Hessian over the motions that keep the loops closed."""
+    """As of `Judgement`."""
     lowest: float
-    """The lowest of them over the largest, coordinates scaled to unit stiffness."""
     crossed: bool
     """The path went through a change of stability."""
     kind: str = "found"
@@ -43,7 +58,7 @@ class Answer:
 
 def nothing(kind: str) -> Answer:
     """No equilibrium."""
-    return Answer(np.full(3, np.nan), np.eye(3), np.full((6, 3), np.nan), np.nan, 0, np.nan, False, kind)
+    return Answer(np.full(3, np.nan), np.eye(3), np.full((6, 6), np.nan), np.nan, 0, np.nan, False, kind)
 
 
 @dataclass(frozen=True)
@@ -58,9 +73,12 @@ class System:
     matrix: np.ndarray
     scale: np.ndarray
 
+    def scaled(self) -> np.ndarray:
+        return np.asarray(self.scale[:, None] * self.matrix * self.scale)
+
     def solve(self, right: np.ndarray) -> np.ndarray:
         s = self.scale.reshape(-1, *[1] * (right.ndim - 1))
-        return np.asarray(s * np.linalg.solve(self.scale[:, None] * self.matrix * self.scale, s * right))
+        return np.asarray(s * np.linalg.solve(self.scaled(), s * right))
 
     def reduced(self) -> np.ndarray:
         """Eigenvalues, rising, of the Hessian over the closed motions, coordinates scaled to unit stiffness."""
@@ -71,6 +89,15 @@ class System:
         rank = int((values > 1e-9 * values.max(initial=1e-300)).sum())
         z = vt[rank:]
         return np.asarray(np.linalg.eigvalsh(z @ h @ z.T))
+
+    def tip_jacobian(self) -> np.ndarray:
+        """(6, n)"""
+        n = len(self.slope)
+        jp, jw = np.zeros((3, n)), np.zeros((3, n))
+        jp[:, self.tip.of] = self.tip.d[:, :3, 3].T
+        w = np.einsum("kab,cb->kac", self.tip.d[:, :3, :3], self.tip.t[:3, :3])  # dR R^T
+        jw[:, self.tip.of] = np.stack([w[:, 2, 1], w[:, 0, 2], w[:, 1, 0]])
+        return np.vstack([jp, jw])
 
 
 @dataclass
@@ -89,14 +116,20 @@ class Oracle:
 
     def __init__(self, description: MachineDescription, loads: Loads) -> None:
         self.d, self.loads = description, loads
-        self.size, self.closures = self._count()
+        self.names, self.loops = self._count()
+        self.size = len(self.names)
+        self.held: dict[int, float] = {}  # coordinates that are kept, and where
 
-    def _count(self) -> tuple[int, int]:
+    @property
+    def closures(self) -> int:
+        return self.loops + len(self.held)
+
+    def _count(self) -> tuple[list[str], int]:
         size = 1
         while True:
             try:
                 walk = whole(self.d, np.zeros(size), self.loads)[1]
-                return walk.used, 6 * len(walk.loops)
+                return walk.names, 6 * len(walk.loops)
             except IndexError:
                 size *= 2
 
@@ -105,9 +138,11 @@ class Oracle:
         tip, walk = whole(self.d, x, loads)
         slope, curve = walk.energy.slope, walk.energy.curve
         stiffness = np.maximum(np.diag(curve).copy(), 1.0)
-        parts = [gap(a, b, m, n) for (a, b), m in zip(walk.loops, multipliers.reshape(-1, 6), strict=True)]
-        values = np.concatenate([np.zeros(0), *[v for v, _, _ in parts]])
-        a = np.vstack([np.zeros((0, n)), *[rows for _, rows, _ in parts]])
+        own = multipliers[: self.loops].reshape(-1, 6)
+        parts = [gap(a, b, m, n) for (a, b), m in zip(walk.loops, own, strict=True)]
+        kept = list(self.held)
+        values = np.concatenate([*[v for v, _, _ in parts], x[kept] - list(self.held.values())])
+        a = np.vstack([*[rows for _, rows, _ in parts], np.eye(n)[kept]])
         curve = sum((c for _, _, c in parts), start=curve)
         matrix = np.block([[curve, a.T], [a, np.zeros((len(a), len(a)))]])
         scale = np.concatenate(
@@ -129,17 +164,16 @@ class Oracle:
 
     def solve(self) -> Answer:
         """Along the path from no load to all of it."""
-        zero = np.zeros(self.size), np.zeros(self.closures)
-        system = self._system(*zero, self.loads.times(0.0))
-        if np.linalg.svd(system.scale[:, None] * system.matrix * system.scale)[1][-1] < SINGULAR:
+        self.held = {}
+        if not self._hold_what_spins():
             return nothing("singular")
-        start = self._newton(*zero, 0.0, ITERATIONS)
+        start = self._newton(np.zeros(self.size), np.zeros(self.closures), 0.0, ITERATIONS)
         if start is None:
             return nothing("ends")
         at, done, share, crossed = self._point(*start, 0.0), 0.0, 1.0, False
         for _ in range(MOST):
             if done == 1:
-                return self._answer(at, crossed)
+                return self._answer(at, crossed) if self._let_go(at) else nothing("given up")
             share = min(share, 1 - done)
             step = self._step(at, done, share)
             if step is None:
@@ -150,6 +184,63 @@ class Oracle:
                 crossed |= step.falling != at.falling
                 at, done, share = step, min(1.0, done + share), 2 * share
         return nothing("given up")
+
+    def judge(self, coordinates: dict[str, float]) -> Judgement:
+        """Of a configuration under all of the loads; `coordinates` count from the description's."""
+        x = np.array([coordinates[name] for name in self.names])
+        self.held = {j: float(x[j]) for j in self.held}
+        system = self._system(x, np.zeros(self.closures), self.loads)
+        s = system.scale[: self.size]
+        multipliers = np.linalg.lstsq((system.jacobian * s).T, -s * system.slope, rcond=None)[0]
+        system = self._system(x, multipliers, self.loads)
+        step = system.solve(-np.concatenate([system.slope, system.closures]))[: self.size]
+        values = system.reduced()
+        return Judgement(float(np.abs(step).max()), int((values < 0).sum()), float(values[0] / values[-1]))
+
+    def _hold_what_spins(self) -> bool:
+        """Without load at home: one coordinate of each free motion that leaves the tip; False if one moves it."""
+        system = self._system(np.zeros(self.size), np.zeros(self.loops), self.loads.times(0.0))
+        _, values, vt = np.linalg.svd(system.scaled())
+        free = (vt[values < SINGULAR] * system.scale)[:, : self.size]
+        if len(free) == 0:
+            return True
+        if np.abs(system.tip_jacobian() @ free.T).max() > STILL * np.abs(free).max():
+            return False
+        self.held = {int(j): 0.0 for j in qr(free, pivoting=True)[2][: len(free)]}
+        return True
+
+    def _let_go(self, at: Point) -> bool:
+        """From the held equilibrium downhill along every spin that the loads turn, until they hang."""
+        for _ in range(200 if self.held else 0):
+            kept = list(self.held)
+            system = self._system(at.x, at.multipliers, self.loads)
+            right = np.zeros((self.size + self.closures, len(kept)))
+            right[self.size + self.loops :] = np.eye(len(kept))
+            moved = system.solve(right)
+            slope = -at.multipliers[self.loops :]
+            curve = -moved[self.size + self.loops :]
+            noise = 1e-12 * float(np.abs(self._load(at.x)).max(initial=0.0))
+            turning = [i for i in range(len(kept)) if abs(slope[i]) > noise or abs(curve[i, i]) > 1e3 * noise]
+            values, vectors = np.linalg.eigh(curve[np.ix_(turning, turning)])
+            down = vectors.T @ slope[turning]
+            turn = -down / np.maximum(np.abs(values), noise)
+            turn[(np.abs(down) <= noise) & (values < 0)] = LONGEST
+            if not turning or (np.abs(turn).max() < 1e-9 and values[0] > 0):
+                for i in turning:
+                    del self.held[kept[i]]
+                multipliers = np.delete(at.multipliers, [self.loops + i for i in turning])
+                polished = self._newton(at.x, multipliers, 1.0)
+                if polished is not None:
+                    at.x, at.multipliers = polished
+                return polished is not None
+            step = vectors @ (turn * min(1.0, LONGEST / np.abs(turn).max()))
+            for i, by in zip(turning, step, strict=True):
+                self.held[kept[i]] += float(by)
+            found = self._newton(at.x + moved[: self.size, turning] @ step, at.multipliers, 1.0, ITERATIONS)
+            if found is None:
+                return False
+            at.x, at.multipliers = found
+        return not self.held
 
     def _step(self, at: Point, done: float, share: float) -> Point | None:
         # the tangent predicts, so that Newton starts from the path's own direction
@@ -183,15 +274,11 @@ class Oracle:
 
     def _answer(self, at: Point, crossed: bool) -> Answer:
         system = self._system(at.x, at.multipliers, self.loads)
-        tip, n = system.tip, self.size
-        jp, jw = np.zeros((3, n)), np.zeros((3, n))
-        jp[:, tip.of] = tip.d[:, :3, 3].T
-        w = np.einsum("kab,cb->kac", tip.d[:, :3, :3], tip.t[:3, :3])  # dR R^T
-        jw[:, tip.of] = np.stack([w[:, 2, 1], w[:, 0, 2], w[:, 1, 0]])
-        moved = system.solve(np.vstack([jp.T, np.zeros((self.closures, 3))]))[:n]
+        jacobian = system.tip_jacobian()
+        moved = system.solve(np.vstack([jacobian.T, np.zeros((self.closures, 6))]))[: self.size]
         left = np.abs(system.slope).max() + np.abs(system.closures).max(initial=0)
-        values = system.reduced()
+        values, tip = system.reduced(), system.tip
         return Answer(
-            tip.t[:3, 3], tip.t[:3, :3], np.vstack([jp, jw]) @ moved, float(left), int((values < 0).sum()),
+            tip.t[:3, 3], tip.t[:3, :3], jacobian @ moved, float(left), int((values < 0).sum()),
             float(values[0] / values[-1]), crossed,
         )  # fmt: skip

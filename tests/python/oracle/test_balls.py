@@ -90,7 +90,7 @@ def machine_with_a_ball(seed: int) -> tuple[MachineDescription, Generator]:
     """Random machines until one has ball joints, all of them free, and is not singular at home."""
     while True:
         generator = Generator(seed)
-        d = generator.machine()
+        d = generator.random_legs()
         balls = [e for leg in d.legs for e in leg.elements if isinstance(e, Joint) and e.kind == "spherical"]
         if balls and all(e.law is None for e in balls) and determined(with_balls(d, in_chart("xyz"))):
             return d, generator
