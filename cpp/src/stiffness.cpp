@@ -9,7 +9,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double pivot_alarm = 1e-5;
-constexpr double safe_pivot = 1e-3;    // of the scaled elastic block
+constexpr double safe_pivot = 1e-3;     // of the scaled elastic block
 constexpr double least_motion = 1e-10;  // beside the largest: below, a compliance is noise
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
