@@ -14,7 +14,9 @@ from stiffmap.compiled import Status
 from stiffmap.description import Body, Joint, Spring
 from stiffmap.description.tree import all_elements
 from stiffmap.files.shipped import find
+from stiffmap.free_motions import direction, free_motions
 from stiffmap.machine import Machine
+from stiffmap.trial import tried
 from stiffmap.units import FORCES, LENGTHS
 from stiffmap.yaml_text import read
 
@@ -32,33 +34,10 @@ def advice(machine: Machine, path: str | PathLike[str]) -> list[str]:
         *_freedoms(machine),
         *_reach(machine),
         *_limits(machine),
-        *_rigid(machine),
+        *(_rigid(machine) or tried(machine).findings),
         *_numbers(machine, path),
         *_rams(machine, path),
     ]
-
-
-def twist_words(twist: Floats, length: float) -> str:
-    """``turn about z`` or ``move along x`` for a twist (6,), m and rad."""
-    v, w = twist[:3], twist[3:]
-    if np.linalg.norm(w) * length > 0.1 * np.linalg.norm(v):
-        moved = " and shift with it" if np.linalg.norm(v) > 0.1 * np.linalg.norm(w) * length else ""
-        return f"turn about {_direction(w)}{moved}"
-    return f"move along {_direction(v)}"
-
-
-def _direction(v: Floats) -> str:
-    u = v / np.linalg.norm(v)
-    main = int(np.argmax(np.abs(u)))
-    if abs(u[main]) > 0.999:
-        return NAMES[main]
-    return f"({', '.join(f'{c:.2g}' for c in u)})"
-
-
-def free_motions(machine: Machine, free_twists: Floats) -> list[str]:
-    """The free twists of a singular pose (6, 6), columns, in words."""
-    columns = [c for c in free_twists.T if np.isfinite(c).all()]
-    return [twist_words(c, machine.compiled.length) for c in columns]
 
 
 def _freedoms(machine: Machine) -> list[str]:
@@ -91,7 +70,7 @@ def _reach(machine: Machine) -> list[str]:
             "components commanded; name those that are, such as task: [x, y]"
         )
     elif lost:
-        towards = f"{'-' if lost[0].sum() < 0 else '+'}{_direction(abs(lost[0]))}"
+        towards = f"{'-' if lost[0].sum() < 0 else '+'}{direction(abs(lost[0]))}"
         out.append(
             f"home lies on the limit of its own reach: {1e3 * TRIAL * length:.3g} mm towards {towards} is "
             "unreachable"

@@ -6,11 +6,13 @@ from numpy.typing import ArrayLike
 
 from stiffmap.branches import Start
 from stiffmap.closing import Kinematics, close_actuators, close_poses
-from stiffmap.machine import Machine
+from stiffmap.compiled import Status
+from stiffmap.machine import Machine, hint_metres, takes_machine
 
 __all__ = ["Kinematics", "forward_kinematics", "inverse_kinematics"]
 
 
+@takes_machine
 def inverse_kinematics(
     machine: Machine,
     position: ArrayLike,
@@ -25,9 +27,12 @@ def inverse_kinematics(
     (docs/conventions.md), which are closed with their actuators held and continued to the pose; None: from
     home. docs/theory.md (C3), (C5).
     """
-    return close_poses(machine.compiled, position, rotation, start, threads)
+    out = close_poses(machine.compiled, position, rotation, start, threads)
+    hint_metres(machine, position, bool((out.status == Status.UNREACHABLE).all()))
+    return out
 
 
+@takes_machine
 def forward_kinematics(
     machine: Machine, actuators: ArrayLike, *, start: Start | None = None, threads: int | None = None
 ) -> Kinematics:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats
-from stiffmap.compiled import CompiledMachine
+from stiffmap.compiled import CompiledMachine, Status
 from stiffmap.derivatives import Prepared, Request, differentiate, prepare, read_requests
 from stiffmap.description import MachineDescription
 from stiffmap.effects import add_effect
@@ -155,10 +155,15 @@ class Machine:
         if options is None and not derivatives and (not given or given in PLAIN):
             one = self._compiled.solve_one(position, wrench)
             if one is not None:
-                return Solution(one, (), self._compiled.names, "tcp")
+                s = Solution(one, (), self._compiled.names, "tcp")
+                if max(abs(v) for v in position) > METRES_TOO_FAR * self._compiled.length:  # type: ignore[union-attr, arg-type]  # plain numbers
+                    hint_metres(self, position, bool(s.status == Status.UNREACHABLE), 3)
+                return s
         call = Call(position, wrench, merged(options, given))
         if not derivatives:
-            return solve_call(self._compiled, call)[0]
+            s = solve_call(self._compiled, call)[0]
+            hint_metres(self, position, bool((s.status == Status.UNREACHABLE).all()), 3)
+            return s
         requests = read_requests(derivatives, derivatives_of)
         ready = self._derivable.get(requests.key, lambda: prepare(self._compiled, requests))
         return differentiate(ready, call, requests)
@@ -262,12 +267,12 @@ def takes_machine(
 METRES_TOO_FAR = 100.0
 
 
-def hint_metres(machine: Machine, position: ArrayLike, failed: bool) -> None:
+def hint_metres(machine: Machine, position: ArrayLike, failed: bool, depth: int = 4) -> None:
     """Warn where every pose failed and lies as far outside as millimetres read as metres do."""
     far = float(np.abs(np.asarray(position, dtype=float)).max(initial=0.0))
     if failed and far > METRES_TOO_FAR * machine.compiled.length:
         warnings.warn(
             f"no pose can be reached: positions up to {far:g} m, the machine measures "
             f"{machine.compiled.length:.2g} m; metres are expected (200 mm is 0.2)",
-            stacklevel=4,
+            stacklevel=depth,
         )

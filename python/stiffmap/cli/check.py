@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -12,6 +12,9 @@ from rich.markup import escape
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.files import FileCheck, check_file
 from stiffmap.home import gap_text
+
+if TYPE_CHECKING:
+    from stiffmap.trial import Trial
 
 MOST_CHANGES = 12
 
@@ -37,7 +40,10 @@ def check(
     if as_json:
         print_json(as_plain(result))
     else:
-        _print(result)
+        from stiffmap.machine import Machine
+        from stiffmap.trial import tried
+
+        _print(result, tried(Machine(result.description)))
     if strict and result.warnings:
         raise typer.Exit(1)
 
@@ -64,7 +70,7 @@ def as_plain(result: FileCheck) -> dict[str, Any]:
     }
 
 
-def _print(result: FileCheck) -> None:
+def _print(result: FileCheck, trial: Trial) -> None:
     # soft_wrap: a path or a count must not be broken when piped
     console = Console(highlight=False, soft_wrap=True)
     machine = result.description
@@ -79,6 +85,11 @@ def _print(result: FileCheck) -> None:
         )
     for effect in machine.effects:
         console.print(f"  effect: {effect.kind} of {effect.element} {' '.join(effect.legs)}")
+    if trial.stiffness is not None:
+        low, high = (f"{1e-6 * v:.2g}" for v in trial.stiffness)
+        console.print(
+            f"  softest direction over the workspace: {low} … {high} N/µm, tried with {trial.force:.2g} N"
+        )
     for warning in result.warnings:
         console.print(f"  [yellow]warning:[/yellow] {escape(warning)}")
     console.print("  [green]usable[/green]")

@@ -10,7 +10,6 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from stiffmap.advice import free_motions
 from stiffmap.cli.inputs import (
     MM,
     EffectsOption,
@@ -29,6 +28,7 @@ from stiffmap.cli.inputs import (
     rotation,
 )
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.free_motions import free_motions
 from stiffmap.solution import Solution
 from stiffmap.status import Flag, Status
 

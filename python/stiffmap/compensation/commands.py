@@ -24,7 +24,7 @@ from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.experiment.prediction.unloaded_state import drive_jacobian
 from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 
 STEPS = 25
 DONE = 1e-10
@@ -96,6 +96,7 @@ class Commands:
             raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
 
 
+@takes_machine
 def compensate(
     machine: Machine,
     position: ArrayLike | None = None,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from os import PathLike
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, as_machine
 from stiffmap.maps.block import solve_block
 from stiffmap.maps.plan import MapPlan
 from stiffmap.maps.request import map_plan
@@ -41,12 +42,12 @@ class MapEstimate:
         )
 
 
-def map_estimate(machine: Machine, **call: Any) -> MapEstimate:
+def map_estimate(machine: Machine | str | PathLike[str], **call: Any) -> MapEstimate:
     """Time, memory and disk of `error_map` with these arguments, from solving a sample of its poses.
 
     Raises StiffmapError for bad input.
     """
-    plan = map_plan(machine, **call)
+    plan = map_plan(as_machine(machine), **call)
     poses = plan.rows * plan.x.size
     each = int(sum(np.dtype(v.dtype).itemsize * int(np.prod(plan.tail(v))) for v in plan.variables))
     per_pose = _times(plan)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from functools import partial
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import xarray as xr
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, as_machine
 from stiffmap.maps.cluster import on_cluster
 from stiffmap.maps.grid_map import at_once, solve_here
 from stiffmap.maps.histogram import RELATIVE_WIDTH, Histogram
@@ -28,7 +29,7 @@ DEFLECTION = re.compile(r"(worst_|best_)?deflection(_xy|_xz|_yz)?")
 
 
 def map_statistics(
-    machine: Machine,
+    machine: Machine | str | PathLike[str],
     *,
     percentiles: Sequence[float] = (50, 95, 99),
     chunk: int | None = None,
@@ -60,7 +61,7 @@ def map_statistics(
     wanted = np.asarray(percentiles, dtype=float)
     if wanted.ndim != 1 or wanted.size == 0 or not ((wanted >= 0) & (wanted <= 100)).all():
         raise StiffmapError(f"percentiles: expected numbers from 0 to 100, got {list(percentiles)}")
-    plan = map_plan(machine, **call)
+    plan = map_plan(as_machine(machine), **call)
     tiles = tiles_of(plan)
     solver = (
         partial(solve_here, poses=at_once(chunk))

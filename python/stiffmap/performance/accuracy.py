@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.broadcasting import Floats
 from stiffmap.kinematics import forward_kinematics
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.inputs import plane_axes
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.scaling import drive_values
@@ -37,6 +37,7 @@ class AccuracyTransmission:
     status: NDArray[np.uint8]
 
 
+@takes_machine
 def accuracy_transmission(
     machine: Machine,
     position: ArrayLike,

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.cells import prove
 from stiffmap.performance.limits import Bounds
 from stiffmap.rotations import as_rotations
@@ -65,6 +65,7 @@ class LargestBox:
         return np.stack([local - self.edges / 2, local + self.edges / 2])
 
 
+@takes_machine
 def largest_box(
     machine: Machine,
     proportions: ArrayLike = (1.0, 1.0, 1.0),

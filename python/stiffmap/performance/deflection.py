@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.inputs import plane_axes
 from stiffmap.performance.poses import box_nodes, read_box
 from stiffmap.status import Status
@@ -41,6 +41,7 @@ class WorstDeflection:
     linear: bool
 
 
+@takes_machine
 def worst_deflection(
     machine: Machine,
     position: ArrayLike | None = None,

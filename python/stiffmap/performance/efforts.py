@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.inertia import friction_efforts, need_masses, rest_efforts, rigid_dynamics
 from stiffmap.performance.refusal import place_text, refuse_failed
@@ -23,6 +23,7 @@ IMPOSSIBLE = 1e-6
 """Relative part of a motion that the machine cannot do: above it, the trajectory is refused."""
 
 
+@takes_machine
 def drive_efforts(
     machine: Machine,
     trajectory: Trajectory,

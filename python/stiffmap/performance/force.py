@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.broadcasting import Floats
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.inputs import plane_axes
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.inertia import rest_efforts
@@ -39,6 +39,7 @@ class ForceTransmission:
     status: NDArray[np.uint8]
 
 
+@takes_machine
 def force_transmission(
     machine: Machine,
     position: ArrayLike,

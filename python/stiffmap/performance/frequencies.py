@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing, wrench_array
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.inertia import inertias, need_masses
 from stiffmap.rotations import as_rotations
 
@@ -31,6 +31,7 @@ class NaturalFrequencies:
         return np.asarray(self.frequency, dtype=dtype)  # type: ignore[call-overload, no-any-return]
 
 
+@takes_machine
 def natural_frequencies(
     machine: Machine,
     position: ArrayLike,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.poses import box_nodes, read_box
 from stiffmap.performance.registry import Case, Found, Measure, all_measures, get_measure
 from stiffmap.performance.requirements import Bound, Requirements, load_requirements
@@ -97,6 +97,7 @@ class MeasuresTable:
         }
 
 
+@takes_machine
 def measures(
     machine: Machine,
     *,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.broadcasting import Floats
-from stiffmap.machine import Machine
+from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.inputs import plane_axes
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.polygons import Polygon, section_polygon
@@ -45,6 +45,7 @@ class VelocityTransmission:
     flags: NDArray[np.uint32]
 
 
+@takes_machine
 def velocity_transmission(
     machine: Machine,
     position: ArrayLike,
@@ -121,6 +122,7 @@ def singular_values(j: Floats) -> Floats:
     return out
 
 
+@takes_machine
 def velocity_section(
     machine: Machine,
     position: ArrayLike,

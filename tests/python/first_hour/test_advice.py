@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.advice import advice, twist_words
+from stiffmap.advice import advice
 from stiffmap.cli import main
 from stiffmap.files.shipped import machine_folder
 from stiffmap.files.starter import starter_text
+from stiffmap.free_motions import twist_words
+from stiffmap.trial import positions, tried
 
 STARTER = starter_text("m")
 FIVE_BAR = (machine_folder() / "five-bar.yaml").read_text(encoding="utf-8")
@@ -83,3 +85,49 @@ legs:
 """
     (tmp_path / "m.yaml").write_text(text, encoding="utf-8")
     assert any("rigid" in a for a in advice(sm.load_machine(tmp_path / "m.yaml"), tmp_path / "m.yaml"))
+
+
+def test_the_box_is_tried_free_and_loaded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A compliance in the wrong unit, and a machine that loses its hold away from home."""
+    assert main(["check", "five-bar"]) == 0
+    assert "softest direction over the workspace: 0.12 … 0.35 N/µm" in capsys.readouterr().out
+    tripteron = sm.load_machine("tripteron")
+    low, high = tripteron.workspace
+    t = tried(tripteron)
+    p = positions(tripteron)
+    assert len(p) == 28
+    assert (p[1:] > low).all()
+    assert (p[1:] < high).all()
+    soft = [np.linalg.eigvalsh(c[:3, :3])[-1] for c in tripteron.solve(p).compliance]
+    assert t.stiffness == pytest.approx((1 / max(soft), 1 / min(soft)), rel=1e-9)
+    old = "compliance: {k11: 1.0e-7, k22: 6.0e-7"
+    assert old in COLUMN
+    (tmp_path / "m.yaml").write_text(
+        COLUMN.replace(old, "compliance: {k11: 1.0e-7, k22: 6.0e+2"), encoding="utf-8"
+    )
+    found = advice(sm.load_machine(tmp_path / "m.yaml"), tmp_path / "m.yaml")
+    assert any("very soft: 0.0017 N move the tool by 1 mm" in a for a in found), found
+
+
+PENDULUM = """
+name: pendulum
+units: {length: mm, force: N, angle: deg}
+home: {translation: [0, 0, 300]}
+task: [z]
+workspace: {x: [-1, 1], y: [-1, 1], z: [250, 350]}
+legs:
+  a:
+    elements:
+      - {actuator: lift, kind: prismatic, axis: z, home: 0, compliance: 1e-5}
+      - {spring: hinge, stiffness: [1e6, 1e6, 1e6, 0, 1e8, 1e8]}
+      - {offset: arm, translation: [0, 0, 300]}
+"""
+
+
+def test_what_is_free_is_said_in_words(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(PENDULUM, encoding="utf-8")
+    found = advice(sm.load_machine(tmp_path / "m.yaml"), tmp_path / "m.yaml")
+    (said,) = [
+        a for a in found if "the platform can turn about x" in a
+    ]  # of home, once and not for each position
+    assert "although all drives stand still" in said

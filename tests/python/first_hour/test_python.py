@@ -84,3 +84,34 @@ def test_synonyms_find_effects(word: str, kind: str, capsys: pytest.CaptureFixtu
 
 def test_synonyms_are_of_kinds_that_exist() -> None:
     assert set(SYNONYMS) <= set(kinds())
+
+
+def test_metres_are_expected_wherever_positions_are_given() -> None:
+    machine = sm.load_machine("five-bar")
+    for call in (
+        lambda: machine.solve((0.0, 400.0, 0.0)),
+        lambda: machine.solve([[0.0, 400.0, 0.0], [50.0, 400.0, 0.0]], method="reference"),
+        lambda: sm.inverse_kinematics(machine, [0.0, 400.0, 0.0]),
+    ):
+        with pytest.warns(UserWarning, match="metres are expected") as told:
+            call()
+        assert told[0].filename == __file__
+
+
+def test_a_machine_is_a_name_or_a_file_everywhere() -> None:
+    """Every public function whose first argument is a machine takes text as well."""
+    import inspect
+
+    taking = {
+        n: inspect.signature(f)
+        for n in sm.__all__
+        if inspect.isfunction(f := getattr(sm, n)) and "machine" in list(inspect.signature(f).parameters)[:1]
+    }
+    assert len(taking) > 15
+    for name, signature in taking.items():
+        said = str(signature.parameters["machine"].annotation)
+        assert hasattr(getattr(sm, name), "__wrapped__") or "str" in said, name
+    k = sm.inverse_kinematics("five-bar", [0.0, 0.4, 0.0])
+    again = sm.forward_kinematics("five-bar", k.actuators)
+    np.testing.assert_allclose(again.position[:2], [0.0, 0.4], atol=1e-12)
+    assert sm.map_estimate("five-bar", x=[0.0], y=[0.4], z=[0.0], wrench=[1, 0, 0, 0, 0, 0]).poses == 1
