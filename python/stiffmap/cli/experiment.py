@@ -24,8 +24,18 @@ def experiment(
     machine: Annotated[str, typer.Option(help="Declared machine: shipped name or machine file.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the experiment.")],
     quantity: Annotated[
-        str, typer.Option(help="deflection (loaded minus unloaded) or position (measured minus commanded).")
-    ] = "deflection",
+        str | None,
+        typer.Option(
+            help="deflection (loaded minus unloaded) or position (measured minus commanded). "
+            "[default: the instrument's, else deflection]"
+        ),
+    ] = None,
+    instrument: Annotated[
+        str | None,
+        typer.Option(
+            help="What wrote the file: tracker, dial-gauges, ball-bar, iso-9283, or a mapping file."
+        ),
+    ] = None,
     mapped: Annotated[
         list[str] | None,
         typer.Option(
@@ -52,15 +62,20 @@ def experiment(
 
       [cyan]stiffmap experiment new readings.xlsx --machine five-bar -o readings[/cyan]
 
+      [cyan]stiffmap experiment new points.csv --instrument tracker --machine hexapod --noise dx=0.01 -o points[/cyan]
+
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
     from stiffmap.experiment import load_experiment
     from stiffmap.machine import load_machine
     from stiffmap.spreadsheet.convert import understand, write_folder
+    from stiffmap.spreadsheet.instrument import as_readings, load_instrument
     from stiffmap.spreadsheet.sheet import read_sheet
 
     if action != "new":
         raise StiffmapError(f"experiment: expected 'new', got '{action}'")
+    wrote = None if instrument is None else load_instrument(instrument)
+    quantity = quantity or (wrote.quantity if wrote else "deflection")
     if quantity not in ("deflection", "position"):
         raise StiffmapError(f"--quantity: expected deflection or position, got '{quantity}'")
     load_machine(machine)
@@ -68,7 +83,11 @@ def experiment(
         raise FileError("exists already; use --overwrite to replace it", file=str(output / "experiment.yaml"))
     table = read_sheet(file, sheet)
     chosen = {k: v.split("|") for k, v in _pairs(mapped, "map").items()}
-    found = understand(table, chosen, _pairs(unit, "unit"), _numbers(constant, "set"))
+    units, constants = _pairs(unit, "unit"), _numbers(constant, "set")
+    if wrote is not None:
+        table, meant, assumed, constants = as_readings(table, wrote, constants)
+        chosen, units = meant | chosen, assumed | units
+    found = understand(table, chosen, units, constants)
     write_folder(found, table, output, machine, quantity, _numbers(noise, "noise"), f"from {file.name}")
     made = load_experiment(output)
     if as_json:

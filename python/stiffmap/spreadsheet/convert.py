@@ -17,6 +17,8 @@ from stiffmap.yaml_text import text_of
 WORDS = ("id", "setup", "branch")
 POSE = ("x", "y", "z")
 FORCE = ("fx", "fy", "fz")
+POSE2 = ("x2", "y2", "z2")
+COUNTED = ("order", "repeat")
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ def understand(
             sheet.numbers(c.index)  # raises, naming the line
     known = {c.meaning for c in used} | set(constants)
     _ask(sheet, known)
-    named = {c.meaning: _unit(c, units) for c in used if c.meaning not in (*WORDS, "order")}
+    named = {c.meaning: _unit(c, units) for c in used if c.meaning not in (*WORDS, *COUNTED)}
     repeats = max([c.repeat for c in used], default=0) or 1
     header, rows = _rows(sheet, used, constants, repeats)
     return Imported(columns, named, header, rows, repeats, dict(constants),
@@ -87,7 +89,13 @@ def _unit(c: Column, units: Mapping[str, str]) -> str:
             f"--unit {c.meaning}={kind.split(',')[0]}"
         )
     found = known_unit(text)
-    wanted = LENGTHS if c.meaning in (*POSE, "dx", "dy", "dz") else FORCES if c.meaning in FORCE else None
+    wanted = (
+        LENGTHS
+        if c.meaning in (*POSE, *POSE2, "dx", "dy", "dz", "dd")
+        else FORCES
+        if c.meaning in FORCE
+        else None
+    )
     if not found or (wanted is not None and found not in wanted.values()):
         raise StiffmapError(f"column '{c.name}' ({c.meaning}): the unit '{text}' is not one of this quantity")
     return found

@@ -36,7 +36,7 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     *((a, rf"{a}|pos ?_?{a}|{a} ?_?pos|position ?_?{a}|nominal ?_?{a}|soll ?_?{a}|{a} ?soll") for a in "xyz"),
 )  # fmt: skip
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
-READINGS = ("dx", "dy", "dz", "rx", "ry", "rz")
+READINGS = ("dx", "dy", "dz", "rx", "ry", "rz", "dd")
 
 
 @dataclass(frozen=True)
