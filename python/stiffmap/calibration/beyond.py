@@ -19,6 +19,8 @@ from stiffmap.experiment.experiment import Floats
 
 FREE = 100.0
 """Times the standard uncertainty; what goes further is no number of this machine."""
+LIKE = 0.1
+"""Share of the evidence gained within which another unknown is a rival: a model is no better than that."""
 FAR = 3.0
 """Standard uncertainties that a number must be off to be called beyond tolerance."""
 MOST = 4
@@ -66,9 +68,8 @@ def beyond_tolerance(sums: Sums, unknowns: Sequence[Unknown], folds: Sequence[Su
         factor = trial
         which.append(best)
         spread = float(np.sqrt(freed.covariance[best, best])) * FREE
-        rivals = tuple(
-            unknowns[i].name for i in np.argsort(-gains) if i != best and gains[i] > gains[best] - STRONG
-        )
+        enough = gains[best] - max(STRONG, LIKE * gains[best])
+        rivals = tuple(unknowns[i].name for i in np.argsort(-gains) if i != best and gains[i] > enough)
         found.append(Beyond(p.name, value * p.u, spread * p.u, p.unit, float(gains[best]), rivals))
     return BeyondTolerance(tuple(found), tuple(which), factor)
 

@@ -16,6 +16,8 @@ import numpy as np
 from stiffmap.calibration.statistics import Sums
 from stiffmap.experiment.experiment import Integers
 
+LIKE = 0.1
+"""Share of the evidence that all chosen groups gain within which another set is a rival: models are no better."""
 STRONG = 5.0
 """Nats: odds of 150, before which a group or a name is not preferred to another."""
 
@@ -31,7 +33,7 @@ class GroupEvidence:
     """Nats lost when the group is taken out of the full set."""
     unknowns: int
     rivals: tuple[str, ...] = ()
-    """Groups that would explain within `STRONG` nats what this one does."""
+    """Groups that would explain as much (`STRONG` nats, `LIKE`) as this one does."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Choice:
     evidence: float
     groups: tuple[GroupEvidence, ...]
     rivals: tuple[tuple[str, ...], ...] = ()
-    """Sets of groups within `STRONG` nats of the chosen one that do not contain it."""
+    """Sets of groups that explain as much as the chosen one and do not contain it."""
 
 
 def compare(sums: Sums, members: Mapping[str, Sequence[int]], base: Sequence[str] = ()) -> Choice:
@@ -81,7 +83,8 @@ def compare(sums: Sums, members: Mapping[str, Sequence[int]], base: Sequence[str
         else:
             break
     best = known(chosen)
-    rivals = _rivals(known, names, chosen, best)
+    enough = best - max(STRONG, LIKE * (best - known([])))
+    rivals = _rivals(known, names, chosen, enough)
     groups = tuple(
         GroupEvidence(
             n,
@@ -96,7 +99,7 @@ def compare(sums: Sums, members: Mapping[str, Sequence[int]], base: Sequence[str
 
 
 def _rivals(
-    known: Callable[[Sequence[str]], float], names: Sequence[str], chosen: Sequence[str], best: float
+    known: Callable[[Sequence[str]], float], names: Sequence[str], chosen: Sequence[str], enough: float
 ) -> list[tuple[str, ...]]:
     """Sets with one or two chosen groups exchanged for as many others, or left out, that explain as well."""
     out: list[tuple[str, ...]] = []
@@ -107,7 +110,7 @@ def _rivals(
             for new in [c for m in range(k + 1) for c in combinations(others, m)]:
                 trial = tuple(sorted([*kept, *new]))
                 longer = any(set(r) <= set(trial) for r in out)
-                if not longer and best - known(trial) < STRONG:
+                if not longer and known(trial) > enough:
                     out.append(trial)
     return sorted(out, key=lambda t: -known(t))
 

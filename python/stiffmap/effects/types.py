@@ -70,6 +70,9 @@ class EffectType:
         Whether a plan cannot show it: its metrology loop leaves it out, or an unknown frame takes it up.
     behind_platform
         Whether its elements sit between the platform, which may carry the target, and the tool.
+    reverses
+        Whether it shows as itself only where a load changes its sign; under one that never does it reads as a
+        constant offset, and the offset is named before it.
     certified
         Whether it is an error of an instrument whose certificate bounds it.
     signature
@@ -105,6 +108,7 @@ class EffectType:
     signature: Signatures | None = None
     hidden: Callable[[Plan], bool] | None = None
     behind_platform: bool = False
+    reverses: bool = False
     certified: bool = False
     at: ParametersAt | None = None
     derived: Derived | None = None

@@ -23,7 +23,7 @@ BRANCHES = ("", "loading", "unloading")
 PER_ROW = (
     *("ids", "position", "wrench", "reading", "sigma", "rotation", "other", "other_rotation", "command"),
     *("approach", "repeat", "order", "hours", "temperature", "branch", "setup", "points", "load_points"),
-    *("joints", "other_command", "other_joints", "gravity_of", "instrument", "target"),
+    *("joints", "near", "other_command", "other_joints", "gravity_of", "instrument", "target"),
     *("seen", "seen_rotation"),
 )
 """Fields with one entry per row; None or empty where the experiment has none."""
@@ -81,6 +81,10 @@ class Experiment:
     joints: Floats | None = None
     """(n, j) m, rad: coordinates of `joint_names` of the rigid machine at `command`, once `located`."""
     joint_names: tuple[str, ...] = ()
+    near: Floats | None = None
+    """(n, j): where all coordinates `near_names` of the declared rigid machine stand, for machines near it to close
+    from; None: from home."""
+    near_names: tuple[str, ...] = ()
     other_command: Floats | None = None
     """(n, actuators): second command of a distance."""
     other_joints: Floats | None = None

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiffmap.diagnosis.decision.patterns import unit
+from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.summary import rms
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.folds import folds
@@ -36,9 +37,11 @@ def empirical(experiment: Experiment, residual: Floats, sigma: Floats, seed: int
     label, _ = folds(experiment, seed)
     if label.max() == 0:
         return None
+    lengths = metres(experiment.channels)
+    of = lengths & experiment.axis_read if (lengths & experiment.axis_read).any() else experiment.axis_read
     fields = [(_held(experiment, residual, sigma, label, s), s) for s in LENGTHS]
-    field, length = min(fields, key=lambda f: rms((residual - f[0])[:, :3]))
-    return Empirical(rms(residual[:, :3]), rms((residual - field)[:, :3]), length, field)
+    field, length = min(fields, key=lambda f: rms((residual - f[0])[:, of]))
+    return Empirical(rms(residual[:, of]), rms((residual - field)[:, of]), length, field)
 
 
 def _held(e: Experiment, residual: Floats, sigma: Floats, label: Integers, length: float) -> Floats:

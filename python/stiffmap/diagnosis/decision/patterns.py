@@ -14,9 +14,12 @@ import numpy as np
 from scipy.stats import chi2
 
 from stiffmap.diagnosis.search.significance import ALPHA
-from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.channels import HEIGHT
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.whitening import Problem, basis
 
+TOUCHED = 0.1
+"""Share of a height's spread that its sum with the commanded height keeps where the command was the reading."""
 Features = list[tuple[str, Floats]]
 
 
@@ -77,7 +80,7 @@ def _reduction(
 def features(problem: Problem) -> Iterator[tuple[str, Floats]]:
     """Name and (n, p) columns of every pattern."""
     e = problem.experiment
-    x = unit(e.position)
+    x = unit(_free(e))
     n = len(e)
     yield "constant", np.ones((n, 1))
     yield "linear trend over the workspace", x
@@ -98,6 +101,19 @@ def features(problem: Problem) -> Iterator[tuple[str, Floats]]:
         labels = np.unique(e.setup, return_inverse=True)[1]
         yield "set-ups", np.eye(labels.max() + 1)[labels]
     yield "single poses", np.eye(e.groups.max() + 1)[e.groups]
+
+
+def _free(e: Experiment) -> Floats:
+    """(n, 3) m, commanded positions; where a surface was touched, without the coordinate that was the reading."""
+    if HEIGHT not in e.extra:
+        return e.position
+    normal = np.array(e.normal)
+    height = e.position @ normal
+    reading = e.reading[:, e.channels.index(HEIGHT)]
+    if not np.nanstd(reading + height) < TOUCHED * np.nanstd(reading):
+        return e.position
+    along = np.abs(normal) == np.abs(normal).max()
+    return np.asarray(np.where(along, 0.0, e.position - np.outer(height, normal)))
 
 
 def loads(wrench: Floats, x: Floats) -> Iterator[tuple[str, Floats]]:

@@ -37,8 +37,9 @@ def left(d: Findings) -> Figure:
     """What is left of the worst axis over the workspace, and the empirical field that would remove it."""
     assert d.empirical is not None
     names = [c.name for c in d.experiment.channels]
-    named = [p.axis for p in d.unexplained if p.axis in names[:3]]
-    axis = names.index(named[0]) if named else 0
+    seen = [n for n, read in zip(names, d.experiment.axis_read, strict=True) if read]
+    named = [p.axis for p in d.unexplained if p.axis in seen]
+    axis = names.index(named[0] if named else seen[0])
     figure = Figure(figsize=(11, 6.4), layout="constrained")
     at = _pose_means(d.experiment, d.experiment.position) * MM
     shown = [

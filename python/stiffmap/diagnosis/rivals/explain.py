@@ -61,7 +61,7 @@ def _leader(s: Study, search: Search, model: Model, found: list[Rival]) -> Rival
     top = score(model, search.problem)
     equal = [r for r in found if r not in words and top - score(r.model, search.problem) < EQUAL]
 
-    def key(m: Model) -> tuple[int, list[tuple[int, int, int]]]:
+    def key(m: Model) -> tuple[int, list[tuple[int, bool, int, int]]]:
         return m.freedom, sorted(
             coarseness(c, k, s.description) for c, k in zip(m.candidates, m.sizes(), strict=True)
         )

@@ -28,6 +28,8 @@ LEVEL, RARE = 0.01, 1e-3
 ODDS = 100.0
 MARGIN = 30.0
 """Rivals whose -ln p is this much below the chosen effect's are refused without a full fit."""
+LIKE = 0.1
+"""Beside a calibrated machine, whose model is never exact: share of what an effect explains that a rival may miss."""
 SAME, PARALLEL, NESTED = 3.0, 0.1, 1.0
 """Predictions less than 3 standard deviations apart in all readings together are the same to this plan;
 at different places also their signatures must agree in 99 % of their squares. Less than one apart, a
@@ -67,11 +69,13 @@ def rivals(search: Search, model: Model, classes: Sequence[AliasClass], number: 
         reduced = fit(model.without(i), search.predictor, search.problem)
         if not reduced.usable:
             continue
-        for f in additions(search, reduced, number, MARGIN):
+        explained = max(reduced.chi2 - model.chi2, 0.0)
+        margin = MARGIN if search.problem.uncertain is None else max(MARGIN, 0.5 * LIKE * explained)
+        for f in additions(search, reduced, number, margin):
             new = f.model.candidates[-1]
             if new == replaced or new in longer.get(replaced, set()) or not f.model.usable:
                 continue
-            rival = compare(search, model, i, f.model, float(np.sqrt(max(reduced.chi2 - model.chi2, 0.0))))
+            rival = compare(search, model, i, f.model, float(np.sqrt(explained)))
             if f.minus_log_p > search.threshold and stays(search, model, rival):
                 found.append(rival)
     return sorted(found, key=lambda r: -r.p)
@@ -97,6 +101,9 @@ def stays(search: Search, model: Model, rival: Rival) -> bool:
     if rival.model.freedom > model.freedom and rival.gap < NESTED:
         return two_words(model.candidates[rival.replaces], rival.candidate)
     if rival.same and two_words(model.candidates[rival.replaces], rival.candidate):
+        return True
+    beside_calibration = search.problem.uncertain is not None
+    if beside_calibration and rival.model.chi2 - model.chi2 < LIKE * rival.size**2:
         return True
     if p_of_loss(model, rival, search.problem.freedom) < RARE:
         return False

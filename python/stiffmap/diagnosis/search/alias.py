@@ -79,9 +79,14 @@ def same_way(screen: Screen, i: int, j: int) -> bool:
     return bool(float(screen.columns(i)[:, 0] @ screen.columns(j)[:, 0]) * a.sign[0] * b.sign[0] > 0)
 
 
-def coarseness(candidate: Candidate, rank: int, description: MachineDescription) -> tuple[int, int, int]:
-    """Sort key: fewest parameters, then drive, then whole link or body, joint, single entry; then kind."""
-    return (rank, _part(candidate.element, description), registry.kinds().index(candidate.kind))
+def coarseness(
+    candidate: Candidate, rank: int, description: MachineDescription
+) -> tuple[int, bool, int, int]:
+    """Sort key: fewest parameters, constant before what a reversal of load would show, then drive, then whole
+    link or body, joint, single entry; then kind."""
+    kind = candidate.kind
+    part = _part(candidate.element, description)
+    return (rank, registry.get(kind).reverses, part, registry.kinds().index(kind))
 
 
 def _part(element: str, description: MachineDescription) -> int:

@@ -34,6 +34,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 EFFECT = EffectType(
     kind="dead_zone",
     precedence=20,
+    reverses=True,
     title="backlash of a drive, gap in a joint or a spring's direction",
     doc=(
         "A gap in series with the spring of a drive, an elastic joint or an uncoupled direction of a link spring (element `foot.k22`): no force while the deflection is within the half width "

@@ -53,6 +53,7 @@ def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> 
 EFFECT = EffectType(
     kind="friction",
     precedence=60,
+    reverses=True,
     title="dry friction of a drive, an elastic joint or a spring's direction",
     doc=(
         "Coulomb friction beside the spring of a drive, an elastic joint or an uncoupled direction of a link spring "

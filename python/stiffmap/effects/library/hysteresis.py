@@ -73,6 +73,7 @@ def nowhere(description: MachineDescription) -> list[Place]:
 EFFECT = EffectType(
     kind="hysteresis",
     precedence=70,
+    reverses=True,
     title="friction, play and stiffening of a drive along a sequence of loads",
     doc=(
         "Rows in order of time; a set-up starts afresh. The force s that the drive's spring feels follows the drive's "

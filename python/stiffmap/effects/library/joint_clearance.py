@@ -60,6 +60,7 @@ def _axis_first(axis: NDArray[np.float64]) -> NDArray[np.float64]:
 EFFECT = EffectType(
     kind="joint_clearance",
     precedence=240,
+    reverses=True,
     title="clearance of pins",
     doc=(
         "Radial play of revolute joints: a gap of ± `radius` in each of the two directions across the axis "

@@ -41,6 +41,7 @@ def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> 
 EFFECT = EffectType(
     kind="joint_friction",
     precedence=250,
+    reverses=True,
     title="dry friction of a passive joint",
     doc=(
         "Coulomb friction about each axis of a free passive joint, level L, against its motion q from the commanded "

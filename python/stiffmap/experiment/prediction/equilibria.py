@@ -87,6 +87,7 @@ def _pairs(
         rotation=plan.other_rotation,
         command=plan.other_command,
         joints=plan.other_joints,
+        near=None,
     ).rows(rows)
     there, count = motions(machine, second, threads)
     first = bare.rows(rows)
@@ -172,7 +173,10 @@ class Solver:
 def _solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solution:
     """Each row at its pose, or at its joints in the branch in which they are commanded."""
     if plan.joints is None:
-        return machine.solve(plan.position, plan.wrench, options=replace(options, rotation=plan.rotation))
+        known = plan.near is not None and tuple(machine.compiled.names.coordinates) == plan.near_names
+        start = plan.near if known else None
+        options = replace(options, rotation=plan.rotation, start=start)
+        return machine.solve(plan.position, plan.wrench, options=options)
     start = coordinates_of(machine, plan)
     drives = [machine.compiled.names.joints[a] for a in machine.actuators]
     return machine.solve_joints(start[:, drives], plan.wrench, options=replace(options, start=start))
