@@ -14,7 +14,6 @@ import numpy as np
 from scipy.stats import chi2
 
 from stiffmap.diagnosis.search.significance import ALPHA
-from stiffmap.experiment.channels import HEIGHT
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.whitening import Problem, basis
 
@@ -105,11 +104,12 @@ def features(problem: Problem) -> Iterator[tuple[str, Floats]]:
 
 def _free(e: Experiment) -> Floats:
     """(n, 3) m, commanded positions; where a surface was touched, without the coordinate that was the reading."""
-    if HEIGHT not in e.extra:
+    names = [c.name for c in e.channels]
+    if "hh" not in names:
         return e.position
     normal = np.array(e.normal)
     height = e.position @ normal
-    reading = e.reading[:, e.channels.index(HEIGHT)]
+    reading = e.reading[:, names.index("hh")]
     if not np.nanstd(reading + height) < TOUCHED * np.nanstd(reading):
         return e.position
     along = np.abs(normal) == np.abs(normal).max()
