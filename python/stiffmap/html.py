@@ -37,4 +37,8 @@ def machine_html(d: Any, actuators: Sequence[str], points: Sequence[str]) -> str
     effects = "; ".join(f"{e.kind} of {e.element} {' '.join(e.legs)}" for e in d.effects)
     rows.append(("effects", effects or "none"))
     parts = [(f"leg {leg.name}", " → ".join(e.name for e in leg.elements)) for leg in d.legs]
-    return titled(f"{d.name}: {d.title}", table(("", ""), rows), table(("chain", "elements"), parts))
+    return titled(
+        f"{d.name}: {d.title}" if d.title else d.name,
+        table(("", ""), rows),
+        table(("chain", "elements"), parts),
+    )

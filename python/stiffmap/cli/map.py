@@ -30,6 +30,7 @@ from stiffmap.cli.inputs import (
 from stiffmap.cli.map_big import print_estimate, print_statistics
 from stiffmap.cli.map_summary import as_table, failures, summary
 from stiffmap.cli.map_uncertainty import draw_deviations, print_uncertainty, uncertainty_data
+from stiffmap.cli.map_worst import in_words, worst_pose
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
@@ -161,14 +162,18 @@ def map_command(
     band = uncertainty_data(ds, plane) if uncertainty else None
     files += draw_deviations(ds, output, plane) if uncertainty and pictures else []
     rows = summary(ds, plane, MM * tolerance)
+    blame = worst_pose(m, ds, call["gravity"])
     if as_json:
-        data = {"machine": m.name, "rows": rows, "failed": failures(ds), "files": list(map(str, files))}
+        data: dict[str, Any] = {"machine": m.name, "rows": rows, "failed": failures(ds)}
+        data |= {"files": list(map(str, files)), "worst_pose": blame}
         print_json(plain(data if band is None else data | {"uncertainty": band}))
     else:
         console = Console(highlight=False)
         console.print(as_table(ds, rows, plane, tolerance))
         if band is not None:
             print_uncertainty(console, band, plane)
+        if blame is not None:
+            console.print(in_words(blame), soft_wrap=True)
         for name, count in failures(ds).items():
             console.print(f"[yellow]{count} poses: {name}[/yellow]")
         console.print(f"wrote {', '.join(map(str, files))}", soft_wrap=True)
