@@ -16,6 +16,10 @@ Inertia symmetric_inertia(MatX& A, double threshold) {
   const double alpha = (1 + std::sqrt(17.0)) / 8;
   const Index n = A.rows();
   Inertia out;
+  if (!A.allFinite()) {  // numbers overflowed on the way: no pivot can be chosen
+    out.zero = n;
+    return out;
+  }
   const auto swap = [&](Index i, Index j) {
     if (i == j) return;
     A.row(i).swap(A.row(j));

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 LONGEST_WORD, LONGEST_MESSAGE = 400, 3000  # characters
+MOST_PROBLEMS = 20  # shown of one file
 
 
 class StiffmapError(ValueError):
@@ -28,13 +29,16 @@ class FileError(StiffmapError):
 
 
 class FileErrors(FileError):
-    """Several problems of one file, one line each; ``problems`` holds them, the other attributes are those of
-    the first."""
+    """Several problems of one file, one line each and the first twenty of them; ``problems`` holds all, the
+    other attributes are those of the first."""
 
     def __init__(self, problems: Sequence[FileError]) -> None:
         first = problems[0]
         super().__init__(first.reason, file=first.file, line=first.line, key=first.key)
-        self.args = ("\n".join(str(p) for p in problems),)
+        lines = [str(p) for p in problems[:MOST_PROBLEMS]]
+        if len(problems) > MOST_PROBLEMS:
+            lines.append(f"... and {len(problems) - MOST_PROBLEMS} more problems in this file")
+        self.args = ("\n".join(lines),)
         self.problems = tuple(problems)
 
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <Eigen/Eigenvalues>
 #include <boost/test/unit_test.hpp>
+#include <limits>
 
 #include "machines.hpp"
 #include "numeric.hpp"
@@ -45,6 +46,16 @@ void check_inertia(MatX A) {
 }  // namespace
 
 BOOST_AUTO_TEST_SUITE(saddle)
+
+BOOST_AUTO_TEST_CASE(a_matrix_with_nan_has_no_inertia) {
+  for (const Index n : {1, 2, 7}) {
+    MatX A = MatX::Identity(n, n);
+    A(n - 1, 0) = A(0, n - 1) = std::numeric_limits<double>::quiet_NaN();
+    const Inertia got = symmetric_inertia(A, 1e-9);
+    BOOST_TEST(got.zero == n);
+    BOOST_TEST(got.positive + got.negative == 0);
+  }
+}
 
 BOOST_AUTO_TEST_CASE(inertia_agrees_with_eigenvalues) {
   Random random(1);

@@ -12,7 +12,7 @@ struct Inertia {
   Index positive = 0, negative = 0, zero = 0;
 };
 
-/// Inertia of a symmetric matrix by Bunch-Parlett elimination (destroys A).
+/// Inertia of a symmetric matrix by Bunch-Parlett elimination (destroys A); all zero where an entry is not finite.
 Inertia symmetric_inertia(MatX& A, double threshold);
 
 /// Unknowns are z (all coordinates) and the loop wrenches. Fixed coordinates keep a unit row. Scaling

@@ -17,6 +17,8 @@ from stiffmap.units import Dimension, UnitSystem
 from stiffmap.yaml_text import Document, KeyPath
 
 T = TypeVar("T")
+SMALLEST, LARGEST = 1e-60, 1e60
+"""Of a number that is not zero (SI): what lies beyond is a slip of the pen, and its products overflow."""
 
 
 @dataclass
@@ -106,9 +108,15 @@ class Context:
 
     def _converted(self, value: float, dimension: Dimension) -> float:
         try:
-            return self.units.to_si(value, dimension)
+            si = self.units.to_si(value, dimension)
         except OverflowError:
-            self.fail(f"the number is too large: {value}")
+            si = math.inf
+        if not (si == 0.0 or SMALLEST <= abs(si) <= LARGEST):
+            size = "large" if abs(si) > LARGEST else "small"
+            self.fail(
+                f"the number is too {size}: {value} (no machine has it; squares and products must be finite)"
+            )
+        return si
 
     def inverse(self, number: Number, dimension: Dimension, field_name: str) -> float:
         """SI value of 1/number (a stiffness from a compliance); the uncertainty follows to first order."""

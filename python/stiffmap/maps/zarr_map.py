@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -77,11 +78,16 @@ class ZarrMap:
         os.replace(self.folder, out)
 
     def begin(self) -> None:
-        """Write the empty map: metadata and coordinates."""
+        """Write the empty map and an empty journal."""
+        self._frame(self.folder)
+        (self.folder / JOURNAL).write_text("", encoding="utf-8")
+
+    def _frame(self, folder: Path) -> None:
+        """Write metadata and coordinates."""
         package = zarr_package()
         frame = xr.Dataset(coords=self.plan.coords, attrs=self.plan.attrs)
-        zarr_strings(frame).to_zarr(self.folder, mode="w", zarr_format=3, consolidated=False)
-        group = package.open_group(self.folder, mode="r+", zarr_format=3)
+        zarr_strings(frame).to_zarr(folder, mode="w", zarr_format=3, consolidated=False)
+        group = package.open_group(folder, mode="r+", zarr_format=3)
         from zarr.codecs import Crc32cCodec, ZstdCodec
 
         for v in self.plan.variables:
@@ -96,17 +102,16 @@ class ZarrMap:
                 dimension_names=self.plan.dims(v),
                 attributes={k: a.tolist() if isinstance(a, np.ndarray) else a for k, a in v.attrs.items()},
             )
-        (self.folder / JOURNAL).write_text("", encoding="utf-8")
 
     def recover(self) -> None:
         """Take up what an earlier run left.
 
         StiffmapError where it belongs to another map, FileError for a chunk that is damaged.
         """
-        kept = json.loads((self.folder / "zarr.json").read_text(encoding="utf-8"))["attributes"]
-        refuse_another_map(self.folder, kept, self.plan.attrs)
-        for entry in entries(self.folder / JOURNAL):
-            checks = {self.chunk(n, entry["tile"]): value for n, value in entry["crc"].items()}
+        refuse_another_map(self.folder, self._kept_attributes(), self.plan.attrs)
+        self._mend_frame()
+        for line, entry in entries(self.folder / JOURNAL):
+            index, checks = self._checksums(line, entry)
             for path, value in checks.items():
                 if path.exists() and crc(path) != value:
                     raise FileError(
@@ -114,7 +119,43 @@ class ZarrMap:
                         "resume=True (--resume) computes it again",
                         file=str(path),
                     )
-            self.done[entry["tile"]] = all(path.exists() for path in checks)
+            self.done[index] = all(path.exists() for path in checks)
+
+    def _kept_attributes(self) -> dict[str, Any]:
+        path = self.folder / "zarr.json"
+        try:
+            kept = json.loads(path.read_text(encoding="utf-8"))["attributes"]
+            if not isinstance(kept, dict) or not isinstance(json.loads(kept["call"]), dict):
+                raise TypeError
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise FileError(
+                "is damaged: expected the attributes of an unfinished map; without them nobody can tell whose "
+                "tiles these are: start again without resume (--resume)",
+                file=str(path),
+            ) from error
+        return kept
+
+    def _mend_frame(self) -> None:
+        """Metadata and coordinates follow from the plan: what is damaged is written again."""
+        with tempfile.TemporaryDirectory(dir=self.folder.parent, prefix=f"{self.folder.name}.") as place:
+            fresh = Path(place) / "frame"
+            self._frame(fresh)
+            for path in fresh.rglob("*"):
+                target = self.folder / path.relative_to(fresh)
+                if path.is_file() and not (target.is_file() and target.read_bytes() == path.read_bytes()):
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    shutil.copyfile(path, target)
+
+    def _checksums(self, line: int, entry: Any) -> tuple[int, dict[Path, int]]:
+        """Tile and checksums of its chunks by a line of the journal."""
+        try:
+            index, checks = entry["tile"], entry["crc"]
+            known = isinstance(index, int) and 0 <= index < self.tiles.count
+            if not known or set(checks) != {v.name for v in self.plan.variables}:
+                raise ValueError
+            return index, {self.chunk(n, index): value for n, value in checks.items()}
+        except (KeyError, TypeError, ValueError) as error:
+            raise damaged_line(self.folder / JOURNAL, line) from error
 
 
 def zarr_package() -> Any:
@@ -131,10 +172,24 @@ def crc(path: Path) -> int:
     return zlib.crc32(path.read_bytes())
 
 
-def entries(journal: Path) -> Iterator[dict[str, Any]]:
-    """Complete lines of the journal; the last one may have been cut off."""
-    for line in journal.read_text(encoding="utf-8").split("\n")[:-1]:
-        yield json.loads(line)
+def entries(journal: Path) -> Iterator[tuple[int, Any]]:
+    """Complete lines of the journal by their numbers; the last one may have been cut off."""
+    lines = journal.read_bytes().split(b"\n")[:-1]
+    for number, line in enumerate(lines, 1):
+        try:
+            yield number, json.loads(line)
+        except ValueError as error:
+            raise damaged_line(journal, number) from error
+
+
+def damaged_line(journal: Path, line: int) -> FileError:
+    """What is said of a line that this program did not write."""
+    return FileError(
+        "is damaged: expected a tile and the checksums of its chunks; delete this line, and resume=True "
+        "(--resume) computes its tile again",
+        file=str(journal),
+        line=line,
+    )
 
 
 @contextmanager
@@ -165,8 +220,11 @@ def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> Iterator[ZarrMap
     zarr_package()
     with only_job(folder):
         out = ZarrMap(plan, folder, tiles_of(plan))
-        if resume and (folder / JOURNAL).exists():
-            out.recover()
-        else:
-            out.begin()
+        try:
+            if resume and (folder / JOURNAL).exists():
+                out.recover()
+            else:
+                out.begin()
+        except OSError as error:
+            raise FileError(f"cannot be written: {error.strerror or error}", file=str(folder)) from error
         yield out

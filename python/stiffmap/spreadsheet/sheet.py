@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import re
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from stiffmap.errors import FileError, MissingPartError
 EXCEL = (".xlsx", ".xlsm")
 NOTHING = {"", "-", "--", "–", "na", "n/a", "n.a.", "nan", "none", "null", "#n/a"}
 COMMENTS = ("#", "%", "//")
+LONGEST_HEADER, MOST_COLUMNS = 300, 1000
 SEPARATORS = ";\t|,"
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+")
 """``1.000`` is a thousand in a table with decimal commas."""
@@ -78,10 +80,18 @@ def read_sheet(path: Path, sheet: str | None = None) -> Sheet:
     if start is None:
         raise FileError("no header line with rows of numbers below it was found", file=str(path))
     header = [re.sub(r"\s+", " ", c.strip()) for c in kept[start - 1][1]]
+    endless = next((c for c in header if len(c) > LONGEST_HEADER), None)
+    if endless is not None or len(header) > MOST_COLUMNS:
+        what = f"{len(header)} columns" if endless is None else f"one of {len(endless)} characters"
+        raise FileError(
+            f"expected a header of at most {MOST_COLUMNS} columns of {LONGEST_HEADER} characters each; found {what}",
+            file=str(path),
+            line=kept[start - 1][0],
+        )
     width = max(i for i, c in enumerate(header) if c) + 1
     rows = [(n, tuple(x.strip() for x in (*c, *[""] * width)[:width])) for n, c in kept[start:]]
     names = [h or f"column {i + 1}" for i, h in enumerate(header[:width])]
-    twice = sorted({h for h in names if names.count(h) > 1})
+    twice = sorted(h for h, n in Counter(names).items() if n > 1)
     if twice:
         raise FileError(f"column '{twice[0]}' occurs twice", file=str(path), line=kept[start - 1][0])
     return Sheet(str(path), tuple(names), tuple(r for _, r in rows), tuple(n for n, _ in rows), comma)
@@ -110,8 +120,11 @@ def _text(path: Path) -> list[tuple[int, list[str]]]:
     sample = [line for line in text.splitlines() if line.strip() and not line.strip().startswith(COMMENTS)]
     counts = {s: sum(line.count(s) > 0 for line in sample) for s in SEPARATORS}
     best = max(SEPARATORS, key=lambda s: (counts[s] > len(sample) / 2, -SEPARATORS.index(s)))
-    reader = csv.reader(io.StringIO(text), delimiter=best)
-    return [(reader.line_num, row) for row in reader]
+    reader = csv.reader(io.StringIO(text.replace("\r\n", "\n").replace("\r", "\n")), delimiter=best)
+    try:
+        return [(reader.line_num, row) for row in reader]
+    except csv.Error as error:
+        raise FileError(f"is no table: {error}", file=str(path), line=reader.line_num) from error
 
 
 def _decoded(raw: bytes) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from machine_text import BASE, ELEMENTS, changed, description, with_element
 
-from stiffmap.errors import FileError, StiffmapError, UnknownMachineError
+from stiffmap.errors import FileError, FileErrors, StiffmapError, UnknownMachineError
 from stiffmap.files import load_description
 
 
@@ -179,3 +179,21 @@ def test_numbers_that_units_carry_beyond_double() -> None:
 
 def test_leg_called_base() -> None:
     assert "cannot be a leg's name" in message(BASE.replace("  a:\n", "  base:\n"))
+
+
+def test_a_wrong_value_beside_an_unknown_key_is_told_as_well() -> None:
+    with pytest.raises(FileErrors) as caught:
+        description(
+            BASE.replace("gravity:", "gravitty:").replace("compliance: 1", "compliance: x") + "zzz: 1\n"
+        )
+    told = [str(p) for p in caught.value.problems]
+    assert len(told) == 2, told
+
+
+def test_twenty_problems_are_told_and_the_rest_counted() -> None:
+    with pytest.raises(FileErrors) as caught:
+        description(BASE + "".join(f"wrong{i}: 1\n" for i in range(50)))
+    assert len(caught.value.problems) == 50
+    lines = str(caught.value).split("\n")
+    assert len(lines) == 21
+    assert lines[-1] == "... and 30 more problems in this file"

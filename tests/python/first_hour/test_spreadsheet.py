@@ -141,3 +141,20 @@ def test_pieces() -> None:
 def test_the_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(sm.StiffmapError, match="cannot be read"):
         read_sheet(tmp_path / "no.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x,y,dx\n1,2," + "9" * 200_000 + "\n", "line 2: is no table: field larger"),
+        (
+            "x,y," + "d(" * 5000 + "\n1,2,3\n",
+            "at most 1000 columns of 300 characters each; found one of 10000",
+        ),
+        ("x," * 5000 + "y\n" + "1," * 5000 + "2\n", "found 5001 columns"),
+    ],
+)
+def test_endless_cells_are_refused_at_once(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    with pytest.raises(sm.StiffmapError, match=words):
+        read_sheet(tmp_path / "t.csv")

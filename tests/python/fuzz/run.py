@@ -15,6 +15,7 @@ import signal
 import sys
 import tempfile
 import time
+import warnings
 from collections import Counter
 from pathlib import Path
 from types import FrameType
@@ -43,6 +44,7 @@ def main() -> int:
     given = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     signal.signal(signal.SIGPROF, _hang)
+    warnings.simplefilter("error", RuntimeWarning)
     kinds = list(TARGETS) if given.kind == "all" else [given.kind]
     return int(sum(campaign(k, given.seed, given.count) for k in kinds) > 0)
 
@@ -85,7 +87,7 @@ def attempt(target: Target, text: str, folder: Path) -> str:
         target.run(text, folder)
     except StiffmapError as error:
         message = str(error)
-        return "refused" if message and len(message) < 4000 else f"message of {len(message)} characters"
+        return "refused" if message and len(message) < 8000 else f"message of {len(message)} characters"
     except Hang:
         return f"hang: more than {SECONDS:g} s"
     except BaseException as error:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import atexit
 import shutil
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +18,10 @@ import stiffmap as sm
 from stiffmap.experiment import load_experiment
 from stiffmap.link.linkfile import load_link
 from stiffmap.link.readers import read_field
+from stiffmap.maps import tiles
+from stiffmap.maps.zarr_map import ZarrMap
+from stiffmap.spreadsheet.convert import understand, write_folder
+from stiffmap.spreadsheet.sheet import read_sheet
 from stiffmap.urdf.importing import import_urdf
 
 ROOT = Path(__file__).parents[3]
@@ -67,6 +76,80 @@ def _urdf(text: str, folder: Path) -> None:
     import_urdf(path, None, meshes=False)
 
 
+def _sheet(text: str, folder: Path) -> None:
+    path = folder / "readings.csv"
+    path.write_text(text, encoding="utf-8", errors="surrogatepass")
+    sheet = read_sheet(path)
+    found = understand(sheet, {}, {"x": "mm", "y": "mm", "z": "mm", "dx": "mm"}, {"fx": 300.0})
+    write_folder(found, sheet, folder / "out", "orthoglide-revised", "deflection", {"dx": 0.01}, "")
+    load_experiment(folder / "out")
+
+
+def _zarr(text: str, folder: Path) -> None:
+    name, _, content = text.partition("\n")
+    shutil.copytree(_zarr_maps()[1], folder / "m.zarr.partial")
+    victim = folder / "m.zarr.partial" / name
+    if name in tree(_zarr_maps()[1]):
+        victim.write_bytes(content.encode("latin-1", "replace"))
+    with _tiles_of_one_row():
+        sm.error_map(*_zarr_call()[0], **_zarr_call()[1], out=folder / "m.zarr", resume=True).close()
+    assert tree(folder / "m.zarr") == tree(_zarr_maps()[0]), "another map than an uninterrupted one"
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    """Bytes of all files of a folder."""
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+@cache
+def _zarr_call() -> tuple[tuple[sm.Machine], dict[str, Any]]:
+    grid = {"x": [0.0, 0.1], "y": [0.0, 0.1, 0.2], "z": [0.0]}
+    return (sm.load_machine("orthoglide-revised"),), {**grid, "wrench": [300.0, 0, 0, 0, 0, 0], "plane": None}
+
+
+@contextmanager
+def _tiles_of_one_row() -> Iterator[None]:
+    usual, tiles.TILE_POSES = tiles.TILE_POSES, 2
+    try:
+        yield
+    finally:
+        tiles.TILE_POSES = usual
+
+
+class PowerCut(Exception):
+    """Stands for one."""
+
+
+@cache
+def _zarr_maps() -> tuple[Path, Path]:
+    """A finished map, and one that was cut off after two of its three tiles."""
+    place = Path(tempfile.mkdtemp())
+    atexit.register(shutil.rmtree, place, ignore_errors=True)
+    machine, call = _zarr_call()
+    put, count = ZarrMap.put, iter(range(2))
+
+    def failing(self: ZarrMap, index: int, values: dict[str, Any]) -> None:
+        if next(count, None) is None:
+            raise PowerCut
+        put(self, index, values)
+
+    with _tiles_of_one_row():
+        sm.error_map(*machine, **call, out=place / "m.zarr").close()
+        ZarrMap.put = failing  # type: ignore[method-assign]
+        try:
+            sm.error_map(*machine, **call, out=place / "n.zarr", threads=1)
+        except PowerCut:
+            pass
+        finally:
+            ZarrMap.put = put  # type: ignore[method-assign]
+    return place / "m.zarr", place / "n.zarr.partial"
+
+
+def _zarr_seeds() -> list[str]:
+    """Name of a file, then its bytes."""
+    return [f"{name}\n{raw.decode('latin-1')}" for name, raw in tree(_zarr_maps()[1]).items()]
+
+
 def _copy(name: str, folder: Path) -> None:
     for path in (EXPERIMENTS / name).iterdir():
         shutil.copy(path, folder / path.name)
@@ -98,6 +181,12 @@ URDF = """<robot name="arm"><link name="base"/><link name="a"/><link name="tool"
 <limit lower="0" upper="1" effort="9" velocity="2"/></joint></robot>
 """
 
+SHEETS = (
+    "Messung 12;;;\nX [mm];Y [mm];Z [mm];Uhr 1 [µm];Uhr 2 [µm]\n0;0;0;12,5;12,7\n10;0;0;13,5;n/a\n20;5,5;0;14;14,2\n",
+    "# dial gauge\nx,y,z,dx,dy,dz,note\n1,2,3,0.01,0.02,0.03,a\n2,2,3,0.01,0.02,0.03,b\n",
+    "x\ty\tz\tdx\n1\t2\t3\t0.1\n4\t5\t6\t-0.1\n",
+)
+
 TARGETS = {
     "machine": Target(lambda: [p.read_text() for p in sorted(MACHINES.glob("*.yaml"))], _machine),
     "experiment": Target(
@@ -107,4 +196,6 @@ TARGETS = {
     "field": Target(_field_seed, _field),
     "link": Target(_link_seed, _link),
     "urdf": Target(lambda: [URDF], _urdf),
+    "sheet": Target(lambda: list(SHEETS), _sheet),
+    "zarr": Target(_zarr_seeds, _zarr),
 }

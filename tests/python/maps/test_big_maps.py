@@ -171,6 +171,44 @@ def test_a_damaged_chunk_is_named_and_can_be_computed_again(
     assert tree(out) == whole
 
 
+@pytest.mark.parametrize(
+    "bad", [b"{", b"[]", b'{"tile": 99, "crc": {}}', b'{"tile": true, "crc": {}}', b"\xff"]
+)
+def test_a_damaged_line_of_the_journal_is_named(
+    machine: sm.Machine, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bad: bytes
+) -> None:
+    out = tmp_path / "m.zarr"
+    journal = half_done(machine, out, monkeypatch) / "journal.jsonl"
+    lines = journal.read_bytes().split(b"\n")
+    journal.write_bytes(b"\n".join([lines[0], bad, *lines[2:]]))
+    with pytest.raises(sm.StiffmapError, match=r"journal.jsonl, line 2: is damaged.*delete this line"):
+        sm.error_map(machine, **CALL, out=out, resume=True)
+    journal.write_bytes(b"\n".join([lines[0], *lines[2:]]))
+    sm.error_map(machine, **CALL, out=out, resume=True).close()
+    assert tree(out) == whole
+
+
+@pytest.mark.parametrize("name", ["deflection/zarr.json", "x/zarr.json", "y/c/0"])
+def test_damaged_metadata_are_written_again(
+    machine: sm.Machine, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    out = tmp_path / "m.zarr"
+    path = half_done(machine, out, monkeypatch) / name
+    path.write_bytes(path.read_bytes()[:-9].replace(b"12", b"13"))
+    sm.error_map(machine, **CALL, out=out, resume=True).close()
+    assert tree(out) == whole
+
+
+@pytest.mark.parametrize("text", ["", "{", '{"attributes": 3}', '{"attributes": {"call": "{"}}'])
+def test_a_map_whose_call_is_lost_is_not_taken_up(
+    machine: sm.Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
+    half = half_done(machine, tmp_path / "m.zarr", monkeypatch)
+    (half / "zarr.json").write_text(text)
+    with pytest.raises(sm.StiffmapError, match=r"zarr.json: is damaged.*without resume"):
+        sm.error_map(machine, **CALL, out=tmp_path / "m.zarr", resume=True)
+
+
 def test_a_full_disk_loses_nothing(
     machine: sm.Machine, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -213,7 +213,7 @@ def whole(table: Table, column: str) -> Integers | None:
     if column not in table:
         return None
     values = table.numbers(column)
-    wrong = np.flatnonzero(values != np.round(values))
+    wrong = np.flatnonzero((values != np.round(values)) | (np.abs(values) > 2**53))
     if wrong.size:
         raise FileError(
             f"column '{column}': expected whole numbers", file=table.file, line=table.lines[wrong[0]]

@@ -82,12 +82,13 @@ def _unknown_key(key: str, known: list[str], data: Any) -> InitErrorDetails:
 
 def _once_more(error: Any) -> InitErrorDetails:
     """A problem that has been found, to be raised with others."""
+    sort: str | PydanticCustomError = error["type"]
     context = error.get("ctx", {})
     try:
-        sort: Any = PydanticKnownError(error["type"], context)
-    except KeyError:
+        PydanticKnownError(error["type"], context)
+    except (KeyError, TypeError):
         sort = PydanticCustomError(error["type"], "{message}", {**context, "message": error["msg"]})
-    return InitErrorDetails(type=sort, loc=error["loc"], input=error["input"])
+    return InitErrorDetails(type=sort, loc=error["loc"], input=error["input"], ctx=context)
 
 
 def _as_name(value: Any) -> Any:

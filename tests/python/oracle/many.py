@@ -1,0 +1,256 @@
+"""Solve many random cases and verify every answer by free bodies (`statics`), or see that it is flagged.
+
+    python -m tests.python.oracle.many --count 10000000 [--machine NAME ...] [--out many.jsonl] [--jobs 2]
+
+Machines x effects x poses in, on and beyond the workspace x loads from nothing to buckling x load types x gravity. An
+answer CONVERGED must balance to 1e-6 of the largest force in the machine, close to 1e-6 of its size, and have moved its
+TCP by the displacement that it states; every other status must come without numbers. Batches are written to --out as
+they end; the same command goes on where it was stopped. Exit code 1 where an answer is wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+from tests.python.oracle.statics import Case, balance, closed, coordinates
+
+import stiffmap as sm
+
+BATCH = 2000
+FORCE, CLOSURE, MOTION = 1e-6, 1e-6, 1e-6
+EFFECTS: dict[str, dict[str, object]] = {
+    "as declared": {},
+    "dead_zone": {"half_width": 2e-5},
+    "friction": {"force": 20.0, "branch": "loading"},
+    "hardening": {"cubic": 1e13},
+    "length": {"error": 3e-4},
+    "tilt": {"angle_x": 2e-3, "angle_y": -1e-3},
+    "straightness": {"amplitude": 4e-5, "period": 0.3, "phase": 0.4},
+    "position_offset": {"error": 2e-4},
+    "zero_offset": {"error": 3e-4},
+    "periodic_error": {"amplitude": 3e-5, "period": 0.02, "phase": 0.3},
+    "lead_error": {"slope": 2e-4},
+    "joint_friction": {"torque": 0.2, "branch": "loading"},
+    "joint_compliance": {"translation": 1e-9, "rotation": 1e-7},
+    "compliance": {"scale": 1.7},
+    "bilinear": {"ratio": 0.5, "force": 100.0},
+    "position_dependent_compliance": {"slope": 0.3},
+}
+
+
+@dataclass(frozen=True)
+class Batch:
+    """One call of `Machine.solve`."""
+
+    machine: str
+    effect: str
+    seed: int
+
+
+def batches(machines: list[str], count: int) -> Iterator[Batch]:
+    """As many as make `count` solves, machines and effects in turn."""
+    made = seed = 0
+    while made < count:
+        for name in machines:
+            for effect in EFFECTS:
+                if made >= count:
+                    return
+                yield Batch(name, effect, seed)
+                made += BATCH
+        seed += 1
+
+
+def changed(machine: sm.Machine, effect: str) -> sm.Machine | None:
+    """The machine with an effect on every element that takes it; None where none does."""
+    if effect == "as declared":
+        return machine
+    names = {n for leg in machine.description.legs for n in element_names(leg.elements)}
+    out, found = machine, 0
+    for name in sorted(names):
+        try:
+            out, found = out.with_effect(effect, element=name, **EFFECTS[effect]), found + 1  # type: ignore[arg-type]
+        except sm.StiffmapError:
+            continue
+    return out if found else None
+
+
+def element_names(elements: object) -> Iterator[str]:
+    """Of a chain, those inside its blocks too."""
+    for e in elements:  # type: ignore[attr-defined]
+        if hasattr(e, "branches"):
+            for branch in e.branches:
+                yield from element_names(branch.elements)
+        else:
+            yield e.name
+
+
+@cache
+def buckling(name: str) -> float:
+    """Force (N) under which a tenth of random poses and directions of a shipped machine have no stable answer."""
+    machine, rng = sm.load_machine(name), np.random.default_rng(0)
+    p, force = rng.uniform(*machine.workspace, (50, 3)), rng.normal(size=(50, 3))
+    force /= np.linalg.norm(force, axis=1)[:, None]
+    level = 10.0
+    while level < 1e5:
+        wrench = np.hstack([level * force, np.zeros((50, 3))])
+        if (machine.solve(p, wrench, threads=1).status != sm.Status.CONVERGED).mean() > 0.1:
+            break
+        level *= 1.5
+    return level
+
+
+def asked(machine: sm.Machine, rng: np.random.Generator, count: int) -> tuple[np.ndarray, dict[str, object]]:
+    """Positions (n, 3) and the load of a batch."""
+    low, high = machine.workspace
+    middle, half = (low + high) / 2, (high - low) / 2
+    u = rng.uniform(-1, 1, (count, 3))
+    where = rng.integers(0, 4, count)
+    u[where == 1] = np.clip(u[where == 1] * 3, -1, 1)  # on the faces, edges and corners
+    u[where == 2] *= 1.8  # beyond
+    force = rng.normal(size=(count, 3))
+    size = buckling(machine.description.name) * 10 ** rng.uniform(-4, 0.02, count) * (rng.random(count) < 0.9)
+    force *= (size / np.linalg.norm(force, axis=1))[:, None]
+    kind = str(rng.choice(["dead", "dead", "follower", "semitangential"]))
+    moment = np.zeros((count, 3))
+    if kind != "dead":
+        moment = 0.05 * np.linalg.norm(force, axis=1)[:, None] * rng.normal(size=(count, 3))
+    gravity = [0.0, 0.0, -9.81] if rng.random() < 0.5 else [0.0, 0.0, 0.0]
+    return middle + u * half, {
+        "wrench": np.hstack([force, moment]),
+        "load_type": kind,
+        "gravity": gravity,
+        "method": "reference" if rng.random() < 0.01 else "fast",
+    }
+
+
+def run(batch: Batch, count: int = BATCH) -> dict[str, object]:
+    """Counts, worst numbers and the wrong answers of a batch."""
+    machine = changed(sm.load_machine(batch.machine), batch.effect)
+    if machine is None:
+        return {**vars(batch), "solves": 0}
+    key = [batch.seed, *batch.machine.encode(), *batch.effect.encode()]
+    p, load = asked(machine, np.random.default_rng(key), count)
+    if load["method"] == "reference":
+        p = p[:20]
+        load["wrench"] = load["wrench"][:20]  # type: ignore[index]
+    s = machine.solve(p, threads=1, **load)  # type: ignore[arg-type]
+    failed = np.isin(s.status, (int(sm.Status.UNREACHABLE), int(sm.Status.NOT_CONVERGED)))
+    numbers = np.isfinite(s.displacement).any(1) | np.isfinite(s.stiffness).any((1, 2))
+    good = s.status == sm.Status.CONVERGED
+    wrong = {int(i): "a number with a failed status" for i in np.flatnonzero(failed & numbers)}
+    wrong |= {
+        int(i): "CONVERGED without numbers"
+        for i in np.flatnonzero(good & ~np.isfinite(s.displacement).all(1))
+    }
+    out = {"solves": len(p), "status": Counter(sm.Status(int(v)).name for v in s.status)}
+    flagged = s.flags & (sm.Flag.BRANCH_UNVERIFIED) != 0
+    worst, bad = verified(machine, p, load, s, np.flatnonzero(good & np.isfinite(s.displacement).all(1)))
+    wrong |= {i: f"{word}{' (flagged)' if flagged[i] else ''}" for i, word in bad.items()}
+    return {**vars(batch), **out, "flagged": int((good & flagged).sum()), "worst": worst, "wrong": wrong}
+
+
+def verified(
+    machine: sm.Machine, p: np.ndarray, load: dict[str, object], s: sm.Solution, at: np.ndarray
+) -> tuple[dict[str, float], dict[int, str]]:
+    """Largest relative errors, and what is wrong, by the pose."""
+    if not len(at):
+        return {}, {}
+    d, size = machine.description, machine_size(machine)
+    start = sm.inverse_kinematics(machine, p[at])
+    names = s.coordinate_names
+    wrench = np.asarray(load["wrench"])[at]
+    command = {n: start.actuators[:, i] for i, n in enumerate(s.actuators)}
+    turned = np.broadcast_to(np.eye(3), (len(at), 3, 3))
+    gravity = np.asarray(load["gravity"], dtype=float)
+    before = coordinates(names, start.coordinates)
+    case = Case(command, turned, wrench[:, :3], wrench[:, 3:], gravity, str(load["load_type"]), before)
+    gap, tip = closed(d, before, case, size)
+    case = Case(command, tip.r, wrench[:, :3], wrench[:, 3:], gravity, str(load["load_type"]), before)
+    found = balance(d, coordinates(names, s.coordinates[at]), case, size)
+    stated = s.displacement[at]
+    turn = Rotation.from_matrix(found.rotation @ np.swapaxes(tip.r, 1, 2)).as_rotvec()
+    moved = np.abs(
+        np.hstack([found.position - tip.p, size * turn]) - stated * [1, 1, 1, size, size, size]
+    ).max(1)
+    force = found.residual / np.maximum(found.scale, 1.0)
+    errors = {
+        "command": np.maximum(gap, task_error(d, tip, p[at])) / size,
+        "closure": found.gap / size,
+        "force": force,
+        "motion": moved / size,
+    }
+    limits = {"command": CLOSURE, "closure": CLOSURE, "force": FORCE, "motion": MOTION}
+    bad = {}
+    for word, error in errors.items():
+        for i in np.flatnonzero(~(error < limits[word])):
+            bad[int(at[i])] = f"{word} off by {error[i]:.1e}"
+    return {w: float(e.max()) for w, e in errors.items()}, bad
+
+
+def task_error(d: object, tip: object, p: np.ndarray) -> np.ndarray:
+    """Distance (n,) m of the closed TCP from the command, in the components that are commanded."""
+    use = [c in d.task for c in "xyz"]  # type: ignore[attr-defined]
+    return np.abs(tip.p - p)[:, use].max(1, initial=0.0)  # type: ignore[attr-defined, no-any-return]
+
+
+def machine_size(machine: sm.Machine) -> float:
+    """Of the workspace and of the way to it, m."""
+    low, high = machine.workspace
+    return float(max(np.linalg.norm(high - low), np.abs([low, high]).max()))
+
+
+def main() -> int:
+    """Runs the batches that are not in --out yet, then prints the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--count", type=float, default=1e5)
+    parser.add_argument("--machine", action="append")
+    parser.add_argument("--out", type=Path, default=Path("build/many.jsonl"))
+    parser.add_argument("--jobs", type=int, default=2)
+    given = parser.parse_args()
+    given.out.parent.mkdir(parents=True, exist_ok=True)
+    done = [json.loads(line) for line in given.out.read_text().splitlines()] if given.out.exists() else []
+    seen = {(r["machine"], r["effect"], r["seed"]) for r in done}
+    todo = [b for b in batches(given.machine or sm.machine_names(), int(given.count))
+            if (b.machine, b.effect, b.seed) not in seen]  # fmt: skip
+    with ProcessPoolExecutor(given.jobs) as pool, given.out.open("a") as out:
+        for work in as_completed([pool.submit(run, b) for b in todo]):
+            result = json.loads(json.dumps(work.result()))
+            out.write(json.dumps(result) + "\n")
+            out.flush()
+            done.append(result)
+    return report(done)
+
+
+def report(done: list[dict[str, object]]) -> int:
+    """Prints a row per machine, and the wrong answers."""
+    bad = [(r["machine"], r["effect"], r["seed"], i, w) for r in done for i, w in r.get("wrong", {}).items()]  # type: ignore[attr-defined]
+    for machine in dict.fromkeys(str(r["machine"]) for r in done):
+        rows = [r for r in done if r["machine"] == machine and r["solves"]]
+        status = sum((Counter(r["status"]) for r in rows), Counter[str]())  # type: ignore[arg-type]
+        worst = {
+            w: max((r["worst"].get(w, 0.0) for r in rows), default=0.0)
+            for w in ("command", "closure", "force", "motion")
+        }  # type: ignore[attr-defined]
+        told = ", ".join(f"{w} {v:.1e}" for w, v in worst.items())
+        flagged = sum(int(str(r["flagged"])) for r in rows)
+        print(f"{machine}: {sum(status.values())} solves; {dict(status)}; {flagged} flagged; worst {told}")
+    for row in bad[:40]:
+        print("WRONG", *row)
+    print(f"{sum(int(str(r['solves'])) for r in done)} solves, {len(bad)} wrong")
+    return int(bool(bad))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,375 @@
+"""Whether answers are equilibria: free bodies, for a batch of poses, straight from the description.
+
+Frames by plain transforms; the virtual work of every known wrench on every coordinate; the wrenches of the loops, which
+nobody knows, by least squares. What no wrench of the loops can balance is the residual. Nothing of the core is used but
+the coordinates of its answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from stiffmap.description import Block, Body, Joint, MachineDescription, Offset, Point, Spring, TableStroke
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Case:
+    """What was asked of n poses; SI, base axes."""
+
+    command: dict[str, Array]
+    """Full name of each actuator -> (n,) coordinate that the controller commands."""
+    turned: Array
+    """(n, 3, 3) commanded rotation of the TCP."""
+    force: Array
+    """(n, 3) at the TCP."""
+    moment: Array
+    """(n, 3)."""
+    gravity: Array
+    """(3,)."""
+    load_type: str = "dead"
+    unloaded: dict[str, Array] = field(default_factory=dict)
+    """Full name of each joint -> (n,) coordinate at the commanded pose, before any load."""
+
+
+@dataclass
+class Axis:
+    """A coordinate: its axis and a point on it (n, 3), base axes; the force that its spring or law asks for."""
+
+    revolute: bool
+    axis: Array
+    point: Array
+    force: Array | None
+    """(n,): along the axis, needed to hold the coordinate where it is; None: see `allowed`, or a rigid drive."""
+    allowed: tuple[Array, Array] | None = None
+    """(n, k) lower and upper ends of what a law with steps or friction allows."""
+
+
+@dataclass
+class Frame:
+    """Rotation (n, 3, 3), position (n, 3), numbers of the coordinates before it."""
+
+    r: Array
+    p: Array
+    before: tuple[int, ...] = ()
+
+
+@dataclass
+class Walk:
+    """What is gathered on the way."""
+
+    d: MachineDescription
+    x: dict[str, Array]
+    case: Case
+    as_built: bool
+    axes: list[Axis] = field(default_factory=list)
+    known: list[tuple[Frame, Array, Array, Array]] = field(default_factory=list)
+    """Frame that bears it, point (n, 3), force (n, 3), moment (n, 3)."""
+    loops: list[tuple[Frame, Frame]] = field(default_factory=list)
+    points: dict[str, tuple[Frame, Array]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Of n poses."""
+
+    gap: Array
+    """(n,) m: largest opening of a loop; angles times the machine's size."""
+    residual: Array
+    """(n,) N: largest force that nothing balances; moments by the machine's size."""
+    scale: Array
+    """(n,) N: largest force in the machine."""
+    position: Array
+    """(n, 3) TCP."""
+    rotation: Array
+    """(n, 3, 3)."""
+
+
+def balance(d: MachineDescription, x: dict[str, Array], case: Case, size: float) -> Balance:
+    """The machine as built at coordinates `x`, under the loads of `case`."""
+    walk, tip = walked(d, x, case, as_built=True)
+    load(walk, tip)
+    external(walk)
+    residual, scale = unbalanced(walk, size)
+    return Balance(gaps(walk, size), residual, scale, tip.p, tip.r)
+
+
+def closed(d: MachineDescription, x: dict[str, Array], case: Case, size: float) -> tuple[Array, Frame]:
+    """Largest gap (n,) m of the machine as the controller knows it, and its TCP."""
+    walk, tip = walked(d, x, case, as_built=False)
+    return gaps(walk, size), tip
+
+
+def walked(d: MachineDescription, x: dict[str, Array], case: Case, as_built: bool) -> tuple[Walk, Frame]:
+    """Everything between base and TCP."""
+    n = len(case.force)
+    walk = Walk(d, x, case, as_built)
+    start = along(walk, d.base, Frame(np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3))), "")
+    ends = [along(walk, leg.elements, start, f"{leg.name}.") for leg in d.legs]
+    walk.loops += [(ends[0], end) for end in ends[1:]]
+    return walk, along(walk, d.platform, ends[0], "")
+
+
+def along(walk: Walk, elements: Iterable[Any], f: Frame, prefix: str) -> Frame:
+    """Frame behind a sequence."""
+    for e in elements:
+        name = prefix + e.name
+        if isinstance(e, Offset):
+            t = e.actual if e.actual is not None and walk.as_built else e.nominal
+            f = Frame(f.r @ np.array(t.r), f.p + f.r @ np.array(t.p), f.before)
+        elif isinstance(e, Joint):
+            f = through_joint(walk, e, f, name)
+        elif isinstance(e, Spring):
+            f = through_spring(walk, e, f, name)
+        elif isinstance(e, Body):
+            at = f.p + f.r @ np.array(e.com)
+            weight = np.broadcast_to(e.mass * walk.case.gravity, at.shape)
+            walk.known.append((f, at, weight, np.zeros_like(at)))
+        elif isinstance(e, Point):
+            walk.points[name] = (f, f.p + f.r @ np.array(e.offset))
+        elif isinstance(e, Block):
+            ends = [along(walk, b.elements, f, f"{prefix}{b.name}.") for b in e.branches]
+            walk.loops += [(ends[0], end) for end in ends[1:]]
+            f = ends[0]
+    return f
+
+
+def moved(walk: Walk, f: Frame, revolute: bool, axis: Array, value: Array, made: Axis) -> Frame:
+    """Frame behind one coordinate."""
+    walk.axes.append(made)
+    before = (*f.before, len(walk.axes) - 1)
+    if not revolute:
+        return Frame(f.r, f.p + value[:, None] * made.axis, before)
+    x, y, z = axis
+    s = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    turn = np.eye(3) + np.sin(value)[:, None, None] * s + (1 - np.cos(value))[:, None, None] * (s @ s)
+    return Frame(f.r @ turn, f.p, before)
+
+
+def through_joint(walk: Walk, e: Joint, f: Frame, name: str) -> Frame:
+    """One axis after the other; the errors of its command and of its guide."""
+    laws = e.axis_laws or (e.law,) * len(e.axes)
+    revolute = e.kind != "prismatic"
+    for i, (axis, law) in enumerate(zip(e.axes, laws, strict=True)):
+        full = name if len(e.axes) == 1 else f"{name}.{i + 1}"
+        value = walk.x[full]
+        column = f.r @ np.array(axis)
+        made = Axis(revolute, column, f.p, np.zeros_like(value))
+        if e.actuated:
+            u = walk.case.command[name]
+            if walk.as_built:
+                for g in e.guide_errors:
+                    f = Frame(
+                        f.r, f.p + command_error(g.error, u, e)[:, None] * (f.r @ np.array(g.axis)), f.before
+                    )
+            made.force = None
+            if law is not None:
+                target = u + sum(command_error(c, u, e) for c in e.command_errors) * walk.as_built
+                soft = 1.0 + e.compliance_slope * (u - e.home[0])
+                made.force, made.allowed = law_force(law, value - target, soft)
+        elif law is not None:
+            rest = e.rest[i] if e.rest is not None else e.home[i]
+            made.force, made.allowed = law_force(law, value - rest, np.ones_like(value))
+        elif e.friction is not None:
+            turned = value - walk.case.unloaded.get(full, value + np.inf)
+            level = np.where(np.abs(turned) < 1e-14, 0.0, e.friction.level)[:, None] * np.ones(2)
+            made.force = None
+            made.allowed = (level * [-1, 1], level * [-1, 1])
+            if e.friction.branch == "loading_stuck":
+                made.allowed = (-level[:, :1], level[:, :1])
+        f = moved(walk, f, revolute, np.array(axis), value, made)
+    return f
+
+
+def command_error(c: Any, u: Array, e: Joint) -> Array:
+    """Added to the command u."""
+    v = u - (e.home[0] if c.reference is None else c.reference)
+    out: Array = c.offset + c.slope * v + c.amplitude * np.sin(2 * np.pi * v / c.period + c.phase)
+    return out
+
+
+def law_force(law: Any, a: Array, soft: Array) -> tuple[Array | None, tuple[Array, Array] | None]:
+    """Force of a law at deflections a (n,), the compliance being `soft` times as large; what it allows if it is
+    not one number."""
+    if law.knots:
+        low, high = polyline(law, a, soft)
+        one = np.abs(high - low).max() == 0.0
+        return (low, None) if one else (None, (low[:, None], high[:, None]))
+    force: Array = law.stiffness * a / soft + law.cubic * a**3
+    if law.friction:
+        none = np.where(np.abs(a) < 1e-14, 0.0, 1.0)[:, None]  # nothing pushes: nothing rubs
+        both = force[:, None] + none * law.friction * np.array([-1.0, 1.0])
+        return None, (both, both)
+    return force, None
+
+
+def polyline(law: Any, a: Array, soft: Array) -> tuple[Array, Array]:
+    """Least and largest force at a deflection within round-off of a."""
+    k = np.array(law.knots)
+    reach = 1e-12 + 1e-9 * np.abs(k[:, 0]).max()
+    out = []
+    for side in (-reach, reach):
+        v = a + side
+        force = np.interp(v, k[:, 0], k[:, 1])
+        force = np.where(v < k[0, 0], k[0, 1] + law.stiffness / soft * (v - k[0, 0]), force)
+        out.append(np.where(v > k[-1, 0], k[-1, 1] + law.stiffness / soft * (v - k[-1, 0]), force))
+    return out[0], out[1]
+
+
+def through_spring(walk: Walk, e: Spring, f: Frame, name: str) -> Frame:
+    """Translation, then rotations about x, y and z."""
+    names = [f"{name}.{c}" for c in ("tx", "ty", "tz", "rx", "ry", "rz")]
+    v = np.stack([walk.x[n] for n in names], -1)
+    own = v - np.array(e.rest)
+    free: list[int] = []
+    if e.stiffness is not None:
+        force = own @ np.array(e.stiffness)
+    else:
+        matrix = compliance(walk, e, name)
+        # a rigid direction of a compliance: its force is a reaction
+        free = [i for i in range(6) if not matrix[:, i].any()]
+        keep = [i for i in range(6) if i not in free]
+        force = np.zeros_like(v)
+        force[:, keep] = np.linalg.solve(matrix[:, keep][:, :, keep], own[:, keep, None])[..., 0]
+    laws = dict(e.laws)
+    basis = f.r
+    for i in range(3):
+        made = Axis(False, basis[:, :, i], f.p, None if i in free else force[:, i])
+        if i in laws:
+            made.force, made.allowed = law_force(laws[i], own[:, i], np.ones(len(v)))
+        f = moved(walk, f, False, np.eye(3)[i], v[:, i], made)
+    for i in range(3, 6):
+        made = Axis(True, f.r[:, :, i - 3], f.p, None if i in free else force[:, i])
+        if i in laws:
+            made.force, made.allowed = law_force(laws[i], own[:, i], np.ones(len(v)))
+        f = moved(walk, f, True, np.eye(3)[i - 3], v[:, i], made)
+    return f
+
+
+def compliance(walk: Walk, e: Spring, name: str) -> Array:
+    """(n, 6, 6); that of a beam goes with its length: axial and torsion and bending angles with L, deflection with L^3,
+    the angle by a force with L^2."""
+    own, s = np.array(e.compliance), e.stroke
+    if s is None:
+        return np.broadcast_to(own, (len(walk.case.force), 6, 6))
+    leg = name.rpartition(".")[0]
+    u = next(walk.case.unloaded[n] for n in (f"{leg}.{s.joint}", s.joint) if n in walk.case.unloaded)
+    if isinstance(s, TableStroke):
+        rows = np.array(s.rows)
+        flat = [np.interp(u, s.at, rows[:, i, j]) for i in range(6) for j in range(6)]
+        return np.stack(flat, -1).reshape(-1, 6, 6)
+    ratio = (s.length + s.rate * (u - s.at)) / s.length
+    power = np.ones((6, 6))
+    across = [i for i in range(3) if i != s.along]
+    power[np.ix_(across, across)] = 3
+    power[:3, 3:] = power[3:, :3] = 2
+    return own * ratio[:, None, None] ** power
+
+
+def load(walk: Walk, tip: Frame) -> None:
+    """The wrench at the TCP as its type turns it."""
+    c = walk.case
+    turned = tip.r @ np.swapaxes(c.turned, 1, 2)
+    f, m = c.force, c.moment
+    if c.load_type == "follower":
+        f, m = (np.einsum("nij,nj->ni", turned, v) for v in (f, m))
+    elif c.load_type == "semitangential":
+        trace = np.einsum("nii->n", turned)[:, None]
+        m = 0.5 * (trace * m - np.einsum("nji,nj->ni", turned, m))
+    walk.known.append((tip, tip.p, f, m))
+
+
+def external(walk: Walk) -> None:
+    """Cables and counterbalances."""
+    for s in walk.d.external_springs:
+        f, at = walk.points[s.point]
+        line = np.array(s.anchor) - at
+        length = np.linalg.norm(line, axis=1)
+        pull = s.stiffness * (length - s.length)
+        if s.tension_only:
+            pull = np.maximum(pull, 0.0)
+        walk.known.append((f, at, (pull / length)[:, None] * line, np.zeros_like(at)))
+
+
+def work(axis: Axis, point: Array, force: Array, moment: Array) -> Array:
+    """(n,) of a wrench on a unit of the coordinate."""
+    if not axis.revolute:
+        return np.einsum("ni,ni->n", axis.axis, force)
+    return np.einsum("ni,ni->n", axis.axis, moment + np.cross(point - axis.point, force))
+
+
+def unbalanced(walk: Walk, size: float) -> tuple[Array, Array]:
+    """Residual and scale (n,) N."""
+    n, m = len(walk.case.force), len(walk.axes)
+    weight = np.array([1.0 / size if a.revolute else 1.0 for a in walk.axes])
+    needed, given = np.zeros((n, m)), np.zeros((n, m))
+    for i, a in enumerate(walk.axes):
+        if a.force is not None:
+            needed[:, i] = a.force
+    for f, at, force, moment in walk.known:
+        for i in f.before:
+            given[:, i] += work(walk.axes[i], at, force, moment)
+    columns = np.zeros((n, m, 6 * len(walk.loops)))
+    for k, (first, other) in enumerate(walk.loops):
+        for f, sign in ((other, 1.0), (first, -1.0)):
+            for i in f.before:
+                a = walk.axes[i]
+                if a.revolute:
+                    columns[:, i, 6 * k : 6 * k + 3] += sign * np.cross(a.axis, first.p - a.point)
+                    columns[:, i, 6 * k + 3 : 6 * k + 6] += sign * size * a.axis
+                else:
+                    columns[:, i, 6 * k : 6 * k + 3] += sign * a.axis
+    rows = [i for i, a in enumerate(walk.axes) if a.force is not None]
+    b, left = weight * (needed - given), weight[:, None] * columns
+    reaction = least_squares(left[:, rows], b[:, rows])
+    rest = np.abs(np.einsum("nij,nj->ni", left, reaction) - b) if walk.loops else np.abs(b)
+    worst = rest[:, rows].max(1, initial=0.0)
+    for i, a in enumerate(walk.axes):
+        if a.allowed is not None:
+            held = weight[i] * given[:, i]
+            if walk.loops:
+                held = held + np.einsum("nj,nj->n", left[:, i], reaction)
+            low, high = (weight[i] * v for v in a.allowed)
+            off = np.maximum(np.maximum(low - held[:, None], held[:, None] - high), 0.0).min(1)
+            worst = np.maximum(worst, off)
+    sizes = [
+        np.abs(weight * needed).max(1),
+        np.abs(weight * given).max(1),
+        np.abs(reaction).max(1, initial=0.0),
+    ]
+    return worst, np.max(sizes, axis=0)
+
+
+def least_squares(a: Array, b: Array) -> Array:
+    """(n, columns) of least norm where the columns depend on each other."""
+    if a.shape[2] == 0:
+        return np.zeros((len(a), 0))
+    q, r = np.linalg.qr(a)
+    diagonal = np.abs(np.einsum("nii->ni", r))
+    sound = diagonal.min(1) > 1e-8 * diagonal.max(1)
+    out = np.empty((len(a), a.shape[2]))
+    if sound.any():
+        right = np.einsum("nij,ni->nj", q[sound], b[sound])
+        out[sound] = np.linalg.solve(r[sound], right[..., None])[..., 0]
+    if not sound.all():
+        out[~sound] = (np.linalg.pinv(a[~sound], rcond=1e-9) @ b[~sound][..., None])[..., 0]
+    return out
+
+
+def gaps(walk: Walk, size: float) -> Array:
+    """(n,) m."""
+    out = np.zeros(len(walk.case.force))
+    for first, other in walk.loops:
+        out = np.maximum(out, np.abs(other.p - first.p).max(1))
+        out = np.maximum(out, size * np.abs(other.r - first.r).max((1, 2)))
+    return out
+
+
+def coordinates(names: Sequence[str], values: Array) -> dict[str, Array]:
+    """Columns by name."""
+    return {name: np.ascontiguousarray(values[:, i]) for i, name in enumerate(names)}

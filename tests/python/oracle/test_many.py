@@ -1,0 +1,43 @@
+"""Answers are equilibria of free bodies (`python -m tests.python.oracle.many` for many more)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.python.oracle.many import Batch, run
+from tests.python.oracle.statics import Case, balance, closed, coordinates
+
+import stiffmap as sm
+
+
+@pytest.mark.parametrize("machine", sm.machine_names())
+def test_answers_are_equilibria(machine: str) -> None:
+    found = run(Batch(machine, "as declared", 7), count=40)
+    assert found["wrong"] == {}
+    assert found["status"]["CONVERGED"] >= 10  # type: ignore[index]
+
+
+@pytest.mark.parametrize("effect", ["dead_zone", "friction", "hardening", "straightness", "joint_friction"])
+def test_answers_with_an_effect_are_equilibria(effect: str) -> None:
+    found = run(Batch("orthoglide-revised", effect, 3), count=40)
+    assert found["wrong"] == {}
+    assert found["status"]["CONVERGED"] >= 10  # type: ignore[index]
+
+
+def test_a_wrong_coordinate_is_noticed_by_its_size() -> None:
+    machine = sm.load_machine("ur10")
+    home = np.array(machine.description.home.p)
+    s = machine.solve(home, [0.0, 50.0, -100.0, 0, 0, 0])
+    start = sm.inverse_kinematics(machine, home[None])
+    force = np.array([[0.0, 50.0, -100.0]])
+    command = {n: start.actuators[:, i] for i, n in enumerate(s.actuators)}
+    case = Case(command, np.eye(3)[None], force, 0 * force, np.zeros(3))
+    tip = closed(machine.description, coordinates(s.coordinate_names, start.coordinates), case, 1.0)[1]
+    assert tip.p[0] == pytest.approx(home, abs=1e-12)
+    x = coordinates(s.coordinate_names, s.coordinates[None])
+    sound = balance(machine.description, x, case, 1.0)
+    assert sound.residual[0] < 1e-8 * sound.scale[0]
+    x["arm.elbow"] = x["arm.elbow"] + 1e-6
+    spoilt = balance(machine.description, x, case, 1.0)
+    law = next(e.law for e in machine.description.legs[0].elements if e.name == "elbow")
+    assert spoilt.residual[0] == pytest.approx(1e-6 * law.stiffness, rel=1e-2)
