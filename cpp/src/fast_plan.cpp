@@ -64,7 +64,7 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
       d.errors.push_back(
           {i32(moves), i32(k.coordinate), e.offset, e.slope, e.amplitude, e.period, e.phase, e.reference});
     d.drives.push_back({chains.drives[i].coordinate, chains.drives[i].slot, chains.drives[i].prismatic,
-                        m.home_coordinates[k.coordinate], k.compliance_slope, k.force_limit});
+                        m.home_coordinates[k.coordinate], k.numbers.compliance_slope, k.numbers.force_limit});
   }
   add_strokes(m, d);
   for (const ElasticJoint& e : chains.elastic) {

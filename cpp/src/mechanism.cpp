@@ -87,7 +87,7 @@ Index Mechanism::add_joint(const Joint& joint, Index node, const std::string& pr
   if (!joint.actuated) return node;
   c.actuator = static_cast<Index>(drives.size());
   c.locked = !joint.law;
-  Drive drive{name, size() - 1, joint.compliance_slope, {}, joint.force_limit};
+  Drive drive{name, size() - 1, joint.numbers, {}};
   for (const CommandError& e : joint.command_errors) drive.errors.push_back({drive.coordinate, e});
   drives.push_back(drive);
   return add_guide_errors(joint, node, name);

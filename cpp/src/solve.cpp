@@ -22,7 +22,7 @@ bool command(const Mechanism& m, const VecX& x, Problem& p) {
   }
   for (const Drive& d : m.drives) {
     const double u = x[d.coordinate];
-    p.drive_scale[d.coordinate] = 1 + d.compliance_slope * (u - m.home_coordinates[d.coordinate]);
+    p.drive_scale[d.coordinate] = 1 + d.numbers.compliance_slope * (u - m.home_coordinates[d.coordinate]);
     for (const auto& [coordinate, e] : d.errors)
       p.base[coordinate] += e.offset + e.slope * (u - e.reference) +
                             e.amplitude * std::sin(2 * std::numbers::pi * (u - e.reference) / e.period + e.phase);
@@ -197,7 +197,7 @@ void report(const Mechanism& m, const PoseInput& in, const SolveWorkspace& ws, P
   for (std::size_t i = 0; i < m.drives.size(); ++i) {
     const Index j = m.drives[i].coordinate;
     out.effort[static_cast<Index>(i)] = m.coordinates[at(j)].locked ? lin.r[j] : -lin.tau[j];
-    if (std::abs(out.effort[static_cast<Index>(i)]) > m.drives[i].force_limit) out.flags |= flag::drive_force;
+    if (std::abs(out.effort[static_cast<Index>(i)]) > m.drives[i].numbers.force_limit) out.flags |= flag::drive_force;
   }
   const NodePoint& first = m.points[at(in.read_points.front())];
   leg_wrenches(m, in, ws, lin.frames.point(first.node, first.offset), out);

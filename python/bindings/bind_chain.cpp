@@ -18,10 +18,25 @@ Pose make_pose(const Array& p, const Array& R) {
           Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(data(R, {3, 3}, "rotation"))};
 }
 
+DriveNumbers drive_numbers_of(const py::dict& given) {
+  DriveNumbers out;
+  std::size_t known = 0;
+  for (const DriveNumber& n : drive_numbers)
+    if (given.contains(n.name)) {
+      out.*n.value = given[n.name].cast<double>();
+      ++known;
+    }
+  if (known != given.size()) throw py::key_error("a number that the core's drives do not have");
+  return out;
+}
+
 }  // namespace
 
 void bind_chain(py::module_& m) {
   using namespace py::literals;
+  py::list names;
+  for (const DriveNumber& n : drive_numbers) names.append(n.name);
+  m.attr("DRIVE_NUMBERS") = py::tuple(names);
   py::class_<Pose>(m, "Pose").def(py::init(&make_pose), "translation"_a, "rotation"_a);
   py::class_<Law>(m, "Law").def(py::init<double, double, std::vector<std::pair<double, double>>, double>(),
                                 "stiffness"_a, "cubic"_a, "knots"_a, "friction"_a = 0.0);
@@ -49,22 +64,21 @@ void bind_chain(py::module_& m) {
       .def(
           "joint",
           [](Chain& c, const std::string& name, bool prismatic, const Array& axis, bool actuated, double home,
-             const std::optional<Law>& law, double compliance_slope, const std::vector<CommandError>& errors,
-             double lower, double upper, double force_limit, const std::vector<std::pair<Array, CommandError>>& guide,
-             double friction, bool about_command, std::optional<double> rest, const std::string& ball) {
+             const std::optional<Law>& law, const py::dict& numbers, const std::vector<CommandError>& errors,
+             double lower, double upper, const std::vector<std::pair<Array, CommandError>>& guide, double friction,
+             bool about_command, std::optional<double> rest, const std::string& ball) {
             std::vector<GuideError> across;
             for (const auto& [direction, error] : guide) across.push_back({vec3(direction, "axis"), error});
             c.elements.emplace_back(Joint{name, prismatic ? JointType::prismatic : JointType::revolute,
-                                          vec3(axis, "axis"), actuated, home, law, compliance_slope, errors, across,
-                                          friction, about_command, rest,
+                                          vec3(axis, "axis"), actuated, home, law, drive_numbers_of(numbers), errors,
+                                          across, friction, about_command, rest,
                                           ball.empty()     ? BallChart::none
                                           : ball == "free" ? BallChart::free
                                                            : BallChart::meant,
-                                          lower, upper, force_limit});
+                                          lower, upper});
           },
-          "name"_a, "prismatic"_a, "axis"_a, "actuated"_a, "home"_a, "law"_a, "compliance_slope"_a, "errors"_a,
-          "lower"_a, "upper"_a, "force_limit"_a, "guide_errors"_a, "friction"_a, "about_command"_a,
-          "rest"_a = std::nullopt, "ball"_a = "")
+          "name"_a, "prismatic"_a, "axis"_a, "actuated"_a, "home"_a, "law"_a, "numbers"_a, "errors"_a, "lower"_a,
+          "upper"_a, "guide_errors"_a, "friction"_a, "about_command"_a, "rest"_a = std::nullopt, "ball"_a = "")
       .def(
           "spring",
           [](Chain& c, const std::string& name, const Array& matrix, bool compliance, const Array& rest,

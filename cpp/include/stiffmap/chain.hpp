@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "stiffmap/drive_numbers.hpp"
 #include "stiffmap/law.hpp"
 #include "stiffmap/se3.hpp"
 #include "stiffmap/spring.hpp"
@@ -51,7 +52,7 @@ struct Joint {
   bool actuated = false;
   double home = 0;
   std::optional<Law> law;
-  double compliance_slope = 0;  ///< relative change of the drive compliance per unit of travel
+  DriveNumbers numbers;
   std::vector<CommandError> command_errors;
   std::vector<GuideError> guide_errors;
   double friction = 0;         ///< free passive joint: constant force against its deflection; < 0: with it (theory L3)
@@ -59,7 +60,6 @@ struct Joint {
   std::optional<double> rest;  ///< passive: coordinate at which `law` is free of force; none: as at home
   BallChart ball = BallChart::none;  ///< this joint and the next two are one ball joint
   double lower = -1e300, upper = 1e300;
-  double force_limit = 1e300;
 };
 
 /// Virtual spring of six coordinates (t, phi): p + R t, R Rx Ry Rz (theory S2). `laws` replace single

@@ -75,9 +75,8 @@ struct DriveError {
 struct Drive {
   std::string name;
   Index coordinate = -1;
-  double compliance_slope = 0;  ///< counted from home
+  DriveNumbers numbers;
   std::vector<DriveError> errors;
-  double force_limit = 1e300;
 };
 
 /// Two frames that a closed loop makes one: `end` of an extra branch and `primary` of the first.

@@ -24,6 +24,7 @@ from stiffmap.description import (
     Pose,
     Spring,
 )
+from stiffmap.description.numbers import numbers_of
 from stiffmap.description.strokes import present_rows
 from stiffmap.description.tree import ENDS
 from stiffmap.errors import StiffmapError
@@ -117,7 +118,6 @@ def add_joint(out: _core.Chain, e: Joint) -> None:
         out.offset(f"{e.name}.home", turn, turn)
     range_ = e.drive.range if e.drive and e.drive.range else e.limits
     lower, upper = range_ or (-UNLIMITED, UNLIMITED)
-    force = e.drive.force if e.drive and e.drive.force else UNLIMITED
     stuck = e.friction if e.friction and e.friction.branch == "loading_stuck" else None
     own = [stick_law(stuck.level) if stuck else law(one) if one else None for one in e.laws]
     for i, (axis, home) in enumerate(zip(e.axes, e.home, strict=True)):
@@ -128,17 +128,26 @@ def add_joint(out: _core.Chain, e: Joint) -> None:
             actuated=e.actuated,
             home=home,
             law=own[i],
-            compliance_slope=e.compliance_slope,
+            numbers=drive_numbers(e),
             errors=[command_error(c) for c in e.command_errors],
             lower=lower,
             upper=upper,
-            force_limit=force,
             guide_errors=[(np.array(g.axis), command_error(g.error)) for g in e.guide_errors],
             friction=sliding_friction(e.friction),
             about_command=stuck is not None,
             rest=None if e.rest is None else e.rest[i],
             ball="" if e.kind != "spherical" or i else "free" if any_axes_do(e) else "meant",
         )
+
+
+def drive_numbers(e: Joint) -> dict[str, float]:
+    """Values of the core's ``DriveNumbers`` that the joint and its drive have."""
+    return {
+        n.core: float(value)
+        for holder in (e, e.drive)
+        for n in (() if holder is None else numbers_of(holder))
+        if n.core and (value := getattr(holder, n.name))  # zero: none
+    }
 
 
 def command_error(c: CommandError) -> _core.CommandError:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from stiffmap.description.laws import CommandError, GuideError, JointFriction, Law
+from stiffmap.description.numbers import interval, number
 from stiffmap.description.pose import IDENTITY, Pose, Rows, Vector
 from stiffmap.description.strokes import BeamStroke, Matrix6, TableStroke
 
@@ -26,14 +27,17 @@ class Offset:
 
 @dataclass(frozen=True)
 class Drive:
-    """What a motor adds to an actuated joint; used by limits and dynamics (SI)."""
+    """What a motor adds to an actuated joint; used by limits and dynamics (SI). A further number is a line here
+    (`description.numbers`), and one in the core's ``DriveNumbers`` if a calculation there uses it."""
 
-    range: tuple[float, float] | None = None
-    speed: float | None = None
-    force: float | None = None
-    encoder_error: float | None = None
-    coulomb_friction: float | None = None
-    viscous_friction: float | None = None
+    range: tuple[float, float] | None = interval("range", "Stroke that the drive can take.")
+    speed: float | None = number("speed", "Largest speed.", coordinate=1, lower=0.0)
+    force: float | None = number("force", "Largest force or torque.", effort=1, lower=0.0, core="force_limit")
+    encoder_error: float | None = number("encoder_error", "Error of the encoder.", coordinate=1, lower=0.0)
+    coulomb_friction: float | None = number("friction.coulomb", "Coulomb friction.", effort=1, lower=0.0)
+    viscous_friction: float | None = number(
+        "friction.viscous", "Friction per speed.", coordinate=-1, effort=1, lower=0.0
+    )
 
 
 @dataclass(frozen=True)
@@ -68,11 +72,17 @@ class Joint:
     law: Law | None = None
     axis_laws: tuple[Law, ...] = ()
     rest: tuple[float, ...] | None = None
-    compliance_slope: float = 0.0
+    compliance_slope: float = number(
+        "compliance_slope",
+        "Relative change of the drive's compliance per travel.",
+        default=0.0,
+        coordinate=-1,
+        core="compliance_slope",
+    )
     command_errors: tuple[CommandError, ...] = ()
     guide_errors: tuple[GuideError, ...] = ()
     friction: JointFriction | None = None
-    limits: tuple[float, float] | None = None
+    limits: tuple[float, float] | None = interval("limits", "Range of the coordinate.", passive=True)
     drive: Drive | None = None
 
     @property

@@ -21,6 +21,7 @@ from stiffmap.description import (
     Offset,
     Point,
 )
+from stiffmap.description.numbers import JointNumber, numbers_of
 from stiffmap.description.pose import Rows, vector
 from stiffmap.files.build_geometry import build_pose, build_vector
 from stiffmap.files.build_springs import build_law, build_spring
@@ -37,7 +38,7 @@ from stiffmap.files.schema.elements import (
     PointModel,
     SpringModel,
 )
-from stiffmap.units import ANGLE, FORCE, INERTIA, LENGTH, MASS, MOMENT, NONE, Dimension
+from stiffmap.units import ANGLE, INERTIA, LENGTH, MASS, NONE, Dimension
 
 ZERO = Number(value=0.0)
 
@@ -104,9 +105,6 @@ def _joint(model: JointModel, context: Context) -> Joint:
     angular = model.kind != "prismatic"
     coordinate = ANGLE if angular else LENGTH
     home = _list(model.home) if model.home is not None else [ZERO] * len(axes)
-    limits = None
-    if model.limits is not None:
-        limits = build_range(model.limits, coordinate, context, "limits")
     return Joint(
         model.joint,
         model.kind,
@@ -114,7 +112,7 @@ def _joint(model: JointModel, context: Context) -> Joint:
         coordinates(home, coordinate, context),
         **_laws(model, angular, context),
         rest=None if model.rest is None else coordinates(_list(model.rest), coordinate, context, "rest"),
-        limits=limits,
+        **build_numbers(model, Joint, angular, context),
     )
 
 
@@ -171,25 +169,38 @@ def build_range(pair: list[Number], dimension: Dimension, context: Context, name
     return (low, high)
 
 
+def build_numbers(
+    model: JointModel | ActuatorModel, holder: type, angular: bool, context: Context
+) -> dict[str, Any]:
+    """Values of the numbers that `holder` declares and the file gives, SI; raises `FileError` out of bounds."""
+    out: dict[str, Any] = {}
+    for n in numbers_of(holder):
+        keys = n.key.split(".")
+        given: Any = model
+        for key in keys:
+            given = getattr(given, key, None)
+        if given is None:
+            continue
+        if n.interval:
+            out[n.name] = build_range(given, n.dimension(angular), context, n.key)
+            continue
+        out[n.name] = context.si(given, n.dimension(angular), n.key)
+        if not n.lower <= out[n.name] <= n.upper:
+            context.at(*keys).fail(f"expected {_bounds(n)}; found {given.value}")
+    return out
+
+
+def _bounds(n: JointNumber) -> str:
+    if n.upper == float("inf"):
+        return "a number that is not negative" if n.lower == 0.0 else f"{n.lower:g} or more (SI)"
+    return f"{n.lower:g} to {n.upper:g} (SI)"
+
+
 def _actuator(model: ActuatorModel, context: Context) -> Joint:
     angular = model.kind == "revolute"
     coordinate = ANGLE if angular else LENGTH
 
-    def optional(number: Number | None, dimension: Dimension, name: str) -> float | None:
-        return None if number is None else context.si(number, dimension, name)
-
-    slope = optional(model.compliance_slope, Dimension(*(-n for n in coordinate)), "compliance_slope")
-    effort = MOMENT if angular else FORCE
-    viscous = Dimension(*(e - c for e, c in zip(effort, coordinate, strict=True)))
-    friction = model.friction
-    drive = Drive(
-        range=None if model.range is None else build_range(model.range, coordinate, context, "range"),
-        speed=optional(model.speed, coordinate, "speed"),
-        force=optional(model.force, effort, "force"),
-        encoder_error=optional(model.encoder_error, coordinate, "encoder_error"),
-        coulomb_friction=optional(friction.coulomb, effort, "friction.coulomb") if friction else None,
-        viscous_friction=optional(friction.viscous, viscous, "friction.viscous") if friction else None,
-    )
+    drive = Drive(**build_numbers(model, Drive, angular, context))
     return Joint(
         model.actuator,
         model.kind,
@@ -197,9 +208,8 @@ def _actuator(model: ActuatorModel, context: Context) -> Joint:
         coordinates([model.home or ZERO], coordinate, context),
         actuated=True,
         law=_law(model, angular, context),
-        compliance_slope=slope or 0.0,
         command_errors=tuple(_command_error(e, coordinate, context) for e in model.command_errors or []),
-        limits=None if model.limits is None else build_range(model.limits, coordinate, context, "limits"),
+        **build_numbers(model, Joint, angular, context),
         drive=None if drive == Drive() else drive,
     )
 

@@ -20,6 +20,7 @@ from stiffmap.description import (
     Spring,
     TableStroke,
 )
+from stiffmap.description.numbers import numbers_of
 from stiffmap.description.pose import IDENTITY, Rows
 from stiffmap.description.strokes import present_rows
 from stiffmap.errors import StiffmapError
@@ -97,8 +98,7 @@ def _joint(joint: Joint) -> Plain:
     else:
         plain["axes"] = [_axis(axis) for axis in joint.axes]
     plain["home"] = float(joint.home[0]) if len(joint.home) == 1 else floats(joint.home)
-    if joint.limits is not None:
-        plain["limits"] = floats(joint.limits)
+    plain.update(_numbers(joint))
     if joint.rest is not None:
         plain["rest"] = float(joint.rest[0]) if len(joint.rest) == 1 else floats(joint.rest)
     return {**plain, **_law(joint.law), **_axis_laws(joint)}
@@ -121,23 +121,27 @@ def _actuator(joint: Joint) -> Plain:
         "home": float(joint.home[0]),
         **(_law(joint.law) or {"rigid": True}),
     }
-    if joint.compliance_slope:
-        plain["compliance_slope"] = float(joint.compliance_slope)
-    if joint.limits is not None:
-        plain["limits"] = floats(joint.limits)
-    if joint.drive is not None:
-        drive = joint.drive
-        friction = {"coulomb": drive.coulomb_friction, "viscous": drive.viscous_friction}
-        plain.update({} if drive.range is None else {"range": floats(drive.range)})
-        plain.update(_given(speed=drive.speed, force=drive.force, encoder_error=drive.encoder_error))
-        plain.update({"friction": _given(**friction)} if _given(**friction) else {})
+    plain.update(_numbers(joint))
     if joint.command_errors:
         plain["command_errors"] = [_command_error(error) for error in joint.command_errors]
     return plain
 
 
-def _given(**values: float | None) -> Plain:
-    return {key: float(value) for key, value in values.items() if value is not None}
+def _numbers(joint: Joint) -> Plain:
+    """What the joint and its drive declare and have, under the keys of a file."""
+    plain: Plain = {}
+    for holder in (joint, joint.drive):
+        for n in () if holder is None else numbers_of(holder):
+            value = getattr(holder, n.name)
+            if value is None or value == n.default:
+                continue
+            outer, _, inner = n.key.partition(".")
+            entry = floats(value) if n.interval else float(value)
+            if inner:
+                plain.setdefault(outer, {})[inner] = entry
+            else:
+                plain[outer] = entry
+    return plain
 
 
 def _command_error(error: CommandError) -> Plain:

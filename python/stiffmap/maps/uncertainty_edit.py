@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.description import Body, Element, Joint, MachineDescription, Offset, Point, Spring, tree
+from stiffmap.description import Body, Drive, Element, Joint, MachineDescription, Offset, Point, Spring, tree
 from stiffmap.description.elements import Matrix6
+from stiffmap.description.numbers import numbers_of
 from stiffmap.description.pose import Pose, Vector
 
 
@@ -48,8 +49,10 @@ def _moved_number(element: Element, field: str, delta: float) -> Element | None:
             if name == "compliance":
                 return replace(element, compliance=entries)
             return replace(element, stiffness=entries)
-        case Joint() if field == "compliance_slope":
-            return replace(element, compliance_slope=element.compliance_slope + delta)
+        case Joint() if (n := _declared(element, field)) is not None:
+            holder, name = n
+            changed = replace(holder, **{name: getattr(holder, name) + delta})
+            return changed if isinstance(changed, Joint) else replace(element, drive=changed)
         case Joint():
             assert element.law is not None
             return replace(element, law=replace(element.law, **{part: getattr(element.law, part) + delta}))
@@ -71,8 +74,8 @@ def _value(element: Element, field: str) -> float | None:
         case Spring() if name in ("compliance", "stiffness") and getattr(element, name) is not None:
             i, j = int(part[1]) - 1, int(part[2]) - 1
             return float(getattr(element, name)[i][j])
-        case Joint() if field == "compliance_slope":
-            return element.compliance_slope
+        case Joint() if (n := _declared(element, field)) is not None:
+            return float(getattr(*n))
         case Joint() if element.law is not None and field in ("stiffness", "law.stiffness", "law.cubic"):
             return float(getattr(element.law, part))
         case Body() if field == "mass":
@@ -85,6 +88,16 @@ def _value(element: Element, field: str) -> float | None:
             return element.nominal.translation["xyz".index(part)]
         case Offset() if name == "actual.translation" and element.actual is not None:
             return element.actual.translation["xyz".index(part)]
+    return None
+
+
+def _declared(joint: Joint, key: str) -> tuple[Joint | Drive, str] | None:
+    """The number that the joint or its drive declares under a file's key and has: holder and name."""
+    for holder in (joint, joint.drive):
+        for n in () if holder is None else numbers_of(holder):
+            if n.key == key and not n.interval and getattr(holder, n.name) is not None:
+                assert holder is not None
+                return holder, n.name
     return None
 
 

@@ -2,17 +2,54 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
+from stiffmap.description import Drive, Joint
+from stiffmap.description.numbers import JointNumber, numbers_of
 from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Pair, Vector3
 from stiffmap.files.schema.geometry import Axis, Frame
 from stiffmap.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix, Stroke
 
 SORTS = ("offset", "joint", "actuator", "spring", "body", "point", "block")
 AXES_OF = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 3}
+
+
+def _model(name: str, numbers: dict[str, JointNumber]) -> type[FileModel]:
+    """Keys of these numbers; those with a dot in their key in mappings of their own."""
+    keys: dict[str, Any] = {}
+    inner: dict[str, dict[str, JointNumber]] = {}
+    for key, n in numbers.items():
+        outer, _, rest = key.partition(".")
+        if rest:
+            inner.setdefault(outer, {})[rest] = n
+        else:
+            keys[key] = ((Pair if n.interval else Number) | None, Field(default=None, description=n.doc))
+    keys |= {k: (_model(k.capitalize(), v) | None, None) for k, v in inner.items()}
+    return create_model(name, __base__=FileModel, **keys)
+
+
+def _numbers(name: str, *, passive: bool) -> type[FileModel]:
+    """Keys of all declared numbers of a joint with a drive, or of a passive one."""
+    found = (*numbers_of(Joint), *(() if passive else numbers_of(Drive)))
+    return _model(name, {n.key: n for n in found if n.passive or not passive})
+
+
+if TYPE_CHECKING:  # the keys are made from the numbers that Joint and Drive declare
+
+    class PassiveNumbers(FileModel):
+        """Keys of the numbers of a passive joint."""
+
+    class DriveNumbers(FileModel):
+        """Keys of the numbers of a joint with a drive."""
+
+else:
+    PassiveNumbers, DriveNumbers = (
+        _numbers("PassiveNumbers", passive=True),
+        _numbers("DriveNumbers", passive=False),
+    )
 
 
 class OffsetModel(Frame):
@@ -23,7 +60,7 @@ class OffsetModel(Frame):
     note: str = ""
 
 
-class JointModel(FileModel):
+class JointModel(PassiveNumbers):
     """Passive joint; it turns or slides freely unless it has a stiffness or a law, for all axes or a list with
     one per axis. ``rest`` is the coordinate at which these are free of force (left out: as at home)."""
 
@@ -32,7 +69,6 @@ class JointModel(FileModel):
     axis: Axis | None = None
     axes: list[Axis] | None = None
     home: Number | Numbers | None = None
-    limits: Pair | None = None
     stiffness: Number | Numbers | None = None
     compliance: Number | Numbers | None = None
     law: LawModel | None = None
@@ -65,13 +101,6 @@ class JointModel(FileModel):
         return self
 
 
-class Friction(FileModel):
-    """Friction of a drive: Coulomb force (or torque) and viscous coefficient."""
-
-    coulomb: Number | None = None
-    viscous: Number | None = None
-
-
 class CommandErrorModel(FileModel):
     """Error added to the commanded coordinate u: offset + slope*(u - reference) + amplitude*sin(...)."""
 
@@ -83,7 +112,7 @@ class CommandErrorModel(FileModel):
     reference: Number | None = None
 
 
-class ActuatorModel(FileModel):
+class ActuatorModel(DriveNumbers):
     """Actuated joint, one axis; give its stiffness, its compliance, a law, or ``rigid: true``."""
 
     actuator: Name
@@ -94,13 +123,6 @@ class ActuatorModel(FileModel):
     compliance: Number | None = None
     law: LawModel | None = None
     rigid: Literal[True] | None = None
-    compliance_slope: Number | None = None
-    range: Pair | None = None
-    limits: Pair | None = None
-    speed: Number | None = None
-    force: Number | None = None
-    encoder_error: Number | None = None
-    friction: Friction | None = None
     command_errors: list[CommandErrorModel] | None = None
     note: str = ""
 
