@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
@@ -14,9 +15,32 @@ LENGTHS = {
     "um": Fraction(1, 10**6),
     "in": Fraction(254, 10**4),
 }
+SYNONYMS = {"inch": "in", "µm": "um", "μm": "um", "Nm": "N*m", "Nmm": "N*mm"}
+"""Other ways to write a unit."""
 FORCES = {"N": Fraction(1), "kN": Fraction(1000), "MN": Fraction(10**6)}
 MASSES = {"kg": Fraction(1), "g": Fraction(1, 1000), "t": Fraction(1000)}
+MOMENTS = {"N*m": Fraction(1), "N*mm": Fraction(1, 1000), "kN*m": Fraction(1000)}
+STRESSES = {"Pa": Fraction(1), "MPa": Fraction(10**6), "GPa": Fraction(10**9), "N/mm2": Fraction(10**6)}
+PLANE_ANGLES: dict[str, Fraction | float] = {
+    "rad": Fraction(1),
+    "mrad": Fraction(1, 1000),
+    "urad": Fraction(1, 10**6),
+    "deg": math.pi / 180,
+    "°": math.pi / 180,
+    "arcmin": math.pi / 10800,
+    "arcsec": math.pi / 648000,
+}
 ANGLES = ("rad", "deg")
+"""Those of a machine file."""
+
+
+def size_of(unit: str, *tables: Mapping[str, Fraction | float]) -> float:
+    """SI size of a unit of one of these tables, in any of its spellings; KeyError where it is in none."""
+    name = SYNONYMS.get(unit, unit)
+    for table in tables:
+        if name in table:
+            return float(table[name])
+    raise KeyError(unit)
 
 
 class Dimension(NamedTuple):

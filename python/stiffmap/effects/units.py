@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
 from fractions import Fraction
 
 from stiffmap.errors import StiffmapError
-from stiffmap.units import FORCES, LENGTHS, MASSES
+from stiffmap.units import FORCES, LENGTHS, MASSES, PLANE_ANGLES
 
 _MICRO = Fraction(1, 10**6)
-_ANGLES = {"rad": Fraction(1), "mrad": Fraction(1, 1000), "urad": _MICRO}
-_TURNS = {"deg": math.pi / 180, "°": math.pi / 180, "arcmin": math.pi / 10800, "arcsec": math.pi / 648000}
 _PLAIN = {"1": Fraction(1), "%": Fraction(1, 100), "ppm": _MICRO}
 _NUMBER = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)$")
 _ATOM = re.compile(r"^([^\d^]+|1)(?:\^?(\d))?$")
@@ -29,8 +26,7 @@ def _atoms() -> dict[str, tuple[Fraction | float, str]]:
         (LENGTHS, "m"),
         (FORCES, "N"),
         (MASSES, "kg"),
-        (_ANGLES, "rad"),
-        (_TURNS, "rad"),
+        (PLANE_ANGLES, "rad"),
     ):
         table.update({name: (factor, dimension) for name, factor in units.items()})
     table.update({name: (factor, "") for name, factor in _PLAIN.items()})

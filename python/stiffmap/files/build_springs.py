@@ -7,10 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stiffmap import beams
 from stiffmap.description import Law, Spring
 from stiffmap.description.elements import Matrix6
-from stiffmap.files import sections
-from stiffmap.files.cantilever import cantilever_compliance
 from stiffmap.files.context import Context, LinkUse, StrokeUse
 from stiffmap.files.matrix_checks import asymmetry, lowest_eigenvalue
 from stiffmap.files.schema.base import Number
@@ -106,7 +105,7 @@ def build_beam(beam: Beam, context: Context) -> NDArray[np.float64]:
         e, g = _moduli(beam, context)
         s = _section(beam, context)
         values = [e * s.area, g * s.torsion, e * s.about_width, e * s.about_height]
-    return cantilever_compliance(length, beam.along, *values)
+    return beams.cantilever_compliance(length, beam.along, *values)
 
 
 def _moduli(beam: Beam, context: Context) -> tuple[float, float]:
@@ -124,25 +123,25 @@ def _moduli(beam: Beam, context: Context) -> tuple[float, float]:
     return e, e / (2 * (1 + context.si(material.nu, NONE, "beam.material.nu")))
 
 
-def _section(beam: Beam, context: Context) -> sections.Section:
+def _section(beam: Beam, context: Context) -> beams.Section:
     if beam.round is not None:
-        return sections.round_section(_positive(beam.round.diameter, LENGTH, "round.diameter", context))
+        return beams.round_section(_positive(beam.round.diameter, LENGTH, "round.diameter", context))
     if beam.tube is not None:
         outer = _positive(beam.tube.outer, LENGTH, "tube.outer", context)
         inner = _positive(beam.tube.inner, LENGTH, "tube.inner", context)
         if inner >= outer:
             context.at("tube").fail("the inner diameter must be smaller than the outer one")
-        return sections.tube_section(outer, inner)
+        return beams.tube_section(outer, inner)
     shape, sort = (beam.rectangle, "rectangle") if beam.rectangle is not None else (beam.hollow, "hollow")
     assert shape is not None
     width = _positive(shape.width, LENGTH, f"{sort}.width", context)
     height = _positive(shape.height, LENGTH, f"{sort}.height", context)
     if beam.hollow is None:
-        return sections.rectangle_section(width, height)
+        return beams.rectangle_section(width, height)
     wall = _positive(beam.hollow.wall, LENGTH, "hollow.wall", context)
     if 2 * wall >= min(width, height):
         context.at("hollow").fail("twice the wall must be smaller than width and height")
-    return sections.hollow_section(width, height, wall)
+    return beams.hollow_section(width, height, wall)
 
 
 def _positive(number: Number, dimension: Dimension, name: str, context: Context) -> float:

@@ -12,9 +12,10 @@ from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Ints
 from stiffmap.link.mesh import SolidMesh, checked_mesh
 from stiffmap.link.optional import gmsh_session
+from stiffmap.units import LENGTHS, size_of
 
 CAD, MESH = {".step", ".stp", ".iges", ".igs", ".brep"}, {".msh", ".inp", ".unv", ".bdf", ".med", ".stl"}
-UNITS = {"mm": 1e-3, "m": 1.0, "cm": 1e-2, "inch": 0.0254}
+UNITS = {u: size_of(u, LENGTHS) for u in ("mm", "m", "cm", "in", "inch")}
 _GMSH_TO_OURS = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]  # gmsh lists edge 23 before 13
 
 Faces = dict[str, list[int]]

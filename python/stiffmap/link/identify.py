@@ -12,7 +12,7 @@ from stiffmap.link.arrays import Bools, Floats
 from stiffmap.link.checks import Field, check_points, checked_field, identifiable_columns
 from stiffmap.link.correlation import Correlation, analyse_correlation
 from stiffmap.link.estimate import Evidence
-from stiffmap.link.finite import refuse_finite_rotation
+from stiffmap.link.finite import finite_rotation
 from stiffmap.link.noise import Noise, estimate_noise
 from stiffmap.link.outliers import LEVEL, find_outliers
 from stiffmap.link.regression import regress
@@ -21,6 +21,7 @@ from stiffmap.link.rigidfit import RigidFit, fit_exact, fit_linear, turn_back
 from stiffmap.link.transport import twist_transport
 
 Known = float | ArrayLike | Literal["independent"] | None
+FITS = {"linear": fit_linear, "exact": fit_exact}
 ROUND_OFF = 1e-14  # of the largest displacement: below it a residual is arithmetic, not noise
 
 
@@ -31,7 +32,7 @@ def identify_link(
     *,
     reference: ArrayLike,
     noise: Known = None,
-    method: Literal["linear", "exact"] = "linear",
+    method: Literal["auto", "linear", "exact"] = "auto",
     symmetric: bool = True,
     zeros: Literal["report", "apply"] = "report",
     level: float = 0.05,
@@ -47,7 +48,8 @@ def identify_link(
         reference: (3,) m, the point where the spring sits.
         noise: None estimates the noise from the residuals and tests whether it is independent;
             "independent" skips that test; a number or (cases,) numbers in m are a known noise.
-        method: "linear" for a linear solver's field (eq. 14, 15), "exact" for one with finite rotations.
+        method: "linear" for a linear solver's field (eq. 14, 15), "exact" for one with finite rotations; "auto" takes
+            "exact" where the field shows that it turns by more than the linear fit can follow.
         symmetric: re-estimate under symmetry (`raw` keeps the estimate before).
         zeros: "apply" re-estimates with the insignificant entries at zero.
         level: family-wise level of the zero test.
@@ -56,21 +58,25 @@ def identify_link(
 
     Raises:
         StiffmapError: shapes, NaN, fewer than three or collinear points, wrenches of rank below six,
-            displacements too large for a linear field.
+            displacements too large for a linear field where method="linear" was asked for.
     """
     field = checked_field(points, displacements, wrenches, reference)
     known = known_noise(noise, len(field.wrenches))
     columns = identifiable_columns(field.wrenches, partial=partial)
-    kept = ~_outliers(field, known, outliers, method)
-    fits = [_fit(field, k, kept[k], method) for k in range(len(kept))]
-    if method == "linear":
-        refuse_finite_rotation(field, kept)
+    found = "exact" if method == "exact" else "linear"
+    kept = ~_outliers(field, known, outliers, found)
+    if found == "linear" and (too_large := finite_rotation(field, kept)):
+        if method == "linear":
+            raise StiffmapError(too_large)
+        found = "exact"
+        kept = ~_outliers(field, known, outliers, found)
+    fits = [_fit(field, k, kept[k], found) for k in range(len(kept))]
     estimate = _noise(field, fits, known)
-    correlation = _correlation(field, kept, noise)
+    correlation = _correlation(field, kept, noise, found)
     covariances = _twist_covariances(field, kept, fits, estimate, correlation)
     regression = regress(field.wrenches, np.array([f.twist for f in fits]), covariances)
     evidence = Evidence(
-        field, kept, tuple(fits), estimate, correlation, covariances, regression, columns, method
+        field, kept, tuple(fits), estimate, correlation, covariances, regression, columns, found
     )
     link = build_link(evidence, symmetric=symmetric, level=level)
     return link.with_zeros() if zeros == "apply" else link
@@ -109,8 +115,7 @@ def _outliers(field: Field, known: Floats | None, wanted: bool, method: str) -> 
 def _fit(field: Field, case: int, kept: Bools, method: str) -> RigidFit:
     points = field.points[kept]
     check_points(points)
-    fit = fit_exact if method == "exact" else fit_linear
-    return fit(points, field.displacements[case, kept], field.reference)
+    return FITS[method](points, field.displacements[case, kept], field.reference)
 
 
 def _noise(field: Field, fits: list[RigidFit], known: Floats | None) -> Noise:
@@ -123,13 +128,13 @@ def _noise(field: Field, fits: list[RigidFit], known: Floats | None) -> Noise:
     return noise._replace(used=known, used_dof=np.full(len(known), np.inf), pooled=False)
 
 
-def _correlation(field: Field, kept: Bools, noise: Known) -> Correlation | None:
+def _correlation(field: Field, kept: Bools, noise: Known, method: str) -> Correlation | None:
     """Correlation of the residuals on the nodes that every case keeps; None when not asked for."""
     common = kept.all(axis=0)
     if noise is not None or common.sum() < 12:
         return None
     p = field.points[common]
-    residuals = [fit_linear(p, u[common], field.reference).residual for u in field.displacements]
+    residuals = [FITS[method](p, u[common], field.reference).residual for u in field.displacements]
     size = np.abs(field.displacements).max(axis=(1, 2), keepdims=True)
     r = np.array(residuals)
     # Round-off of an exactly rigid field is not a field of noise.

@@ -14,6 +14,7 @@ from stiffmap.link.arrays import Floats
 from stiffmap.link.gmshmesh import UNITS
 from stiffmap.link.shapes import Bar, Foot, ForkBar, HollowBar
 from stiffmap.link.solve import Material
+from stiffmap.units import FORCES, MOMENTS, STRESSES, size_of
 from stiffmap.yaml_text import read
 
 # Handbook values for a first estimate; a measured modulus belongs in the part file.
@@ -25,8 +26,8 @@ MATERIALS = {
     "cast-iron": (110e9, 0.26),
     "magnesium": (45e9, 0.35),
 }
-STRESS = {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6}
-LOAD_UNITS = {"N": 1.0, "kN": 1e3, "N*m": 1.0, "Nm": 1.0, "N*mm": 1e-3, "Nmm": 1e-3}
+STRESS = {u: float(v) for u, v in STRESSES.items()}
+LOAD_UNITS = {u: size_of(u, FORCES, MOMENTS) for u in ("N", "kN", "N*m", "Nm", "N*mm", "Nmm")}
 UNIT_WRENCHES = np.diag([100.0, 100.0, 100.0, 10.0, 10.0, 10.0])  # linear solver: the size does not matter
 
 _BY_NAME: dict[str, type[BaseModel]] = {
@@ -39,7 +40,7 @@ _BY_NAME: dict[str, type[BaseModel]] = {
 
 class _Units(BaseModel):
     model_config = ConfigDict(extra="forbid")
-    length: Literal["mm", "m", "cm", "inch"]
+    length: Literal["mm", "m", "cm", "in", "inch"]
     stress: Literal["Pa", "MPa", "GPa", "N/mm2"] = "MPa"
 
 

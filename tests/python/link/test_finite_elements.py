@@ -212,7 +212,7 @@ def test_fork_loads_enter_through_the_pin_holes():
 
 
 def test_tube_formula_is_the_outer_less_the_inner_rectangle():
-    assert tube(0.02, 0.03, 0.002).iz == pytest.approx((0.03 * 0.02**3 - 0.026 * 0.016**3) / 12)
+    assert tube(0.02, 0.03, 0.002).about_height == pytest.approx((0.03 * 0.02**3 - 0.026 * 0.016**3) / 12)
 
 
 def test_torsion_series_has_the_textbook_value():

@@ -11,19 +11,14 @@ import numpy as np
 from stiffmap.errors import FileError
 from stiffmap.experiment.experiment import WRENCH, Channel, Floats
 from stiffmap.experiment.files.schema import ExperimentFile
-from stiffmap.units import FORCES, LENGTHS
+from stiffmap.units import FORCES, LENGTHS, MOMENTS, PLANE_ANGLES, size_of
 
-ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
-MOMENTS = {"N*m": 1.0, "N*mm": 1e-3, "kN*m": 1e3}
+ANGLES = {a: float(PLANE_ANGLES[a]) for a in ("rad", "mrad", "deg")}
 
 
 def factor(unit: str) -> float:
     """SI size of a unit of length, angle, force or moment."""
-    for table in (ANGLES, MOMENTS):
-        if unit in table:
-            return table[unit]
-    unit = unit.replace("µ", "u")
-    return float(LENGTHS[unit] if unit in LENGTHS else FORCES[unit])
+    return size_of(unit, PLANE_ANGLES, MOMENTS, LENGTHS, FORCES)
 
 
 @dataclass(frozen=True)

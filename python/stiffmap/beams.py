@@ -1,0 +1,76 @@
+"""Beams: sections (area, torsion, bending about the two axes across the beam), and the cantilever's compliance.
+
+Elementary formulas of the strength of materials; torsion of a solid rectangle by Saint-Venant's
+series (Timoshenko & Goodier, Theory of Elasticity, art. 109), of a thin-walled tube by Bredt's
+formula on the mid-line.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Section(NamedTuple):
+    """Area (m²), torsion constant J (m⁴), second moments about the width and height axes (m⁴)."""
+
+    area: float
+    torsion: float
+    about_width: float
+    about_height: float
+
+
+def round_section(diameter: float) -> Section:
+    """Solid circle."""
+    second = math.pi * diameter**4 / 64
+    return Section(math.pi * diameter**2 / 4, 2 * second, second, second)
+
+
+def tube_section(outer: float, inner: float) -> Section:
+    """Circular tube of outer and inner diameter."""
+    second = math.pi * (outer**4 - inner**4) / 64
+    return Section(math.pi * (outer**2 - inner**2) / 4, 2 * second, second, second)
+
+
+def rectangle_section(width: float, height: float) -> Section:
+    """Solid rectangle."""
+    long, short = max(width, height), min(width, height)
+    terms = (math.tanh(n * math.pi * long / (2 * short)) / n**5 for n in range(1, 40, 2))
+    torsion = long * short**3 / 3 * (1 - 192 / math.pi**5 * short / long * sum(terms))
+    return Section(width * height, torsion, width * height**3 / 12, height * width**3 / 12)
+
+
+def hollow_section(width: float, height: float, wall: float) -> Section:
+    """Rectangular tube; J by Bredt, so thin-walled."""
+    w, h = width - 2 * wall, height - 2 * wall
+    enclosed, around = (width - wall) * (height - wall), 2 * (width + height - 2 * wall)
+    return Section(
+        width * height - w * h,
+        4 * enclosed**2 * wall / around,
+        (width * height**3 - w * h**3) / 12,
+        (height * width**3 - h * w**3) / 12,
+    )
+
+
+def cantilever_compliance(
+    length: float, along: str, ea: float, gj: float, ei_next: float, ei_last: float
+) -> NDArray[np.float64]:
+    """Compliance (6, 6) of an Euler-Bernoulli cantilever at its free end, local axes, SI.
+
+    The beam leaves its root along ``along`` (x, y, z, -x, -y, -z). ``ei_next`` is the bending
+    stiffness about the axis that follows cyclically (y of x, z of y, x of z), ``ei_last`` about
+    the remaining one.
+    """
+    sign = -1.0 if along.startswith("-") else 1.0
+    a = "xyz".index(along[-1])
+    b, c = (a + 1) % 3, (a + 2) % 3
+    k = np.zeros((6, 6))
+    k[a, a], k[3 + a, 3 + a] = length / ea, length / gj
+    k[b, b], k[3 + c, 3 + c] = length**3 / (3 * ei_last), length / ei_last
+    k[c, c], k[3 + b, 3 + b] = length**3 / (3 * ei_next), length / ei_next
+    k[b, 3 + c] = k[3 + c, b] = sign * length**2 / (2 * ei_last)
+    k[c, 3 + b] = k[3 + b, c] = -sign * length**2 / (2 * ei_next)
+    return k
