@@ -10,7 +10,7 @@ import numpy as np
 from stiffmap.calibration.defaults import Tolerances
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.nuisance import nuisance_columns
-from stiffmap.experiment.poses.setups import setups_of
+from stiffmap.experiment.setups import setups_of
 
 INSTRUMENT = "instrument"
 SCALE = "scale"

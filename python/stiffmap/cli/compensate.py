@@ -23,8 +23,8 @@ from stiffmap.compensation import (
 from stiffmap.compensation import compensate as compute
 from stiffmap.description import MachineDescription
 from stiffmap.errors import FileError, StiffmapError
-from stiffmap.experiment.files.orientation import against_base
 from stiffmap.experiment.files.plan_file import load_plan
+from stiffmap.experiment.poses.orientation import against_base
 from stiffmap.machine import Machine
 from stiffmap.maps.files import read_dataset
 

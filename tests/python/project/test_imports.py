@@ -29,6 +29,20 @@ RANKS = (
     ("files", "derivatives"),
     ("machine",),
 )
+# Rooms inside a room, each may import earlier ones only.
+INNER = {
+    "diagnosis": ("clock", "candidates", "fitting", "search", ("rivals", "decision"), "report", "verdict"),
+    "experiment": (
+        ("experiment", "channels", "notebook", "setups"),
+        "readings",
+        "poses",
+        "noise",
+        "prediction",
+        "comparison",
+        "virtual",
+        "files",
+    ),
+}
 RANK = {name: i for i, names in enumerate(RANKS) for name in names}
 TOP = {"stiffmap", "stiffmap.__main__"}  # the shop window: it names what lies in all rooms
 
@@ -76,6 +90,22 @@ def test_imports_lead_to_earlier_ranks() -> None:
         for target in targets - TOP:
             here, there = room(name), room(target)
             if here in RANK and here != there and RANK.get(there, len(RANKS)) >= RANK[here]:
+                wrong.append(f"{name} imports {target}")
+    assert wrong == []
+
+
+@pytest.mark.parametrize("outer", INNER)
+def test_rooms_inside_a_room_have_an_order(outer: str) -> None:
+    places = [(names,) if isinstance(names, str) else names for names in INNER[outer]]
+    rank = {name: i for i, names in enumerate(places) for name in names}
+    here = f"stiffmap.{outer}."
+    inside = {m.removeprefix(here).split(".")[0] for m in MODULES if m.startswith(here)}
+    assert inside == set(rank)
+    wrong = []
+    for name, targets in GRAPH.items():
+        for target in (t for t in targets if t.startswith(here) and name.startswith(here)):
+            own, other = (n.removeprefix(here).split(".")[0] for n in (name, target))
+            if own != other and rank[other] > rank[own]:
                 wrong.append(f"{name} imports {target}")
     assert wrong == []
 

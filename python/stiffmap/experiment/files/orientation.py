@@ -7,13 +7,11 @@ orientation is R = turn · R_home. A file that gives orientations of the tool it
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.errors import FileError
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.files.schema import OrientationModel
 from stiffmap.experiment.files.table import Table
 from stiffmap.experiment.files.units import Scales
@@ -39,19 +37,6 @@ def rotations(
     if second is not None and first is None:
         first = np.tile(np.eye(3), (len(table.rows), 1, 1))
     return first, first if second is None else second
-
-
-def against_base(experiment: Experiment, home: Floats) -> Experiment:
-    """The experiment with its orientations as those of the TCP; `home` (3, 3) is that at home."""
-    if experiment.rotation is None or experiment.rotation_against == "base":
-        return replace(experiment, rotation_against="base")
-    second = experiment.other_rotation
-    return replace(
-        experiment,
-        rotation=experiment.rotation @ home,
-        other_rotation=None if second is None else second @ home,
-        rotation_against="base",
-    )
 
 
 def _orientation(table: Table, scales: Scales, model: OrientationModel, second: bool) -> Floats | None:

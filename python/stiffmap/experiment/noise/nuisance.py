@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.setups import setups_of, targets_of
 from stiffmap.experiment.readings import kind_of
+from stiffmap.experiment.setups import setups_of, targets_of
 
 
 def nuisance_columns(experiment: Experiment, base: Floats) -> Floats:

@@ -10,8 +10,8 @@ from stiffmap.description import Point
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.poses.handeye import Sighting, as_commanded, find_frames, unmoved
-from stiffmap.experiment.poses.setups import setups_of, targets_of
 from stiffmap.experiment.readings import kinds
+from stiffmap.experiment.setups import setups_of, targets_of
 from stiffmap.machine import Machine
 
 SEEN = "seen_target_"

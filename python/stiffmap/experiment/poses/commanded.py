@@ -8,7 +8,7 @@ import numpy as np
 
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Mask
-from stiffmap.experiment.files.orientation import against_base
+from stiffmap.experiment.poses.orientation import against_base
 from stiffmap.kinematics import Kinematics, forward_kinematics
 from stiffmap.machine import Machine
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.setups import setups_of
 from stiffmap.experiment.readings.types import ReadingKind, Seen
+from stiffmap.experiment.setups import setups_of
 
 
 def change(here: Seen, there: Seen | None) -> Floats:
