@@ -11,7 +11,7 @@ is a batch of random poses in the workspace box of the machine file:
     outside    the same force, a third of the poses beyond the box (up to half its size)
     beyond     the same force at the poses of `outside` that are out of reach
 
---effects adds a row per machine and effect of its drives, links and joints, under the same force. Behind each
+--effects adds a row per machine and kind of effect (effect_cases.py), under the same force, the worst first. Behind each
 multiple stands the share of poses that took the reference path, in percent. Coordinates are spring directions plus
 joint axes. Exit code 1 where a number of the table is above its limit: 4, outside the box 10, the share 0.1 %.
 """
@@ -22,11 +22,11 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from effect_cases import machines_with_effects
 
 import stiffmap as sm
 from stiffmap.files import shipped_machines
@@ -37,16 +37,6 @@ BASE = "orthoglide-revised"
 POSES = 4096
 MOST, MOST_OUTSIDE, MOST_SHARE = 4.0, 10.0, 1e-3
 COLUMNS = ("unloaded", "loaded", "gravity", "outside", "beyond")
-EFFECTS: tuple[tuple[str, dict[str, object]], ...] = (
-    ("dead_zone", {"half_width": 5e-6}),
-    ("friction", {"force": 5.0, "branch": "loading"}),
-    ("hardening", {"cubic": 1e13}),
-    ("length", {"error": 2e-5}),
-    ("tilt", {"angle_x": 5e-4, "angle_y": -3e-4}),
-    ("straightness", {"amplitude": 1e-5, "period": 0.4, "phase": 0.5}),
-    ("joint_friction", {"torque": 0.1, "branch": "loading"}),
-    ("joint_compliance", {"translation": 1e-9, "rotation": 1e-7}),
-)
 
 
 def inside(machine: sm.Machine, n: int) -> np.ndarray:
@@ -114,28 +104,10 @@ def cases(machine: sm.Machine) -> Iterator[Case]:
         yield "beyond", solve(wrench=FORCE), np.resize(wide[::3][:256][far], (512, 3))
 
 
-def element_names(elements: Iterable[Any]) -> Iterator[str]:
-    """Names of a chain's elements, with those inside its blocks."""
-    for e in elements:
-        if hasattr(e, "branches"):
-            for branch in e.branches:
-                yield from element_names(branch.elements if hasattr(branch, "elements") else branch[1])
-        else:
-            yield e.name
-
-
 def effect_cases(machine: sm.Machine) -> Iterator[Case]:
-    """One case for each effect that some element of the machine takes; all of its elements have it."""
-    names = {n for leg in machine.description.legs for n in element_names(leg.elements)}
-    for kind, values in EFFECTS:
-        changed, found = machine, 0
-        for name in sorted(names):
-            try:
-                changed, found = changed.with_effect(kind, element=name, **values), found + 1  # type: ignore[arg-type]
-            except sm.StiffmapError:
-                continue
-        if found:
-            yield kind, (lambda p, m=changed: m.solve(p, FORCE, threads=1)), inside(machine, POSES)
+    """One case for each kind of effect; all elements that take it have it."""
+    for kind, changed in machines_with_effects(machine):
+        yield kind, (lambda p, m=changed: m.solve(p, FORCE, threads=1)), inside(machine, POSES)
 
 
 def main() -> int:
@@ -168,12 +140,11 @@ def main() -> int:
             )
         cells = [f"{row[c][0]:.1f} ({100 * row[c][1]:.2g} %)" if c in row else "–" for c in COLUMNS]
         print(f"| {name} | {' | '.join(cells)} |", flush=True)
-        for column in row:
-            if column not in COLUMNS:
-                print(
-                    f"|   {column} | – | {row[column][0]:.1f} ({100 * row[column][1]:.2g} %) | | | |",
-                    flush=True,
-                )
+        for column in sorted(set(row) - set(COLUMNS), key=lambda c: -row[c][0]):
+            print(
+                f"|   {column} | – | {row[column][0]:.1f} ({100 * row[column][1]:.2g} %) | | | |",
+                flush=True,
+            )
     if wanted.json:
         wanted.json.write_text(json.dumps(table, indent=1))
     print(f"\n{late} of {sum(map(len, table.values()))} numbers above their limit")

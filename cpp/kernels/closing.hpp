@@ -7,6 +7,7 @@
 #include "frames.hpp"
 #include "normal_equations.hpp"
 #include "planar.hpp"
+#include "reach.hpp"
 #include "starts.hpp"
 
 namespace stiffmap::kernel {
@@ -23,16 +24,17 @@ struct Closing {
   const Program& P;
   Scratch& s;
 
-  M never = {};  ///< lanes whose pose is out of reach, as far as descents from here and from home can tell
+  M never = {};  ///< lanes whose pose is out of reach: beyond a leg's length, or as far as descents can tell
 
   /// Closes the legs to `tip`, whose position is at[lane]; returns the lanes that closed, coordinates
   /// in s.x. Where the start was too far and there is patience, the nearest node is continued in leaps.
   M close(const Frame& tip, const double* const (&at)[W], bool patient) {
     for (int q = 0; q < P.coordinate_count; ++q) s.x[q] = splat(P.coordinates[q].role == 2 ? 0 : P.coordinates[q].home);
-    const M usable = start(tip, at);
+    if (P.reach) never = beyond_reach(P, tip);
+    const M usable = start(tip, at) & ~never;
     const M ok = reach(tip, usable);
-    if (P.planar || !patient || all(ok)) return ok;
-    return ok | leap(tip, at, ~ok);
+    if (P.planar || !patient || all(ok | never)) return ok;
+    return ok | leap(tip, at, ~ok & ~never);
   }
 
   M start(const Frame& tip, const double* const (&at)[W]) {

@@ -169,6 +169,7 @@ struct Block {
   void pass(Newton& at, const Program& of) {
     set_base(of);
     at.evaluate(false);
+    if (of.spring_count > 0) at.pull();
     at.frames_and_wrenches();
   }
 
@@ -222,6 +223,7 @@ struct Block {
     newton.dense(newton.answer, K);
     write(done, newton, K, newton.compliance, iterations, steps);
     if (in.perturbed_count == 0) return;
+    if (P.spring_count > 0) newton.pull();
     newton.linearize();  // lanes that settled early have lost their factors
     vary(done & ~unstable, newton, newton.compliance);
   }

@@ -27,7 +27,9 @@ struct LoadPath {
       e.negative = splat(0);
       e.closest = splat(1e300);
       n.evaluate(false);
+      if (n.P.spring_count > 0) n.pull();
       n.linearize();
+      if (n.P.spring_count > 0) n.springs_too();
       V m[6][6];
       n.dense(n.K, m);
       n.invert(m);

@@ -6,6 +6,7 @@
 #include "load_steps.hpp"
 #include "steps.hpp"
 #include "tangents.hpp"
+#include "tip_springs.hpp"
 #include "wrenches.hpp"
 
 namespace stiffmap::kernel {
@@ -17,9 +18,10 @@ struct Newton {
   Elimination& e;
   V6 whole_load;  ///< external wrench at the point, base axes
   V3 whole_gravity;
-  V6 load = whole_load;  ///< the share that acts
-  V6 pending = {};       ///< what is added in this step (F11)
-  Frame tip = {};        ///< frame of the tip; the point is tip.p + tip.R point
+  V6 load = whole_load;       ///< the share that acts, with the external springs
+  V6 dead_load = whole_load;  ///< of the load alone, a dead wrench
+  V6 pending = {};            ///< what is added in this step (F11)
+  Frame tip = {};             ///< frame of the tip; the point is tip.p + tip.R point
   V3 point = {};
   Sym6 K = {};  ///< symmetric tangent at the point
   V6 c = {};
@@ -123,14 +125,18 @@ struct Newton {
   }
 
   /// As the reference: what bears nothing stays at its centre, friction opposes the deflection.
-  void start_laws(M active) {
+  /// Returns the lanes in which it is doubtful whether something bears: round-off decides, and the reference's counts.
+  M start_laws(M active) {
+    M doubtful{};
     for (int q = 0; q < P.coordinate_count; ++q) {
       const CoordinateProgram& k = P.coordinates[q];
       if (k.locked || (k.law < 0 && k.friction == 0)) continue;
       for (int i = 0; i < W; ++i) {
         if (!active[i]) continue;
         const double linear = s.z[q][i];
-        const bool bears = __builtin_fabs(linear) * k.unit > unloaded * P.length;
+        const double share = __builtin_fabs(linear) * k.unit / P.length;
+        const bool bears = share > unloaded;
+        if (share > 0.01 * unloaded && share < 10 * unloaded) doubtful[i] = -1;
         if (k.law < 0) {
           s.friction_sign[q][i] = !bears ? 0 : linear > 0 ? 1 : -1;
           continue;
@@ -145,6 +151,7 @@ struct Newton {
                                  : from_force(law, spring, s.scale[q][i]);
       }
     }
+    return doubtful;
   }
 
   // ---- one linearisation ----------------------------------------------------------------------
@@ -162,6 +169,18 @@ struct Newton {
     wrenches(e, P.chains[P.root], F, at);
   }
 
+  /// The external springs act where the tip is now. Apart from the other passes, so that machines without such springs
+  /// keep their code and their bits.
+  [[gnu::noinline]] void pull() {
+    load = dead_load;
+    frames_and_wrenches();
+    tip_springs(P, tip, point, load, nullptr);
+  }
+  [[gnu::noinline]] void springs_too() {
+    V6 again{};
+    tip_springs(P, tip, point, again, &K);
+  }
+
   [[gnu::noinline]] void linearize() {
     frames_and_wrenches();
     e.lowest = splat(1e300);
@@ -173,7 +192,7 @@ struct Newton {
   /// Tangent of a small extra dead wrench at the point, K - S(m)/2 in the rotational block.
   void dense(const Sym6& symmetric, V (&m)[6][6]) const {
     unpack(symmetric, m);
-    const V3 h = splat(0.5) * load.b;
+    const V3 h = splat(0.5) * dead_load.b;
     m[3][4] += h.z;
     m[3][5] -= h.y;
     m[4][3] -= h.z;
@@ -207,6 +226,16 @@ struct Newton {
     }
     for (int i = 0; i < 6; ++i)
       for (int j = 0; j < 6; ++j) m[i][j] = x[i][j];
+  }
+
+  /// Lanes in which a drive or spring is inside its gap.
+  M open_gaps() const {
+    M open{};
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      const CoordinateProgram& k = P.coordinates[q];
+      if (k.law >= 0 && !k.locked && P.laws[k.law].count > 0) open |= s.dtau[q] == 0.0;
+    }
+    return open;
   }
 
   V step_norm() const {
@@ -246,7 +275,9 @@ struct Newton {
       const M first = way.factor > way.acting;
       put_load(way.acting, way.factor);
       evaluate(secant);
+      if (P.spring_count > 0) pull();
       linearize();
+      if (P.spring_count > 0) springs_too();
       V m[6][6];
       dense(K, m);
       invert(m);
@@ -257,7 +288,7 @@ struct Newton {
       if (secant) {
         failed |= active & ~(norm < 1e6);
         move(active);
-        start_laws(active);
+        failed |= start_laws(active) & active;
         continue;
       }
       // Settled: this linearisation is the one at the answer. The step is taken all the same, unless
@@ -277,9 +308,8 @@ struct Newton {
         const M second = (way.tries == 1.0) & (norm <= 5.0 * way.previous) & (norm <= 0.02) & (e.lowest > pivot_floor);
         distrusted |= active & ~settled & ~((norm <= 0.2 * way.previous) | (norm <= 1e-7) | second);
       }
-      // A gap that nothing closes: free play is the reference's to find (it has no step out of it).
-      else
-        distrusted |= active & (absolute(e.lowest) < 1e-12);
+      // Free play is the reference's to find: a singular step would leave the gap by chance.
+      if (corners && k == 1) distrusted |= active & open_gaps();
       distrusted |= active & ~settled & (way.tries >= static_cast<double>(in.max_iterations));
       move(active & ~kept & ~distrusted);
       done |= settled & ~failed;
@@ -303,12 +333,14 @@ struct Newton {
   void settle() {
     put_load(splat(1), splat(1));
     evaluate(false);
+    if (P.spring_count > 0) pull();
     frames_and_wrenches();
   }
 
   /// The share that acts, and the one whose equilibrium is sought.
   void put_load(V acting, V factor) {
     load = acting * whole_load;
+    dead_load = load;
     pending = (factor - acting) * whole_load;
     e.gravity = acting * whole_gravity;
     e.pending = (factor - acting) * whole_gravity;

@@ -108,6 +108,21 @@ struct PlanarLeg {
   std::int32_t coordinate[4];
 };
 
+/// How far a leg can stretch beyond its first slides: from the centre of its first turning joint, in base axes, to that
+/// of its last one, in the tip's frame. A target further away, but for the slides, is out of reach for sure.
+struct ReachProgram {
+  double first[3], last[3];
+  double along[3][3];  ///< slides before the first turning joint, made orthonormal
+  std::int32_t slides, known;
+  double length;  ///< of all that is between the two centres
+};
+
+/// An external spring at the tip (theory S2): straight, from a point of the tip's body to an anchor in the base.
+struct TipSpringProgram {
+  double offset[3], anchor[3], stiffness, length;
+  std::int32_t tension_only;
+};
+
 struct Program {
   const Op* ops;
   const ChainProgram* chains;
@@ -121,11 +136,14 @@ struct Program {
   const LegClosure* legs;
   const ClosureEquation* equations;
   const ClosureTerm* terms;
+  const ReachProgram* reach;        ///< one per leg where legs close one by one
+  const TipSpringProgram* springs;  ///< external ones
   const std::int32_t* unknowns;
   const std::int32_t* envelope;  ///< per unknown: the first one of its leg that shares an equation with one up to it
   const PlanarLeg* planar;       ///< one per leg, or null: the closure starts from the grid
   const double* grid;            ///< closure starts: nodes x row of unknowns of all legs, NaN where unreachable
-  std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count;
+  std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count,
+      spring_count;
   std::int32_t root, legs_op;  ///< root chain; the legs' block operation
   std::int32_t joint_slots, stiff_slots, group_slots, stroke_count;
   std::int32_t closes;         ///< 1: leg by leg, 2: all at once (`legs` is then the whole machine)
@@ -179,7 +197,8 @@ struct KernelOutput {
 inline constexpr std::int64_t program_layout =
     sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) + 41 * sizeof(Op) +
     43 * sizeof(CoordinateProgram) + 47 * sizeof(DriveProgram) + 53 * sizeof(LawProgram) + 59 * sizeof(ClosureTerm) +
-    67 * sizeof(ChainProgram) + 61 * sizeof(PlanarLeg) + 71 * sizeof(StrokeProgram);
+    71 * sizeof(ReachProgram) + 73 * sizeof(TipSpringProgram) + 67 * sizeof(ChainProgram) + 61 * sizeof(PlanarLeg) +
+    71 * sizeof(StrokeProgram);
 
 /// The one symbol that each level exports. Poses begin .. end-1; `scratch` of scratch_size() bytes.
 struct KernelTable {

@@ -109,6 +109,9 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.terms = d.terms.data();
   p.unknowns = d.unknowns.data();
   p.envelope = d.envelope.data();
+  p.reach = d.reach.data();
+  p.springs = d.springs.data();
+  p.spring_count = i32(d.springs.size());
   p.planar = d.planar.empty() ? nullptr : d.planar.data();
   p.op_count = i32(d.ops.size());
   p.chain_count = i32(d.chains.size());
@@ -132,7 +135,14 @@ void link(const Mechanism& m, FastPlanData& d) {
 }  // namespace
 
 FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high) : data_(std::make_unique<FastPlanData>()) {
-  if (!m.external_springs.empty()) missing_ = "external springs";
+  for (const NodeSpring& s : m.external_springs) {
+    if (s.node != m.tip) missing_ = "external springs that are not at the tip";
+    data_->springs.push_back({{s.offset[0], s.offset[1], s.offset[2]},
+                              {s.anchor[0], s.anchor[1], s.anchor[2]},
+                              s.stiffness,
+                              s.length,
+                              s.tension_only});
+  }
   const CompiledChains chains = compile_chains(m, *data_);
   if (missing_.empty()) missing_ = chains.missing;
   if (data_->program.legs_op < 0) missing_ = "no legs";
@@ -142,6 +152,7 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high) : data
   const bool box = (high - low).minCoeff() >= 0 && high.allFinite();
   const bool leg_by_leg = m.task == full_task && only_legs_have_joints(m, *data_) && compile_closure(m, *data_);
   if (leg_by_leg) recognise_planar_legs(m, *data_);
+  if (leg_by_leg) bound_reach(m, *data_);
   const bool whole = !leg_by_leg && box && compile_whole_closure(m, *data_);
   link(m, *data_);
   Program& p = data_->program;

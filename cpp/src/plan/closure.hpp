@@ -15,6 +15,9 @@ bool compile_closure(const Mechanism& m, FastPlanData& out);
 /// The same for the whole machine at once: every loop, and the commanded components of the tip.
 bool compile_whole_closure(const Mechanism& m, FastPlanData& out);
 
+/// How far each leg can stretch.
+void bound_reach(const Mechanism& m, FastPlanData& out);
+
 /// Closed forms, if every leg has one.
 void recognise_planar_legs(const Mechanism& m, FastPlanData& out);
 

@@ -30,6 +30,8 @@ struct FastPlanData {
   std::vector<ClosureTerm> terms;
   std::vector<std::int32_t> unknowns, envelope;
   std::vector<PlanarLeg> planar;
+  std::vector<ReachProgram> reach;
+  std::vector<TipSpringProgram> springs;
   std::shared_ptr<const std::vector<double>> grid;
 };
 

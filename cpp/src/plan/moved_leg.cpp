@@ -68,6 +68,9 @@ struct One {
 std::int32_t moved_leg(const Program& p, const Program& q) {
   if (p.legs_op != p.chains[p.root].first || p.chain_count != q.chain_count || p.error_count != q.error_count)
     return nobody;
+  if (p.spring_count != q.spring_count) return nobody;
+  for (std::int32_t i = 0; i < p.spring_count; ++i)
+    if (!same(p.springs[i], q.springs[i])) return nobody;
   const Owners owners(p);
   const auto of = [&](std::int32_t coordinate) { return owners.coordinate[static_cast<std::size_t>(coordinate)]; };
   One one;

@@ -37,7 +37,7 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
 
 
 def _loads(plan: MapPlan, position: Floats) -> dict[str, Any]:
-    s = plan.loading.solve(position[:, None], plan.wrenches)
+    s = plan.loading.solve(position[:, None], plan.wrenches, stiffness=plan.compliance)
     d = without_failed(s.displacement, s.status)
     out: dict[str, Any] = {
         "displacement": d,

@@ -26,9 +26,9 @@ class Loading:
         self.machine = machine
         self.options = merged(options, given)
 
-    def solve(self, position: Floats, wrench: Floats) -> Solution:
-        """Equilibria at positions (..., 3) under wrenches (..., 6), broadcast together."""
-        return self.machine.solve(position, wrench, options=self.options)
+    def solve(self, position: Floats, wrench: Floats, *, stiffness: bool = True) -> Solution:
+        """Equilibria at positions (..., 3) under wrenches (..., 6), broadcast together; without the 6x6 if not asked."""
+        return self.machine.solve(position, wrench, options=replace(self.options, stiffness=stiffness))
 
     def solve_varied(
         self, position: Floats, wrench: Floats, variants: tuple[Machine, ...]

@@ -108,3 +108,39 @@ def test_free_play_that_bears_nothing_is_singular() -> None:
     position, _ = draw(machine, 20, seed=25)
     force = np.array([30.0, 20.0, -40.0, 0.0, 0.0, 0.0])  # no moment about the last axis, but for round-off
     assert (machine.solve(position, force).status == sm.Status.SINGULAR).all()
+
+
+def test_gaps_that_bear_round_off_are_the_references() -> None:
+    machine = sm.load_machine("hybrid")
+    for drive in ("a", "b"):
+        machine = machine.with_effect("dead_zone", element=drive, half_width=5e-6)
+    position, wrench = draw(machine, 16, seed=442)
+    wrench[::2] = 0.0
+    options = {"gravity": (0.0, 0.0, -9.81)}
+    fast, reference = (machine.solve(position, wrench, method=m, **options) for m in ("fast", "reference"))
+    np.testing.assert_array_equal(fast.status, reference.status)
+
+
+@pytest.mark.parametrize("name", ["orthoglide-revised", "ur10", "five-bar"])
+@pytest.mark.parametrize("tension_only", ["no", "yes"])
+def test_external_springs_at_the_tip(name: str, tension_only: str) -> None:
+    machine = sm.load_machine(name)
+    size = machine.compiled.length
+    machine = machine.with_effect(
+        "external_spring",
+        stiffness=500.0,
+        length=0.7 * size,
+        anchor_x=0.3 * size,
+        anchor_y=-0.2 * size,
+        anchor_z=size,
+        tension_only=tension_only,
+    )
+    assert machine.fast == ""
+    position, wrench = draw(machine, 24, seed=26)
+    wrench[::5] = 0.0
+    assert machine.solve(position, wrench).reference_share < 0.1
+    for options in ({}, {"gravity": (0.0, 0.0, -9.81)}):
+        found = gap(machine, position, wrench, **options)
+        assert found.statuses == 0
+        assert found.poses > 20
+        assert found.worst() < TOLERANCE
