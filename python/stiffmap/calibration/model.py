@@ -23,7 +23,7 @@ from stiffmap.machine import Machine
 
 STEP = 0.1
 """Of a standard uncertainty, for differences."""
-STEPS, CLOSE = 8, 1e-3
+STEPS, CLOSE = 30, 1e-3
 """Gauss-Newton steps at most; change (in standard uncertainties, or posterior ones) that ends them."""
 
 Progress = Callable[[str, int, int], None]
