@@ -180,23 +180,24 @@ MatX still_directions(const Mechanism& m, const Target& target, ClosureWorkspace
 
 /// The same a little way off home, where no axes coincide by chance; false where no such place was found.
 bool still_off_home(const Mechanism& m, ClosureWorkspace& ws, MatX& out) {
-  VecX x = m.home_coordinates;
   std::minstd_rand random(1);
-  std::uniform_real_distribution<double> share(-0.05, 0.05);
-  select_unknowns(m, true, ws);
-  for (const Index j : ws.unknown) x[j] += share(random) * m.length / m.unit(j);
-  int iterations = 0;
-  const bool ok = close(m, Target{}, Pace::damped, ws, x, iterations);
-  const Pose tip = ws.frames.at(m.tip);
-  select_free(m, ws);
-  if (!ok) return false;
-  const Target target{&tip};
-  residual(m, x, target, ws);
-  out = still_directions(m, target, ws);
-  return true;
+  std::uniform_real_distribution<double> share(-1, 1);
+  for (const double way : {0.05, 0.02, 0.1, 0.01, 0.2, 0.3}) {
+    VecX x = m.home_coordinates;
+    select_unknowns(m, true, ws);
+    for (const Index j : ws.unknown) x[j] += way * share(random) * m.length / m.unit(j);
+    int iterations = 0;
+    const bool ok = close(m, Target{}, Pace::damped, ws, x, iterations);
+    const Pose tip = ws.frames.at(m.tip);
+    select_free(m, ws);
+    if (!ok) continue;
+    const Target target{&tip};
+    residual(m, x, target, ws);
+    out = still_directions(m, target, ws);
+    return true;
+  }
+  return false;
 }
-
-}  // namespace
 
 /// Whether a null direction at home is a finite motion: with one coordinate held elsewhere the others close again.
 bool goes_on(Mechanism& m, const Target& target, const VecX& direction, Index coordinate, ClosureWorkspace& ws) {
@@ -212,6 +213,8 @@ bool goes_on(Mechanism& m, const Target& target, const VecX& direction, Index co
   select_free(m, ws);
   return ok;
 }
+
+}  // namespace
 
 /// A spin moves passive coordinates and nothing that the closure sees, at home as anywhere: its null
 /// direction is the tangent of a finite motion, and has its like off home (axes that coincide at home only

@@ -9,6 +9,8 @@ namespace stiffmap {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double open_turn = 0.4;     // of a spin, rad or shares of the length
+constexpr double open_change = 0.02;  // of the stiffness by it: more than errors of the geometry make
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -88,6 +90,45 @@ void reset(const Mechanism& m, std::uint32_t flags, PoseResult& out) {
   out.indeterminate.assign(static_cast<std::size_t>(m.size()), false);
 }
 
+/// Stiffness of a point at closed coordinates that nothing loads; NaN where a command is out of its table.
+Mat6 unloaded_stiffness(const Mechanism& m, const VecX& x, const NodePoint& point) {
+  Problem p(m);
+  if (!command(m, x, p)) return Mat6::Constant(nan);
+  p.secant_laws = true;
+  State state(m);
+  start_state(m, x, state);
+  Linearization lin(m);
+  SaddleSystem saddle(m);
+  linearize(m, p, state, lin);
+  saddle.assemble(m, lin);
+  StiffnessWorkspace ws(m);
+  return point_stiffness(m, lin, saddle, point.node, point.offset, ws).stiffness;
+}
+
+/// Largest difference of two stiffnesses, relative to the second one's diagonal.
+double change(const Mat6& K, const Mat6& before) {
+  const Vec6 s = before.diagonal().cwiseAbs().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  return (s.asDiagonal() * (K - before) * s.asDiagonal()).cwiseAbs().maxCoeff();
+}
+
+/// A held spin along which the tip's stiffness changes leaves the configuration open (theory K3): not held.
+void let_go_of_configurations(Mechanism& m) {
+  const NodePoint& tip = m.points.front();
+  ClosureWorkspace ws(m);
+  Mat6 home;
+  bool known = false;
+  for (Index j = 0; j < m.size(); ++j) {
+    Coordinate& c = m.coordinates[at(j)];
+    if (!c.locked || c.role != Role::passive) continue;
+    if (!known) home = unloaded_stiffness(m, m.home_coordinates, tip);
+    known = true;
+    VecX x = m.home_coordinates;
+    x[j] += open_turn * m.length / m.unit(j);
+    if (close_passive(m, m.home, ws, x) > 1e-9) continue;
+    if (change(unloaded_stiffness(m, x, tip), home) > open_change) c.locked = false;
+  }
+}
+
 /// A free motion of passive coordinates at a pose: does it leave the stiffness as it is? Moves along
 /// it, closes again, compares (theory K3).
 bool configuration_undetermined(const Mechanism& m, const PoseInput& in, const VecX& motion, SolveWorkspace& ws,
@@ -105,20 +146,8 @@ bool configuration_undetermined(const Mechanism& m, const PoseInput& in, const V
   double kept = 0;
   for (Index j = 0; j < m.size(); ++j) kept = std::max(kept, std::abs(x[j] - ws.x[j]) * m.unit(j) / m.length);
   if (kept < 0.5 * stride) return false;  // came back: only an infinitesimal freedom
-  Problem p(m);
-  if (!command(m, x, p)) return true;
-  p.secant_laws = true;
-  State state(m);
-  start_state(m, x, state);
-  Linearization lin(m);
-  SaddleSystem saddle(m);
-  linearize(m, p, state, lin);
-  saddle.assemble(m, lin);
   const NodePoint& point = m.points[at(in.read_points.front())];
-  const StiffnessResult k = point_stiffness(m, lin, saddle, point.node, point.offset, ws.stiffness);
-  const Vec6 s = stiffness.diagonal().cwiseAbs().cwiseSqrt().cwiseMax(1e-300);
-  const Mat6 change = s.cwiseInverse().asDiagonal() * (k.stiffness - stiffness) * s.cwiseInverse().asDiagonal();
-  return change.cwiseAbs().maxCoeff() > 1e-6;
+  return !(change(unloaded_stiffness(m, x, point), stiffness) <= 1e-6);
 }
 
 /// Rank at the commanded configuration before any load: the four cases of theory (K3). True: go on.
@@ -298,7 +327,7 @@ void conclude_pose(const Mechanism& m, const PoseInput& in, const EquilibriumRes
   const NodePoint& p = m.points[at(in.read_points.front())];
   const EquilibriumWorkspace& done = ws.equilibrium;
   out.point = point_stiffness(m, done.lin, done.saddle, p.node, p.offset, ws.stiffness);
-  if (out.point.flags & flag::rigid_direction)
+  if (done.saddle.regular() || out.point.flags & flag::rigid_direction)
     by_compliance(m, compliance_of(m, p, ws.equilibrium), done.saddle.regular(), out.point);
   ws.spins.release(p, ws.equilibrium, out.point);
   out.flags |= out.point.flags;
@@ -335,6 +364,7 @@ Mechanism assemble(const Chain& root, const Pose& home, const std::vector<Extern
     for (DriveError& e : d.errors)
       if (std::isnan(e.error.reference)) e.error.reference = m.home_coordinates[d.coordinate];
   lock_spins(m);
+  let_go_of_configurations(m);
   return m;
 }
 

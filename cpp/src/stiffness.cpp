@@ -10,6 +10,7 @@ namespace {
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double pivot_alarm = 1e-5;
 constexpr double safe_pivot = 1e-3;     // of the scaled elastic block
+constexpr double same_answer = 1e-9;    // of two ways to the compliance
 constexpr double least_motion = 1e-10;  // beside the largest: below, a compliance is noise
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
@@ -150,13 +151,18 @@ StiffnessResult point_stiffness(const Mechanism& m, const Linearization& lin, co
 }
 
 void by_compliance(const Mechanism& m, const Mat6& C, bool regular, StiffnessResult& out) {
-  out.compliance = C;
+  const bool rigid = out.flags & flag::rigid_direction;
+  if (rigid) out.compliance = C;
   Vec6 s;
   s << Vec3::Constant(std::sqrt(m.stiffness)), Vec3::Constant(std::sqrt(m.stiffness) * m.length);
   const Mat6 scaled = unscale(C, s);
-  if (!regular || !scaled.allFinite()) return;
+  if (!regular || out.free > 0 || !scaled.allFinite()) return;
   const Vec6 sizes = singular_vectors(scaled).values;
   if (!(sizes[5] > least_motion * sizes[0])) return;
+  const Vec6 d = scaled.diagonal().cwiseAbs().cwiseSqrt().cwiseInverse();
+  const Mat6 gap = unscale(unscale(out.compliance, s) - scaled, d);
+  if (!rigid && gap.cwiseAbs().maxCoeff() < same_answer) return;
+  out.compliance = C;
   out.stiffness = unscale(inverse(scaled), s);
   out.flags &= ~flag::rigid_direction;
 }

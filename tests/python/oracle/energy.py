@@ -7,6 +7,7 @@ R being the rotation of the tip since the command; a dead moment has none."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,10 @@ from stiffmap.description import Block, Body, Joint, MachineDescription, Offset,
 CROSS = np.zeros((3, 3, 3))  # CROSS[i] = matrix of (axis i) x
 for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     CROSS[_i, _k, _j], CROSS[_i, _j, _k] = 1.0, -1.0
+
+
+EYE = np.eye(4)
+UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -108,14 +113,20 @@ def pushed(f: Frame, axis: Any, home: float, number: int, value: float) -> Frame
     return f.moved(number, homogeneous(np.eye(3), (home + value) * np.array(axis)), d, np.zeros((4, 4)))
 
 
+@lru_cache(maxsize=4096)
+def about(axis: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Homogeneous: axis x, and its square."""
+    s = np.tensordot(np.array(axis), CROSS, axes=1)
+    out = np.zeros((2, 4, 4))
+    out[0, :3, :3], out[1, :3, :3] = s, s @ s
+    return out[0], out[1]
+
+
 def turned(f: Frame, axis: Any, home: float, number: int, value: float) -> Frame:
     """Behind a rotation about a unit axis (Rodrigues)."""
-    s = np.tensordot(np.array(axis), CROSS, axes=1)
+    s, ss = about(tuple(axis))
     sin, cos = np.sin(home + value), np.cos(home + value)
-    r = np.eye(3) + sin * s + (1 - cos) * (s @ s)
-    d, dd = np.zeros((4, 4)), np.zeros((4, 4))
-    d[:3, :3], dd[:3, :3] = cos * s + sin * (s @ s), -sin * s + cos * (s @ s)
-    return f.moved(number, homogeneous(r), d, dd)
+    return f.moved(number, EYE + sin * s + (1 - cos) * ss, cos * s + sin * ss, -sin * s + cos * ss)
 
 
 def at_point(offset: Any, force: Any) -> np.ndarray:
@@ -175,7 +186,7 @@ def through_spring(e: Spring, f: Frame, walk: Walk, name: str) -> Frame:
     walk.energy.slope[of] += k @ (np.array([a for _, a in taken]) - np.array(e.rest))
     walk.energy.curve[np.ix_(of, of)] += k
     for i, (j, a) in enumerate(taken):
-        f = (pushed if i < 3 else turned)(f, np.eye(3)[i % 3], 0.0, j, a)
+        f = (pushed if i < 3 else turned)(f, UNITS[i % 3], 0.0, j, a)
     return f
 
 

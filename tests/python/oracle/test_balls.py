@@ -81,6 +81,42 @@ def test_every_chart_gives_the_same_machine(name: str, method: str) -> None:
             assert np.abs(value - wanted).max() < 1e-9 * np.abs(wanted).max(), letters
 
 
+@pytest.mark.parametrize("method", ["fast", "reference"])
+@pytest.mark.parametrize("legs", [("a",), ("a", "b", "c")])
+def test_hinges_that_coincide_at_home_are_no_spin(legs: tuple[str, ...], method: str) -> None:
+    """Three hinges z, x, z: at home what lies between turns freely, and with it the direction that is blocked; off
+    home they are a ball joint again."""
+    declared = load_description("3-rps")
+
+    def hinges(e: Joint) -> tuple[Element, ...]:
+        axes = ("z", "x", "z")
+        return (
+            Offset("turn", Pose.of((0, 0, 0), home_turn(e))),
+            *(Joint(f"hinge{i}", "revolute", (AXES[a],), (0.0,)) for i, a in enumerate(axes)),
+        )
+
+    changed = with_balls(declared, hinges)
+    mixed = replace(
+        declared,
+        legs=tuple(
+            new if new.name in legs else old for old, new in zip(declared.legs, changed.legs, strict=True)
+        ),
+    )
+    machine, wrench = sm.Machine(mixed), [300, -200, 100, 0, 0, 0]
+    assert machine.solve(declared.home.p, wrench, method=method).status == sm.Status.SINGULAR
+    for tilt in (1e-3, 0.1):
+        turned = np.array(declared.home.r) @ Rotation.from_rotvec([tilt, 0.7 * tilt, 0]).as_matrix()
+        s, ball = (
+            m.solve(declared.home.p, wrench, rotation=turned, method=method)
+            for m in (machine, sm.Machine(declared))
+        )
+        if s.status == sm.Status.UNREACHABLE:  # refused; what is answered is right
+            continue
+        assert s.status == sm.Status.CONVERGED
+        np.testing.assert_allclose(s.displacement, ball.displacement, atol=1e-9)
+        assert np.abs(s.compliance - ball.compliance).max() < 1e-6 * np.abs(ball.compliance).max()
+
+
 def determined(d: MachineDescription) -> bool:
     """Whether the machine resists every motion of its platform at home, without a load."""
     return bool(sm.Machine(d).solve(d.home.p, rotation=d.home.r).status == sm.Status.CONVERGED)
