@@ -205,7 +205,7 @@ bool examine_unloaded(const Mechanism& m, const PoseInput& in, SolveWorkspace& w
 Mat6 compliance_of(const Mechanism& m, const NodePoint& p, EquilibriumWorkspace& eq) {
   MatX J(6, m.size());
   eq.lin.point_jacobian(m, p.node, p.offset, J);
-  for (Index j = 0; j < m.size(); ++j) J.col(j) *= eq.saddle.kind()[at(j)] == Kind::fixed ? 0.0 : eq.lin.da[j];
+  for (Index j = 0; j < m.size(); ++j) J.col(j) *= eq.lin.kind[at(j)] == Kind::fixed ? 0.0 : eq.lin.da[j];
   Mat6 C;
   for (int k = 0; k < 6; ++k) {
     eq.saddle.solve(J.row(k).transpose(), VecX::Zero(m.closures()), eq.dz, eq.dlambda);
