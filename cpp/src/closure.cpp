@@ -214,6 +214,16 @@ bool goes_on(Mechanism& m, const Target& target, const VecX& direction, Index co
   return ok;
 }
 
+/// Sizes of a spin's coordinates; the middle one of a ball joint counts little: it turns back before the spin has gone
+/// round.
+VecX winding(const Mechanism& m, const VecX& spin, const ClosureWorkspace& ws) {
+  VecX out = spin.cwiseAbs();
+  for (const Ball& b : m.balls)
+    for (std::size_t k = 0; k < ws.unknown.size(); ++k)
+      if (ws.unknown[k] == b.first + 1) out[static_cast<Index>(k)] *= 0.2;
+  return out;
+}
+
 }  // namespace
 
 /// A spin moves passive coordinates and nothing that the closure sees, at home as anywhere: its null
@@ -235,7 +245,7 @@ void lock_spins(Mechanism& m) {
       spin = (still * (still.transpose() * off_home.rightCols<1>())).normalized();
     }
     Index held = 0;
-    spin.cwiseAbs().maxCoeff(&held);
+    winding(m, spin, ws).maxCoeff(&held);
     if (!goes_on(m, target, spin / spin[held], ws.unknown[at(held)], ws)) return;  // singular at home, but no spin
     m.coordinates[at(ws.unknown[at(held)])].locked = true;
   }
