@@ -34,6 +34,8 @@ from stiffmap.experiment.noise.whitening import Problem
 BEYOND = 100.0
 """Standard uncertainties of its certificate that an instrument is never taken to be off by."""
 AT_BOUND = 1e-6
+COVERED, FAINT = 0.95, 0.1
+"""Share of an effect's signature that uncertain numbers imitate; those that ten standard uncertainties of show at all."""
 WORTH_A_FLOOR = 0.3
 """Noise variances per pose that no linear explanation takes: effects are then looked for at that floor at once."""
 MEETING = 10.0
@@ -171,6 +173,8 @@ def _searched(s: Study, tolerances: Tolerances) -> Answer:
     assert s.layer is not None
     finding, verdict, left = judge(s, find(s))
     model, refused = admissible(finding.model, finding, tolerances)
+    model, more = _beyond_calibration(s, model, finding)
+    refused += more
     if refused:
         finding = with_model(finding, model)
         left = unexplained(s, finding)
@@ -186,7 +190,9 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
     finding = find(again)
     held = held_out(again, finding.outliers, seed, finding)
     model, refused = admissible(finding.model, finding, tolerances)
+    model, same = _beyond_calibration(s, model, finding)
     model, more = _shared(model, finding, held)
+    more = same + more
     finding = with_model(finding, model)
     left = unexplained(s, _on(s, finding))
     return Answer(again, finding, _word(finding, left), left, s.layer.calibration, held, refused + more)
@@ -263,6 +269,26 @@ def _why_not(model: Model, i: int, tolerances: Tolerances) -> str:
         if off > BEYOND * tolerances.instrument:
             return f"{off:.2g} is beyond the instrument's certificate ({tolerances.instrument:.2g}) a hundred times"
     return ""
+
+
+def _beyond_calibration(s: Study, model: Model, finding: Finding) -> tuple[Model, tuple[str, ...]]:
+    """The model without effects that are nothing but numbers which the calibration finds within tolerance."""
+    assert s.layer is not None
+    if s.layer.calibration.beyond:
+        return model, ()
+    problem, predictor = finding.search.problem.exact, finding.search.predictor
+    columns = problem.white(s.layer.columns)
+    u, size, _ = np.linalg.svd(columns, full_matrices=False)
+    q = u[:, size > FAINT]
+    refused: list[str] = []
+    for c in tuple(model.candidates):
+        i = model.candidates.index(c)
+        less = fit(model.without(i), predictor, finding.search.problem)
+        alone = problem.white(predictor(model.terms()) - predictor(model.without(i).terms()))
+        if float(np.sum((q.T @ alone) ** 2)) > COVERED * float(alone @ alone):
+            refused.append(f"{c}: numbers that are uncertain anyway show the same, and are within tolerance")
+            model = less
+    return model, tuple(refused)
 
 
 def _shared(model: Model, finding: Finding, held: HeldOut | None) -> tuple[Model, tuple[str, ...]]:
