@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "arrays.hpp"
+#include "stiffmap/enclosure.hpp"
 #include "stiffmap/modes.hpp"
 #include "stiffmap/parallel.hpp"
 
@@ -93,6 +94,64 @@ py::dict kinematics(const Mechanism& m, const Array& position, const Array& rota
   out["misfit"] = misfit;
   out["status"] = status;
   out["flags"] = flags;
+  return out;
+}
+
+/// Coordinates and their slopes over cells: centre + axes * d, |d_k| <= half_k.
+py::dict enclose(const Mechanism& m, const Array& centre, const Array& half, const Array& axes, const Array& rotation,
+                 int slopes, const std::vector<Index>& watched, int threads) {
+  const py::ssize_t n = count_of(centre), size = m.size(), nodes = static_cast<py::ssize_t>(watched.size());
+  const double *p = data(centre, {n, 3}, "centre"), *h = data(half, {n, 3}, "half");
+  const Mat3 R = Eigen::Map<const Row3>(data(rotation, {3, 3}, "rotation")),
+             along = Eigen::Map<const Row3>(data(axes, {3, 3}, "axes"));
+  auto x_out = unknown({n, size}), slope = unknown({n, size, slopes}), radius = unknown({n, size}),
+       change = unknown({n, 3, size, slopes}), slack = unknown({n, size, slopes}), moved = unknown({n, nodes}),
+       position = unknown({n, nodes, 3}), bend = unknown({n, 3});
+  py::array_t<bool> enclosed(n), closed(n);
+  double *xs = x_out.mutable_data(), *ss = slope.mutable_data(), *rs = radius.mutable_data(),
+         *cs = change.mutable_data(), *ks = slack.mutable_data(), *ms = moved.mutable_data(),
+         *ps = position.mutable_data(), *bs = bend.mutable_data();
+  bool *good = enclosed.mutable_data(), *shut = closed.mutable_data();
+  {
+    py::gil_scoped_release free;
+    parallel_chunks(n, 16, threads, [&](int, long begin, long end) {
+      PoseCloser closer(m);
+      Encloser encloser(m);
+      Enclosure e;
+      VecX x(m.size());
+      for (long i = begin; i < end; ++i) {
+        x.setConstant(nan);
+        const ClosureResult r = closer.close(m, {Eigen::Map<const Vec3>(p + 3 * i), R}, x, false);
+        shut[i] = r.status == Status::converged;
+        good[i] = false;
+        if (!shut[i]) continue;
+        Eigen::Map<VecX>(xs + size * i, size) = x;
+        encloser.enclose(m, closer.frames(), x, along, Eigen::Map<const Vec3>(h + 3 * i), slopes, watched, e);
+        for (py::ssize_t k = 0; k < nodes; ++k)
+          Eigen::Map<Vec3>(ps + 3 * (nodes * i + k)) = closer.frames().at(watched[static_cast<std::size_t>(k)]).p;
+        Eigen::Map<Vec3>(bs + 3 * i) = e.bend;
+        if (!e.enclosed) continue;
+        good[i] = true;
+        Eigen::Map<RowX>(ss + slopes * size * i, size, slopes) = e.G;
+        Eigen::Map<RowX>(ks + slopes * size * i, size, slopes) = e.slack;
+        Eigen::Map<VecX>(rs + size * i, size) = e.radius;
+        Eigen::Map<VecX>(ms + nodes * i, nodes) = e.moved;
+        for (py::ssize_t k = 0; k < 3; ++k)
+          Eigen::Map<RowX>(cs + slopes * size * (3 * i + k), size, slopes) = e.change[static_cast<std::size_t>(k)];
+      }
+    });
+  }
+  py::dict out;
+  out["closed"] = closed;
+  out["enclosed"] = enclosed;
+  out["coordinates"] = x_out;
+  out["slope"] = slope;
+  out["radius"] = radius;
+  out["change"] = change;
+  out["slack"] = slack;
+  out["points"] = position;
+  out["moved"] = moved;
+  out["bend"] = bend;
   return out;
 }
 
@@ -209,6 +268,9 @@ void bind_measures(py::module_& m) {
                                return out;
                              })
       .def("kinematics", &kinematics, "position"_a, "rotation"_a, "start"_a, "rates"_a, "patient"_a, "threads"_a)
+      .def_property_readonly("not_enclosed", &Encloser::missing)
+      .def("enclose", &enclose, "centre"_a, "half"_a, "axes"_a, "rotation"_a, "slopes"_a, "watched"_a,
+           "threads"_a)
       .def("dynamics", &dynamics, "inertias"_a, "coordinates"_a, "twist"_a, "twist_rate"_a, "wrench"_a, "gravity"_a,
            "threads"_a)
       .def("modes", &modes, "inertias"_a, "position"_a, "rotation"_a, "wrench"_a, "gravity"_a, "count"_a, "threads"_a);

@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
+#include <array>
 #include <vector>
 
 #include "stiffmap/closure.hpp"
@@ -22,6 +23,32 @@ struct Motion {
   double misfit = 0;  ///< loop velocity that the drives' rates leave open, relative: 0 unless they are dependent
 };
 
+/// The joints alone: springs at rest, locked coordinates at home, the constant transforms between joints multiplied.
+class RigidTree {
+ public:
+  explicit RigidTree(const Mechanism& m);
+
+  /// Frames of moving joints, of the tip and of the loops' ends; axes and origins of moving joints. Others stay.
+  void forward(const VecX& x, Frames& out) const;
+  /// Drives and free passive coordinates.
+  const std::vector<Index>& moving() const { return moving_; }
+  /// Those that move the tip, from the base outwards.
+  const std::vector<Index>& tip() const { return tip_; }
+  /// Those that move one end of a loop and not the other: primary and end.
+  const std::array<std::vector<Index>, 2>& loop(std::size_t l) const { return loops_[l]; }
+
+ private:
+  struct Step {
+    Index node, parent, coordinate;
+    JointType type;
+    Pose before;
+    Vec3 axis;
+  };
+  std::vector<Step> steps_;
+  std::vector<Index> moving_, tip_;
+  std::vector<std::array<std::vector<Index>, 2>> loops_;
+};
+
 /// Linear relations between the rates of passive coordinates and drives, factorised once per configuration.
 class LoopRates {
  public:
@@ -34,13 +61,11 @@ class LoopRates {
   void solve(const Mechanism& m, const MatX& e, Eigen::Ref<MatX> out) const;
   void motion(const Mechanism& m, const Frames& frames, Motion& out) const;
 
-  const MatX& loop_jacobian() const { return J_; }
-  const std::vector<Index>& passive() const { return passive_; }
-
  private:
   MatX solve_scaled(const MatX& e) const;
   double fill_normal();
 
+  RigidTree tree_;
   std::vector<Index> passive_;
   std::vector<std::vector<Index>> columns_;  ///< per loop: passive columns that are not zero
   MatX J_, A_, N_;
@@ -51,7 +76,7 @@ class LoopRates {
 };
 
 /// Closes many neighbouring poses: Newton from a given start or from the last pose, else by continuation
-/// from home.
+/// from home. Frames are those of `RigidTree`.
 class PoseCloser {
  public:
   explicit PoseCloser(const Mechanism& m);
@@ -63,15 +88,24 @@ class PoseCloser {
 
  private:
   bool newton(const Mechanism& m, const Pose& pose, VecX& x);
+  void normal(const Mechanism& m, const Pose& pose);
   bool from_home(const Mechanism& m, const Pose& pose, VecX& x);
+  void remember(const Pose& pose, const VecX& x);
+  bool extrapolated(const Pose& pose, VecX& x) const;
   double residual(const Mechanism& m, const Pose& pose, const VecX& x);
 
   ClosureWorkspace ws_;
-  std::vector<Index> unknown_;
+  RigidTree tree_;
+  std::vector<std::vector<Index>> columns_;  ///< of the unknowns: columns of the tip's and of each loop's rows
   MatX A_, N_;
-  VecX e_, last_, trial_;
+  VecX e_, right_, unit_, last_, trial_;
+  Eigen::LLT<MatX> llt_;
   Pose last_pose_;
   bool has_last_ = false;
+  // the poses before the last, while they are evenly spaced along a line
+  VecX before_, earlier_;
+  Vec3 step_ = Vec3::Zero();
+  int even_ = 0;
 };
 
 }  // namespace stiffmap

@@ -217,6 +217,31 @@ class CompiledMachine:
         begin = np.zeros((0, len(self.names.coordinates))) if start is None else start
         return self._mechanism.kinematics(position, rotation, begin, False, patient, threads)
 
+    @property
+    def not_enclosed(self) -> str:
+        """Why cells of positions cannot be enclosed; empty if they can."""
+        return self._mechanism.not_enclosed
+
+    def enclose(
+        self,
+        centre: Floats,
+        half: Floats,
+        axes: Floats,
+        rotation: Floats,
+        *,
+        slopes: int,
+        watched: Sequence[int],
+        threads: int,
+    ) -> dict[str, Any]:
+        """Arrays by name: what holds over the cells (n, 3) centre, half lengths along the columns of axes (3, 3).
+
+        slopes: 3 columns (translations) or 6 (twists) of the coordinates' slopes. watched: frames whose
+        motion is bounded.
+        """
+        return self._mechanism.enclose(
+            centre, half, np.ascontiguousarray(axes), rotation, slopes, list(watched), threads
+        )
+
     def dynamics(
         self,
         inertias: Floats,

@@ -1,89 +1,107 @@
-"""Proof that a box of positions keeps all limits, nodes and what lies between them (theory D8)."""
+"""Whether a cube of positions keeps all limits, inside as well as on its border; how much of it does."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiffmap.broadcasting import Floats
-from stiffmap.performance.limits import Bounds
+from stiffmap.performance.limits import Bounds, Cells
+from stiffmap.performance.sampled import sample
 
-SAFETY = 2.0
-"""On second derivatives, which are second differences between 27 nodes of each cell."""
-FIRST = 3
+FIRST = 4
 """Cells along each edge at first."""
-DEEPEST = 9
-_NODES = np.array(list(product((0, 1, 2), repeat=3)))
-_LINES = [
-    [[int(np.ravel_multi_index(tuple(np.insert(rest, axis, v)), (3, 3, 3))) for v in (0, 1, 2)]
-     for rest in product((0, 1, 2), repeat=2)]
-    for axis in range(3)
-]  # fmt: skip
+HALVED = 0.5
+"""Axes with this share of the largest curvature, or more, are halved too."""
 
 
 @dataclass(frozen=True, eq=False)
-class Proof:
-    """Whether a box keeps its limits; where not, poses that break one."""
+class Shrunk:
+    """The largest cube about a centre, up to the one asked for, that was decided to keep all limits."""
 
-    holds: bool
+    edge: float
     broken: Floats
-    """(k, 3) positions that break a limit, empty where the box holds or nothing was decided."""
-    limit: str
-    """The limit that is broken, or that left the last cells undecided."""
-    worst: float
-    """Largest value of that limit over its bound, at a node."""
+    """(k, 3) positions that break a limit, in the cube's own coordinates."""
+    names: tuple[str, ...]
+    """Limits that stopped it, or that came nearest to."""
+    cells: int
 
 
-def prove(bounds: Bounds, low: Floats, high: Floats) -> Proof:
-    """Cells are halved until each is proven by its nodes and second differences, or a node fails."""
-    unit = (high - low) / FIRST
-    cells = np.array(list(product(range(FIRST), repeat=3)), dtype=float)
-    scale, worst, name = 1.0, 0.0, ""
-    for _ in range(DEEPEST):
-        lattice, where = np.unique(
-            np.rint((cells[:, None] * 2 + _NODES[None]).reshape(-1, 3)).astype(np.int64),
-            axis=0,
-            return_inverse=True,
-        )
-        position = low + lattice * (0.5 * scale) * unit
-        broken, undecided, name, worst = _judge(bounds, position, where.reshape(len(cells), 27))
-        if broken.any():
-            return Proof(False, position[broken], name, worst)
-        if not undecided.any():
-            return Proof(True, np.zeros((0, 3)), name, worst)
-        halves = np.array(list(product((0, 1), repeat=3)), dtype=float)
-        cells = (2 * cells[undecided][:, None] + halves).reshape(-1, 3)
-        scale *= 0.5
-    return Proof(False, np.zeros((0, 3)), name, worst)
+def judge_cells(bounds: Bounds) -> Callable[[Floats, Floats, Floats], Cells]:
+    """Enclosure where it can be had, else nodes."""
+    if bounds.unproven:
+        return lambda centre, half, axes: sample(bounds, centre, half, axes)
+    return bounds.over
 
 
-def _judge(
-    bounds: Bounds, position: Floats, where: NDArray[np.int64]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], str, float]:
-    """Nodes that break a limit, cells that stay undecided, the tightest limit and its share."""
-    closed, limits = bounds.at(position)
-    broken = ~closed
-    undecided = np.zeros(len(where), dtype=bool)
-    tightest, share = ("closure", np.inf) if broken.any() else ("", -np.inf)
-    for limit in limits:
-        over = closed & ~(limit.value <= limit.most)
-        broken |= over
-        size = max(abs(limit.most), 1e-9)
-        most = float(np.max((limit.value[closed] - limit.most) / size, initial=-np.inf))
-        if most > share and tightest != "closure":
-            tightest, share = limit.name, most
-        values = limit.array[where]
-        error = np.zeros(len(where))
-        for lines in _LINES:
-            bends = [
-                np.linalg.norm(values[:, a] - 2 * values[:, b] + values[:, c], axis=-1) for a, b, c in lines
-            ]
-            # a node spacing h has the second difference h² f''; the interpolation error is h² f'' / 8
-            error += SAFETY * np.max(bends, axis=0) / 8
-        top = limit.value[where].max(axis=1)
-        with np.errstate(invalid="ignore"):
-            undecided |= ~(top + error <= limit.most)
-    return broken, undecided, tightest, 1 + share
+def shrink(
+    bounds: Bounds, axes: Floats, shape: Floats, centre: Floats, edge: float, least: float, gap: float, work: int
+) -> Shrunk:
+    """Cells are halved until decided; an undecided one of a size near `gap`, or a point that breaks a
+    limit, shrinks the cube about its centre instead. Coordinates along `axes`, divided by `shape`.
+
+    Gives up (edge 0) below `least`, or when more than `work` cells were asked for.
+    """
+    judge = judge_cells(bounds)
+    step = np.arange(FIRST) / FIRST
+    low = np.stack(np.meshgrid(step, step, step, indexing="ij"), axis=-1).reshape(-1, 3)
+    low = centre - edge / 2 + edge * low
+    high = low + edge / FIRST
+    broken: list[Floats] = []
+    names: dict[str, int] = {}
+    last, count = "", 0
+    while len(low):
+        if count + len(low) > work or edge <= least:
+            return Shrunk(0.0, _points(broken), tuple(names) or (last,), count)
+        middle, half = (low + high) / 2, (high - low) / 2
+        found = judge((middle * shape) @ axes.T, half * shape, axes)
+        count += len(low)
+        outside = found.broken
+        if outside.any():
+            broken.append(middle[outside])
+            for i in np.unique(found.limit[outside]):
+                names[found.names[i]] = 1
+            edge = min(edge, 2 * float(np.abs(middle[outside] - centre).max(axis=1).min()) - 0.1 * gap)
+        left = ~found.inside
+        last = found.names[int(found.limit[left][0])] if left.any() else last
+        low, high, bend = low[left], high[left], found.bend[left]
+        size = (high - low).max(axis=1) if len(low) else np.zeros(0)
+        tiny = size < 0.05 * gap
+        if tiny.any():
+            near = np.maximum(np.maximum(low - centre, centre - high).max(axis=1), 0.0)[tiny]
+            edge = min(edge, 2 * float(near.min()))
+            names[last] = 1
+        low, high = np.maximum(low, centre - edge / 2), np.minimum(high, centre + edge / 2)
+        kept = (high - low > 1e-15).all(axis=1)
+        low, high = halved(low[kept], high[kept], bend[kept])
+    return Shrunk(edge, _points(broken), tuple(names) or ((last,) if last else ()), count)
+
+
+def halved(low: Floats, high: Floats, bend: Floats) -> tuple[Floats, Floats]:
+    """Each cell cut in two along the axes that curve most; along the longest where that is not known."""
+    size = high - low
+    known = np.isfinite(bend).all(axis=1)[:, None]
+    weight = np.where(known, bend * size / np.maximum(size.max(axis=1, keepdims=True), 1e-300), size)
+    # an axis along which nothing curves is cut as well when it is far longer than the others
+    weight = weight + 1e-3 * size / np.maximum(size.max(axis=1, keepdims=True), 1e-300) * weight.max(
+        axis=1, keepdims=True
+    )
+    weight = np.where(weight.max(axis=1, keepdims=True) > 0, weight, size)
+    cut = weight >= HALVED * weight.max(axis=1, keepdims=True)
+    for axis in range(3):
+        chosen = cut[:, axis]
+        middle = (low[chosen, axis] + high[chosen, axis]) / 2
+        upper_low = low[chosen].copy()
+        upper_low[:, axis] = middle
+        upper_high = high[chosen].copy()
+        high = high.copy()
+        high[chosen, axis] = middle
+        low, high = np.concatenate([low, upper_low]), np.concatenate([high, upper_high])
+        cut = np.concatenate([cut, cut[chosen]])
+    return low, high
+
+
+def _points(parts: list[Floats]) -> Floats:
+    return np.concatenate(parts) if parts else np.zeros((0, 3))

@@ -12,9 +12,6 @@ from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.rotations import as_rotations
 
-WORTHWHILE = 256
-"""Poses from which the SIMD kernels' closures are worth asking for as starts."""
-
 
 @dataclass(frozen=True, eq=False)
 class DriveKinematics:
@@ -71,22 +68,9 @@ def drive_kinematics(
     begin: Floats | None
     if start is not None:
         begin = rows(trailing(start, (size,), "start", "coordinates"), shape, (size,))
-    elif not patient:
-        begin = None
     else:
-        begin = _starts(machine, flat_p, flat_r, thread_count(threads))
+        begin = None
     out = compiled.rates(flat_p, flat_r, begin, patient=patient, threads=thread_count(threads))
     drives = list(compiled.drives)
     shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items() if k not in ("rates", "misfit")}
     return DriveKinematics(actuators=shaped["coordinates"][..., drives], **shaped)
-
-
-def _starts(machine: Machine, position: Floats, rotation: Floats, threads: int) -> Floats | None:
-    """Closed coordinates from the kernels, where they take the machine; the closure checks each."""
-    if len(position) < WORTHWHILE or machine.fast:
-        return None
-    answer = machine.compiled.solve(
-        position, rotation, np.zeros((len(position), 1, 6)), load_points=["tcp"], load_types=["dead"],
-        read_points=["tcp"], gravity=np.zeros(3), fast=True, load_steps=0, threads=threads, stiffness=False,
-    )  # fmt: skip
-    return np.asarray(answer.coordinates)

@@ -1,31 +1,31 @@
-"""What keeps a pose inside the workspace, as smooth arrays and convex functions of them.
-
-A box of poses is judged from its nodes: between them each smooth array stays within its multilinear
-interpolant plus (1/8) sum h_k^2 max|second derivative along k|, and the largest value of a convex
-function of the interpolant lies at a node (docs/theory.md D8).
-"""
+"""What keeps a pose inside the workspace: limits at poses, and largest values over whole cells (theory D8)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, thread_count
+from stiffmap.description.machine import TASK
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
-from stiffmap.performance.closing import drive_kinematics
-from stiffmap.performance.scaling import characteristic_length, weighted
-from stiffmap.performance.zonotopes import inverse_rows
+from stiffmap.performance.bars import Bars, segment_distance
+from stiffmap.performance.closing import DriveKinematics, drive_kinematics
+from stiffmap.performance.scaling import characteristic_length, revolute_drives, weighted
+from stiffmap.performance.zonotopes import corners, inverse_rows
 from stiffmap.status import Status
 
 UNLIMITED = 1e299
+BOX = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """One convex bound ``value <= most`` at nodes (n,), of a smooth array."""
+    """One bound ``value <= most`` at poses (n,), of a smooth array."""
 
     name: str
     value: Floats
@@ -34,7 +34,22 @@ class Limit:
     array: Floats
     """(n, a) the smooth array, in the unit of `value`: |change of value| <= |change of array|."""
     left: Floats
-    """(n, a) with right: lower estimate of the value at a neighbour is left·(array there)."""
+    """(n, a): a lower estimate of the value at a neighbour is left·(array there), the value being convex."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """What was proven of cells of positions (n)."""
+
+    inside: NDArray[np.bool_]
+    """Every pose of the cell closes and keeps all limits."""
+    broken: NDArray[np.bool_]
+    """The centre does not."""
+    limit: NDArray[np.int64]
+    """Index into `names` of the limit nearest to its bound, or beyond."""
+    names: tuple[str, ...]
+    bend: Floats
+    """(n, 3) share of each axis in the curvature; NaN: unknown."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +63,9 @@ class Bounds:
     length: float | None = None
     ranges: bool = True
     joints: bool = True
+    clearance: float | None = None
+    deflection: tuple[float, str | None, float] | None = None
+    """N, plane, m: force in its worst direction there, and the largest deflection."""
     threads: int | None = None
     counter: list[int] = field(default_factory=lambda: [0])
 
@@ -58,8 +76,37 @@ class Bounds:
                 raise StiffmapError(
                     f"transmission: expected (lowest, highest) with 0 <= lowest < highest, got ({low}, {high})"
                 )
-        if self.factors != "sphere":
-            raise StiffmapError(f"factors: expected 'sphere' (singular values), got {self.factors!r}")
+        if self.factors not in ("sphere", "cube"):
+            raise StiffmapError(
+                f"factors: expected 'sphere' (singular values) or 'cube' (each drive within its limit), got {self.factors!r}"
+            )
+        if self.clearance is not None and not self.clearance > 0:
+            raise StiffmapError(f"clearance: expected a positive distance in m, got {self.clearance!r}")
+        if self.deflection is not None and not (self.deflection[0] > 0 and self.deflection[2] > 0):
+            raise StiffmapError(
+                f"deflection: expected (force in N, plane, most in m), both positive, got {self.deflection!r}"
+            )
+
+    @cached_property
+    def bars(self) -> Bars:
+        """Straight members whose clearance counts."""
+        return Bars(self.machine)
+
+    @cached_property
+    def unproven(self) -> str:
+        """Empty where cells can be proven, else why their nodes must do."""
+        compiled, drives = self.machine.compiled, len(self.machine.actuators)
+        if self.deflection is not None:
+            return "a deflection has no bound between poses"
+        if compiled.not_enclosed:
+            return compiled.not_enclosed
+        if self.transmission is not None and (
+            drives not in (3, 6) or self.machine.description.task != TASK
+        ):
+            return "drives and commanded motions are not as many"
+        return ""
+
+    # At poses -------------------------------------------------------------------------------------
 
     def at(self, position: Floats) -> tuple[NDArray[np.bool_], list[Limit]]:
         """Which poses (n, 3) close, and the limits there."""
@@ -68,23 +115,178 @@ class Bounds:
         closed = k.status == Status.CONVERGED
         limits: list[Limit] = []
         if self.transmission is not None:
-            size = characteristic_length(self.machine, self.length)
-            j = weighted(self.machine, k.jacobian, size, "all")
-            low, high = self.transmission
-            limits.append(_spectral("transmission above", j, high, closed))
-            if low > 0:
-                limits.append(_spectral("transmission below", inverse_rows(j), 1 / low, closed))
+            limits.extend(self._factors(k, closed))
         limits.extend(self._intervals(k.coordinates))
+        if self.clearance is not None:
+            limits.append(self._clearance(k))
+        if self.deflection is not None:
+            limits.append(self._deflection(position, closed))
         return closed, limits
+
+    def inside(self, position: Floats) -> NDArray[np.bool_]:
+        """Which poses (n, 3) close and keep all limits."""
+        closed, limits = self.at(position)
+        good = closed.copy()
+        for limit in limits:
+            good &= limit.value <= limit.most
+        return good
+
+    def _factors(self, k: DriveKinematics, closed: NDArray[np.bool_]) -> list[Limit]:
+        assert self.transmission is not None
+        j = weighted(self.machine, k.jacobian, self.size, "all")
+        low, high = self.transmission
+        out = []
+        if self.factors == "cube":
+            if np.isfinite(high):
+                out.append(_vertices("cube factor above", j, high, closed))
+            if low > 0:
+                out.append(_rows("cube factor below", inverse_rows(j), 1 / low, closed))
+            return out
+        if np.isfinite(high):
+            out.append(_spectral("transmission above", j, high, closed))
+        if low > 0:
+            out.append(_spectral("transmission below", inverse_rows(j), 1 / low, closed))
+        return out
+
+    @cached_property
+    def size(self) -> float:
+        """Characteristic length, m."""
+        return characteristic_length(self.machine, self.length)
+
+    @cached_property
+    def _coordinates(self) -> list[tuple[int, str, float, float]]:
+        return _coordinate_limits(self.machine, self.ranges, self.joints)
 
     def _intervals(self, x: Floats) -> list[Limit]:
         out = []
-        for index, name, low, high in _coordinate_limits(self.machine, self.ranges, self.joints):
+        for index, name, low, high in self._coordinates:
             for sign, most in ((1.0, high), (-1.0, -low)):
                 if abs(most) < UNLIMITED:
                     value = sign * x[:, index]
                     out.append(Limit(name, value, most, value[:, None], np.ones((len(x), 1))))
         return out
+
+    def _clearance(self, k: DriveKinematics) -> Limit:
+        assert self.clearance is not None
+        value = -self.bars.least_distance(k.coordinates)
+        return Limit("clearance of bars", value, -self.clearance, value[:, None], np.ones((len(value), 1)))
+
+    def _deflection(self, position: Floats, closed: NDArray[np.bool_]) -> Limit:
+        from stiffmap.performance.deflection import worst_deflection
+
+        assert self.deflection is not None
+        force, plane, most = self.deflection
+        value = np.full(len(position), np.inf)
+        if closed.any():
+            d = worst_deflection(
+                self.machine, position[closed], force=force, plane=plane, turns=0, rotation=self.rotation,
+                threads=self.threads,
+            )  # fmt: skip
+            value[closed] = np.where(np.isfinite(d.values), d.values, np.inf)
+        return Limit("deflection", value, most, value[:, None], np.ones((len(value), 1)))
+
+    # Over cells -----------------------------------------------------------------------------------
+
+    def over(self, centre: Floats, half: Floats, axes: Floats) -> Cells:
+        """Cells (n, 3) of positions, base axes, with half lengths (n, 3) along the columns of `axes`."""
+        self.counter[0] += len(centre)
+        compiled = self.machine.compiled
+        drives = list(compiled.drives)
+        wide = self.transmission is not None and len(drives) == 6
+        watched = self.bars.nodes if self.clearance is not None else ()
+        rotation = compiled.home_rotation if self.rotation is None else self.rotation
+        e = compiled.enclose(
+            np.ascontiguousarray(centre), np.ascontiguousarray(half), axes, rotation, slopes=6 if wide else 3,
+            watched=watched, threads=thread_count(self.threads),
+        )  # fmt: skip
+        ok = np.asarray(e["enclosed"])
+        names, most, mid = ["closure"], [np.where(ok, -np.inf, np.inf)], [np.where(e["closed"], -np.inf, np.inf)]
+
+        def add(name: str, at_centre: Floats, over: Floats, bound: float) -> None:
+            size = max(abs(bound), 1e-9)
+            names.append(name)
+            with np.errstate(invalid="ignore"):
+                most.append(np.where(ok, (over - bound) / size, np.inf))
+                mid.append((at_centre - bound) / size)
+
+        x = e["coordinates"]
+        swing = np.einsum("njk,nk->nj", np.abs(e["slope"][..., :3]), half) + e["radius"]
+        for index, name, low, high in self._coordinates:
+            for sign, bound in ((1.0, high), (-1.0, -low)):
+                if abs(bound) < UNLIMITED:
+                    value = sign * x[:, index]
+                    add(name, value, value + swing[:, index], bound)
+        if self.clearance is not None:
+            d, moved = self.bars.over(e["points"], e["moved"])
+            add("clearance of bars", -d, -d + moved, -self.clearance)
+        if self.transmission is not None:
+            frame = np.eye(6)
+            frame[:3, :3] = axes
+            turn = revolute_drives(self.machine)
+            rows = np.where(turn, self.size, 1.0)[:, None]
+            columns = np.concatenate([np.ones(3), np.full(3, 1 / self.size)])[: 6 if wide else 3]
+            scale = rows * columns
+            w = e["slope"][:, drives] * scale
+            change = e["change"][:, :, drives] * scale
+            slack = np.linalg.norm(e["slack"][:, drives] * scale, axis=(1, 2))
+            for name, at_centre, over, bound in _factors_over(
+                w, change * half[:, :, None, None], slack, self.transmission, self.factors
+            ):
+                add(name, at_centre, over, bound)
+        table, centres = np.stack(most), np.stack(mid)
+        with np.errstate(invalid="ignore"):
+            broken = ~(centres <= 0).all(axis=0) & ~np.isnan(centres).any(axis=0) | ~np.asarray(e["closed"])
+        return Cells((table <= 0).all(axis=0), broken, np.argmax(np.where(np.isnan(table), np.inf, table), axis=0),
+                     tuple(names), np.asarray(e["bend"]))  # fmt: skip
+
+
+def _factors_over(
+    w: Floats, step: Floats, slack: Floats, transmission: tuple[float, float], factors: str
+) -> list[tuple[str, Floats, Floats, float]]:
+    """Name, value at the centre, largest value over the cell and bound, from W = J^-1 (n, d, d), its change
+    to the cell's faces (n, 3, d, d) and the Frobenius norm of what is left (n,)."""
+    low, high = transmission
+    n, d = len(w), w.shape[-1]
+    out = []
+    lost = np.full(n, np.inf)
+    unknown = np.where(np.isfinite(w).all(axis=(1, 2)), np.inf, -np.inf)
+    ok = np.isfinite(w).all(axis=(1, 2)) & np.isfinite(slack)
+    if low > 0:
+        at = w[ok][:, None] + np.einsum("ck,nkab->ncab", BOX, step[ok])
+        mid, top = unknown.copy(), lost.copy()
+        if factors == "sphere":
+            mid[ok] = _largest(w[ok])
+            top[ok] = _largest(at).max(axis=1) + slack[ok]
+        else:
+            mid[ok] = np.linalg.norm(w[ok], axis=2).max(axis=1)
+            top[ok] = np.linalg.norm(at, axis=3).max(axis=(1, 2)) + slack[ok]
+        out.append(("transmission below" if factors == "sphere" else "cube factor below", mid, top, 1 / low))
+    if not np.isfinite(high):
+        return out
+    mid, top = unknown.copy(), lost.copy()
+    ok = ok & (np.abs(np.linalg.det(np.where(ok[:, None, None], w, np.eye(d)))) > 1e-12)
+    v = np.linalg.inv(w[ok])
+    relative = v[:, None] @ step[ok]
+    size = _largest(v)
+    # J = (1 + Z)^-1 V with Z = V (step + rest): its part of first order is exact, the others are bounded
+    z = _largest(np.einsum("ck,nkab->ncab", BOX, relative)).max(axis=1) + size * slack[ok]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rest = np.where(z < 1, (z**2 / (1 - z) + size * slack[ok]) * size, np.inf)
+    at = v[:, None] - np.einsum("ck,nkab->ncab", BOX, relative @ v[:, None])
+    if factors == "sphere":
+        mid[ok], top[ok] = size, _largest(at).max(axis=1) + rest
+    else:
+        signs = corners(d).T
+        mid[ok] = np.linalg.norm(v @ signs, axis=1).max(axis=1)
+        top[ok] = np.linalg.norm(at @ signs, axis=2).max(axis=(1, 2)) + rest * np.sqrt(d)
+    out.append(("transmission above" if factors == "sphere" else "cube factor above", mid, top, high))
+    return out
+
+
+def _largest(a: Floats) -> Floats:
+    """(...) largest singular value."""
+    gram = np.swapaxes(a, -1, -2) @ a
+    return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(gram)[..., -1], 0.0)))
 
 
 def _coordinate_limits(machine: Machine, ranges: bool, joints: bool) -> list[tuple[int, str, float, float]]:
@@ -110,3 +312,40 @@ def _spectral(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_])
         value[ok] = s[:, 0]
         left[ok] = (u[:, :, 0, None] * vh[:, None, 0, :]).reshape(ok.sum(), -1)
     return Limit(name, value, most, matrix.reshape(n, -1), left)
+
+
+def _vertices(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_]) -> Limit:
+    """Farthest corner of the image of the cube: the norm of J s for the worst s."""
+    n, rows, d = matrix.shape
+    value, left = np.full(n, np.inf), np.full((n, rows * d), np.nan)
+    ok = closed & np.isfinite(matrix).all(axis=(1, 2))
+    if ok.any():
+        signs = corners(d)
+        images = matrix[ok] @ signs.T
+        norms = np.linalg.norm(images, axis=1)
+        worst = np.argmax(norms, axis=1)
+        rows_of = np.arange(len(worst))
+        value[ok] = norms[rows_of, worst]
+        unit = images[rows_of, :, worst] / value[ok][:, None]
+        left[ok] = (unit[:, :, None] * signs[worst][:, None, :]).reshape(len(worst), -1)
+    # the change of the value is at most sqrt(d) times that of the matrix
+    return Limit(name, value, most, np.sqrt(d) * matrix.reshape(n, -1), left / np.sqrt(d))
+
+
+def _rows(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_]) -> Limit:
+    """Longest row of the inverse: the drive that first stops a motion."""
+    n, d, columns = matrix.shape
+    value, left = np.full(n, np.inf), np.full((n, d * columns), np.nan)
+    ok = closed & np.isfinite(matrix).all(axis=(1, 2))
+    if ok.any():
+        norms = np.linalg.norm(matrix[ok], axis=2)
+        worst = np.argmax(norms, axis=1)
+        rows_of = np.arange(len(worst))
+        value[ok] = norms[rows_of, worst]
+        pick = np.zeros((len(worst), d, columns))
+        pick[rows_of, worst] = matrix[ok][rows_of, worst] / value[ok][:, None]
+        left[ok] = pick.reshape(len(worst), -1)
+    return Limit(name, value, most, matrix.reshape(n, -1), left)
+
+
+__all__ = ["Bounds", "Cells", "Limit", "segment_distance"]

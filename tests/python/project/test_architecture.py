@@ -22,7 +22,7 @@ RANKS = (
     ("closure", "linearization"),
     ("saddle", "home", "motion"),
     ("stability",),
-    ("equilibrium", "stiffness", "dynamics"),
+    ("equilibrium", "stiffness", "dynamics", "enclosure"),
     ("spins",),
     ("solve", "fast_plan"),
     ("batch", "clamp", "follower", "modes"),

@@ -1,0 +1,258 @@
+"""Search for the largest cube in the workspace: a lower bound that was proven, an upper one that excludes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+from scipy.spatial import cKDTree
+
+from stiffmap.broadcasting import Floats
+from stiffmap.performance.cells import shrink
+from stiffmap.performance.limits import BOX, Bounds
+
+SAMPLES = 13
+"""Nodes along each edge of the region where poses that break a limit are looked for first."""
+ROUNDS = 60
+STEP = 2e-3
+"""Spacing of the differences that give slopes at a corner, times the region's size."""
+AGAIN = 8
+"""Most times that the cube moves away from poses that the proof found broken."""
+CROSS = np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+FACES = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
+MOST_CELLS = 6000
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Bounds on the edge of the cube."""
+
+    edge: float
+    upper: float
+    centre: Floats
+    names: tuple[str, ...]
+    poses: int
+    exhausted: bool
+    """Whether the work allowed was used up."""
+
+
+class BoxSearch:
+    """Works in coordinates of the box's axes divided by its proportions: boxes are then cubes."""
+
+    def __init__(
+        self, bounds: Bounds, shape: Floats, axes: Floats, region: Floats, gap: float, work: int
+    ) -> None:
+        self.shape, self.axes, self.gap, self.work = shape, axes, gap, work
+        self.low, self.high = region / shape
+        self.size = float((self.high - self.low).max())
+        self.bounds = bounds
+        self.best, self.centre = 0.0, (self.low + self.high) / 2
+        self.names: tuple[str, ...] = ()
+        self.witnesses = np.zeros((0, 3))
+        self.exhausted = False
+
+    def run(self) -> Found:
+        """Lower bound, then upper bound."""
+        climbed = [self.climb(start, edge) for start, edge in self.starts(3)]
+        for centre, edge in sorted(climbed, key=lambda c: -c[1]):
+            if edge > self.best + 0.5 * self.gap:
+                self._prove(centre, edge)
+        upper = self._cover()
+        return Found(
+            self.best, max(upper, self.best), self.centre, self.names, self.bounds.counter[0], self.exhausted
+        )
+
+    def estimate(self) -> tuple[Floats, float]:
+        """Centre and edge of a good cube by its corners alone: nothing is proven."""
+        found = [self.climb(*s) for s in self.starts(1)]
+        return max(found, key=lambda f: f[1]) if found else (self.centre, 0.0)
+
+    def base(self, local: Floats) -> Floats:
+        """Base axes."""
+        return np.asarray((local * self.shape) @ self.axes.T)
+
+    @property
+    def _left(self) -> int:
+        return self.work - self.bounds.counter[0]
+
+    def _inside(self, local: Floats) -> NDArray[np.bool_]:
+        return self.bounds.inside(self.base(local))
+
+    # Lower bound ----------------------------------------------------------------------------------
+
+    def starts(self, count: int) -> list[tuple[Floats, float]]:
+        """The roomiest nodes of a grid, and the cubes about them that hold no node that breaks a limit."""
+        axes = [np.linspace(a, b, SAMPLES) for a, b in zip(self.low, self.high, strict=True)]
+        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        good: NDArray[np.bool_] = self._inside(grid.reshape(-1, 3)).reshape(grid.shape[:3])
+        pairs = []
+        for axis in range(3):
+            a, b = np.moveaxis(grid, axis, 0), np.moveaxis(good, axis, 0)
+            for here, there in ((slice(None, -1), slice(1, None)), (slice(1, None), slice(None, -1))):
+                change = b[here] & ~b[there]
+                pairs.append((a[here][change], a[there][change]))
+        inside, outside = (np.concatenate([p[i] for p in pairs]) for i in (0, 1))
+        self.witnesses = np.concatenate([grid[~good], self._pull(inside, outside, 8)])
+        nodes = grid[good]
+        if not len(nodes):
+            return []
+        room = self._room(self._tree(), nodes)
+        order = np.argsort(-room, kind="stable")[:count]
+        return [(nodes[i], float(room[i])) for i in order]
+
+    def _pull(self, inside: Floats, outside: Floats, steps: int) -> Floats:
+        """Broken points on the way to points that hold, as near to those as bisection comes."""
+        for _ in range(steps):
+            middle = (inside + outside) / 2
+            good = self._inside(middle)[:, None]
+            inside, outside = np.where(good, middle, inside), np.where(good, outside, middle)
+        return outside
+
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.witnesses if len(self.witnesses) else np.full((1, 3), 1e9))
+
+    def _room(self, tree: cKDTree, centres: Floats) -> Floats:
+        """Edge of the cube about each centre that touches the nearest witness or the region's border."""
+        near = tree.query(centres, p=np.inf)[0]
+        border = np.minimum(centres - self.low, self.high - centres).min(axis=1)
+        return np.asarray(2 * np.minimum(near, border))
+
+    def climb(self, centre: Floats, edge: float) -> tuple[Floats, float]:
+        """Linear programs over the limits at the corners, within a shrinking trust region."""
+        trust, edge = 0.1 * self.size, 0.9 * edge
+        while edge > self.gap and not self._inside(centre + BOX * edge / 2).all():
+            edge *= 0.8  # a limit between the witnesses
+        for _ in range(ROUNDS):
+            better = self._program(centre, edge, trust)
+            if better is None or better[1] <= edge + 0.1 * self.gap:
+                trust *= 0.25
+                if trust < 0.1 * self.gap:
+                    break
+                continue
+            if self._inside(better[0] + BOX * better[1] / 2).all():
+                centre, edge = better
+            else:
+                trust *= 0.5
+        return centre, edge
+
+    def _program(self, centre: Floats, edge: float, reach: float) -> tuple[Floats, float] | None:
+        """Best cube with its centre within `reach`, limits at the corners taken as linear."""
+        corners = centre + BOX * edge / 2
+        rows, room = [], []
+        step = STEP * self.size
+        closed, limits = self.bounds.at(self.base((corners[:, None] + step * CROSS).reshape(-1, 3)))
+        closed = closed.reshape(8, -1)
+        for limit in limits:
+            arrays = limit.array.reshape(8, len(CROSS), -1)
+            left = limit.left.reshape(8, len(CROSS), -1)[:, 0]
+            for c in range(8):
+                if not closed[c].all():
+                    continue
+                value = arrays[c] @ left[c]
+                slope = (value[1:4] - value[4:7]) / (2 * step)
+                rows.append([*slope, slope @ BOX[c] / 2])
+                room.append(limit.most - value[0])
+        if not rows:
+            return None
+        rows, room = np.array(rows), np.array(room)
+        finite = np.isfinite(rows).all(axis=1) & np.isfinite(room)
+        rows, room = list(rows[finite]), list(room[finite])
+        inside = [
+            (max(-reach, lo), min(reach, hi))
+            for lo, hi in zip(self.low - centre, self.high - centre, strict=True)
+        ]
+        for axis in range(3):  # stays in the region
+            for sign in (1.0, -1.0):
+                row = np.zeros(4)
+                row[axis], row[3] = sign, 0.5
+                rows.append(row)
+                space = (self.high - centre)[axis] if sign > 0 else (centre - self.low)[axis]
+                room.append(space - edge / 2)
+        answer = linprog(
+            [0, 0, 0, -1], A_ub=np.array(rows), b_ub=np.array(room), bounds=[*inside, (-edge, reach)]
+        )
+        if answer.status != 0:
+            return None
+        return centre + answer.x[:3], edge + float(answer.x[3])
+
+    def _prove(self, centre: Floats, edge: float) -> None:
+        """The climbed cube, shrunk to what can be proven; moved away from what was found broken."""
+        edge -= 0.1 * self.gap
+        for _ in range(AGAIN):
+            if edge <= self.best or self._left <= 0:
+                return
+            share = max(self._left // 3, 1000)
+            found = shrink(
+                self.bounds, self.axes, self.shape, centre, edge, self.best, 0.5 * self.gap, share
+            )
+            self.exhausted |= found.cells + 64 > share
+            self.witnesses = np.concatenate([self.witnesses, found.broken])
+            if found.edge > self.best:
+                self.best, self.centre, self.names = found.edge, centre, found.names
+            elif not self.names:
+                self.names = found.names
+            if not len(found.broken):
+                return
+            centre, roomier = self._roomier(centre)
+            if roomier <= self.best + 0.3 * self.gap:
+                return
+            edge = min(roomier, edge)
+
+    def _roomier(self, centre: Floats) -> tuple[Floats, float]:
+        """A centre nearby with the most room between the witnesses."""
+        tree, step = self._tree(), 0.05 * self.size
+        room = float(self._room(tree, centre[None])[0])
+        while step > 0.05 * self.gap:
+            trial = centre + step * FACES
+            rooms = self._room(tree, trial)
+            i = int(np.argmax(rooms))
+            if rooms[i] > room:
+                centre, room = trial[i], float(rooms[i])
+            else:
+                step *= 0.5
+        return centre, room
+
+    # Upper bound ----------------------------------------------------------------------------------
+
+    def _cover(self) -> float:
+        """Every centre is excluded by a pose that breaks a limit inside of every cube about its cell."""
+        half = self.size / 16
+        axes = [np.arange(a + half, b + half, 2 * half) for a, b in zip(self.low, self.high, strict=True)]
+        cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        target = self.best + 0.8 * self.gap
+        tree = self._tree()
+        top = self._room(tree, cells) + 2 * half
+        while True:
+            cells, top = cells[top > target], top[top > target]
+            if not len(cells):
+                return target
+            inner = target / 2 - half  # half an edge of what all cubes about a cell share
+            if inner > 0:
+                cells, top = self._struck(cells, top, inner)
+                if not len(cells):
+                    return target
+            if half < 0.02 * self.gap:
+                return float(top.max())
+            if len(cells) > MOST_CELLS or self._left < 8 * len(cells):
+                self.exhausted = True
+                return float(top.max())
+            half /= 2
+            cells = (cells[:, None] + half * BOX).reshape(-1, 3)
+            top = np.minimum(np.repeat(top, 8), self._room(self._tree(), cells) + 2 * half)
+
+    def _struck(self, cells: Floats, top: Floats, inner: float) -> tuple[Floats, Floats]:
+        """Cells whose shared cube holds no pose that breaks a limit, as far as corners and middles tell."""
+        for points in (BOX, FACES[np.abs(FACES).sum(axis=1) < 3]):
+            if not len(cells) or self._left < len(points) * len(cells):
+                break
+            at = cells[:, None] + inner * points
+            good = self._inside(at.reshape(-1, 3)).reshape(len(cells), -1)
+            hit = ~good.all(axis=1)
+            self.witnesses = np.concatenate([self.witnesses, at[hit][~good[hit]]])
+            cells, top = cells[~hit], top[~hit]
+            if len(cells) > 500:
+                break
+        return cells, top
