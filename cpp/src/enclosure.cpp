@@ -133,8 +133,8 @@ void Encloser::columns(const Mechanism& m, const Arm& arm, double sign, Index ro
 
 /// Adds the derivatives of the columns along the three directions of `slope`, known to `slack`. `centre`: the
 /// values too, else only their radii.
-void Encloser::second(const Mechanism& m, const Arm& arm, double sign, Index row, const MatX& slope,
-                      const MatX& slack, bool centre, Bend& bend) const {
+void Encloser::second(const Mechanism& m, const Arm& arm, double sign, Index row, const MatX& slope, const MatX& slack,
+                      bool centre, Bend& bend) const {
   const Index n = static_cast<Index>(arm.joint.size());
   const auto add = [&](Index i, Index by, Index from, const Vec3& h, double size, double change) {
     for (Index k = 0; k < 3; ++k) {
@@ -320,10 +320,9 @@ void Encloser::enclose(const Mechanism& m, const Frames& frames, const VecX& x, 
     scale(m, bend_.radius[k]);
     change[k] = -P_[k] * G_;
     MatX slack_k;
-    if (!majorise(E_,
-                  E_ * change[k].cwiseAbs() + P_[k].cwiseAbs() * dG_ +
-                      absC_ * (bend_.radius[k] * (G_.cwiseAbs() + dG_)),
-                  slack_k))
+    if (!majorise(
+            E_, E_ * change[k].cwiseAbs() + P_[k].cwiseAbs() * dG_ + absC_ * (bend_.radius[k] * (G_.cwiseAbs() + dG_)),
+            slack_k))
       return;
     total += half[static_cast<Index>(k)] * slack_k;
   }
@@ -347,8 +346,8 @@ void Encloser::enclose(const Mechanism& m, const Frames& frames, const VecX& x, 
     const auto& path = m.path[at(watched[i])];
     double moved = 0;
     for (auto j = path.rbegin(); j != path.rend(); ++j)
-      moved += turns(m, *j) ? full[*j] * (frames.axis.col(*j).cross(p - frames.origin.col(*j)).norm() + moved)
-                            : full[*j];
+      moved +=
+          turns(m, *j) ? full[*j] * (frames.axis.col(*j).cross(p - frames.origin.col(*j)).norm() + moved) : full[*j];
     out.moved[static_cast<Index>(i)] = moved;
   }
   out.enclosed = true;

@@ -62,7 +62,8 @@ RigidTree::RigidTree(const Mechanism& m) {
       else since[i].R = (since[i].R * rotation_about(n.axis, held)).eval();
     }
     kept[i] = kept[i] || moving;
-    if (kept[i]) steps_.push_back({static_cast<Index>(i), behind[i], moving ? n.coordinate : -1, n.type, since[i], n.axis});
+    if (kept[i])
+      steps_.push_back({static_cast<Index>(i), behind[i], moving ? n.coordinate : -1, n.type, since[i], n.axis});
   }
 }
 
@@ -114,7 +115,8 @@ void LoopRates::factorise(const Mechanism& m, const Frames& frames) {
         J_.col(j).segment<6>(row) = c;
       }
     }
-    for (Index k : columns_[i]) A_.col(k).segment<6>(row) = J_.col(passive_[at(k)]).segment<6>(row) / m.unit(passive_[at(k)]);
+    for (Index k : columns_[i])
+      A_.col(k).segment<6>(row) = J_.col(passive_[at(k)]).segment<6>(row) / m.unit(passive_[at(k)]);
   }
   pivot_ = passive_.empty() ? 1.0 : fill_normal();
   regular_ = pivot_ > sound_pivot;
@@ -288,7 +290,8 @@ bool PoseCloser::newton(const Mechanism& m, const Pose& pose, VecX& x) {
     const double norm = step.norm() / m.length;
     if (!(norm < 0.3) || (k > 0 && norm > 0.25 * previous && norm > 1e-9)) return false;
     const auto& moving = tree_.moving();
-    for (std::size_t u = 0; u < moving.size(); ++u) x[moving[u]] -= step[static_cast<Index>(u)] / unit_[static_cast<Index>(u)];
+    for (std::size_t u = 0; u < moving.size(); ++u)
+      x[moving[u]] -= step[static_cast<Index>(u)] / unit_[static_cast<Index>(u)];
     previous = norm;
     error = residual(m, pose, x);
   }
@@ -347,7 +350,8 @@ ClosureResult PoseCloser::close(const Mechanism& m, const Pose& pose, VecX& x, b
     if (given.allFinite()) {
       for (Index j = 0; j < m.size(); ++j)
         if (m.coordinates[at(j)].role == Role::spring) x[j] = 0;
-        else if (m.coordinates[at(j)].role == Role::passive && m.coordinates[at(j)].locked) x[j] = m.home_coordinates[j];
+        else if (m.coordinates[at(j)].role == Role::passive && m.coordinates[at(j)].locked)
+          x[j] = m.home_coordinates[j];
       ok = newton(m, pose, x);
     }
     const bool near =

@@ -269,8 +269,7 @@ void bind_measures(py::module_& m) {
                              })
       .def("kinematics", &kinematics, "position"_a, "rotation"_a, "start"_a, "rates"_a, "patient"_a, "threads"_a)
       .def_property_readonly("not_enclosed", &Encloser::missing)
-      .def("enclose", &enclose, "centre"_a, "half"_a, "axes"_a, "rotation"_a, "slopes"_a, "watched"_a,
-           "threads"_a)
+      .def("enclose", &enclose, "centre"_a, "half"_a, "axes"_a, "rotation"_a, "slopes"_a, "watched"_a, "threads"_a)
       .def("dynamics", &dynamics, "inertias"_a, "coordinates"_a, "twist"_a, "twist_rate"_a, "wrench"_a, "gravity"_a,
            "threads"_a)
       .def("modes", &modes, "inertias"_a, "position"_a, "rotation"_a, "wrench"_a, "gravity"_a, "count"_a, "threads"_a);

@@ -40,10 +40,10 @@ class Encloser {
   struct Arm {
     std::vector<Index> joint;  ///< coordinates
     std::vector<Index> unknown;
-    Mat3X w, c;       ///< axis, and velocity that it gives to the end
-    VecX size;        ///< |c| at most
-    VecX turn, lever; ///< bounds: turn of the axis, change of c in the axis's own frame
-    double whole = 0; ///< turn of the end
+    Mat3X w, c;        ///< axis, and velocity that it gives to the end
+    VecX size;         ///< |c| at most
+    VecX turn, lever;  ///< bounds: turn of the axis, change of c in the axis's own frame
+    double whole = 0;  ///< turn of the end
   };
   /// Equations' derivatives along three directions and their radii, angles as lengths.
   struct Bend {

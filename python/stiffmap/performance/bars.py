@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from stiffmap.broadcasting import Floats
@@ -23,7 +25,7 @@ class Bars:
         for *_, primary, end in compiled.loops:
             for tip in (primary, end):
                 chain = self._joints(tip)
-                for a, b in zip(chain[:-1], chain[1:], strict=True):
+                for a, b in pairwise(chain):
                     if np.linalg.norm(where[b] - where[a]) > SHORT * compiled.length and self._leg(a):
                         spans.add((a, b))
         self.spans = sorted(spans)
@@ -36,12 +38,12 @@ class Bars:
         ).reshape(-1, 2)
 
     def _joints(self, node: int) -> list[int]:
-        """Frames of the joints from the base to a frame, and itself."""
-        out, at = [node], node
+        """Frames of the joints from the base to a frame; what lies beyond the last one is the platform."""
+        out, at = list[int](), node
         roles = self._compiled.names.roles
         while at > 0:
             parent, coordinate = self._compiled.nodes[at]
-            if coordinate >= 0 and roles[coordinate] != Role.SPRING and at != node:
+            if coordinate >= 0 and roles[coordinate] != Role.SPRING:
                 out.append(at)
             at = parent
         return out[::-1]

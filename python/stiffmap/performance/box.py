@@ -15,7 +15,7 @@ from stiffmap.performance.limits import Bounds
 from stiffmap.performance.turning import best_orientation, turned
 from stiffmap.rotations import as_rotations
 
-WORK = 400_000
+WORK = 60_000
 """Cells and poses at most; when they are used up, the bounds stay as far apart as they are."""
 
 

@@ -14,7 +14,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.performance.cells import shrink
 from stiffmap.performance.limits import BOX, Bounds
 
-SAMPLES = 13
+SAMPLES = 9
 """Nodes along each edge of the region where poses that break a limit are looked for first."""
 ROUNDS = 60
 STEP = 2e-3
@@ -23,7 +23,8 @@ AGAIN = 8
 """Most times that the cube moves away from poses that the proof found broken."""
 CROSS = np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
 FACES = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
-MOST_CELLS = 6000
+MOST_CELLS = 8000
+TRIED = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +96,7 @@ class BoxSearch:
                 change = b[here] & ~b[there]
                 pairs.append((a[here][change], a[there][change]))
         inside, outside = (np.concatenate([p[i] for p in pairs]) for i in (0, 1))
-        self.witnesses = np.concatenate([grid[~good], self._pull(inside, outside, 8)])
+        self.witnesses = np.concatenate([grid[~good], self._pull(inside, outside, 6)])
         nodes = grid[good]
         if not len(nodes):
             return []
@@ -141,7 +142,8 @@ class BoxSearch:
     def _program(self, centre: Floats, edge: float, reach: float) -> tuple[Floats, float] | None:
         """Best cube with its centre within `reach`, limits at the corners taken as linear."""
         corners = centre + BOX * edge / 2
-        rows, room = [], []
+        rows: list[Floats] = []
+        room: list[float] = []
         step = STEP * self.size
         closed, limits = self.bounds.at(self.base((corners[:, None] + step * CROSS).reshape(-1, 3)))
         closed = closed.reshape(8, -1)
@@ -153,13 +155,13 @@ class BoxSearch:
                     continue
                 value = arrays[c] @ left[c]
                 slope = (value[1:4] - value[4:7]) / (2 * step)
-                rows.append([*slope, slope @ BOX[c] / 2])
+                rows.append(np.array([*slope, slope @ BOX[c] / 2]))
                 room.append(limit.most - value[0])
         if not rows:
             return None
-        rows, room = np.array(rows), np.array(room)
-        finite = np.isfinite(rows).all(axis=1) & np.isfinite(room)
-        rows, room = list(rows[finite]), list(room[finite])
+        finite = [bool(np.isfinite(r).all() and np.isfinite(v)) for r, v in zip(rows, room, strict=True)]
+        rows = [r for r, ok in zip(rows, finite, strict=True) if ok]
+        room = [v for v, ok in zip(room, finite, strict=True) if ok]
         inside = [
             (max(-reach, lo), min(reach, hi))
             for lo, hi in zip(self.low - centre, self.high - centre, strict=True)
@@ -182,12 +184,10 @@ class BoxSearch:
         """The climbed cube, shrunk to what can be proven; moved away from what was found broken."""
         edge -= 0.1 * self.gap
         for _ in range(AGAIN):
-            if edge <= self.best or self._left <= 0:
+            if edge <= self.best or self._left <= self.work // 2:
                 return
-            share = max(self._left // 3, 1000)
-            found = shrink(
-                self.bounds, self.axes, self.shape, centre, edge, self.best, 0.5 * self.gap, share
-            )
+            share = max((self._left - self.work // 2) // 2, 500)
+            found = shrink(self.bounds, self.axes, self.shape, centre, edge, self.best, 0.5 * self.gap, share)
             self.exhausted |= found.cells + 64 > share
             self.witnesses = np.concatenate([self.witnesses, found.broken])
             if found.edge > self.best:
@@ -199,7 +199,7 @@ class BoxSearch:
             centre, roomier = self._roomier(centre)
             if roomier <= self.best + 0.3 * self.gap:
                 return
-            edge = min(roomier, edge)
+            edge = self.best + (min(roomier, edge) - self.best) / 2
 
     def _roomier(self, centre: Floats) -> tuple[Floats, float]:
         """A centre nearby with the most room between the witnesses."""
@@ -218,41 +218,74 @@ class BoxSearch:
     # Upper bound ----------------------------------------------------------------------------------
 
     def _cover(self) -> float:
-        """Every centre is excluded by a pose that breaks a limit inside of every cube about its cell."""
-        half = self.size / 16
-        axes = [np.arange(a + half, b + half, 2 * half) for a, b in zip(self.low, self.high, strict=True)]
-        cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        target = self.best + 0.8 * self.gap
-        tree = self._tree()
-        top = self._room(tree, cells) + 2 * half
+        """Upper bounds from the region's size down to what was proven, as far as the work lasts."""
+        upper = 2 * self.size
+        target = self.size / 2
+        last = self.best + 0.8 * self.gap
         while True:
-            cells, top = cells[top > target], top[top > target]
-            if not len(cells):
-                return target
-            inner = target / 2 - half  # half an edge of what all cubes about a cell share
-            if inner > 0:
-                cells, top = self._struck(cells, top, inner)
-                if not len(cells):
-                    return target
-            if half < 0.02 * self.gap:
-                return float(top.max())
-            if len(cells) > MOST_CELLS or self._left < 8 * len(cells):
+            target = last if target < 1.3 * last else target
+            if not self._excluded(target):
                 self.exhausted = True
-                return float(top.max())
-            half /= 2
-            cells = (cells[:, None] + half * BOX).reshape(-1, 3)
-            top = np.minimum(np.repeat(top, 8), self._room(self._tree(), cells) + 2 * half)
+                return upper
+            upper = target
+            if target == last:
+                return upper
+            target /= 2
 
-    def _struck(self, cells: Floats, top: Floats, inner: float) -> tuple[Floats, Floats]:
+    def _excluded(self, target: float) -> bool:
+        """Whether every centre is excluded by a pose that breaks a limit inside of every cube about its cell."""
+        half = np.full(3, min(self.size / 16, target / 4))
+        axes = [np.arange(a, b, 2 * h) + h for a, b, h in zip(self.low, self.high, half, strict=True)]
+        cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        most = max(MOST_CELLS, 2 * len(cells))
+        while True:
+            cells = cells[self._room(self._tree(), cells) + 2 * half.max() > target]
+            cells = self._struck(cells, target / 2 - half)
+            if not len(cells):
+                return True
+            if len(cells) > most or self._left < 8 * len(cells) or half.min() < 0.02 * self.gap:
+                return False
+            for axis in self._worth(cells, half, target):
+                half[axis] /= 2
+                move = np.zeros(3)
+                move[axis] = half[axis]
+                cells = np.concatenate([cells - move, cells + move])
+
+    def _worth(self, cells: Floats, half: Floats, target: float) -> list[int]:
+        """Axes along which halving the cells excludes some: not those along which the limits hardly change."""
+        if self._left < 40 * TRIED:
+            return [0, 1, 2]
+        some = cells[:: max(1, len(cells) // TRIED)]
+        children = some + half / 2 * np.where(np.arange(len(some))[:, None] >> np.arange(3) & 1, 1.0, -1.0)
+
+        def struck(which: list[int]) -> int:
+            part, at = half.copy(), some.copy()
+            part[which] /= 2
+            at[:, which] = children[:, which]
+            inner = target / 2 - part
+            if (inner <= 0).any():
+                return 0
+            points = at[:, None] + inner * BOX
+            good = self._inside(points.reshape(-1, 3)).reshape(len(some), 8)
+            return int((~good.all(axis=1)).sum())
+
+        every = struck([0, 1, 2])
+        needed = [a for a in range(3) if struck([b for b in range(3) if b != a]) < 0.9 * every]
+        return needed or [0, 1, 2]
+
+    def _struck(self, cells: Floats, inner: Floats) -> Floats:
         """Cells whose shared cube holds no pose that breaks a limit, as far as corners and middles tell."""
+        if (inner <= 0).any():
+            return cells
         for points in (BOX, FACES[np.abs(FACES).sum(axis=1) < 3]):
             if not len(cells) or self._left < len(points) * len(cells):
                 break
             at = cells[:, None] + inner * points
             good = self._inside(at.reshape(-1, 3)).reshape(len(cells), -1)
             hit = ~good.all(axis=1)
-            self.witnesses = np.concatenate([self.witnesses, at[hit][~good[hit]]])
-            cells, top = cells[~hit], top[~hit]
-            if len(cells) > 500:
+            struck = at[hit][~good[hit]]
+            self.witnesses = np.concatenate([self.witnesses, struck[:: max(1, len(struck) // 2000)]])
+            cells = cells[~hit]
+            if len(cells) > 300:
                 break
-        return cells, top
+        return cells

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.broadcasting import Floats
 from stiffmap.performance.limits import Bounds, Cells
@@ -37,7 +38,14 @@ def judge_cells(bounds: Bounds) -> Callable[[Floats, Floats, Floats], Cells]:
 
 
 def shrink(
-    bounds: Bounds, axes: Floats, shape: Floats, centre: Floats, edge: float, least: float, gap: float, work: int
+    bounds: Bounds,
+    axes: Floats,
+    shape: Floats,
+    centre: Floats,
+    edge: float,
+    least: float,
+    gap: float,
+    work: int,
 ) -> Shrunk:
     """Cells are halved until decided; an undecided one of a size near `gap`, or a point that breaks a
     limit, shrinks the cube about its centre instead. Coordinates along `axes`, divided by `shape`.
@@ -51,7 +59,7 @@ def shrink(
     high = low + edge / FIRST
     broken: list[Floats] = []
     names: dict[str, int] = {}
-    last, count = "", 0
+    last, count, back = "", 0, 0.1 * gap
     while len(low):
         if count + len(low) > work or edge <= least:
             return Shrunk(0.0, _points(broken), tuple(names) or (last,), count)
@@ -60,10 +68,12 @@ def shrink(
         count += len(low)
         outside = found.broken
         if outside.any():
-            broken.append(middle[outside])
+            points = (middle + found.where / shape)[outside]
+            broken.append(points)
             for i in np.unique(found.limit[outside]):
                 names[found.names[i]] = 1
-            edge = min(edge, 2 * float(np.abs(middle[outside] - centre).max(axis=1).min()) - 0.1 * gap)
+            edge = min(edge, 2 * float(np.abs(points - centre).max(axis=1).min()) - back)
+            back *= 3  # a face that sticks out is left in few steps
         left = ~found.inside
         last = found.names[int(found.limit[left][0])] if left.any() else last
         low, high, bend = low[left], high[left], found.bend[left]
@@ -82,16 +92,16 @@ def shrink(
 def halved(low: Floats, high: Floats, bend: Floats) -> tuple[Floats, Floats]:
     """Each cell cut in two along the axes that curve most; along the longest where that is not known."""
     size = high - low
-    known = np.isfinite(bend).all(axis=1)[:, None]
+    known = np.isfinite(bend).all(axis=1, keepdims=True)
     weight = np.where(known, bend * size / np.maximum(size.max(axis=1, keepdims=True), 1e-300), size)
     # an axis along which nothing curves is cut as well when it is far longer than the others
     weight = weight + 1e-3 * size / np.maximum(size.max(axis=1, keepdims=True), 1e-300) * weight.max(
         axis=1, keepdims=True
     )
     weight = np.where(weight.max(axis=1, keepdims=True) > 0, weight, size)
-    cut = weight >= HALVED * weight.max(axis=1, keepdims=True)
+    cut: NDArray[np.bool_] = np.greater_equal(weight, HALVED * weight.max(axis=1, keepdims=True))
     for axis in range(3):
-        chosen = cut[:, axis]
+        chosen = np.asarray(cut)[:, axis]
         middle = (low[chosen, axis] + high[chosen, axis]) / 2
         upper_low = low[chosen].copy()
         upper_low[:, axis] = middle

@@ -13,7 +13,7 @@ from stiffmap.broadcasting import Floats, thread_count
 from stiffmap.description.machine import TASK
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
-from stiffmap.performance.bars import Bars, segment_distance
+from stiffmap.performance.bars import Bars
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.scaling import characteristic_length, revolute_drives, weighted
 from stiffmap.performance.zonotopes import corners, inverse_rows
@@ -44,7 +44,9 @@ class Cells:
     inside: NDArray[np.bool_]
     """Every pose of the cell closes and keeps all limits."""
     broken: NDArray[np.bool_]
-    """The centre does not."""
+    """Some pose of it does not."""
+    where: Floats
+    """(n, 3) that pose, from the centre, along the cell's axes."""
     limit: NDArray[np.int64]
     """Index into `names` of the limit nearest to its bound, or beyond."""
     names: tuple[str, ...]
@@ -100,9 +102,7 @@ class Bounds:
             return "a deflection has no bound between poses"
         if compiled.not_enclosed:
             return compiled.not_enclosed
-        if self.transmission is not None and (
-            drives not in (3, 6) or self.machine.description.task != TASK
-        ):
+        if self.transmission is not None and (drives not in (3, 6) or self.machine.description.task != TASK):
             return "drives and commanded motions are not as many"
         return ""
 
@@ -200,25 +200,32 @@ class Bounds:
             watched=watched, threads=thread_count(self.threads),
         )  # fmt: skip
         ok = np.asarray(e["enclosed"])
-        names, most, mid = ["closure"], [np.where(ok, -np.inf, np.inf)], [np.where(e["closed"], -np.inf, np.inf)]
+        names, most, least = (
+            ["closure"],
+            [np.where(ok, -np.inf, np.inf)],
+            [np.where(e["closed"], -np.inf, np.inf)],
+        )
+        places = [np.zeros_like(half)]
 
-        def add(name: str, at_centre: Floats, over: Floats, bound: float) -> None:
+        def add(name: str, value: Floats, slack: Floats, bound: float, place: Floats) -> None:
+            """A limit's value at its worst corner, by the linear model, and what that may miss."""
             size = max(abs(bound), 1e-9)
             names.append(name)
             with np.errstate(invalid="ignore"):
-                most.append(np.where(ok, (over - bound) / size, np.inf))
-                mid.append((at_centre - bound) / size)
+                most.append(np.where(ok, (value + slack - bound) / size, np.inf))
+                least.append(np.where(ok, (value - slack - bound) / size, -np.inf))
+            places.append(place)
 
         x = e["coordinates"]
-        swing = np.einsum("njk,nk->nj", np.abs(e["slope"][..., :3]), half) + e["radius"]
         for index, name, low, high in self._coordinates:
             for sign, bound in ((1.0, high), (-1.0, -low)):
                 if abs(bound) < UNLIMITED:
-                    value = sign * x[:, index]
-                    add(name, value, value + swing[:, index], bound)
+                    slope = sign * e["slope"][:, index, :3]
+                    value = sign * x[:, index] + (np.abs(slope) * half).sum(axis=1)
+                    add(name, value, e["radius"][:, index], bound, np.where(slope < 0, -1.0, 1.0) * half)
         if self.clearance is not None:
             d, moved = self.bars.over(e["points"], e["moved"])
-            add("clearance of bars", -d, -d + moved, -self.clearance)
+            add("clearance of bars", -d, moved, -self.clearance, np.zeros_like(half))
         if self.transmission is not None:
             frame = np.eye(6)
             frame[:3, :3] = axes
@@ -229,41 +236,36 @@ class Bounds:
             w = e["slope"][:, drives] * scale
             change = e["change"][:, :, drives] * scale
             slack = np.linalg.norm(e["slack"][:, drives] * scale, axis=(1, 2))
-            for name, at_centre, over, bound in _factors_over(
+            for name, value, rest, bound, corner in _factors_over(
                 w, change * half[:, :, None, None], slack, self.transmission, self.factors
             ):
-                add(name, at_centre, over, bound)
-        table, centres = np.stack(most), np.stack(mid)
-        with np.errstate(invalid="ignore"):
-            broken = ~(centres <= 0).all(axis=0) & ~np.isnan(centres).any(axis=0) | ~np.asarray(e["closed"])
-        return Cells((table <= 0).all(axis=0), broken, np.argmax(np.where(np.isnan(table), np.inf, table), axis=0),
-                     tuple(names), np.asarray(e["bend"]))  # fmt: skip
+                add(name, value, rest, bound, BOX[corner] * half)
+        table, sure = np.stack(most), np.stack(least)
+        table, sure = np.where(np.isnan(table), np.inf, table), np.where(np.isnan(sure), -np.inf, sure)
+        broken, worst = (sure > 0).any(axis=0), np.argmax(sure, axis=0)
+        limit = np.where(broken, worst, np.argmax(table, axis=0))
+        where = np.stack(places)[worst, np.arange(len(centre))]
+        inside = np.asarray((table <= 0).all(axis=0))
+        return Cells(inside, np.asarray(broken), where, limit, tuple(names), np.asarray(e["bend"]))
 
 
 def _factors_over(
     w: Floats, step: Floats, slack: Floats, transmission: tuple[float, float], factors: str
-) -> list[tuple[str, Floats, Floats, float]]:
-    """Name, value at the centre, largest value over the cell and bound, from W = J^-1 (n, d, d), its change
-    to the cell's faces (n, 3, d, d) and the Frobenius norm of what is left (n,)."""
+) -> list[tuple[str, Floats, Floats, float, NDArray[np.int64]]]:
+    """Name, value at the worst corner by the linear model, what it may miss, bound and number of that corner,
+    from W = J^-1 (n, d, d), its change to the cell's faces (n, 3, d, d), the Frobenius norm of the rest (n,)."""
     low, high = transmission
     n, d = len(w), w.shape[-1]
     out = []
-    lost = np.full(n, np.inf)
-    unknown = np.where(np.isfinite(w).all(axis=(1, 2)), np.inf, -np.inf)
+    sphere = factors == "sphere"
     ok = np.isfinite(w).all(axis=(1, 2)) & np.isfinite(slack)
     if low > 0:
         at = w[ok][:, None] + np.einsum("ck,nkab->ncab", BOX, step[ok])
-        mid, top = unknown.copy(), lost.copy()
-        if factors == "sphere":
-            mid[ok] = _largest(w[ok])
-            top[ok] = _largest(at).max(axis=1) + slack[ok]
-        else:
-            mid[ok] = np.linalg.norm(w[ok], axis=2).max(axis=1)
-            top[ok] = np.linalg.norm(at, axis=3).max(axis=(1, 2)) + slack[ok]
-        out.append(("transmission below" if factors == "sphere" else "cube factor below", mid, top, 1 / low))
+        values = _largest(at) if sphere else np.linalg.norm(at, axis=3).max(axis=2)
+        name = "transmission below" if sphere else "cube factor below"
+        out.append((name, *_spread(n, ok, values, slack[ok]), 1 / low, _worst(n, ok, values)))
     if not np.isfinite(high):
         return out
-    mid, top = unknown.copy(), lost.copy()
     ok = ok & (np.abs(np.linalg.det(np.where(ok[:, None, None], w, np.eye(d)))) > 1e-12)
     v = np.linalg.inv(w[ok])
     relative = v[:, None] @ step[ok]
@@ -273,13 +275,24 @@ def _factors_over(
     with np.errstate(divide="ignore", invalid="ignore"):
         rest = np.where(z < 1, (z**2 / (1 - z) + size * slack[ok]) * size, np.inf)
     at = v[:, None] - np.einsum("ck,nkab->ncab", BOX, relative @ v[:, None])
-    if factors == "sphere":
-        mid[ok], top[ok] = size, _largest(at).max(axis=1) + rest
+    if sphere:
+        values = _largest(at)
     else:
-        signs = corners(d).T
-        mid[ok] = np.linalg.norm(v @ signs, axis=1).max(axis=1)
-        top[ok] = np.linalg.norm(at @ signs, axis=2).max(axis=(1, 2)) + rest * np.sqrt(d)
-    out.append(("transmission above" if factors == "sphere" else "cube factor above", mid, top, high))
+        values, rest = np.linalg.norm(at @ corners(d).T, axis=2).max(axis=2), rest * np.sqrt(d)
+    name = "transmission above" if sphere else "cube factor above"
+    out.append((name, *_spread(n, ok, values, rest), high, _worst(n, ok, values)))
+    return out
+
+
+def _spread(n: int, ok: NDArray[np.bool_], values: Floats, rest: Floats) -> tuple[Floats, Floats]:
+    value, slack = np.full(n, np.nan), np.full(n, np.inf)
+    value[ok], slack[ok] = values.max(axis=1), rest
+    return value, slack
+
+
+def _worst(n: int, ok: NDArray[np.bool_], values: Floats) -> NDArray[np.int64]:
+    out = np.zeros(n, dtype=np.int64)
+    out[ok] = values.argmax(axis=1)
     return out
 
 
@@ -311,7 +324,7 @@ def _spectral(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_])
         u, s, vh = np.linalg.svd(matrix[ok], full_matrices=False)
         value[ok] = s[:, 0]
         left[ok] = (u[:, :, 0, None] * vh[:, None, 0, :]).reshape(ok.sum(), -1)
-    return Limit(name, value, most, matrix.reshape(n, -1), left)
+    return Limit(name, value, most, matrix.reshape(n, left.shape[1]), left)
 
 
 def _vertices(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_]) -> Limit:
@@ -329,7 +342,7 @@ def _vertices(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_])
         unit = images[rows_of, :, worst] / value[ok][:, None]
         left[ok] = (unit[:, :, None] * signs[worst][:, None, :]).reshape(len(worst), -1)
     # the change of the value is at most sqrt(d) times that of the matrix
-    return Limit(name, value, most, np.sqrt(d) * matrix.reshape(n, -1), left / np.sqrt(d))
+    return Limit(name, value, most, np.sqrt(d) * matrix.reshape(n, rows * d), left / np.sqrt(d))
 
 
 def _rows(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_]) -> Limit:
@@ -345,7 +358,4 @@ def _rows(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_]) -> 
         pick = np.zeros((len(worst), d, columns))
         pick[rows_of, worst] = matrix[ok][rows_of, worst] / value[ok][:, None]
         left[ok] = pick.reshape(len(worst), -1)
-    return Limit(name, value, most, matrix.reshape(n, -1), left)
-
-
-__all__ = ["Bounds", "Cells", "Limit", "segment_distance"]
+    return Limit(name, value, most, matrix.reshape(n, left.shape[1]), left)

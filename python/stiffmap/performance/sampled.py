@@ -27,7 +27,10 @@ def sample(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells:
     closed, limits = bounds.at((centre[:, None] + local @ axes.T).reshape(-1, 3))
     closed = closed.reshape(n, 27)
     names = ["closure", *(limit.name for limit in limits)]
-    most, mid = [np.where(closed.all(axis=1), -np.inf, np.inf)], [np.where(closed[:, _MIDDLE], -np.inf, np.inf)]
+    most, mid = (
+        [np.where(closed.all(axis=1), -np.inf, np.inf)],
+        [np.where(closed[:, _MIDDLE], -np.inf, np.inf)],
+    )
     bend = np.zeros((n, 3))
     for limit in limits:
         values = limit.array.reshape(n, 27, -1)
@@ -46,6 +49,7 @@ def sample(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells:
             mid.append((nodes[:, _MIDDLE] - limit.most) / size)
     table, centres = np.stack(most), np.stack(mid)
     with np.errstate(invalid="ignore"):
-        broken = ~(centres <= 0).all(axis=0)
-        return Cells((table <= 0).all(axis=0), broken,
+        broken = np.asarray(~(centres <= 0).all(axis=0))
+        inside = np.asarray((table <= 0).all(axis=0))
+        return Cells(inside, broken, np.zeros_like(half),
                      np.argmax(np.where(np.isnan(table), np.inf, table), axis=0), tuple(names), bend)  # fmt: skip

@@ -25,7 +25,9 @@ def best_orientation(bounds: Bounds, shape: Floats, region: Floats, gap: float) 
 
     def minus_edge(vector: Floats) -> float:
         axes = Rotation.from_rotvec(vector).as_matrix()
-        search = BoxSearch(replace(bounds, counter=[0]), shape, axes, turned(region, axes), 1e-3 * size, 10**9)
+        search = BoxSearch(
+            replace(bounds, counter=[0]), shape, axes, turned(region, axes), 1e-3 * size, 10**9
+        )
         return -search.estimate()[1]
 
     rng = np.random.default_rng(0)
