@@ -17,7 +17,7 @@ def compute(case: Case) -> Found:
         case.machine, case.proportions, transmission=case.transmission, length=case.length,
         rotation=case.rotation, gap=case.gap, threads=case.threads,
     )  # fmt: skip
-    note = f"no box of {1e3 * b.edge_upper:.2f} mm; limited by {', '.join(b.limited_by) or 'nothing found'}"
+    note = f"no box of {1e3 * b.edge_upper:.2f} mm; limited by {', '.join(b.limited_by) or 'nothing found'}; {b.guarantee}"
     return Found(b.edge, b.centre, b.edge, b.centre, note, extra={"box": b})
 
 
