@@ -27,6 +27,7 @@ ZERO = {
     "swing-table": ("motor", ("front_left",), 1e-3, 12),
     "hybrid": ("carriage", ("a",), 2e-4, 10),
     "3-rps": ("strut", ("b",), 1e-3, 12),
+    "travelling-column": ("head_drive", ("machine",), 2e-4, 12),
 }
 
 # machine -> drive, legs, true compliance over the declared one, largest force (N), poses

@@ -24,14 +24,13 @@ ASKS = (
 )  # for a number that only the caller knows
 
 
-def small(kind: str) -> dict[str, float]:
+def small(machine: sm.Machine, kind: str, element: str, legs: tuple[str, ...]) -> dict[str, float]:
     """A small value of each parameter that a caller has to give; one of those that exclude each other."""
     effect = get(kind)
-    names = [p for p in effect.parameters if p.fitted and p.null is not None]
-    if effect.one_of:
-        names = [p for p in names if p.name == effect.one_of[0]] + [
-            p for p in names if p.name not in effect.one_of
-        ]
+    given = effect.parameters_at(machine.description, element, legs)
+    names = [p for p in given if p.fitted and p.null is not None]
+    first = next((p.name for p in names if p.name in effect.one_of), "")
+    names = [p for p in names if p.name == first or p.name not in effect.one_of]
     return {p.name: (p.null or 0.0) + 0.1 * p.scale for p in names}
 
 
@@ -50,9 +49,13 @@ def test_effects(name: str, tmp_path: Path) -> None:
         element, legs = places[0]
         if kind in ASKS:
             with pytest.raises(sm.StiffmapError, match="is missing"):
-                machine.with_effect(kind, element=element, legs=list(legs), **small(kind))
+                machine.with_effect(
+                    kind, element=element, legs=list(legs), **small(machine, kind, element, legs)
+                )
             continue
-        other = machine.with_effect(kind, element=element, legs=list(legs), **small(kind))
+        other = machine.with_effect(
+            kind, element=element, legs=list(legs), **small(machine, kind, element, legs)
+        )
         s = other.solve(p, wrench, gravity=[0, 0, -9.81])
         assert s.ok, f"{kind} of {element}: {sm.Status(int(s.status)).name}"
         if np.abs(s.displacement - before).max() > 1e-12:
