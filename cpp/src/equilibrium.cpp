@@ -28,10 +28,6 @@ bool has_knots(const Mechanism& m) {
                      [](const Law& law) { return law.has_knots() || law.friction() != 0; });
 }
 
-bool has_cubic(const Mechanism& m) {
-  return std::any_of(m.laws.begin(), m.laws.end(), [](const Law& law) { return law.cubic() != 0; });
-}
-
 /// A linear deflection below this share of the length is closure noise: the coordinate bears nothing.
 constexpr double unloaded = 1e-11;
 
@@ -105,7 +101,7 @@ void line_search(const Mechanism& m, const Problem& p, EquilibriumWorkspace& ws,
 /// result is the continuation of the start and no other root (theory E9).
 Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bool cold, bool trusting,
                EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
-  const bool knots = has_knots(m), hardens = has_cubic(m);
+  const bool knots = has_knots(m);
   double first = 0, previous = 0;
   out.contraction = 0;
   p.secant_laws = cold && knots;
@@ -128,8 +124,7 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
       continue;
     }
     if (first > 0 && out.contraction == 0) out.contraction = norm / first;
-    // A hardening drive's stiffness goes with its small deflection: one step more makes it as exact as the others.
-    if (norm < opt.tolerance && (!hardens || norm < 1e-3 * opt.tolerance || (k > 0 && previous < opt.tolerance))) {
+    if (norm < opt.tolerance) {
       if (knots && !ws.saddle.regular() && leave_gaps(m, p, ws.lin, state)) {
         linearize(m, p, state, ws.lin);
         continue;

@@ -142,7 +142,7 @@ def cells(r: Row) -> tuple[str, ...]:
         "–" if np.isnan(r.found.worst) else f"{f * r.found.worst:.5g}",
         unit,
         "" if r.found.worst_at is None else " ".join(f"{1e3 * v:.0f}" for v in r.found.worst_at),
-        "" if np.isnan(r.found.best) else f"{f * r.found.best:.5g}",
+        "" if np.isnan(r.found.best) else f"{f * r.found.best:.4g}",
         required(r),
         "" if np.isnan(r.margin) else f"{f * r.margin:+.4g}",
         verdict,
