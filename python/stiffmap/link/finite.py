@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.link.arrays import Bools, Floats
-from stiffmap.link.checks import Field
+from stiffmap.link.checks import Field, on_one_line
 from stiffmap.link.rigidfit import fit_exact, fit_linear, parting_rotation
 
 EVIDENCE = 20.0  # difference of the residual sums in units of the noise variance
@@ -28,6 +28,8 @@ def finite_rotation(field: Field, kept: Bools) -> str:
     """
     for k, u in enumerate(field.displacements):
         for nodes in (kept[k], np.ones(kept.shape[1], dtype=bool)):
+            if nodes.sum() < 3 or on_one_line(field.points[nodes]):
+                continue  # no fit at all; the fit of the nodes that are kept says so
             if found := _finite_case(k, field.points[nodes], u[nodes], field.reference):
                 return found
     return ""
