@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 from functools import cache
-from importlib.util import module_from_spec, spec_from_file_location
 from os import PathLike
-from pathlib import Path
 
 from stiffmap.effects.evidence import RECORDS
 from stiffmap.effects.synonyms import found_by
 from stiffmap.effects.types import EffectType
 from stiffmap.errors import FileError, StiffmapError
+from stiffmap.python_file import run_python_file
 
 
 @cache
@@ -66,15 +65,7 @@ def load_effects(path: str | PathLike[str]) -> tuple[EffectType, ...]:
 
     Raises `FileError` where it cannot be run or defines none.
     """
-    file = Path(path)
-    spec = spec_from_file_location(f"stiffmap_effect_{file.stem}", file)
-    if spec is None or spec.loader is None or not file.is_file():
-        raise FileError("cannot be read as a Python file that defines an effect", file=str(path))
-    module = module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        raise FileError(f"cannot be run: {type(error).__name__}: {error}", file=str(path)) from error
+    module = run_python_file(path, "effect", "an effect")
     found = defined(module)
     if not found:
         raise FileError("defines no effect: expected EFFECT = EffectType(...)", file=str(path))

@@ -36,14 +36,14 @@ EFFECTS: dict[str, dict[str, object]] = {
     "length": {"error": 3e-4},
     "tilt": {"angle_x": 2e-3, "angle_y": -1e-3},
     "straightness": {"amplitude": 4e-5, "period": 0.3, "phase": 0.4},
-    "position_offset": {"error": 2e-4},
+    "position_offset": {"error_x": 2e-4, "error_z": -1e-4},
     "zero_offset": {"error": 3e-4},
     "periodic_error": {"amplitude": 3e-5, "period": 0.02, "phase": 0.3},
     "lead_error": {"slope": 2e-4},
     "joint_friction": {"torque": 0.2, "branch": "loading"},
     "joint_compliance": {"translation": 1e-9, "rotation": 1e-7},
     "compliance": {"scale": 1.7},
-    "bilinear": {"ratio": 0.5, "force": 100.0},
+    "bilinear": {"ratio": 0.5, "knee": 100.0},
     "position_dependent_compliance": {"slope": 0.3},
 }
 

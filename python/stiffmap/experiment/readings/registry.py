@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.util import module_from_spec, spec_from_file_location
 from os import PathLike
-from pathlib import Path
 from pkgutil import iter_modules
 
 import stiffmap.experiment.readings.library as library
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.experiment.channels import AXES, Channel
 from stiffmap.experiment.readings.types import ReadingKind
+from stiffmap.python_file import run_python_file
 
 _LIBRARY: dict[str, ReadingKind] = {
     kind.name: kind
@@ -54,15 +53,7 @@ def unregister(name: str) -> None:
 
 def load_readings(path: str | PathLike[str]) -> ReadingKind:
     """Run a Python file and register its ``READING``; raises `FileError` where it has none."""
-    file = Path(path)
-    spec = spec_from_file_location(f"stiffmap_reading_{file.stem}", file)
-    if spec is None or spec.loader is None or not file.is_file():
-        raise FileError("cannot be read as a Python file that defines a kind of reading", file=str(path))
-    module = module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        raise FileError(f"cannot be run: {type(error).__name__}: {error}", file=str(path)) from error
+    module = run_python_file(path, "reading", "a kind of reading")
     kind = getattr(module, "READING", None)
     if not isinstance(kind, ReadingKind):
         raise FileError("defines no reading: expected READING = ReadingKind(...)", file=str(path))
