@@ -8,6 +8,7 @@ from stiffmap.performance.efforts import PeakAcceleration, drive_efforts, fastes
 from stiffmap.performance.force import ForceTransmission, force_transmission
 from stiffmap.performance.frequencies import NaturalFrequencies, natural_frequencies
 from stiffmap.performance.inertia import body_masses, moving_mass, total_mass
+from stiffmap.performance.pieces import in_pieces
 from stiffmap.performance.requirements import Requirements, load_requirements
 from stiffmap.performance.table import MeasuresTable, measures
 from stiffmap.performance.trajectory import Path, Trajectory, circle, line, read_points, through, timed
@@ -33,6 +34,7 @@ __all__ = [
     "drive_kinematics",
     "fastest",
     "force_transmission",
+    "in_pieces",
     "largest_box",
     "line",
     "load_requirements",

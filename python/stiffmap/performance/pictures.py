@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
+from stiffmap.performance.mode_pictures import mode_figure
 from stiffmap.performance.registry import Measure
 from stiffmap.performance.table import MeasuresTable, Row
 from stiffmap.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, new_figure, paper_style
@@ -81,7 +82,7 @@ def _hexagon(axes, vertices: Floats, inner: float, outer: float) -> None:  # typ
 
 
 def measure_figures(table: MeasuresTable) -> dict[str, Figure]:
-    """Name -> figure: the table against its requirements, maps on three planes, Figure 1 at the worst pose."""
+    """Name -> figure: the table against its requirements, maps on three planes, Figure 1 and modes at the worst poses."""
     out = {"requirements": requirement_figure(table)} if table.requirements.bounds else {}
     for row in table.rows:
         if row.measure.name in MAPPED and row.found.values is not None:
@@ -90,6 +91,9 @@ def measure_figures(table: MeasuresTable) -> dict[str, Figure]:
     last = rows.get("transmission_max")
     if last is not None and last.found.worst_at is not None and np.isfinite(last.found.worst):
         out["transmission"] = transmission_figure(table.machine, last.found.worst_at, table.case.plane)
+    slow = rows.get("frequency")
+    if slow is not None and slow.found.worst_at is not None and np.isfinite(slow.found.worst):
+        out["modes"] = mode_figure(table.machine, slow.found.worst_at, gravity=table.case.gravity)
     return out
 
 

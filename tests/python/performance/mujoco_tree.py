@@ -16,7 +16,9 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 
 class Tree:
-    def __init__(self, machine, springs: bool, gravity=(0.0, 0.0, 0.0)):
+    def __init__(self, machine, springs: bool, gravity=(0.0, 0.0, 0.0), x=None):
+        """`x`: coordinates of the commanded pose, where springs vary with a stroke."""
+        self.x = x
         self.count, self.names, self.loops, self.springs = 0, [], [], springs
         self.stiffness, self.drives = [], []
         d = machine.description
@@ -53,7 +55,7 @@ class Tree:
                 if e.stiffness is not None:
                     k = np.array(e.stiffness)
                 else:
-                    k = np.linalg.inv(np.array(e.compliance))
+                    k = np.linalg.inv(self._stretched(np.array(e.compliance), e.stroke, prefix))
                 for i in range(6):
                     node = self._joint(node, np.eye(3)[i % 3], i < 3, f"{name}.{i}", k[i])
             elif isinstance(e, Body):
@@ -66,6 +68,15 @@ class Tree:
                 self.loops.extend((self._site(ends[0]), self._site(end)) for end in ends[1:])
                 node = ends[0]
         return node
+
+    def _stretched(self, c, stroke, prefix):
+        """A cantilever grown longer: stretching and turning with the length, bending with its square and cube."""
+        if stroke is None:
+            return c
+        grown = 1 + stroke.rate * (self.x[f"{prefix}.{stroke.joint}"] - stroke.at) / stroke.length
+        power = np.ones(6)
+        power[[i for i in range(3) if i != stroke.along]] = 2
+        return c * grown ** (power[:, None] + power - 1)
 
     def _joint(self, node, axis, sliding, name, stiffness):
         self.names.append(name)

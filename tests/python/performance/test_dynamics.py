@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import scipy.linalg
 from scipy.interpolate import make_interp_spline
 
 import stiffmap as sm
+from stiffmap.description import Body, Offset
 from stiffmap.performance import drive_kinematics, fastest, line, peak_acceleration, timed
 
 GRAVITY = [0.0, 0.0, -9.81]
@@ -84,18 +86,40 @@ def test_efforts_against_mujoco_with_loops_closed(name):
         np.testing.assert_allclose(d.effort.values[i], expected, atol=2e-6 * scale)
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["orthoglide-revised", "orthoglide-original", "linear-delta", "hexapod", "3-rps", "rotary-delta", "ur10"],
-)
+def with_links(name):
+    """The tripteron declares no mass: its round aluminium links get theirs."""
+    if name != "tripteron":
+        return sm.load_machine(name)
+    mass = 2700 * np.pi * 0.15**2 / 4 * 0.75
+    across = mass * (0.75**2 / 12 + 0.15**2 / 16)
+    inertia = ((mass * 0.15**2 / 8, 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, across))
+    d = sm.load_machine(name).description
+
+    def heavy(elements):
+        out = []
+        for e in elements:
+            if isinstance(e, Offset) and e.name.endswith("_length"):
+                out.append(Body(e.name[:-7] + "_body", mass, (0.375, 0.0, 0.0), inertia))
+            out.append(e)
+        return tuple(out)
+
+    legs = tuple(replace(leg, elements=heavy(leg.elements)) for leg in d.legs)
+    tool = Body("tool", 5.0, inertia=((0.01, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, 0.015)))
+    return sm.Machine(replace(d, legs=legs, platform=(*d.platform, tool)))
+
+
+@pytest.mark.parametrize("name", sm.machine_names())
 def test_frequencies_against_mujoco(name):
-    machine = sm.load_machine(name)
-    p = machine.workspace.mean(axis=0) + (0 if name == "3-rps" else np.array([0.01, -0.02, 0.015]))
+    machine = with_links(name)
+    low, high = machine.workspace
+    aside = np.where(high - low > 0.01, np.array([0.01, -0.02, 0.015]), 0.0)
+    p = (low + high) / 2 + aside
     found = sm.natural_frequencies(machine, p, gravity=[0, 0, 0], modes=4)
     assert found.status == sm.Status.CONVERGED
-    tree = engine().Tree(machine, springs=True)
     k = drive_kinematics(machine, p)
-    tree.put(dict(zip(machine.compiled.names.coordinates, k.coordinates, strict=True)))
+    x = dict(zip(machine.compiled.names.coordinates, k.coordinates, strict=True))
+    tree = engine().Tree(machine, springs=True, x=x)
+    tree.put(x)
     stiffness = np.zeros((tree.model.nv, tree.model.nv))
     group = {}
     for joint, row in zip(tree.names, tree.stiffness, strict=True):
@@ -114,7 +138,10 @@ def test_frequencies_against_mujoco(name):
     K = Z.T @ stiffness[np.ix_(free, free)] @ Z
     M = Z.T @ tree.mass()[np.ix_(free, free)] @ Z
     mu = scipy.linalg.eigh(M, K, eigvals_only=True)[::-1][:4]
-    np.testing.assert_allclose(found.frequency, 1 / np.sqrt(mu) / (2 * np.pi), rtol=1e-6)
+    expected = 1 / np.sqrt(mu) / (2 * np.pi)
+    some = expected < 1e5  # beyond are the tiny inertias that MuJoCo wants of points
+    assert some.sum() >= 3 and np.isnan(found.frequency[~some]).all()
+    np.testing.assert_allclose(found.frequency[some], expected[some], rtol=1e-6)
 
 
 def test_peak_acceleration_at_the_isotropic_point():
