@@ -36,6 +36,7 @@ COMMANDS = (
     Command("import", "stiffmap.cli.importing", "import_urdf", "Machine file from a URDF."),
     Command("sweep", "stiffmap.cli.sweep", "sweep", "Deflection against the size of a force."),
     Command("measures", "stiffmap.cli.measures", "measures", "Performance measures against requirements."),
+    Command("efforts", "stiffmap.cli.efforts", "efforts", "Efforts of the drives along a motion."),
     Command("optimize", "stiffmap.cli.optimize", "optimize", "Best designs under several measures."),
     Command("paper", "stiffmap.cli.paper", "paper", "Reproduce the figures and statements of the paper."),
     Command("link", "stiffmap.cli.link", "link_command", "Spring of a link from a part or a field."),

@@ -8,6 +8,7 @@ from stiffmap.performance.efforts import PeakAcceleration, drive_efforts, fastes
 from stiffmap.performance.force import ForceTransmission, force_transmission
 from stiffmap.performance.frequencies import NaturalFrequencies, natural_frequencies
 from stiffmap.performance.inertia import body_masses, moving_mass, total_mass
+from stiffmap.performance.motion_files import Motion, load_motion
 from stiffmap.performance.pieces import in_pieces
 from stiffmap.performance.requirements import Requirements, load_requirements
 from stiffmap.performance.table import MeasuresTable, measures
@@ -20,6 +21,7 @@ __all__ = [
     "ForceTransmission",
     "LargestBox",
     "MeasuresTable",
+    "Motion",
     "NaturalFrequencies",
     "Path",
     "PeakAcceleration",
@@ -37,6 +39,7 @@ __all__ = [
     "in_pieces",
     "largest_box",
     "line",
+    "load_motion",
     "load_requirements",
     "measures",
     "moving_mass",

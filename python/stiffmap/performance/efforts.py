@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,12 +10,13 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats
+from stiffmap.description.elements import Drive
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.inertia import friction_efforts, need_masses, rest_efforts, rigid_dynamics
 from stiffmap.performance.refusal import place_text, refuse_failed
-from stiffmap.performance.scaling import drive_table, drive_values
+from stiffmap.performance.scaling import drive_table, drive_values, revolute_drives
 from stiffmap.performance.timing import quickest
 from stiffmap.performance.trajectory import Path, Trajectory
 from stiffmap.performance.zonotopes import inverse_rows
@@ -41,7 +43,8 @@ def drive_efforts(
 
     Returns a Dataset over (time, drive): effort, rate, acceleration, coordinate, power, friction; over
     time: kinetic, potential (J); over drive: peak_effort, rms_effort, peak_speed, peak_power,
-    effort_margin and speed_margin (limit minus peak; NaN where none is declared). SI units.
+    effort_margin, speed_margin (limit minus peak) and range_margin (distance from the nearer end of the
+    range), NaN where none is declared. SI units.
 
     Raises StiffmapError where masses are missing (names the bodies) and where the path leaves the
     reach or meets a singularity (says where and when).
@@ -94,10 +97,17 @@ def _dataset(
             "peak_power": ("drive", np.abs(power).max(axis=0)),
             "effort_margin": ("drive", most["force"] - np.abs(effort).max(axis=0)),
             "speed_margin": ("drive", most["speed"] - np.abs(out["rate"]).max(axis=0)),
+            "range_margin": ("drive", _room(drives, k.actuators)),
         },
         coords={"time": t.time, "drive": list(machine.actuators)},
-        attrs={"machine": machine.name},
+        attrs={"machine": machine.name, "revolute": revolute_drives(machine).astype(int).tolist()},
     )
+
+
+def _room(drives: Sequence[Drive], coordinates: Floats) -> Floats:
+    """(drives,) least distance from the ends of the declared range; NaN where none is declared."""
+    ends = np.array([d.range or (np.nan, np.nan) for d in drives])
+    return np.asarray(np.minimum(coordinates - ends[:, 0], ends[:, 1] - coordinates).min(axis=0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,38 +3,73 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
-from stiffmap.performance.closing import DriveKinematics
+from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.status import Status
+
+STEPS = 24
+"""Halvings between two samples, to say where and when."""
 
 
 def refuse_failed(machine: Machine, k: DriveKinematics, time: Floats | None, position: Floats) -> None:
-    """StiffmapError with place and time of the first pose of a motion that cannot be."""
-    failed = k.status != Status.CONVERGED
-    if not failed.any() and len(failed) > 1:
-        failed = _crossed(k)
+    """StiffmapError with place and time of the first pose of a motion that cannot be; between two samples it is
+    sought by halving."""
+    failed = (k.status != Status.CONVERGED) | _crossed(k.jacobian) | _jumped(k)
     if not failed.any():
         return
     i = int(np.argmax(failed))
+    share, p, status = 0.0, position[i], Status(int(k.status[i]))
+    if i > 0:
+        share, p = _between(machine, k, position, i)
     word = {Status.UNREACHABLE: "leaves the reach", Status.SINGULAR: "meets a singularity"}
-    what = word.get(Status(int(k.status[i])), "passes a singularity")
-    when = "" if time is None else f", t = {time[i]:.4g} s"
-    raise StiffmapError(f"{machine.name}: the trajectory {what} at {place_text(position[i])}{when}")
+    what = word.get(status, "passes a singularity")
+    when = "" if time is None else f", t = {time[i] - share * (time[i] - time[max(i - 1, 0)]):.4g} s"
+    raise StiffmapError(f"{machine.name}: the trajectory {what} at {place_text(p)}{when}")
 
 
-def _crossed(k: DriveKinematics) -> np.ndarray:
-    """Where the drive Jacobian of a machine with as many drives as motions changes its orientation."""
-    first = k.jacobian[0]
-    u = np.linalg.svd(first, full_matrices=False)[0]
-    det = np.linalg.det(u.T @ k.jacobian)
-    flipped = np.zeros(len(det), dtype=bool)
-    flipped[1:] = np.sign(det[1:]) * np.sign(det[:-1]) <= 0
-    scale = np.linalg.norm(k.jacobian, axis=(-2, -1)) ** k.jacobian.shape[-1]
+def _between(machine: Machine, k: DriveKinematics, position: Floats, i: int) -> tuple[float, Floats]:
+    """Share of the step back from sample `i`, and the place, of what happens between `i - 1` and `i`."""
+    a, b = position[i - 1], position[i]
+    low, high, start = 0.0, 1.0, k.coordinates[i - 1]
+    for _ in range(STEPS):
+        middle = (low + high) / 2
+        there = drive_kinematics(machine, a + middle * (b - a), k.rotation[i - 1], start=start)
+        pair = np.stack([k.jacobian[i - 1], there.jacobian])
+        if there.status != Status.CONVERGED or _crossed(pair)[1]:
+            high = middle
+        else:
+            low, start = middle, there.coordinates
+    return 1 - high, a + high * (b - a)
+
+
+def _jumped(k: DriveKinematics) -> NDArray[np.bool_]:
+    """(n,) where the drives went another way than the tool: another configuration, with a singularity between."""
+    j = (k.jacobian[1:, :3] + k.jacobian[:-1, :3]) / 2
+    way, moved = np.diff(k.position, axis=0), np.diff(k.actuators, axis=0)
+    off = np.linalg.norm(way - (j @ moved[..., None])[..., 0], axis=1)
+    with np.errstate(invalid="ignore"):
+        return np.concatenate([[False], off > np.linalg.norm(way, axis=1) + 1e-9])
+
+
+def _crossed(jacobian: Floats) -> NDArray[np.bool_]:
+    """(n,) where the drive Jacobian (n, 6, drives) of a machine with as many drives as motions changes its
+    orientation; False where it is NaN."""
+    ok = np.isfinite(jacobian).all(axis=(1, 2))
+    out = np.zeros(len(jacobian), dtype=bool)
+    if not ok.any():
+        return out
+    j = jacobian[ok]
     # a smooth change of sign is a drive that stops moving the tool; a jump is one that runs away
-    return np.asarray(flipped & (np.abs(det) < 0.1 * scale) | (np.abs(det) < 1e-9 * scale))
+    turn = np.linalg.det(np.swapaxes(j[:-1], 1, 2) @ j[1:])
+    flipped = np.concatenate([[False], turn <= 0])
+    scale = np.linalg.norm(j, axis=(-2, -1)) ** (2 * j.shape[-1])
+    gram = np.linalg.det(np.swapaxes(j, 1, 2) @ j)
+    out[ok] = flipped | (gram < 1e-18 * scale)
+    return out
 
 
 def place_text(p: Floats) -> str:
