@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,9 @@ from stiffmap.broadcasting import Floats
 from stiffmap.compiled import Role, Status
 from stiffmap.errors import StiffmapError
 from stiffmap.html import table, titled
-from stiffmap.machine import Machine, takes_machine
+from stiffmap.machine import Machine, metres_expected, takes_machine
+from stiffmap.options import SolveKeywords, merged
+from stiffmap.solving import Call, solve_call
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -104,15 +106,17 @@ def deflection_budget(
     p = machine.description.home.p if position is None else np.asarray(position, dtype=float)
     load = np.asarray(wrench, dtype=float)
     g = machine.compiled.gravity(gravity)
-    options: dict[str, Any] = {"rotation": rotation, "point": point, "method": "reference"}
-    loaded = machine.solve(p, load, gravity=g, **options)
-    free = machine.solve(p, np.zeros(6), gravity=(0.0, 0.0, 0.0), **options)
+    options: SolveKeywords = {"rotation": rotation, "point": point, "method": "reference"}
+    cases = ((load, g), (np.zeros(6), np.zeros(3)))
+    calls = [Call(p, w, merged(None, {**options, "gravity": a})) for w, a in cases]
+    loaded, free = (solve_call(machine.compiled, call)[0] for call in calls)
     for s in (loaded, free):
         if s.status.shape != ():
             raise StiffmapError("position: expected one pose and one wrench")
         if int(s.status) != Status.CONVERGED:
+            hint = metres_expected(machine.compiled, p) if int(s.status) == Status.UNREACHABLE else ""
             raise StiffmapError(
-                f"the pose is {Status(int(s.status)).name.lower()}: it has no deflection to share"
+                f"the pose is {Status(int(s.status)).name.lower()}: {hint or 'it has no deflection to share'}"
             )
     unit = _unit_reactions(machine, p, load / 2, g / 2, rotation, point)
     moved = loaded.coordinates - free.coordinates

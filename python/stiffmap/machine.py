@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property, wraps
 from os import PathLike
+from types import FrameType
 from typing import Any, Concatenate, ParamSpec, TypeVar, Unpack
 
 import numpy as np
@@ -157,12 +159,12 @@ class Machine:
             if one is not None:
                 s = Solution(one, (), self._compiled.names, "tcp")
                 if max(abs(v) for v in position) > METRES_TOO_FAR * self._compiled.length:  # type: ignore[union-attr, arg-type]  # plain numbers
-                    hint_metres(self, position, bool(s.status == Status.UNREACHABLE), 3)
+                    hint_metres(self, position, bool(s.status == Status.UNREACHABLE))
                 return s
         call = Call(position, wrench, merged(options, given))
         if not derivatives:
             s = solve_call(self._compiled, call)[0]
-            hint_metres(self, position, bool((s.status == Status.UNREACHABLE).all()), 3)
+            hint_metres(self, position, bool((s.status == Status.UNREACHABLE).all()))
             return s
         requests = read_requests(derivatives, derivatives_of)
         ready = self._derivable.get(requests.key, lambda: prepare(self._compiled, requests))
@@ -267,12 +269,28 @@ def takes_machine(
 METRES_TOO_FAR = 100.0
 
 
-def hint_metres(machine: Machine, position: ArrayLike, failed: bool, depth: int = 4) -> None:
-    """Warn where every pose failed and lies as far outside as millimetres read as metres do."""
+def hint_metres(machine: Machine, position: ArrayLike, failed: bool) -> None:
+    """Warn, at the caller's line, where every pose failed and lies as far outside as millimetres read as metres do."""
+    text = metres_expected(machine.compiled, position) if failed else ""
+    if text:
+        warnings.warn(f"no pose can be reached: {text}", stacklevel=_frames_of_this_package())
+
+
+def metres_expected(machine: CompiledMachine, position: ArrayLike) -> str:
+    """Why positions look like millimetres; empty where they do not."""
     far = float(np.abs(np.asarray(position, dtype=float)).max(initial=0.0))
-    if failed and far > METRES_TOO_FAR * machine.compiled.length:
-        warnings.warn(
-            f"no pose can be reached: positions up to {far:g} m, the machine measures "
-            f"{machine.compiled.length:.2g} m; metres are expected (200 mm is 0.2)",
-            stacklevel=depth,
-        )
+    if not far > METRES_TOO_FAR * machine.length:
+        return ""
+    return (
+        f"positions up to {far:g} m, the machine measures {machine.length:.2g} m; "
+        "metres are expected (200 mm is 0.2)"
+    )
+
+
+def _frames_of_this_package() -> int:
+    """How many callers, from `hint_metres` on, stand in stiffmap itself."""
+    frame: FrameType | None = sys._getframe(1)
+    count = 1
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == __package__:
+        frame, count = frame.f_back, count + 1
+    return count

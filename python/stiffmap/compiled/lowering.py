@@ -31,6 +31,8 @@ from stiffmap.errors import StiffmapError
 from stiffmap.home import Gap, misfit_text
 
 UNLIMITED = 1e300
+ROUND_OFF = 1e-12
+"""Of a range's larger end: a pose that is commanded to an end is not flagged for its last digits."""
 FAR = 10.0  # rad or m: end of the flat pieces of a stick law
 START = 1e-3  # rad or m: slope of a stick law in the linear start of Newton's iteration
 
@@ -116,8 +118,7 @@ def add_joint(out: _core.Chain, e: Joint) -> None:
     e, turn = charted(e)
     if turn is not None:
         out.offset(f"{e.name}.home", turn, turn)
-    range_ = e.drive.range if e.drive and e.drive.range else e.limits
-    lower, upper = range_ or (-UNLIMITED, UNLIMITED)
+    lower, upper = limits_with_slack(e)
     stuck = e.friction if e.friction and e.friction.branch == "loading_stuck" else None
     own = [stick_law(stuck.level) if stuck else law(one) if one else None for one in e.laws]
     for i, (axis, home) in enumerate(zip(e.axes, e.home, strict=True)):
@@ -138,6 +139,15 @@ def add_joint(out: _core.Chain, e: Joint) -> None:
             rest=None if e.rest is None else e.rest[i],
             ball="" if e.kind != "spherical" or i else "free" if any_axes_do(e) else "meant",
         )
+
+
+def limits_with_slack(e: Joint) -> tuple[float, float]:
+    """Ends of a drive's range or a joint's limits, wider by what round-off makes of a pose at an end."""
+    ends = e.drive.range if e.drive and e.drive.range else e.limits
+    if ends is None:
+        return -UNLIMITED, UNLIMITED
+    slack = ROUND_OFF * max(map(abs, ends))
+    return ends[0] - slack, ends[1] + slack
 
 
 def drive_numbers(e: Joint) -> dict[str, float]:

@@ -11,6 +11,7 @@ import xarray as xr
 from stiffmap.broadcasting import Floats
 from stiffmap.compiled.machine import PATH_CONTROLS as CONTROLS
 from stiffmap.errors import StiffmapError
+from stiffmap.machine import hint_metres
 from stiffmap.maps.critical import critical_variables
 from stiffmap.maps.fixed_order_sums import norm
 from stiffmap.maps.loading import Loading
@@ -52,6 +53,7 @@ def load_path(
         cross=cross,
     )
     (end, points, critical), (crossing_end, crossing, crossing_critical) = branches
+    hint_metres(machine, position, not points)
     _check_cross(cross, critical, str(ENDS[end]))
     call = {"function": "sweep", "position": position, "direction": direction, "control": control,
             "limit": limit, "steps": steps, "cross": cross}  # fmt: skip

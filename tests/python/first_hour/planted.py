@@ -1,4 +1,4 @@
-"""A diagnosis with a known answer, small enough for the fast lane."""
+"""A diagnosis with a known answer, that the slow tests of pages share."""
 
 from __future__ import annotations
 

@@ -92,10 +92,15 @@ def test_metres_are_expected_wherever_positions_are_given() -> None:
         lambda: machine.solve((0.0, 400.0, 0.0)),
         lambda: machine.solve([[0.0, 400.0, 0.0], [50.0, 400.0, 0.0]], method="reference"),
         lambda: sm.inverse_kinematics(machine, [0.0, 400.0, 0.0]),
+        lambda: sm.polar("five-bar", [0.0, 400.0, 0.0]),
+        lambda: sm.sweep(machine, [0.0, 400.0, 0.0], [1, 0, 0], [10.0]),
+        lambda: sm.sweep(machine, [0.0, 400.0, 0.0], [1, 0, 0], limit=10.0),
     ):
         with pytest.warns(UserWarning, match="metres are expected") as told:
             call()
-        assert told[0].filename == __file__
+        assert {w.filename for w in told} == {__file__}
+    with pytest.raises(sm.StiffmapError, match=r"unreachable: positions up to 400 m.*metres are expected"):
+        sm.deflection_budget(machine, [0.0, 400.0, 0.0], [10.0, 0, 0, 0, 0, 0])
 
 
 def test_a_machine_is_a_name_or_a_file_everywhere() -> None:

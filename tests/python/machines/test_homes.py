@@ -10,6 +10,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.cli import main
+from stiffmap.description import Joint
 from stiffmap.files import check_file, description_from_text, description_text, shipped_machines
 from stiffmap.status import Status
 
@@ -201,3 +202,19 @@ def test_everything_counts_from_the_closed_home(method: str) -> None:
             assert s.status == Status.CONVERGED
             assert s.displacement[0] == pytest.approx(drive, rel=1e-9)
             assert s.displacement[5] == pytest.approx(3 / 200.0, rel=1e-9)  # 2e5 N·mm/rad
+
+
+def test_a_pose_at_the_end_of_a_drive_is_within_its_range() -> None:
+    """Commanded to an end, it comes back from kinematics with other last digits; a micrometre further is outside."""
+    machine = sm.load_machine("linear-delta")
+    joints = [e for leg in machine.description.legs for e in leg.elements if isinstance(e, Joint) and e.drive]
+    assert joints[0].drive and joints[0].drive.range
+    low, high = joints[0].drive.range
+    for end, inside in ((low, 0.06), (high, -0.06)):
+        for turn in np.linspace(0.3, 0.7, 11):
+            for past, outside in ((0.0, False), (-np.sign(inside) * 1e-6, True)):
+                drives = [end + past, end + inside + 0.05 * turn, end + inside - 0.03 * turn]
+                p = sm.forward_kinematics(machine, drives).position
+                for method in ("fast", "reference"):
+                    s = machine.solve(p, np.zeros(6), method=method)
+                    assert bool(int(s.flags) & sm.Flag.DRIVE_RANGE) == outside
