@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "closing.hpp"
 
@@ -157,100 +156,6 @@ void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace&
 
 }  // namespace
 
-namespace {
-
-constexpr double finite_turn = 0.2;  // rad, or that share of the length
-
-/// Joints that nothing but the closure holds: what a spring resists is no spin.
-void select_free(const Mechanism& m, ClosureWorkspace& ws) {
-  select_unknowns(m, false, ws);
-  const auto sprung = [&](Index j) { return m.coordinates[at(j)].law >= 0; };
-  ws.unknown.erase(std::remove_if(ws.unknown.begin(), ws.unknown.end(), sprung), ws.unknown.end());
-}
-
-/// Null directions of the closure over the passive coordinates, tip held, at the frames of the last residual.
-MatX still_directions(const Mechanism& m, const Target& target, ClosureWorkspace& ws) {
-  newton_step(m, target, ws);
-  const Index n = ws.A.cols();
-  if (n == 0) return MatX(0, 0);
-  const Singular svd = singular_vectors(ws.A);
-  const Index rank = (svd.values.array() > rank_threshold).count();
-  return svd.V.rightCols(n - rank);
-}
-
-/// The same a little way off home, where no axes coincide by chance; false where no such place was found.
-bool still_off_home(const Mechanism& m, ClosureWorkspace& ws, MatX& out) {
-  std::minstd_rand random(1);
-  std::uniform_real_distribution<double> share(-1, 1);
-  for (const double way : {0.05, 0.02, 0.1, 0.01, 0.2, 0.3}) {
-    VecX x = m.home_coordinates;
-    select_unknowns(m, true, ws);
-    for (const Index j : ws.unknown) x[j] += way * share(random) * m.length / m.unit(j);
-    int iterations = 0;
-    const bool ok = close(m, Target{}, Pace::damped, ws, x, iterations);
-    const Pose tip = ws.frames.at(m.tip);
-    select_free(m, ws);
-    if (!ok) continue;
-    const Target target{&tip};
-    residual(m, x, target, ws);
-    out = still_directions(m, target, ws);
-    return true;
-  }
-  return false;
-}
-
-/// Whether a null direction at home is a finite motion: with one coordinate held elsewhere the others close again.
-bool goes_on(Mechanism& m, const Target& target, const VecX& direction, Index coordinate, ClosureWorkspace& ws) {
-  VecX x = m.home_coordinates;
-  for (std::size_t k = 0; k < ws.unknown.size(); ++k)
-    x[ws.unknown[k]] += finite_turn * m.length / m.unit(ws.unknown[k]) * direction[static_cast<Index>(k)];
-  bool& locked = m.coordinates[at(coordinate)].locked;
-  locked = true;
-  select_free(m, ws);
-  int iterations = 0;
-  const bool ok = close(m, target, Pace::damped, ws, x, iterations) && residual(m, x, target, ws) < round_off;
-  locked = false;
-  select_free(m, ws);
-  return ok;
-}
-
-/// Sizes of a spin's coordinates; the middle one of a ball joint counts little: it turns back before the spin has gone
-/// round.
-VecX winding(const Mechanism& m, const VecX& spin, const ClosureWorkspace& ws) {
-  VecX out = spin.cwiseAbs();
-  for (const Ball& b : m.balls)
-    for (std::size_t k = 0; k < ws.unknown.size(); ++k)
-      if (ws.unknown[k] == b.first + 1) out[static_cast<Index>(k)] *= 0.2;
-  return out;
-}
-
-}  // namespace
-
-/// A spin moves passive coordinates and nothing that the closure sees, at home as anywhere: its null
-/// direction is the tangent of a finite motion, and has its like off home (axes that coincide at home only
-/// have not: a gimbal lock). One coordinate of it is held.
-void lock_spins(Mechanism& m) {
-  ClosureWorkspace ws(m);
-  const Target target{&m.home};
-  for (;;) {
-    select_free(m, ws);
-    residual(m, m.home_coordinates, target, ws);
-    const MatX still = still_directions(m, target, ws);
-    if (still.cols() == 0) return;
-    VecX spin = still.rightCols<1>();
-    MatX off_home;
-    if (still_off_home(m, ws, off_home) && off_home.cols() < still.cols()) {
-      if (off_home.cols() == 0) return;
-      // the direction at home that is nearest to a spin elsewhere
-      spin = (still * (still.transpose() * off_home.rightCols<1>())).normalized();
-    }
-    Index held = 0;
-    winding(m, spin, ws).maxCoeff(&held);
-    if (!goes_on(m, target, spin / spin[held], ws.unknown[at(held)], ws)) return;  // singular at home, but no spin
-    m.coordinates[at(ws.unknown[at(held)])].locked = true;
-  }
-}
-
 ClosureWorkspace::ClosureWorkspace(const Mechanism& m)
     : frames(m),
       J(MatX::Zero(6 + m.closures(), m.size())),
@@ -275,6 +180,13 @@ ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorks
   const Target target{&way, m.task};
   const auto set = [&](double s, VecX&) { way = on_the_way(at_pose, pose, s); };
   bool ok = continuation(m, target, set, ws, x, out);
+  if (!ok && m.beside_home.size() > 0) {  // from home no way leads where a locked hinge has to turn by a right angle
+    x = m.beside_home;
+    forward(m, Geometry::nominal, x, ws.frames);
+    const Pose beside = ws.frames.at(m.tip);
+    ok = continuation(m, target, [&](double s, VecX&) { way = on_the_way(beside, pose, s); }, ws, x, out);
+    if (ok) out.flags |= flag::branch_unverified;
+  }
   if (!ok) {  // the straight way may leave the workspace although its end lies inside
     x = m.home_coordinates;
     way = pose;

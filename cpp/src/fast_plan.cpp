@@ -146,6 +146,7 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high) : data
   const CompiledChains chains = compile_chains(m, *data_);
   if (missing_.empty()) missing_ = chains.missing;
   if (data_->program.legs_op < 0) missing_ = "no legs";
+  if (missing_.empty() && m.beside_home.size() > 0) missing_ = "hinges that do not lock at home";
   if (!missing_.empty()) return;
   heavy_spins_ = Spins(m).heavy();
   fill_tables(m, chains, *data_);

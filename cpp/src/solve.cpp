@@ -352,12 +352,19 @@ Mechanism assemble(const Chain& root, const Pose& home, const std::vector<Extern
   const HomeFit first = close_home(m, search);
   if (fit) *fit = first;
   if (!first.closed) throw HomeMisfit(first);
-  if (!closes_exactly(m)) {
-    Mechanism repaired(corrected(m), m.home, springs);
-    repaired.task = task;
-    repaired.home_coordinates = m.home_coordinates;
-    m = std::move(repaired);
+  const auto rebuild = [&](const Chain& chain, const VecX& home_coordinates) {
+    Mechanism other(chain, m.home, springs);
+    other.task = task;
+    other.home_coordinates = home_coordinates;
+    m = std::move(other);
     close_home(m, HomeSearch::near);
+  };
+  if (!closes_exactly(m)) rebuild(corrected(m), VecX(m.home_coordinates));
+  if (const std::vector<SpunBall> balls = balls_to_renumber(m); !balls.empty()) {
+    VecX x = m.home_coordinates;
+    for (const SpunBall& b : balls) x.segment<3>(b.first).setZero();
+    rebuild(renumbered(m, balls), x);
+    m.spun_balls = balls;
   }
   m.set_rest();
   for (Drive& d : m.drives)

@@ -156,7 +156,14 @@ void by_compliance(const Mechanism& m, const Mat6& C, bool regular, StiffnessRes
   Vec6 s;
   s << Vec3::Constant(std::sqrt(m.stiffness)), Vec3::Constant(std::sqrt(m.stiffness) * m.length);
   const Mat6 scaled = unscale(C, s);
-  if (!regular || out.free > 0 || !scaled.allFinite()) return;
+  if (!regular || !scaled.allFinite()) return;
+  if (out.free >
+      0) {  // a soft direction beside very stiff ones: the tangent, with units of its own, tells it from none
+    out.free = 0;
+    out.free_twists.setConstant(nan);
+    out.compliance = C;
+    return;
+  }
   const Vec6 sizes = singular_vectors(scaled).values;
   if (!(sizes[5] > least_motion * sizes[0])) return;
   const Vec6 d = scaled.diagonal().cwiseAbs().cwiseSqrt().cwiseInverse();

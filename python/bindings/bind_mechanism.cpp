@@ -9,6 +9,14 @@
 namespace stiffmap::bindings {
 namespace {
 
+using Nine = std::array<double, 9>;
+
+Nine by_rows(const Mat3& R) {
+  Nine out;
+  for (int i = 0; i < 9; ++i) out[static_cast<std::size_t>(i)] = R(i / 3, i % 3);
+  return out;
+}
+
 template <class T, class Get>
 std::vector<std::string> names(const std::vector<T>& items, Get get) {
   std::vector<std::string> out;
@@ -82,6 +90,13 @@ void bind_mechanism(py::module_& m) {
                              [](const Mechanism& k) {
                                std::vector<bool> out;
                                for (const Coordinate& c : k.coordinates) out.push_back(c.locked);
+                               return out;
+                             })
+      .def_property_readonly("spun_balls",
+                             [](const Mechanism& k) {
+                               std::vector<std::tuple<Index, Nine, Nine>> out;  // first coordinate, turn, axes
+                               for (const SpunBall& b : k.spun_balls)
+                                 out.emplace_back(b.first, by_rows(b.turn), by_rows(b.axes));
                                return out;
                              })
       .def_property_readonly("springs",

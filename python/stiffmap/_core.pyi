@@ -101,6 +101,9 @@ class Mechanism:
     def springs(self) -> list[tuple[str, int]]:
         ...
     @property
+    def spun_balls(self) -> list[tuple[int, typing.Annotated[list[float], "FixedSize(9)"], typing.Annotated[list[float], "FixedSize(9)"]]]:
+        ...
+    @property
     def stiffness(self) -> float:
         ...
 class FastPlan:

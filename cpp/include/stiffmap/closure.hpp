@@ -48,10 +48,6 @@ ClosureResult branch_closure(const Mechanism& m, const Pose& pose, ClosureWorksp
 /// What there is to say of coordinates that are closed already: tip pose and limits; NaN is out of reach.
 ClosureResult given_closure(const Mechanism& m, ClosureWorkspace& ws, const VecX& x);
 
-/// Locks passive coordinates that spin without effect on any frame that carries load (theory C6); the home
-/// configuration must be closed.
-void lock_spins(Mechanism& m);
-
 /// Moves passive coordinates only, tip and actuators held, to close the loops again (Gauss-Newton of
 /// least norm); returns the remaining error.
 double close_passive(const Mechanism& m, const Pose& tip, ClosureWorkspace& ws, VecX& x);

@@ -53,6 +53,13 @@ struct Ball {
   double spread(double second) const { return std::abs(std::cos(second - middle)); }
 };
 
+/// A free ball joint that has other axes than it was declared with: one is the line about which a body spins.
+struct SpunBall {
+  Index first = 0;  ///< coordinate
+  Mat3 turn;        ///< constant rotation before the joint: its own at home, where the coordinates are zero
+  Mat3 axes;        ///< columns
+};
+
 inline constexpr double near_lock = 0.02;  ///< spread below which a pose carries a flag
 inline constexpr double locked = 1e-5;     ///< spread below which a direction of rotation is lost
 
@@ -122,6 +129,7 @@ class Mechanism {
   std::vector<Coordinate> coordinates;
   std::vector<SpringGroup> groups;
   std::vector<Ball> balls;
+  std::vector<SpunBall> spun_balls;
   std::vector<Law> laws;
   std::vector<Drive> drives;
   std::vector<Loop> loops;
@@ -134,6 +142,7 @@ class Mechanism {
   Task task = full_task;                 ///< commanded pose components
   Pose home;                             ///< tip pose of the home configuration
   VecX home_coordinates;                 ///< as declared; once assembled: closed at home
+  VecX beside_home;                      ///< closed, where hinges that lock at home do not; empty: none do
   VecX rest;                             ///< where laws about a fixed coordinate are free of force
   double length = 1;                     ///< characteristic length: turns angles into lengths in every norm
   double stiffness = 1;                  ///< characteristic stiffness, N/m: turns forces into lengths

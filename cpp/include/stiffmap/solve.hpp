@@ -2,6 +2,7 @@
 // One pose from command to answer: closure, equilibrium, stiffness, and what kind of pose it is.
 #pragma once
 
+#include "stiffmap/free_spins.hpp"
 #include "stiffmap/home.hpp"
 #include "stiffmap/spins.hpp"
 

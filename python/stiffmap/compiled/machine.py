@@ -44,6 +44,18 @@ class CompiledMachine:
         return home_gaps(self.description)
 
     @cached_property
+    def spun_balls(self) -> dict[str, tuple[Floats, Floats]]:
+        """Ball joints beside a rod that spins, with axes of their own (docs/theory.md C8): (3, 3) rotation at home, (3, 3)
+        axes (rows) in the frame behind it, where the coordinates are zero. Counted from the axes of `charted`."""
+        return {
+            self.names.coordinates[first].rpartition(".")[0]: (
+                np.array(turn).reshape(3, 3),
+                np.array(axes).reshape(3, 3).T,
+            )
+            for first, turn, axes in self._mechanism.spun_balls
+        }
+
+    @cached_property
     def _plan(self) -> _core.FastPlan:
         box = self.description.workspace
         low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))

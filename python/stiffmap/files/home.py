@@ -35,9 +35,10 @@ def home_changes(machine: CompiledMachine) -> list[HomeChange]:
     """Joint coordinates that the closed home configuration changes by more than round-off."""
     closed = dict(zip(machine.names.coordinates, machine.home_coordinates().tolist(), strict=True))
     changes = []
-    for name, e in all_elements(machine.description):
-        if not isinstance(e, Joint) or charted(e)[1] is not None:  # a free ball joint in axes of our own
-            continue
+    for full_name, e in all_elements(machine.description):
+        name = full_name.removeprefix("base.").removeprefix("platform.")  # as the core has it
+        if not isinstance(e, Joint) or charted(e)[1] is not None or name in machine.spun_balls:
+            continue  # a free ball joint in axes of our own
         for i, declared in enumerate(e.home):
             full = name if len(e.home) == 1 else f"{name}.{i + 1}"
             if abs(closed[full] - declared) > CHANGED:

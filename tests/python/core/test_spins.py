@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
-from stiffmap.description import Body, Joint, Law, Leg, MachineDescription, Offset, Pose
+from stiffmap.description import Body, Element, Joint, Law, Leg, MachineDescription, Offset, Point, Pose
 
 SPAN, MASS, OFF, G = 0.4, 2.0, 0.05, 9.81
 GRAVITY = (0.0, 0.0, -G)
@@ -82,10 +82,10 @@ def test_a_centred_rod_stays_indifferent() -> None:
     assert s.status == sm.Status.CONVERGED and s.flags & sm.Flag.FREE_SPIN
 
 
-def slanted(axes: np.ndarray, sprung: float = 0.0) -> sm.Machine:
-    """The rod of `machine(0.4)`, the coordinates of both its ball joints about other axes (rows): none of them is
+def slanted(axes: np.ndarray, sprung: float = 0.0, angle: float = 0.4) -> sm.Machine:
+    """The rod of `machine(angle)`, the coordinates of both its ball joints about other axes (rows): none of them is
     along the rod. `sprung`: N·m/rad about each axis of the lower ball."""
-    d = machine(0.4).description
+    d = machine(angle).description
 
     def change(e: object) -> object:
         if not isinstance(e, Joint):
@@ -109,6 +109,43 @@ def test_a_spin_is_found_about_a_line_that_is_no_axis(seed: int) -> None:
     np.testing.assert_allclose(s.compliance / scale, expected.compliance / scale, atol=1e-8)
     weightless = slanted(axes).solve((SPAN, 0, 0), force)
     assert weightless.status == sm.Status.CONVERGED and weightless.flags & sm.Flag.FREE_SPIN
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rod_turns_half_round_in_any_axes(seed: int) -> None:
+    """From the top, past what would be the locks of the declared axes; the spin is a coordinate of its own."""
+    axes = Rotation.random(random_state=seed).as_matrix()
+    force = [20.0, -30, 40, 0, 0, 0]
+    expected = machine(0.4).solve((SPAN, 0, 0), force, gravity=GRAVITY)
+    for angle in np.arange(-3, 3.1, 0.75):
+        m = slanted(axes, angle=angle)
+        s = m.solve((SPAN, 0, 0), force, gravity=GRAVITY)
+        assert s.status == sm.Status.CONVERGED and not s.flags & sm.Flag.GIMBAL_LOCK
+        np.testing.assert_allclose(s.displacement, expected.displacement, atol=1e-12)
+        assert len(m.free_spins) == 1
+        names = [n for n in s.coordinate_names if n.startswith(("swing.low", "swing.high"))]
+        moved = {n: abs(x) for n, x in zip(s.coordinate_names, s.coordinates, strict=True) if n in names}
+        turned = {n for n, x in moved.items() if x > 1e-2}
+        assert turned <= {"swing.low.3", "swing.high.1"}
+
+
+def test_a_force_on_the_rod_turns_it() -> None:
+    """No weight: the point to which a force is tied comes to lie behind it, seen along the rod."""
+    d = slanted(Rotation.random(random_state=4).as_matrix()).description
+
+    def pulled(e: object) -> tuple[Element, ...]:
+        return (Point("hook", (SPAN / 2, 0.0, OFF)), e) if isinstance(e, Body) else (e,)  # type: ignore[return-value]
+
+    legs = tuple(
+        replace(leg, elements=tuple(new for e in leg.elements for new in pulled(e))) for leg in d.legs
+    )
+    m, pull = sm.Machine(replace(d, legs=legs)), np.array([5.0, -20.0, 12.0])
+    s = m.solve((SPAN, 0, 0), wrenches={"swing.hook": [*pull, 0, 0, 0]}, read_points=["swing.hook"])
+    assert s.status == sm.Status.CONVERGED and not s.flags & sm.Flag.FREE_SPIN
+    across = np.array([0, *pull[1:]]) / np.hypot(*pull[1:])
+    # from (0, 0, OFF) beside the rod to OFF along the force
+    moved = s.readings[1, :3] + (0, 0, OFF)
+    np.testing.assert_allclose(moved[1:], OFF * across[1:], atol=1e-4)
 
 
 def test_a_spring_about_the_rod_decides_how_far_it_turns() -> None:

@@ -181,6 +181,14 @@ def test_check_says_what_it_changed(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert changes["right.motor"].closed == pytest.approx(np.radians(53.13010235415598), abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    "path", [m.path for m in shipped_machines()], ids=[m.name for m in shipped_machines()]
+)
+def test_a_shipped_machine_closes_as_declared(path: str) -> None:
+    """Also where joints stand before or behind the legs."""
+    assert not check_file(path).changes
+
+
 def slide(home: float) -> str:
     """A drive with a compliance that grows along its stroke, and an elastic hinge; closes at home 100 mm, 30°."""
     text = "name: slide\n" + UNITS + "home: {translation: [600, 0, 0], turns: [{about: z, by: 30}]}\n"

@@ -93,7 +93,7 @@ def coordinates_at(d: MachineDescription, machine: sm.Machine, pose: Pose) -> Ma
             sm.inverse_kinematics(machine, pose.p, pose.r).coordinates,
         )
     )
-    there = placed(d, home, at, pose)
+    there = placed(d, home, at, pose, machine.compiled.spun_balls)
     n = len(Oracle(there, no_loads()).names)
     tip, walk = whole(as_drawn(there), np.zeros(n), no_loads())
     gaps = [np.abs(a.t - b.t).max() for a, b in walk.loops]

@@ -20,6 +20,7 @@ from stiffmap.description import (
     Leg,
     MachineDescription,
     Offset,
+    Point,
     Pose,
 )
 from stiffmap.description.tree import point_names
@@ -27,6 +28,7 @@ from stiffmap.description.tree import point_names
 from .energy import Loads
 from .parts import Parts, end_of
 
+PULLED = "pulled"  # a point of a rod that spins
 GRAVITY = np.array([0.0, 0.0, -9.81])
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -216,7 +218,7 @@ class Generator(Parts):
         return MachineDescription("strut", legs, base=(base,), home=home)
 
     def loads(self, description: MachineDescription) -> Loads:
-        """Force at the tip, forces at most points; in half of the cases gravity, in a third a semitangential
+        """Force at the tip, forces at most points (of rods that spin as well); in half of the cases gravity, in a third a semitangential
         moment (which the fast path leaves to the reference path). On a strut: a thrust about the buckling load,
         half of them exactly along it."""
         if description.name == "strut":
@@ -227,10 +229,13 @@ class Generator(Parts):
         moment = moment if self.rng.random() < 1 / 3 else np.zeros(3)
         heavy = description.name in ("heavy starts", "spinning rods")
         gravity = GRAVITY if self.rng.random() < (0.9 if heavy else 0.5) else np.zeros(3)
-        named = [n for n in point_names(description) if self.rng.random() < 0.7]
+        names = point_names(description)
+        on_rods = [n for n in names if n.endswith(PULLED)]
+        named = [n for n in names if n not in on_rods and self.rng.random() < 0.7]
         far = [10.0, 100.0] if description.name == "random" else [5.0, 25.0]
         factor = float(self.rng.choice([1.0, 1.0, *far]))
         at = {n: factor * self.rng.normal(size=3) * 100 for n in named}
+        at |= {n: self.aside.normal(size=3) * 10 ** self.aside.uniform(0, 2) for n in on_rods}
         return Loads(factor * force, factor * moment, gravity, at)
 
     def pose(self, description: MachineDescription) -> Pose:
@@ -301,6 +306,8 @@ class Generator(Parts):
         out += [Joint("drive", "prismatic", (axis,), (0.2,), actuated=True, law=law), self._spring("rod")]
         if below == "spherical" or self.rng.random() < 0.5:
             out.append(Body("rod", float(self.rng.uniform(0.5, 4)), self._vector(0.1)))
+        if below == "spherical" and self.aside.random() < 0.3:
+            out.append(Point(PULLED, tuple(float(v) for v in self.aside.uniform(-0.1, 0.1, 3))))
         turn = np.array(end_of(out).r).T @ Rotation.random(random_state=self.rng).as_matrix()
         out.append(Offset("reach", end_of(out).inverse() @ Pose.of(head, np.array(end_of(out).r) @ turn)))
         out.append(self._joint("ball", "spherical"))

@@ -18,6 +18,9 @@ class Parts:
 
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
+        self.aside = np.random.default_rng(
+            (seed, 1)
+        )  # what was thought of later: the machines keep their seeds
 
     def _vector(self, size: float) -> tuple[float, float, float]:
         x, y, z = self.rng.uniform(-size, size, 3)

@@ -3,6 +3,7 @@ home, and free ball joints by the axes that number their rotations in a solution
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +13,14 @@ from stiffmap.description import Block, Branch, Element, Joint, MachineDescripti
 
 WIDE = 0.9  # volume of a ball joint's axes at home, below which other axes number its rotations
 Coordinates = dict[str, float]
+Charts = Mapping[str, tuple[np.ndarray, np.ndarray]]
 
 
-def placed(d: MachineDescription, home: Coordinates, at: Coordinates, pose: Pose) -> MachineDescription:
-    """`home` and `at`: coordinates by full name where the machine is closed."""
+def placed(
+    d: MachineDescription, home: Coordinates, at: Coordinates, pose: Pose, spun: Charts
+) -> MachineDescription:
+    """`home` and `at`: coordinates by full name where the machine is closed; `spun`: rotation at home and axes behind
+    it of balls that have others than declared (any do: they are free, and what closes is a ball joint that closes)."""
 
     def walk(elements: tuple[Element, ...], prefix: str) -> tuple[Element, ...]:
         out: list[Element] = []
@@ -24,7 +29,7 @@ def placed(d: MachineDescription, home: Coordinates, at: Coordinates, pose: Pose
                 branches = (Branch(b.name, walk(b.elements, f"{prefix}{b.name}.")) for b in e.branches)
                 out.append(replace(e, branches=tuple(branches)))
             elif isinstance(e, Joint):
-                out += joint(e, prefix + e.name, home, at)
+                out += joint(e, prefix + e.name, home, at, spun)
             else:
                 out.append(e)
         return tuple(out)
@@ -49,9 +54,14 @@ def as_drawn(d: MachineDescription) -> MachineDescription:
     return replace(d, base=walk(d.base), legs=legs, platform=walk(d.platform))
 
 
-def joint(e: Joint, name: str, home: Coordinates, at: Coordinates) -> tuple[Element, ...]:
+def joint(e: Joint, name: str, home: Coordinates, at: Coordinates, spun: Charts) -> tuple[Element, ...]:
     names = [name] if len(e.axes) == 1 else [f"{name}.{i + 1}" for i in range(len(e.axes))]
     values = tuple(at[n] for n in names)
+    if name in spun:
+        turn, own = spun[name]
+        turn = turn if spread(e) >= WIDE else turns(e)[-1] @ turn
+        around = tuple((float(a[0]), float(a[1]), float(a[2])) for a in own)
+        return (Offset(f"{e.name}_home", Pose.of((0, 0, 0), turn)), replace(e, axes=around, home=values))
     if e.kind != "spherical" or not e.free or spread(e) >= WIDE:
         rest = e.rest or (None if e.actuated or e.free else tuple(home[n] for n in names))
         return (replace(e, home=values, rest=rest),)

@@ -48,6 +48,13 @@ def test_heavy_joints_before_the_first_spring(seed: int) -> None:
         assert not objection(c), c
 
 
+@pytest.mark.parametrize("seed", [1147, 401, 732, 1246, 372, 1522, 1668, 1001])
+def test_rods_that_spin_far(seed: int) -> None:
+    """Machines whose rods turn far under their weight, past locks of the axes that their balls are declared with."""
+    for c in compare(seed):
+        assert not objection(c), c
+
+
 def test_struts_buckle_where_the_energy_says_so() -> None:
     """Beyond exact bifurcations: unstable without a flag, or flagged, never CONVERGED and unflagged."""
     seen = [c for seed in range(20) for c in of_family("strut", seed)]

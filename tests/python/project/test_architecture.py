@@ -20,7 +20,7 @@ RANKS = (
     ("mechanism",),
     ("kinematics",),
     ("closure", "linearization"),
-    ("saddle", "home", "motion"),
+    ("saddle", "home", "free_spins", "motion"),
     ("stability",),
     ("equilibrium", "stiffness", "dynamics", "enclosure"),
     ("spins",),
