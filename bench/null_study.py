@@ -25,7 +25,7 @@ import numpy as np
 
 import stiffmap as sm
 from stiffmap.calibration import Calibrator, Tolerances, Unknown, unknowns
-from stiffmap.calibration.model import predicted, sensitivity
+from stiffmap.calibration.model import predicted, sensitivity, sensitivity_at
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 
@@ -136,6 +136,8 @@ def covered(
     elsewhere = Predictor(machine, plan_of(name, quantity, 2))
     known = found.sensitivity.unknowns
     s = sensitivity(elsewhere, names)
+    mine = dict(zip(known, found.fit.values, strict=True))
+    s = sensitivity_at(elsewhere, s, np.array([mine.get(u, 0.0) for u in s.unknowns]))
     at = {u: i for i, u in enumerate(s.unknowns)}
     columns = np.zeros((*s.base.shape, len(known)))
     for i, u in enumerate(known):

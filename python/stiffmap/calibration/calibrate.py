@@ -16,7 +16,15 @@ from stiffmap.calibration.edit import edited
 from stiffmap.calibration.facts import Beyond, HeldOut, Row
 from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.groups import Choice, compare
-from stiffmap.calibration.model import Fitted, Progress, Sensitivity, fitted, sensitivity
+from stiffmap.calibration.model import (
+    Fitted,
+    Progress,
+    Sensitivity,
+    bends,
+    fitted,
+    sensitivity,
+    sensitivity_at,
+)
 from stiffmap.calibration.result import Calibration
 from stiffmap.calibration.statistics import Sums, directions, independent
 from stiffmap.calibration.unknowns import GROUPS, Unknown, unknowns
@@ -131,6 +139,10 @@ class Calibrator:
         first = Calibrator._on(predictor, s, noise, nobody, until, seconds)
         out = first._alone()
         found = first if not out.any() else Calibrator._on(predictor, s, noise, out, until, seconds)
+        fit = found.fit
+        if time.monotonic() < until and bends(found.problem, s, fit.values, fit.prediction):
+            s = sensitivity_at(predictor, s, fit.values, until)
+            found = Calibrator._on(predictor, s, noise, out, until, seconds, fit.values)
         seconds["fit"] = time.perf_counter() - begun
         return found
 
@@ -142,6 +154,7 @@ class Calibrator:
         out: Mask,
         until: float,
         seconds: dict[str, float],
+        start: Floats | None = None,
     ) -> Calibrator:
         e = predictor.experiment
         problem = Problem.of(e, noise.sigma, s.base, ~out)
@@ -154,7 +167,7 @@ class Calibrator:
             rho = model_form(Blocks.of(felt, linear, label, q))
             return Blocks.of(a, linear, label, q).beside(rho).estimate, 1.0 + rho
 
-        fit = fitted(predictor, problem, s, columns, weigh, until=until)
+        fit = fitted(predictor, problem, s, columns, weigh, start=start, until=until)
         rho = model_form(Blocks.of(felt, fit.linear, label, q))
         return Calibrator(predictor, s, noise, problem, columns, fit, rho, out, seconds, until)
 

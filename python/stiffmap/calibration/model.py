@@ -6,7 +6,7 @@ import copy
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,6 +44,8 @@ class Sensitivity:
     """Whether a time budget ended the differences before all unknowns had their turn."""
 
 
+BENT = 0.05
+"""Share of a fit's whole change that a straight line misses, beyond which columns are taken anew at the fit."""
 MOST_KEPT = 4
 _KEPT: OrderedDict[tuple[str, tuple[Unknown, ...]], Sensitivity] = OrderedDict()
 
@@ -90,6 +92,34 @@ def sensitivity(
             _KEPT.popitem(last=False)
     _KEPT.move_to_end(key)
     return _KEPT[key]
+
+
+def bends(problem: Problem, s: Sensitivity, values: Floats, prediction: Floats) -> bool:
+    """Whether the columns at the fit differ so much from `s.columns` that standard deviations would be wrong.
+
+    Along the fit's own direction they differ by twice what the straight line misses.
+    """
+    straight = s.columns @ values
+    missed = problem.white(prediction - s.base - straight)
+    return 2.0 * float(np.linalg.norm(missed)) > BENT * float(np.linalg.norm(problem.white(straight)))
+
+
+def sensitivity_at(predictor: Predictor, s: Sensitivity, values: Floats, until: float = np.inf) -> Sensitivity:
+    """The same unknowns with columns at `values` (p,); those that fail there keep the old ones."""
+    columns = s.columns.copy()
+    base = predicted(predictor, s.unknowns, values)
+    for k in range(len(s.unknowns)):
+        if time.monotonic() > until:
+            break
+        moved = values.copy()
+        moved[k] += STEP
+        try:
+            column = (predicted(predictor, s.unknowns, moved) - base) / STEP
+        except StiffmapError:
+            continue
+        if np.isfinite(column[np.isfinite(base)]).all():
+            columns[..., k] = column
+    return replace(s, columns=columns)
 
 
 def _differences(
@@ -143,18 +173,21 @@ def fitted(
     columns: Floats,
     weigh: Callable[[Floats, Floats], tuple[Floats, float]],
     *,
+    start: Floats | None = None,
     until: float = np.inf,
 ) -> Fitted:
-    """Gauss-Newton with the Jacobian at the declared machine, which small errors hardly change.
+    """Gauss-Newton with one Jacobian, which small errors hardly change.
 
     columns
         (N, p) whitened `s.columns`.
+    start
+        (p,) values to begin with; default: the declared ones.
     weigh
         (columns, linear residual) -> the posterior mean under the priors, and the variance of one
         reading's misfit in noise variances.
     """
-    values = np.zeros(columns.shape[1])
-    prediction = s.base
+    values = np.zeros(columns.shape[1]) if start is None else start
+    prediction = s.base if start is None else predicted(predictor, s.unknowns, start)
     residual = problem.residual(prediction)
     converged = not columns.shape[1]
     for _ in range(STEPS if columns.shape[1] else 0):

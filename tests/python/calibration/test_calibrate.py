@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.calibration import Unknown, calibrate, unknowns
+from stiffmap.calibration import Calibrator, Unknown, calibrate, unknowns
 from stiffmap.calibration.edit import edited
-from stiffmap.calibration.model import predicted
+from stiffmap.calibration.model import bends, predicted, sensitivity, sensitivity_at
 from stiffmap.cli.app import main
 from stiffmap.experiment import Experiment, Predictor, random_plan, save_experiment
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.whitening import Problem
 
 MACHINES = ("linear-delta", "ur10", "orthoglide-revised")
 
@@ -138,3 +140,44 @@ def test_at_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"calibration.json", "table.txt", "machine.yaml"}
     assert main(["calibrate", "linear-delta", str(tmp_path / "twin"), "--exclude", "wings"]) == 2
     assert "unknown group 'wings'" in capsys.readouterr().err
+
+
+def test_columns_are_those_of_the_machine_that_is_found() -> None:
+    """A drive twice as soft: its deflection, and what the readings say of it, are twice as large."""
+    machine = sm.load_machine("orthoglide-revised")
+    plan = random_plan(machine, "deflection", poses=8, loads=6, seed=1)
+    predictor = Predictor(machine, plan)
+    wanted = [u for u in unknowns(machine.description, plan) if u.name == "compliance of x.foot"]
+    s = sensitivity(predictor, wanted)
+    values = np.array([np.log(2.0) / wanted[0].u])
+    moved = sensitivity_at(predictor, s, values)
+    problem = Problem.of(plan, plan.sigma, s.base)
+    size = [float(np.linalg.norm(problem.white(c.columns))) for c in (s, moved)]
+    assert size[1] / size[0] == pytest.approx(2.0, rel=0.05)
+    assert bends(problem, s, values, predicted(predictor, s.unknowns, values))
+    assert not bends(problem, s, values * 0.01, predicted(predictor, s.unknowns, values * 0.01))
+
+
+def test_a_calibration_of_compliances_ends_at_their_most_likely_values() -> None:
+    """At the end the gradient of misfit and priors is zero, by differences that share nothing with the fit's columns."""
+    machine = sm.load_machine("orthoglide-revised")
+    plan = random_plan(machine, "deflection", poses=10, loads=6, seed=1)
+    predictor = Predictor(machine, plan)
+    wanted = [u for u in unknowns(machine.description, plan) if u.group == "drive compliance"]
+    exact = predicted(predictor, wanted, np.array([2.0, -1.5, 1.0]))
+    twin = plan.with_readings(exact + np.random.default_rng(2).standard_normal(exact.shape) * plan.sigma)
+    found = Calibrator.of(Predictor(machine, twin), wanted)
+
+    def cost(t: Floats) -> float:
+        r = found.problem.residual(predicted(predictor, found.sensitivity.unknowns, t))
+        return 0.5 * float(r @ r + t @ t)
+
+    at = found.fit.values
+    spread = np.sqrt(np.diag(found.sums.covariance))
+    for i in range(len(at)):
+        step = np.eye(len(at))[i] * 0.3 * spread[i]
+        slope = (cost(at + step) - cost(at - step)) / 0.6
+        bend = (cost(at + step) - 2 * cost(at) + cost(at - step)) / 0.09
+        assert abs(slope) < 0.05
+        assert bend > 0
+    assert np.all(np.abs(at - [2.0, -1.5, 1.0]) < 4 * spread)
