@@ -24,8 +24,8 @@ LIKE = 0.1
 FAR = 3.0
 """Standard uncertainties that a number must be off to be called beyond tolerance."""
 MOST = 4
-WIDEST = float(np.log(100.0))
-"""Of a factor's logarithm; beyond it something else is wrong."""
+WIDEST, LEAST = 100.0, 0.01
+"""A compliance's or mass's factor goes no further; beyond it something else is wrong."""
 SHARE = 0.7
 """Of the folds that must gain."""
 
@@ -37,13 +37,21 @@ class BeyondTolerance:
     found: tuple[Beyond, ...]
     which: tuple[int, ...]
     factor: Floats
+    logarithm: Floats
+    """(p,) what a value of a factor, on which readings depend linearly, is more than its logarithm."""
 
 
-def beyond_tolerance(sums: Sums, unknowns: Sequence[Unknown], folds: Sequence[Sums] = ()) -> BeyondTolerance:
+def beyond_tolerance(
+    sums: Sums, unknowns: Sequence[Unknown], folds: Sequence[Sums] = (), at: Floats | None = None
+) -> BeyondTolerance:
     """Forward search; the instrument's scale is its certificate's and never let go, and a mass or compliance
-    goes no further than `WIDEST`. Most of the `folds` must gain by themselves: a model's error that
-    poses share is no noise, and sums over all of them overstate what they say.
+    stays between `LEAST` and `WIDEST` times what is declared. Most of the `folds` must gain by themselves: a
+    model's error that poses share is no noise, and sums over all of them overstate what they say.
+
+    at
+        (p,) where the columns of `sums` hold, in standard uncertainties; default: the declared numbers.
     """
+    near = np.zeros(len(unknowns)) if at is None else at
     factor = np.ones(len(unknowns))
     found: list[Beyond] = []
     which: list[int] = []
@@ -59,19 +67,33 @@ def beyond_tolerance(sums: Sums, unknowns: Sequence[Unknown], folds: Sequence[Su
         freed = sums.scaled(trial)
         value = float(freed.estimate[best] * FREE)
         p = unknowns[best]
-        if (
-            abs(value) < FAR
-            or (p.unit == "ln" and abs(value) * p.u > WIDEST)
-            or not _holds(folds, factor, best)
-        ):
+        times = as_factor(p, value, near[best]) if p.unit == "ln" else 1.0
+        if abs(value) < FAR or not LEAST < times < WIDEST or not _holds(folds, factor, best):
             break
         factor = trial
         which.append(best)
         spread = float(np.sqrt(freed.covariance[best, best])) * FREE
         enough = gains[best] - max(STRONG, LIKE * gains[best])
         rivals = tuple(unknowns[i].name for i in np.argsort(-gains) if i != best and gains[i] > enough)
-        found.append(Beyond(p.name, value * p.u, spread * p.u, p.unit, float(gains[best]), rivals))
-    return BeyondTolerance(tuple(found), tuple(which), factor)
+        size, wide = value * p.u, spread * p.u
+        if p.unit == "ln":
+            size, wide = float(np.log(times)), wide * float(np.exp(near[best] * p.u)) / times
+        found.append(Beyond(p.name, size, wide, p.unit, float(gains[best]), rivals))
+    estimate = sums.scaled(factor).estimate * factor if which else np.zeros(len(unknowns))
+    more = np.zeros(len(unknowns))
+    for i in (k for k in which if unknowns[k].unit == "ln"):
+        times = max(as_factor(unknowns[i], float(estimate[i]), near[i]), LEAST)
+        more[i] = float(np.log(times)) / unknowns[i].u - float(estimate[i])
+    return BeyondTolerance(tuple(found), tuple(which), factor, more)
+
+
+def as_factor(p: Unknown, value: float, at: float = 0.0) -> float:
+    """Factor of a compliance or mass at `value`, found with the slope that its logarithm has `at` a place.
+
+    Readings are linear in the factor itself: beyond small changes its logarithm is not what the slope says, and
+    below zero there is none.
+    """
+    return float(np.exp(at * p.u) * (1.0 + (value - at) * p.u))
 
 
 def _holds(folds: Sequence[Sums], factor: Floats, i: int) -> bool:

@@ -209,13 +209,14 @@ class Calibrator:
         start = time.perf_counter()
         sums, members = self.sums, self.members()
         names = self.sensitivity.unknowns
-        found = beyond_tolerance(sums, names, self._folds(seed))
+        found = beyond_tolerance(sums, names, self._folds(seed), self.sensitivity.at)
         freed = sums.scaled(found.factor)
         choice = compare(freed, members, [b for b in BASE if b in members])
         fit, rho = self.fit, self.rho
         values = fit.values if not found.which else freed.estimate * found.factor
         moves: dict[tuple[str, str], float] = {}
-        for p, v in zip(names, values, strict=True):
+        built = values + found.logarithm
+        for p, v in zip(names, built, strict=True):
             for place, weight in p.moves:
                 moves[place] = moves.get(place, 0.0) + weight * p.u * float(v)
         e = self.predictor.experiment
@@ -229,7 +230,7 @@ class Calibrator:
         seconds = {**self.seconds, "evidence": time.perf_counter() - start}
         return Calibration(
             verdict=_verdict(as_declared, found.found),
-            rows=_rows(names, freed, found.factor, values),
+            rows=_rows(names, freed, found.factor, built),
             beyond=found.found,
             groups=choice,
             rank=sums.rank,
@@ -248,7 +249,7 @@ class Calibrator:
             experiment=e,
             residual=after,
             unknowns=names,
-            values=values,
+            values=built,
             seconds=seconds,
         )
 
@@ -295,11 +296,11 @@ class Calibrator:
 
 
 def pose_labels(problem: Problem) -> Integers:
-    """(N,) number of the pose, set-up and channel of each reading."""
+    """(N,) number of the cluster (of one pose), set-up and channel of each reading."""
     e = problem.experiment
     setup = np.unique(e.setup or ("",) * len(e), return_inverse=True)[1].reshape(-1)
     row, axis = problem.index
-    return np.asarray((e.groups[row] * (int(setup.max()) + 1) + setup[row]) * len(e.channels) + axis)
+    return np.asarray((e.clusters[row] * (int(setup.max()) + 1) + setup[row]) * len(e.channels) + axis)
 
 
 def _unit(e: Experiment, noise: Noise) -> tuple[str, Size, float]:

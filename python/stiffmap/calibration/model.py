@@ -42,6 +42,8 @@ class Sensitivity:
     """Unknowns that the machine cannot be built or solved with, and why."""
     stopped: bool = False
     """Whether a time budget ended the differences before all unknowns had their turn."""
+    at: Floats | None = None
+    """(p,) where the columns hold, in standard uncertainties; None: at the declared numbers."""
 
 
 BENT = 0.05
@@ -104,7 +106,9 @@ def bends(problem: Problem, s: Sensitivity, values: Floats, prediction: Floats) 
     return 2.0 * float(np.linalg.norm(missed)) > BENT * float(np.linalg.norm(problem.white(straight)))
 
 
-def sensitivity_at(predictor: Predictor, s: Sensitivity, values: Floats, until: float = np.inf) -> Sensitivity:
+def sensitivity_at(
+    predictor: Predictor, s: Sensitivity, values: Floats, until: float = np.inf
+) -> Sensitivity:
     """The same unknowns with columns at `values` (p,); those that fail there keep the old ones."""
     columns = s.columns.copy()
     base = predicted(predictor, s.unknowns, values)
@@ -119,7 +123,7 @@ def sensitivity_at(predictor: Predictor, s: Sensitivity, values: Floats, until: 
             continue
         if np.isfinite(column[np.isfinite(base)]).all():
             columns[..., k] = column
-    return replace(s, columns=columns)
+    return replace(s, columns=columns, at=values)
 
 
 def _differences(

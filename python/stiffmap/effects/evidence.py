@@ -45,6 +45,10 @@ class Plan(Protocol):
         """(n,)."""
 
     @property
+    def load_direction(self) -> NDArray[np.intp] | None:
+        """(n,) which way the load of each row was reached; None where loads do not run."""
+
+    @property
     def hours(self) -> Floats | None:
         """(n,) h."""
 

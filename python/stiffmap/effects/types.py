@@ -81,6 +81,8 @@ class EffectType:
         Parameters with the units and bounds of one place (a revolute drive counts in rad).
     tried
         Places that a diagnosis tries as an explanation; None: all of them.
+    moved
+        Parameters that a diagnosis fits, the others at their defaults; empty: all that are `fitted`.
     derived
         Further numbers that a report shows, computed from the parameters.
     """
@@ -113,6 +115,7 @@ class EffectType:
     at: ParametersAt | None = None
     derived: Derived | None = None
     tried: Places | None = None
+    moved: tuple[str, ...] = ()
 
     @property
     def measurement(self) -> bool:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.notebook import experiment_html
+from stiffmap.experiment.ramps import directions
 
 __all__ = ["AXES", "BRANCHES", "WRENCH", "Channel", "Experiment", "Floats", "Integers", "Loop"]
 
@@ -20,6 +21,7 @@ Integers = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 BRANCHES = ("", "loading", "unloading")
+CLUSTERS = 20
 PER_ROW = (
     *("ids", "position", "wrench", "reading", "sigma", "rotation", "other", "other_rotation", "command"),
     *("approach", "repeat", "order", "hours", "temperature", "branch", "setup", "points", "load_points"),
@@ -184,6 +186,20 @@ class Experiment:
         """(n,) number of the commanded pose (or pair of poses) of each row."""
         return _numbers([self.command if self.command is not None else self.position, *self._turned])
 
+    @cached_property
+    def clusters(self) -> Integers:
+        """(n,) rows that share what a model gets wrong: of one pose; on a ramp of loads those of one pose, set-up
+        and direction within a twentieth of the range."""
+        ways = self.load_direction
+        if ways is None:
+            return self.groups
+        run = np.unique(self.setup or ("",) * len(self), return_inverse=True)[1].reshape(-1)
+        range_ = np.ptp(self.wrench, axis=0)
+        bins = np.floor(
+            CLUSTERS * (self.wrench - self.wrench.min(axis=0)) / np.where(range_ > 0, range_, 1.0)
+        )
+        return _numbers([self.groups, run, ways, np.minimum(bins, CLUSTERS - 1)])
+
     @property
     def _turned(self) -> list[Any]:
         return [self.rotation, self.other, self.other_rotation]
@@ -193,7 +209,17 @@ class Experiment:
         """(n,) number of the condition (pose, load, how it was reached): repeats share it."""
         words = [self.branch, self.setup, self.points, self.load_points]
         labels = [np.unique(w, return_inverse=True)[1].reshape(-1) for w in words if w]
-        return _numbers([self.groups, self.wrench, self.temperature, self.approach, *labels])
+        ways = self.load_direction
+        return _numbers([self.groups, self.wrench, self.temperature, self.approach, *labels, ways])
+
+    @cached_property
+    def load_direction(self) -> Integers | None:
+        """(n,) +1 going up, -1 going down, where loads run in order of time; None where they jump or no order is
+        recorded."""
+        if self.order is None or len(self) == 0:
+            return None
+        run = np.unique(self.setup or ("",) * len(self), return_inverse=True)[1].reshape(-1)
+        return directions(self.wrench, self.order, run)
 
     def rows(self, keep: NDArray[np.bool_] | Integers) -> Experiment:
         """The experiment with some of its rows: (n,) of which to keep, or (k,) their numbers."""

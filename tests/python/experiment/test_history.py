@@ -12,6 +12,7 @@ import stiffmap as sm
 from stiffmap.cli.inputs import placed
 from stiffmap.effects.library.hysteresis import deflection, spring_force
 from stiffmap.experiment import Predictor, load_experiment
+from stiffmap.experiment.ramps import directions
 from stiffmap.planning import estimate
 
 ONE_JOINT = """
@@ -147,3 +148,67 @@ def test_gravity_and_loads_of_every_row_reach_the_drives(tmp_path: Path) -> None
     lag = 2.5e-5 * 5.0 * (ahead - behind) / 2e-6
     np.testing.assert_allclose(np.abs(more[:, :3]), np.abs([lag, lag]), rtol=1e-3, atol=1e-9)
     np.testing.assert_allclose(more[0, :3], -more[1, :3], atol=1e-9)
+
+
+def measured_ramps(
+    folder: Path, twist: np.ndarray, torque: np.ndarray, noise: float, starts: int = 3
+) -> Path:
+    """A folder of ramps as a user writes it; `twist` (n,) in degrees, each ramp a set-up of its own."""
+    folder.mkdir()
+    (folder / "gear.yaml").write_text(ONE_JOINT)
+    (folder / "experiment.yaml").write_text(
+        "machine: gear.yaml\nquantity: position\nunits: {length: mm, force: N, angle: deg}\n"
+        f"noise: {{rz: {noise}}}\nframe: offset_unknown\ncommand: {{q: {{actuator: box.gear, unit: deg}}}}\n"
+    )
+    each = np.array_split(np.arange(len(torque)), starts)
+    rows = [f"r{k},{i},0,{1e3 * torque[i]:.6f},{twist[i]:.9f}" for k, part in enumerate(each) for i in part]
+    (folder / "data.csv").write_text("\n".join(["setup,order,q,mz,rz", *rows]))
+    return folder
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [
+        PLAIN | {"level": 4.0, "half_width": 0.02, "seat": 1.0},
+        PLAIN | {"level": 5.0},
+        PLAIN,
+    ],
+)
+def test_a_diagnosis_finds_what_a_gear_remembers(tmp_path: Path, truth: dict[str, float]) -> None:
+    """Ramps of a gear whose twist was computed here, with noise of 0.02 degrees."""
+    one = ramps(40.0, 20)
+    rng = np.random.default_rng(4)
+    twist = np.concatenate([deflection(one, 1e-3, truth) for _ in range(3)])
+    twist = np.degrees(twist) + 0.02 * rng.standard_normal(len(twist))
+    folder = measured_ramps(tmp_path / "ramps", twist, np.tile(one, 3), 0.02)
+    d = sm.diagnose(str(folder / "gear.yaml"), folder)
+    assert [e.kind for e in d.effects] == (["hysteresis"] if truth["level"] else [])
+    assert "nan" not in str(d)
+    if truth["level"]:
+        low, high = d.effects[0].parameters["level"][1:3]
+        assert low < truth["level"] < high
+        assert d.after.size[0] < 1.3 * np.radians(0.02)
+        assert d.after.size[1] == "rad"
+
+
+def test_which_way_a_load_was_reached() -> None:
+    """On a ramp with noise each row knows its direction; loads that jump have none."""
+    load = np.concatenate([np.arange(0, 40), np.arange(40, -40, -1), np.arange(-40, 0)]).astype(float)
+    wrench = np.zeros((len(load), 6))
+    wrench[:, 5] = load + 0.3 * np.sin(7.0 * np.arange(len(load)))
+    one = np.zeros(len(load), dtype=np.intp)
+    way = directions(wrench, np.arange(len(load)), one)
+    assert way is not None
+    wanted = np.sign(np.gradient(load))
+    assert np.mean(way == wanted) > 0.95
+    mixed = np.random.default_rng(0).permutation(len(load))
+    assert directions(wrench[mixed], np.arange(len(load)), one) is None
+    assert directions(np.zeros((5, 6)), np.arange(5), one[:5]) is None
+
+
+def test_one_element_and_many_alike() -> None:
+    force = np.cumsum(np.random.default_rng(0).standard_normal(500))
+    for breakaway in (1.0, 1.6):
+        np.testing.assert_array_equal(
+            spring_force(force, 2.0, breakaway), spring_force(force, np.array([2.0, 2.0]), breakaway)[:, 1]
+        )

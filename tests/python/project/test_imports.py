@@ -33,7 +33,7 @@ RANKS = (
 INNER = {
     "diagnosis": ("clock", "candidates", "fitting", "search", ("rivals", "decision"), "report", "verdict"),
     "experiment": (
-        ("experiment", "channels", "notebook", "setups"),
+        ("experiment", "channels", "notebook", "ramps", "setups"),
         "readings",
         "poses",
         "noise",

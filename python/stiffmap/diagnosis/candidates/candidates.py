@@ -68,7 +68,9 @@ def of_kind(effect: EffectType, description: MachineDescription) -> list[Candida
     out = []
     for element, legs in (effect.tried or effect.places)(description):
         parameters = tuple(
-            p for p in effect.parameters_at(description, element, legs) if p.fitted or _unknown(p)
+            p
+            for p in effect.parameters_at(description, element, legs)
+            if (p.name in effect.moved if effect.moved else p.fitted or _unknown(p))
         )
         parameters = tuple(p for p in parameters if not _later_alternative(effect, p, parameters))
         parameters = tuple(map(_plausible, parameters))

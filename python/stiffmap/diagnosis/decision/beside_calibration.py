@@ -27,13 +27,14 @@ from stiffmap.diagnosis.search.calibrated import Layer
 from stiffmap.diagnosis.search.screen import Screen
 from stiffmap.diagnosis.search.selection import MOST_EFFECTS
 from stiffmap.diagnosis.search.study import Finding, Study, find, search_on, study
-from stiffmap.effects import get
+from stiffmap.effects import Parameter, get
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 
 BEYOND = 100.0
 """Standard uncertainties of its certificate that an instrument is never taken to be off by."""
-AT_BOUND = 1e-6
+AT_BOUND, AT_SCALE = 1e-6, 1e-3
+"""Share of a parameter's range, and of its typical size, within which it is at its bound."""
 COVERED, FAINT = 0.95, 0.1
 """Share of an effect's signature that uncertain numbers imitate; those that ten standard uncertainties of show at all."""
 WORTH_A_FLOOR = 0.3
@@ -42,6 +43,10 @@ MEETING = 10.0
 """Nats that each fault beyond the first costs."""
 SURE = 30.0
 """Nats by which uncertain numbers must lead before single effects on an exact machine are not fitted at all."""
+HOPELESS = 25.0
+"""Chi-square per reading that the best few linear explanations leave: no few effects on an exact machine do then."""
+FELL = 0.7
+"""Share of the floor to which effects must bring it before the search is done again at the lower one."""
 SCALES = (1.0, 0.3, 0.1, 0.03, 0.01)
 
 
@@ -65,7 +70,7 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
     positions = s.experiment.quantity == "position"
     if positions:
         found = calibrator(s, tolerances, exclude)
-        if found is not None and leads_by_far(s, found):
+        if found is not None and (leads_by_far(s, found) or hopeless(s)):
             return _layered(s, found, seed, tolerances)
     finding, verdict, left = judge(s, find(s))
     first = Answer(s, finding, verdict, left)
@@ -121,6 +126,13 @@ def leads_by_far(s: Study, found: Calibrator) -> bool:
     left, number = screened(screen, problem.residual(s.plan.base))
     few = -0.5 * (float(left @ left) + number * float(np.log(max(len(left), 2))))
     return spread_evidence(problem, found) > few + SURE
+
+
+def hopeless(s: Study) -> bool:
+    """Whether the best few effects, taken as linear, leave so much that no few effects are the whole story."""
+    problem, screen = s.whole
+    left, number = screened(screen, problem.residual(s.plan.base))
+    return float(left @ left) > HOPELESS * max(problem.freedom - number, 1)
 
 
 def screened(screen: Screen, residual: Floats) -> tuple[Floats, int]:
@@ -188,6 +200,11 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
     raised = Layer.of(found, s.layer.calibration, rho)
     again = study(s.predictor, seed, raised, s.clock, s.without)
     finding = find(again)
+    lower = floor_of(s, finding) if finding.model.candidates else rho
+    if lower < FELL * rho and not s.clock.over:  # the first floor held what the effects explain
+        raised = Layer.of(found, s.layer.calibration, lower)
+        again = study(s.predictor, seed, raised, s.clock, s.without)
+        finding = find(again)
     held = held_out(again, finding.outliers, seed, finding)
     model, refused = admissible(finding.model, finding, tolerances)
     model, same = _beyond_calibration(s, model, finding)
@@ -246,14 +263,15 @@ def _why_not(model: Model, i: int, tolerances: Tolerances) -> str:
     low, high = (b[part] for b in model.bounds())
     x = model.values[part]
     held = {k - part.start for k in model.held}
-    span = high - low
+    near = np.minimum(AT_BOUND * (high - low), AT_SCALE)
     at = [
         p.name
         for k, p in enumerate(candidate.parameters)
         if k not in held
+        and not _as_left_out(p, x[k] * p.scale)
         and (
-            (x[k] - low[k] < AT_BOUND * span[k] and p.lower != p.null)
-            or (high[k] - x[k] < AT_BOUND * span[k] and p.upper != p.null)
+            (x[k] - low[k] < near[k] and p.lower != p.null)
+            or (high[k] - x[k] < near[k] and p.upper != p.null)
         )
     ]
     if at:
@@ -269,6 +287,11 @@ def _why_not(model: Model, i: int, tolerances: Tolerances) -> str:
         if off > BEYOND * tolerances.instrument:
             return f"{off:.2g} is beyond the instrument's certificate ({tolerances.instrument:.2g}) a hundred times"
     return ""
+
+
+def _as_left_out(p: Parameter, value: float) -> bool:
+    """Whether a shape is within what it is when nobody gives it, as a gap that is crossed at once: no bound of a search."""
+    return p.null is None and p.default is not None and value <= p.default
 
 
 def _beyond_calibration(s: Study, model: Model, finding: Finding) -> tuple[Model, tuple[str, ...]]:

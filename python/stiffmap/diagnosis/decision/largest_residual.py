@@ -27,7 +27,9 @@ def located(pattern: Pattern, e: Experiment, residual: Floats, sigma: Floats) ->
     good = np.isfinite(residual[:, axis])
     y = residual[good, axis]
     at, size = worst_pose(e, good, y, sigma[good, axis])
-    return replace(pattern, detail=_words(pattern.what, e, good, y), position=at, size=size)
+    return replace(
+        pattern, detail=_words(pattern.what, e, good, y, f"µ{e.channels[axis].unit}"), position=at, size=size
+    )
 
 
 def worst_pose(
@@ -42,30 +44,30 @@ def worst_pose(
     return (x, y_, z), float(np.sqrt(np.mean(y[groups == worst] ** 2)))
 
 
-def _words(what: str, e: Experiment, good: Mask, y: Floats) -> str:
+def _words(what: str, e: Experiment, good: Mask, y: Floats, micro: str) -> str:
     if what.startswith("waves"):
         name = what.split()[-1]
         series = {"order": e.order, "temperature": e.temperature}.get(name)
         x = e.position[:, "xyz".index(name)] if name in "xyz" else series
         assert x is not None
-        return _wave(name, x[good], y)
+        return _wave(name, x[good], y, micro)
     if what == "linear trend over the workspace":
         slopes = np.linalg.lstsq(np.column_stack([np.ones(len(y)), unit(e.position[good])]), y, rcond=None)[
             0
         ][1:]
-        return ", ".join(f"{2e6 * s:+.1f} µm across {a}" for s, a in zip(slopes, "xyz", strict=True))
+        return ", ".join(f"{2e6 * s:+.1f} {micro} across {a}" for s, a in zip(slopes, "xyz", strict=True))
     return ""
 
 
-def _wave(name: str, x: Floats, y: Floats) -> str:
+def _wave(name: str, x: Floats, y: Floats, micro: str) -> str:
     factor, label = (1e3, "mm") if name in "xyz" else (1.0, "K" if name == "temperature" else "readings")
     total = float(np.sum((y - y.mean()) ** 2))
     tries = [_single(x, y, k) for k in np.arange(1.0, 12.01, 0.25)]
     left, period, amplitude = min(tries)
     share, edge, height = _step(x, y)
     if share > STEP_SHARE * (total - left):
-        return f"a step of {1e6 * height:+.1f} µm at {name} = {factor * edge:.4g} {label}"
-    return f"mostly a period of {factor * period:.3g} {label}, amplitude {1e6 * amplitude:.1f} µm"
+        return f"a step of {1e6 * height:+.1f} {micro} at {name} = {factor * edge:.4g} {label}"
+    return f"mostly a period of {factor * period:.3g} {label}, amplitude {1e6 * amplitude:.1f} {micro}"
 
 
 def _single(x: Floats, y: Floats, halves: float) -> tuple[float, float, float]:

@@ -86,8 +86,8 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
         left=[(p.axis, p.what, p.detail, _at(p), f"{p.p:.2g}") for p in d.unexplained[:12]],
         empirical=d.unexplained
         and d.empirical
-        and f"would bring held-out readings from {1e6 * d.empirical.before:.2f} µm to "
-        f"{1e6 * d.empirical.after:.2f} µm rms.",
+        and f"would bring held-out readings from {1e6 * d.empirical.before:.2f} µ{d.before.size[1]} to "
+        f"{1e6 * d.empirical.after:.2f} µ{d.before.size[1]} rms.",
         seen=_seen(d),
         shown=SHOWN,
         unseen=d.unobservable,

@@ -6,7 +6,7 @@ from math import floor, log10
 from typing import Any
 
 from stiffmap.diagnosis.report.findings import Effect
-from stiffmap.diagnosis.report.wording import separation_text
+from stiffmap.diagnosis.report.wording import noise_size, separation_text
 from stiffmap.effects import registry
 
 UNITS = {
@@ -68,7 +68,8 @@ def _softer(e: Effect) -> str:
 
 def opening(d: Any) -> str:
     """The verdict as one says it."""
-    size = f"{1e6 * d.before.rms:.1f} µm rms, noise {1e6 * d.noise.rms:.1f} µm"
+    before, unit = d.before.size
+    size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * noise_size(d):.1f} µ{unit}"
     told = "; ".join(sentence(e) for e in d.effects)
     if d.verdict == "none":
         return f"The machine agrees with its file within what these readings can show ({size})."

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.report.findings import Effect, Findings
 from stiffmap.diagnosis.rivals.separation import Separation
@@ -21,12 +23,31 @@ def five_lines(d: Findings) -> list[str]:
     return [
         f"verdict: {d.verdict} - {VERDICTS[d.verdict]}",
         "effects: " + ("; ".join(effect_text(e) for e in d.effects) or "none") + _others(d),
-        f"held-out readings: rms {1e3 * d.before.rms:.4f} mm before, {1e3 * d.after.rms:.4f} mm after "
-        f"(noise floor {1e3 * d.noise.rms:.4f} mm, ratio {d.after.ratio:.3f}, n = {d.after.n})",
+        f"held-out readings: rms {_thousandth(*d.before.size)} before, {_thousandth(*d.after.size)} after "
+        f"(noise floor {_thousandth(noise_size(d), d.before.size[1])}, ratio {_ratio(d):.3f}, n = {d.after.n})",
         _left(d),
         _limits(d),
         *_more(d),
     ]
+
+
+def noise_size(d: Findings) -> float:
+    """Noise floor in the unit of the readings' sizes, m or rad; what no model explains is not in it."""
+    if d.calibration is not None:
+        return d.calibration.noise
+    floors = np.array(list(d.noise.floor.values()))
+    return d.noise.rms if d.before.size[1] == "m" else float(np.sqrt(np.mean(floors**2)))
+
+
+def _ratio(d: Findings) -> float:
+    if d.calibration is not None:
+        return d.after.size[0] / noise_size(d)
+    return d.after.ratio
+
+
+def _thousandth(value: float, unit: str) -> str:
+    """``0.0123 mm`` or ``0.0123 mrad``."""
+    return f"{1e3 * value:.4f} m{unit}"
 
 
 def _more(d: Findings) -> list[str]:
@@ -37,7 +58,8 @@ def _more(d: Findings) -> list[str]:
         gain = ""
         if h is not None and h.gain is not None and d.effects:
             gain = f"; held-out gain {h.gain[0]:.3g} ± {h.gain[1]:.2g} noise variances per reading"
-        all_ = 1.0 - (d.after.rms / d.before.rms) ** 2 if d.before.rms > 0 else 0.0
+        before, after = d.before.size[0], d.after.size[0]
+        all_ = 1.0 - (after / before) ** 2 if before > 0 else 0.0
         out.append(
             f"explained: {100 * all_:.1f} % of the squares as declared, {100 * d.explained:.1f} % of the misfit "
             f"by effects{gain}"
@@ -97,7 +119,9 @@ def _left(d: Findings) -> str:
     if d.unexplained:
         p = d.unexplained[0]
         more = (
-            f"; an empirical correction would leave {1e3 * d.empirical.after:.4f} mm" if d.empirical else ""
+            f"; an empirical correction would leave {_thousandth(d.empirical.after, d.before.size[1])}"
+            if d.empirical
+            else ""
         )
         detail = f", {p.detail}" if p.detail else ""
         return f"unexplained: {p.what} in {p.axis} (p = {p.p:.1g}){detail}{_place(p)}{more}"

@@ -146,9 +146,9 @@ def worse_p(problem: Problem, chosen: Model, other: Model) -> float:
 
 
 def group_scores(problem: Problem, model: Model) -> Floats:
-    """(G,) log-score of each pose predicted without it; scores without the part that all models share."""
+    """(G,) log-score of each pose (on a ramp, each cluster) predicted without it; scores without the part that all models share."""
     assert model.residual is not None and model.jacobian is not None
-    groups = problem.groups
+    groups = problem.experiment.clusters[problem.index[0]]
     inverse = np.linalg.pinv(model.jacobian.T @ model.jacobian, rcond=1e-12, hermitian=True)
     out = []
     for g in np.unique(groups):

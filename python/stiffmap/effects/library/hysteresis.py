@@ -7,16 +7,15 @@ own are a Prandtl-Ishlinskii model, which obeys Masing's rule.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.description import MachineDescription
-from stiffmap.effects.evidence import Floats
+from stiffmap.effects.evidence import Floats, Plan, Probe, Signature, Tried
 from stiffmap.effects.library.drive_law import in_unit_of_joint
 from stiffmap.effects.sites import at_sites, elastic_drives
-from stiffmap.effects.types import EffectType, Parameter, Place
+from stiffmap.effects.types import EffectType, Parameter
 
 PARAMETERS = (
     Parameter("level", "N", 0.0, 1e6, 0.0, 1.0, "Coulomb level", default=0.0, angular="N·m"),
@@ -36,12 +35,17 @@ PARAMETERS = (
 
 ELEMENTS = 16
 """Elements that stand for a spread of levels."""
+SEATS = (0.003, 0.03, 0.1)
+"""Shares of the largest load within which play is crossed."""
 
 
 def spring_force(force: Floats, level: ArrayLike, breakaway: float = 1.0) -> Floats:
     """(n, ...) force s that the spring feels while the drive's `force` (n,) runs, from rest at s = 0, with
     elements of these levels (...)."""
     levels = np.asarray(level, dtype=float)
+    if levels.size == 1:
+        alone = _of_one(force.tolist(), float(levels.item()), breakaway)
+        return np.array(alone).reshape(len(force), *levels.shape)
     s, sliding = np.zeros(levels.shape), np.zeros(levels.shape)
     out = np.empty((len(force), *levels.shape))
     for i, f in enumerate(force):
@@ -55,6 +59,21 @@ def spring_force(force: Floats, level: ArrayLike, breakaway: float = 1.0) -> Flo
     return out
 
 
+def _of_one(force: list[float], level: float, breakaway: float) -> list[float]:
+    """`spring_force` of one element, on plain numbers."""
+    s, sliding, out = 0.0, 0.0, []
+    for f in force:
+        gap = f - s
+        ahead = sliding * gap
+        if abs(gap) > (level if ahead > 0 else level * breakaway):
+            sliding = 1.0 if gap > 0 else -1.0
+            s = f - sliding * level
+        elif ahead < level * (1 - 1e-12):
+            sliding = 0.0
+        out.append(s)
+    return out
+
+
 def deflection(force: Floats, compliance: float, values: Mapping[str, float]) -> Floats:
     """(n,) deflection of a drive while `force` (n,) runs, theory L5."""
     level, spread = values["level"], values["spread"]
@@ -65,9 +84,18 @@ def deflection(force: Floats, compliance: float, values: Mapping[str, float]) ->
     return np.asarray((compliance * bent + values["half_width"] * np.tanh(s / values["seat"])).mean(axis=1))
 
 
-def nowhere(description: MachineDescription) -> list[Place]:
-    """A diagnosis does not try it by itself: it needs rows in order of time."""
-    return []
+def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
+    """Play that is crossed within a few shares of the largest load."""
+    seat = next(p for p in tried.parameters if p.name == "seat")
+    part = slice(3, 6) if seat.unit == "N·m" else slice(0, 3)
+    largest = float(np.abs(probe.plan.wrench[:, part]).max())
+    for share in SEATS if largest > 0.0 else ():
+        yield Signature({"seat": share * largest})
+
+
+def jumps(plan: Plan) -> bool:
+    """Whether loads do not run in order of time: memory is then nothing that readings can tell."""
+    return plan.load_direction is None
 
 
 EFFECT = EffectType(
@@ -85,7 +113,10 @@ EFFECT = EffectType(
     parameters=PARAMETERS,
     places=at_sites(elastic_drives),
     apply=None,
-    tried=nowhere,
+    signature=signature,
+    hidden=jumps,
+    tried=at_sites(elastic_drives),
+    moved=("level", "half_width", "seat"),
     frame="the drive's coordinate",
     moves="what the drive moves",
     excludes=("hysteresis", "friction"),

@@ -25,6 +25,13 @@ class Summary:
     """rms over the noise floor, linear and angular readings together."""
     rotation_rms: float | None = None
 
+    @property
+    def size(self) -> tuple[float, str]:
+        """rms in m of the lengths, or in rad where only angles are read; and that unit."""
+        if self.rotation_rms is not None and not np.isfinite(self.rms):
+            return self.rotation_rms, "rad"
+        return self.rms, "m"
+
 
 def summary(residual: Floats, sigma: Floats, channels: tuple[Channel, ...] = AXIS_CHANNELS) -> Summary:
     """Summary of residuals (n, c), NaN where nothing was read."""
