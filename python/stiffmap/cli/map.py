@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import numpy as np
-import typer
 from rich.console import Console
 
 from stiffmap.cli.inputs import (
@@ -22,74 +19,63 @@ from stiffmap.cli.inputs import (
     ToleranceOption,
     finish,
     folder,
-    force_given,
     gravity,
     machine_with,
     plain,
 )
 from stiffmap.cli.map_big import print_estimate, print_statistics
+from stiffmap.cli.map_files import Wanted, write_files
+from stiffmap.cli.map_inputs import cases, grid, named_formats
+from stiffmap.cli.map_options import (
+    ComplianceOption,
+    DirectionsOption,
+    EstimateOption,
+    FormatsOption,
+    OutputOption,
+    OwnScalesOption,
+    PicturesOption,
+    PointsOption,
+    ResumeOption,
+    SchedulerOption,
+    StatisticsOption,
+    TablesOption,
+    UncertaintyOption,
+    XOption,
+    YOption,
+    ZarrOption,
+    ZOption,
+)
 from stiffmap.cli.map_summary import as_table, failures, summary
-from stiffmap.cli.map_uncertainty import draw_deviations, print_uncertainty, uncertainty_data
+from stiffmap.cli.map_uncertainty import print_uncertainty, uncertainty_data
 from stiffmap.cli.map_worst import in_words, worst_pose
 from stiffmap.cli.output import JsonOption, print_json
-from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
-from stiffmap.maps.table import write_map_table
 
 
 def map_command(
     machine: MachineArgument,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder for the map and its pictures.")
-    ] = Path("stiffmap-map"),
-    z: Annotated[
-        list[float] | None,
-        typer.Option(help="z-plane in mm; repeatable. [default: lowest, 0, highest of the workspace]"),
-    ] = None,
-    y: Annotated[list[float] | None, typer.Option(help="Planes across y instead, in mm; repeatable.")] = None,
-    x: Annotated[list[float] | None, typer.Option(help="Planes across x instead, in mm; repeatable.")] = None,
-    points: Annotated[
-        int, typer.Option(help="Positions along each axis of a plane, over the whole workspace.")
-    ] = 101,
+    output: OutputOption = Path("stiffmap-map"),
+    z: ZOption = None,
+    y: YOption = None,
+    x: XOption = None,
+    points: PointsOption = 101,
     force: ForceOption = "300",
     plane: PlaneOption = "xy",
     tolerance: ToleranceOption = 0.25,
-    directions: Annotated[
-        int,
-        typer.Option(
-            help="Force directions solved before the extremes are searched; 16 or more "
-            "for machines with play."
-        ),
-    ] = 4,
+    directions: DirectionsOption = 4,
     effect: EffectsOption = None,
     gravity_: GravityOption = None,
-    compliance: Annotated[bool, typer.Option(help="Keep the 6x6 compliance of every pose.")] = False,
-    uncertainty: Annotated[
-        bool,
-        typer.Option("--uncertainty", help="Standard deviation of the map, from links and `u` of the file."),
-    ] = False,
-    zarr: Annotated[bool, typer.Option("--zarr", help="Write Zarr instead of NetCDF.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Take up an interrupted run.")] = False,
-    pictures: Annotated[bool, typer.Option(help="Draw the maps.")] = True,
-    formats: Annotated[
-        str, typer.Option("--format", help="Formats of the pictures: png, svg, pdf, or several as png,pdf.")
-    ] = "png",
-    tables: Annotated[
-        str | None, typer.Option("--table", help="Write the map as a table too: csv, xlsx, or csv,xlsx.")
-    ] = None,
-    own_scales: Annotated[
-        bool, typer.Option("--own-scales", help="A colour scale for each plane instead of a common one.")
-    ] = False,
-    estimate: Annotated[
-        bool,
-        typer.Option("--estimate", help="Only say how long it will take, and the memory and disk it needs."),
-    ] = False,
-    statistics: Annotated[
-        bool, typer.Option("--statistics", help="Maxima, percentiles and shares only; no map is stored.")
-    ] = False,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Address of a dask scheduler whose workers solve the map.")
-    ] = None,
+    compliance: ComplianceOption = False,
+    uncertainty: UncertaintyOption = False,
+    zarr: ZarrOption = False,
+    resume: ResumeOption = False,
+    pictures: PicturesOption = True,
+    formats: FormatsOption = "png",
+    tables: TablesOption = None,
+    own_scales: OwnScalesOption = False,
+    estimate: EstimateOption = False,
+    statistics: StatisticsOption = False,
+    scheduler: SchedulerOption = None,
     method: MethodOption = "fast",
     threads: ThreadsOption = None,
     as_json: JsonOption = False,
@@ -125,9 +111,7 @@ def map_command(
 
       [cyan]stiffmap map orthoglide-revised --points 51 --statistics[/cyan]
     """
-    import stiffmap
-
-    kinds = named_formats(formats, "--format", ("png", "svg", "pdf"))
+    kinds = named_formats(formats, "--format", ("png", "svg", "pdf")) if pictures else []
     sheets = named_formats(tables, "--table", ("csv", "xlsx")) if tables else []
     m = machine_with(machine, effect)
     call: dict[str, Any] = {
@@ -144,96 +128,42 @@ def map_command(
     }
     if estimate:
         print_estimate(m, call, as_json)
-        return
-    if statistics:
+    elif statistics:
         print_statistics(m, call, plane, scheduler, as_json)
-        return
-    target = folder(output) / ("map.zarr" if zarr else "map.nc")
-    ds = stiffmap.error_map(
-        m,
-        **call,
-        scheduler=scheduler,
-        progress=False if as_json else None,
-        out=target,
-        resume=resume,
-    )
-    files = [target, *(draw(ds, output, plane, MM * tolerance, kinds, own_scales) if pictures else [])]
-    files += [write_map_table(ds, output / f"map.{kind}") for kind in sheets]
-    band = uncertainty_data(ds, plane) if uncertainty else None
-    files += draw_deviations(ds, output, plane) if uncertainty and pictures else []
-    rows = summary(ds, plane, MM * tolerance)
-    blame = worst_pose(m, ds, call["gravity"])
+    else:
+        target = folder(output) / ("map.zarr" if zarr else "map.nc")
+        how = {
+            "scheduler": scheduler,
+            "progress": False if as_json else None,
+            "out": target,
+            "resume": resume,
+        }
+        wanted = Wanted(output, plane, tolerance, kinds, sheets, own_scales, uncertainty)
+        _map(m, call, how, wanted, as_json)
+
+
+def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wanted, as_json: bool) -> None:
+    """Compute, write, print; ends the command."""
+    import stiffmap
+
+    ds = stiffmap.error_map(machine, **call, **how)
+    rows, failed = summary(ds, wanted.plane, MM * wanted.tolerance), failures(ds)
+    worst = worst_pose(machine, ds, call["gravity"])
+    table = as_table(ds, rows, wanted.plane, wanted.tolerance)
+    files = [how["out"], *write_files(machine, ds, wanted, table, worst, failed)]
+    band = uncertainty_data(ds, wanted.plane) if wanted.uncertainty else None
     if as_json:
-        data: dict[str, Any] = {"machine": m.name, "rows": rows, "failed": failures(ds)}
-        data |= {"files": list(map(str, files)), "worst_pose": blame}
+        data: dict[str, Any] = {"machine": machine.name, "rows": rows, "failed": failed}
+        data |= {"files": list(map(str, files)), "worst_pose": worst}
         print_json(plain(data if band is None else data | {"uncertainty": band}))
     else:
         console = Console(highlight=False)
-        console.print(as_table(ds, rows, plane, tolerance))
+        console.print(table)
         if band is not None:
-            print_uncertainty(console, band, plane)
-        if blame is not None:
-            console.print(in_words(blame), soft_wrap=True)
-        for name, count in failures(ds).items():
+            print_uncertainty(console, band, wanted.plane)
+        if worst is not None:
+            console.print(in_words(worst), soft_wrap=True)
+        for name, count in failed.items():
             console.print(f"[yellow]{count} poses: {name}[/yellow]")
         console.print(f"wrote {', '.join(map(str, files))}", soft_wrap=True)
-    finish(bool(failures(ds)))
-
-
-def grid(machine: Machine, planes: dict[str, list[float] | None], points: int) -> dict[str, Any]:
-    """Axes (m) over the workspace box; a coordinate that is not commanded has one value, its home."""
-    given = {a: MM * np.array(v) for a, v in planes.items() if v}
-    if len(given) > 1:
-        raise StiffmapError(f"--{' and --'.join(given)}: expected planes across one axis")
-    low, high = machine.workspace
-    task = machine.description.task
-    out: dict[str, Any] = {}
-    for i, a in enumerate("xyz"):
-        if a in given:
-            out[a] = given[a]
-        elif task and a not in task:
-            out[a] = [float(machine.description.home.p[i])]
-        elif a == "z" and not given:
-            middle = 0.0 if low[2] < 0 < high[2] else (low[2] + high[2]) / 2
-            out[a] = [low[2], middle, high[2]]
-        else:
-            out[a] = np.linspace(low[i], high[i], max(points, 0))
-    if task and np.size(out["x"]) == np.size(out["y"]) == 1 and not given:
-        out["z"] = np.linspace(low[2], high[2], max(points, 0))  # only the height is commanded
-    return out
-
-
-def named_formats(text: str, option: str, known: Sequence[str]) -> list[str]:
-    """Endings of files, separated by commas."""
-    kinds = [k.strip().lower() for k in text.split(",")]
-    if not set(kinds) <= set(known):
-        several = ",".join(known[:2])
-        raise StiffmapError(f"{option}: expected {', '.join(known)}, or several as {several}; got '{text}'")
-    return kinds
-
-
-def cases(plane: str, text: str) -> dict[str, list[float]]:
-    """The force that is given as a vector; of a size, forces along the axes of the plane."""
-    from stiffmap.maps.inputs import magnitude, plane_axes
-
-    size, vector = force_given(text)
-    magnitude(size, "--force", "N")
-    if vector is not None:
-        return {"F": [*vector, 0.0, 0.0, 0.0]}
-    return {f"F{'xyz'[i]}": [size if k == i else 0.0 for k in range(6)] for i in plane_axes(plane)}
-
-
-def draw(
-    ds: Any, output: Path, plane: str, tolerance: float, kinds: Sequence[str] = ("png",), own: bool = False
-) -> list[Path]:
-    """One picture per reading of the force's direction."""
-    from stiffmap.plot import map_figure, save
-
-    chosen: dict[str, dict[str, Any]] = {
-        w: {"variable": f"{w}_deflection_{plane}"} for w in ("worst", "best")
-    }
-    chosen |= {str(c): {"variable": f"deflection_{plane}", "case": str(c)} for c in ds.case.values}
-    figures = {
-        name: map_figure(ds, tolerance=tolerance, common_scale=not own, **how) for name, how in chosen.items()
-    }
-    return [save(f, output / f"map-{name}.{kind}") for name, f in figures.items() for kind in kinds]
+    finish(bool(failed))

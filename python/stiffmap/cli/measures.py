@@ -10,6 +10,7 @@ import typer
 from rich import box as borders
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from stiffmap.cli.inputs import (
     MM,
@@ -29,6 +30,8 @@ from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from stiffmap.performance import MeasuresTable
     from stiffmap.performance.table import Row
 
@@ -60,7 +63,7 @@ def measures(
 ) -> None:
     """All performance measures of a machine over a box: worst and best pose, requirement, margin.
 
-    With -o: the table (JSON) and pictures.
+    With -o: the table (JSON), pictures, and both as a page (report.html).
 
     Exit codes: 0 done, 1 a requirement does not hold, 2 bad input.
 
@@ -169,5 +172,40 @@ def write(table: MeasuresTable, output: Path) -> list[str]:
         data.write_text(json.dumps(plain(table.as_plain()), indent=2, ensure_ascii=False), encoding="utf-8")
     except OSError as error:
         raise StiffmapError(f"{data}: cannot be written: {error.strerror}") from error
-    pictures = [save(f, output / f"{name}.png") for name, f in measure_figures(table).items()]
-    return [str(p) for p in (data, *pictures)]
+    figures = measure_figures(table)
+    pictures = [save(f, output / f"{name}.png") for name, f in figures.items()]
+    return [str(p) for p in (data, *pictures, write_report(table, output / "report.html", figures))]
+
+
+def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure]) -> Path:
+    """The table as one page with its pictures."""
+    from stiffmap.maps.provenance import digest
+    from stiffmap.performance.pictures import caption
+    from stiffmap.report.sheet import Sheet, write_sheet
+
+    text = as_table(table)
+    columns = [[escape_free(str(cell)) for cell in c.cells] for c in text.columns]
+    sheet = Sheet(
+        title=f"Measures of {table.machine.name}",
+        answer=verdict_of(table),
+        lines=[f"{text.title}.", *table.notes, *remarks(table)],
+        head=[str(c.header) for c in text.columns],
+        rows=list(zip(*columns, strict=True)),
+        numbers=(2, 4, 5, 6, 7),
+    )
+    digests = {f"machine {table.machine.name}, as loaded": digest(table.machine)}
+    return write_sheet(path, sheet, {caption(n): f for n, f in figures.items()}, digests)
+
+
+def escape_free(cell: str) -> str:
+    """A cell without the terminal's colours."""
+    return Text.from_markup(cell).plain
+
+
+def verdict_of(table: MeasuresTable) -> str:
+    """Whether the machine meets what is required, in a sentence."""
+    if not table.requirements.bounds:
+        return f"{len(table.rows)} measures; nothing is required of them."
+    missed = [r.measure.title for r in table.rows if r.verdict not in ("", "pass")]
+    name = f"{table.machine.name} against {table.requirements.name}"
+    return f"{name}: does not meet {', '.join(missed)}." if missed else f"{name}: meets all of it."

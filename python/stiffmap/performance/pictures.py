@@ -97,6 +97,20 @@ def measure_figures(table: MeasuresTable) -> dict[str, Figure]:
     return out
 
 
+CAPTIONS = {
+    "requirements": "Each requirement: the worst value over its bound. The line at 1 is the bound.",
+    "transmission": "Velocities of the tool at the worst pose for drive rates within a sphere (a), within a cube (b), and in the "
+    "plane (c).",
+    "modes": "Natural modes at the pose of the lowest frequency.",
+}
+
+
+def caption(name: str) -> str:
+    """What a figure of `measure_figures` shows, in a sentence."""
+    mapped = name.removeprefix("map-").replace("_", " ")
+    return CAPTIONS.get(name) or f"Map of {mapped} over the box: lowest, middle and highest plane."
+
+
 def requirement_figure(table: MeasuresTable) -> Figure:
     """Each requirement as a bar: worst value over the bound, the line at 1 is the bound."""
     rows = [r for r in table.rows if r.bound is not None]

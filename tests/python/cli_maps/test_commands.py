@@ -50,8 +50,11 @@ def test_map_writes_what_the_library_computes(capsys: pytest.CaptureFixture[str]
     assert data["failed"] == {}
     assert len(data["rows"]) == 3 * 4
     files = [Path(f) for f in data["files"]]
-    assert [f.name for f in files] == ["map.nc", "map-worst.png", "map-best.png", "map-Fx.png", "map-Fy.png"]
-    assert all(f.read_bytes().startswith(PNG) for f in files[1:])
+    pictures = [f"map-{name}.png" for name in ("worst", "best", "Fx", "Fy", "loaded")]
+    assert [f.name for f in files] == ["map.nc", *pictures, "report.html"]
+    assert all(f.read_bytes().startswith(PNG) for f in files[1:-1])
+    report = files[-1].read_text(encoding="utf-8")
+    assert report.count("<img") == len(pictures) and "worst pose" in report.lower() and "://" not in report
     x = np.linspace(-0.2, 0.3, 3)
     cases = {"Fx": [300.0, 0, 0, 0, 0, 0], "Fy": [0, 300.0, 0, 0, 0, 0]}
     same = sm.error_map(sm.load_machine(NAME), x=x, y=x, z=[-0.2, 0, 0.3], wrench=cases)

@@ -130,7 +130,7 @@ def test_planes_across_another_axis(capsys: pytest.CaptureFixture[str], tmp_path
                     "--format", "svg,pdf", "-o", str(tmp_path))  # fmt: skip
     assert {r["y"] for r in data["rows"]} == {0.0, 0.1}
     endings = {Path(f).suffix for f in data["files"]}
-    assert endings == {".nc", ".svg", ".pdf"}
+    assert endings == {".nc", ".html", ".svg", ".pdf"}
     assert main(["map", NAME, "--y", "0", "--z", "0"]) == 2
     assert "planes across one axis" in capsys.readouterr().err
     assert main(["map", NAME, "--format", "gif"]) == 2

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import stiffmap as sm
+from stiffmap.cli import main
 from stiffmap.diagnosis.report.findings import Effect
 from stiffmap.diagnosis.report.sentences import measured, sentence
 from stiffmap.report.page import write_page
@@ -39,6 +40,16 @@ def test_the_report_of_a_diagnosis(width: int, tmp_path: Path) -> None:
     assert look(tmp_path / "r.html", tmp_path, width) == {"wide": 0, "lost": 0, "console": 0}
 
 
+def test_measures_as_a_page_with_their_pictures(tmp_path: Path) -> None:
+    only = "mass,transmission_max,accuracy"
+    assert main(["measures", "orthoglide-revised", "--only", only, "--nodes", "3", "-o", str(tmp_path)]) == 0
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    pictures = sorted(p.name for p in tmp_path.glob("*.png"))
+    assert pictures == ["map-accuracy.png", "map-transmission_max.png", "transmission.png"]
+    assert text.count("<img") == len(pictures)
+    assert "3 measures" in text and "[green]" not in text and "://" not in text
+
+
 def test_a_broken_page_is_seen(tmp_path: Path) -> None:
     """What the other tests ask for can be missing."""
     page = tmp_path / "bad.html"
@@ -62,6 +73,7 @@ def test_the_report_says_what_a_workshop_signs(tmp_path: Path) -> None:
         "The drive of leg z is 2.15 times as soft as in your file",
         "What to do next",
         "Evidence",
+        "without load (dashed), under it (enlarged)",
         "Where the corrected machine",
         "What is left",
         "What this experiment could have seen",

@@ -14,7 +14,7 @@ from matplotlib.text import Text
 
 import stiffmap as sm
 from stiffmap import plot
-from stiffmap.cli.map import grid
+from stiffmap.cli.map_inputs import grid
 from stiffmap.plot.error_maps import shares
 
 FORCE = {"Fx": [300.0, 0, 0, 0, 0, 0]}

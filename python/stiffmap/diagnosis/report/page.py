@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 import hashlib
 from collections.abc import Iterable, Sequence
-from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from stiffmap.budget import deflection_budget
 from stiffmap.description import Joint
@@ -49,6 +46,7 @@ def write_report(
 def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLike[str]] = ()) -> str:
     """The report as text."""
     from stiffmap.diagnosis.report.pictures import CAPTIONS, figures
+    from stiffmap.report.pictures import inline
     from stiffmap.report.provenance import provenance
     from stiffmap.report.templates import render
 
@@ -96,13 +94,6 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
     )
 
 
-def inline(figure: Figure) -> str:
-    """PNG as a data address."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
-
-
 def in_axis_units(axis: str, value: float) -> str:
     """A reading's size: µm, µrad for a rotation."""
     return f"{1e6 * value:.2f} {'µrad' if axis.startswith('r') else 'µm'}"
@@ -136,16 +127,12 @@ def _effect(e: Effect) -> dict[str, Any]:
 
 def _budget(d: Findings) -> dict[str, Any] | None:
     """Shares of the corrected machine's deflection at the worst pose of the map in the pictures."""
-    from stiffmap.diagnosis.report.pictures import plane_errors
+    from stiffmap.diagnosis.report.pictures import worst_pose
 
-    if not d.effects:
+    worst = worst_pose(d) if d.effects else None
+    if worst is None:
         return None
-    x, y, force, _, errors = plane_errors(d)
-    size = np.linalg.norm(errors, axis=-1)
-    if not force.any() or not np.isfinite(size).any():
-        return None
-    row, column = np.unravel_index(int(np.nanargmax(size)), size.shape)
-    p = np.array([x[column], y[row], d.declared.workspace.mean(axis=0)[2]])
+    p, force = worst
     found = deflection_budget(d.machine, p, force)
     whole = 1e6 * float(np.linalg.norm(found.displacement[:3]))
     return {

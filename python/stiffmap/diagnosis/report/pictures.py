@@ -9,14 +9,17 @@ from stiffmap.diagnosis.report.findings import Findings
 from stiffmap.experiment.comparison.pictures import vector_cases
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.machine import Machine
+from stiffmap.plot.loaded import loaded_figure
 
 UM, MM = 1e6, 1e3
 CAPTIONS = {
-    "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the declared machine and with the "
-    "corrected one; both enlarged alike.",
+    "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the machine of your file and "
+    "with the corrected one; both enlarged alike.",
     "residual_trends": "Residual of every reading against what may drive it. What depends on nothing here is noise.",
     "residual_histogram": "Residuals over the noise floor. With the right machine they follow the dashed line.",
-    "maps": "Error of the tool over a plane of the workspace: the file's machine, the corrected one, and what the finding changes.",
+    "maps": "Error of the tool over a plane of the workspace: the machine of your file, the corrected one, and what the finding changes.",
+    "loaded": "The corrected machine where it deflects most in that plane: without load (dashed), under it (enlarged), and the part "
+    "of each spring and drive.",
     "unexplained": "What no effect explains, over the workspace, and the empirical field that would remove it.",
 }
 BEFORE, AFTER = "#c1432e", "#2a6f97"
@@ -28,6 +31,8 @@ def figures(d: Findings) -> dict[str, Figure]:
     made |= {"residual_trends": trends(d), "residual_histogram": histogram(d)}
     if d.effects:
         made["maps"] = maps(d)
+        worst = worst_pose(d)
+        made |= {"loaded": loaded_figure(d.machine, *worst)} if worst else {}
     if d.unexplained and d.empirical:
         made["unexplained"] = left(d)
     return made
@@ -153,12 +158,12 @@ def histogram(d: Findings) -> Figure:
 
 
 def maps(d: Findings) -> Figure:
-    """Error over a z-plane: declared machine, corrected machine, and what changes."""
+    """Error over a z-plane: the file's machine, the corrected machine, and what changes."""
     x, y, force, one, other = plane_errors(d)
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     axes = figure.subplots(1, 3)
     top = float(np.nanmax([np.nanmax(np.linalg.norm(v, axis=-1)) for v in (one, other)])) * MM
-    titles = ("declared machine", "corrected machine", "difference of the two")
+    titles = ("machine of the file", "corrected machine", "difference of the two")
     for ax, title, v in zip(axes, titles, (one, other, other - one), strict=True):
         size = np.linalg.norm(v, axis=-1) * MM
         limit = {} if title.startswith("difference") else {"vmin": 0.0, "vmax": top}
@@ -168,6 +173,19 @@ def maps(d: Findings) -> Figure:
     load = "no force" if not force.any() else "force (" + ", ".join(f"{f:.0f}" for f in force[:3]) + ") N"
     figure.suptitle(f"Error of the TCP over the plane z = {_middle(d.declared)[2] * MM:.0f} mm, {load}")
     return figure
+
+
+def worst_pose(d: Findings) -> tuple[Floats, Floats] | None:
+    """Position (3,) m in the plane of the maps where the corrected machine deflects most, and the wrench (6,) N, N·m.
+
+    None without a force, or where no pose of the plane has an answer.
+    """
+    x, y, force, _, errors = plane_errors(d)
+    size = np.linalg.norm(errors, axis=-1)
+    if not force.any() or not np.isfinite(size).any():
+        return None
+    row, column = np.unravel_index(int(np.nanargmax(size)), size.shape)
+    return np.array([x[column], y[row], _middle(d.declared)[2]]), force
 
 
 def plane_errors(d: Findings, count: int = 25) -> tuple[Floats, Floats, Floats, Floats, Floats]:

@@ -1,0 +1,47 @@
+"""A report of one table: the answer, its numbers, its pictures; one file, nothing from the network."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from stiffmap.errors import FileError
+from stiffmap.report.pictures import inline
+from stiffmap.report.provenance import provenance
+from stiffmap.report.templates import render
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What the page says, in the units that it shows."""
+
+    title: str
+    answer: str
+    lines: Sequence[str]
+    """Sentences below the answer."""
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    numbers: Sequence[int] = ()
+    """Columns, from 1, whose cells are numbers."""
+
+
+def write_sheet(
+    path: str | PathLike[str], sheet: Sheet, pictures: Mapping[str, Figure], digests: dict[str, str]
+) -> Path:
+    """Write the page; `pictures` by their captions, `digests` of what went in. Raises FileError."""
+    target = Path(path)
+    text = render(
+        "sheet.html",
+        sheet=sheet,
+        pictures=[(caption, inline(figure)) for caption, figure in pictures.items()],
+        provenance=provenance(None, None, (), digests)[1:],  # a command has no date of its own
+    )
+    try:
+        target.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror}", file=str(target)) from error
+    return target
