@@ -128,7 +128,7 @@ class Calibrator:
         until: float = np.inf,
         progress: Progress | None = None,
     ) -> Calibrator:
-        """Sensitivities, one fit, rows that stand alone set aside, the fit again without them."""
+        """Sensitivities, one fit, outliers taken out, the fit again without them."""
         start = time.perf_counter()
         e = predictor.experiment
         s = sensitivity(predictor, wanted, until=until, progress=progress)

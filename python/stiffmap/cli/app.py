@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from inspect import getdoc
 from typing import Annotated, Any
 
 import typer
@@ -18,8 +19,8 @@ INTERRUPTED = 130
 
 HELP = """How far is a loaded machine pushed off its commanded position?
 
-Lengths in mm, forces in N, angles in deg. Every command has [bold]--help[/bold] with examples and
-[bold]--json[/bold]. Exit codes: 0 done, 1 done with findings, 2 bad input, 130 interrupted.
+Lengths in mm, forces in N, angles in deg. Every command has [bold]--help[/bold] with
+examples and [bold]--json[/bold]. Exit codes: 0 done, 1 done with findings, 2 bad input, 130 interrupted.
 """
 
 
@@ -48,7 +49,7 @@ def build_app(arguments: Sequence[str]) -> typer.Typer:
     """App in which only the command that ``arguments`` name is imported; the others are their summaries."""
     wanted = next((a for a in _without_effects(arguments) if not a.startswith("-")), None)
     app = typer.Typer(
-        help=HELP,
+        help=flowed(HELP),
         no_args_is_help=True,
         add_completion=False,
         rich_markup_mode="rich",
@@ -58,8 +59,13 @@ def build_app(arguments: Sequence[str]) -> typer.Typer:
     for command in COMMANDS:
         if command.exists():
             function = load(command) if command.name == wanted else _summary(command)
-            app.command(command.name)(function)
+            app.command(command.name, help=flowed(getdoc(function) or ""))(function)
     return app
+
+
+def flowed(text: str) -> str:
+    """Paragraphs without the source's line breaks: the terminal breaks them at its own width."""
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
 
 
 def load(command: Command) -> Callable[..., Any]:

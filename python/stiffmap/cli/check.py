@@ -76,7 +76,7 @@ def _print(result: FileCheck, trial: Trial) -> None:
     machine = result.description
     console.print(f"[bold]{machine.name}[/bold]  {escape(machine.title)}")
     console.print("  " + ", ".join(f"{n} {sort}" for sort, n in result.counts.items() if n))
-    console.print(f"  declared home configuration is open at {gap_text(machine, result.gaps)}")
+    console.print(f"  home as written is open at {gap_text(machine, result.gaps)}")
     for change in sorted(result.changes, key=lambda c: -abs(c.closed - c.declared))[:MOST_CHANGES]:
         console.print(f"  home, closed: {change.text(machine)}")
     if len(result.changes) > MOST_CHANGES:

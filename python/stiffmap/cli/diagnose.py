@@ -12,6 +12,7 @@ import typer
 from stiffmap.calibration import Tolerances
 from stiffmap.cli.output import JsonOption
 from stiffmap.diagnosis import Diagnosis, diagnose
+from stiffmap.diagnosis.report.sentences import next_step
 from stiffmap.errors import FileError
 
 
@@ -64,6 +65,10 @@ def diagnose_command(
     if output is not None:
         write(result, output, date, [p for p in (Path(machine), Path(data)) if p.exists()])
     print(result.to_json() if as_json else result)
+    if not as_json:
+        print(f"next: {next_step(result)}")
+        if output is not None:
+            print(f"wrote {output}: start with report.html")
     if result.verdict != "none":
         raise typer.Exit(1)
 

@@ -22,13 +22,13 @@ from stiffmap.cli.inputs import (
     position,
     rotation,
 )
-from stiffmap.cli.mobility import Mobility, mobility
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import Block, Body, Element, Joint, Offset, Point, Spring
 from stiffmap.effects import effect_text
 from stiffmap.errors import StiffmapError
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
+from stiffmap.mobility import Mobility, mobility
 from stiffmap.status import Status
 
 

@@ -83,6 +83,8 @@ class EffectType:
         Places that a diagnosis tries as an explanation; None: all of them.
     moved
         Parameters that a diagnosis fits, the others at their defaults; empty: all that are `fitted`.
+    compared
+        Words for a `scale` above and below 1: (``soft``, ``stiff``) makes "2.15 times as soft as in your file".
     derived
         Further numbers that a report shows, computed from the parameters.
     """
@@ -116,6 +118,7 @@ class EffectType:
     derived: Derived | None = None
     tried: Places | None = None
     moved: tuple[str, ...] = ()
+    compared: tuple[str, str] | None = None
 
     @property
     def measurement(self) -> bool:

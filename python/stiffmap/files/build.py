@@ -85,6 +85,13 @@ def _check_points(description: MachineDescription, context: Context) -> None:
 def _workspace(box: Box | None, context: Context) -> tuple[Vector, Vector] | None:
     if box is None:
         return None
+    for axis in "xyz":
+        low, high = getattr(box, axis)
+        if low.value == high.value:
+            context.at(axis).fail(
+                f"{low.value} to {high.value} is no interval; where the tool does not move, give some room around it: "
+                f"[{float(low.value) - 1:g}, {float(high.value) + 1:g}]"
+            )
     ranges = [build_range(getattr(box, axis), LENGTH, context, axis) for axis in "xyz"]
     (x0, x1), (y0, y1), (z0, z1) = ranges
     return (x0, y0, z0), (x1, y1, z1)

@@ -63,7 +63,7 @@ def link_command(
         ),
     ] = "bed",
     zeros: Annotated[bool, typer.Option("--zeros", help="Set insignificant entries to zero.")] = False,
-    out: Annotated[Path | None, typer.Option(help="Link file to write (YAML).")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Link file to write (YAML).")] = None,
     picture: Annotated[Path | None, typer.Option(help="PNG to write.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, SI.")] = False,
 ) -> None:

@@ -150,6 +150,6 @@ def test_rows_outside_the_declared_box_are_a_limit(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rows = ROWS.replace("4,0,80", "4,310,80")
-    assert "limit: 1 row lies outside the declared workspace" in residual_lines(
+    assert "limit: 1 row lies outside the workspace of the file" in residual_lines(
         write(tmp_path, rows=rows), capsys
     )

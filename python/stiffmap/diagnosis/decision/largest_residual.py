@@ -18,7 +18,7 @@ def located(pattern: Pattern, e: Experiment, residual: Floats, sigma: Floats) ->
     """The pattern with the pose where its axis is worst, and words on period, step or slope.
 
     residual, sigma
-        (n, c) SI, NaN where a row is set aside.
+        (n, c) SI, NaN where a row is an outlier.
     """
     names = [c.name for c in e.channels]
     if pattern.axis not in names:

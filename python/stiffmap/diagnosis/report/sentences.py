@@ -45,18 +45,19 @@ def place(e: Effect) -> str:
 def sentence(e: Effect) -> str:
     """One effect, with its size."""
     p = e.parameters
-    if e.kind == "compliance" and "scale" in p and p["scale"][0] > 0:
-        return _softer(e)
+    words = registry.get(e.kind).compared
+    if words and "scale" in p and p["scale"][0] > 0:
+        return _compared(e, *words)
     values = ", ".join(f"{n.replace('_', ' ')} {measured(*v)}" for n, v in p.items())
     return f"{registry.get(e.kind).title} at {place(e)}: {values}"
 
 
-def _softer(e: Effect) -> str:
+def _compared(e: Effect, more: str, less: str) -> str:
     scale = e.parameters["scale"][0]
     how = (
-        f"{scale:.2f} times as soft as in your file"
+        f"{scale:.2f} times as {more} as in your file"
         if scale >= 1
-        else f"{1 / scale:.2f} times as stiff as in your file"
+        else f"{1 / scale:.2f} times as {less} as in your file"
     )
     head = f"{place(e).capitalize() if place(e)[0] != 't' else 'T' + place(e)[1:]} is {how}"
     if "value" not in e.parameters:
@@ -70,7 +71,7 @@ def opening(d: Any) -> str:
     """The verdict as one says it."""
     before, unit = d.before.size
     size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * noise_size(d):.1f} µ{unit}"
-    told = "; ".join(sentence(e) for e in d.effects)
+    named = "; ".join(sentence(e) for e in d.effects)
     if d.verdict == "none":
         return f"The machine agrees with its file within what these readings can show ({size})."
     if d.verdict == "unattributed":
@@ -78,9 +79,9 @@ def opening(d: Any) -> str:
             f"The machine differs from its file ({size}), and no single cause known to stiffmap explains how."
         )
     if d.verdict == "ambiguous":
-        return f"The readings are explained by more than one cause. First of them: {told}."
+        return f"The readings are explained by more than one cause. First of them: {named}."
     rest = " Part of the difference remains unexplained." if "unattributed" in d.verdict else ""
-    return f"{told}.{rest}"
+    return f"{named}.{rest}"
 
 
 def next_step(d: Any) -> str:
@@ -96,7 +97,7 @@ def next_step(d: Any) -> str:
         return f"One more measurement decides: {separation_text(d.separations[0])}."
     if any(e.aliases for e in d.effects):
         return (
-            "Inspect this place and those which these readings cannot tell from it (named below); the corrected "
+            "Inspect this place and those which these readings cannot tell from it (the report names them); the corrected "
             "machine file predicts the tool equally well whichever it is."
         )
     return "Inspect this place; until it is mended, plan and compensate with the corrected machine file."

@@ -61,12 +61,15 @@ def _more(d: Findings) -> list[str]:
         before, after = d.before.size[0], d.after.size[0]
         all_ = 1.0 - (after / before) ** 2 if before > 0 else 0.0
         out.append(
-            f"explained: {100 * all_:.1f} % of the squares as declared, {100 * d.explained:.1f} % of the misfit "
+            f"explained: {100 * all_:.1f} % of the squares against your file, {100 * d.explained:.1f} % of the misfit "
             f"by effects{gain}"
         )
     if d.calibration is not None:
         c = d.calibration
-        out += [f"calibration: {c.verdict}, {c.rank} directions told", *c.lines()[1 : 1 + len(c.beyond)]]
+        out += [
+            f"calibration: {c.verdict}, {c.rank} directions determined",
+            *c.lines()[1 : 1 + len(c.beyond)],
+        ]
         out += [line for line in c.lines() if line.startswith(("groups:", "model-form"))]
     out += [f"not named: {why}" for why in d.refused]
     if d.stopped:
@@ -89,7 +92,7 @@ def effect_text(e: Effect) -> str:
         text = f"{name} {value * factor:.4g} [{low * factor:.4g}, {high * factor:.4g}]"
         values.append(text if label == "1" else f"{text} {label}")
     n = len(e.aliases)
-    same = f" (cannot be told from {n} {'alias' if n == 1 else 'aliases'})" if n else ""
+    same = f" (these readings cannot tell it from {n} other{'s' if n > 1 else ''})" if n else ""
     return f"{e.kind} of {e.element}{legs}: {', '.join(values)}{same}"
 
 

@@ -25,7 +25,7 @@ class Layer:
     noise: Noise
     """With the model-form floor in it."""
     out: Mask
-    """(n,) rows set aside by the calibration."""
+    """(n,) outliers of the calibration."""
     calibration: Calibration
 
     @staticmethod

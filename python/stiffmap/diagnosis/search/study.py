@@ -75,7 +75,7 @@ class Study:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """Result of a pass: the selection, the search behind it, and the rows set aside."""
+    """Result of a pass: the selection, the search behind it, and the outliers."""
 
     selection: Selection
     search: Search

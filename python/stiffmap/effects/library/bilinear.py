@@ -45,7 +45,7 @@ EFFECT = EffectType(
     precedence=40,
     title="spring whose stiffness changes at a force",
     doc=(
-        "The declared compliance up to the force `knee` in both directions, `ratio` times it for the force "
+        "The nominal compliance up to the force `knee` in both directions, `ratio` times it for the force "
         "beyond (a preloaded screw that opens, a stop that closes); of a drive, an elastic joint or an uncoupled "
         "direction of a link spring (element `foot.k22`)."
     ),

@@ -13,7 +13,7 @@ from stiffmap.effects.sites import at_sites, found, joints, springs
 from stiffmap.effects.types import EffectType, Parameter, Placed
 from stiffmap.errors import StiffmapError
 
-SCALE = Parameter("scale", "1", 1e-3, 1e3, 1.0, 0.1, "factor on the declared compliance")
+SCALE = Parameter("scale", "1", 1e-3, 1e3, 1.0, 0.1, "factor on the nominal compliance")
 VALUE = Parameter(
     "value",
     "m/N",
@@ -132,9 +132,9 @@ def derived(description: MachineDescription, placed: Placed) -> dict[str, float]
 EFFECT = EffectType(
     kind="compliance",
     precedence=10,
-    title="compliance other than declared",
+    title="compliance other than nominal",
     doc=(
-        "The declared compliance of a drive, an elastic joint or a link times `scale`; on a 6x6 spring the "
+        "The nominal compliance of a drive, an elastic joint or a link times `scale`; on a 6x6 spring the "
         "whole matrix, or one diagonal entry of it (element `foot.k11`), its couplings staying as they are."
     ),
     parameters=(SCALE, VALUE),
@@ -144,4 +144,5 @@ EFFECT = EffectType(
     one_of=("scale", "value"),
     at=at,
     derived=derived,
+    compared=("soft", "stiff"),
 )

@@ -34,7 +34,7 @@ EFFECT = EffectType(
     precedence=30,
     title="spring that stiffens with load",
     doc=(
-        "Force = a/c + cubic·a³ at the deflection a, with the declared compliance c, of a drive, an elastic joint or "
+        "Force = a/c + cubic·a³ at the deflection a, with the nominal compliance c, of a drive, an elastic joint or "
         "an uncoupled direction of a link spring (element `foot.k22`)."
     ),
     parameters=(CUBIC,),

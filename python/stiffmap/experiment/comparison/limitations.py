@@ -55,7 +55,7 @@ def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[
         out.append("no repeats: the stated noise is believed")
     outside = _outside(e, machine)
     if outside:
-        out.append(f"{outside} row{'s lie' if outside > 1 else ' lies'} outside the declared workspace")
+        out.append(f"{outside} row{'s lie' if outside > 1 else ' lies'} outside the workspace of the file")
     if e.quantity == "deflection" and not e.branch:
         out.append("no branch column: friction is judged as if every load came from zero")
     return out + _inside_the_loop(e)
