@@ -14,7 +14,6 @@ from itertools import combinations
 import numpy as np
 
 from stiffmap.calibration.statistics import Sums
-from stiffmap.experiment.experiment import Integers
 
 LIKE = 0.1
 """Share of the evidence that all chosen groups gain within which another set is a rival: models are no better."""
@@ -113,17 +112,3 @@ def _rivals(
                 if not longer and known(trial) > enough:
                     out.append(trial)
     return sorted(out, key=lambda t: -known(t))
-
-
-def cross_validated(folds: Sequence[Sums], which: Integers) -> tuple[float, list[float]]:
-    """Held-out misfit per reading (noise variances), all folds together and one by one."""
-    total = folds[0]
-    for f in folds[1:]:
-        total = total + f
-    left, count, each = 0.0, 0.0, []
-    for f in folds:
-        here = f.pick(which)
-        value = here.misfit((total - f).pick(which).estimate)
-        each.append(value / max(here.number, 1.0))
-        left, count = left + value, count + here.number
-    return left / max(count, 1.0), each

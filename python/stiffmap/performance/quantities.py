@@ -7,7 +7,6 @@ import re
 from stiffmap.effects.units import read_value
 from stiffmap.errors import StiffmapError
 
-_OWN = {r"\bmin\b": (60.0, "s"), r"\bHz\b": (1.0, "1/s"), r"\bg\b(?!/)": (1e-3, "kg")}
 _RATE = re.compile(r"^(.*?)/min$")
 
 

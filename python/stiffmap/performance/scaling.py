@@ -12,7 +12,6 @@ from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 
 PARTS = {"all": slice(0, 6), "translation": slice(0, 3), "rotation": slice(3, 6)}
-LIMITS = {"speed": "speed", "force": "force", "encoder_error": "encoder_error"}
 
 
 def drive_table(machine: Machine) -> list[Drive]:

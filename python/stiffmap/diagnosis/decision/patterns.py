@@ -19,7 +19,6 @@ from stiffmap.experiment.noise.whitening import Problem, basis
 
 TOUCHED = 0.1
 """Share of a height's spread that its sum with the commanded height keeps where the command was the reading."""
-Features = list[tuple[str, Floats]]
 
 
 @dataclass(frozen=True)
