@@ -268,8 +268,7 @@ struct Newton {
   M solve(M usable, bool corners, V& iterations, V& steps) {
     M done = ~usable & usable, failed = ~usable;
     LoadSteps way{P, s};
-    // With corners the signs of friction come from the reference's first step, which has the load in its tangent.
-    way.begin(corners ? ~M{} : unloaded_lanes());
+    way.begin(unloaded_lanes());
     for (int k = 0; k < most_iterations; ++k) {
       const bool secant = corners && k == 0;
       const M first = way.factor > way.acting;
@@ -289,6 +288,7 @@ struct Newton {
         failed |= active & ~(norm < 1e6);
         move(active);
         failed |= start_laws(active) & active;
+        way.acting = way.factor;
         continue;
       }
       // Settled: this linearisation is the one at the answer. The step is taken all the same, unless

@@ -14,6 +14,7 @@ constexpr double shortest_load_step = 1.0 / 16384;
 constexpr double crossing_step = 1.0 / 1024;  // a change of stability is looked at this closely
 constexpr double trusted_bend = 0.1;          // of a load step: its chord against the tangents at its ends
 constexpr double crossing_bend = 1e-3, bend_noise = 1e-9;
+constexpr double nothing = 1e-15;  // a step that changes no force
 constexpr double balanced = 1e-9;  // merit of an equilibrium, in unit deflections of the machine's stiffness and length
 constexpr int most_load_steps = 400;
 constexpr int patient_steps = 8;
@@ -30,6 +31,7 @@ bool has_knots(const Mechanism& m) {
 
 /// A linear deflection below this share of the length is closure noise: the coordinate bears nothing.
 constexpr double unloaded = 1e-11;
+constexpr double gap_noise = 1e-14;  // the same for the force that a gap would have to bear at an equilibrium
 
 /// After an iteration with all laws linear: put each law where it carries the force just found. One
 /// that bears nothing stays at its centre, friction opposes the deflection just found.
@@ -54,7 +56,7 @@ bool leave_gaps(const Mechanism& m, const Problem& p, const Linearization& lin, 
     const Coordinate& c = m.coordinates[at(j)];
     if (c.law < 0 || c.locked || lin.kind[at(j)] != Kind::free) continue;
     const Law& law = m.laws[at(c.law)];
-    if (std::abs(lin.r[j]) * m.unit(j) <= unloaded * m.length * law.stiffness()) continue;
+    if (std::abs(lin.r[j]) * m.unit(j) <= gap_noise * m.length * law.stiffness()) continue;
     state.z[j] = law.from_force(lin.tau[j] - law.friction() * p.friction_sign[j] - lin.r[j], p.drive_scale[j]);
     left = true;
   }
@@ -104,7 +106,7 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
   const bool knots = has_knots(m);
   double first = 0, previous = 0;
   out.contraction = 0;
-  p.secant_laws = cold && knots;
+  p.secant_laws = p.first_order = cold && knots;
   linearize(m, p, state, ws.lin);
   for (int k = 0; k < opt.max_iterations; ++k) {
     ws.saddle.assemble(m, ws.lin);
@@ -119,12 +121,14 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
       state.z += ws.dz;
       state.lambda += ws.dlambda;
       start_laws(m, p, state);
-      p.secant_laws = false;
+      p.secant_laws = p.first_order = false;
       linearize(m, p, state, ws.lin);
       continue;
     }
     if (first > 0 && out.contraction == 0) out.contraction = norm / first;
-    if (norm < opt.tolerance) {
+    // A short step may still cross a corner, after which the force is another: two in a row do not.
+    const bool settled = norm < opt.tolerance && (!knots || norm < nothing || (previous > 0 && previous < opt.tolerance));
+    if (settled) {
       if (knots && !ws.saddle.regular() && leave_gaps(m, p, ws.lin, state)) {
         linearize(m, p, state, ws.lin);
         continue;

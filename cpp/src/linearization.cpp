@@ -191,6 +191,7 @@ void linearize(const Mechanism& m, const Problem& problem, const State& state, L
   out.r.setZero();
   add_springs(m, problem, out);
   add_loads(m, problem, out);
+  if (problem.first_order) out.H.setZero();
   for (const NodeSpring& s : m.external_springs) add_external_spring(m, s, out);
   add_loops(m, problem, state, out);
   out.r += out.tau;

@@ -68,7 +68,8 @@ def test_null_is_the_plain_machine_with_the_elements_of_any_value(kind, name, re
         got = machine.solve(POSES[name], WRENCH)
         by_reference = bool((got.flags & sm.Flag.REFERENCE_PATH).any())  # some effects leave the fast path
         same = expected["reference" if by_reference or machine.fast else "fast"]
-        assert np.abs(got.displacement - same.displacement).max() < 2e-15, (element, legs)
+        # m and rad; the last Newton step of the one may be one more than that of the other
+        assert np.abs(got.displacement - same.displacement).max() < 1e-14, (element, legs)
         assert topology(null) == topology(some)
         assert null.effects[0].element == element and null.effects[0].legs == legs
 

@@ -14,24 +14,28 @@ import argparse
 import json
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 from tests.python.oracle.statics import Case, balance, closed, coordinates
 
 import stiffmap as sm
+from stiffmap.description import Joint, Law
+from stiffmap.effects.registry import get
+from stiffmap.effects.types import EffectType
 
 BATCH = 2000
 FORCE, CLOSURE, MOTION = 1e-6, 1e-6, 1e-6
 EFFECTS: dict[str, dict[str, object]] = {
     "as declared": {},
     "dead_zone": {"half_width": 2e-5},
-    "friction": {"force": 20.0, "branch": "loading"},
+    "friction": {"force": 20.0, "torque": 2.0, "branch": "loading"},
     "hardening": {"cubic": 1e13},
     "length": {"error": 3e-4},
     "tilt": {"angle_x": 2e-3, "angle_y": -1e-3},
@@ -40,11 +44,24 @@ EFFECTS: dict[str, dict[str, object]] = {
     "zero_offset": {"error": 3e-4},
     "periodic_error": {"amplitude": 3e-5, "period": 0.02, "phase": 0.3},
     "lead_error": {"slope": 2e-4},
-    "joint_friction": {"torque": 0.2, "branch": "loading"},
+    "joint_friction": {"torque": 0.2, "force": 2.0, "branch": "loading"},
     "joint_compliance": {"translation": 1e-9, "rotation": 1e-7},
+    "joint_clearance": {"radius": 5e-6},
     "compliance": {"scale": 1.7},
     "bilinear": {"ratio": 0.5, "knee": 100.0},
+    "tabulated": {"step": 2e-5, "factor_1": 0.6, "factor_2": 0.9, "factor_3": 1.2, "factor_4": 1.3},
     "position_dependent_compliance": {"slope": 0.3},
+    "axis_tilt": {"angle_x": 1e-3, "angle_y": 2e-3},
+    "leg_tilt": {"angle_x": 1e-3, "angle_z": -2e-3},
+    "length_difference": {"difference": 1e-4},
+    "parallelogram_width": {"error": 1e-4},
+    "parallelogram_parallelism": {"angle_x": 1e-3, "angle_y": 1e-3},
+    "tcp_offset": {"error_x": 1e-3, "error_z": 2e-3},
+    "base_compliance": {"translation": 1e-8, "rotation": 1e-7},
+    "tool_compliance": {"translation": 1e-8, "rotation": 1e-7},
+    "preload": {"rest_x": 1e-5},
+    "thermal_growth": {"coefficient": 1.2e-5, "temperature_difference": 8.0},
+    "payload": {"mass": 3.0, "com_z": -0.05},
 }
 
 
@@ -70,28 +87,32 @@ def batches(machines: list[str], count: int) -> Iterator[Batch]:
         seed += 1
 
 
-def changed(machine: sm.Machine, effect: str) -> sm.Machine | None:
-    """The machine with an effect on every element that takes it; None where none does."""
+@cache
+def changed(name: str, effect: str) -> tuple[sm.Machine | None, tuple[str, ...]]:
+    """A shipped machine with an effect at every place that takes it, and the places that refused it."""
+    machine = sm.load_machine(name)
     if effect == "as declared":
-        return machine
-    names = {n for leg in machine.description.legs for n in element_names(leg.elements)}
-    out, found = machine, 0
-    for name in sorted(names):
+        return machine, ()
+    kind = get(effect)
+    widest = dict(kind.places(machine.description))  # all legs stand last
+    out, refused = machine, []
+    for element, legs in widest.items():
         try:
-            out, found = out.with_effect(effect, element=name, **EFFECTS[effect]), found + 1  # type: ignore[arg-type]
-        except sm.StiffmapError:
-            continue
-    return out if found else None
+            out = out.with_effect(
+                effect, element=element, legs=list(legs) or None, **given(kind, machine, element, legs)
+            )
+        except sm.StiffmapError as error:
+            refused.append(f"{element}: {error}")
+    return (out if out is not machine else None), tuple(refused)
 
 
-def element_names(elements: object) -> Iterator[str]:
-    """Of a chain, those inside its blocks too."""
-    for e in elements:  # type: ignore[attr-defined]
-        if hasattr(e, "branches"):
-            for branch in e.branches:
-                yield from element_names(branch.elements)
-        else:
-            yield e.name
+def given(kind: EffectType, machine: sm.Machine, element: str, legs: tuple[str, ...]) -> dict[str, Any]:
+    """Values of an effect at a place: of force and torque the one that it takes."""
+    values = dict(EFFECTS[kind.kind])
+    if kind.at is not None and kind.one_of:
+        left_out = [p.name for p in kind.at(machine.description, element, legs) if not p.fitted]
+        values = {n: v for n, v in values.items() if n not in left_out}
+    return values
 
 
 @cache
@@ -135,9 +156,9 @@ def asked(machine: sm.Machine, rng: np.random.Generator, count: int) -> tuple[np
 
 def run(batch: Batch, count: int = BATCH) -> dict[str, object]:
     """Counts, worst numbers and the wrong answers of a batch."""
-    machine = changed(sm.load_machine(batch.machine), batch.effect)
+    machine, refused = changed(batch.machine, batch.effect)
     if machine is None:
-        return {**vars(batch), "solves": 0}
+        return {**vars(batch), "solves": 0, "refused": refused}
     key = [batch.seed, *batch.machine.encode(), *batch.effect.encode()]
     p, load = asked(machine, np.random.default_rng(key), count)
     if load["method"] == "reference":
@@ -154,17 +175,20 @@ def run(batch: Batch, count: int = BATCH) -> dict[str, object]:
     }
     out = {"solves": len(p), "status": Counter(sm.Status(int(v)).name for v in s.status)}
     flagged = s.flags & (sm.Flag.BRANCH_UNVERIFIED) != 0
-    worst, bad = verified(machine, p, load, s, np.flatnonzero(good & np.isfinite(s.displacement).all(1)))
+    worst, bad, undecided = verified(
+        machine, p, load, s, np.flatnonzero(good & np.isfinite(s.displacement).all(1))
+    )
     wrong |= {i: f"{word}{' (flagged)' if flagged[i] else ''}" for i, word in bad.items()}
+    out |= {"refused": refused, "undecided": undecided}
     return {**vars(batch), **out, "flagged": int((good & flagged).sum()), "worst": worst, "wrong": wrong}
 
 
 def verified(
     machine: sm.Machine, p: np.ndarray, load: dict[str, object], s: sm.Solution, at: np.ndarray
-) -> tuple[dict[str, float], dict[int, str]]:
-    """Largest relative errors, and what is wrong, by the pose."""
+) -> tuple[dict[str, float], dict[int, str], int]:
+    """Largest relative errors, what is wrong by the pose, and how many poses the free bodies cannot decide."""
     if not len(at):
-        return {}, {}
+        return {}, {}, 0
     d, size = machine.description, machine_size(machine)
     start = sm.inverse_kinematics(machine, p[at])
     names = s.coordinate_names
@@ -175,7 +199,8 @@ def verified(
     before = coordinates(names, start.coordinates)
     case = Case(command, turned, wrench[:, :3], wrench[:, 3:], gravity, str(load["load_type"]), before)
     gap, tip = closed(d, before, case, size)
-    case = Case(command, tip.r, wrench[:, :3], wrench[:, 3:], gravity, str(load["load_type"]), before)
+    smooth = without_friction(machine, p[at], {**load, "wrench": wrench}, names)
+    case = Case(command, tip.r, wrench[:, :3], wrench[:, 3:], gravity, str(load["load_type"]), before, smooth)
     found = balance(d, coordinates(names, s.coordinates[at]), case, size)
     stated = s.displacement[at]
     turn = Rotation.from_matrix(found.rotation @ np.swapaxes(tip.r, 1, 2)).as_rotvec()
@@ -189,12 +214,48 @@ def verified(
         "force": force,
         "motion": moved / size,
     }
+    undecided = found.undecided & ~(force < FORCE)
+    errors["force"] = np.where(undecided, 0.0, force)
     limits = {"command": CLOSURE, "closure": CLOSURE, "force": FORCE, "motion": MOTION}
     bad = {}
     for word, error in errors.items():
         for i in np.flatnonzero(~(error < limits[word])):
             bad[int(at[i])] = f"{word} off by {error[i]:.1e}"
-    return {w: float(e.max()) for w, e in errors.items()}, bad
+    return {w: float(e.max()) for w, e in errors.items()}, bad, int(undecided.sum())
+
+
+def without_friction(
+    machine: sm.Machine, p: np.ndarray, load: dict[str, Any], names: Sequence[str]
+) -> dict[str, np.ndarray]:
+    """Way (n,) of each coordinate in linear statics without friction, NaN where it is second order; empty where
+    nothing rubs."""
+    smooth = sm.Machine(smoothed(machine.description))
+    if smooth == machine:
+        return {}
+
+    def reached(share: float) -> np.ndarray:
+        wrench, gravity = share * load["wrench"], share * np.asarray(load["gravity"])
+        at = {**load, "wrench": wrench, "gravity": list(gravity)}
+        return smooth.solve(p, threads=1, **at).coordinates
+
+    start, step = reached(0.0), 1e-4
+    linear, whole = (reached(step) - start) / step, reached(1.0) - start
+    bent = np.where(np.sign(linear) == np.sign(whole), 0.01, 1.0) * np.abs(whole - linear)
+    doubtful = ~(np.abs(linear) > np.maximum(3e-11, bent))
+    return coordinates(names, np.where(doubtful, np.nan, linear))
+
+
+def smoothed(item: Any) -> Any:
+    """A description whose laws have no friction."""
+    if isinstance(item, Law):
+        return replace(item, friction=0.0)
+    if isinstance(item, Joint):
+        item = replace(item, friction=None)
+    if isinstance(item, tuple):
+        return tuple(smoothed(v) for v in item)
+    if is_dataclass(item):
+        return replace(item, **{f.name: smoothed(getattr(item, f.name)) for f in fields(item) if f.init})
+    return item
 
 
 def task_error(d: object, tip: object, p: np.ndarray) -> np.ndarray:
@@ -245,7 +306,11 @@ def report(done: list[dict[str, object]]) -> int:
         }  # type: ignore[attr-defined]
         told = ", ".join(f"{w} {v:.1e}" for w, v in worst.items())
         flagged = sum(int(str(r["flagged"])) for r in rows)
-        print(f"{machine}: {sum(status.values())} solves; {dict(status)}; {flagged} flagged; worst {told}")
+        undecided = sum(int(str(r["undecided"])) for r in rows)
+        print(
+            f"{machine}: {sum(status.values())} solves; {dict(status)}; {flagged} flagged; "
+            f"{undecided} undecided; worst {told}"
+        )
     for row in bad[:40]:
         print("WRONG", *row)
     print(f"{sum(int(str(r['solves'])) for r in done)} solves, {len(bad)} wrong")

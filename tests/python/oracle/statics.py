@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from stiffmap.description import Block, Body, Joint, MachineDescription, Offset, Point, Spring, TableStroke
 
@@ -35,6 +36,9 @@ class Case:
     load_type: str = "dead"
     unloaded: dict[str, Array] = field(default_factory=dict)
     """Full name of each joint -> (n,) coordinate at the commanded pose, before any load."""
+    smooth: dict[str, Array] = field(default_factory=dict)
+    """Full name of each coordinate -> (n,) its way in linear statics without friction: friction opposes it. NaN: too
+    little to tell."""
 
 
 @dataclass
@@ -45,7 +49,8 @@ class Axis:
     axis: Array
     point: Array
     force: Array | None
-    """(n,): along the axis, needed to hold the coordinate where it is; None: see `allowed`, or a rigid drive."""
+    """(n,): along the axis, needed to hold the coordinate where it is; a first guess where `allowed` stands; None: a
+    rigid drive, whose force is a reaction."""
     allowed: tuple[Array, Array] | None = None
     """(n, k) lower and upper ends of what a law with steps or friction allows."""
 
@@ -88,6 +93,8 @@ class Balance:
     """(n, 3) TCP."""
     rotation: Array
     """(n, 3, 3)."""
+    undecided: Array
+    """(n,) bool: linear statics does not say which way something rubs, so that a residual proves nothing."""
 
 
 def balance(d: MachineDescription, x: dict[str, Array], case: Case, size: float) -> Balance:
@@ -96,7 +103,7 @@ def balance(d: MachineDescription, x: dict[str, Array], case: Case, size: float)
     load(walk, tip)
     external(walk)
     residual, scale = unbalanced(walk, size)
-    return Balance(gaps(walk, size), residual, scale, tip.p, tip.r)
+    return Balance(gaps(walk, size), residual, scale, tip.p, tip.r, open_ways(walk))
 
 
 def closed(d: MachineDescription, x: dict[str, Array], case: Case, size: float) -> tuple[Array, Frame]:
@@ -171,17 +178,22 @@ def through_joint(walk: Walk, e: Joint, f: Frame, name: str) -> Frame:
             if law is not None:
                 target = u + sum(command_error(c, u, e) for c in e.command_errors) * walk.as_built
                 soft = 1.0 + e.compliance_slope * (u - e.home[0])
-                made.force, made.allowed = law_force(law, value - target, soft)
+                made.force, made.allowed = law_force(
+                    law, value - target, soft, levels(walk, full, law.friction)
+                )
         elif law is not None:
             rest = e.rest[i] if e.rest is not None else e.home[i]
-            made.force, made.allowed = law_force(law, value - rest, np.ones_like(value))
+            made.force, made.allowed = law_force(
+                law, value - rest, np.ones_like(value), levels(walk, full, law.friction)
+            )
         elif e.friction is not None:
             turned = value - walk.case.unloaded.get(full, value + np.inf)
-            level = np.where(np.abs(turned) < 1e-14, 0.0, e.friction.level)[:, None] * np.ones(2)
-            made.force = None
-            made.allowed = (level * [-1, 1], level * [-1, 1])
+            level = e.friction.level
+            made.force = 0.0 * turned
+            both = levels(walk, full, level)
+            made.allowed = (both, both)
             if e.friction.branch == "loading_stuck":
-                made.allowed = (-level[:, :1], level[:, :1])
+                made.allowed = (np.full((len(value), 1), -level), np.full((len(value), 1), level))
         f = moved(walk, f, revolute, np.array(axis), value, made)
     return f
 
@@ -193,18 +205,26 @@ def command_error(c: Any, u: Array, e: Joint) -> Array:
     return out
 
 
-def law_force(law: Any, a: Array, soft: Array) -> tuple[Array | None, tuple[Array, Array] | None]:
+def levels(walk: Walk, name: str, level: float) -> Array:
+    """(n, 3) forces that sliding friction may add: one where its way is known, both and none where it is not."""
+    out: Array = level * np.array([-1.0, 0.0, 1.0]) * np.ones((len(walk.case.force), 1))
+    way = walk.case.smooth.get(name, np.full(len(out), np.nan))
+    known = np.isfinite(way)
+    out[known] = level * np.sign(way[known, None])
+    return out
+
+
+def law_force(law: Any, a: Array, soft: Array, rubs: Array) -> tuple[Array, tuple[Array, Array] | None]:
     """Force of a law at deflections a (n,), the compliance being `soft` times as large; what it allows if it is
     not one number."""
     if law.knots:
         low, high = polyline(law, a, soft)
-        one = np.abs(high - low).max() == 0.0
-        return (low, None) if one else (None, (low[:, None], high[:, None]))
+        return (low + high) / 2, (low[:, None], high[:, None])
     force: Array = law.stiffness * a / soft + law.cubic * a**3
     if law.friction:
-        none = np.where(np.abs(a) < 1e-14, 0.0, 1.0)[:, None]  # nothing pushes: nothing rubs
-        both = force[:, None] + none * law.friction * np.array([-1.0, 1.0])
-        return None, (both, both)
+        both = force[:, None] + rubs
+        known = rubs.min(1) == rubs.max(1)
+        return np.where(known, both[:, 0], 0.0), (both, both)  # what is second order is small
     return force, None
 
 
@@ -241,12 +261,16 @@ def through_spring(walk: Walk, e: Spring, f: Frame, name: str) -> Frame:
     for i in range(3):
         made = Axis(False, basis[:, :, i], f.p, None if i in free else force[:, i])
         if i in laws:
-            made.force, made.allowed = law_force(laws[i], own[:, i], np.ones(len(v)))
+            made.force, made.allowed = law_force(
+                laws[i], own[:, i], np.ones(len(v)), levels(walk, names[i], laws[i].friction)
+            )
         f = moved(walk, f, False, np.eye(3)[i], v[:, i], made)
     for i in range(3, 6):
         made = Axis(True, f.r[:, :, i - 3], f.p, None if i in free else force[:, i])
         if i in laws:
-            made.force, made.allowed = law_force(laws[i], own[:, i], np.ones(len(v)))
+            made.force, made.allowed = law_force(
+                laws[i], own[:, i], np.ones(len(v)), levels(walk, names[i], laws[i].friction)
+            )
         f = moved(walk, f, True, np.eye(3)[i - 3], v[:, i], made)
     return f
 
@@ -287,7 +311,7 @@ def load(walk: Walk, tip: Frame) -> None:
 def external(walk: Walk) -> None:
     """Cables and counterbalances."""
     for s in walk.d.external_springs:
-        f, at = walk.points[s.point]
+        f, at = walk.points[s.point.removeprefix("platform.").removeprefix("base.")]
         line = np.array(s.anchor) - at
         length = np.linalg.norm(line, axis=1)
         pull = s.stiffness * (length - s.length)
@@ -311,6 +335,8 @@ def unbalanced(walk: Walk, size: float) -> tuple[Array, Array]:
     for i, a in enumerate(walk.axes):
         if a.force is not None:
             needed[:, i] = a.force
+        if a.allowed is not None:
+            needed[:, i] = nearest(a.allowed, np.arange(n), needed[:, i])
     for f, at, force, moment in walk.known:
         for i in f.before:
             given[:, i] += work(walk.axes[i], at, force, moment)
@@ -324,25 +350,82 @@ def unbalanced(walk: Walk, size: float) -> tuple[Array, Array]:
                     columns[:, i, 6 * k + 3 : 6 * k + 6] += sign * size * a.axis
                 else:
                     columns[:, i, 6 * k : 6 * k + 3] += sign * a.axis
-    rows = [i for i, a in enumerate(walk.axes) if a.force is not None]
-    b, left = weight * (needed - given), weight[:, None] * columns
-    reaction = least_squares(left[:, rows], b[:, rows])
-    rest = np.abs(np.einsum("nij,nj->ni", left, reaction) - b) if walk.loops else np.abs(b)
-    worst = rest[:, rows].max(1, initial=0.0)
-    for i, a in enumerate(walk.axes):
-        if a.allowed is not None:
-            held = weight[i] * given[:, i]
-            if walk.loops:
-                held = held + np.einsum("nj,nj->n", left[:, i], reaction)
-            low, high = (weight[i] * v for v in a.allowed)
-            off = np.maximum(np.maximum(low - held[:, None], held[:, None] - high), 0.0).min(1)
-            worst = np.maximum(worst, off)
+    left = weight[:, None] * columns
+    worst, reaction = settle(walk, weight, left, given, needed)
+    if any(
+        a.allowed is not None for a in walk.axes
+    ):  # what rubs where its way is second order: from the middle too
+        other = needed.copy()
+        for i, a in enumerate(walk.axes):
+            if a.allowed is not None:
+                middle = a.allowed[0].shape[1] // 2
+                other[:, i] = (a.allowed[0][:, middle] + a.allowed[1][:, middle]) / 2
+        again, pull = settle(walk, weight, left, given, other)
+        better = again < worst
+        worst, reaction = np.where(better, again, worst), np.where(better[:, None], pull, reaction)
+        for j in np.flatnonzero(worst > 1e-8 * np.abs(reaction).max(1, initial=0.0)):
+            worst[j] = min(worst[j], bounded(walk, weight, left[j], given, needed, int(j)))
     sizes = [
         np.abs(weight * needed).max(1),
         np.abs(weight * given).max(1),
         np.abs(reaction).max(1, initial=0.0),
     ]
     return worst, np.max(sizes, axis=0)
+
+
+def settle(walk: Walk, weight: Array, left: Array, given: Array, needed: Array) -> tuple[Array, Array]:
+    """Residual (n,) and reactions of the loops: between what the loops can give and what the laws allow, in turns."""
+    n = len(given)
+    rows = [i for i, a in enumerate(walk.axes) if a.force is not None]
+    steps = [i for i, a in enumerate(walk.axes) if a.allowed is not None]
+    worst, reaction, todo = np.full(n, np.inf), np.zeros((n, left.shape[2])), np.arange(n)
+    for _ in range(60 if steps else 1):
+        b = weight * (needed[todo] - given[todo])
+        reaction[todo] = least_squares(left[todo][:, rows], b[:, rows])
+        held = np.einsum("nij,nj->ni", left[todo], reaction[todo])
+        worst[todo] = np.minimum(worst[todo], np.abs(held - b)[:, rows].max(1, initial=0.0))
+        before, after = needed[todo], needed[todo].copy()
+        for i in steps:
+            after[:, i] = nearest(walk.axes[i].allowed, todo, given[todo, i] + held[:, i] / weight[i])
+        needed[todo] = after
+        todo = todo[(after != before).any(1)]
+        if not len(todo):
+            break
+    return worst, reaction
+
+
+def bounded(walk: Walk, weight: Array, left: Array, given: Array, needed: Array, j: int) -> float:
+    """Residual of one pose by bounded least squares over the reactions and the forces inside steps of laws."""
+    rows = [i for i, a in enumerate(walk.axes) if a.force is not None]
+    inside = [i for i in rows if (a := walk.axes[i].allowed) is not None and a[0][j, 0] < a[1][j, 0]]
+    if not inside:
+        return np.inf
+    unit = np.zeros((len(walk.axes), len(inside)))
+    unit[inside, range(len(inside))] = -weight[inside]
+    b = weight * (np.where(np.isin(np.arange(len(weight)), inside), 0.0, needed[j]) - given[j])
+    ends = [(walk.axes[i].allowed[0][j, 0], walk.axes[i].allowed[1][j, 0]) for i in inside]  # type: ignore[index]
+    free = [(-np.inf, np.inf)] * left.shape[1]
+    low, high = np.transpose(np.array([*free, *ends]))
+    a = np.hstack([left, unit])[rows]
+    return float(np.abs(a @ lsq_linear(a, b[rows], (low, high), tol=1e-15).x - b[rows]).max())
+
+
+def open_ways(walk: Walk) -> Array:
+    """(n,) bool."""
+    out = np.zeros(len(walk.case.force), dtype=bool)
+    for a in walk.axes:
+        if a.allowed is not None:
+            out |= (a.allowed[0] == a.allowed[1]).all(1) & (np.ptp(a.allowed[0], axis=1) > 0)
+    return out
+
+
+def nearest(allowed: tuple[Array, Array] | None, at: Array, force: Array) -> Array:
+    """Of the intervals that a law allows at these poses, the force that lies nearest."""
+    assert allowed is not None
+    low, high = (v[at] for v in allowed)
+    choice = np.clip(force[:, None], low, high)
+    best = np.abs(choice - force[:, None]).argmin(1)
+    return choice[np.arange(len(at)), best]
 
 
 def least_squares(a: Array, b: Array) -> Array:

@@ -61,7 +61,7 @@ EFFECT = EffectType(
         "with the deflection a and the force F, level L and compliance c: on "
         "the branch `loading` (from zero load) a = c·(F - L·sign F); on the branch `unloading` (from a "
         "larger load, friction fully reversed) a = c·(F + L·sign F). `loading` takes the full level also "
-        "where |F| < L, with the sign that F has in the machine without friction; a drive that really "
+        "where |F| < L, with the sign that F has in linear statics without friction; a drive that really "
         "sticks there, a = 0, is `loading_stuck`. Both agree where |F| > L."
     ),
     parameters=(FORCE, TORQUE),
