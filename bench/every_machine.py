@@ -13,7 +13,7 @@ is a batch of random poses in the workspace box of the machine file:
 
 --effects adds a row per machine and kind of effect (effect_cases.py), under the same force, the worst first. Behind each
 multiple stands the share of poses that took the reference path, in percent. Coordinates are spring directions plus
-joint axes. Exit code 1 where a number of the table is above its limit: 4, outside the box 10, the share 0.1 %.
+joint axes, of the machine that is solved: with its effect's, where that adds springs. Exit code 1 where a number of the table is above its limit: 4, outside the box 10, the share 0.1 %.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def share(answer: sm.Solution) -> float:
     return float((answer.flags & sm.Flag.REFERENCE_PATH != 0).mean())
 
 
-Case = tuple[str, Callable[[np.ndarray], sm.Solution], np.ndarray]
+Case = tuple[str, sm.Machine, Callable[[np.ndarray], sm.Solution], np.ndarray]
 
 
 def cases(machine: sm.Machine) -> Iterator[Case]:
@@ -95,19 +95,19 @@ def cases(machine: sm.Machine) -> Iterator[Case]:
         return lambda p: machine.solve(p, threads=1, **options)  # type: ignore[arg-type]
 
     poses, wide = inside(machine, POSES), outside(machine, POSES)
-    yield "unloaded", solve(), poses
-    yield "loaded", solve(wrench=FORCE), poses
-    yield "gravity", solve(wrench=FORCE, gravity=GRAVITY), poses
-    yield "outside", solve(wrench=FORCE), wide
+    yield "unloaded", machine, solve(), poses
+    yield "loaded", machine, solve(wrench=FORCE), poses
+    yield "gravity", machine, solve(wrench=FORCE, gravity=GRAVITY), poses
+    yield "outside", machine, solve(wrench=FORCE), wide
     far = machine.solve(wide[::3][:256], threads=1, stiffness=False).status == sm.Status.UNREACHABLE
     if far.sum() > 8:
-        yield "beyond", solve(wrench=FORCE), np.resize(wide[::3][:256][far], (512, 3))
+        yield "beyond", machine, solve(wrench=FORCE), np.resize(wide[::3][:256][far], (512, 3))
 
 
 def effect_cases(machine: sm.Machine) -> Iterator[Case]:
     """One case for each kind of effect; all elements that take it have it."""
     for kind, changed in machines_with_effects(machine):
-        yield kind, (lambda p, m=changed: m.solve(p, FORCE, threads=1)), inside(machine, POSES)
+        yield kind, changed, (lambda p, m=changed: m.solve(p, FORCE, threads=1)), inside(machine, POSES)
 
 
 def main() -> int:
@@ -130,9 +130,12 @@ def main() -> int:
     for name in wanted.machines or [m.name for m in shipped_machines()]:
         machine = sm.load_machine(name)
         row = table[name] = {}
-        n = len(machine.compiled.names.coordinates)
-        for column, solve, poses in (*cases(machine), *(effect_cases(machine) if wanted.effects else ())):
+        for column, solved, solve, poses in (
+            *cases(machine),
+            *(effect_cases(machine) if wanted.effects else ()),
+        ):
             seconds, answer = cost(solve, poses, wanted.seconds)
+            n = len(solved.compiled.names.coordinates)
             row[column] = [seconds / n / unit, share(answer), 1e6 * seconds]
             wide = column in ("outside", "beyond")
             late += row[column][0] > (MOST_OUTSIDE if wide else MOST) or (

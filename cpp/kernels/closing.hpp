@@ -14,11 +14,11 @@ namespace stiffmap::kernel {
 
 inline constexpr int most_closure_steps = 12;
 inline constexpr int most_leaps = 48;
-inline constexpr double shortest_leap = 1.0 / 64;  // of the way
-inline constexpr double trusted_step = 0.25;       // first Gauss-Newton step, relative to the length
-inline constexpr double closed = 1e-12;            // largest error, relative to the length
-inline constexpr double exact = 3e-15;             // the same: a closed form needs no step
-inline constexpr double last_step = 1e-8;          // its square, what it leaves, is below round-off
+inline constexpr double shortest_leap = 1.0 / 1024;  // of the way
+inline constexpr double trusted_step = 0.25;         // first Gauss-Newton step, relative to the length
+inline constexpr double closed = 1e-12;              // largest error, relative to the length
+inline constexpr double exact = 3e-15;               // the same: a closed form needs no step
+inline constexpr double last_step = 1e-8;            // its square, what it leaves, is below round-off
 
 struct Closing {
   const Program& P;

@@ -12,12 +12,13 @@ struct Elimination {
   V3 gravity;
   V lowest;  ///< smallest pivot, dimensionless: at or below zero the pose is not a plain minimum
   double scale[6];
-  bool heavy = false;        ///< there is gravity
-  V3 pending = {};           ///< gravity that acts, but is not in the wrenches yet: the first step under a load (F11)
-  bool counts = false;       ///< the signs of the pivots are asked
-  V negative = splat(0);     ///< negative pivots: directions in which the energy falls (Haynsworth)
-  V closest = splat(0);      ///< the pivot next to zero, dimensionless
-  V transferred = splat(0);  ///< largest step of a branch's wrench, over stiffness times length
+  bool heavy = false;     ///< there is gravity
+  V3 pending = {};        ///< gravity that acts, but is not in the wrenches yet: the first step under a load (F11)
+  bool counts = false;    ///< the signs of the pivots are asked
+  V negative = splat(0);  ///< negative pivots: directions in which the energy falls (Haynsworth)
+  V closest = splat(0);   ///< the pivot next to zero, dimensionless
+  V product = splat(1), hundreds = splat(0);  ///< of all pivots' sizes: product times ten to the hundreds
+  V transferred = splat(0);                   ///< largest step of a branch's wrench, over stiffness times length
 
   /// A leg: only its numbers differ from those of the last pass over all, and the others' results are kept.
   static constexpr std::int32_t all = -1, all_anew = -2;  ///< all_anew: keeps the residuals of the last pass over all
@@ -30,9 +31,19 @@ struct Elimination {
     lowest = lowest < relative ? lowest : relative;
     if (counts) count(relative);
   }
-  void count(V relative) {
+  [[gnu::noinline]] void count(V relative) {
     negative = select(relative < 0.0, negative + 1.0, negative);
-    closest = absolute(relative) < closest ? absolute(relative) : closest;
+    const V size = absolute(relative);
+    closest = size < closest ? size : closest;
+    product *= size;
+    const M low = product < 1e-100, high = product > 1e100;
+    product = select(low, 1e100 * product, select(high, 1e-100 * product, product));
+    hundreds = select(low, hundreds - 1.0, select(high, hundreds + 1.0, hundreds));
+  }
+  void count_anew() {
+    negative = hundreds = splat(0);
+    product = splat(1);
+    closest = splat(1e300);
   }
 };
 

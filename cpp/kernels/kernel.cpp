@@ -58,7 +58,7 @@ struct Block {
   Frame command;
   V6 load;
   M never = {};  ///< lanes out of reach
-
+  M closed = {};
   M unstable = {}, ended = {};
 
   std::int64_t place(int lane) const { return first + (lane < count ? lane : count - 1); }
@@ -165,6 +165,21 @@ struct Block {
     return hit;
   }
 
+  /// Lanes that close, but where a spring is not declared: no pose of the machine, with what the command is beyond.
+  [[gnu::noinline]] void refuse(M lanes) {
+    never |= lanes;
+    const M lock = locked(P.near_lock);
+    for (int i = 0; i < count; ++i) {
+      if (!lanes[i]) continue;
+      std::uint32_t flags = lock[i] ? P.flag_lock : 0u;
+      for (int q = 0; q < P.coordinate_count; ++q) {
+        const CoordinateProgram& k = P.coordinates[q];
+        if (s.closed[q][i] < k.lower || s.closed[q][i] > k.upper) flags |= k.role == 0 ? P.flag_range : P.flag_limit;
+      }
+      out.flags[pose(i)] = flags;
+    }
+  }
+
   /// Frames and wrenches of a program's machine at the coordinates found.
   void pass(Newton& at, const Program& of) {
     set_base(of);
@@ -208,7 +223,10 @@ struct Block {
 
   void run() {
     M usable = read();
-    usable &= set_start();
+    const M declared = set_start();
+    if (any(usable & ~declared)) refuse(usable & beyond_strokes(P, s));
+    usable &= declared;
+    closed = usable;
     usable &= ~locked(P.locked);
     const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
     Elimination e{
@@ -231,7 +249,7 @@ struct Block {
   M follow(M lanes, Newton& newton, V& iterations, V& steps) {
     stand_at_start(lanes);
     LoadPath path{newton};
-    const M done = path.follow(lanes, iterations);
+    const M done = path.follow(lanes, iterations, [&](M anew) { stand_at_start(anew); });
     unstable = path.unstable;
     ended = path.ended;
     steps = select(lanes, splat(1), steps);
@@ -250,6 +268,7 @@ struct Block {
                     : never[i]   ? pose_unreachable
                     : ended[i]   ? pose_ended
                     : in.patient ? pose_left
+                    : closed[i]  ? pose_heavy
                                  : pose_slow;
       if (!done[i]) continue;
       for (int r = 0; r < 6; ++r) out.displacement[6 * k + r] = moved[r][i];

@@ -124,8 +124,17 @@ struct Newton {
     }
   }
 
+  /// Its equilibrium does not depend on where Newton starts: no dry friction, and it yields under any force.
+  bool strictly_rises(const LawProgram& law) const {
+    const double* n = P.knots + 3 * law.first;
+    for (int i = 1; i < law.count; ++i)
+      if (n[3 * i + 1] == n[3 * i - 2]) return false;
+    return law.friction == 0;
+  }
+
   /// As the reference: what bears nothing stays at its centre, friction opposes the deflection.
-  /// Returns the lanes in which it is doubtful whether something bears: round-off decides, and the reference's counts.
+  /// Returns the lanes in which it is doubtful whether something bears and that matters: round-off decides, and the
+  /// reference's counts.
   M start_laws(M active) {
     M doubtful{};
     for (int q = 0; q < P.coordinate_count; ++q) {
@@ -136,7 +145,8 @@ struct Newton {
         const double linear = s.z[q][i];
         const double share = __builtin_fabs(linear) * k.unit / P.length;
         const bool bears = share > unloaded;
-        if (share > 0.01 * unloaded && share < 10 * unloaded) doubtful[i] = -1;
+        if (share > 0.1 * unloaded && share < 10 * unloaded && !(k.law >= 0 && strictly_rises(P.laws[k.law])))
+          doubtful[i] = -1;
         if (k.law < 0) {
           s.friction_sign[q][i] = !bears ? 0 : linear > 0 ? 1 : -1;
           continue;
@@ -244,6 +254,20 @@ struct Newton {
     return worst * (1 / P.length);
   }
 
+  /// How much the last step changes the slope of a hardening law, relative: its answer's tangent is not that of before.
+  [[gnu::noinline]] V hardening_change() const {
+    V worst = splat(0);
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      const CoordinateProgram& k = P.coordinates[q];
+      if (k.law < 0 || k.locked || !(P.laws[k.law].cubic > 0)) continue;
+      const LawProgram& law = P.laws[k.law];
+      const V linear = law.stiffness / s.scale[q], a = s.x[q] - s.a_base[q], slope = linear + 3 * law.cubic * a * a;
+      const V step = k.by_force ? s.dz[q] * s.da[q] : s.dz[q];
+      worst = larger(worst, absolute(6 * law.cubic * a * step / slope));
+    }
+    return worst;
+  }
+
   /// Step of all coordinates from the last linearisation, m its inverse.
   void step(const V (&m)[6][6], M active) {
     V rhs[6], eta[6];
@@ -268,6 +292,9 @@ struct Newton {
   M solve(M usable, bool corners, V& iterations, V& steps) {
     M done = ~usable & usable, failed = ~usable;
     LoadSteps way{P, s};
+    const double most_tries = in.max_iterations * (corners && in.patient ? 3.0 : 1.0);
+    const double whole_tries = in.patient ? 5 : 9, longest = in.patient ? 0.125 : 0.375;
+    V share = splat(1), straight = splat(0);  // of Newton's steps, where corners make them go to and fro
     way.begin(unloaded_lanes());
     for (int k = 0; k < most_iterations; ++k) {
       const bool secant = corners && k == 0;
@@ -295,9 +322,11 @@ struct Newton {
       // there is nothing to gain from it.
       const V change = larger(norm, e.transferred);
       const M whole = way.acting == 1.0;
-      const M settled = active & whole & ((change < small) | ((norm < in.tolerance) & (way.previous < in.tolerance)));
+      M settled = active & whole & ((change < small) | ((norm < in.tolerance) & (way.previous < in.tolerance)));
+      if (P.hardens && any(settled))
+        settled &= (hardening_change() < same_slope) | ((norm < small) & (way.previous < small));
       failed |= settled & ~(e.lowest > pivot_floor);
-      const M kept = active & whole & (change < nothing);
+      const M kept = settled & (change < nothing);
       take(settled & ~failed, m);
       if (any(kept)) keep_wrenches(e, kept);
       M distrusted = active & ~settled & ~(norm < 1e6);
@@ -308,9 +337,18 @@ struct Newton {
         const M second = (way.tries == 1.0) & (norm <= 5.0 * way.previous) & (norm <= 0.02) & (e.lowest > pivot_floor);
         distrusted |= active & ~settled & ~((norm <= 0.2 * way.previous) | (norm <= 1e-7) | second);
       }
+      if (corners) {
+        // Where no corner was met, what is left of a step is what was not taken.
+        const M worse = active & (way.tries > 1.0) & (norm > (1.0 - 0.5 * share) * way.previous);
+        straight = select(norm < (1.001 - share) * way.previous, straight + 1.0, splat(0));
+        const V most = select((way.tries < whole_tries) | (straight > 1.0), splat(1), splat(longest));
+        const V twice = share + share;
+        share = select(worse, larger(0.5 * share, splat(0.125)), select(twice < most, twice, most));
+        if (any(share < 1.0)) shorten(share);
+      }
       // Free play is the reference's to find: a singular step would leave the gap by chance.
       if (corners && k == 1) distrusted |= active & open_gaps();
-      distrusted |= active & ~settled & (way.tries >= static_cast<double>(in.max_iterations));
+      distrusted |= active & ~settled & (way.tries >= most_tries);
       move(active & ~kept & ~distrusted);
       done |= settled & ~failed;
       fresh = all(kept == active);
@@ -359,6 +397,15 @@ struct Newton {
     return absolute(w.b.x) + absolute(w.b.y) + absolute(w.b.z) > 0.0;
   }
 
+  /// Takes only a share of the last step.
+  [[gnu::noinline]] void shorten(V share) {
+    for (int q = 0; q < P.coordinate_count; ++q) s.dz[q] *= share;
+    for (int k = 0; k < P.chain_count; ++k) {
+      BranchSlot& b = s.branches[k];
+      b.F = select(share < 1.0, b.before + share * (b.F - b.before), b.F);
+    }
+  }
+
   void move(M lanes) {
     for (int q = 0; q < P.coordinate_count; ++q) s.z[q] = select(lanes, s.z[q] + s.dz[q], s.z[q]);
   }
@@ -367,6 +414,7 @@ struct Newton {
   const double pivot_floor = 1e-5 * P.softest;
   static constexpr double small = 1e-13;  ///< step that changes the tangent by no more than that
   static constexpr double nothing = 1e-15;
+  static constexpr double same_slope = 1e-11;  ///< change of a law's slope that the compliance does not show
   static constexpr double unloaded = 1e-11;
   bool fresh = false;  ///< frames and wrenches are those at the answer
 };

@@ -151,6 +151,7 @@ struct Program {
   std::int32_t open_task;      ///< some are not
   std::int32_t exact_weights;  ///< the tangent is exact with the bodies' weight too
   std::int32_t starts_linear;  ///< a law with knots or friction: Newton starts with all laws linear
+  std::int32_t hardens;        ///< a law with a cubic term
   std::uint32_t flag_force, flag_range, flag_limit, flag_lock, flag_always, flag_stepped;
   std::int32_t grid_n[3], grid_row;  ///< nodes along each axis; numbers per node, a multiple of 8
   double grid_low[3], grid_step[3];
@@ -183,6 +184,7 @@ inline constexpr std::uint8_t pose_left = 0;  ///< to the reference path
 inline constexpr std::uint8_t pose_solved = 1, pose_unstable = 2, pose_unreachable = 3;
 inline constexpr std::uint8_t pose_ended = 4;  ///< the path of equilibria ends before the whole load
 inline constexpr std::uint8_t pose_slow = 5;   ///< to be looked at patiently, together with others
+inline constexpr std::uint8_t pose_heavy = 6;  ///< the same, but closed: its load is what takes long
 
 /// Row-major answers; null: not wanted. `done`: how the pose left the kernels.
 struct KernelOutput {

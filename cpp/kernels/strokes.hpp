@@ -6,6 +6,8 @@
 
 namespace stiffmap::kernel {
 
+inline constexpr double stroke_margin = 1e-9;  // of the length or range: next to the border the reference decides
+
 /// A beam: stiffness over powers of its length.
 inline M beam_stroke(const StrokeProgram& t, const double* K, V u, V (&out)[36]) {
   const V longer = 1.0 + t.rate / t.length * (u - t.at);
@@ -57,6 +59,23 @@ inline M set_strokes(const Program& P, Scratch& s) {
     known &= t.count ? table_stroke(P, t, u, K) : beam_stroke(t, P.ops[t.op].K, u, K);
   }
   return known;
+}
+
+/// Lanes that command a stroke beyond what is declared, and not by round-off: such a ram is not there.
+[[gnu::noinline]] inline M beyond_strokes(const Program& P, const Scratch& s) {
+  M no{};
+  for (int i = 0; i < P.stroke_count; ++i) {
+    const StrokeProgram& t = P.strokes[i];
+    const V u = s.closed[t.coordinate];
+    if (t.count == 0) {
+      no |= 1.0 + t.rate / t.length * (u - t.at) < -stroke_margin;
+      continue;
+    }
+    const double low = P.stroke_rows[stroke_row * t.first], high = P.stroke_rows[stroke_row * (t.first + t.count - 1)];
+    const double margin = t.slack + stroke_margin * (high - low);
+    no |= (u < low - margin) | (u > high + margin);
+  }
+  return no;
 }
 
 }  // namespace stiffmap::kernel

@@ -65,9 +65,9 @@ class Reference {
   }
 
   /// What is said of a pose that the kernels found out of reach.
-  void unreachable(const Mechanism& m, const BatchInput& in, Index i, const BatchOutput& out) {
+  void unreachable(const Mechanism& m, const BatchInput& in, Index i, std::uint32_t flags, const BatchOutput& out) {
     prepare(m, in);
-    result_.flags = 0;
+    result_.flags = flags;
     result_.iterations = 0;
     result_.indeterminate.assign(at(m.size()), false);
     fail_pose(m, pose_, Status::unreachable, result_);
@@ -196,12 +196,14 @@ class FastBatch {
     kernels(in_.count, fast_chunk, nullptr);
     std::vector<std::int64_t> left;
     const auto collect = [&](auto&& wanted) {
-      left.clear();
       for (Index i = 0; i < in_.count; ++i)
         if (wanted(done_[at(i)])) left.push_back(i);
     };
+    // Side by side with their like: those that don't close yet, then those whose load is followed.
     collect([](std::uint8_t how) { return how == pose_slow; });
+    collect([](std::uint8_t how) { return how == pose_heavy; });
     if (!left.empty()) kernels(static_cast<Index>(left.size()), patient_chunk, left.data());
+    left.clear();
     collect([](std::uint8_t how) { return how == pose_left || how == pose_ended; });
     parallel_chunks(static_cast<long>(left.size()), 1, threads_, [&](int thread, long begin, long end) {
       for (long k = begin; k < end; ++k) {
@@ -264,7 +266,7 @@ class FastBatch {
         const Index i = pose_at(place);
         const std::uint8_t how = done_[at(i)];
         if (how == pose_solved || how == pose_unstable) complete(i, how);
-        else if (how == pose_unreachable) s.reference.unreachable(m_, in_, i, out_);
+        else if (how == pose_unreachable) s.reference.unreachable(m_, in_, i, flags_[at(i)], out_);
         if (how != pose_solved) forget_variants(i);
       }
     });

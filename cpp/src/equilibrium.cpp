@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace stiffmap {
 namespace {
@@ -18,6 +19,7 @@ constexpr double nothing = 1e-15;  // a step that changes no force
 constexpr double balanced = 1e-9;  // merit of an equilibrium, in unit deflections of the machine's stiffness and length
 constexpr int most_load_steps = 400;
 constexpr int patient_steps = 8;
+constexpr int most_idle = 10;  // Newton steps in which the merit is not halved once: at a singular point each one does
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -104,7 +106,8 @@ void line_search(const Mechanism& m, const Problem& p, EquilibriumWorkspace& ws,
 Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bool cold, bool trusting,
                EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
   const bool knots = has_knots(m);
-  double first = 0, previous = 0;
+  double first = 0, previous = 0, least = std::numeric_limits<double>::infinity();
+  int idle = 0;
   out.contraction = 0;
   p.secant_laws = p.first_order = cold && knots;
   linearize(m, p, state, ws.lin);
@@ -145,6 +148,10 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
     }
     previous = norm;
     const double merit = ws.saddle.merit(ws.lin);
+    idle = merit < 0.5 * least ? 0 : idle + 1;
+    if (merit < 0.5 * least) least = merit;
+    const bool last_attempt = !trusting && !knots && opt.load_steps == 0;
+    if (last_attempt && idle > most_idle && !in_balance(m, ws)) return Outcome::failed;  // it wanders
     ws.before = state;
     state.z += ws.dz;
     state.lambda += ws.dlambda;

@@ -45,6 +45,7 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
     for (const auto& [a, tau] : law.knots())
       for (double v : {a, tau, a + tau / law.stiffness()}) d.knots.push_back(v);
     d.program.starts_linear |= law.has_knots() || law.friction() != 0;
+    d.program.hardens |= law.cubic() > 0;
   }
   for (const Coordinate& c : m.coordinates) {
     const Index j = static_cast<Index>(&c - m.coordinates.data());

@@ -92,6 +92,7 @@ def test_displacements_alone_under_gravity(effects: list[Effect]) -> None:
         ("rotary-delta", ("joint_compliance", {"element": "rod", "translation": 1e-9, "rotation": 1e-7})),
         ("five-bar", ("hardening", {"element": "motor", "cubic": 1e13})),
         ("ur10", ("hardening", {"element": "elbow", "cubic": 1e13})),
+        ("orthoglide-revised", ("joint_clearance", {"element": "bar", "radius": 1e-5})),
     ],
 )
 def test_soft_and_stiff_parts_stay_in_the_kernels(name: str, effect: Effect) -> None:
@@ -99,6 +100,16 @@ def test_soft_and_stiff_parts_stay_in_the_kernels(name: str, effect: Effect) -> 
     position, wrench = draw(machine, 40, seed=24)
     assert machine.solve(position, wrench).reference_share == 0
     found = gap(machine, position[:10], wrench[:10])
+    assert found.statuses == 0
+    assert found.worst() < TOLERANCE
+
+
+@pytest.mark.parametrize("name", ["ur10", "rotary-delta"])
+def test_the_slope_of_a_stiff_law_is_that_of_the_answer(name: str) -> None:
+    machine = sm.load_machine(name)
+    for drive in {"ur10": ("base", "shoulder", "elbow"), "rotary-delta": ("motor",)}[name]:
+        machine = machine.with_effect("hardening", element=drive, cubic=1e13)
+    found = gap(machine, *draw(machine, 24, seed=30))
     assert found.statuses == 0
     assert found.worst() < TOLERANCE
 
