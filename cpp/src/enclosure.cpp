@@ -345,9 +345,11 @@ void Encloser::enclose(const Mechanism& m, const Frames& frames, const VecX& x, 
     const Vec3& p = frames.at(watched[i]).p;
     const auto& path = m.path[at(watched[i])];
     double moved = 0;
-    for (auto j = path.rbegin(); j != path.rend(); ++j)
+    for (auto j = path.rbegin(); j != path.rend(); ++j) {
+      if (full[*j] == 0) continue;  // springs: their axes are not in the frames
       moved +=
           turns(m, *j) ? full[*j] * (frames.axis.col(*j).cross(p - frames.origin.col(*j)).norm() + moved) : full[*j];
+    }
     out.moved[static_cast<Index>(i)] = moved;
   }
   out.enclosed = true;

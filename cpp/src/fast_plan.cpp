@@ -135,7 +135,8 @@ void link(const Mechanism& m, FastPlanData& d) {
 
 }  // namespace
 
-FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high) : data_(std::make_unique<FastPlanData>()) {
+FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int grid_nodes)
+    : data_(std::make_unique<FastPlanData>()) {
   for (const NodeSpring& s : m.external_springs) {
     if (s.node != m.tip) missing_ = "external springs that are not at the tip";
     data_->springs.push_back({{s.offset[0], s.offset[1], s.offset[2]},
@@ -163,7 +164,7 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high) : data
   for (int i = 0; i < 9; ++i) p.home_R[i] = m.home.R(i % 3, i / 3);
   p.open_task = m.task != full_task;
   p.closes = leg_by_leg && (box || p.planar) ? 1 : whole ? 2 : 0;
-  if (p.closes && !p.planar) place_grid(m, low, high, *data_);
+  if (p.closes && !p.planar) place_grid(m, low, high, grid_nodes, *data_);
 }
 
 bool FastPlan::nearest_start(const Mechanism& m, const Vec3& position, VecX& x, Pose& at) const {

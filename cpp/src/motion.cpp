@@ -298,6 +298,14 @@ bool PoseCloser::newton(const Mechanism& m, const Pose& pose, VecX& x) {
   return error < closed;
 }
 
+double PoseCloser::pivot(const Mechanism& m, const Pose& pose) {
+  normal(m, pose);
+  llt_.compute(N_);
+  if (llt_.info() != Eigen::Success) return 0;
+  const auto pivots = llt_.matrixLLT().diagonal();
+  return pivots.minCoeff() / pivots.maxCoeff();
+}
+
 /// Straight continuation from home.
 bool PoseCloser::from_home(const Mechanism& m, const Pose& pose, VecX& x) {
   x = m.home_coordinates;

@@ -38,13 +38,13 @@ void bind_mechanism(py::module_& m) {
   using namespace py::literals;
   py::class_<Mechanism> mechanism(m, "Mechanism");  // before the signatures that name it
   py::class_<FastPlan>(m, "FastPlan")
-      .def(py::init([](const Mechanism& k, const Array& low, const Array& high) {
+      .def(py::init([](const Mechanism& k, const Array& low, const Array& high, int grid_nodes) {
              const Vec3 a = Eigen::Map<const Vec3>(data(low, {3}, "low")),
                         b = Eigen::Map<const Vec3>(data(high, {3}, "high"));
              py::gil_scoped_release free;
-             return std::make_unique<FastPlan>(k, a, b);
+             return std::make_unique<FastPlan>(k, a, b, grid_nodes);
            }),
-           "mechanism"_a, "low"_a, "high"_a)
+           "mechanism"_a, "low"_a, "high"_a, "grid_nodes"_a = 8)
       .def_property_readonly("available", &FastPlan::available)
       .def_property_readonly("missing", &FastPlan::missing);
   // Raised with the words of the core, and the gaps as numbers: (message, declared, closest).

@@ -107,7 +107,7 @@ class Mechanism:
     def stiffness(self) -> float:
         ...
 class FastPlan:
-    def __init__(self, mechanism: Mechanism, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+    def __init__(self, mechanism: Mechanism, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], grid_nodes: typing.SupportsInt | typing.SupportsIndex = 8) -> None:
         ...
     @property
     def available(self) -> bool:

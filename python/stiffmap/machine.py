@@ -37,9 +37,12 @@ class Machine:
     Pickles, compares by its description, and may be shared by threads.
     """
 
-    def __init__(self, description: MachineDescription) -> None:
+    def __init__(self, description: MachineDescription, *, start_nodes: int = 8) -> None:
+        """`start_nodes`: closures prepared along each edge of the workspace; fewer for a machine with few calls."""
         self._description = description
-        self._compiled = CompiledMachine(description)  # refuses an impossible machine when it is made
+        self._compiled = CompiledMachine(
+            description, start_nodes
+        )  # refuses an impossible machine when it is made
 
     @property
     def description(self) -> MachineDescription:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import NamedTuple
 
 LENGTHS = {
@@ -63,6 +64,15 @@ MODULUS = Dimension(force=1, length=-2)
 BENDING = Dimension(force=1, length=2)
 
 
+@lru_cache
+def _scale(length: str, force: str, mass: str, dimension: Dimension) -> Fraction:
+    return (
+        LENGTHS[length] ** dimension.length
+        * FORCES[force] ** dimension.force
+        * MASSES[mass] ** dimension.mass
+    )
+
+
 @dataclass(frozen=True)
 class UnitSystem:
     """The units that a file declares once; derived units follow from them."""
@@ -74,11 +84,7 @@ class UnitSystem:
 
     def to_si(self, value: float, dimension: Dimension) -> float:
         """SI value of ``value``, rounded once: 775 mm is the double nearest to 0.775 m."""
-        scale = (
-            LENGTHS[self.length] ** dimension.length
-            * FORCES[self.force] ** dimension.force
-            * MASSES[self.mass] ** dimension.mass
-        )
+        scale = _scale(self.length, self.force, self.mass, dimension)
         # repr gives the decimal number that was written, so that no binary rounding enters twice
         result = value if scale == 1 else float(Fraction(repr(float(value))) * scale)
         if self.angle == "deg" and dimension.angle:

@@ -16,8 +16,9 @@ struct FastPlanData;
 /// Immutable and shared by all threads. `missing` says why a mechanism has to take the reference path.
 class FastPlan {
  public:
-  /// `low`, `high`: box of tip positions where poses are expected; empty: none is known.
-  FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high);
+  /// `low`, `high`: box of tip positions where poses are expected; empty: none is known. `grid_nodes`: along each edge
+  /// of it closures are prepared as starts.
+  FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int grid_nodes = 8);
   ~FastPlan();
   FastPlan(const FastPlan&) = delete;
   FastPlan& operator=(const FastPlan&) = delete;

@@ -85,6 +85,8 @@ class PoseCloser {
   /// a pose that a straight continuation from home does not reach counts as out of reach.
   ClosureResult close(const Mechanism& m, const Pose& pose, VecX& x, bool patient = true);
   const Frames& frames() const { return ws_.frames; }
+  /// Of the equations at the closed pose: the smallest pivot relative to the largest, unpivoted.
+  double pivot(const Mechanism& m, const Pose& pose);
 
  private:
   bool newton(const Mechanism& m, const Pose& pose, VecX& x);

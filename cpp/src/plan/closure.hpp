@@ -22,6 +22,6 @@ void bound_reach(const Mechanism& m, FastPlanData& out);
 void recognise_planar_legs(const Mechanism& m, FastPlanData& out);
 
 /// Closed configurations on a grid over a box of tip positions.
-void place_grid(const Mechanism& m, const Vec3& low, const Vec3& high, FastPlanData& out);
+void place_grid(const Mechanism& m, const Vec3& low, const Vec3& high, int grid_nodes, FastPlanData& out);
 
 }  // namespace stiffmap

@@ -5,13 +5,14 @@
 
 #include "closure.hpp"
 #include "stiffmap/closure.hpp"
+#include "stiffmap/motion.hpp"
 #include "stiffmap/parallel.hpp"
 
 namespace stiffmap {
 namespace {
 
-constexpr int grid_nodes = 8;
 constexpr std::size_t cached_grids = 32;
+constexpr double sound = 0.05;  // least pivot of a node that is far from singular
 
 /// Everything that the nominal closure depends on, as a key: joints and the constant transforms between
 /// them. Springs, weights and errors are left out, so that variants of one machine share their grid.
@@ -84,6 +85,7 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
   auto grid = std::make_shared<std::vector<double>>(nodes * row, 0.0);
   std::vector<VecX> x(nodes);
   ClosureWorkspace ws(m);
+  PoseCloser quick(m);
   for (int k = 0; k < p.grid_n[2]; ++k)
     for (int j = 0; j < p.grid_n[1]; ++j)
       for (int i = 0; i < p.grid_n[0]; ++i) {
@@ -105,6 +107,14 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
         double* const unknowns = grid->data() + node * row;
         std::fill_n(unknowns, d.unknowns.size(), std::nan(""));
         VecX found = VecX::Zero(m.size());
+        if (from) found = *from;
+        else found.setConstant(std::nan(""));
+        if (quick.close(m, pose, found, false).status == Status::converged && quick.pivot(m, pose) > sound) {
+          x[node] = found;
+          for (std::size_t u = 0; u < d.unknowns.size(); ++u) unknowns[u] = found[d.unknowns[u]];
+          continue;
+        }
+        found.setZero();
         ClosureResult r =
             from ? inverse_closure(m, pose, ws, found, *from, start) : inverse_closure(m, pose, ws, found);
         if (from && (r.status != Status::converged || r.flags & flag::branch_unverified))
@@ -125,7 +135,7 @@ std::shared_ptr<const std::vector<double>> grid_of(const Mechanism& m, const Fas
 
 }  // namespace
 
-void place_grid(const Mechanism& m, const Vec3& low, const Vec3& high, FastPlanData& d) {
+void place_grid(const Mechanism& m, const Vec3& low, const Vec3& high, int grid_nodes, FastPlanData& d) {
   Program& p = d.program;
   for (int c = 0; c < 3; ++c) {
     const double size = high[c] - low[c];

@@ -117,11 +117,14 @@ def as_table(found: xr.Dataset) -> Table:
     turns = found.attrs["revolute"]
     table = Table(
         box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
         title=f"{found.attrs['machine']}: {span:.4g} s; peaks; share of the declared limit",
     )
-    heads = ("drive", "unit", "effort", "share", "rms", "speed", "share", "power, W", "")
+    heads = ("drive", "unit", "effort", "share", "rms", "speed", "share", "power, W", "limit")
     for head in heads:
-        table.add_column(head, no_wrap=True, justify="left" if head in ("drive", "unit", "") else "right")
+        table.add_column(
+            head, no_wrap=True, justify="left" if head in ("drive", "unit", "limit") else "right"
+        )
     over = exceeded(found)
     for i, drive in enumerate(found.drive.values):
         at = found.isel(drive=i)
@@ -134,7 +137,7 @@ def as_table(found: xr.Dataset) -> Table:
             f"{float(at.peak_speed):.4g}",
             _share(at.peak_speed, at.speed_margin),
             f"{float(at.peak_power):.4g}",
-            "[red]exceeded[/red]" if over[i] else "",
+            "[red]over[/red]" if over[i] else "",
         )
     return table
 

@@ -25,8 +25,9 @@ class CompiledMachine:
     and check before they call. Immutable; may be shared by threads.
     """
 
-    def __init__(self, description: MachineDescription) -> None:
+    def __init__(self, description: MachineDescription, start_nodes: int = 8) -> None:
         self.description = description
+        self._start_nodes = start_nodes
         self._mechanism = build_mechanism(description)
 
     @cached_property
@@ -59,7 +60,7 @@ class CompiledMachine:
     def _plan(self) -> _core.FastPlan:
         box = self.description.workspace
         low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))
-        return _core.FastPlan(self._mechanism, np.array(low), np.array(high))
+        return _core.FastPlan(self._mechanism, np.array(low), np.array(high), self._start_nodes)
 
     @cached_property
     def _one(self) -> _core.OneCall:

@@ -6,6 +6,7 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 from stiffmap.errors import StiffmapError
 
@@ -23,11 +24,16 @@ def evaluate(text: str | float | int, names: Mapping[str, float]) -> float:
     if isinstance(text, int | float):
         return float(text)
     try:
-        return float(_value(ast.parse(text, mode="eval").body, names))
+        return float(_value(_parsed(text), names))
     except (SyntaxError, TypeError, ArithmeticError, ValueError) as error:
         if isinstance(error, StiffmapError):
             raise
         raise StiffmapError(f"cannot evaluate '{text}': {error}") from None
+
+
+@lru_cache(maxsize=4096)
+def _parsed(text: str) -> ast.expr:
+    return ast.parse(text, mode="eval").body
 
 
 def _value(node: ast.expr, names: Mapping[str, float]) -> float:

@@ -47,7 +47,7 @@ def judge(design: Design, x: Floats) -> Judged:
 
 
 def _values(design: Design, x: Floats, names: list[str]) -> dict[str, float]:
-    machine = design.machine(x)
+    machine = design.quick_machine(x)
     task = design.requirements
     low, high = read_box(machine, None)
     if task.box is not None:

@@ -36,6 +36,15 @@ def put(data: Any, place: str, value: float) -> None:
         holder[key] = value
 
 
+def indices(data: Any, place: str) -> tuple[str | int, ...]:
+    """The place as keys and numbers alone; StiffmapError names the step that is not there."""
+    at, out = data, list[str | int]()
+    for step in steps(place):
+        out.append(_key(at, step, place))
+        at = at[out[-1]]
+    return tuple(out)
+
+
 def _holder(data: Any, place: str) -> tuple[Any, Any]:
     at, path = data, steps(place)
     for i, step in enumerate(path):

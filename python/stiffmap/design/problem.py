@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from stiffmap.broadcasting import Floats
+from stiffmap.design.editing import Editor
 from stiffmap.design.expressions import evaluate
 from stiffmap.design.places import put
 from stiffmap.errors import FileError, StiffmapError
@@ -24,6 +26,9 @@ from stiffmap.performance.quantities import quantity
 from stiffmap.performance.registry import all_measures, get_measure
 from stiffmap.performance.requirements import Bound, Requirements, load_requirements
 from stiffmap.yaml_text import Document, read
+
+START_NODES = 3
+"""Of a machine that is asked for a few hundred poses once."""
 
 
 class VariableModel(FileModel):
@@ -112,6 +117,19 @@ class Design:
         for place, text in self.model.numbers.items():
             put(data, place, evaluate(text, names))
         return data
+
+    def quick_machine(self, x: Floats) -> Machine:
+        """As `machine`, several times as quick; uncertainties and notes are those of the machine file."""
+        if not self._editor.can:
+            return self.machine(x)
+        names = self.names(x)
+        values = {place: evaluate(text, names) for place, text in self.model.numbers.items()}
+        return Machine(self._editor.description(values), start_nodes=START_NODES)
+
+    @cached_property
+    def _editor(self) -> Editor:
+        document = Document(_unshared(self.document.data), self.document.lines)
+        return Editor(document, self.machine_file, list(self.model.numbers))
 
     def machine(self, x: Floats) -> Machine:
         """The machine of a vector of variables; StiffmapError where it cannot be."""

@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from stiffmap.broadcasting import Floats, thread_count
 from stiffmap.description.machine import TASK
@@ -21,6 +22,10 @@ from stiffmap.status import Status
 
 UNLIMITED = 1e299
 BOX = np.array(list(product((-1.0, 1.0), repeat=3)))
+
+
+KNOWN = 4000
+"""Closed poses that are kept as starts, about."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +75,8 @@ class Bounds:
     """N, plane, m: force in its worst direction there, and the largest deflection."""
     threads: int | None = None
     counter: list[int] = field(default_factory=lambda: [0])
+    known: list[tuple[Floats, Floats, cKDTree]] = field(default_factory=list)
+    """Positions and coordinates of poses that were closed, as starts for others: none or one entry."""
 
     def __post_init__(self) -> None:
         if self.transmission is not None:
@@ -111,17 +118,35 @@ class Bounds:
     def at(self, position: Floats) -> tuple[NDArray[np.bool_], list[Limit]]:
         """Which poses (n, 3) close, and the limits there."""
         self.counter[0] += len(position)
-        k = drive_kinematics(self.machine, position, self.rotation, patient=False, threads=self.threads)
+        k = self._closed(position)
         closed = k.status == Status.CONVERGED
         limits: list[Limit] = []
         if self.transmission is not None:
             limits.extend(self._factors(k, closed))
-        limits.extend(self._intervals(k.coordinates))
+        limits.extend(self.intervals(k.coordinates))
         if self.clearance is not None:
             limits.append(self._clearance(k))
         if self.deflection is not None:
             limits.append(self._deflection(position, closed))
         return closed, limits
+
+    def _closed(self, position: Floats) -> DriveKinematics:
+        """Kinematics at poses, begun at the nearest pose that was closed before."""
+        start = None
+        if self.known:
+            _, coordinates, tree = self.known[0]
+            start = coordinates[tree.query(position)[1]]
+        k = drive_kinematics(
+            self.machine, position, self.rotation, start=start, patient=False, threads=self.threads
+        )
+        good = k.status == Status.CONVERGED
+        if good.any() and (not self.known or len(self.known[0][0]) < KNOWN):
+            new, there = position[good], k.coordinates[good]
+            if self.known:
+                new = np.concatenate([self.known[0][0], new])
+                there = np.concatenate([self.known[0][1], there])
+            self.known[:] = [(new, there, cKDTree(new))]
+        return k
 
     def inside(self, position: Floats) -> NDArray[np.bool_]:
         """Which poses (n, 3) close and keep all limits."""
@@ -157,7 +182,8 @@ class Bounds:
     def _coordinates(self) -> list[tuple[int, str, float, float]]:
         return _coordinate_limits(self.machine, self.ranges, self.joints)
 
-    def _intervals(self, x: Floats) -> list[Limit]:
+    def intervals(self, x: Floats) -> list[Limit]:
+        """Ranges of drives and limits of joints at coordinates (n, coordinates)."""
         out = []
         for index, name, low, high in self._coordinates:
             for sign, most in ((1.0, high), (-1.0, -low)):

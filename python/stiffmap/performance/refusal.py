@@ -18,7 +18,7 @@ STEPS = 24
 def refuse_failed(machine: Machine, k: DriveKinematics, time: Floats | None, position: Floats) -> None:
     """StiffmapError with place and time of the first pose of a motion that cannot be; between two samples it is
     sought by halving."""
-    failed = (k.status != Status.CONVERGED) | _crossed(k.jacobian) | _jumped(k)
+    failed = (k.status != Status.CONVERGED) | _crossed(k.jacobian)
     if not failed.any():
         return
     i = int(np.argmax(failed))
@@ -44,15 +44,6 @@ def _between(machine: Machine, k: DriveKinematics, position: Floats, i: int) -> 
         else:
             low, start = middle, there.coordinates
     return 1 - high, a + high * (b - a)
-
-
-def _jumped(k: DriveKinematics) -> NDArray[np.bool_]:
-    """(n,) where the drives went another way than the tool: another configuration, with a singularity between."""
-    j = (k.jacobian[1:, :3] + k.jacobian[:-1, :3]) / 2
-    way, moved = np.diff(k.position, axis=0), np.diff(k.actuators, axis=0)
-    off = np.linalg.norm(way - (j @ moved[..., None])[..., 0], axis=1)
-    with np.errstate(invalid="ignore"):
-        return np.concatenate([[False], off > np.linalg.norm(way, axis=1) + 1e-9])
 
 
 def _crossed(jacobian: Floats) -> NDArray[np.bool_]:

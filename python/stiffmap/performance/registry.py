@@ -14,9 +14,11 @@ from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.performance import kinds
-from stiffmap.performance.closing import DriveKinematics, drive_kinematics
+from stiffmap.performance.closing import DriveKinematics, drive_kinematics, kernel_starts
 from stiffmap.performance.poses import box_nodes
 from stiffmap.performance.velocity import VelocityTransmission, transmission_of
+from stiffmap.performance.zonotopes import inverse_rows
+from stiffmap.solution import Solution
 
 
 @dataclass(eq=False)
@@ -53,12 +55,30 @@ class Case:
     @cached_property
     def kinematics(self) -> DriveKinematics:
         """At `positions`."""
-        return drive_kinematics(self.machine, self.positions, self.rotation, threads=self.threads)
+        if self.quick:
+            start = None if self.machine.fast else self.still.coordinates
+        else:
+            start = kernel_starts(self.machine, self.positions, self.rotation, self.threads)
+        return drive_kinematics(
+            self.machine, self.positions, self.rotation, start=start, threads=self.threads
+        )
+
+    @cached_property
+    def still(self) -> Solution:
+        """Unloaded equilibria with their compliance at `positions`, no gravity."""
+        return self.machine.solve(
+            self.positions, rotation=self.rotation, gravity=np.zeros(3), threads=self.threads
+        )
 
     @cached_property
     def factors(self) -> VelocityTransmission:
         """Velocity transmission at `positions`."""
-        return transmission_of(self.machine, self.kinematics, length=self.length)
+        return transmission_of(self.machine, self.kinematics, length=self.length, inverse=self.inverse)
+
+    @cached_property
+    def inverse(self) -> Floats:
+        """(nodes³, drives, 6) rates of the drives per twist of the tool, at `positions`."""
+        return inverse_rows(self.kinematics.jacobian)
 
     @cached_property
     def coarse_kinematics(self) -> DriveKinematics:

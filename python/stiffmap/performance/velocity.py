@@ -12,8 +12,8 @@ from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.inputs import plane_axes
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.polygons import Polygon, section_polygon
-from stiffmap.performance.scaling import characteristic_length, drive_values, weighted
-from stiffmap.performance.zonotopes import farthest_vertex, inscribed_sphere, inverse_rows, inverse_rows_limit
+from stiffmap.performance.scaling import characteristic_length, drive_values, mixes_units, weighted
+from stiffmap.performance.zonotopes import farthest_vertex, inscribed_sphere, inverse_rows, rows_limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +84,9 @@ def transmission_of(
     length: float | None = None,
     limits: ArrayLike | str = "unit",
     part: str = "all",
+    inverse: Floats | None = None,
 ) -> VelocityTransmission:
-    """The same from kinematics that are at hand."""
+    """The same from kinematics that are at hand, and perhaps the inverse (..., drives, 6) of their Jacobian."""
     unit = isinstance(limits, str) and limits == "unit"
     given = np.ones(()) if unit else None if isinstance(limits, str) and limits == "declared" else limits
     speeds = drive_values(machine, "speed", given, "m/s or rad/s")
@@ -95,15 +96,22 @@ def transmission_of(
     s = singular_values(j)
     low, high = s[..., -1], s[..., 0]
     if part == "all":
-        slowest = inverse_rows_limit(j, speeds)
+        same = inverse is not None and not mixes_units(machine) and _translates(k.jacobian)
+        slowest = rows_limit(inverse if same and inverse is not None else inverse_rows(j), speeds)
     else:
-        slowest = inscribed_sphere(driven) if part == "translation" else inverse_rows_limit(j, speeds)
+        slowest = inscribed_sphere(driven) if part == "translation" else rows_limit(inverse_rows(j), speeds)
     with np.errstate(invalid="ignore", divide="ignore"):
         return VelocityTransmission(
             sphere_min=low, sphere_max=high, cube_min=slowest, cube_max=farthest_vertex(driven),
             condition=high / low, dexterity=low / high, manipulability=np.prod(s, axis=-1),
             jacobian=k.jacobian, length=size, limits=speeds, status=k.status, flags=k.flags,
         )  # fmt: skip
+
+
+def _translates(jacobian: Floats) -> bool:
+    """Whether the platform turns nowhere, so that weights of rotations change nothing."""
+    turning, moving = (np.abs(jacobian[..., rows, :]) for rows in (slice(3, 6), slice(3)))
+    return bool(np.nanmax(turning, initial=0.0) <= 1e-13 * np.nanmax(moving, initial=0.0))
 
 
 def singular_values(j: Floats) -> Floats:

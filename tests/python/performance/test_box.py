@@ -196,3 +196,18 @@ def test_a_box_is_turned_to_where_it_fits():
 def test_bad_input(options, words):
     with pytest.raises(sm.StiffmapError, match=words):
         sm.largest_box(sm.load_machine("orthoglide-revised"), **options)
+
+
+def test_what_is_proven_of_bars_depends_on_no_thread():
+    machine = sm.load_machine("orthoglide-revised")
+    bars = Bounds(machine, clearance=0.07).bars
+    p = np.random.default_rng(3).uniform(*machine.workspace, (30, 3))
+    one, *more = (
+        machine.compiled.enclose(
+            p, np.full((30, 3), 5e-4), np.eye(3), np.eye(3), slopes=3, watched=bars.nodes, threads=n
+        )["moved"]
+        for n in (1, 2, 2, 2, 2)
+    )
+    assert np.isfinite(one).all()
+    for other in more:
+        np.testing.assert_allclose(other, one, rtol=1e-6)

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -123,3 +127,52 @@ def test_the_shipped_redesign_starts_from_a_sound_machine():
     low, high = design.bounds
     judged = judge(design, (low + high) / 2)
     assert not judged.reason and np.isfinite(judged.violations).all()
+
+
+@pytest.mark.parametrize("name", ["redesign", "small"])
+def test_quick_machines_are_those_of_the_file(tmp_path, name):
+    """Only the elements that change are built again; every number comes out as from the whole file."""
+    design = load_design(name if name == "redesign" else write(tmp_path))
+    low, high = design.bounds
+    assert design._editor.can
+    for x in np.random.default_rng(2).uniform(low, high, (4, len(low))):
+        whole, quick = design.machine(x).description, design.quick_machine(x).description
+        bare = {"uncertainty": (), "notes": ()}
+        assert replace(whole, **bare) == replace(quick, **bare)
+
+
+def test_quick_judgement_is_that_of_the_full_measures():
+    """At the same nodes: factors, speed and force alike; the deflection in its worst direction."""
+    design = load_design("redesign")
+    low, high = design.bounds
+    x = (low + high) / 2
+    quick = judge(design, x).values
+    n = design.model.search.nodes
+    full = sm.measures(
+        design.machine(x), requirements=design.requirements, nodes=n, coarse=n,
+        only=["velocity", "force", "transmission_min", "transmission_max", "mass", "footprint"],
+    )  # fmt: skip
+    for row in full.rows:
+        assert quick[row.measure.name] == pytest.approx(row.found.worst, rel=1e-9), row.measure.name
+    d = sm.worst_deflection(
+        design.machine(x), box=[full.case.low, full.case.high], force=300.0, nodes=n, refine=False
+    )
+    assert quick["deflection"] == pytest.approx(d.value, rel=2e-3)
+
+
+def test_a_search_that_is_killed_goes_on(tmp_path):
+    """SIGKILL in the middle: the same command ends with the set of a search that was left alone."""
+    path = write(tmp_path, FILE.replace("generations: 3", "generations: 6"))
+    code = f"from stiffmap.design import optimize; optimize({str(path)!r}, folder={str(tmp_path / 'b')!r}, processes=1)"
+    running = subprocess.Popen([sys.executable, "-c", code])
+    kept = tmp_path / "b/evaluations.jsonl"
+    until = time.monotonic() + 120
+    while not (kept.exists() and kept.read_bytes().count(b"\n") > 9):
+        assert running.poll() is None and time.monotonic() < until
+        time.sleep(0.002)
+    running.kill()
+    running.wait()
+    before = kept.read_bytes().count(b"\n")
+    again, whole = optimize(path, folder=tmp_path / "b", processes=1), optimize(path, processes=1)
+    np.testing.assert_array_equal(again.x, whole.x)
+    assert again.history == whole.history and 9 < before <= 1 + 8 * 6

@@ -7,6 +7,7 @@ import numpy as np
 from stiffmap.performance.box import largest_box
 from stiffmap.performance.limits import Bounds
 from stiffmap.performance.registry import Case, Found, Measure
+from stiffmap.status import Status
 
 
 def compute(case: Case) -> Found:
@@ -23,13 +24,12 @@ def compute(case: Case) -> Found:
 
 def concentric(case: Case) -> Found:
     """The largest box about the centre of the case's box whose nodes, and the case's, keep all limits."""
-    bounds = Bounds(
-        case.machine, case.rotation, case.transmission, "sphere", case.length, threads=case.threads
-    )
-    closed, limits = bounds.at(case.positions)
-    good = closed.copy()
-    for limit in limits:
-        good &= limit.value <= limit.most
+    k, v = case.kinematics, case.factors
+    good = k.status == Status.CONVERGED
+    with np.errstate(invalid="ignore"):
+        good &= (v.sphere_min >= case.transmission[0]) & (v.sphere_max <= case.transmission[1])
+        for limit in Bounds(case.machine, transmission=None).intervals(k.coordinates):
+            good &= limit.value <= limit.most
     centre, half = (case.low + case.high) / 2, (case.high - case.low) / 2
     share = (np.abs(case.positions - centre) / half).max(axis=1)
     kept = 1.0 if good.all() else float(share[~good].min())

@@ -6,13 +6,12 @@ from stiffmap.maps.inputs import plane_axes
 from stiffmap.performance.polygons import inner_radius
 from stiffmap.performance.registry import Case, Found, Measure, over_poses
 from stiffmap.performance.scaling import drive_values
-from stiffmap.performance.zonotopes import inverse_rows
 
 
 def compute(case: Case) -> Found:
     """Over all poses of the box, drives within the speeds that the machine file declares."""
     speeds = drive_values(case.machine, "speed", None, "m/s or rad/s")
-    rates = inverse_rows(case.kinematics.jacobian)[..., list(plane_axes(case.plane))]
+    rates = case.inverse[..., list(plane_axes(case.plane))]
     return over_poses(case.positions, inner_radius(rates, speeds), "high")
 
 
