@@ -16,7 +16,16 @@ from stiffmap.performance.registry import Measure
 from stiffmap.performance.table import MeasuresTable, Row
 from stiffmap.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, new_figure, paper_style
 
-MAPPED = ("transmission_max", "transmission_min", "velocity", "force", "accuracy", "deflection", "frequency")
+MAPPED = (
+    "transmission_max",
+    "transmission_min",
+    "singularity",
+    "velocity",
+    "force",
+    "accuracy",
+    "deflection",
+    "frequency",
+)
 
 
 def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy") -> Figure:
