@@ -7,10 +7,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
-from stiffmap.calibration.beyond import FREE, _gains
+from stiffmap.calibration.beyond import FREE, _gains, as_factor, beyond_tolerance
 from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.groups import compare
 from stiffmap.calibration.statistics import Sums, directions, independent
+from stiffmap.calibration.unknowns import Unknown
 
 Floats = NDArray[np.float64]
 
@@ -107,3 +108,32 @@ def test_nothing_is_chosen_in_noise() -> None:
     a = rng.standard_normal((300, 12)) * 10.0
     choice = compare(Sums.of(a, rng.standard_normal(300)), {"one": [*range(6)], "two": [*range(6, 12)]})
     assert choice.chosen == ()
+
+
+def test_a_factor_beyond_tolerance_stays_a_factor() -> None:
+    """Readings are linear in a mass: three times it is ln 3 off, less than nothing of it is no explanation."""
+    rng = np.random.default_rng(3)
+    mass = Unknown("mass of link", "masses", "ln", 0.05)
+    own = rng.standard_normal((400, 1))
+    weight = 40.0 * own[:, 0]
+    for times in (3.0, -2.0):
+        reading = weight * (times - 1.0) + rng.standard_normal(400)
+        sums = Sums.of(weight[:, None] * mass.u, reading)
+        found = beyond_tolerance(sums, [mass])
+        if times > 0:
+            (one,) = found.found
+            assert abs(one.value - np.log(times)) < 3 * one.sigma
+            assert one.sigma < 0.01
+            value = sums.scaled(found.factor).estimate * found.factor + found.logarithm
+            assert abs(value[0] * mass.u - np.log(times)) < 0.01
+        else:
+            assert not found.found
+
+
+def test_a_factor_is_told_from_where_its_slope_was_taken() -> None:
+    """At twice the compliance the slope of the logarithm is twice as large: 0.1 more of it is not 10 % of the declared."""
+    c = Unknown("compliance of drive", "drive compliance", "ln", 0.2)
+    at = np.log(2.0) / c.u
+    assert abs(as_factor(c, at, at) - 2.0) < 1e-12
+    assert abs(as_factor(c, at + 0.5, at) - 2.2) < 1e-12
+    assert abs(as_factor(c, 5.0) - 2.0) < 1e-12
