@@ -37,7 +37,7 @@ def expanded(document: Document, file: str) -> Document:
     if not isinstance(templates, dict) or not isinstance(data.get("legs"), dict):
         return document
     with_parameters = {name: t for name, t in templates.items() if isinstance(t, dict)}
-    work = _Expansion(document, file, with_parameters)
+    work = _Expansion(document, file, with_parameters, [str(t) for t in templates])
     legs = {name: work.leg(name, leg) for name, leg in data["legs"].items()}
     if work.problems:
         raise together(work.problems)
@@ -46,8 +46,8 @@ def expanded(document: Document, file: str) -> Document:
 
 
 class _Expansion:
-    def __init__(self, document: Document, file: str, templates: Mapping[str, Any]) -> None:
-        self.document, self.file, self.templates = document, file, templates
+    def __init__(self, document: Document, file: str, templates: Mapping[Any, Any], names: list[str]) -> None:
+        self.document, self.file, self.templates, self.names = document, file, templates, names
         self.lines = dict(document.lines)
         self.problems: list[FileError] = []
         for name, template in templates.items():
@@ -64,12 +64,20 @@ class _Expansion:
                 self._fail(
                     ("templates", name, "parameters"), "expected a mapping of names to numbers or nothing"
                 )
+        self.sound = not self.problems
 
     def leg(self, name: str, leg: Any) -> Any:
         """A leg of the file with its elements written out; other legs as they are."""
-        if not isinstance(leg, dict) or leg.get("template") not in self.templates or self.problems:
+        asked = leg.get("template") if isinstance(leg, dict) else None
+        if not isinstance(asked, str | int) or not self.sound:
             return leg
-        template = self.templates[leg["template"]]
+        if self.templates and str(asked) not in self.names:
+            near = suggestion(str(asked), self.names)
+            there = ", ".join(self.names)
+            self._fail(("legs", name, "template"), f"no template '{asked}'{near}; there are: {there}")
+        if asked not in self.templates:
+            return leg
+        template = self.templates[asked]
         declared = template.get("parameters") or {}
         given = leg.get("with") or {}
         if not isinstance(given, dict):
@@ -85,7 +93,7 @@ class _Expansion:
         if missing:
             self._fail(("legs", name), f"the template needs {', '.join(missing)} under 'with'")
             return leg
-        source: KeyPath = ("templates", leg["template"], "elements")
+        source: KeyPath = ("templates", asked, "elements")
         put = _Substitution(values, lambda path, message: self._fail(source + path, message))
         target: KeyPath = ("legs", name, "elements")
         for path, line in self.document.lines.items():

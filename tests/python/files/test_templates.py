@@ -124,3 +124,15 @@ def test_all_mistakes_of_the_numbers_at_once() -> None:
     assert len(found) == 3 and len({p.line for p in found}) == 3
     assert str(FileErrors(found)).count("\n") == 2
     assert {p.key.split(".")[1] for p in found} == {"a", "b"}
+
+
+def test_all_legs_that_misuse_templates_at_once() -> None:
+    legs = "  a: {template: strut}\n  b: {template: strud}\n  c: {template: strut, with: {tub: 3, mass: 1}}\n"
+    found = problems(TEMPLATE[: TEMPLATE.index("  a: {")] + legs)
+    assert [p.key for p in found] == ["legs.a", "legs.b.template", "legs.c.with.tub"]
+    assert "no template 'strud' (did you mean 'strut'?); there are: strut" in found[1].reason
+
+
+def test_a_template_is_named_by_a_word() -> None:
+    (found,) = problems(TEMPLATE.replace("a: {template: strut,", "a: {template: [strut],"))
+    assert found.key == "legs.a.template" and "expected text" in found.reason

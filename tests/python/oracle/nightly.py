@@ -1,7 +1,7 @@
 """Thousands of random machines against energy minimisation: numbers, and every status against the eigenvalues of the
 energy's Hessian over the motions that keep the loops closed.
 
-usage: python -m tests.python.oracle.nightly --count 1000 [--first 0]
+usage: python -m tests.python.oracle.nightly --count 1000 [--first 0] [--only "spinning rods"]
 """
 
 from __future__ import annotations
@@ -9,10 +9,12 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
+from collections.abc import Sequence
 
 from stiffmap import Flag, Status
 
 from .compare import Comparison, compare
+from .generate import Generator
 
 LIMIT = 1e-8
 OFF = 1e-8  # m, rad: from the core's coordinates to the equilibrium
@@ -27,10 +29,14 @@ def main() -> int:
     options.add_argument("--count", type=int, default=100)
     options.add_argument("--first", type=int, default=0)
     options.add_argument("--every", type=int, default=250, help="machines between two lines of progress")
+    options.add_argument("--only", default="", help="machines of this name among the seeds")
     given = options.parse_args()
+    seeds: Sequence[int] = range(given.first, given.first + given.count)
+    if given.only:
+        seeds = [seed for seed in seeds if Generator(seed).machine().name == given.only]
     states: Counter[str] = Counter()
     bad, worst = 0, 0.0
-    for done, seed in enumerate(range(given.first, given.first + given.count), 1):
+    for done, seed in enumerate(seeds, 1):
         for c in compare(seed):
             states[
                 f"{c.truth}{' beyond a bifurcation' if c.crossed else ''}: {c.status.name}"
@@ -42,7 +48,7 @@ def main() -> int:
                 print(f"seed {seed}: {wrong}: {c}", flush=True)
             elif c.truth == "found" and not c.told:
                 worst = max(worst, c.gap)
-        if done % given.every == 0 or done == given.count:
+        if done % given.every == 0 or done == len(seeds):
             print(
                 f"{done} machines by both paths, {dict(states)}, worst {worst:.1e}, {bad} disagree",
                 flush=True,
