@@ -130,7 +130,8 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
     }
     if (first > 0 && out.contraction == 0) out.contraction = norm / first;
     // A short step may still cross a corner, after which the force is another: two in a row do not.
-    const bool settled = norm < opt.tolerance && (!knots || norm < nothing || (previous > 0 && previous < opt.tolerance));
+    const bool settled =
+        norm < opt.tolerance && (!knots || norm < nothing || (previous > 0 && previous < opt.tolerance));
     if (settled) {
       if (knots && !ws.saddle.regular() && leave_gaps(m, p, ws.lin, state)) {
         linearize(m, p, state, ws.lin);
