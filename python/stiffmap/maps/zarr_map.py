@@ -110,6 +110,8 @@ class ZarrMap:
         """
         refuse_another_map(self.folder, self._kept_attributes(), self.plan.attrs)
         self._mend_frame()
+        for scrap in self.folder.rglob("*.partial"):  # chunks that zarr had not put in their place
+            scrap.unlink()
         for line, entry in entries(self.folder / JOURNAL):
             index, checks = self._checksums(line, entry)
             for path, value in checks.items():
