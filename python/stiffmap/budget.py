@@ -70,16 +70,16 @@ class DeflectionBudget:
         size = 1e6 * float(np.linalg.norm(self.displacement[:3]))
         lines = [f"{size:.1f} µm at {self.point}, of which"]
         lines += [
-            f"  {100 * s:6.1f} %  {n:<24} ({', '.join(f'{v:.1f}' for v in 1e6 * c[:3])}) µm"
+            f"  {100 * s:z6.1f} %  {n:<24} ({', '.join(f'{v:z.1f}' for v in 1e6 * c[:3])}) µm"
             for n, c, s in self.ranked()
         ]
-        return "\n".join([*lines, f"  {100 * self.rest_share:6.1f} %  of second order"])
+        return "\n".join([*lines, f"  {100 * self.rest_share:z6.1f} %  of second order"])
 
     def _repr_html_(self) -> str:
         """Shares, folded where there are many."""
         size = 1e6 * float(np.linalg.norm(self.displacement[:3]))
         rows = [
-            (n, f"{100 * s:.1f} %", ", ".join(f"{v:.1f}" for v in 1e6 * c[:3])) for n, c, s in self.ranked()
+            (n, f"{100 * s:z.1f} %", ", ".join(f"{v:z.1f}" for v in 1e6 * c[:3])) for n, c, s in self.ranked()
         ]
         return titled(f"{size:.1f} µm at {self.point}", table(("element", "share", "dx, dy, dz, µm"), rows))
 

@@ -25,7 +25,7 @@ class FastPlan {
 
   bool available() const { return missing_.empty(); }
   const std::string& missing() const { return missing_; }
-  /// Under gravity the reference path turns the spins (theory C9).
+  /// Under gravity the reference path turns the spins (theory C10).
   bool heavy_spins() const { return heavy_spins_; }
   const Program& program() const;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Spins that are held (theory C6) although a load turns them: where they come to rest (theory C9).
+// Spins that are held (theory C6) although a load turns them: where they come to rest (theory C10).
 #pragma once
 
 #include "stiffmap/equilibrium.hpp"

@@ -35,9 +35,7 @@ def worst_pose(machine: Machine, ds: Any, gravity: Any) -> dict[str, Any] | None
 
 
 def in_words(worst: dict[str, Any]) -> str:
-    """``worst pose under Fx: (300, 300, -200) mm, 930.1 µm: 57 % z.foot, 20 % z.actuator …``."""
+    """``worst pose under Fx: (300, 300, -200) mm, 930.1 µm in space, of which 57 % z.foot, 20 % z.actuator …``."""
     at = ", ".join(f"{v / MM:.4g}" for v in worst["position"])
     parts = ", ".join(f"{100 * s:.0f} % {n}" for n, s in list(worst["shares"].items())[:NAMED])
-    return (
-        f"worst pose under {worst['case']}: ({at}) mm, {1e6 * worst['deflection']:.1f} µm, of which {parts}"
-    )
+    return f"worst pose under {worst['case']}: ({at}) mm, {1e6 * worst['deflection']:.1f} µm in space, of which {parts}"

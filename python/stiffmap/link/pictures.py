@@ -68,10 +68,10 @@ def _draw_residuals(figure: Any, link: Link, cases: int) -> None:
         axes.quiver(x, y, residual[k, :, a], residual[k, :, b], angles="xy", width=0.005)
         out = link.outliers[k]
         axes.plot(x[out], y[out], "x", color="#D55E00", label="outlier")
-        figure.colorbar(dots, ax=axes, label="residual [µm]", location="bottom")
-        axes.set(title=f"case {k + 1}", xlabel=f"{'xyz'[a]} [mm]", aspect="equal")
+        figure.colorbar(dots, ax=axes, label="residual, µm", location="bottom")
+        axes.set(title=f"case {k + 1}", xlabel=f"{'xyz'[a]}, mm", aspect="equal")
         if k == 0:
-            axes.set_ylabel(f"{'xyz'[b]} [mm]")
+            axes.set_ylabel(f"{'xyz'[b]}, mm")
 
 
 def _draw_shape(axes: Any, part: PartLink, triangles: Ints, case: int) -> None:
@@ -89,8 +89,8 @@ def _draw_shape(axes: Any, part: PartLink, triangles: Ints, case: int) -> None:
     middle = low + 1e3 * np.ptp(p, axis=0) / 2
     for axis, centre, width in zip("xyz", middle, size, strict=True):
         getattr(axes, f"set_{axis}lim")(centre - 0.55 * width, centre + 0.55 * width)
-        getattr(axes, f"set_{axis}label")(f"{axis} [mm]", fontsize=7)
-    axes.set_box_aspect(size, zoom=0.95)
+        getattr(axes, f"set_{axis}label")(f"{axis}, mm", fontsize=7, labelpad=-3)
+    axes.set_box_aspect(size, zoom=0.8)  # room for the labels
     axes.tick_params(labelsize=6)
     for axis, width in zip("xyz", size, strict=True):  # labels of a thin side would overlap
         axes.locator_params(axis=axis, nbins=4 if width > 0.5 * size.max() else 2)

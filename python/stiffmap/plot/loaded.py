@@ -21,6 +21,7 @@ from stiffmap.plot.style import BLUE, MM, ORANGE, headline, legend_below, new_fi
 SHOWN = 0.08
 """Of the machine's extent, how far the tool moves in the picture."""
 MOST_BARS = 10
+FAINT = 5e-4  # share of an element that is not worth a bar
 FORCE = "#C1121F"
 
 
@@ -146,14 +147,15 @@ def draw_budget(ax: Any, budget: DeflectionBudget) -> None:
     """A bar per element, in the direction in which the tool moves."""
     size = 1e6 * float(np.linalg.norm(budget.displacement[:3]))
     ranked = [(n, size * s, s) for n, _, s in budget.ranked()]
-    rest = sum(s for _, _, s in ranked[MOST_BARS:])
-    if len(ranked) > MOST_BARS:
-        ranked = [*ranked[:MOST_BARS], (f"{len(ranked) - MOST_BARS} others", size * rest, rest)]
+    shown = min(MOST_BARS, sum(abs(s) > FAINT for _, _, s in ranked))
+    rest = sum(s for _, _, s in ranked[shown:])
+    if len(ranked) > shown + 1:
+        ranked = [*ranked[:shown], (f"{len(ranked) - shown} others", size * rest, rest)]
     at = np.arange(len(ranked))
     values = [v for _, v, _ in ranked]
     ax.barh(at, values, color=[BLUE if v >= 0 else ORANGE for v in values])
     for i, (_, v, s) in enumerate(ranked):
-        ax.text(max(v, 0), i, f" {v:.1f} µm, {100 * s:.0f} %", va="center", fontsize=7)
+        ax.text(max(v, 0), i, f" {v:z.1f} µm, {100 * s:z.0f} %", va="center", fontsize=7)
     ax.set_yticks(at, [n for n, _, _ in ranked])
     ax.invert_yaxis()
     ax.set_xlim(min(0.0, 1.15 * min(values, default=0)), 1.45 * max(max(values, default=1), 1e-9))

@@ -77,6 +77,7 @@ def look_from(ax: Any, shape: Skeleton, view: tuple[float, float] | None = None)
     flat = bool(points) and float(np.ptp(np.array(points)[:, 2])) < 1e-3
     ax.view_init(*(view or ((90.0, -90.0) if flat else (22.0, 35.0))))
     ax.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
+    ax.locator_params(nbins=5)  # numbers of slanting axes would run into each other
     if flat and view is None:
         ax.set_zlabel("")
         ax.set_zticks([])

@@ -1,4 +1,4 @@
-"""A rod on two ball joints whose centre of mass is off its axis hangs like a pendulum (theory C9)."""
+"""A rod on two ball joints whose centre of mass is off its axis hangs like a pendulum (theory C10)."""
 
 from __future__ import annotations
 

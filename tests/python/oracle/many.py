@@ -1,6 +1,6 @@
 """Solve many random cases and verify every answer by free bodies (`statics`), or see that it is flagged.
 
-    python -m tests.python.oracle.many --count 10000000 [--machine NAME ...] [--out many.jsonl] [--jobs 2]
+    python -m tests.python.oracle.many --count 10000000 [--machine NAME ...] [--out many.jsonl] [--jobs 2] [--batch 2000]
 
 Machines x effects x poses in, on and beyond the workspace x loads from nothing to buckling x load types x gravity. An
 answer CONVERGED must balance to 1e-6 of the largest force in the machine, close to 1e-6 of its size, and have moved its
@@ -74,7 +74,7 @@ class Batch:
     seed: int
 
 
-def batches(machines: list[str], count: int) -> Iterator[Batch]:
+def batches(machines: list[str], count: int, size: int) -> Iterator[Batch]:
     """As many as make `count` solves, machines and effects in turn."""
     made = seed = 0
     while made < count:
@@ -83,7 +83,7 @@ def batches(machines: list[str], count: int) -> Iterator[Batch]:
                 if made >= count:
                     return
                 yield Batch(name, effect, seed)
-                made += BATCH
+                made += size
         seed += 1
 
 
@@ -279,14 +279,15 @@ def main() -> int:
     parser.add_argument("--machine", action="append")
     parser.add_argument("--out", type=Path, default=Path("build/many.jsonl"))
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--batch", type=int, default=BATCH, help="solves of one machine and effect at a time")
     given = parser.parse_args()
     given.out.parent.mkdir(parents=True, exist_ok=True)
     done = [json.loads(line) for line in given.out.read_text().splitlines()] if given.out.exists() else []
     seen = {(r["machine"], r["effect"], r["seed"]) for r in done}
-    todo = [b for b in batches(given.machine or sm.machine_names(), int(given.count))
+    todo = [b for b in batches(given.machine or sm.machine_names(), int(given.count), given.batch)
             if (b.machine, b.effect, b.seed) not in seen]  # fmt: skip
     with ProcessPoolExecutor(given.jobs) as pool, given.out.open("a") as out:
-        for work in as_completed([pool.submit(run, b) for b in todo]):
+        for work in as_completed([pool.submit(run, b, given.batch) for b in todo]):
             result = json.loads(json.dumps(work.result()))
             out.write(json.dumps(result) + "\n")
             out.flush()

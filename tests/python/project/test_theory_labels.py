@@ -34,6 +34,12 @@ def test_cited_labels_are_defined() -> None:
     assert {k: v for k, v in labels.items() if k not in defined()} == {}
 
 
+def test_a_label_is_given_once() -> None:
+    labels = re.findall(r"(?m)^\*\*([A-Z]\d+),", THEORY)
+    assert len(labels) > 25
+    assert [k for k in labels if labels.count(k) > 1] == []
+
+
 def test_named_checks_exist() -> None:
     sources = {
         p.name: p.read_text(encoding="utf-8")
