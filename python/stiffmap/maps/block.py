@@ -27,10 +27,13 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
     if plan.turning:
         directions = even_directions(plan.loading, position, plan.force, plan.axes, plan.directions)
         out["direction_status"] = directions.status.max(axis=1)
+        extremes: dict[str, Floats] = {}
         for suffix, parts in (("", ALL), (f"_{plan.shown_plane}", plan.axes)):
             values, status = _extremes(plan, position, directions, parts, suffix)
-            out |= values
+            extremes |= values
             out["direction_status"] = np.maximum(out["direction_status"], status)
+        # one status for all of them: where the worst is not known, the best is not either
+        out |= {n: np.where(out["direction_status"] == 0, v, np.nan) for n, v in extremes.items()}
         if plan.uncertain is not None:
             out |= worst_deviations(plan, plan.uncertain, position, out)
     return out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import shutil
 import warnings
 from pathlib import Path
@@ -105,6 +106,10 @@ def cannot(block: Block) -> str:
 )
 def test_page_runs(name: str, folder: Path) -> None:
     reader = Reader(folder, given(name))
+    for text, stem in re.findall(
+        r"```yaml\n(name: (\w+)\n.*?)```", WITH_CODE[name].read_text(encoding="utf-8"), re.DOTALL
+    ):
+        (folder / f"{stem}.yaml").write_text(text, encoding="utf-8")  # files that the page shows
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for block in blocks(WITH_CODE[name]):

@@ -37,8 +37,8 @@ def joint_channels(plan: Experiment) -> list[Channel]:
 
 
 def _command_error(machine: Machine, channel: Channel, u: Floats) -> Floats:
-    joint = dict(all_elements(machine.description)).get(channel.joint)
-    errors = joint.command_errors if isinstance(joint, Joint) else ()
+    named = (e for n, e in all_elements(machine.description) if n == channel.joint and isinstance(e, Joint))
+    errors = next((e.command_errors for e in named), ())
     if not errors:
         return np.zeros_like(u)
     compiled = machine.compiled
