@@ -59,7 +59,7 @@ BOOST_AUTO_TEST_SUITE(batch)
 BOOST_AUTO_TEST_CASE(threads_do_not_change_a_bit) {
   const Mechanism m = Orthoglide().build();
   Random random(1);
-  std::vector<double> position(3 * 67);                      // five chunks
+  std::vector<double> position(3 * 40);                      // three chunks
   for (double& p : position) p = random.uniform(-0.3, 0.6);  // some out of reach
   const Answer one = run(m, position, 1), seven = run(m, position, 7);
   BOOST_TEST(one.status == seven.status, boost::test_tools::per_element());
