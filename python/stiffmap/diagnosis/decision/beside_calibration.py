@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +25,6 @@ from stiffmap.diagnosis.fitting.fit import evaluate, fit
 from stiffmap.diagnosis.fitting.interval import unseen
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.calibrated import Layer
-from stiffmap.diagnosis.search.screen import Screen
 from stiffmap.diagnosis.search.selection import MOST_EFFECTS
 from stiffmap.diagnosis.search.study import Finding, Study, find, search_on, study
 from stiffmap.effects import Parameter, get
@@ -70,8 +70,10 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
     positions = s.experiment.quantity == "position"
     if positions:
         found = calibrator(s, tolerances, exclude)
-        if found is not None and (leads_by_far(s, found) or hopeless(s)):
-            return _layered(s, found, seed, tolerances)
+        if found is not None:
+            problem, few = s.whole[0], screened(s)
+            if leads_by_far(problem, found, few) or hopeless(problem, few):
+                return _layered(s, found, seed, tolerances)
     finding, verdict, left = judge(s, find(s))
     first = Answer(s, finding, verdict, left)
     if s.clock.over or not (left or finding.model.candidates):
@@ -105,9 +107,8 @@ def _above(s: Study, layer: Layer, seed: int) -> Study:
 
 def _floor_beside_screen(s: Study) -> float:
     """What the calibration and the best few effects, taken as linear, leave per pose, in noise variances."""
-    problem, screen = s.whole
-    left, _ = screened(screen, problem.residual(s.plan.base))
-    blocks = Blocks.of(np.zeros((len(left), 0)), left, pose_labels(problem))
+    left = screened(s).left
+    blocks = Blocks.of(np.zeros((len(left), 0)), left, pose_labels(s.whole[0]))
     return model_form(blocks) * float(np.median(blocks.number))
 
 
@@ -120,24 +121,20 @@ def calibrator(s: Study, tolerances: Tolerances, exclude: tuple[str, ...]) -> Ca
     return found if found.sensitivity.unknowns else None
 
 
-def leads_by_far(s: Study, found: Calibrator) -> bool:
-    """Whether uncertain numbers beat by far what the linear screen promises of any few effects."""
+class Screened(NamedTuple):
+    """The best few effects, taken as linear, one after the other."""
+
+    left: Floats
+    """(N,) what they leave of the whitened residual."""
+    number: int
+    """Directions that they take."""
+
+
+def screened(s: Study) -> Screened:
+    """What the best few effects of a study's screen, taken as linear, leave of all its readings."""
     problem, screen = s.whole
-    left, number = screened(screen, problem.residual(s.plan.base))
-    few = -0.5 * (float(left @ left) + number * float(np.log(max(len(left), 2))))
-    return spread_evidence(problem, found) > few + SURE
-
-
-def hopeless(s: Study) -> bool:
-    """Whether the best few effects, taken as linear, leave so much that no few effects are the whole story."""
-    problem, screen = s.whole
-    left, number = screened(screen, problem.residual(s.plan.base))
-    return float(left @ left) > HOPELESS * max(problem.freedom - number, 1)
-
-
-def screened(screen: Screen, residual: Floats) -> tuple[Floats, int]:
-    """(N,) what the best few effects leave, taken as linear, one after the other, and their directions."""
-    left, beside, tangent = residual, screen, np.zeros((len(residual), 0))
+    left, beside = problem.residual(s.plan.base), screen
+    tangent = np.zeros((len(left), 0))
     for _ in range(MOST_EFFECTS):
         reductions = beside.delta_chi2(left[:, None])[:, 0]
         best = int(np.argmax(reductions)) if len(reductions) else -1
@@ -147,7 +144,19 @@ def screened(screen: Screen, residual: Floats) -> tuple[Floats, int]:
         left = left - q @ (q.T @ left)
         tangent = np.column_stack([tangent, q])
         beside = screen.beside(tangent)
-    return left, int(tangent.shape[1])
+    return Screened(left, int(tangent.shape[1]))
+
+
+def leads_by_far(problem: Problem, found: Calibrator, few: Screened) -> bool:
+    """Whether uncertain numbers beat by far what the linear screen promises of any few effects."""
+    chi2 = float(few.left @ few.left)
+    promised = -0.5 * (chi2 + few.number * float(np.log(max(len(few.left), 2))))
+    return spread_evidence(problem, found) > promised + SURE
+
+
+def hopeless(problem: Problem, few: Screened) -> bool:
+    """Whether the best few effects, taken as linear, leave so much that no few effects are the whole story."""
+    return float(few.left @ few.left) > HOPELESS * max(problem.freedom - few.number, 1)
 
 
 def sparse_evidence(first: Answer) -> float:
@@ -197,14 +206,10 @@ def _searched(s: Study, tolerances: Tolerances) -> Answer:
 def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances: Tolerances) -> Answer:
     """The search where what no model explains counts as noise; only what holds is named."""
     assert s.layer is not None
-    raised = Layer.of(found, s.layer.calibration, rho)
-    again = study(s.predictor, seed, raised, s.clock, s.without)
-    finding = find(again)
+    again, finding = _found_at(s, found, rho, seed)
     lower = floor_of(s, finding) if finding.model.candidates else rho
     if lower < FELL * rho and not s.clock.over:  # the first floor held what the effects explain
-        raised = Layer.of(found, s.layer.calibration, lower)
-        again = study(s.predictor, seed, raised, s.clock, s.without)
-        finding = find(again)
+        again, finding = _found_at(s, found, lower, seed)
     held = held_out(again, finding.outliers, seed, finding)
     model, refused = admissible(finding.model, finding, tolerances)
     model, same = _beyond_calibration(s, model, finding)
@@ -213,6 +218,14 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
     finding = with_model(finding, model)
     left = unexplained(s, _on(s, finding))
     return Answer(again, finding, _word(finding, left), left, s.layer.calibration, held, refused + more)
+
+
+def _found_at(s: Study, found: Calibrator, rho: float, seed: int) -> tuple[Study, Finding]:
+    """The search done again where `rho` noise variances of no model's count as noise."""
+    assert s.layer is not None
+    raised = Layer.of(found, s.layer.calibration, rho)
+    again = study(s.predictor, seed, raised, s.clock, s.without)
+    return again, find(again)
 
 
 def _on(s: Study, finding: Finding) -> Finding:
