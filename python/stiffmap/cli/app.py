@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import traceback
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from inspect import getdoc
@@ -15,12 +17,15 @@ from stiffmap.cli.vectors import joined
 from stiffmap.errors import FileErrors, MissingPartError, StiffmapError
 
 BAD_INPUT = 2
+DEFECT = 70
 INTERRUPTED = 130
+TRACEBACK = "STIFFMAP_TRACEBACK"
 
 HELP = """How far is a loaded machine pushed off its commanded position?
 
 Lengths in mm, forces in N, angles in deg. Every command has [bold]--help[/bold] with
-examples and [bold]--json[/bold]. Exit codes: 0 done, 1 done with findings, 2 bad input, 130 interrupted.
+examples and [bold]--json[/bold]. Exit codes: 0 done, 1 done with findings, 2 bad input, 70 a defect of stiffmap,
+130 interrupted.
 """
 
 
@@ -37,7 +42,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
+    except Exception as error:
+        if os.environ.get(TRACEBACK):
+            raise
+        print(f"stiffmap: {_defect(error)}", file=sys.stderr)
+        return DEFECT
     return 0
+
+
+def _defect(error: Exception) -> str:
+    at = traceback.extract_tb(error.__traceback__)[-1]
+    place = "/".join(at.filename.replace("\\", "/").split("/")[-2:])
+    what = f"{type(error).__name__} in {place}, line {at.lineno}: {one_line(error)}"
+    return f"a defect of stiffmap, not of your files: {what}. Please report it with the output under {TRACEBACK}=1."
 
 
 def one_line(error: Exception) -> str:

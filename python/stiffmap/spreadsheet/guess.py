@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from stiffmap.errors import StiffmapError
 
 LENGTHS = {"m": "m", "cm": "cm", "mm": "mm", "um": "um", "µm": "um", "μm": "um", "micron": "um", "in": "in"}
-FORCES = {"n": "N", "kn": "kN", "mn": "MN"}
+FORCES = {"n": "N", "kn": "kN"}
 ANGLES = {"rad": "rad", "mrad": "mrad", "deg": "deg", "°": "deg", "grad": "deg"}
 MOMENTS = {
     "nm": "N*m",
@@ -28,10 +28,10 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     ("order", r"order|reihenfolge|sequence"),
     ("setup", r"set-?up|aufbau|aufspannung"),
     ("branch", r"branch|richtung der last|loading"),
-    *((f"f{a}", rf"f ?_?{a}|force ?_?{a}|kraft ?_?{a}|last ?_?{a}|load ?_?{a}") for a in "xyz"),
+    *((f"f{a}", rf"f ?_?{a}|force ?_?(in )?{a}|kraft ?_?{a}|last ?_?{a}|load ?_?{a}") for a in "xyz"),
     *((f"m{a}", rf"m ?_?{a}|moment ?_?{a}|torque ?_?{a}") for a in "xyz"),
     *((f"u_d{a}", rf"u ?_?d?{a}|sigma ?_?d?{a}|std ?_?d?{a}") for a in "xyz"),
-    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displacement|verschiebung|abweichung|error|dev) ?_?{a}") for a in "xyz"),
+    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displacement|verschiebung|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr) ?_?{a}") for a in "xyz"),
     *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
     *((a, rf"{a}|pos ?_?{a}|{a} ?_?pos|position ?_?{a}|nominal ?_?{a}|soll ?_?{a}|{a} ?soll") for a in "xyz"),
 )  # fmt: skip
@@ -55,18 +55,23 @@ class Column:
 
 
 def split_unit(header: str) -> tuple[str, str]:
-    """``Uhr 1 [µm]`` is ``Uhr 1`` in ``µm``; also round brackets, and a slash before a known unit."""
+    """``Uhr 1 [µm]`` is ``Uhr 1`` in ``µm``; also round brackets, and ``x / mm``, ``x, mm``, ``x in mm``, ``x_mm``."""
     match = re.match(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$", header)
     if match:
         return match[1].strip(), match[2].strip()
-    name, slash, unit = header.rpartition("/")
-    if slash and known_unit(unit.strip()):
-        return name.strip(), unit.strip()
+    said = re.match(r"^(.*?)(?:\s*[/,;]\s*|\s+in\s+)(\S+)\s*$", header)
+    bare = re.match(r"^(.*\S)[\s_](\S{2,})\s*$", header)
+    if said and known_unit(said[2]):
+        return said[1].strip(), said[2]
+    if bare and bare[2].lower() != "in" and known_unit(bare[2]):
+        return bare[1].strip(), bare[2]
     return header.strip(), ""
 
 
 def known_unit(unit: str) -> str:
     """The unit as experiment files write it; empty for an unknown one."""
+    if unit.strip() in ("MN", "mN"):  # a factor of 1e9 between the two: here the case decides
+        return unit.strip()
     key = unit.strip().lower()
     for table in (LENGTHS, FORCES, ANGLES, MOMENTS, TEMPERATURES):
         if key in table:

@@ -147,6 +147,8 @@ def _excel(path: Path, sheet: str | None) -> list[tuple[int, list[str]]]:
         ) from None
     try:
         book = load_workbook(path, data_only=True, read_only=True)
+    except FileNotFoundError:
+        raise FileError("there is no such file", file=str(path)) from None
     except Exception as error:  # openpyxl raises many kinds for what is no workbook
         raise FileError(f"cannot be read as an Excel workbook ({error})", file=str(path)) from error
     if sheet is not None and sheet not in book.sheetnames:

@@ -121,6 +121,21 @@ def test_interrupt(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtur
     assert run(capsys, "check", "tripteron")[0] == 130
 
 
+def test_a_defect_is_one_line_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(file: str) -> None:
+        raise ValueError("shapes\n(2,) (3,)")
+
+    monkeypatch.setattr("stiffmap.cli.check.check_file", broken)
+    code, _, err = run(capsys, "check", "tripteron")
+    assert code == 70 and err.count("\n") == 1
+    assert "a defect of stiffmap" in err and "ValueError" in err and "shapes (2,) (3,)" in err
+    monkeypatch.setenv("STIFFMAP_TRACEBACK", "1")
+    with pytest.raises(ValueError, match="shapes"):
+        run(capsys, "check", "tripteron")
+
+
 def test_missing_parts_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "needs_more.py").write_text("import a_package_that_is_missing\n", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))

@@ -10,6 +10,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.description import AppliedEffect
 from stiffmap.diagnosis.candidates.candidates import Candidate, candidates, clash
+from stiffmap.diagnosis.candidates.probe import STEP, PlanProbe
 from stiffmap.diagnosis.candidates.sensitivity import Variant, difference
 from stiffmap.diagnosis.fitting.fit import evaluate, fit
 from stiffmap.diagnosis.fitting.model import Model
@@ -91,3 +92,20 @@ def test_backward_keeps_what_cannot_be_left_out(search: Search, tilts: list[Cand
 
     hurt = replace(search, predictor=broken)  # type: ignore[arg-type]
     assert backward(hurt, model).candidates == model.candidates
+
+
+def test_loads_next_to_buckling_leave_signatures_whole() -> None:
+    machine = sm.load_machine("linear-delta")
+    at, push = np.array([[-0.1, 0.1, 0.22], [0.0, 0.0, 0.3]]), np.array([[0, 150.0, 0, 0, 0, 0]] * 2)
+    more = machine.solve(at, push + [0, STEP, 0, 0, 0, 0])
+    assert list(more.status) == [
+        sm.Status.UNSTABLE,
+        sm.Status.CONVERGED,
+    ]  # a little more, and a rod gives way
+    plan = replace(
+        random_plan(machine, "deflection", poses=2, seed=1).rows(np.arange(2)), position=at, wrench=push
+    )
+    predictor = Predictor(machine, plan)
+    probe = PlanProbe(predictor, predictor())
+    expected = np.array(machine.solve(at, push).compliance)[:, :3, :3]
+    np.testing.assert_allclose(probe.compliance()[:, :3, :3], expected, atol=1e-3 * np.abs(expected).max())

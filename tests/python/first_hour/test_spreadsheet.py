@@ -102,6 +102,7 @@ def test_everything_may_be_guessed(tmp_path: Path, capsys: pytest.CaptureFixture
             ("--set", "z=0"),
             "line 3: column 'dx [mm]': expected a number",
         ),
+        ("x [mm];y [mm];fx [mN];dx [mm]\n1;2;3;4\n", ("--set", "z=0"), "the unit 'mN' is not one of"),
         ("only words\n", (), "no header line"),
         ("x [mm];y [mm];dx [mm]\n1;2;3\n", ("--map", "dz=Uhr"), "--map: no column 'Uhr'"),
         ("x [mm];y [mm];dx [mm]\n1;2;3\n", ("--map", "dz"), "--map: expected NAME=VALUE"),
@@ -125,6 +126,11 @@ def test_an_experiment_is_not_overwritten(tmp_path: Path, capsys: pytest.Capture
 def test_pieces() -> None:
     assert split_unit("Uhr 1 [µm]") == ("Uhr 1", "µm") and split_unit("x / mm") == ("x", "mm")
     assert split_unit("left/right") == ("left/right", "")
+    for header in ("x / mm", "x, mm", "x in mm", "x_mm", "x mm", "x(mm)"):
+        assert split_unit(header) == ("x", "mm"), header
+    assert split_unit("point in") == ("point in", "") and split_unit("load in N") == ("load", "N")
+    meant = [(c.meaning, c.repeat, c.unit) for c in guess(["Force x, kN", "gauge x 1 [µm]", "Messuhr y"], {})]
+    assert meant == [("fx", 0, "kN"), ("dx", 1, "µm"), ("dy", 0, "")]
     assert (
         number("1.234,5", True) == 1234.5
         and number("1,5", False) is None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -49,10 +49,16 @@ class PlanProbe:
         return coordinates_of(self.predictor.machine, self.plan)
 
     def compliance(self) -> Floats:
-        """(n, c, 3) change of every reading per newton along x, y, z at the loaded point."""
-        p, e = self.predictor, self.plan
+        """(n, c, 3) change of every reading per newton along x, y, z at the loaded point.
+
+        Where the machine gives way under a little more, by a little less; NaN where it does under both.
+        """
+        load = self.plan.wrench
         out = []
         for axis in np.eye(6)[:3]:
-            more = Predictor(p.machine, replace(e, wrench=e.wrench + STEP * axis), threads=p.threads)
-            out.append((more() - self.base) / STEP)
+            slope = (self.predictor.under(load + STEP * axis) - self.base) / STEP
+            if not np.isfinite(slope[np.isfinite(self.base)]).all():
+                less = (self.base - self.predictor.under(load - STEP * axis)) / STEP
+                slope = np.where(np.isfinite(slope), slope, less)
+            out.append(slope)
         return np.stack(out, axis=-1)

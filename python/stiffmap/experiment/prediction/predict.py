@@ -62,6 +62,11 @@ class Predictor:
             motion = motion + history_motion(self._drives[key], plan, remembering)
         return readings(self.experiment, motion, terms)
 
+    def under(self, wrench: Floats) -> Floats:
+        """(n, c) m, rad: the same readings under other wrenches (n, 6); NaN where the machine fails under them."""
+        plan = replace(self.experiment, wrench=wrench)
+        return readings(plan, at_records(plan, (), self._branches), ())
+
     def _set_aside(self) -> None:
         """Leaves out the rows that the declared machine has no equilibrium for, and names them."""
         e = self.experiment
