@@ -29,9 +29,13 @@ def gap_text(machine: MachineDescription, gaps: Sequence[tuple[str, float, float
     """The gaps that are more than round-off, in the file's units: ``left by 0.3 mm and 0.1 deg``."""
     units = machine.units
     wide = [Gap(*g) for g in gaps if max(g[1], g[2]) > ENOUGH] or [Gap(*g) for g in gaps]
-    return ", ".join(
-        f"{g.name} by {units.say(g.translation, LENGTH)} and {units.say(g.rotation, ANGLE)}" for g in wide
-    )
+
+    def parts(g: Gap) -> str:
+        both = ((g.translation, LENGTH), (g.rotation, ANGLE))
+        told = [units.say(v, dimension) for v, dimension in both if v > ENOUGH]
+        return " and ".join(told or [units.say(v, dimension) for v, dimension in both])
+
+    return ", ".join(f"{g.name} by {parts(g)}" for g in wide)
 
 
 def misfit_text(

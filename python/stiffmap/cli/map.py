@@ -49,6 +49,7 @@ from stiffmap.cli.map_summary import as_table, failures, summary
 from stiffmap.cli.map_uncertainty import print_uncertainty, uncertainty_data
 from stiffmap.cli.map_worst import in_words, worst_pose
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.cli.statuses import failed_in_words
 from stiffmap.machine import Machine
 
 
@@ -163,7 +164,7 @@ def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wa
             print_uncertainty(console, band, wanted.plane)
         if worst is not None:
             console.print(in_words(worst), soft_wrap=True)
-        for name, count in failed.items():
-            console.print(f"[yellow]{count} poses: {name}[/yellow]")
+        for line in failed_in_words(failed):
+            console.print(f"[yellow]{line}[/yellow]", soft_wrap=True)
         console.print(f"wrote {', '.join(map(str, files))}", soft_wrap=True)
     finish(bool(failed))

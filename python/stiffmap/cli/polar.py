@@ -30,6 +30,8 @@ from stiffmap.cli.inputs import (
     position,
 )
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.cli.statuses import failed_in_words
+from stiffmap.compiled import Status
 
 AtOption = Annotated[
     list[str] | None, typer.Option(help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]")
@@ -85,6 +87,10 @@ def polar(
         console.print(as_table(many, plane))
         for p in places if vector is not None else []:
             console.print(_under(m, p, vector, how), soft_wrap=True)
+        statuses = np.concatenate([d.status.values.ravel() for d in many])
+        failed = {s.name: int((statuses == s).sum()) for s in Status if s and (statuses == s).any()}
+        for line in failed_in_words(failed, "directions"):
+            console.print(f"[yellow]{line}[/yellow]", soft_wrap=True)
         if files:
             console.print(f"wrote {', '.join(files)}", soft_wrap=True)
     finish(any(bool((d.status != 0).any()) for d in many))

@@ -69,7 +69,7 @@ def test_a_home_off_by_more_than_its_digits_is_refused() -> None:
         sm.StiffmapError, match=r"lift: home configuration does not close: d by 0\.0(2|1)\d* mm"
     ):
         machine(table(0.02))
-    with pytest.raises(sm.StiffmapError, match=r"d by .* mm and 0\.01 deg"):
+    with pytest.raises(sm.StiffmapError, match=r"d by 0\.01 deg"):
         machine(table(0.0, 0.01))
 
 
@@ -167,7 +167,7 @@ def test_the_message_is_in_the_units_of_the_file(tmp_path: Path, capsys: pytest.
     )
     assert main(["check", str(file)]) == 2
     error = capsys.readouterr().err
-    assert re.search(r"home configuration does not close: right by \S+ mm and 30 deg", error)
+    assert re.search(r"home configuration does not close: right by 30 deg", error)
     assert "legs." not in error and " m " not in error
 
 

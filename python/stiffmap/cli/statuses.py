@@ -1,0 +1,20 @@
+"""What failed poses are told in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from stiffmap.compiled import Status
+
+MEANINGS = {
+    Status.UNREACHABLE.name: "the joints cannot get there, or a limit forbids it",
+    Status.SINGULAR.name: "the machine can move freely there",
+    Status.UNSTABLE.name: "it gives way before the whole load acts; a slender rod between balls in one piece does so "
+    "early: docs/machine_files.md",
+    Status.NOT_CONVERGED.name: "no equilibrium was found under the whole load",
+}
+
+
+def failed_in_words(failed: Mapping[str, int], what: str = "poses") -> list[str]:
+    """``12 poses: UNSTABLE (…)``, a line per status."""
+    return [f"{count} {what}: {name} ({MEANINGS[name]})" for name, count in failed.items()]
