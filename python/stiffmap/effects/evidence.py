@@ -143,3 +143,12 @@ def signatures_on_a_grid(probe: Probe, tried: Tried) -> Iterator[Signature]:
         points = np.array([[*typical[:i], v, *typical[i + 1 :]] for i, s in enumerate(sizes) for v in s])
     for point in points:
         yield Signature({p.name: float(v) for p, v in zip(free, point, strict=True)})
+
+
+def shares_of_load(probe: Probe, tried: Tried, name: str, shares: Sequence[float]) -> Iterator[Signature]:
+    """A parameter without a null at shares of the largest force of the plan, or moment where that is its unit."""
+    parameter = next(p for p in tried.parameters if p.name == name)
+    part = slice(3, 6) if parameter.unit == "N·m" else slice(0, 3)
+    largest = float(np.abs(probe.plan.wrench[:, part]).max())
+    for share in shares if largest > 0.0 else ():
+        yield Signature({name: share * largest})

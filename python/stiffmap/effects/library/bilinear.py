@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from stiffmap.description import Law, MachineDescription
-from stiffmap.effects.evidence import Probe, Signature, Tried
+from stiffmap.effects.evidence import Probe, Signature, Tried, shares_of_load
 from stiffmap.effects.library.drive_law import change_law, in_unit_of_joint, linear
 from stiffmap.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter, Placed
@@ -33,11 +31,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
 def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
     """A knee at a few shares of the largest load."""
-    knee = next(p for p in tried.parameters if p.name == "knee")
-    part = slice(3, 6) if knee.unit == "N·m" else slice(0, 3)
-    largest = float(np.abs(probe.plan.wrench[:, part]).max())
-    for share in KNEES if largest > 0.0 else ():
-        yield Signature({"knee": share * largest})
+    return shares_of_load(probe, tried, "knee", KNEES)
 
 
 EFFECT = EffectType(

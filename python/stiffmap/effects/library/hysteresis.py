@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.effects.evidence import Floats, Plan, Probe, Signature, Tried
+from stiffmap.effects.evidence import Floats, Plan, Probe, Signature, Tried, shares_of_load
 from stiffmap.effects.library.drive_law import in_unit_of_joint
 from stiffmap.effects.sites import at_sites, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter
@@ -43,20 +43,8 @@ def spring_force(force: Floats, level: ArrayLike, breakaway: float = 1.0) -> Flo
     """(n, ...) force s that the spring feels while the drive's `force` (n,) runs, from rest at s = 0, with
     elements of these levels (...)."""
     levels = np.asarray(level, dtype=float)
-    if levels.size == 1:
-        alone = _of_one(force.tolist(), float(levels.item()), breakaway)
-        return np.array(alone).reshape(len(force), *levels.shape)
-    s, sliding = np.zeros(levels.shape), np.zeros(levels.shape)
-    out = np.empty((len(force), *levels.shape))
-    for i, f in enumerate(force):
-        gap = f - s
-        reach = np.where(sliding * gap > 0, levels, levels * breakaway)
-        moves = np.abs(gap) > reach
-        rests = ~moves & (sliding * gap < levels * (1 - 1e-12))
-        sliding = np.where(moves, np.sign(gap), np.where(rests, 0.0, sliding))
-        s = np.where(moves, f - sliding * levels, s)
-        out[i] = s
-    return out
+    each = [_of_one(force.tolist(), float(v), breakaway) for v in levels.ravel()]
+    return np.stack(each, axis=1).reshape(len(force), *levels.shape)
 
 
 def _of_one(force: list[float], level: float, breakaway: float) -> list[float]:
@@ -86,11 +74,7 @@ def deflection(force: Floats, compliance: float, values: Mapping[str, float]) ->
 
 def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
     """Play that is crossed within a few shares of the largest load."""
-    seat = next(p for p in tried.parameters if p.name == "seat")
-    part = slice(3, 6) if seat.unit == "N·m" else slice(0, 3)
-    largest = float(np.abs(probe.plan.wrench[:, part]).max())
-    for share in SEATS if largest > 0.0 else ():
-        yield Signature({"seat": share * largest})
+    return shares_of_load(probe, tried, "seat", SEATS)
 
 
 def jumps(plan: Plan) -> bool:
