@@ -298,9 +298,8 @@ class Calibrator:
 def pose_labels(problem: Problem) -> Integers:
     """(N,) number of the cluster (of one pose), set-up and channel of each reading."""
     e = problem.experiment
-    setup = np.unique(e.setup or ("",) * len(e), return_inverse=True)[1].reshape(-1)
     row, axis = problem.index
-    return np.asarray((e.clusters[row] * (int(setup.max()) + 1) + setup[row]) * len(e.channels) + axis)
+    return np.asarray((e.clusters[row] * (int(e.runs.max()) + 1) + e.runs[row]) * len(e.channels) + axis)
 
 
 def _unit(e: Experiment, noise: Noise) -> tuple[str, Size, float]:

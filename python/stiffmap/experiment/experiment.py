@@ -187,18 +187,22 @@ class Experiment:
         return _numbers([self.command if self.command is not None else self.position, *self._turned])
 
     @cached_property
+    def runs(self) -> Integers:
+        """(n,) number of the set-up of each row; all 0 where no set-ups are named."""
+        return np.unique(self.setup or ("",) * len(self), return_inverse=True)[1].reshape(-1)
+
+    @cached_property
     def clusters(self) -> Integers:
         """(n,) rows that share what a model gets wrong: of one pose; on a ramp of loads those of one pose, set-up
         and direction within a twentieth of the range."""
         ways = self.load_direction
         if ways is None:
             return self.groups
-        run = np.unique(self.setup or ("",) * len(self), return_inverse=True)[1].reshape(-1)
         range_ = np.ptp(self.wrench, axis=0)
         bins = np.floor(
             CLUSTERS * (self.wrench - self.wrench.min(axis=0)) / np.where(range_ > 0, range_, 1.0)
         )
-        return _numbers([self.groups, run, ways, np.minimum(bins, CLUSTERS - 1)])
+        return _numbers([self.groups, self.runs, ways, np.minimum(bins, CLUSTERS - 1)])
 
     @property
     def _turned(self) -> list[Any]:
@@ -218,8 +222,7 @@ class Experiment:
         recorded."""
         if self.order is None or len(self) == 0:
             return None
-        run = np.unique(self.setup or ("",) * len(self), return_inverse=True)[1].reshape(-1)
-        return directions(self.wrench, self.order, run)
+        return directions(self.wrench, self.order, self.runs)
 
     def rows(self, keep: NDArray[np.bool_] | Integers) -> Experiment:
         """The experiment with some of its rows: (n,) of which to keep, or (k,) their numbers."""

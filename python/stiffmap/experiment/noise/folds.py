@@ -11,9 +11,8 @@ FOLDS = 5
 
 def folds(experiment: Experiment, seed: int) -> tuple[Integers, str]:
     """(n,) fold of every row: whole set-ups where there are several, else whole poses."""
-    setups = np.unique(experiment.setup or ("",) * len(experiment), return_inverse=True)[1]
-    if setups.max() > 0:
-        return setups, "set-ups"
+    if experiment.runs.max() > 0:
+        return experiment.runs, "set-ups"
     number = int(experiment.groups.max()) + 1
     label = np.random.default_rng(seed).permutation(number) % min(FOLDS, number)
     return label[experiment.groups], "poses"
