@@ -152,10 +152,9 @@ def _elements(machine: Machine) -> tuple[tuple[str, ...], list[list[int]]]:
 
 
 def _elastic(machine: Machine, name: str) -> bool:
-    from stiffmap.description import Joint
-    from stiffmap.description.tree import all_elements
+    from stiffmap.description.tree import joints
 
     return any(
-        isinstance(e, Joint) and e.law is not None and (name == n or name.rpartition(".")[0] == n)
-        for n, e in all_elements(machine.description)
+        j.law is not None and (name == n or name.rpartition(".")[0] == n)
+        for n, j in joints(machine.description).items()
     )

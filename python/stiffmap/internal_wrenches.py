@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.broadcasting import Floats, rows, thread_count
-from stiffmap.description import Joint
-from stiffmap.description.tree import all_elements
+from stiffmap.description.tree import joints
 from stiffmap.machine import Machine, takes_machine
 
 
@@ -92,6 +91,6 @@ def assembly_stress(
 
 def _has_law(machine: Machine, name: str) -> bool:
     return any(
-        isinstance(e, Joint) and any(e.laws) and (name == n or name.rpartition(".")[0] == n)
-        for n, e in all_elements(machine.description)
+        any(j.laws) and (name == n or name.rpartition(".")[0] == n)
+        for n, j in joints(machine.description).items()
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from stiffmap.description.elements import Block, Element, Point
+from stiffmap.description.elements import Block, Element, Joint, Point
 from stiffmap.description.machine import MachineDescription
 
 Elements = tuple[Element, ...]
@@ -39,6 +39,17 @@ def all_elements(description: MachineDescription) -> Iterator[tuple[str, Element
 def point_names(description: MachineDescription) -> list[str]:
     """Full names of the named points."""
     return [name for name, element in all_elements(description) if isinstance(element, Point)]
+
+
+def core_name(full: str) -> str:
+    """What the core, and so an actuator or a coordinate, is called: without ``base.`` or ``platform.``."""
+    sequence, _, rest = full.partition(".")
+    return rest if sequence in ENDS else full
+
+
+def joints(description: MachineDescription) -> dict[str, Joint]:
+    """The joints by the names that the core gives them."""
+    return {core_name(n): e for n, e in all_elements(description) if isinstance(e, Joint)}
 
 
 def find(description: MachineDescription, full: str) -> list[Element]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from stiffmap.compiled import CompiledMachine
 from stiffmap.compiled.ball import charted
 from stiffmap.description import Joint, MachineDescription
-from stiffmap.description.tree import all_elements
+from stiffmap.description.tree import all_elements, core_name
 from stiffmap.units import ANGLE, LENGTH
 
 CHANGED = 1e-9  # m, rad
@@ -36,7 +36,7 @@ def home_changes(machine: CompiledMachine) -> list[HomeChange]:
     closed = dict(zip(machine.names.coordinates, machine.home_coordinates().tolist(), strict=True))
     changes = []
     for full_name, e in all_elements(machine.description):
-        name = full_name.removeprefix("base.").removeprefix("platform.")  # as the core has it
+        name = core_name(full_name)
         if not isinstance(e, Joint) or charted(e)[1] is not None or name in machine.spun_balls:
             continue  # a free ball joint in axes of our own
         for i, declared in enumerate(e.home):

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats
-from stiffmap.description import Drive, Joint
-from stiffmap.description.tree import all_elements
+from stiffmap.description import Drive
+from stiffmap.description.tree import joints
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 
@@ -16,12 +16,8 @@ PARTS = {"all": slice(0, 6), "translation": slice(0, 3), "rotation": slice(3, 6)
 
 def drive_table(machine: Machine) -> list[Drive]:
     """What each actuator's motor declares, in the order of `Machine.actuators`."""
-    found = {
-        name: e.drive or Drive()
-        for name, e in all_elements(machine.description)
-        if isinstance(e, Joint) and e.actuated
-    }
-    return [found[name] for name in machine.actuators]
+    found = joints(machine.description)
+    return [found[name].drive or Drive() for name in machine.actuators]
 
 
 def drive_values(machine: Machine, field: str, given: ArrayLike | None, unit: str) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from stiffmap.broadcasting import Floats
 from stiffmap.compiled import CompiledMachine, Role
 from stiffmap.description import Joint
-from stiffmap.description.tree import all_elements
+from stiffmap.description.tree import joints
 from stiffmap.machine import Machine
 
 COINCIDENT = 1e-9
@@ -37,13 +37,13 @@ def skeleton(machine: Machine, coordinates: Floats, *, shortest: float = COINCID
     core = machine.compiled
     position, rotation = core.frames(coordinates)
     owner = owners(core)
-    joints = {n: e for n, e in all_elements(machine.description) if isinstance(e, Joint)}
+    named = joints(machine.description)
     links, guides, marks = [], [], {Role.ACTUATOR: [], Role.PASSIVE: []}  # type: ignore[var-annotated]
     for i, (parent, c) in enumerate(core.nodes):
         role = core.names.roles[c] if c >= 0 else None
         if role in marks:
             marks[role].append(position[i])
-        joint = joints.get(core.names.coordinates[c]) if c >= 0 else None
+        joint = named.get(core.names.coordinates[c]) if c >= 0 else None
         if joint is not None and joint.kind == "prismatic" and not _moves(core, parent):
             guides.append((owner[i], travel(joint, float(coordinates[c]), position[i], rotation[i])))
         elif parent >= 0 and np.linalg.norm(position[i] - position[parent]) > shortest and parent != 0:

@@ -10,8 +10,10 @@ from scipy.optimize import minimize_scalar
 
 import stiffmap as sm
 from stiffmap.cli.inputs import placed
+from stiffmap.description.tree import joints
 from stiffmap.effects.library.hysteresis import deflection, spring_force
 from stiffmap.experiment import Predictor, load_experiment
+from stiffmap.experiment.prediction.history import drives_of
 from stiffmap.experiment.ramps import directions
 from stiffmap.planning import estimate
 
@@ -148,6 +150,27 @@ def test_gravity_and_loads_of_every_row_reach_the_drives(tmp_path: Path) -> None
     lag = 2.5e-5 * 5.0 * (ahead - behind) / 2e-6
     np.testing.assert_allclose(np.abs(more[:, :3]), np.abs([lag, lag]), rtol=1e-3, atol=1e-9)
     np.testing.assert_allclose(more[0, :3], -more[1, :3], atol=1e-9)
+
+
+def test_friction_of_a_drive_behind_the_platform(tmp_path: Path) -> None:
+    """The fork of the hybrid turns the tool by level times compliance where its torque exceeds the level."""
+    machine = sm.load_machine("hybrid")
+    p, loads = machine.description.home.p, [0.0, 500.0, 0.0]
+    rows = [f"{p[0]},{p[1]},{p[2]},{f},{i}" for i, f in enumerate(loads)]
+    (tmp_path / "experiment.yaml").write_text(
+        "machine: hybrid\nquantity: deflection\nunits: {length: m, force: N, angle: rad}\nnoise: {rx: 1e-6}\n"
+    )
+    data = [f"{row},0" for row in rows]
+    (tmp_path / "data.csv").write_text("\n".join(["x,y,z,fy,order,rx", *data]) + "\n")
+    plan = load_experiment(tmp_path)
+    predict = Predictor(machine, plan)
+    more = predict([placed(machine, "hysteresis a level=5N·m")]) - predict()
+    torque = np.abs(drives_of(machine, plan).effort[:, machine.actuators.index("a")])
+    assert torque[1] > 10.0
+    law = joints(machine.description)["a"].law
+    assert law is not None
+    lag = 5.0 / law.stiffness
+    np.testing.assert_allclose(np.abs(more[1, 3]), lag, rtol=1e-3)
 
 
 def measured_ramps(

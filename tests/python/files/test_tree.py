@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from stiffmap import load_machine
 from stiffmap.description import Body, Joint, MachineDescription, Offset, Spring
-from stiffmap.description.tree import all_elements, edit, find, point_names, sequences
+from stiffmap.description.tree import all_elements, edit, find, joints, point_names, sequences
 from stiffmap.files import description_from_text
 
 TEXT = """
@@ -70,6 +71,14 @@ def test_found_by_the_full_name() -> None:
     assert find(nested(), "a.bar") == [] and find(nested(), "nowhere") == []
     (pin,) = find(nested(), "a.low.two.pin")
     assert isinstance(pin, Joint) and pin.axes == ((0.0, 1.0, 0.0),)
+
+
+def test_joints_bear_the_names_of_the_core() -> None:
+    """Those of base and platform without it, as actuators and coordinates do."""
+    assert list(joints(nested())) == ["a.pin", "a.low.one.pin", "a.low.two.pin"]
+    for name in ("hybrid", "ur10", "tripteron"):
+        machine = load_machine(name)
+        assert [n for n, j in joints(machine.description).items() if j.actuated] == list(machine.actuators)
 
 
 def test_every_element_can_be_edited_and_nothing_else_is_touched() -> None:

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.budget import deflection_budget
-from stiffmap.description import Joint
-from stiffmap.description.tree import all_elements
+from stiffmap.description.tree import joints
 from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.report.findings import Detectability, Effect, Findings
 from stiffmap.diagnosis.report.sentences import UNITS, next_step, opening
@@ -178,9 +177,7 @@ def _at(p: Pattern) -> str:
 
 def _seen(d: Findings) -> list[tuple[str, str, str]]:
     """What could have been found, the easiest first."""
-    turning = {
-        n for n, e in all_elements(d.declared.description) if isinstance(e, Joint) and e.kind != "prismatic"
-    }
+    turning = {n for n, j in joints(d.declared.description).items() if j.kind != "prismatic"}
     return [row for _, row in sorted((_one_seen(x, turning) for x in d.detectable), key=lambda pair: pair[0])]
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiffmap.description import AppliedEffect, Joint
-from stiffmap.description.tree import all_elements
+from stiffmap.description import AppliedEffect
+from stiffmap.description.tree import joints
 from stiffmap.effects.check import values_at
 from stiffmap.effects.evidence import Drive
 from stiffmap.effects.registry import get
@@ -90,15 +90,12 @@ def _extra(
     machine: Machine, plan: Experiment, name: str, force: Floats, values: Mapping[str, float], drive: Drive
 ) -> Floats:
     """(n,) deflection beyond that of the machine's own spring, set-up by set-up in order of time."""
-    # a body or a spring may bear its name
-    joint = next(e for n, e in all_elements(machine.description) if n == name and isinstance(e, Joint))
-    assert joint.law is not None
-    compliance = 1.0 / joint.law.stiffness
-    assert plan.order is not None
-    label = np.unique(plan.setup or ("",) * len(plan), return_inverse=True)[1].reshape(-1)
+    law = joints(machine.description)[name].law
+    assert law is not None and plan.order is not None
+    compliance = 1.0 / law.stiffness
     out = np.empty(len(plan))
-    for setup in np.unique(label):
-        here = np.flatnonzero(label == setup)
+    for setup in np.unique(plan.runs):
+        here = np.flatnonzero(plan.runs == setup)
         run = here[np.argsort(plan.order[here], kind="stable")]
         out[run] = drive(force[run], compliance, values) - compliance * force[run]
     return out

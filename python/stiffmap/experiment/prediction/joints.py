@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from stiffmap.description import CommandError, Joint
-from stiffmap.description.tree import all_elements
+from stiffmap.description import CommandError
+from stiffmap.description.tree import joints
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -37,8 +37,8 @@ def joint_channels(plan: Experiment) -> list[Channel]:
 
 
 def _command_error(machine: Machine, channel: Channel, u: Floats) -> Floats:
-    named = (e for n, e in all_elements(machine.description) if n == channel.joint and isinstance(e, Joint))
-    errors = next((e.command_errors for e in named), ())
+    joint = joints(machine.description).get(channel.joint)
+    errors = joint.command_errors if joint else ()
     if not errors:
         return np.zeros_like(u)
     compiled = machine.compiled
