@@ -157,8 +157,8 @@ void by_compliance(const Mechanism& m, const Mat6& C, bool regular, StiffnessRes
   s << Vec3::Constant(std::sqrt(m.stiffness)), Vec3::Constant(std::sqrt(m.stiffness) * m.length);
   const Mat6 scaled = unscale(C, s);
   if (!regular || !scaled.allFinite()) return;
-  if (out.free >
-      0) {  // a soft direction beside very stiff ones: the tangent, with units of its own, tells it from none
+  // A soft direction beside very stiff ones: the tangent, with units of its own, tells it from none.
+  if (out.free > 0) {
     out.free = 0;
     out.free_twists.setConstant(nan);
     out.compliance = C;

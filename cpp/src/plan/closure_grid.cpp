@@ -106,12 +106,13 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
         }
         double* const unknowns = grid->data() + node * row;
         std::fill_n(unknowns, d.unknowns.size(), std::nan(""));
-        VecX found = VecX::Zero(m.size());
-        if (from) found = *from;
-        else found.setConstant(std::nan(""));
+        const auto keep = [&](const VecX& found) {
+          for (std::size_t u = 0; u < d.unknowns.size(); ++u) unknowns[u] = found[d.unknowns[u]];
+        };
+        VecX found = from ? *from : VecX::Constant(m.size(), std::nan(""));
         if (quick.close(m, pose, found, false).status == Status::converged && quick.pivot(m, pose) > sound) {
           x[node] = found;
-          for (std::size_t u = 0; u < d.unknowns.size(); ++u) unknowns[u] = found[d.unknowns[u]];
+          keep(found);
           continue;
         }
         found.setZero();
@@ -121,8 +122,7 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
           r = inverse_closure(m, pose, ws, found);
         if (r.status != Status::converged || r.flags & flag::branch_unverified) continue;
         x[node] = found;
-        if (nearly_singular(ws)) continue;
-        for (std::size_t u = 0; u < d.unknowns.size(); ++u) unknowns[u] = found[d.unknowns[u]];
+        if (!nearly_singular(ws)) keep(found);
       }
   return grid;
 }
