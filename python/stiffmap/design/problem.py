@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from stiffmap.broadcasting import Floats
 from stiffmap.design.editing import Editor
@@ -18,7 +18,7 @@ from stiffmap.design.expressions import evaluate
 from stiffmap.design.places import put
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.files.load import describe_document
-from stiffmap.files.report import file_error
+from stiffmap.files.report import validated
 from stiffmap.files.schema.base import FileModel, Name
 from stiffmap.files.shipped import find
 from stiffmap.machine import Machine
@@ -158,14 +158,8 @@ def load_design(path: str | PathLike[str]) -> Design:
             raise FileError("no such design file", file=str(given))
         given = shipped
     document, file = read(given), str(given)
-    if not isinstance(document.data, dict):
-        raise FileError(
-            "a design file is a mapping with name, machine, variables, numbers, objectives", file=file
-        )
-    try:
-        model = DesignFile.model_validate(document.data)
-    except ValidationError as error:
-        raise file_error(error, document, file) from error
+    expected = "a design file is a mapping with name, machine, variables, numbers, objectives"
+    model = validated(DesignFile, document, file, expected)
 
     def fail(message: str, *keys: str) -> FileError:
         return FileError(message, file=file, line=document.line(keys), key=".".join(keys))

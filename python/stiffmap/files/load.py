@@ -5,17 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
-
-from pydantic import ValidationError
 
 from stiffmap.description import MachineDescription
 from stiffmap.effects import apply_records
-from stiffmap.errors import FileError
 from stiffmap.files.build import build, build_effect
-from stiffmap.files.report import file_error
+from stiffmap.files.report import validated
 from stiffmap.files.schema import MachineFile
-from stiffmap.files.schema.base import describe
 from stiffmap.files.shipped import find
 from stiffmap.files.templates import expanded
 from stiffmap.yaml_text import Document, parse, read
@@ -49,13 +44,4 @@ def describe_document(document: Document, file: str, folder: Path) -> MachineDes
 
 def validate(document: Document, file: str) -> MachineFile:
     """Plain data against the schema; raises `FileError` with every problem."""
-    if not isinstance(document.data, dict):
-        found = describe(document.data)
-        raise FileError(f"a machine file is a mapping with name, units and legs; found {found}", file=file)
-    data: dict[str, Any] = document.data
-    try:
-        return MachineFile.model_validate(data)
-    except ValidationError as error:
-        raise file_error(error, document, file) from error
-    except OverflowError as error:
-        raise FileError("a number is too large", file=file) from error
+    return validated(MachineFile, document, file, "a machine file is a mapping with name, units and legs")

@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from stiffmap.errors import FileError, together
 from stiffmap.files.schema.base import describe, suggestion
 from stiffmap.files.schema.elements import SORTS
 from stiffmap.yaml_text import Document, KeyPath
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def validated(model: type[M], document: Document, file: str, expected: str) -> M:
+    """A file's content against a schema; raises `FileError` with every problem.
+
+    expected
+        What such a file is: ``a motion file is a mapping with name and line, circle or points``.
+    """
+    if not isinstance(document.data, dict):
+        raise FileError(f"{expected}; found {describe(document.data)}", file=file)
+    try:
+        return model.model_validate(document.data)
+    except ValidationError as error:
+        raise file_error(error, document, file) from error
+    except OverflowError as error:
+        raise FileError("a number is too large", file=file) from error
 
 
 def file_error(error: ValidationError, document: Document, file: str) -> FileError:

@@ -6,21 +6,22 @@ import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from os import PathLike
 from pathlib import Path as FilePath
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field, ValidationError
+from pydantic import Field
 from scipy.interpolate import make_interp_spline
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import FileError, StiffmapError
-from stiffmap.files.report import file_error
+from stiffmap.files.report import validated
 from stiffmap.files.schema.base import FileModel, Name
 from stiffmap.machine import Machine
-from stiffmap.performance.quantities import quantity
+from stiffmap.performance.quantities import quantity, quantity_in
 from stiffmap.performance.trajectory import Path, Trajectory, circle, line, through, timed
 from stiffmap.yaml_text import Document, read
 
@@ -106,18 +107,9 @@ def load_motion(file: str | PathLike[str]) -> Motion:
 
 
 def _described(document: Document, file: str) -> Motion:
-    if not isinstance(document.data, dict):
-        raise FileError("a motion file is a mapping with name and line, circle or points", file=file)
-    try:
-        m = MotionFile.model_validate(document.data)
-    except ValidationError as error:
-        raise file_error(error, document, file) from error
-
-    def si(value: Any, unit: str, *keys: str | int) -> float:
-        try:
-            return quantity(value, unit)
-        except StiffmapError as error:
-            raise FileError(str(error), file=file, line=document.line(keys), key=_dotted(keys)) from None
+    expected = "a motion file is a mapping with name and line, circle or points"
+    m = validated(MotionFile, document, file, expected)
+    si = partial(quantity_in, document, file)
 
     def row(values: Sequence[Any], unit: str, *keys: str | int) -> list[float]:
         return [si(v, unit, *keys, i) for i, v in enumerate(values)]
@@ -148,10 +140,6 @@ def _described(document: Document, file: str) -> Motion:
         if value is not None and not value > 0:
             raise FileError(f"expected a positive {name}", file=file, line=document.line((name,)), key=name)
     return Motion(m.name, path, None, span, speed, np.array(row(m.force, "N", "force")))
-
-
-def _dotted(keys: Sequence[str | int]) -> str:
-    return "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in keys).lstrip(".")
 
 
 def _table(place: FilePath) -> Motion:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 
 from stiffmap.effects.units import read_value
-from stiffmap.errors import StiffmapError
+from stiffmap.errors import FileError, StiffmapError
+from stiffmap.files.report import key_text
+from stiffmap.yaml_text import Document
 
 _RATE = re.compile(r"^(.*?)/min$")
 
@@ -27,3 +29,11 @@ def quantity(value: object, unit: str) -> float:
     if match := _RATE.match(text):
         return read_value(f"{match[1]}/s", unit) / 60
     return read_value(text, unit)
+
+
+def quantity_in(document: Document, file: str, value: object, unit: str, *keys: str | int) -> float:
+    """`quantity` of a number that stands in a file under these keys; raises `FileError` with its line."""
+    try:
+        return quantity(value, unit)
+    except StiffmapError as error:
+        raise FileError(str(error), file=file, line=document.line(keys), key=key_text(keys)) from None

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from stiffmap.errors import FileError, StiffmapError
-from stiffmap.files.report import file_error
+from stiffmap.errors import FileError
+from stiffmap.files.report import validated
 from stiffmap.files.schema.base import FileModel, Name
-from stiffmap.performance.quantities import quantity
+from stiffmap.performance.quantities import quantity_in
 from stiffmap.performance.registry import all_measures, get_measure
 from stiffmap.yaml_text import Document, read
 
@@ -101,19 +102,9 @@ def load_requirements(name_or_path: str | PathLike[str]) -> Requirements:
 
 def requirements_of(document: Document, file: str) -> Requirements:
     """Schema, then units."""
-    if not isinstance(document.data, dict):
-        raise FileError("a requirements file is a mapping with name, box, force and requirements", file=file)
-    try:
-        model = RequirementsFile.model_validate(document.data)
-    except ValidationError as error:
-        raise file_error(error, document, file) from error
-
-    def si(value: Any, unit: str, *path: str) -> float:
-        try:
-            return quantity(value, unit)
-        except StiffmapError as error:
-            raise FileError(str(error), file=file, line=document.line(path), key=".".join(path)) from None
-
+    expected = "a requirements file is a mapping with name, box, force and requirements"
+    model = validated(RequirementsFile, document, file, expected)
+    si = partial(quantity_in, document, file)
     bounds = []
     known = {m.name for m in all_measures()}
     for name, given in model.requirements.items():

@@ -6,7 +6,6 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from pydantic import ValidationError
 
 from stiffmap.errors import FileError
 from stiffmap.experiment.channels import AXIS_CHANNELS, Channel
@@ -17,9 +16,9 @@ from stiffmap.experiment.files.schema import ExperimentFile, file_model
 from stiffmap.experiment.files.table import Table, read_table
 from stiffmap.experiment.files.units import ANGLES, Scales
 from stiffmap.experiment.readings import kinds
-from stiffmap.files.report import file_error
+from stiffmap.files.report import validated
 from stiffmap.files.schema.base import suggestion
-from stiffmap.yaml_text import Document, read
+from stiffmap.yaml_text import read
 
 
 def load_experiment(path: str | PathLike[str]) -> Experiment:
@@ -34,20 +33,12 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
             "there is no such experiment (expected a folder with experiment.yaml)", file=str(place)
         )
     document = read(file)
-    model = _validate(document, str(file))
+    expected = "an experiment file is a mapping with machine, quantity and units"
+    model = validated(file_model(), document, str(file), expected)
     table = _rename(read_table(file.parent / model.data), model.columns)
     seconds = [f"{c}2" for c in model.command if f"{c}2" in table]
     _known_columns(table, (*model.joints, *model.command, *seconds))
     return _assemble(model, table, Scales.of(model, str(file)), file)
-
-
-def _validate(document: Document, file: str) -> ExperimentFile:
-    if not isinstance(document.data, dict):
-        raise FileError("an experiment file is a mapping with machine, quantity and units", file=file)
-    try:
-        return file_model().model_validate(document.data)
-    except ValidationError as error:
-        raise file_error(error, document, file) from error
 
 
 def _rename(table: Table, columns: dict[str, str]) -> Table:
