@@ -10,7 +10,6 @@ import typer
 from rich import box as borders
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from stiffmap.cli.inputs import (
     MM,
@@ -27,6 +26,7 @@ from stiffmap.cli.inputs import (
     plain,
 )
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.cli.table_text import as_text
 from stiffmap.errors import StiffmapError
 
 if TYPE_CHECKING:
@@ -184,22 +184,17 @@ def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure]) -
     from stiffmap.report.sheet import Sheet, write_sheet
 
     text = as_table(table)
-    columns = [[escape_free(str(cell)) for cell in c.cells] for c in text.columns]
+    head, rows = as_text(text)
     sheet = Sheet(
         title=f"Measures of {table.machine.name}",
         answer=verdict_of(table),
         lines=[f"{text.title}.", *table.notes, *remarks(table)],
-        head=[str(c.header) for c in text.columns],
-        rows=list(zip(*columns, strict=True)),
+        head=head,
+        rows=rows,
         numbers=(2, 4, 5, 6, 7),
     )
     digests = {f"machine {table.machine.name}, as loaded": digest(table.machine)}
     return write_sheet(path, sheet, {caption(n): f for n, f in figures.items()}, digests)
-
-
-def escape_free(cell: str) -> str:
-    """A cell without the terminal's colours."""
-    return Text.from_markup(cell).plain
 
 
 def verdict_of(table: MeasuresTable) -> str:
