@@ -151,7 +151,7 @@ def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wa
     rows, failed = summary(ds, wanted.plane, MM * wanted.tolerance), failures(ds)
     worst = worst_pose(machine, ds, call["gravity"])
     table = as_table(ds, rows, wanted.plane, wanted.tolerance)
-    files = [how["out"], *write_files(machine, ds, wanted, table, worst, failed)]
+    files = [how["out"], *write_files(machine, ds, wanted, table, worst, failed, call["gravity"])]
     band = uncertainty_data(ds, wanted.plane) if wanted.uncertainty else None
     if as_json:
         data: dict[str, Any] = {"machine": machine.name, "rows": rows, "failed": failed}

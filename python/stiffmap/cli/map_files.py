@@ -14,6 +14,7 @@ from rich.table import Table
 from stiffmap.cli.inputs import MM
 from stiffmap.cli.map_uncertainty import draw_deviations
 from stiffmap.cli.map_worst import in_words
+from stiffmap.cli.table_text import as_text
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.maps.table import write_map_table
@@ -45,12 +46,13 @@ def write_files(
     table: Table,
     worst: dict[str, Any] | None,
     failed: dict[str, int],
+    gravity: Any = None,
 ) -> list[Path]:
     """Pictures of the map and of the machine at its worst pose, tables, deviations, report."""
     from stiffmap.plot import save
 
     figures = map_figures(ds, wanted.plane, MM * wanted.tolerance, wanted.own_scales) if wanted.kinds else {}
-    figures |= loaded(machine, ds, worst) if figures and worst is not None else {}
+    figures |= loaded(machine, ds, worst, gravity) if figures and worst is not None else {}
     files = [save(f, wanted.output / f"map-{n}.{kind}") for n, f in figures.items() for kind in wanted.kinds]
     files += [write_map_table(ds, wanted.output / f"map.{kind}") for kind in wanted.tables]
     files += draw_deviations(ds, wanted.output, wanted.plane) if wanted.uncertainty and figures else []
@@ -73,12 +75,13 @@ def map_figures(ds: xr.Dataset, plane: str, tolerance: float, own_scales: bool) 
     }
 
 
-def loaded(machine: Machine, ds: xr.Dataset, worst: dict[str, Any]) -> dict[str, Figure]:
+def loaded(machine: Machine, ds: xr.Dataset, worst: dict[str, Any], gravity: Any) -> dict[str, Figure]:
     """The machine deformed at the worst pose; nothing where it has no stable shape without the load."""
     from stiffmap.plot import loaded_figure
 
     try:
-        return {"loaded": loaded_figure(machine, worst["position"], ds.wrench.sel(case=worst["case"]).values)}
+        wrench = ds.wrench.sel(case=worst["case"]).values
+        return {"loaded": loaded_figure(machine, worst["position"], wrench, gravity=gravity)}
     except StiffmapError:
         return {}
 
@@ -94,22 +97,22 @@ def write_report(
     """The map as one page: its worst pose in words, the table, the pictures."""
     from stiffmap.report.sheet import Sheet, write_sheet
 
-    columns = [list(map(str, c.cells)) for c in table.columns]
+    head, rows = as_text(table)
     names = {s.name: s.name.lower().replace("_", " ") for s in Status}
     lines = [f"{n} poses have no value: {names[name]}." for name, n in failed.items()]
     sheet = Sheet(
         title=f"Error map of {ds.attrs['machine']}",
         answer=_answer(ds, wanted, worst),
         lines=[*lines, f"{table.title}."],
-        head=[str(c.header) for c in table.columns],
-        rows=list(zip(*columns, strict=True)),
+        head=head,
+        rows=rows,
         numbers=(1, 3, 4, 5, 6),
     )
     captions = {
         "worst": "Deflection where the force points in the worst direction at every position.",
         "best": "Deflection where the force points in the best direction at every position.",
-        "loaded": "The machine at its worst pose: without load (dashed), under it (enlarged), and the part of each spring and "
-        "drive in the deflection of the tool.",
+        "loaded": "The machine at its worst pose: without load (dashed), under it (enlarged), and the part of each "
+        "spring and drive in the deflection of the tool.",
     }
     pictures = {captions.get(n, f"Deflection under the force {n}."): f for n, f in figures.items()}
     digests = {f"machine {ds.attrs['machine']}, as loaded": ds.attrs["machine_digest"]}

@@ -60,23 +60,30 @@ class LoadedShape:
 
 
 def loaded_shape(
-    machine: Machine, position: ArrayLike | None, wrench: ArrayLike, *, rotation: ArrayLike | None = None
+    machine: Machine,
+    position: ArrayLike | None,
+    wrench: ArrayLike,
+    *,
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
 ) -> LoadedShape:
-    """Shapes at a pose (m) without and under a wrench (N, N·m at the TCP).
+    """Shapes at a pose (m): without load and gravity, and under a wrench (N, N·m at the TCP) and gravity (m/s²,
+    None: the machine file's).
 
     Raises StiffmapError where one of them is no stable equilibrium.
     """
     p = machine.description.home.p if position is None else np.asarray(position, dtype=float)
     load = np.asarray(wrench, dtype=float)
-    both = machine.solve(p, np.stack([np.zeros(6), load]), rotation=rotation)
-    if (both.status != Status.CONVERGED).any():
+    free = machine.solve(p, np.zeros(6), rotation=rotation, gravity=np.zeros(3))
+    under = machine.solve(p, load, rotation=rotation, gravity=gravity)
+    status = max(int(free.status), int(under.status))
+    if status != Status.CONVERGED:
         where = ", ".join(f"{MM * v:g}" for v in p)
         raise StiffmapError(
-            f"{machine.name} cannot be drawn under load at ({where}) mm: "
-            f"{Status(int(both.status.max())).name.lower()}"
+            f"{machine.name} cannot be drawn under load at ({where}) mm: {Status(status).name.lower()}"
         )
-    rest, loaded = (skeleton(machine, c, shortest=-1.0) for c in both.coordinates)
-    d = np.asarray(both.displacement[1] - both.displacement[0])
+    rest, loaded = (skeleton(machine, s.coordinates, shortest=-1.0) for s in (free, under))
+    d = np.asarray(under.displacement - free.displacement)
     shape = LoadedShape(rest, loaded, 1.0, d, load[:3])
     return LoadedShape(
         rest, loaded, round_factor(SHOWN * shape.extent, float(np.linalg.norm(d[:3]))), d, load[:3]
@@ -98,11 +105,13 @@ def loaded_figure(
     wrench: ArrayLike = (0.0, 0.0, -300.0, 0.0, 0.0, 0.0),
     *,
     rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
     view: tuple[float, float] | None = None,
 ) -> Figure:
-    """The machine loaded and deformed, and the share of each element in the tool's deflection."""
-    shape = loaded_shape(machine, position, wrench, rotation=rotation)
-    budget = deflection_budget(machine, position, wrench, rotation=rotation)
+    """The machine deformed by a wrench (N, N·m) and gravity (m/s², None: the machine file's), and the share of each
+    element in the tool's deflection."""
+    shape = loaded_shape(machine, position, wrench, rotation=rotation, gravity=gravity)
+    budget = deflection_budget(machine, position, wrench, rotation=rotation, gravity=gravity)
     with paper_style():
         figure = new_figure(9.4, 5.0)
         ax: Any = figure.add_subplot(1, 2, 1, projection="3d")

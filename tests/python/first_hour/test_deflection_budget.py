@@ -71,6 +71,37 @@ def test_the_loaded_picture_enlarges_what_was_solved() -> None:
     assert "drawn ×" in figure.get_suptitle()
 
 
+def test_the_loaded_picture_shows_what_gravity_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Free of load and gravity beside both: as far apart as the budget of the same pose says; in a map too."""
+    machine, g = sm.load_machine("ur10"), [0.0, 0.0, -9.81]
+    shape = loaded_shape(machine, None, np.zeros(6), gravity=g)
+    budget = sm.deflection_budget(machine, None, np.zeros(6), gravity=g)
+    np.testing.assert_allclose(shape.displacement, budget.displacement, rtol=1e-6, atol=1e-12)
+    assert abs(shape.displacement[2]) > 1e-5
+    np.testing.assert_allclose(shape.enlarged(1.0).tcp - shape.rest.tcp, shape.displacement[:3], atol=1e-12)
+    drawn = []
+    real = plot.loaded_figure
+    monkeypatch.setattr(plot, "loaded_figure", lambda *a, **k: drawn.append(real(*a, **k)) or drawn[-1])
+    call = [
+        "map",
+        "orthoglide-revised",
+        "--points",
+        "2",
+        "--z",
+        "0",
+        "--gravity",
+        "0,0,-9.81",
+        "-o",
+        str(tmp_path),
+    ]
+    assert main([*call, "--json"]) == 0
+    worst = json.loads(capsys.readouterr().out)["worst_pose"]
+    size = f"{1e6 * worst['deflection']:.1f} µm"
+    assert size in drawn[0].get_suptitle()
+
+
 def test_show_load_writes_picture_page_and_shares(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, page = tmp_path / "m.png", tmp_path / "m.html"
     code = main(
