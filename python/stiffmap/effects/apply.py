@@ -39,10 +39,7 @@ def add_effect(
     missing one, and effects that exclude each other.
     """
     effect = registry.get(kind)
-    if effect.measurement:
-        raise StiffmapError(
-            f"{kind}: lives in the measurement, not in the machine; a diagnosis applies it to readings"
-        )
+    _refuse_measurement(effect)
     numbers, options = split(effect, parameters)
     place = place_of(effect, _declared(description), element, legs)
     record = AppliedEffect(kind, *place, parameters=numbers, options=options)
@@ -53,10 +50,30 @@ def add_effect(
 
 def apply_records(description: MachineDescription, records: Sequence[AppliedEffect]) -> MachineDescription:
     """The machine with the effects of these records added one after the other."""
+    if description.effects or description.declared is not None:
+        for r in records:
+            given = {**dict(r.parameters), **dict(r.options)}
+            description = add_effect(
+                description, r.kind, element=r.element or None, legs=r.legs or None, **given
+            )
+        return description
+    checked: list[AppliedEffect] = []
     for r in records:
-        given = {**dict(r.parameters), **dict(r.options)}
-        description = add_effect(description, r.kind, element=r.element or None, legs=r.legs or None, **given)
-    return description
+        effect = registry.get(r.kind)
+        _refuse_measurement(effect)
+        numbers, options = split(effect, {**dict(r.parameters), **dict(r.options)})
+        place = place_of(effect, description, r.element or None, r.legs or None)
+        one = AppliedEffect(r.kind, *place, parameters=numbers, options=options)
+        check_exclusion(one, checked)
+        checked.append(one)
+    return _build(description, tuple(checked)) if checked else description
+
+
+def _refuse_measurement(effect: EffectType) -> None:
+    if effect.measurement:
+        raise StiffmapError(
+            f"{effect.kind}: lives in the measurement, not in the machine; a diagnosis applies it to readings"
+        )
 
 
 def resolve(effect: EffectType, declared: MachineDescription, record: AppliedEffect) -> Placed:

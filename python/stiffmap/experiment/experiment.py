@@ -192,6 +192,18 @@ class Experiment:
         return np.unique(self.setup or ("",) * len(self), return_inverse=True)[1].reshape(-1)
 
     @cached_property
+    def distinct(self) -> tuple[Experiment, Integers]:
+        """The rows of each different (pose, wrench) once, and (n,) which of them stands for each row."""
+        key = np.hstack([self.groups[:, None], self.wrench])
+        _, first, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        return self.rows(first.astype(np.intp)), back.reshape(-1)
+
+    @cached_property
+    def without_load(self) -> Experiment:
+        """The same rows without their wrenches."""
+        return replace(self, wrench=np.zeros_like(self.wrench)) if self.wrench.any() else self
+
+    @cached_property
     def clusters(self) -> Integers:
         """(n,) rows that share what a model gets wrong: of one pose; on a ramp of loads those of one pose, set-up
         and direction within a twentieth of the range."""

@@ -113,7 +113,7 @@ class Solver:
 
     def rest(self) -> tuple[Floats, int]:
         """(n, c) without the wrenches: in the centre of every gap, or on the side of the approach."""
-        bare = replace(self.plan, wrench=np.zeros_like(self.plan.wrench))
+        bare = self.plan.without_load
         sided = self.plan.quantity == "position" or self.plan.unloaded == "approach"
         if sided and self.plan.approach is not None and lags(self.machine.description):
             return self._sided(bare)
@@ -131,7 +131,9 @@ class Solver:
     def _equilibria(self, machine: Machine, plan: Experiment) -> tuple[Floats, int]:
         if not plan.wrench.any() and not _moves_unloaded(machine, plan):
             return _at_command(machine, plan), 0
-        labels = np.array(plan.load_points or (plan.load_point,) * len(plan))
+        if len(set(plan.load_points)) < 2:
+            return self._unique(machine, plan, plan.load_points[0] if plan.load_points else plan.load_point)
+        labels = np.array(plan.load_points)
         out, count = np.full((len(plan), len(plan.channels)), np.nan), 0
         for point in np.unique(labels):
             here = np.flatnonzero(labels == point)
@@ -141,10 +143,7 @@ class Solver:
 
     def _unique(self, machine: Machine, plan: Experiment, load_point: str) -> tuple[Floats, int]:
         """Each different (pose, wrench) is solved once."""
-        key = np.hstack([plan.groups[:, None], plan.wrench])
-        _, first, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
-        back = back.reshape(-1)
-        once = plan.rows(first)
+        once, back = plan.distinct
         read = targets(machine, plan)
         on = carrier(machine, plan.loop.instrument_on)
         wanted = list(dict.fromkeys([*read, *([on] if on else [])]))
@@ -164,10 +163,10 @@ class Solver:
         if on:
             linear = seen_from(machine, plan, read, on, linear, moved[back, wanted.index(on)])
         if not joint_channels(plan):
-            return linear, len(first)
+            return linear, len(once)
         joints = joint_motions(machine, once, solution.coordinates, solution.coordinate_names)
         joints = np.where(ok[:, None], joints, np.nan)
-        return np.hstack([linear, joints[back]]), len(first)
+        return np.hstack([linear, joints[back]]), len(once)
 
 
 def _solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solution:

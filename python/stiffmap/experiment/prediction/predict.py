@@ -91,7 +91,9 @@ class Predictor:
         return Machine(apply_records(self.machine.description, mechanical))  # compiled once, not per effect
 
     def _motion(self, mechanical: Terms, load: Terms) -> Floats:
-        plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
+        w = true_wrench(self.experiment, load)
+        # the plan itself where nothing changes it: what it has counted is kept
+        plan = self.experiment if w is self.experiment.wrench else replace(self.experiment, wrench=w)
         return at_records(plan, mechanical, self._branches)
 
     def _branches(self, plan: Experiment, terms: Terms) -> Floats:
