@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,16 +18,15 @@ from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.statistics import Sums
 from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
+from stiffmap.diagnosis.decision.few import MEETING, not_few, screened
 from stiffmap.diagnosis.decision.judge import judge, unexplained, with_model
 from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.fitting.fit import evaluate, fit
 from stiffmap.diagnosis.fitting.interval import unseen
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.calibrated import Layer
-from stiffmap.diagnosis.search.selection import MOST_EFFECTS
 from stiffmap.diagnosis.search.study import Finding, Study, find, search_on, study
 from stiffmap.effects import Parameter, get
-from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 
 BEYOND = 100.0
@@ -39,14 +37,9 @@ COVERED, FAINT = 0.95, 0.1
 """Share of an effect's signature that uncertain numbers imitate; those that ten standard uncertainties of show at all."""
 WORTH_A_FLOOR = 0.3
 """Noise variances per pose that no linear explanation takes: effects are then looked for at that floor at once."""
-MEETING = 10.0
-"""Nats that each fault beyond the first costs."""
-SURE = 30.0
-"""Nats by which uncertain numbers must lead before single effects on an exact machine are not fitted at all."""
-HOPELESS = 25.0
-"""Chi-square per reading that the best few linear explanations leave: no few effects on an exact machine do then."""
-FELL = 0.7
-"""Share of the floor to which effects must bring it before the search is done again at the lower one."""
+REJECTED = 5.41
+"""Nats by which the readings must reject the floor that a search was done at, before it is done again at the lower
+one: half the chi-square of one degree of freedom that chance exceeds once in a thousand."""
 SCALES = (1.0, 0.3, 0.1, 0.03, 0.01)
 
 
@@ -70,10 +63,8 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
     positions = s.experiment.quantity == "position"
     if positions:
         found = calibrator(s, tolerances, exclude)
-        if found is not None:
-            problem, few = s.whole[0], screened(s)
-            if leads_by_far(problem, found, few) or hopeless(problem, few):
-                return _layered(s, found, seed, tolerances)
+        if found is not None and not_few(s, screened(s), spread_evidence(s.whole[0], found)):
+            return _layered(s, found, seed, tolerances)
     finding, verdict, left = judge(s, find(s))
     first = Answer(s, finding, verdict, left)
     if s.clock.over or not (left or finding.model.candidates):
@@ -119,44 +110,6 @@ def calibrator(s: Study, tolerances: Tolerances, exclude: tuple[str, ...]) -> Ca
     names = [u for u in unknowns(p.machine.description, p.experiment, tolerances) if u.group not in exclude]
     found = Calibrator.of(p, names, s.clock.until)
     return found if found.sensitivity.unknowns else None
-
-
-class Screened(NamedTuple):
-    """The best few effects, taken as linear, one after the other."""
-
-    left: Floats
-    """(N,) what they leave of the whitened residual."""
-    number: int
-    """Directions that they take."""
-
-
-def screened(s: Study) -> Screened:
-    """What the best few effects of a study's screen, taken as linear, leave of all its readings."""
-    problem, screen = s.whole
-    left, beside = problem.residual(s.plan.base), screen
-    tangent = np.zeros((len(left), 0))
-    for _ in range(MOST_EFFECTS):
-        reductions = beside.delta_chi2(left[:, None])[:, 0]
-        best = int(np.argmax(reductions)) if len(reductions) else -1
-        if best < 0 or reductions[best] <= 0.0:
-            break
-        q = beside.basis(best)
-        left = left - q @ (q.T @ left)
-        tangent = np.column_stack([tangent, q])
-        beside = screen.beside(tangent)
-    return Screened(left, int(tangent.shape[1]))
-
-
-def leads_by_far(problem: Problem, found: Calibrator, few: Screened) -> bool:
-    """Whether uncertain numbers beat by far what the linear screen promises of any few effects."""
-    chi2 = float(few.left @ few.left)
-    promised = -0.5 * (chi2 + few.number * float(np.log(max(len(few.left), 2))))
-    return spread_evidence(problem, found) > promised + SURE
-
-
-def hopeless(problem: Problem, few: Screened) -> bool:
-    """Whether the best few effects, taken as linear, leave so much that no few effects are the whole story."""
-    return float(few.left @ few.left) > HOPELESS * max(problem.freedom - few.number, 1)
 
 
 def sparse_evidence(first: Answer) -> float:
@@ -207,9 +160,10 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
     """The search where what no model explains counts as noise; only what holds is named."""
     assert s.layer is not None
     again, finding = _found_at(s, found, rho, seed)
-    lower = floor_of(s, finding) if finding.model.candidates else rho
-    if lower < FELL * rho and not s.clock.over:  # the first floor held what the effects explain
-        again, finding = _found_at(s, found, lower, seed)
+    if finding.model.candidates and not s.clock.over:
+        lower = floor_of(s, finding)
+        if lower < rho and rejected(s, finding, rho):  # the first floor held what the effects explain
+            again, finding = _found_at(s, found, lower, seed)
     held = held_out(again, finding.outliers, seed, finding)
     model, refused = admissible(finding.model, finding, tolerances)
     model, same = _beyond_calibration(s, model, finding)
@@ -238,12 +192,24 @@ def _on(s: Study, finding: Finding) -> Finding:
 
 def floor_of(s: Study, finding: Finding) -> float:
     """What no model explains, in noise variances of one reading: REML per pose, beside calibration and effects."""
+    blocks = _left_by(s, finding)
+    return model_form(blocks) * float(np.median(blocks.number))
+
+
+def rejected(s: Study, finding: Finding, rho: float) -> bool:
+    """Whether what a finding leaves is likelier by `REJECTED` nats at a floor of its own than at `rho`."""
+    blocks = _left_by(s, finding)
+    own, first = model_form(blocks), rho / float(np.median(blocks.number))
+    return blocks.log_likelihood(own) - blocks.log_likelihood(first) > REJECTED
+
+
+def _left_by(s: Study, finding: Finding) -> Blocks:
+    """What the calibration and the effects of a finding leave, in blocks of one pose and channel."""
     assert s.layer is not None
     problem = s.problem_of(~finding.outliers).exact
     columns = problem.white(s.layer.columns)
     residual = problem.residual(s.predictor(finding.model.terms()))
-    blocks = Blocks.of(columns, residual, pose_labels(problem))
-    return model_form(blocks) * float(np.median(blocks.number))
+    return Blocks.of(columns, residual, pose_labels(problem))
 
 
 def _word(finding: Finding, left: list[Pattern]) -> str:

@@ -23,14 +23,27 @@ from stiffmap.experiment.prediction.predict import Predictor
 PAYS = 1e-3
 """Change of chi-square that is not worth another step."""
 STEPS, FRESH = 12, 3
+BENT = 0.05
+"""Share of a step's change by which a borrowed Jacobian may be wrong."""
 DAMPING = 0.01
 """Levenberg's term, per scale: a parameter that the readings hardly feel stays where it is."""
 
 Residual = Callable[[Floats], Floats]
 
 
-def fit(model: Model, predictor: Predictor, problem: Problem, *, fixed: Sequence[int] = ()) -> Model:
+def fit(
+    model: Model,
+    predictor: Predictor,
+    problem: Problem,
+    *,
+    fixed: Sequence[int] = (),
+    near: Floats | None = None,
+) -> Model:
     """The model with the values that minimise chi-square; `fixed` indices stay.
+
+    near
+        (N, k) Jacobian of somewhere near, to begin with instead of differences; it serves as long as it
+        foretells what steps do.
 
     Its residual and Jacobian belong to these values. Where the machine cannot be built or solved with
     them chi2 is infinite, residual and Jacobian are None and `problem` says why; values stay within
@@ -39,7 +52,7 @@ def fit(model: Model, predictor: Predictor, problem: Problem, *, fixed: Sequence
     free = np.array([i for i in range(len(model.values)) if i not in {*fixed, *model.held}], dtype=np.intp)
     model = replace(model, values=np.clip(model.values, *model.bounds()))
     try:
-        return _descend(model, predictor, problem, free)
+        return _descend(model, predictor, problem, free, None if near is None else near[:, free])
     except StiffmapError as error:
         return replace(model, chi2=np.inf, residual=None, jacobian=None, failure=str(error))
 
@@ -53,7 +66,9 @@ def evaluate(model: Model, predictor: Predictor, problem: Problem) -> Model:
     return replace(model, chi2=float(r @ r), residual=r, jacobian=j)
 
 
-def _descend(model: Model, predictor: Predictor, problem: Problem, free: NDArray[np.intp]) -> Model:
+def _descend(
+    model: Model, predictor: Predictor, problem: Problem, free: NDArray[np.intp], near: Floats | None
+) -> Model:
     low, high = model.bounds()
     x = model.values
 
@@ -67,7 +82,8 @@ def _descend(model: Model, predictor: Predictor, problem: Problem, free: NDArray
         except StiffmapError:
             return np.full(len(problem), np.inf)
 
-    r, j, age = residual(x), jacobian(model, x, predictor, problem, free), 0
+    r = residual(x)
+    j, age = (jacobian(model, x, predictor, problem, free), 0) if near is None else (near, 1)
     for _ in range(STEPS if free.size else 0):
         step = np.zeros_like(x)
         step[free] = _bounded(j, r, (low - x)[free], (high - x)[free])
@@ -75,6 +91,10 @@ def _descend(model: Model, predictor: Predictor, problem: Problem, free: NDArray
             break
         moved, tried = _shorten(tried_residual, x, step, r)
         gain = float(r @ r - tried @ tried)
+        if near is not None and not _foretold(j, r, tried, (moved - x)[free]):
+            near, x, r = None, moved, tried
+            j, age = jacobian(model, x, predictor, problem, free), 0
+            continue
         if gain > 0:
             s = (moved - x)[free]
             j, x, r, age = j + np.outer(tried - r - j @ s, s) / (s @ s), moved, tried, age + 1
@@ -100,6 +120,14 @@ def _bounded(j: Floats, r: Floats, low: Floats, high: Floats) -> Floats:
         (np.minimum(low, 0) * unit - margin, np.maximum(high, 0) * unit + margin),
     )
     return np.asarray(np.clip(found.x / unit, low, high))
+
+
+def _foretold(j: Floats, r: Floats, tried: Floats, step: Floats) -> bool:
+    """Whether a Jacobian told what a step did, to within `BENT` of it."""
+    told = j @ step
+    return float(np.linalg.norm(tried - r - told)) <= BENT * float(np.linalg.norm(told)) + float(
+        np.sqrt(PAYS)
+    )
 
 
 def promised(j: Floats, r: Floats, step: Floats) -> float:

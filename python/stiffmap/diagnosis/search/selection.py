@@ -91,14 +91,26 @@ def select(search: Search) -> Selection:
     return Selection(model, null, tuple(steps))
 
 
-def best_addition(search: Search, model: Model) -> Finalist | None:
-    """The candidate that explains most beside the model, judged by full fits of the best few."""
-    found = [f for f in additions(search, model, search.finalists) if f.model.usable]
-    return max(found, key=lambda f: f.minus_log_p, default=None)
+def best_addition(search: Search, model: Model, but: Candidate | None = None) -> Finalist | None:
+    """The candidate that explains most beside the model, judged by full fits of the best few, `but` one."""
+    found = [f for f in additions(search, model, search.finalists, but=but) if f.model.usable]
+    best = max(found, key=lambda f: f.minus_log_p, default=None)
+    return None if best is None else _polished(search, model, best)
 
 
-def additions(search: Search, model: Model, number: int, margin: float = MARGIN) -> list[Finalist]:
-    """Full fits of what screening puts first: within `margin` (or `CLOSE`) of the best."""
+def _polished(search: Search, before: Model, best: Finalist) -> Finalist:
+    """The finalist with a Jacobian of its own: those that lose need none."""
+    model = fit(best.model, search.predictor, search.problem)
+    if not model.usable or model.chi2 > best.model.chi2:
+        return best
+    delta_chi2 = before.chi2 - model.chi2
+    return Finalist(model, delta_chi2, minus_log_p_of(delta_chi2, model.sizes()[-1]))
+
+
+def additions(
+    search: Search, model: Model, number: int, margin: float = MARGIN, but: Candidate | None = None
+) -> list[Finalist]:
+    """Full fits of what screening puts first: within `margin` (or `CLOSE`) of the best, `but` one that is known."""
     if model.residual is None:
         return []
     screen = search.screen.beside(model.tangent())
@@ -116,7 +128,8 @@ def additions(search: Search, model: Model, number: int, margin: float = MARGIN)
     if top < WORTH * search.threshold:
         return []
     picked = [i for i in best_of.values() if minus_log_p[i] > top - max(margin, CLOSE * top)]
-    return [_finalist(search, model, screen, i) for i in picked[:number]]
+    fitted = [i for i in picked[:number] if screen.variants[i].candidate != but]
+    return [_finalist(search, model, screen, i) for i in fitted]
 
 
 def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
@@ -127,13 +140,26 @@ def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
     starts = start_values(variant, estimate, flat)
     held = np.flatnonzero(flat).tolist() if len(starts) == 1 else []
     begun = [model.plus(variant.candidate, s, held) for s in starts]
-    fits = [fit(b, search.predictor, search.problem) for b in begun]
+    near = _near(search.screen, model, i)
+    fits = [fit(b, search.predictor, search.problem, near=near) for b in begun]
     best = min(fits, key=lambda m: m.chi2)
     if not best.usable:
         beside = f" beside {' + '.join(map(str, model.candidates))}" if model.candidates else ""
         search.failed[f"{variant.candidate}{beside}"] = best.failure
     delta_chi2 = model.chi2 - best.chi2
     return Finalist(best, delta_chi2, minus_log_p_of(delta_chi2, best.sizes()[-1]))
+
+
+def _near(screen: Screen, model: Model, i: int) -> Floats | None:
+    """(N, k) Jacobian of the model and one effect more, the effect's at its null; None where it has no slope there."""
+    variant, columns = screen.variants[i], screen.columns(i)
+    shaped = (
+        variant.shape or variant.start is not None or columns.shape[1] < len(variant.candidate.parameters)
+    )
+    if shaped or not np.any(columns != 0.0, axis=0).all():
+        return None
+    own = model.jacobian if model.jacobian is not None else np.zeros((screen.readings, 0))
+    return np.column_stack([own, -columns])
 
 
 def minus_log_p_of(delta_chi2: float, freedom: int) -> float:
@@ -197,7 +223,7 @@ def exchange(search: Search, model: Model) -> Model:
         better = model
         for i in range(len(model.candidates)):
             reduced = fit(model.without(i), search.predictor, search.problem)
-            found = best_addition(search, reduced) if reduced.usable else None
+            found = best_addition(search, reduced, model.candidates[i]) if reduced.usable else None
             if found and score(found.model, search.problem) > score(better, search.problem) + 1.0:
                 better = found.model
         if better is model:
