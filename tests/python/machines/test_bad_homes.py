@@ -24,7 +24,7 @@ def changed(folder: Path, old: str, new: str) -> Path:
 
 def test_impossible_home(tmp_path: Path) -> None:
     file = changed(tmp_path, "home: -151.92751306414704", "home: 0")
-    with pytest.raises(sm.StiffmapError, match=r"home configuration does not close: .*right by \d.* mm"):
+    with pytest.raises(sm.StiffmapError, match=r"home configuration does not close: .*right by \d.* deg"):
         sm.load_machine(file)
 
 
@@ -33,13 +33,13 @@ def test_check_does_not_call_it_usable(tmp_path: Path, capsys: pytest.CaptureFix
     assert main(["check", str(file)]) == 2
     out, error = capsys.readouterr()
     assert "usable" not in out and error.count("\n") == 1
-    assert re.search(r"home configuration does not close: .*right by \d.* mm", error)
+    assert re.search(r"home configuration does not close: .*right by \d.* deg", error)
 
 
 def test_wrong_assembly_branch(tmp_path: Path) -> None:
     """The right elbow bent inwards: its leg could reach the tool, but not from these angles."""
     file = changed(tmp_path, "home: 98.79741070999106", "home: -98.79741070999106")
-    with pytest.raises(sm.StiffmapError, match=r"home configuration does not close: .*right by \d.* mm"):
+    with pytest.raises(sm.StiffmapError, match=r"home configuration does not close: .*right by \d.* deg"):
         sm.load_machine(file)
 
 
