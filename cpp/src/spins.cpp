@@ -81,11 +81,20 @@ void Spins::measure(const Problem& p, EquilibriumWorkspace& eq) {
     const Index j = held_[at(k)];
     all.row(k) = (eq.lin.K.row(j) - eq.lin.H.row(j)) * motion_ - eq.lin.J.col(j).transpose() * wrench_;
   }
+  // Residuals of round-off in stiff springs would turn the spins: what the next step takes away is not counted.
+  force_balance(m_, eq.lin, eq.saddle, force_);
+  eq.saddle.solve(force_, eq.lin.e, eq.dz, eq.dlambda);
+  eq.dz = eq.dz.cwiseProduct(eq.lin.da).eval();
+  VecX moment(n);
+  for (Index k = 0; k < n; ++k) {
+    const Index j = held_[at(k)];
+    moment[k] = eq.lin.r[j] + (eq.lin.K.row(j) - eq.lin.H.row(j)).dot(eq.dz) - eq.lin.J.col(j).dot(eq.dlambda);
+  }
   const double least = noise(p);
   turning_.clear();
   std::vector<Index> which;
   for (Index k = 0; k < n; ++k)
-    if (std::abs(eq.lin.r[held_[at(k)]]) > least || all.row(k).cwiseAbs().maxCoeff() > 1e3 * least) {
+    if (std::abs(moment[k]) > least || all.row(k).cwiseAbs().maxCoeff() > 1e3 * least) {
       turning_.push_back(held_[at(k)]);
       which.push_back(k);
     }
@@ -93,7 +102,7 @@ void Spins::measure(const Problem& p, EquilibriumWorkspace& eq) {
   curve_.resize(t, t);
   moment_.resize(t);
   for (Index a = 0; a < t; ++a) {
-    moment_[a] = eq.lin.r[turning_[at(a)]];
+    moment_[a] = moment[which[at(a)]];
     for (Index b = 0; b < t; ++b) curve_(a, b) = all(which[at(a)], which[at(b)]);
   }
   MatX kept(m_.size(), t), kept_wrench(m_.closures(), t);
