@@ -44,12 +44,13 @@ class DeflectionBudget:
         A negative share reduces the deflection.
         """
         d = self.displacement[:3]
-        return np.asarray(self.contributions[:, :3] @ d / (d @ d))
+        size = float(d @ d)
+        return np.asarray(self.contributions[:, :3] @ d / (size or 1.0))
 
     @property
     def rest_share(self) -> float:
         """What is of second order in the deflections, or lies in external springs."""
-        return float(1.0 - self.shares.sum())
+        return float(self.displacement[:3].any()) - float(self.shares.sum())
 
     def ranked(self) -> list[tuple[str, Floats, float]]:
         """Element, contribution (6,), share; the largest share first."""

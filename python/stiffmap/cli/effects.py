@@ -19,7 +19,8 @@ def effects(
     kind: Annotated[
         str | None,
         typer.Argument(
-            help="One kind: its definition and parameters; or a word for it, such as backlash, Spiel, sag."
+            help="One kind: its definition and parameters; or a word for it, such as backlash, Spiel, sag; "
+            "or a machine: the effects and their places on it."
         ),
     ] = None,
     on: Annotated[str | None, typer.Option(help="Machine: the elements and legs where each can be.")] = None,
@@ -39,8 +40,11 @@ def effects(
     """
     from stiffmap.effects import get, kinds
     from stiffmap.effects.synonyms import found_by
+    from stiffmap.files.shipped import machine_names
     from stiffmap.machine import load_machine
 
+    if kind and not on and kind not in kinds() and kind in machine_names():
+        kind, on = None, kind
     machine = load_machine(on) if on else None
     if kind and kind not in kinds() and (meant := found_by(kind, kinds())):
         chosen = [get(k) for k in meant]

@@ -166,9 +166,8 @@ def map_figure(table: MeasuresTable, row: Row) -> Figure:
     planes = sorted({0, len(z) // 2, len(z) - 1})
     with paper_style():
         figure = new_figure(3.0 * len(planes) + 0.8, 3.2)
-        low, high = np.nanmin(grid, initial=np.inf), np.nanmax(grid, initial=-np.inf)
         axes = figure.subplots(1, len(planes), squeeze=False)[0]
-        levels = np.linspace(low, high if high > low else low + 1, 13)
+        levels = _levels(grid)
         for a, k in zip(axes, planes, strict=True):
             _plane(a, row.measure, row, x, y, grid[:, :, k], levels)
             a.set_title(f"z = {MM * z[k]:.0f} mm")
@@ -183,8 +182,17 @@ def map_figure(table: MeasuresTable, row: Row) -> Figure:
     return figure
 
 
+def _levels(grid: Floats) -> Floats:
+    """Thirteen that increase, from the least to the largest finite value."""
+    finite = grid[np.isfinite(grid)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    return np.linspace(low, high if high - low > 1e-9 * abs(high) else low + max(abs(low), 1.0), 13)
+
+
 def _plane(axes, measure: Measure, row: Row, x: Floats, y: Floats, values: Floats, levels: Floats) -> None:  # type: ignore[no-untyped-def]
-    if len(x) > 1 and len(y) > 1:
+    if not np.isfinite(values).any():
+        axes.text(0.5, 0.5, "no value in this plane", transform=axes.transAxes, ha="center", va="center")
+    elif len(x) > 1 and len(y) > 1:
         axes.contourf(MM * x, MM * y, values.T, levels=levels, cmap=COLOURS, extend="both")
         bound = row.bound
         limit = None if bound is None else bound.at_least if bound.at_least is not None else bound.at_most

@@ -61,6 +61,12 @@ def test_an_unreachable_pose_has_no_budget() -> None:
         sm.deflection_budget(sm.load_machine("five-bar"), [9.0, 0, 0], [1.0, 0, 0, 0, 0, 0])
 
 
+def test_without_load_nothing_has_a_share(tmp_path: Path) -> None:
+    budget = sm.deflection_budget("ur10", wrench=[0.0] * 6)
+    assert not budget.shares.any() and budget.rest_share == 0
+    assert main(["show", "ur10", "--load", "0,0,0", "-o", str(tmp_path / "a.png")]) == 0
+
+
 def test_the_loaded_picture_enlarges_what_was_solved() -> None:
     machine = sm.load_machine("orthoglide-revised")
     shape = loaded_shape(machine, [0.1, 0.0, 0.1], [0, 300.0, 0, 0, 0, 0])

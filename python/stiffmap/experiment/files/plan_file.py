@@ -1,11 +1,15 @@
-"""A plan as a CSV file: the columns of an experiment without readings, in mm, N and rad."""
+"""A plan as a CSV file: the columns of an experiment without readings, in mm, N and rad, or in the unit that a header
+names: ``x [um]``."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
 from stiffmap.errors import FileError
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS
@@ -13,7 +17,7 @@ from stiffmap.experiment.experiment import WRENCH, Experiment
 from stiffmap.experiment.files import columns
 from stiffmap.experiment.files.orientation import EULER, TURNED2, rotations
 from stiffmap.experiment.files.schema import ExperimentFile, UnitsModel
-from stiffmap.experiment.files.table import read_table
+from stiffmap.experiment.files.table import Table, read_table
 from stiffmap.experiment.files.units import Scales
 from stiffmap.experiment.virtual.plans import MICRO
 from stiffmap.files.schema.base import suggestion
@@ -33,7 +37,7 @@ def load_plan(
 ) -> Experiment:
     """Plan of a CSV file with x, y, z and, as wanted, loads, orientation, order, temperature, branch,
     set-up, approach and points. Raises `FileError` naming file, row and column."""
-    table = read_table(path)
+    table, own = _units_of_columns(read_table(path))
     for column in table.header:
         if column not in KNOWN:
             near = suggestion(column, list(KNOWN))
@@ -41,7 +45,7 @@ def load_plan(
                 f"unknown column '{column}'{near}; a plan knows {', '.join(KNOWN)}", file=table.file, line=1
             )
     head = {"length": "mm", "force": "N", "angle": "rad"}
-    units = UnitsModel.model_validate(head)
+    units = _units(head | own, table.file)
     model = ExperimentFile(machine=machine.name, quantity=quantity, units=units)  # type: ignore[arg-type]
     scales = Scales.of(model, table.file)
     n = len(table.rows)
@@ -70,3 +74,28 @@ def load_plan(
         points=columns.named(table, "point", "tcp"),
         load_points=columns.named(table, "load_point", "tcp"),
     )
+
+
+def _units_of_columns(table: Table) -> tuple[Table, dict[str, str]]:
+    """The table with bare names of columns, and the units that stood behind them in square brackets."""
+    split = [re.fullmatch(r"(\S+)\s*\[\s*(\S+)\s*\]", h) for h in table.header]
+    names = tuple(m[1] if m else h for m, h in zip(split, table.header, strict=True))
+    twice = next((n for n in names if names.count(n) > 1), None)
+    if twice:
+        raise FileError(f"column '{twice}' stands twice", file=table.file, line=1)
+    own = {m[1]: m[2].replace("µ", "u").replace("μ", "u") for m in split if m}
+    return replace(table, header=names), own
+
+
+def _units(given: dict[str, str], file: str) -> UnitsModel:
+    try:
+        return UnitsModel.model_validate(given)
+    except ValidationError as error:
+        first = error.errors()[0]
+        unknown = [c for c in given if c not in UnitsModel.model_fields]
+        column = str(first["loc"][0]) if first["loc"] else next(iter(unknown), "")
+        expected = first.get("ctx", {}).get("expected")
+        told = f"expected {expected}" if expected else "expected none"
+        raise FileError(
+            f"unit of column '{column}': {told}; found '{given.get(column, '')}'", file=file, line=1
+        ) from error
