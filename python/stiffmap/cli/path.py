@@ -40,10 +40,11 @@ def path(
     )
     files = write(machine, ds, folder(output)) if output else []
     if as_json:
+        counted = ds.assign(unstable_modes=ds.unstable_modes.astype(int))
         names = ("force", "deflection", "deflection_along", "unstable_modes", "status", "branch", "critical_force",
                  "critical_deflection", "critical_kind", "mode_leg", "mode_joint")  # fmt: skip
         print_json(plain({"machine": machine.name, "end": ds.attrs["end"], "crossing_end": ds.attrs["crossing_end"]}
-                         | {n: ds[n].values for n in names} | {"files": files}))  # fmt: skip
+                         | {n: counted[n].values for n in names} | {"files": files}))  # fmt: skip
     else:
         show(Console(highlight=False), ds)
         if files:

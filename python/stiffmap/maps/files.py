@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -50,18 +52,19 @@ def read_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     if not is_zarr(target):
         return xr.open_dataset(target, engine="netcdf4")
     ds = xr.open_zarr(target, consolidated=False)
-    names = [n for n, c in ds.coords.items() if c.dtype.kind == "T"]
-    out: xr.Dataset = ds.assign_coords(
-        {n: (ds[n].dims, np.array(ds[n].values.tolist(), str), ds[n].attrs) for n in names}
-    )
-    return out
+    return _changed(ds, "T", lambda v: np.array(v.values.tolist(), str).reshape(v.shape))
 
 
 def zarr_strings(ds: xr.Dataset) -> xr.Dataset:
     """Names as strings of any length: the form that Zarr's third format has agreed on."""
-    names = [n for n, c in ds.coords.items() if c.dtype.kind == "U"]
-    out: xr.Dataset = ds.assign_coords({n: ds[n].astype(object) for n in names})
-    return out
+    return _changed(ds, "U", lambda v: v.values.astype(object))
+
+
+def _changed(ds: xr.Dataset, kind: str, change: Callable[[xr.Variable], Any]) -> xr.Dataset:
+    """The Dataset with the variables and coordinates of one kind of type changed."""
+    new = {n: (v.dims, change(v), v.attrs) for n, v in ds.variables.items() if v.dtype.kind == kind}
+    out = ds.assign_coords({n: v for n, v in new.items() if n in ds.coords})
+    return out.assign({n: v for n, v in new.items() if n not in ds.coords})
 
 
 def partial_folder(path: Path) -> Path:

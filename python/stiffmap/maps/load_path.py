@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
@@ -12,14 +11,10 @@ from stiffmap.broadcasting import Floats
 from stiffmap.compiled.machine import PATH_CONTROLS as CONTROLS
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import hint_metres
-from stiffmap.maps.critical import critical_variables
-from stiffmap.maps.fixed_order_sums import norm
 from stiffmap.maps.loading import Loading
-from stiffmap.maps.provenance import describe
-from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, meaning, status_attrs
+from stiffmap.maps.sweep_dataset import Equilibria, Followed, sweep_dataset
 from stiffmap.status import Status
 
-BRANCH = meaning("1", "0: the path from rest; 1: the branch that crosses it")
 UNITS = {"force": "N", "displacement": "m", "arc": "m"}
 ENDS = (
     "the limit was reached",
@@ -55,24 +50,16 @@ def load_path(
     (end, points, critical), (crossing_end, crossing, crossing_critical) = branches
     hint_metres(machine, position, not points)
     _check_cross(cross, critical, str(ENDS[end]))
-    call = {"function": "sweep", "position": position, "direction": direction, "control": control,
+    call = {"position": position, "direction": direction, "control": control,
             "limit": limit, "steps": steps, "cross": cross}  # fmt: skip
-    attrs = describe(loading, f"load path by {control}", call) | {
-        "end": ENDS[end],
-        "crossing_end": _crossing_end(cross, critical, crossing, ENDS[crossing_end]),
-        "flags": int(flags),
-        "critical_points": json.dumps([_summary(c) for c in critical]),
-    }
-    data, coords = _variables(points + crossing)
-    data["branch"] = ("step", [0] * len(points) + [1] * len(crossing), BRANCH)
-    modes, mode_coords = critical_variables(machine, critical + crossing_critical)
-    modes["critical_branch"] = ("critical", [0] * len(critical) + [1] * len(crossing_critical), BRANCH)
-    coords |= mode_coords | {
-        "axis": ("axis", np.array(["x", "y", "z"])),
-        "position": ("axis", position, meaning("m", "commanded tcp")),
-        "direction": ("axis", direction, meaning("1", "direction of the force, base axes")),
-    }
-    return xr.Dataset(data | modes, coords, attrs)
+    followed = Followed(
+        ENDS[end],
+        _crossing_end(cross, critical, crossing, ENDS[crossing_end]),
+        tuple(critical),
+        tuple(crossing_critical),
+    )
+    found = _equilibria(points, crossing, int(flags))
+    return sweep_dataset(loading, f"load path by {control}", call, found, followed)
 
 
 def _crossing_end(cross: int, critical: list[dict[str, Any]], points: list[Any], end: str) -> str:
@@ -107,32 +94,17 @@ def check_control(control: str, limit: float | None, steps: int, load_type: obje
     return float(limit)
 
 
-def _variables(points: list[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, Any]]:
-    displacement = np.array([p["displacement"] for p in points]).reshape(-1, 6)
-    force = np.array([p["load"] for p in points])
-    unstable = np.array([p["unstable"] for p in points], dtype=int)
-    status = np.where(unstable > 0, Status.UNSTABLE, Status.CONVERGED).astype(np.uint8)
-    return {
-        "displacement": (
-            ("step", "component"),
-            displacement,
-            meaning(TWIST_UNITS, "displacement of the reference point"),
-        ),
-        "deflection": ("step", norm(displacement[:, :3]), meaning("m", "norm of the translation")),
-        "deflection_xy": ("step", norm(displacement[:, :2]), meaning("m", "norm in the xy plane")),
-        "deflection_along": (
-            "step",
-            np.array([p["along"] for p in points]),
-            meaning("m", "translation along the force"),
-        ),
-        "unstable_modes": ("step", unstable, meaning("1", "directions in which the energy falls")),
-        "status": ("step", status, status_attrs("the equilibrium")),
-    }, {
-        "force": ("step", force, meaning("N", "force along the direction")),
-        "component": ("component", np.array(COMPONENTS)),
-    }
-
-
-def _summary(c: dict[str, Any]) -> dict[str, Any]:
-    kind = "limit" if c["limit"] else "bifurcation"
-    return {"kind": kind, "force": c["load"], "deflection_along": c["along"]}
+def _equilibria(points: list[dict[str, Any]], crossing: list[dict[str, Any]], flags: int) -> Equilibria:
+    """Both branches, one after the other; the flags are those of the whole path."""
+    both = points + crossing
+    unstable = np.array([p["unstable"] for p in both], dtype=float)
+    return Equilibria(
+        force=np.array([p["load"] for p in both], dtype=float),
+        displacement=np.array([p["displacement"] for p in both], dtype=float).reshape(-1, 6),
+        along=np.array([p["along"] for p in both], dtype=float),
+        compliance_along=np.full(len(both), np.nan),
+        unstable_modes=unstable,
+        status=np.where(unstable > 0, Status.UNSTABLE, Status.CONVERGED).astype(np.uint8),
+        flags=np.full(len(both), flags, dtype=np.uint32),
+        branch=np.repeat([0, 1], [len(points), len(crossing)]),
+    )

@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike
 
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
-from stiffmap.maps.fixed_order_sums import dot, norm
+from stiffmap.maps.fixed_order_sums import dot
 from stiffmap.maps.inputs import force_list, place, unit
 from stiffmap.maps.load_path import check_control, load_path
 from stiffmap.maps.loading import Loading, without_failed
-from stiffmap.maps.provenance import describe
-from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
+from stiffmap.maps.sweep_dataset import Equilibria, Followed, sweep_dataset
 from stiffmap.options import LoadingKeywords, SolveOptions
 
 
@@ -46,14 +45,14 @@ def sweep(
     position (3,) m; direction (3,), any length; forces (n,) N, negative ones act against it;
     limit of either sign; steps to the limit. `options` and other keywords as in `Machine.solve`.
 
-    Returns a Dataset with dimension ``force``: displacement, deflection, deflection_xy,
-    deflection_along (component along the force), compliance_along (of a little more force, m/N),
-    status, flags. Unstable equilibria keep their values (status 3); unreachable and not converged
-    ones hold NaN. A path has the dimension ``step`` with the coordinate force, also unstable_modes
-    (number of directions in which the energy falls) and branch (1: the crossing one), and the dimension
-    ``critical``: critical_force, critical_kind (``limit`` or ``bifurcation``: there the path goes on along
-    the branch it came on, and another one crosses), critical_branch, mode over ``coordinate``, mode_leg and
-    mode_joint (what moves most in it); the attributes ``end`` and ``crossing_end`` say why they ended.
+    Returns a Dataset with dimension ``step`` and the coordinate force: displacement, deflection, deflection_xy,
+    deflection_along (component along the force), compliance_along (of a little more force, m/N; NaN on a path),
+    unstable_modes (number of directions in which the energy falls; NaN for single forces), status, flags,
+    branch (1: the crossing one). Unstable equilibria keep their values (status 3); unreachable and not converged
+    ones hold NaN. A path may have entries of the dimension ``critical``: critical_force, critical_kind
+    (``limit`` or ``bifurcation``: there the path goes on along the branch it came on, and another one crosses),
+    critical_branch, mode over ``coordinate``, mode_leg and mode_joint (what moves most in it); the attributes
+    ``end`` and ``crossing_end`` say why its branches ended (empty for single forces).
     Raises StiffmapError for bad input.
     """
     loading = Loading(machine, options, **given)
@@ -70,30 +69,15 @@ def sweep(
     s = loading.solve(p, wrench)
     d = without_failed(s.displacement, s.status, keep_unstable=True)
     c = without_failed(s.compliance, s.status, keep_unstable=True)
-    along = dot(dot(c[:, :3, :3], u), u)
-    data = {
-        "displacement": (
-            ("force", "component"),
-            d,
-            meaning(TWIST_UNITS, "displacement of the reference point"),
-        ),
-        "deflection": ("force", norm(d[:, :3]), meaning("m", "norm of the translation")),
-        "deflection_xy": ("force", norm(d[:, :2]), meaning("m", "norm of the translation in the xy plane")),
-        "deflection_along": ("force", dot(d[:, :3], u), meaning("m", "translation along the force")),
-        "compliance_along": ("force", along, meaning("m/N", "loaded compliance along the force")),
-        "status": ("force", s.status, status_attrs("the equilibrium")),
-        "flags": ("force", s.flags, flag_attrs()),
-    }
-    xyz = np.array(["x", "y", "z"])
-    coords = {
-        "force": ("force", f, meaning("N", "magnitude of the force")),
-        "component": ("component", np.array(COMPONENTS)),
-        "axis": ("axis", xyz),
-        "position": ("axis", p, meaning("m", "commanded tcp")),
-        "direction": ("axis", u, meaning("1", "direction of the force, base axes")),
-    }
-    call = {"function": "sweep", "position": p, "direction": u, "forces": f}
-    attrs = describe(loading, "force sweep", call) | {
-        "failed_poses": "NaN, with their status; unstable ones kept"
-    }
-    return xr.Dataset(data, coords, attrs)
+    found = Equilibria(
+        force=f,
+        displacement=d,
+        along=dot(d[:, :3], u),
+        compliance_along=dot(dot(c[:, :3, :3], u), u),
+        unstable_modes=np.full(f.size, np.nan),
+        status=s.status,
+        flags=s.flags,
+        branch=np.zeros(f.size, dtype=np.intp),
+    )
+    call = {"position": p, "direction": u, "forces": f}
+    return sweep_dataset(loading, "force sweep", call, found, Followed())

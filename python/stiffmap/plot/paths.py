@@ -25,7 +25,7 @@ SHARE = 0.25  # of the machine's length, of the largest motion of a drawn mode
 def path_figure(path: xr.Dataset) -> Figure:
     """Force (N) against displacement along it (mm) of a `sweep` with a limit; unstable parts dashed, a
     crossing branch in another colour."""
-    if "critical" not in path.dims:
+    if not path.attrs.get("end"):
         raise StiffmapError("path: expected a sweep with a limit, got one of single forces")
     with paper_style():
         figure = new_figure(4.6, 3.4)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import structures as s
 
 import stiffmap as sm
+from stiffmap.maps.files import read_dataset, write_dataset
 
 DOWN = (0, -1, 0)
 APEX = (0, s.RISE, 0)
@@ -114,3 +117,13 @@ def test_a_real_machine_pushed_by_displacement() -> None:
 def test_bad_input(options: dict[str, object], message: str) -> None:
     with pytest.raises(sm.StiffmapError, match=message):
         sm.sweep(s.truss(), APEX, DOWN, **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("ending", ["nc", "zarr"])
+def test_a_path_is_the_same_from_the_disk(tmp_path: Path, ending: str) -> None:
+    if ending == "zarr":
+        pytest.importorskip("zarr")
+    path = sm.sweep(s.column(2), (0.4, 0, 0), (-1, 0, 0), limit=1.2 * s.column_load(2, 2))
+    assert path.sizes["critical"] == 2
+    with read_dataset(write_dataset(path, tmp_path / f"path.{ending}")) as stored:
+        assert stored.load().identical(path)

@@ -50,3 +50,18 @@ def test_compliance_along_is_the_slope(machine: sm.Machine) -> None:
     swp = sm.sweep(machine, CORNER, [0.0, 1.0, 0.0], [200 - h, 200, 200 + h])
     slope = (swp.deflection_along[2] - swp.deflection_along[0]) / (2 * h)
     assert float(swp.compliance_along[1]) == pytest.approx(float(slope), rel=1e-7)
+
+
+def test_single_forces_and_paths_have_one_schema(machine: sm.Machine) -> None:
+    """The same variables, dimensions, types and units; what one of them has not is NaN or empty."""
+    single = sm.sweep(machine, CORNER, [1.0, 1.0, 0.0], [0.0, 100.0])
+    path = sm.sweep(machine, CORNER, [1.0, 1.0, 0.0], limit=100.0, steps=2)
+    assert set(single.variables) == set(path.variables) and set(single.attrs) == set(path.attrs)
+    for name, one in single.variables.items():
+        other = path[name]
+        assert one.dims == other.dims and one.dtype.kind == other.dtype.kind, name
+        assert one.attrs.get("units") == other.attrs.get("units"), name
+    assert np.isnan(single.unstable_modes).all() and np.isfinite(single.compliance_along).all()
+    assert np.isnan(path.compliance_along).all() and (path.unstable_modes == 0).all()
+    assert single.attrs["end"] == "" and single.sizes["critical"] == 0 and (single.branch == 0).all()
+    np.testing.assert_allclose(path.displacement[-1], single.displacement[-1], rtol=1e-7, atol=1e-12)
