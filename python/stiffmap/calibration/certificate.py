@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from stiffmap.calibration.defaults import Tolerances
+from stiffmap.description import AppliedEffect, MachineDescription
+from stiffmap.effects import get, kinds
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.setups import setups_of
@@ -21,6 +23,14 @@ def certified(tolerances: Tolerances | None, experiment: Experiment) -> Toleranc
     t, given = tolerances or Tolerances(), dict(experiment.certificate)
     named = {"scale": "instrument", "tool": "tool", "frame": "frame", "frame_direction": "frame_direction"}
     return replace(t, **{named[k]: v for k, v in given.items()})
+
+
+def scaled(description: MachineDescription, share: float) -> AppliedEffect:
+    """The effect of an instrument whose scale is off by this share."""
+    effect = next(e for e in map(get, kinds()) if e.instrument_scale)
+    element, legs = effect.places(description)[0]
+    off = float(effect.parameter(effect.instrument_scale).null or 0.0) + share
+    return AppliedEffect(effect.kind, element, legs, ((effect.instrument_scale, off),))
 
 
 def frame_names(experiment: Experiment) -> Iterator[tuple[str, str]]:

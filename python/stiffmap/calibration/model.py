@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stiffmap.calibration.certificate import INSTRUMENT, SCALE, frame_columns
+from stiffmap.calibration.certificate import INSTRUMENT, SCALE, frame_columns, scaled
 from stiffmap.calibration.edit import edited
 from stiffmap.calibration.unknowns import Unknown
-from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
@@ -65,8 +64,7 @@ def predicted(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats)
         beside = copy.copy(predictor)
         beside.machine = Machine(edited(predictor.machine.description, moves))
         beside._memory = {}
-    gain = AppliedEffect("sensor_gain", "sensor", (), (("gain", 1.0 + scale),))
-    found = beside([gain] if scale else [])
+    found = beside([scaled(predictor.machine.description, scale)] if scale else [])
     if own:
         columns = frame_columns(predictor.experiment, predictor())
         found = found + sum(columns[what] * by for what, by in own.items())

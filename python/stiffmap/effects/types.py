@@ -75,6 +75,8 @@ class EffectType:
         constant offset, and the offset is named before it.
     certified
         Whether it is an error of an instrument whose certificate bounds it.
+    instrument_scale
+        Parameter that is the instrument's scale, which a calibration leaves uncertain as its certificate says.
     signature
         How it shows in readings; None: by differences, with parameters that have no null on a grid.
     at
@@ -114,6 +116,7 @@ class EffectType:
     behind_platform: bool = False
     reverses: bool = False
     certified: bool = False
+    instrument_scale: str = ""
     at: ParametersAt | None = None
     derived: Derived | None = None
     tried: Places | None = None

@@ -89,6 +89,7 @@ def measured(
     reading: Reading | None = None,
     hidden: Callable[[Plan], bool] | None = None,
     certified: bool = False,
+    instrument_scale: str = "",
 ) -> EffectType:
     """A kind that lives in the measurement."""
     return EffectType(
@@ -110,4 +111,5 @@ def measured(
         reading=reading,
         hidden=hidden,
         certified=certified,
+        instrument_scale=instrument_scale,
     )

@@ -14,4 +14,5 @@ EFFECT = measured(
     frame="axes of the reading",
     reading=of_coordinates(scaled),
     certified=True,
+    instrument_scale="gain",
 )
