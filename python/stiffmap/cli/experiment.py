@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich import box
@@ -14,6 +14,10 @@ from rich.table import Table
 
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import FileError, StiffmapError
+
+if TYPE_CHECKING:
+    from stiffmap.experiment import Experiment
+    from stiffmap.spreadsheet.convert import Imported
 
 
 def experiment(
@@ -94,13 +98,18 @@ def experiment(
         print_json({"folder": str(output), "rows": len(made), "repeats": found.repeats,
                     "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units})  # fmt: skip
         return
+    tell(found, table.header, made, machine, output)
+
+
+def tell(found: Imported, header: Sequence[str], made: Experiment, machine: str, output: Path) -> None:
+    """What each column was taken for, the first rows, and what to do next."""
     console = Console(highlight=False, soft_wrap=True)
     for c in found.columns:
         told = f"repeat {c.repeat} of {c.meaning}" if c.repeat else c.meaning
         where = (
             "kept in notes.csv" if c.meaning == "note" else f"{told}, {found.units.get(c.meaning, 'no unit')}"
         )
-        console.print(f"'{escape(table.header[c.index])}': {where}")
+        console.print(f"'{escape(header[c.index])}': {where}")
     for name, value in found.constants.items():
         console.print(f"{name} = {value:g} in every row")
     _show(console, made)

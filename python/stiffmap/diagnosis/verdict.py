@@ -21,7 +21,7 @@ from stiffmap.diagnosis.decision.largest_residual import located
 from stiffmap.diagnosis.decision.stability import explained
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.report.describe import aliases_of, as_place, named_effects
-from stiffmap.diagnosis.report.findings import Detectability, NoiseReport
+from stiffmap.diagnosis.report.findings import Detectability, Effect, NoiseReport
 from stiffmap.diagnosis.report.result import Diagnosis
 from stiffmap.diagnosis.rivals.explain import Explanation, explain
 from stiffmap.diagnosis.rivals.separation import separation
@@ -113,33 +113,17 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
         verdict = "ambiguous"
     inflation = max(1.0, float(np.sqrt(model.chi2 / max(search.problem.freedom, 1)))) if left else 1.0
     keep = ~finding.outliers
-    sizes = detectable(search.screen.beside(model.tangent()), search.threshold)
     sums = _summaries(held if verdict in ("effects", "ambiguous", "none") else None, before, after, s, keep)
     return Diagnosis(
         verdict=verdict,
-        effects=[
-            replace(
-                e, aliases=[*e.aliases, *(as_place(a) for own, a, _ in why.aliases if own.place == e.place)]
-            )
-            for e in named_effects(s, search, model, inflation)
-        ],
+        effects=_effects(s, finding, why, inflation),
         alternatives=[named_effects(s, search, m, inflation) for m in other],
         separations=[separation(s, model, m, seed) for m in other],
         before=sums[0],
         after=sums[1],
         held_out=held,
         noise=_noise(s, finding),
-        detectable=[
-            Detectability(
-                d.candidate.kind,
-                d.candidate.element,
-                d.candidate.legs,
-                d.sizes,
-                aliases_of(s.classes, d.candidate),
-            )
-            for d in sizes
-            if any(v is not None for v in d.sizes.values())
-        ],
+        detectable=_detectable(s, finding),
         unobservable=_unobservable(s, finding),
         outliers=[e.ids[i] for i in np.flatnonzero(finding.outliers)],
         checks_before=checks(e, e.reading, s.noise.sigma, keep),
@@ -168,6 +152,30 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
         if model.candidates
         else 0.0,
     )
+
+
+def _effects(s: Study, finding: Finding, why: Explanation, inflation: float) -> list[Effect]:
+    """The effects that are named, each with what no reading tells from it."""
+    return [
+        replace(e, aliases=[*e.aliases, *(as_place(a) for own, a, _ in why.aliases if own.place == e.place)])
+        for e in named_effects(s, finding.search, finding.model, inflation)
+    ]
+
+
+def _detectable(s: Study, finding: Finding) -> list[Detectability]:
+    """How small each effect could be and still be found, beside those that are named."""
+    search = finding.search
+    return [
+        Detectability(
+            d.candidate.kind,
+            d.candidate.element,
+            d.candidate.legs,
+            d.sizes,
+            aliases_of(s.classes, d.candidate),
+        )
+        for d in detectable(search.screen.beside(finding.model.tangent()), search.threshold)
+        if any(v is not None for v in d.sizes.values())
+    ]
 
 
 def predicted_machine(s: Study, model: Model) -> Machine:

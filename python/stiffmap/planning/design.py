@@ -93,17 +93,12 @@ def design(
     if candidates is None:
         candidates = candidate_rows(machine, quantity, poses, force, axes, noise, seed)
     pool = replace(in_limits(machine, candidates), frame=frame, tool=tool)
-    given = tuple(rival if aim == "separate" else terms)
     old = 0 if done is None else len(done)
     both = pool if done is None else joined(replace(done, frame=frame, tool=tool), pool)
-    information = Information(machine, both, given)
+    information = Information(machine, both, tuple(rival if aim == "separate" else terms))
     count = len(information.names)
-    value: Value = information.identify
-    if aim == "separate":
-        information.add_signal(tuple(terms))
-        value = information.separate
-    elif aim == "map":
-        value = information.map_of(map_weight(machine, given, at, load, force))
+    weight = map_weight(machine, tuple(terms), at, load, force) if aim == "map" else None
+    value = _value(information, aim, tuple(terms), weight)
     start = information.matrices[:old].sum(axis=0)
     free = np.arange(old, len(both), dtype=np.intp)
     if rows > len(free):
@@ -117,11 +112,8 @@ def design(
     ]
     total = start + information.matrices[picked].sum(axis=0)
     scores = value(np.stack([total, *random]))
-    chosen = both.rows(np.sort(picked).astype(np.intp))
-    n = len(chosen)
-    chosen = replace(chosen, ids=tuple(str(i + 1) for i in range(n)), order=np.arange(1, n + 1, dtype=float))
     return Design(
-        chosen,
+        _numbered(both.rows(np.sort(picked).astype(np.intp))),
         aim,
         information.names,
         information.units,
@@ -130,6 +122,22 @@ def design(
         information.in_natural_unit(aim, scores[0]),
         information.in_natural_unit(aim, float(np.median(scores[1:]))),
     )
+
+
+def _value(
+    information: Information, aim: str, terms: tuple[AppliedEffect, ...], weight: Floats | None
+) -> Value:
+    """What the exchange makes as large as it can."""
+    if aim == "separate":
+        information.add_signal(terms)
+        return information.separate
+    return information.identify if weight is None else information.map_of(weight)
+
+
+def _numbered(rows: Experiment) -> Experiment:
+    """With names and order from 1 on."""
+    number = np.arange(1, len(rows) + 1)
+    return replace(rows, ids=tuple(map(str, number)), order=number.astype(float))
 
 
 def follow(

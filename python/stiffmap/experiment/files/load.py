@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -79,6 +80,21 @@ def extra_channels(model: ExperimentFile, table: Table) -> tuple[Channel, ...]:
 
 def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -> Experiment:
     extra = extra_channels(model, table)
+    parts = _readings(model, table, scales, extra)
+    parts |= _rows(model, table, scales) | _setting(model, scales, file)
+    name = file.parent.name if file.name == "experiment.yaml" else file.stem
+    experiment = Experiment(name=name, machine=model.machine, quantity=model.quantity, extra=extra, **parts)
+    if experiment.unloaded == "approach" and experiment.approach is None:
+        raise FileError(
+            "unloaded: approach needs the columns approach_x, approach_y, approach_z", file=str(file)
+        )
+    return experiment
+
+
+def _readings(
+    model: ExperimentFile, table: Table, scales: Scales, extra: tuple[Channel, ...]
+) -> dict[str, Any]:
+    """What the instrument read, SI, and how sure it is."""
     channels = (*AXIS_CHANNELS, *extra)
     for column in AXES[3:]:
         for name in (column, f"u_{column}"):
@@ -98,67 +114,67 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
             file=table.file,
         )
     _fits(model.quantity, table)
+    sigma = read_columns.sigma(model, table, scales, channels)
+    return {
+        "reading": reading,
+        "sigma": np.where(np.isfinite(reading), sigma, np.nan),
+        "seen": seen,
+        "seen_rotation": seen_rotation,
+        "absolute": absolute,
+        "other": read_columns.other(model, table, scales, reading, channels),
+    }
+
+
+def _rows(model: ExperimentFile, table: Table, scales: Scales) -> dict[str, Any]:
+    """What else stands in the rows: poses, loads, commands, and how they were reached."""
     gravity, gravity_of = read_columns.gravities(model, table)
+    rotation, other_rotation = rotations(table, scales, model.orientation)
+    load_point = model.load_point or model.point
+    return {
+        "ids": read_columns.ids(table),
+        "position": read_columns.position(table, scales, bool(model.command)),
+        "wrench": _wrench(model, table, scales),
+        "rotation": rotation,
+        "other_rotation": other_rotation,
+        "command": read_columns.command(model, table, scales),
+        "other_command": read_columns.other_command(model, table, scales),
+        "approach": read_columns.approach(table),
+        "repeat": read_columns.whole(table, "repeat"),
+        **{c: table.numbers(c) if c in table else None for c in ("order", "hours", "temperature")},
+        "branch": read_columns.branch(table),
+        **{c: read_columns.labels(table, c) for c in ("setup", "instrument", "target")},
+        "points": read_columns.named(table, "point", model.point),
+        "load_points": read_columns.named(table, "load_point", load_point),
+        "gravity": gravity,
+        "gravity_of": gravity_of,
+    }
+
+
+def _setting(model: ExperimentFile, scales: Scales, file: Path) -> dict[str, Any]:
+    """What holds for all rows."""
     normal = np.array(model.surface.normal)
     if not np.linalg.norm(normal) > 0:
         raise FileError("surface: normal: expected a direction, got three zeros", file=str(file))
-    normal = normal / np.linalg.norm(normal)
-    sigma = read_columns.sigma(model, table, scales, channels)
-    rotation, other_rotation = rotations(table, scales, model.orientation)
-    experiment = Experiment(
-        name=file.parent.name if file.name == "experiment.yaml" else file.stem,
-        machine=model.machine,
-        quantity=model.quantity,
-        ids=read_columns.ids(table),
-        position=read_columns.position(table, scales, bool(model.command)),
-        wrench=_wrench(model, table, scales),
-        reading=reading,
-        sigma=np.where(np.isfinite(reading), sigma, np.nan),
-        extra=extra,
-        rotation=rotation,
-        other=read_columns.other(model, table, scales, reading, channels),
-        other_rotation=other_rotation,
-        rotation_against=model.orientation.against,
-        command=read_columns.command(model, table, scales),
-        command_of=tuple(
+    x, y, z = (float(v) for v in normal / np.linalg.norm(normal))
+    return {
+        "rotation_against": model.orientation.against,
+        "command_of": tuple(
             Channel(n, "rad" if c.unit in ANGLES else "m", c.actuator) for n, c in model.command.items()
         ),
-        approach=read_columns.approach(table),
-        repeat=read_columns.whole(table, "repeat"),
-        order=table.numbers("order") if "order" in table else None,
-        hours=table.numbers("hours") if "hours" in table else None,
-        temperature=table.numbers("temperature") if "temperature" in table else None,
-        reference_temperature=model.reference_temperature,
-        branch=read_columns.branch(table),
-        setup=read_columns.labels(table, "setup"),
-        instrument=read_columns.labels(table, "instrument"),
-        target=read_columns.labels(table, "target"),
-        other_command=read_columns.other_command(model, table, scales),
-        seen=seen,
-        seen_rotation=seen_rotation,
-        absolute=absolute,
-        normal=(float(normal[0]), float(normal[1]), float(normal[2])),
-        surface=model.surface.shape,
-        gravity_of=gravity_of,
-        point=model.point,
-        load_point=model.load_point or model.point,
-        points=read_columns.named(table, "point", model.point),
-        load_points=read_columns.named(table, "load_point", model.load_point or model.point),
-        gravity=gravity,
-        zero_sigma=np.nan_to_num(read_columns.declared(model.zero_noise, scales, AXIS_CHANNELS)),
-        unloaded=model.unloaded,
-        frame=model.frame,
-        tool=model.tool,
-        certificate=_certificate(model, scales, file),
-        loop=Loop(**model.metrology.model_dump()),
-        title=model.title,
-        source=str(file),
-    )
-    if experiment.unloaded == "approach" and experiment.approach is None:
-        raise FileError(
-            "unloaded: approach needs the columns approach_x, approach_y, approach_z", file=str(file)
-        )
-    return experiment
+        "reference_temperature": model.reference_temperature,
+        "normal": (x, y, z),
+        "surface": model.surface.shape,
+        "point": model.point,
+        "load_point": model.load_point or model.point,
+        "zero_sigma": np.nan_to_num(read_columns.declared(model.zero_noise, scales, AXIS_CHANNELS)),
+        "unloaded": model.unloaded,
+        "frame": model.frame,
+        "tool": model.tool,
+        "certificate": _certificate(model, scales, file),
+        "loop": Loop(**model.metrology.model_dump()),
+        "title": model.title,
+        "source": str(file),
+    }
 
 
 def _certificate(model: ExperimentFile, scales: Scales, file: Path) -> tuple[tuple[str, float], ...]:
