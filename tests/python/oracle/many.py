@@ -24,45 +24,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 from tests.python.oracle.statics import Case, balance, closed, coordinates
+from tests.python.oracle.with_effects import VALUES, with_effect
 
 import stiffmap as sm
 from stiffmap.description import Joint, Law
-from stiffmap.effects.registry import get
-from stiffmap.effects.types import EffectType
 
 BATCH = 2000
 FORCE, CLOSURE, MOTION = 1e-6, 1e-6, 1e-6
-EFFECTS: dict[str, dict[str, object]] = {
-    "as declared": {},
-    "dead_zone": {"half_width": 2e-5},
-    "friction": {"force": 20.0, "torque": 2.0, "branch": "loading"},
-    "hardening": {"cubic": 1e13},
-    "length": {"error": 3e-4},
-    "tilt": {"angle_x": 2e-3, "angle_y": -1e-3},
-    "straightness": {"amplitude": 4e-5, "period": 0.3, "phase": 0.4},
-    "position_offset": {"error_x": 2e-4, "error_z": -1e-4},
-    "zero_offset": {"error": 3e-4},
-    "periodic_error": {"amplitude": 3e-5, "period": 0.02, "phase": 0.3},
-    "lead_error": {"slope": 2e-4},
-    "joint_friction": {"torque": 0.2, "force": 2.0, "branch": "loading"},
-    "joint_compliance": {"translation": 1e-9, "rotation": 1e-7},
-    "joint_clearance": {"radius": 5e-6},
-    "compliance": {"scale": 1.7},
-    "bilinear": {"ratio": 0.5, "knee": 100.0},
-    "tabulated": {"step": 2e-5, "factor_1": 0.6, "factor_2": 0.9, "factor_3": 1.2, "factor_4": 1.3},
-    "position_dependent_compliance": {"slope": 0.3},
-    "axis_tilt": {"angle_x": 1e-3, "angle_y": 2e-3},
-    "leg_tilt": {"angle_x": 1e-3, "angle_z": -2e-3},
-    "length_difference": {"difference": 1e-4},
-    "parallelogram_width": {"error": 1e-4},
-    "parallelogram_parallelism": {"angle_x": 1e-3, "angle_y": 1e-3},
-    "tcp_offset": {"error_x": 1e-3, "error_z": 2e-3},
-    "base_compliance": {"translation": 1e-8, "rotation": 1e-7},
-    "tool_compliance": {"translation": 1e-8, "rotation": 1e-7},
-    "preload": {"rest_x": 1e-5},
-    "thermal_growth": {"coefficient": 1.2e-5, "temperature_difference": 8.0},
-    "payload": {"mass": 3.0, "com_z": -0.05},
-}
+EFFECTS = ("as declared", *VALUES)
 
 
 @dataclass(frozen=True)
@@ -91,28 +60,7 @@ def batches(machines: list[str], count: int, size: int) -> Iterator[Batch]:
 def changed(name: str, effect: str) -> tuple[sm.Machine | None, tuple[str, ...]]:
     """A shipped machine with an effect at every place that takes it, and the places that refused it."""
     machine = sm.load_machine(name)
-    if effect == "as declared":
-        return machine, ()
-    kind = get(effect)
-    widest = dict(kind.places(machine.description))  # all legs stand last
-    out, refused = machine, []
-    for element, legs in widest.items():
-        try:
-            out = out.with_effect(
-                effect, element=element, legs=list(legs) or None, **given(kind, machine, element, legs)
-            )
-        except sm.StiffmapError as error:
-            refused.append(f"{element}: {error}")
-    return (out if out is not machine else None), tuple(refused)
-
-
-def given(kind: EffectType, machine: sm.Machine, element: str, legs: tuple[str, ...]) -> dict[str, Any]:
-    """Values of an effect at a place: of force and torque the one that it takes."""
-    values = dict(EFFECTS[kind.kind])
-    if kind.at is not None and kind.one_of:
-        left_out = [p.name for p in kind.at(machine.description, element, legs) if not p.fitted]
-        values = {n: v for n, v in values.items() if n not in left_out}
-    return values
+    return (machine, ()) if effect == "as declared" else with_effect(machine, effect)
 
 
 @cache
@@ -312,6 +260,9 @@ def report(done: list[dict[str, object]]) -> int:
             f"{machine}: {sum(status.values())} solves; {dict(status)}; {flagged} flagged; "
             f"{undecided} undecided; worst {told}"
         )
+    refused = {f"{r['machine']} {r['effect']}: {why}": None for r in done for why in r["refused"]}  # type: ignore[attr-defined]
+    for text in refused:
+        print("refused:", text)
     for row in bad[:40]:
         print("WRONG", *row)
     print(f"{sum(int(str(r['solves'])) for r in done)} solves, {len(bad)} wrong")
