@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         natural_frequencies,
         velocity_section,
         velocity_transmission,
+        workspace_volume,
         worst_deflection,
     )
     from stiffmap.solution import Solution
@@ -49,6 +50,7 @@ _HOME = {
     "natural_frequencies": "stiffmap.performance",
     "velocity_section": "stiffmap.performance",
     "velocity_transmission": "stiffmap.performance",
+    "workspace_volume": "stiffmap.performance",
     "worst_deflection": "stiffmap.performance",
     "Diagnosis": "stiffmap.diagnosis",
     "compensate": "stiffmap.compensation",
@@ -120,6 +122,7 @@ __all__ = [
     "uncertainty_ranking",
     "velocity_section",
     "velocity_transmission",
+    "workspace_volume",
     "worst_deflection",
 ]
 

@@ -14,6 +14,7 @@ from stiffmap.performance.requirements import Requirements, load_requirements
 from stiffmap.performance.table import MeasuresTable, measures
 from stiffmap.performance.trajectory import Path, Trajectory, circle, line, read_points, through, timed
 from stiffmap.performance.velocity import VelocityTransmission, velocity_section, velocity_transmission
+from stiffmap.performance.workspace import Workspace, workspace_volume
 
 __all__ = [
     "AccuracyTransmission",
@@ -28,6 +29,7 @@ __all__ = [
     "Requirements",
     "Trajectory",
     "VelocityTransmission",
+    "Workspace",
     "WorstDeflection",
     "accuracy_transmission",
     "body_masses",
@@ -51,5 +53,6 @@ __all__ = [
     "total_mass",
     "velocity_section",
     "velocity_transmission",
+    "workspace_volume",
     "worst_deflection",
 ]

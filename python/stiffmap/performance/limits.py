@@ -117,8 +117,11 @@ class Bounds:
 
     def at(self, position: Floats) -> tuple[NDArray[np.bool_], list[Limit]]:
         """Which poses (n, 3) close, and the limits there."""
-        self.counter[0] += len(position)
-        k = self._closed(position)
+        k = self.closed(position)
+        return k.status == Status.CONVERGED, self.limits_of(k, position)
+
+    def limits_of(self, k: DriveKinematics, position: Floats) -> list[Limit]:
+        """The limits at poses (n, 3) whose kinematics are at hand."""
         closed = k.status == Status.CONVERGED
         limits: list[Limit] = []
         if self.transmission is not None:
@@ -128,10 +131,11 @@ class Bounds:
             limits.append(self._clearance(k))
         if self.deflection is not None:
             limits.append(self._deflection(position, closed))
-        return closed, limits
+        return limits
 
-    def _closed(self, position: Floats) -> DriveKinematics:
+    def closed(self, position: Floats) -> DriveKinematics:
         """Kinematics at poses, begun at the nearest pose that was closed before."""
+        self.counter[0] += len(position)
         start = None
         if self.known:
             _, coordinates, tree = self.known[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import cast
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,6 +15,8 @@ from stiffmap.machine import Machine
 from stiffmap.performance.mode_pictures import mode_figure
 from stiffmap.performance.registry import Measure
 from stiffmap.performance.table import MeasuresTable, Row
+from stiffmap.performance.workspace import Workspace
+from stiffmap.performance.workspace_pictures import workspace_figure
 from stiffmap.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, new_figure, paper_style
 
 MAPPED = (
@@ -97,6 +100,11 @@ def measure_figures(table: MeasuresTable) -> dict[str, Figure]:
         if row.measure.name in MAPPED and row.found.values is not None:
             out[f"map-{row.measure.name}"] = map_figure(table, row)
     rows = {r.measure.name: r for r in table.rows}
+    space = rows.get("workspace")
+    if space is not None and space.found.worst > 0:
+        out["map-workspace"] = workspace_figure(
+            table.machine, cast(Workspace, space.found.extra["workspace"])
+        )
     last = rows.get("transmission_max")
     if last is not None and last.found.worst_at is not None and np.isfinite(last.found.worst):
         out["transmission"] = transmission_figure(table.machine, last.found.worst_at, table.case.plane)
@@ -110,6 +118,7 @@ CAPTIONS = {
     "requirements": "Each requirement: the worst value over its bound. The line at 1 is the bound.",
     "transmission": "Velocities of the tool at the worst pose for drive rates within a sphere (a), within a cube (b), and in the "
     "plane (c).",
+    "map-workspace": "Sections of the workspace through its middle, and what it ends by.",
     "modes": "Natural modes at the pose of the lowest frequency.",
 }
 

@@ -1,0 +1,75 @@
+"""Sections of the workspace through its middle, and what it ends by."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Rectangle
+
+from stiffmap.errors import StiffmapError
+from stiffmap.machine import Machine
+from stiffmap.performance.workspace import REACH, Workspace
+from stiffmap.plot.style import BLACK, GREEN, MM, ORANGE, PURPLE, SKY, VERMILLION, new_figure, paper_style
+
+NODES = 90
+KINDS = (
+    (REACH, "0.9", "out of reach"),
+    ("range of", ORANGE, "range of a drive"),
+    ("joint limit", PURPLE, "limit of a joint"),
+    ("transmission", VERMILLION, "transmission"),
+    ("cube factor", VERMILLION, "transmission"),
+    ("singularity", BLACK, "at or beyond a singularity"),
+    ("clearance", GREEN, "clearance of bars"),
+    ("deflection", GREEN, "deflection"),
+)
+"""How a limit's name begins, its colour and its words; where several are broken, the first of these counts."""
+
+
+def workspace_figure(machine: Machine, found: Workspace, nodes: int = NODES) -> Figure:
+    """Sections xy, xz, yz through the middle of what was found; the box that the machine file declares.
+
+    Raises StiffmapError where nothing was found or the workspace is a line.
+    """
+    if not np.isfinite(found.box).all() or found.dimension < 2:
+        raise StiffmapError(f"{machine.name}: no section of the workspace to draw")
+    size = found.region[1] - found.region[0]
+    moves = [i for i in range(3) if size[i] > 0]
+    planes = [(a, b) for a, b in ((0, 1), (0, 2), (1, 2)) if a in moves and b in moves]
+    middle = found.box.mean(axis=0)
+    low, high = machine.workspace
+    seen = {0: ("inside", SKY)}
+    with paper_style():
+        figure = new_figure(max(3.0 * len(planes) + 0.4, 4.0), 3.9)
+        for axes, (a, b) in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
+            u, v = (np.linspace(float(found.region[0, i]), float(found.region[1, i]), nodes) for i in (a, b))
+            p = np.tile(middle, (nodes * nodes, 1))
+            p[:, a], p[:, b] = (g.ravel() for g in np.meshgrid(u, v, indexing="ij"))
+            judged = found.at(p)
+            inside, broken = judged.inside, judged.causes()
+            kind = np.where(inside, 0, 1)
+            for number, (begin, colour, words) in reversed(list(enumerate(KINDS, 1))):
+                for name, bad in broken.items():
+                    if name.startswith(begin):
+                        kind[bad & ~inside] = number
+                        if (bad & ~inside).any():
+                            seen[number] = (words, colour)
+            shown = ListedColormap([SKY, *(colour for _, colour, _ in KINDS)])
+            axes.pcolormesh(
+                MM * u, MM * v, kind.reshape(nodes, nodes).T, cmap=shown, vmin=-0.5, vmax=len(KINDS) + 0.5,
+                shading="nearest", rasterized=True,
+            )  # fmt: skip
+            axes.add_patch(
+                Rectangle(MM * low[[a, b]], *(MM * (high - low)[[a, b]]), fill=False, linewidth=1.0)
+            )
+            axes.set_xlabel(f"{'xyz'[a]}, mm")
+            axes.set_ylabel(f"{'xyz'[b]}, mm")
+            (rest,) = {0, 1, 2} - {a, b}
+            axes.set_title(f"{'xyz'[rest]} = {round(MM * middle[rest]) + 0:d} mm")
+            axes.set_aspect("equal")
+        handles = [Patch(facecolor=c, edgecolor="0.6", label=w) for w, c in dict.fromkeys(seen.values())]
+        handles.append(Patch(fill=False, edgecolor="black", label="box of the machine file"))
+        figure.legend(handles=handles, loc="outside lower center", ncols=1 + len(planes))
+        unit = {2: "m²", 3: "m³"}[found.dimension]
+        figure.suptitle(f"{machine.name}: workspace, {found.volume:.4g} ± {found.error:.1g} {unit}")
+    return figure
