@@ -7,7 +7,7 @@ unknown), positions and, every other time, deflections. Every unknown of the cal
 from a normal law of its standard uncertainty times `--scale` (0.3, 1 and 1 in turn by default: machines are often better
 than they are declared). Resumable: twins that are in the file are not run again; `--table` prints what is there.
 
-Named: effects in the verdict, or unknowns `beyond tolerance`. Coverage: of the 95 % intervals of all unknowns that the
+Named: effects in the verdict, or unknowns (or groups of them as a whole) `beyond tolerance`. Coverage: of the 95 % intervals of all unknowns that the
 readings tell, and of the calibrated machine's prediction at poses that were not measured.
 """
 
@@ -116,7 +116,7 @@ def one(k: int, scale: float | None, diagnose: bool = True) -> dict[str, Any]:
     c = found.answer()
     record |= {
         "calibration": c.verdict,
-        "beyond": [b.name for b in c.beyond],
+        "beyond": [b.name for b in c.beyond] + [f"{w.group} as a whole" for w in c.wider],
         "floor": c.floor / c.noise,
         **covered(found, names, truth, machine, name, quantity),
         "seconds": round(time.perf_counter() - begun, 2),

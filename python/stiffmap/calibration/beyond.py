@@ -87,6 +87,11 @@ def beyond_tolerance(
     return BeyondTolerance(tuple(found), tuple(which), factor, more)
 
 
+def none_beyond(number: int) -> BeyondTolerance:
+    """All of so many unknowns within their tolerances."""
+    return BeyondTolerance((), (), np.ones(number), np.zeros(number))
+
+
 def as_factor(p: Unknown, value: float, at: float = 0.0) -> float:
     """Factor of a compliance or mass at `value`, found with the slope that its logarithm has `at` a place.
 

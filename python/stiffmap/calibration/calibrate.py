@@ -9,13 +9,14 @@ from os import PathLike
 
 import numpy as np
 
-from stiffmap.calibration.beyond import beyond_tolerance
-from stiffmap.calibration.certificate import certified
+from stiffmap.calibration.beyond import beyond_tolerance, none_beyond
+from stiffmap.calibration.certificate import INSTRUMENT, certified
 from stiffmap.calibration.defaults import Tolerances
 from stiffmap.calibration.edit import edited
-from stiffmap.calibration.facts import Beyond, HeldOut, Row
+from stiffmap.calibration.facts import Beyond, HeldOut, Row, Wider
 from stiffmap.calibration.floor import Blocks, model_form
-from stiffmap.calibration.groups import Choice, compare
+from stiffmap.calibration.groups import STRONG, Choice, compare
+from stiffmap.calibration.homing import own_part, zeros_anew
 from stiffmap.calibration.model import (
     Fitted,
     Progress,
@@ -28,6 +29,7 @@ from stiffmap.calibration.model import (
 from stiffmap.calibration.result import Calibration
 from stiffmap.calibration.statistics import Sums, directions, independent
 from stiffmap.calibration.unknowns import GROUPS, Unknown, unknowns
+from stiffmap.calibration.width import widened
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.limitations import refuse
@@ -139,6 +141,10 @@ class Calibrator:
         first = Calibrator._on(predictor, s, noise, nobody, until, seconds)
         out = first._alone()
         found = first if not out.any() else Calibrator._on(predictor, s, noise, out, until, seconds)
+        more = zeros_anew(s, e)
+        if more is not None and found.better_with(more):
+            s = more
+            found = Calibrator._on(predictor, s, noise, out, until, seconds)
         fit = found.fit
         if time.monotonic() < until and bends(found.problem, s, fit.values, fit.prediction):
             s = sensitivity_at(predictor, s, fit.values, until)
@@ -170,6 +176,14 @@ class Calibrator:
         fit = fitted(predictor, problem, s, columns, weigh, start=start, until=until)
         rho = model_form(Blocks.of(felt, fit.linear, label, q))
         return Calibrator(predictor, s, noise, problem, columns, fit, rho, out, seconds, until)
+
+    def better_with(self, more: Sensitivity) -> bool:
+        """Whether the evidence asks for unknowns beyond those that there are, each at a floor of its own."""
+        label, q = pose_labels(self.problem), self.problem.nuisance.shape[1]
+        wide = self.problem.white(more.columns)
+        own, other = (Blocks.of(c @ directions(c), self.fit.linear, label, q) for c in (self.columns, wide))
+        gain = other.log_likelihood(model_form(other)) - own.log_likelihood(model_form(own))
+        return gain > STRONG
 
     def _alone(self) -> Mask:
         """(n,) rows that stand out of what the fit leaves; its misfit as a whole is no row's fault."""
@@ -210,27 +224,36 @@ class Calibrator:
         sums, members = self.sums, self.members()
         names = self.sensitivity.unknowns
         found = beyond_tolerance(sums, names, self._folds(seed), self.sensitivity.at)
-        freed = sums.scaled(found.factor)
+        wider, times = widened(sums, members, (INSTRUMENT,))
+        if (
+            found.found and wider and wider[0].nats > found.found[0].nats
+        ):  # many a little rather than one by much
+            found = none_beyond(len(names))
+        elif found.found:
+            wider, times = widened(sums.scaled(found.factor), members, (INSTRUMENT,))
+        factor = found.factor * times
+        freed = sums.scaled(factor)
         choice = compare(freed, members, [b for b in BASE if b in members])
         fit, rho = self.fit, self.rho
-        values = fit.values if not found.which else freed.estimate * found.factor
+        moved = bool(found.which or wider)
+        values = freed.estimate * factor if moved else fit.values
         moves: dict[tuple[str, str], float] = {}
         built = values + found.logarithm
         for p, v in zip(names, built, strict=True):
-            for place, weight in p.moves:
+            for place, weight in p.moves if not p.setup else ():
                 moves[place] = moves.get(place, 0.0) + weight * p.u * float(v)
         e = self.predictor.experiment
         before = self.left(self.sensitivity.base)
-        after = self.left(fit.prediction) if not found.which else self.unwhite(self.residual_at(values))
+        after = self.unwhite(self.residual_at(values)) if moved else self.left(fit.prediction)
         keep = ~self.out[:, None]
         unit, size, noise = _unit(e, self.noise)
         b, a = (size(np.where(keep, v, np.nan)) for v in (before, after))
-        held = self._held_out(freed, choice, found.factor, seed, size)
-        as_declared = sums.log_evidence <= sums.pick([]).log_evidence and not found.which
+        held = self._held_out(freed, choice, factor, seed, size)
+        as_declared = sums.log_evidence <= sums.pick([]).log_evidence and not moved
         seconds = {**self.seconds, "evidence": time.perf_counter() - start}
         return Calibration(
-            verdict=_verdict(as_declared, found.found),
-            rows=_rows(names, freed, found.factor, built),
+            verdict=_verdict(as_declared, found.found, wider),
+            rows=_rows(names, freed, factor, built),
             beyond=found.found,
             groups=choice,
             rank=sums.rank,
@@ -241,6 +264,7 @@ class Calibrator:
             floor=float(np.sqrt(rho)) * noise,
             explained=1.0 - (a / b) ** 2 if b > 0 else 0.0,
             rest=_rest(e, np.where(keep, after, np.nan), size),
+            wider=wider,
             outliers=tuple(e.ids[i] for i in np.flatnonzero(self.out)),
             failed=self.sensitivity.failed,
             stopped=self.stopped,
@@ -288,7 +312,10 @@ class Calibrator:
             for name, which in sets.items():
                 values = np.zeros(len(sums.right))
                 values[which] = others.pick(which).estimate * factor[which]
-                left[name][test] = self.residual_at(values)[test]
+                rest = self.residual_at(values)
+                left[name][test] = (rest - own_part(self.sensitivity.unknowns, self.columns, rest, test))[
+                    test
+                ]
         found = {name: size(self.unwhite(r)) for name, r in left.items()}
         keep = ~self.out[:, None]
         found["before"] = size(np.where(keep, self.left(self.sensitivity.base), np.nan))
@@ -319,12 +346,14 @@ def _rest(e: Experiment, left: Floats, size: Size) -> dict[str, float]:
     return out
 
 
-def _verdict(as_declared: bool, beyond: Sequence[Beyond]) -> str:
-    if beyond:
-        return "beyond tolerance: " + ", ".join(
-            b.name if not b.rivals else f"{b.name} or {len(b.rivals)} other{'s' * (len(b.rivals) > 1)}"
-            for b in beyond
-        )
+def _verdict(as_declared: bool, beyond: Sequence[Beyond], wider: Sequence[Wider]) -> str:
+    single = [
+        b.name if not b.rivals else f"{b.name} or {len(b.rivals)} other{'s' * (len(b.rivals) > 1)}"
+        for b in beyond
+    ]
+    whole = [f"{' or '.join((w.group, *w.rivals))} as a whole" for w in wider]
+    if single or whole:
+        return "beyond tolerance: " + ", ".join([*single, *whole])
     return "as declared" if as_declared else "adjusted within tolerance"
 
 

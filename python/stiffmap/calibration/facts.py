@@ -54,6 +54,19 @@ class Beyond:
 
 
 @dataclass(frozen=True)
+class Wider:
+    """A group whose unknowns are all off by more than their standard uncertainties say."""
+
+    group: str
+    factor: float
+    """On its standard uncertainties."""
+    nats: float
+    """Evidence gained by it."""
+    rivals: tuple[str, ...] = ()
+    """Groups that would gain as much in its place."""
+
+
+@dataclass(frozen=True)
 class HeldOut:
     """Readings that no estimate saw; rms in m (rad where only angles are read)."""
 
@@ -89,6 +102,7 @@ class Facts:
     """Share of the misfit's squares that the calibration takes away."""
     rest: dict[str, float]
     """rms of what is left, by reading and by set-up, m or rad."""
+    wider: tuple[Wider, ...]
     outliers: tuple[str, ...]
     failed: tuple[tuple[str, str], ...]
     stopped: bool

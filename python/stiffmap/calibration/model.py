@@ -53,10 +53,20 @@ _KEPT: OrderedDict[tuple[str, tuple[Unknown, ...]], Sensitivity] = OrderedDict()
 
 def predicted(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats) -> Floats:
     """(n, c) readings of the machine with unknowns at `values` (p,), in standard uncertainties."""
+    pairs = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
+    out = _predicted(predictor, [(u, v) for u, v in pairs if not u.setup])
+    for name in dict.fromkeys(u.setup for u, _ in pairs if u.setup):
+        here = np.array(predictor.experiment.setup) == name
+        own = _predicted(predictor, [(u, v) for u, v in pairs if u.setup in ("", name)])
+        out = np.where(here[:, None], own, out)
+    return out
+
+
+def _predicted(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> Floats:
     moves: dict[tuple[str, str], float] = {}
-    for unknown, value in zip(unknowns, values, strict=True):
-        for place, weight in unknown.moves if value != 0.0 else ():
-            moves[place] = moves.get(place, 0.0) + weight * unknown.u * float(value)
+    for unknown, value in pairs:
+        for place, weight in unknown.moves:
+            moves[place] = moves.get(place, 0.0) + weight * unknown.u * value
     own = {what: moves.pop((at, what)) for at, what in list(moves) if at == INSTRUMENT}
     scale = own.pop(SCALE, 0.0)
     beside = predictor

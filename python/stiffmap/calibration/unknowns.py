@@ -54,6 +54,8 @@ class Unknown:
     u: float
     moves: tuple[tuple[tuple[str, str], float], ...] = ()
     leg: str = ""
+    setup: str = ""
+    """Set-up whose rows alone it moves; empty: all."""
 
     @property
     def of_instrument(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stiffmap.calibration.facts import Beyond, Facts
+from stiffmap.calibration.facts import Beyond, Facts, Wider
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm"), "ln": (1e2, "%")}
 
@@ -17,6 +17,7 @@ def lines(c: Facts) -> list[str]:
     """Verdict, groups, misfit before and after, what is left."""
     out = [f"calibration: {c.verdict}{' (stopped early)' if c.stopped else ''}"]
     out += [f"  {_beyond(b)}" for b in c.beyond]
+    out += [f"  {_wider(w)}" for w in c.wider]
     out.append(f"told by the readings: {c.rank} directions of {len(c.rows)} unknowns")
     out.append("groups: " + _groups(c))
     out.append(
@@ -45,6 +46,11 @@ def _beyond(b: Beyond) -> str:
     other = f"; or instead: {', '.join(b.rivals[:3])}" if b.rivals else ""
     more = f" and {len(b.rivals) - 3} more" if len(b.rivals) > 3 else ""
     return f"{b.name}: {in_display_units(b.value, b.unit)} ± {in_display_units(b.sigma, b.unit)} ({b.nats:.0f} nats){other}{more}"
+
+
+def _wider(w: Wider) -> str:
+    other = f"; or instead: {', '.join(w.rivals)}" if w.rivals else ""
+    return f"{w.group}: standard uncertainties {w.factor:g} times too small ({w.nats:.0f} nats){other}; which of them, the readings do not tell"
 
 
 def _groups(c: Facts) -> str:

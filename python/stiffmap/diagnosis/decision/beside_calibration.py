@@ -152,7 +152,7 @@ def _searched(s: Study, tolerances: Tolerances) -> Answer:
     if refused:
         finding = with_model(finding, model)
         left = unexplained(s, finding)
-        verdict = _word(finding, left)
+        verdict = _word(s, finding, left)
     return Answer(s, finding, verdict, left, s.layer.calibration, refused=refused)
 
 
@@ -171,7 +171,7 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
     more = same + more
     finding = with_model(finding, model)
     left = unexplained(s, _on(s, finding))
-    return Answer(again, finding, _word(finding, left), left, s.layer.calibration, held, refused + more)
+    return Answer(again, finding, _word(s, finding, left), left, s.layer.calibration, held, refused + more)
 
 
 def _found_at(s: Study, found: Calibrator, rho: float, seed: int) -> tuple[Study, Finding]:
@@ -212,10 +212,13 @@ def _left_by(s: Study, finding: Finding) -> Blocks:
     return Blocks.of(columns, residual, pose_labels(problem))
 
 
-def _word(finding: Finding, left: list[Pattern]) -> str:
+def _word(s: Study, finding: Finding, left: list[Pattern]) -> str:
     named = bool(finding.model.candidates)
+    wide = s.layer is not None and bool(s.layer.calibration.wider)
     if left:
         return "effects+unattributed" if named else "unattributed"
+    if wide and not named:  # a group of numbers is beyond tolerance, and none of them stands out
+        return "ambiguous"
     return "effects" if named else "none"
 
 

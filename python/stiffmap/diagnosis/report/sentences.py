@@ -72,12 +72,16 @@ def opening(d: Any) -> str:
     before, unit = d.before.size
     size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * noise_size(d):.1f} µ{unit}"
     named = "; ".join(sentence(e) for e in d.effects)
+    if d.verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
+        return f"No cause beside the machine's uncertain numbers; these: {d.calibration.verdict} ({size})."
     if d.verdict == "none":
         return f"The machine agrees with its file within what these readings can show ({size})."
     if d.verdict == "unattributed":
         return (
             f"The machine differs from its file ({size}), and no single cause known to stiffmap explains how."
         )
+    if d.verdict == "ambiguous" and not d.effects:
+        return f"No single number of the machine stands out; {d.calibration.verdict} ({size})."
     if d.verdict == "ambiguous":
         return f"The readings are explained by more than one cause. First of them: {named}."
     rest = " Part of the difference remains unexplained." if "unattributed" in d.verdict else ""
@@ -86,8 +90,15 @@ def opening(d: Any) -> str:
 
 def next_step(d: Any) -> str:
     """What to do with the answer."""
+    if d.verdict == "none" and d.calibration is not None and d.calibration.beyond:
+        return "Inspect the number that is beyond tolerance; the calibration's machine file has it."
+    if d.verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
+        return "Nothing to mend. The calibration's machine file predicts this machine better than the declared one."
     if d.verdict == "none":
         return "Nothing to correct. Keep the readings as the record of this state."
+    if d.verdict == "ambiguous" and not d.effects:
+        tilt = "" if d.experiment.axis_read[3:6].any() else ", the tilt of the tool as well (rx, ry, rz)"
+        return f"Read what tells these groups apart{tilt}; `stiffmap plan` proposes poses."
     if d.verdict == "unattributed":
         return (
             "Look at where the difference is largest (What is left), check the instrument's frame and the tool "

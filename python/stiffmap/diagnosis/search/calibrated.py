@@ -27,6 +27,8 @@ class Layer:
     out: Mask
     """(n,) outliers of the calibration."""
     calibration: Calibration
+    own: tuple[int, ...] = ()
+    """Unknowns that belong to one set-up alone."""
 
     @staticmethod
     def of(found: Calibrator, calibration: Calibration, floor: float = 0.0) -> Layer:
@@ -34,7 +36,8 @@ class Layer:
         s, fit = found.sensitivity, found.fit
         bent = fit.prediction - s.base - s.columns @ fit.values
         noise = raised(found.noise, floor)
-        return Layer(s.columns, np.nan_to_num(bent), noise, found.out, calibration)
+        own = tuple(i for i, u in enumerate(s.unknowns) if u.setup)
+        return Layer(s.columns, np.nan_to_num(bent), noise, found.out, calibration, own)
 
     @property
     def digest(self) -> str:
@@ -45,11 +48,16 @@ class Layer:
         """The readings less what is not linear in the uncertain numbers."""
         return experiment.with_readings(experiment.reading - self.bent)
 
-    def part(self, problem: Problem, residual: Floats) -> Floats:
-        """(n, c) what the uncertain numbers say best of a residual, from the rows of the problem."""
-        bare = problem.exact
-        white = bare.white(self.columns)
-        return np.asarray(self.columns @ Sums.of(white, bare.white(np.nan_to_num(residual))).estimate)
+    def part(self, problem: Problem, residual: Floats, columns: Floats | None = None) -> Floats:
+        """(n, c) what the uncertain numbers (of `columns` (n, c, p); default: all) say best of a residual, from the rows
+        of the problem."""
+        bare, columns = problem.exact, self.columns if columns is None else columns
+        white = bare.white(columns)
+        return np.asarray(columns @ Sums.of(white, bare.white(np.nan_to_num(residual))).estimate)
+
+    def own_part(self, problem: Problem, residual: Floats) -> Floats:
+        """(n, c) what unknowns of single set-ups say of a residual, from the rows of the problem."""
+        return self.part(problem, residual, self.columns[..., self.own])
 
 
 def raised(noise: Noise, floor: float) -> Noise:

@@ -49,12 +49,15 @@ class Study:
         `out`), unless not `calibrated`, and less the unknown frames and zeros that fit those outside `out`.
 
         Nuisances are taken from all rows, held out or not: an instrument that was set up anew has a frame
-        of its own, which no other set-up tells.
+        of its own, which no other set-up tells; so with zeros that a set-up has for itself.
         """
         problem = self.problem_of(~out) if out.any() else self.whole[0]
         if self.layer is not None and calibrated:
             told = problem if train is None else self.problem_of(train & ~out)
             residual = residual - self.layer.part(told, residual)
+            if train is not None and self.layer.own and (~train & ~out).any():
+                rest = self.layer.own_part(self.problem_of(~train & ~out), residual)
+                residual = residual - np.where(train[:, None], 0.0, rest)
         return np.asarray(residual - nuisance_part(problem, residual))
 
     def problem_of(self, keep: Mask) -> Problem:
