@@ -63,7 +63,6 @@ KernelInput kernel_input(const BatchInput& in) {
   k.position = in.position;
   k.rotation = in.rotation;
   k.wrench = in.wrench;
-  k.want_stiffness = 1;
   k.max_iterations = 16;
   k.tolerance = EquilibriumOptions{}.tolerance;
   return k;

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "beam.hpp"
 #include "stiffmap/solve.hpp"
 
 namespace stiffmap::bench {
@@ -54,7 +55,7 @@ inline Mat3 columns(const Vec3& x, const Vec3& y, const Vec3& z) {
 inline Case tripteron() {
   const Vec3 X = Vec3::UnitX(), Y = Vec3::UnitY(), Z = Vec3::UnitZ();
   const double L = 0.75, d = 0.15, A = M_PI * d * d / 4, I = M_PI * std::pow(d, 4) / 64;
-  const Mat6 C = beam_compliance(L, {7.0e10 * A, 7.0e10 * I, 7.0e10 * I, 2.55e10 * 2 * I});
+  const Mat6 C = test::beam_compliance(L, {7.0e10 * A, 7.0e10 * I, 7.0e10 * I, 2.55e10 * 2 * I});
   const auto leg = [&](const Vec3& at, const Mat3& R, double s, double q1, double q2, double q3) {
     return Chain{{offset("frame", at, R), slider("actuator", Z, s, 1e6), joint("proximal", JointType::revolute, Z, q1),
                   offset("upper", L * X), link("proximal_link", C), joint("elbow", JointType::revolute, Z, q2),
@@ -85,7 +86,7 @@ inline Mat6 orthoglide_foot() {
   const Mat3 R = columns(-Vec3::UnitY(), Vec3::UnitX(), Vec3::UnitZ());
   Mat6 Q = Mat6::Zero();
   Q.topLeftCorner<3, 3>() = Q.bottomRightCorner<3, 3>() = R;
-  return Q * beam_compliance(0.25, {2e8, 2e3, 2e4, 1.5e4}) * Q.transpose();
+  return Q * test::beam_compliance(0.25, {2e8, 2e3, 2e4, 1.5e4}) * Q.transpose();
 }
 
 /// Six bars in three parallelograms, feet, compliant drives.
@@ -113,7 +114,7 @@ inline Case serial(int n) {
   for (int i = 0; i < n; ++i) {
     const std::string number = std::to_string(i);
     leg.elements.emplace_back(offset("length" + number, Vec3(1.0 / n, 0, 0)));
-    leg.elements.emplace_back(link("link" + number, beam_compliance(1.0 / n, {2e8, 3e5, 3e5, 2e5})));
+    leg.elements.emplace_back(link("link" + number, test::beam_compliance(1.0 / n, {2e8, 3e5, 3e5, 2e5})));
   }
   const Vec3 home(1, 0, 0);
   return {assemble({{Block{"legs", {{"arm", leg}}}}}, {home, Mat3::Identity()}), home - Vec3::Constant(0.1),

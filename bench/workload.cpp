@@ -76,7 +76,6 @@ Index Workload::left_over() const {
   in.position = in_.position;
   in.rotation = in_.rotation;
   in.wrench = in_.wrench;
-  in.want_stiffness = 1;
   in.max_iterations = 16;
   in.tolerance = EquilibriumOptions{}.tolerance;
   KernelOutput out{};

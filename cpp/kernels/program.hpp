@@ -15,6 +15,7 @@ struct Constant {
   std::int32_t has_rotation, has_translation;
 };
 
+/// No padding: operations are compared by their bytes.
 struct Op {
   OpKind kind;
   std::int32_t coordinate;    ///< first coordinate of a joint or spring; -1 otherwise
@@ -23,10 +24,8 @@ struct Op {
   std::int32_t law;           ///< index into laws, -1: none
   std::int32_t first, count;  ///< block: its chains are first .. first+count-1
   std::int32_t wrench;        ///< block: index of the wrench of its second branch
-  std::int32_t start_moves;   ///< block: its start frame is not fixed to the base
   std::int32_t slot;          ///< place of its intermediate results
   std::int32_t stroke;        ///< spring: index into strokes, -1: K holds everywhere
-  std::int32_t unused;        ///< no padding: operations are compared by their bytes
   double direction[3];
   double K[36], rest[6];     ///< spring
   double mass, com[3];       ///< load: a body's weight
@@ -172,7 +171,7 @@ struct KernelInput {
   const std::int64_t*
       index;             ///< the poses to solve, null: all; start, position and rotation go by place if start is given
   std::int32_t patient;  ///< nothing is left for a second look
-  std::int32_t want_stiffness, max_iterations;
+  std::int32_t max_iterations;
   double tolerance;
   const Program* const* perturbed;    ///< variants of the program with the same operations
   const std::int32_t* perturbed_leg;  ///< per variant: the only leg that differs from the program; -1: anything

@@ -151,7 +151,6 @@ KernelInput kernel_input(const Mechanism& m, const BatchInput& in, const SolveOp
     k.gravity[i] = in.gravity[i];
     k.point[i] = m.points[at(in.read_points.front())].offset[i];
   }
-  k.want_stiffness = options.stiffness;
   k.max_iterations = 16;
   k.tolerance = options.equilibrium.tolerance;
   return k;

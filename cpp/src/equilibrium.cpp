@@ -118,7 +118,6 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
     ws.saddle.solve(ws.force, ws.lin.e, ws.dz, ws.dlambda);
     ++out.iterations;
     const double norm = ws.saddle.step_norm(m, ws.dz);
-    out.last_step = norm;
     if (!std::isfinite(norm)) return Outcome::failed;
     if (p.secant_laws) {
       state.z += ws.dz;

@@ -119,20 +119,4 @@ bool stiffness_at(const Stroke& stroke, const SpringMatrix& matrix, double u, Ma
   return true;
 }
 
-Mat6 beam_compliance(double L, const BeamSection& b) {
-  require(L > 0, "beam.length", "a positive length", L);
-  require(b.EA > 0 && b.EIy > 0 && b.EIz > 0 && b.GJ > 0, "beam.section", "positive rigidities EA, EIy, EIz, GJ",
-          std::min(std::min(b.EA, b.GJ), std::min(b.EIy, b.EIz)));
-  Mat6 C = Mat6::Zero();
-  C(0, 0) = L / b.EA;
-  C(1, 1) = L * L * L / (3 * b.EIz);
-  C(2, 2) = L * L * L / (3 * b.EIy);
-  C(3, 3) = L / b.GJ;
-  C(4, 4) = L / b.EIy;
-  C(5, 5) = L / b.EIz;
-  C(1, 5) = C(5, 1) = L * L / (2 * b.EIz);
-  C(2, 4) = C(4, 2) = -L * L / (2 * b.EIy);
-  return C;
-}
-
 }  // namespace stiffmap

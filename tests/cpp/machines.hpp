@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "beam.hpp"
 #include "stiffmap/solve.hpp"
 
 namespace stiffmap::test {

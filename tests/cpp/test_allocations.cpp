@@ -115,7 +115,6 @@ BOOST_AUTO_TEST_CASE(kernels_allocate_nothing) {
   in.position = b.position.data();
   in.rotation = b.rotation.data();
   in.wrench = b.wrench.data();
-  in.want_stiffness = 1;
   in.max_iterations = 16;
   in.tolerance = 1e-10;
   KernelOutput out{};

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "beam.hpp"
 #include "numeric.hpp"
 #include "stiffmap/spring.hpp"
 
@@ -38,32 +39,6 @@ bool contains(const std::string& text, const std::string& part) { return text.fi
 }  // namespace
 
 BOOST_AUTO_TEST_SUITE(spring)
-
-BOOST_AUTO_TEST_CASE(beam_has_its_closed_form) {
-  const double L = 0.6;
-  const BeamSection s{2e8, 3e4, 5e4, 2e4};
-  const Mat6 K = beam_compliance(L, s).inverse();
-  BOOST_TEST(std::abs(K(0, 0) / (s.EA / L) - 1) < 1e-12);
-  BOOST_TEST(std::abs(K(1, 1) / (12 * s.EIz / (L * L * L)) - 1) < 1e-12);
-  BOOST_TEST(std::abs(K(2, 2) / (12 * s.EIy / (L * L * L)) - 1) < 1e-12);
-  BOOST_TEST(std::abs(K(3, 3) / (s.GJ / L) - 1) < 1e-12);
-  BOOST_TEST(std::abs(K(4, 4) / (4 * s.EIy / L) - 1) < 1e-12);
-  BOOST_TEST(std::abs(K(5, 5) / (4 * s.EIz / L) - 1) < 1e-12);
-  BOOST_TEST(std::abs(K(1, 5) / (-6 * s.EIz / (L * L)) - 1) < 1e-12);
-  BOOST_TEST(std::abs(K(2, 4) / (6 * s.EIy / (L * L)) - 1) < 1e-12);
-}
-
-BOOST_AUTO_TEST_CASE(two_half_beams_make_one) {
-  // Series connection through the lever arm of the second half.
-  const double L = 0.6;
-  const BeamSection s{2e8, 3e4, 5e4, 2e4};
-  Mat6 lever = Mat6::Identity();  // twist of a point L/2 further along x
-  lever(1, 5) = L / 2;
-  lever(2, 4) = -L / 2;
-  const Mat6 half = beam_compliance(L / 2, s);
-  const Mat6 whole = lever * half * lever.transpose() + half;
-  BOOST_TEST((whole - beam_compliance(L, s)).cwiseAbs().maxCoeff() < 1e-12 * whole.cwiseAbs().maxCoeff());
-}
 
 BOOST_AUTO_TEST_CASE(compliance_is_inverted) {
   const Mat6 C = random_spd(1);
@@ -126,16 +101,11 @@ BOOST_AUTO_TEST_CASE(nan_is_refused) {
 
 BOOST_AUTO_TEST_CASE(rank_decisions_do_not_depend_on_units) {
   // The same beam in millimetres and newtons, and in metres: no rank is lost in either.
-  const Mat6 C = beam_compliance(0.25, {2e8, 2e4, 2e4, 1.5e4});
+  const Mat6 C = test::beam_compliance(0.25, {2e8, 2e4, 2e4, 1.5e4});
   const Vec6 mm(1e3, 1e3, 1e3, 1, 1, 1);
   const Mat6 in_mm = mm.asDiagonal() * C * mm.asDiagonal() * 1e-6;
   BOOST_TEST(!spring_from_compliance(C, "m").rotated);
   BOOST_TEST(!spring_from_compliance(in_mm, "mm").rotated);
-}
-
-BOOST_AUTO_TEST_CASE(beams_without_length_or_section_are_refused) {
-  BOOST_TEST(contains(message([] { beam_compliance(0, {1, 1, 1, 1}); }), "positive length"));
-  BOOST_TEST(contains(message([] { beam_compliance(1, {1, 0, 1, 1}); }), "rigidities"));
 }
 
 BOOST_AUTO_TEST_SUITE_END()

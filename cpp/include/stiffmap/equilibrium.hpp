@@ -17,7 +17,6 @@ struct EquilibriumResult {
   Status status = Status::not_converged;
   std::uint32_t flags = 0;
   int iterations = 0;
-  double last_step = 0;
   double contraction = 0;  ///< of the second Newton step against the first, at the last load
   int sign_changes = 0;    ///< of the tangent's determinant, from one load step to the next
   Index falling = 0;       ///< directions in which the energy falls at the answer (theory K4)

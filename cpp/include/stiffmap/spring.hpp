@@ -47,12 +47,4 @@ void check_stroke(const Stroke& stroke, const SpringMatrix& matrix, const std::s
 /// Stiffness at u of a spring that is `matrix` where the stroke counts from; false where no compliance is declared.
 bool stiffness_at(const Stroke& stroke, const SpringMatrix& matrix, double u, Mat6& stiffness);
 
-/// Section and material of a straight prismatic beam along local x (SI).
-struct BeamSection {
-  double EA, EIy, EIz, GJ;
-};
-
-/// Compliance of the free end of an Euler-Bernoulli cantilever along x, theory (S1).
-Mat6 beam_compliance(double length, const BeamSection& section);
-
 }  // namespace stiffmap

@@ -201,7 +201,6 @@ class Compiler {
     op.first = i32(first);
     op.count = i32(b.branches.size());
     op.slot = out_.program.stiff_slots++;
-    op.start_moves = way.moves;
     for (std::size_t k = 0; k < b.branches.size(); ++k) chain(b.branches[k].second, first + k, false, way.moves);
     if (is_legs) out_.program.legs_op = here;
     way.rigid = false;
