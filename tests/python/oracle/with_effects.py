@@ -23,7 +23,7 @@ VALUES: dict[str, dict[str, object]] = {
     "joint_friction": {"torque": 0.2, "force": 2.0, "branch": "loading"},
     "joint_compliance": {"translation": 1e-9, "rotation": 1e-7},
     "joint_clearance": {"radius": 5e-6},
-    "compliance": {"scale": 1.7},
+    "compliance": {"scale": 1.3},
     "bilinear": {"ratio": 0.5, "knee": 100.0},
     "tabulated": {"step": 2e-5, "factor_1": 0.6, "factor_2": 0.9, "factor_3": 1.2, "factor_4": 1.3},
     "position_dependent_compliance": {"slope": 0.1},
