@@ -23,6 +23,8 @@ from stiffmap.compensation import (
 from stiffmap.compensation import compensate as compute
 from stiffmap.description import MachineDescription
 from stiffmap.errors import FileError, StiffmapError
+from stiffmap.experiment.comparison.prediction_error import left_by
+from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.files.plan_file import load_plan
 from stiffmap.experiment.poses.orientation import against_base
 from stiffmap.machine import Machine
@@ -63,6 +65,10 @@ def compensate(
     zero: Annotated[
         float | None, typer.Option(help="Position (mm) of the reference point: the table is zero there.")
     ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option(help="Readings that no fit saw: the error before, and what compensation would leave."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Commands at which a deflected machine with errors stands where it is wanted.
@@ -81,20 +87,36 @@ def compensate(
       [cyan]stiffmap compensate results/map.nc --axis x --format siemens -o x.mpf[/cyan]
 
       [cyan]stiffmap compensate ur10 --effect 'zero_offset elbow error=1mrad' --urdf arm.urdf --dh arm.csv[/cyan]
+
+      [cyan]stiffmap compensate result/machine.yaml --check held_out[/cyan]
     """
     out: dict[str, object] = {}
     if axis is not None:
         out = _table(machine, effect, axis, form, points, through, zero, output, force, gravity)
         _say(out, as_json)
         return
-    if poses is None and urdf is None and dh is None:
-        raise StiffmapError("compensate: give a CSV of wanted poses, --axis, --urdf or --dh")
+    if poses is None and urdf is None and dh is None and check is None:
+        raise StiffmapError("compensate: give a CSV of wanted poses, --axis, --urdf, --dh or --check")
     m = machine_with(machine, effect)
     if urdf is not None or dh is not None:
         out |= _geometry(m, urdf, dh)
     if poses is not None:
         out |= _commands(m, poses, output, force, gravity)
+    if check is not None:
+        out |= _checked(m, check)
     _say(out, as_json)
+
+
+def _checked(m: Machine, folder: Path) -> dict[str, object]:
+    """Sizes of readings as they are, and less what the corrected machine says of them."""
+    before, after = left_by(m, load_experiment(folder))
+    out: dict[str, object] = {"readings": before.n}
+    for name, s in (("as measured", before), ("left by compensation", after)):
+        size, unit = s.size
+        out[f"rms {name}, m{unit}"] = round(MM * size, 6)
+        if unit == "m":
+            out[f"largest {name}, mm"] = round(MM * s.max, 6)
+    return out
 
 
 def _say(out: dict[str, object], as_json: bool) -> None:

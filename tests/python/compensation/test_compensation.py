@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from scipy.spatial.transform import Rotation
 import stiffmap as sm
 from stiffmap.cli.app import main
 from stiffmap.compensation import compensate, corrected_geometry, dh_list, urdf_text
+from stiffmap.experiment import Predictor, random_plan, save_experiment
+from stiffmap.experiment.comparison.prediction_error import left_by
 from stiffmap.urdf import import_urdf
 
 MACHINES = (
@@ -141,5 +144,27 @@ def test_the_command_line_writes_commands(tmp_path: Path, capsys: pytest.Capture
     assert out.read_text().startswith("wanted_x_mm")
     assert main(["compensate", "linear-delta", "--urdf", str(tmp_path / "a.urdf")]) == 2
     assert "serial arm" in capsys.readouterr().err
+    assert main(["compensate", "linear-delta", "--check", str(tmp_path / "nothing")]) == 2
     assert main(["compensate", "linear-delta"]) == 2
     assert "wanted poses" in capsys.readouterr().err
+
+
+def test_what_compensation_leaves_of_held_out_readings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A drive's zero that is known goes, the one that nobody knows stays."""
+    machine = sm.load_machine("orthoglide-revised")
+    plan = random_plan(machine, "position", poses=8, repeats=1, seed=2)
+    both = machine.with_effect("zero_offset", element="actuator", legs=["x"], error=1e-4)
+    real = both.with_effect("zero_offset", element="actuator", legs=["z"], error=2e-5)
+    data = plan.with_readings(Predictor(real, plan)())
+    save_experiment(data, tmp_path / "held_out")
+    argument = ["compensate", "orthoglide-revised", "--check", str(tmp_path / "held_out"), "--json"]
+    assert main([*argument, "--effect", "zero_offset actuator x error=0.1mm"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    hidden = Predictor(real, plan)() - Predictor(both, plan)()
+    expected = 1e3 * np.sqrt(np.nanmean(hidden[:, :3] ** 2))
+    assert said["rms left by compensation, mm"] == pytest.approx(expected, rel=1e-3)
+    assert said["rms as measured, mm"] > 4 * expected
+    before, after = left_by(both, data)
+    assert (before.n, after.rms * 1e3) == (24, pytest.approx(expected, rel=1e-3))
