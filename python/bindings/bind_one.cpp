@@ -95,7 +95,7 @@ class OneCall {
     shared_.read_points = {tcp};
   }
 
-  /// Nothing where the call is not a plain one.
+  /// Empty where the call has options that only the general call handles.
   std::unique_ptr<OneAnswer> solve(const py::object& position, const py::object& wrench) const {
     std::array<double, 3> p;
     std::array<double, 6> w{};

@@ -186,7 +186,8 @@ class Calibrator:
         return gain > STRONG
 
     def _alone(self) -> Mask:
-        """(n,) rows that stand out of what the fit leaves; its misfit as a whole is no row's fault."""
+        """(n,) outliers of the fit's residuals, judged against their typical size, so that a model that misfits as a
+        whole makes none."""
         e = self.predictor.experiment
         left = self.left(self.fit.prediction)
         seen = np.isfinite(left).any(axis=0)

@@ -91,7 +91,8 @@ def compare(search: Search, model: Model, i: int, other: Model, size: float) -> 
 
 
 def two_words(one: Candidate, other: Candidate) -> bool:
-    """Two definitions of one error: the same parameters of the same element, told of more or less of it."""
+    """Whether two candidates define one error: the same parameters of the same element, applied to larger or smaller
+    parts of it."""
     names = [[p.name for p in c.parameters] for c in (one, other)]
     return one.element == other.element and one.legs == other.legs and names[0] == names[1]
 

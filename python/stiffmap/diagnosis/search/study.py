@@ -170,8 +170,8 @@ def find(study: Study, rows: Mask | None = None, *, finalists: int = 5) -> Findi
 
 
 def alone(study: Study, residual: Floats) -> Mask:
-    """(n,) outliers of residuals (n, 6); where the model does not fit, its misfit is no row's fault:
-    then noise is what most residuals show."""
+    """(n,) outliers of residuals (n, c). Where the model does not fit, rows are judged against the typical residual
+    instead of the noise floor, so that the misfit makes no outliers."""
     sigma = study.noise.sigma
     seen = np.isfinite(residual).any(axis=0)
     typical = np.ones(sigma.shape[1])
