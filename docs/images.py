@@ -30,7 +30,7 @@ COMMANDS = {  # picture: the command that writes it, and the file's name where t
     "polar.png": (f"polar orthoglide-revised {CORNER} -o {{out}}", ""),
     "sweep.png": (f"sweep orthoglide-revised {CORNER} --direction 1,1,0 -o {{out}}", ""),
     "machines/linear-delta-mode.png": (
-        "sweep linear-delta --direction 0,0,-1 --limit 1500 -o {out}",
+        "sweep linear-delta --direction 0,0,-1 --limit 9000 -o {out}",
         "mode_1.png",
     ),
     "machines/travelling-column-map.png": (

@@ -44,10 +44,10 @@ def test_stress(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_path_finds_the_rods_that_buckle(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A rod on ball joints with one spring at its end buckles at 3 EI / L^2."""
-    call = ["sweep", "linear-delta", "--direction", "0,0,-1", "--limit", "1000", "--points", "10"]
+    call = ["sweep", "linear-delta", "--direction", "0,0,-1", "--limit", "8000", "--points", "10"]
     assert main([*call, "-o", str(tmp_path), "--json"]) == 1
     got = json.loads(capsys.readouterr().out)
-    rod = 3 * 1.2e11 * np.pi * (0.008**4 - 0.006**4) / 64 / 0.5**2
+    rod = 3 * 1.2e11 * np.pi * (0.014**4 - 0.012**4) / 64 / 0.5**2
     assert got["critical_force"][0] == pytest.approx(6 * 0.8 * rod, rel=2e-3)
     assert got["critical_kind"][0] == "bifurcation"
     assert (tmp_path / "path.png").exists() and (tmp_path / "mode_1.png").exists()

@@ -96,7 +96,7 @@ def test_backward_keeps_what_cannot_be_left_out(search: Search, tilts: list[Cand
 
 def test_loads_next_to_buckling_leave_signatures_whole() -> None:
     machine = sm.load_machine("linear-delta")
-    at, push = np.array([[-0.1, 0.1, 0.22], [0.0, 0.0, 0.3]]), np.array([[0, 150.0, 0, 0, 0, 0]] * 2)
+    at, push = np.array([[-0.1, 0.1, 0.22], [0.0, 0.0, 0.3]]), np.array([[0, 955.0, 0, 0, 0, 0]] * 2)
     more = machine.solve(at, push + [0, STEP, 0, 0, 0, 0])
     assert list(more.status) == [
         sm.Status.UNSTABLE,

@@ -103,3 +103,12 @@ def test_model_free_checks_see_what_they_should(machine: sm.Machine, plan: sm.Ex
     assert slack["linearity"] < 1e-6 and slack["sign reversal"] > 1e-3
     turned = p_values(AppliedEffect("load_direction", "load", (), (("angle_z", 0.1),)))
     assert turned["reciprocity"] < 1e-6 and turned["linearity"] > 1e-3
+
+
+def test_rows_that_are_left_out_say_whether_it_is_the_load() -> None:
+    machine = sm.load_machine("linear-delta")
+    plan = random_plan(machine, "deflection", poses=2, seed=1)
+    with pytest.raises(sm.StiffmapError, match=r"at 36 rows .*: it gives way under the load there"):
+        Predictor(machine, replace(plan, wrench=plan.wrench * 300))
+    with pytest.raises(sm.StiffmapError, match=r"at 36 rows .*: out of reach, or units are wrong"):
+        Predictor(machine, replace(plan, position=plan.position + np.array([1.0, 0, 0])))

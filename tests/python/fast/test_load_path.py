@@ -8,8 +8,8 @@ from agreement import TOLERANCE, displacement_gap
 
 import stiffmap as sm
 
-FORCE = np.array([100.0, 50.0, -200.0, 0.0, 0.0, 0.0])
-MOMENT = np.array([60.0, -40.0, -150.0, 4.0, -3.0, 5.0])
+FORCE = np.array([900.0, 450.0, -1800.0, 0.0, 0.0, 0.0])
+MOMENT = np.array([400.0, -250.0, -950.0, 25.0, -20.0, 30.0])
 
 
 def poses(machine: sm.Machine, n: int) -> np.ndarray:

@@ -15,6 +15,7 @@ from stiffmap.machine import Machine
 AS_HOME = 1e-9
 NAMED = 5
 """Rows that a sentence names."""
+OUT_OF_REACH = "out of reach, or units are wrong"
 
 
 def located(machine: Machine, experiment: Experiment) -> Experiment:
@@ -61,7 +62,7 @@ def _with_other(plan: Experiment, here: Kinematics, there: Kinematics, index: li
     )
 
 
-def without(experiment: Experiment, failed: Mask, why: str) -> Experiment:
+def without(experiment: Experiment, failed: Mask, why: str, cause: str = OUT_OF_REACH) -> Experiment:
     """The experiment without the rows `failed` (n,), which it then names; StiffmapError if none is left."""
     at = np.flatnonzero(failed)
     if not at.size:
@@ -72,7 +73,7 @@ def without(experiment: Experiment, failed: Mask, why: str) -> Experiment:
         f"; first at ({', '.join(f'{1e3 * v:.1f}' for v in where)}) mm" if np.isfinite(where).all() else ""
     )
     plural = "s" if at.size > 1 else ""
-    told = f"{why} {at.size} row{plural} (id {rows}{first}): out of reach, or units are wrong"
+    told = f"{why} {at.size} row{plural} (id {rows}{first}): {cause}"
     if at.size == len(experiment):
         raise StiffmapError(f"{experiment.name}: {told}")
     kept = experiment.rows(~failed)

@@ -11,9 +11,9 @@ from stiffmap import effects
 from stiffmap.description import AppliedEffect
 from stiffmap.effects import apply_records
 from stiffmap.errors import StiffmapError
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.poses.against_command import resolved
-from stiffmap.experiment.poses.commanded import located, without
+from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, without
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.experiment.prediction.history import Drives, drives_of, history_motion
@@ -73,7 +73,14 @@ class Predictor:
         failed = np.asarray((e.read & ~np.isfinite(self())).any(axis=1))
         if failed.any():
             self._memory.clear()
-            self.experiment = without(e, failed, "the machine has no equilibrium at")
+            self.experiment = without(e, failed, "the machine has no equilibrium at", self._cause(failed))
+
+    def _cause(self, failed: Mask) -> str:
+        """Of rows without an equilibrium: the load, where the machine gets there without it."""
+        there = np.isfinite(self.under(np.zeros_like(self.experiment.wrench)))[failed]
+        if (there | ~self.experiment.read[failed]).all():
+            return "it gives way under the load there; smaller loads, or slender rods in several pieces (docs/machine_files.md)"
+        return OUT_OF_REACH
 
     def _close_from_here(self) -> None:
         """Keeps where the joints stand, for variants of the machine; one on the fast path closes faster by itself."""
