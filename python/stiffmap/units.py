@@ -60,6 +60,7 @@ MOMENT = Dimension(length=1, force=1)
 ANGLE = Dimension(angle=1)
 MASS = Dimension(mass=1)
 INERTIA = Dimension(mass=1, length=2)
+DENSITY = Dimension(mass=1, length=-3)
 MODULUS = Dimension(force=1, length=-2)
 BENDING = Dimension(force=1, length=2)
 

@@ -29,7 +29,7 @@ class Editor:
 
     Places in elements of templates (or of legs without one) and in the workspace are edited in a description
     that was built once. `can` is False where a place lies elsewhere, or where the file has what ties
-    elements together (effects, link files, strokes, homes per leg): the whole file is then to be built.
+    elements together (effects, link files, strokes, bodies of links, homes per leg): the whole file is then to be built.
     Uncertainties and notes stay those of the file.
     """
 
@@ -43,7 +43,8 @@ class Editor:
 
     def _prepare(self) -> None:
         data = self.document.data
-        if data.get("effects") or "stroke" in str(data) or "link:" in str(data):
+        text = str(data)
+        if data.get("effects") or "stroke" in text or "link:" in text or "'of':" in text:
             raise LookupError("tied together")
         model = validate(self.document, self.file)
         self.base: MachineDescription = describe_document(self.document, self.file, Path(self.file).parent)

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.description import (
     Block,
@@ -22,9 +23,9 @@ from stiffmap.description import (
     Point,
 )
 from stiffmap.description.numbers import JointNumber, numbers_of
-from stiffmap.description.pose import Rows, vector
+from stiffmap.description.pose import Rows, Vector, vector
 from stiffmap.files.build_geometry import build_pose, build_vector
-from stiffmap.files.build_springs import build_law, build_spring
+from stiffmap.files.build_springs import beam_body, build_law, build_spring
 from stiffmap.files.context import Context
 from stiffmap.files.schema.base import Number
 from stiffmap.files.schema.elements import (
@@ -52,7 +53,7 @@ def build_elements(models: Sequence[ElementModel], context: Context) -> tuple[El
     elements = []
     for i, model in enumerate(models):
         here = context.at(i)
-        element = context.attempt(partial(build_element, model, here))
+        element = context.attempt(partial(build_element, model, here, (i, models)))
         if element is None:
             continue
         names = [element.name]
@@ -68,8 +69,10 @@ def build_elements(models: Sequence[ElementModel], context: Context) -> tuple[El
     return tuple(elements)
 
 
-def build_element(model: ElementModel, context: Context) -> Element:
-    """One element."""
+def build_element(
+    model: ElementModel, context: Context, among: tuple[int, Sequence[ElementModel]] = (0, ())
+) -> Element:
+    """One element; `among`: its number and the sequence it is in."""
     match model:
         case OffsetModel():
             return _offset(model, _named(model.offset, model.note, context))
@@ -80,7 +83,7 @@ def build_element(model: ElementModel, context: Context) -> Element:
         case SpringModel():
             return build_spring(model, _named(model.spring, model.note, context))
         case BodyModel():
-            return _body(model, _named(model.body, model.note, context))
+            return _body(model, _named(model.body, model.note, context), *among)
         case PointModel():
             return _point(model, _named(model.point, model.note, context))
         case BlockModel():
@@ -224,16 +227,46 @@ def _command_error(model: CommandErrorModel, coordinate: Dimension, context: Con
     return replace(CommandError(), **given)
 
 
-def _body(model: BodyModel, context: Context) -> Body:
-    if model.mass.value < 0.0:
-        context.at("mass").fail(f"must not be negative; found {model.mass.value}")
-    mass = context.si(model.mass, MASS, "mass")
-    com = (0.0, 0.0, 0.0)
+def _body(model: BodyModel, context: Context, place: int, models: Sequence[ElementModel]) -> Body:
+    mass, com, inertia = 0.0, (0.0, 0.0, 0.0), None
+    if model.of is not None:
+        mass, com, inertia = _of_beam(model.of, context, place, models)
+    if model.mass is not None:
+        if model.mass.value < 0.0:
+            context.at("mass").fail(f"must not be negative; found {model.mass.value}")
+        declared = context.si(model.mass, MASS, "mass")
+        if inertia is not None:  # a link as heavy as declared, spread as its section says
+            inertia = inertia * (declared / mass)
+        mass = declared
     if model.com is not None:
         com = build_vector(model.com, LENGTH, context, "com")
-    if model.inertia is None:
+    if model.inertia is not None:
+        return Body(model.body, mass, com, _inertia(model.inertia, context))
+    if inertia is None:
         return Body(model.body, mass, com)
-    return Body(model.body, mass, com, _inertia(model.inertia, context))
+    a, b, c = (vector(row) for row in inertia)
+    return Body(model.body, mass, com, (a, b, c))
+
+
+def _of_beam(
+    name: str, context: Context, place: int, models: Sequence[ElementModel]
+) -> tuple[float, Vector, NDArray[np.float64]]:
+    """Mass, centre and inertia of the beam of a spring of this sequence. The body stands at the beam's root where
+    offsets lead from it to the spring, else at its end."""
+    beams = {m.spring: i for i, m in enumerate(models) if isinstance(m, SpringModel) and m.beam is not None}
+    if name not in beams:
+        there = ", ".join(beams) or "none"
+        context.at("of").fail(f"no spring '{name}' with a beam in this sequence; there are: {there}")
+    spring = models[beams[name]]
+    assert isinstance(spring, SpringModel) and spring.beam is not None
+    beam = spring.beam
+    mass, length, inertia = beam_body(beam, context.at("of"))
+    axis, sign = "xyz".index(beam.along[-1]), -1.0 if beam.along.startswith("-") else 1.0
+    between = [m for m in models[place : beams[name]] if isinstance(m, OffsetModel)]
+    way = sum(build_pose(m, context).translation[axis] for m in between)
+    com = [0.0, 0.0, 0.0]
+    com[axis] = (sign if sign * way > length / 2 else -sign) * length / 2
+    return mass, vector(np.array(com)), inertia
 
 
 def _inertia(terms: list[Number | list[Number]], context: Context) -> Rows:

@@ -15,7 +15,7 @@ from stiffmap.files.matrix_checks import asymmetry, lowest_eigenvalue
 from stiffmap.files.schema.base import Number
 from stiffmap.files.schema.elements import SpringModel
 from stiffmap.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix
-from stiffmap.units import ANGLE, BENDING, FORCE, LENGTH, MODULUS, MOMENT, NONE, Dimension
+from stiffmap.units import ANGLE, BENDING, DENSITY, FORCE, LENGTH, MODULUS, MOMENT, NONE, Dimension
 
 _COMPLIANCE = {0: Dimension(length=1, force=-1), 1: Dimension(force=-1), 2: Dimension(length=-1, force=-1)}
 _STIFFNESS = {0: Dimension(length=-1, force=1), 1: FORCE, 2: MOMENT}
@@ -106,6 +106,25 @@ def build_beam(beam: Beam, context: Context) -> NDArray[np.float64]:
         s = _section(beam, context)
         values = [e * s.area, g * s.torsion, e * s.about_width, e * s.about_height]
     return beams.cantilever_compliance(length, beam.along, *values)
+
+
+def beam_body(beam: Beam, context: Context) -> tuple[float, float, NDArray[np.float64]]:
+    """Mass, length and inertia (3, 3) about its centre, SI, of a uniform beam with a section and a density."""
+    material = beam.material
+    if isinstance(material, str):
+        material = context.materials.get(material)  # an unknown one is refused where the spring is built
+    if beam.EA is not None or material is None or material.density is None:
+        lacks = "a section" if beam.EA is not None else "a material with a density"
+        context.fail(f"no mass: the beam has not {lacks}; give one, or the body's mass")
+    density = _positive(material.density, DENSITY, "material.density", context)
+    length, section = _positive(beam.length, LENGTH, "length", context), _section(beam, context)
+    mass = density * section.area * length
+    i = "xyz".index(beam.along[-1])
+    about = np.zeros(3)
+    about[i] = density * length * (section.about_width + section.about_height)
+    about[(i + 1) % 3] = mass * length**2 / 12 + density * length * section.about_width
+    about[(i + 2) % 3] = mass * length**2 / 12 + density * length * section.about_height
+    return mass, length, np.diag(about)
 
 
 def _moduli(beam: Beam, context: Context) -> tuple[float, float]:

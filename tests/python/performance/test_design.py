@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
+import stiffmap.design
 from stiffmap.design import load_design, optimize
 from stiffmap.design.expressions import evaluate
 from stiffmap.design.judging import judge
@@ -176,3 +177,33 @@ def test_a_search_that_is_killed_goes_on(tmp_path):
     again, whole = optimize(path, folder=tmp_path / "b", processes=1), optimize(path, processes=1)
     np.testing.assert_array_equal(again.x, whole.x)
     assert again.history == whole.history and 9 < before <= 1 + 8 * 6
+
+
+def test_masses_of_links_follow_their_sections(tmp_path):
+    """A variable of a section changes the mass as well, by hand: three legs of one tube each."""
+    text = Path(stiffmap.design.__file__).with_name("trimmer.yaml").read_text(encoding="utf-8")
+    text = text.replace("nu: 0.3}", "nu: 0.3, density: 7.85e-6}")
+    for _ in range(2):
+        text = text.replace(
+            "{body: bar, mass: 1.07, com: [387.5, 0, 0], inertia: [0, 53600, 53600]}", "{body: bar, of: bar}"
+        )
+    (tmp_path / "own.yaml").write_text(text, encoding="utf-8")
+    path = tmp_path / "design.yaml"
+    path.write_text(
+        """
+name: sections
+machine: own.yaml
+variables: {outer: {low: 28, high: 40}}
+numbers:
+  templates.leg.block[parallelogram].branches.low.spring[bar].beam.tube.outer: outer
+  templates.leg.block[parallelogram].branches.high.spring[bar].beam.tube.outer: outer
+objectives: [mass]
+""",
+        encoding="utf-8",
+    )
+    design = load_design(path)
+    for outer in (30.0, 36.0):
+        bar = 7.85e-6 * np.pi / 4 * (outer**2 - 26**2) * 775
+        assert judge(design, np.array([outer])).values["mass"] == pytest.approx(
+            3 * (5 + 2 * bar) + 6, rel=1e-9
+        )

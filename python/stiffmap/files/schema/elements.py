@@ -167,13 +167,21 @@ class SpringModel(FileModel):
 
 
 class BodyModel(FileModel):
-    """Rigid body that moves with the current frame."""
+    """Rigid body that moves with the current frame; of a link with a section, mass, centre and inertia follow from it
+    where they are not given."""
 
     body: Name
-    mass: Number
+    mass: Number | None = None
+    of: Annotated[Name | None, Field(description="Spring of the same sequence whose beam it is.")] = None
     com: Vector3 | None = None
     inertia: list[Number | Vector3] | None = None
     note: str = ""
+
+    @model_validator(mode="after")
+    def _mass(self) -> BodyModel:
+        if self.mass is None and self.of is None:
+            raise PydanticCustomError("mass", "a body needs a mass, or of: the spring whose beam it is")
+        return self
 
 
 class PointModel(FileModel):

@@ -71,11 +71,13 @@ def _upper(entries: dict[Any, Any]) -> dict[str, Any]:
 
 
 class Material(FileModel):
-    """Young's modulus ``E`` with the shear modulus ``G`` or Poisson's ratio ``nu``."""
+    """Young's modulus ``E`` with the shear modulus ``G`` or Poisson's ratio ``nu``; ``density`` (mass/length³) where
+    masses follow from sections."""
 
     E: Number
     G: Number | None = None
     nu: Number | None = None
+    density: Number | None = None
 
     @model_validator(mode="after")
     def _one_shear(self) -> Material:
