@@ -55,6 +55,9 @@ def measures(
         float | None,
         typer.Option(help="Characteristic length in mm, where units mix; default: the machine's."),
     ] = None,
+    toolpath: Annotated[
+        Path | None, typer.Option(help="Motion file (CSV or YAML) for measures along the task's own path.")
+    ] = None,
     effect: EffectsOption = None,
     gravity_: GravityOption = None,
     output: FolderOption = None,
@@ -83,6 +86,7 @@ def measures(
         m, box=limits, force=force, plane=plane, requirements=requirements,
         only=None if only is None else [n.strip() for n in only.split(",")], nodes=nodes, coarse=coarse,
         length=None if length is None else MM * length, gravity=gravity(gravity_), threads=threads,
+        toolpath=toolpath,
     )  # fmt: skip
     files = write(table, folder(output)) if output else []
     if as_json:

@@ -55,7 +55,16 @@ def _values(design: Design, x: Floats, names: list[str]) -> dict[str, float]:
         low, high = middle - half, middle + half
     nodes = design.model.search.nodes
     case = Case(
-        machine, low, high, task.force or 100.0, task.plane, nodes=nodes, coarse=nodes, quick=True, threads=1
+        machine,
+        low,
+        high,
+        task.force or 100.0,
+        task.plane,
+        nodes=nodes,
+        coarse=nodes,
+        quick=True,
+        threads=1,
+        toolpath=design.toolpath,
     )
     return {n: get_measure(n).compute(case).worst for n in names}
 

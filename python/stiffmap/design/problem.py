@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -22,6 +22,7 @@ from stiffmap.files.report import validated
 from stiffmap.files.schema.base import FileModel, Name
 from stiffmap.files.shipped import find
 from stiffmap.machine import Machine
+from stiffmap.performance.motion_files import Motion, load_motion
 from stiffmap.performance.quantities import quantity
 from stiffmap.performance.registry import all_measures, get_measure
 from stiffmap.performance.requirements import Bound, Requirements, load_requirements
@@ -63,6 +64,7 @@ class DesignFile(FileModel):
     title: str = ""
     machine: str
     requirements: str | None = None
+    toolpath: str | None = None
     variables: dict[str, VariableModel] = Field(default_factory=dict)
     catalogues: dict[str, list[dict[str, float | int | str]]] = Field(default_factory=dict)
     constants: dict[str, float | int] = Field(default_factory=dict)
@@ -127,6 +129,11 @@ class Design:
         return Machine(self._editor.description(values), start_nodes=START_NODES)
 
     @cached_property
+    def toolpath(self) -> Motion | None:
+        """The task's own path, for measures along it."""
+        return None if self.requirements.toolpath is None else load_motion(self.requirements.toolpath)
+
+    @cached_property
     def _editor(self) -> Editor:
         document = Document(_unshared(self.document.data), self.document.lines)
         return Editor(document, self.machine_file, list(self.model.numbers))
@@ -187,6 +194,10 @@ def load_design(path: str | PathLike[str]) -> Design:
     if model.requirements is not None:
         near = given.parent / model.requirements
         task = load_requirements(near if near.is_file() else model.requirements)
+    if model.toolpath is not None:
+        task = replace(task, toolpath=str(given.parent / model.toolpath))
+    if task.toolpath is not None:
+        load_motion(task.toolpath)  # a mistake in it is told before the search
     try:
         own = tuple((n, _bound(n, b, known)) for n, b in model.constraints.items())
     except StiffmapError as error:

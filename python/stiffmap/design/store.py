@@ -76,6 +76,14 @@ class Evaluations:
 def fingerprint(design: Design) -> str:
     """Of everything that the answers depend on."""
     text = json.dumps(
-        [design.model.model_dump(), design.document.data, repr(design.requirements)], default=str
+        [design.model.model_dump(), design.document.data, repr(design.requirements), _toolpath(design)],
+        default=str,
     )
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _toolpath(design: Design) -> list[object]:
+    if design.toolpath is None:
+        return []
+    position, force = design.toolpath.places()
+    return [position.tolist(), force.tolist(), design.toolpath.duration, design.toolpath.speed]

@@ -74,6 +74,13 @@ class Motion:
     force: Floats
     """(3,) N on the tool."""
 
+    def places(self) -> tuple[Floats, Floats]:
+        """Positions (n, 3) m along the path and the force (n, 3) N on the tool there."""
+        if self.timed is not None:
+            return self.timed.position, self.timed.force
+        assert self.path is not None
+        return self.path.position, np.broadcast_to(self.force, self.path.position.shape)
+
     def trajectory(
         self, machine: Machine, *, duration: float | None = None, gravity: ArrayLike | None = None
     ) -> Trajectory:

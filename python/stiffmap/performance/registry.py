@@ -15,6 +15,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.performance import kinds
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics, kernel_starts
+from stiffmap.performance.motion_files import Motion
 from stiffmap.performance.poses import box_nodes
 from stiffmap.performance.velocity import VelocityTransmission, transmission_of
 from stiffmap.performance.zonotopes import inverse_rows
@@ -41,6 +42,19 @@ class Case:
     gravity: Floats | None = None
     rotation: Floats | None = None
     threads: int | None = None
+    toolpath: Motion | None = None
+    """The task's own path and force, for measures along it."""
+
+    def path(self, most: int) -> tuple[Floats, Floats]:
+        """Positions (n, 3) m and forces (n, 3) N along the toolpath, `most` samples or a few more.
+
+        StiffmapError where there is no toolpath.
+        """
+        if self.toolpath is None:
+            raise StiffmapError("needs a toolpath: give toolpath in the requirements, or toolpath=")
+        position, force = self.toolpath.places()
+        step = max(1, len(position) // most)
+        return position[::step], force[::step]
 
     @cached_property
     def positions(self) -> Floats:

@@ -44,6 +44,7 @@ class RequirementsFile(FileModel):
     box: BoxModel | None = None
     plane: Literal["xy", "xz", "yz"] = "xy"
     force: Written | None = None
+    toolpath: str | None = None
     requirements: dict[str, BoundModel] = Field(default_factory=dict)
 
 
@@ -75,6 +76,8 @@ class Requirements:
     plane: str = "xy"
     force: float | None = None
     bounds: tuple[tuple[str, Bound], ...] = ()
+    toolpath: str | None = None
+    """Motion file of the task."""
 
     def bound(self, measure: str) -> Bound | None:
         """The bound on a measure, if there is one."""
@@ -138,4 +141,7 @@ def requirements_of(document: Document, file: str) -> Requirements:
             si(model.box.z, "m", "box", "z"),
         )
     force = None if model.force is None else si(model.force, "N", "force")
-    return Requirements(model.name, model.title, model.source, box, model.plane, force, tuple(bounds))
+    toolpath = None if model.toolpath is None else str(Path(file).parent / model.toolpath)
+    return Requirements(
+        model.name, model.title, model.source, box, model.plane, force, tuple(bounds), toolpath
+    )

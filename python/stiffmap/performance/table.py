@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
+from stiffmap.performance.motion_files import Motion, load_motion
 from stiffmap.performance.poses import box_nodes, read_box
 from stiffmap.performance.registry import Case, Found, Measure, all_measures, get_measure
 from stiffmap.performance.requirements import Bound, Requirements, load_requirements
@@ -112,6 +113,7 @@ def measures(
     gravity: ArrayLike | None = None,
     rotation: ArrayLike | None = None,
     gap: float = 1e-4,
+    toolpath: Motion | str | PathLike[str] | None = None,
     threads: int | None = None,
 ) -> MeasuresTable:
     """Table of all measures of §3: worst and best pose, requirement, margin, pass or fail.
@@ -135,6 +137,8 @@ def measures(
         Characteristic length, m, where units mix; None: the machine's own.
     gap
         m between the bounds of the largest box.
+    toolpath
+        A motion file (`load_motion`) for measures along the task's own path; None: the requirement's.
 
     Raises StiffmapError for bad input. A measure that the machine lacks the data for says so in its row.
     """
@@ -159,9 +163,14 @@ def measures(
         proportions=(1.0, float(edges[1] / edges[0]), float(edges[2] / edges[0])), nodes=nodes, coarse=coarse, gap=gap,
         length=length, gravity=None if gravity is None else np.asarray(gravity, dtype=float),
         rotation=None if rotation is None else np.asarray(rotation, dtype=float), threads=threads,
+        toolpath=_motion(toolpath or task.toolpath),
     )  # fmt: skip
     rows = tuple(_row(m, case, task.bound(m.name)) for m in chosen)
     return MeasuresTable(machine, case, task, rows, notes)
+
+
+def _motion(given: Motion | str | PathLike[str] | None) -> Motion | None:
+    return given if given is None or isinstance(given, Motion) else load_motion(given)
 
 
 def _row(measure: Measure, case: Case, bound: Bound | None) -> Row:
