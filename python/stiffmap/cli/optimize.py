@@ -16,6 +16,7 @@ from stiffmap.cli.output import JsonOption, print_json
 
 if TYPE_CHECKING:
     from stiffmap.design import ParetoSet
+    from stiffmap.design.report import Chosen, Report
 
 
 def optimize(
@@ -56,7 +57,8 @@ def optimize(
     problem = load_design(design)
     place = folder(output)
     found = search(problem, folder=place, generations=generations, processes=processes, progress=tell)
-    tables = measured(found, place)
+    report = measured(found, place)
+    tables = report.tables
     files = write(found, place)
     console.print(f"{found.evaluated} designs in {time.monotonic() - begun:.0f} s")
     if as_json:
@@ -67,18 +69,21 @@ def optimize(
                     "evaluated": found.evaluated,
                     "front": len(found.x),
                     "chosen": {k: t.as_plain() for k, t in tables.items()},
+                    "refined": {k: refined(c) for k, c in report.chosen.items()},
                     "files": files,
                 }
             )
         )
     else:
         out = Console(highlight=False)
-        out.print(as_table(found, tables))
+        out.print(as_table(found, report))
+        for line in remarks(report):
+            out.print(f"[dim]{line}[/dim]", soft_wrap=True)
         out.print(
-            f"wrote {', '.join(files)} and the machine files {', '.join(f'{k}.yaml' for k in tables if k != 'start')}",
+            f"wrote {', '.join(files)} and the machine files {', '.join(f'{k}.yaml' for k in report.chosen)}",
             soft_wrap=True,
         )
-    finish(not all(t.passed for k, t in tables.items() if k != "start"))
+    finish(not all(c.table.passed for c in report.chosen.values()))
 
 
 def write(found: ParetoSet, place: Path) -> list[str]:
@@ -92,19 +97,63 @@ def write(found: ParetoSet, place: Path) -> list[str]:
     return [str(data), *(str(save(make(found), place / f"{name}.png")) for name, make in figures.items())]
 
 
-def as_table(found: ParetoSet, tables: dict[str, Any]) -> Table:
-    """Measures of the machine it started from and of the chosen designs, side by side."""
-    out = Table(box=box.SIMPLE, title=f"{found.design.model.name}: measured in full")
+def as_table(found: ParetoSet, report: Report) -> Table:
+    """Measures of the machines beside it and of the chosen designs, with the standard deviations that tolerances give."""
+    out = Table(box=box.SIMPLE, title=f"{found.design.model.name}: measured in full, ± by tolerances")
     out.add_column("measure", no_wrap=True)
+    tables = report.tables
     for name in tables:
         out.add_column(name, justify="right", no_wrap=True)
     for i, row in enumerate(next(iter(tables.values())).rows):
         m = row.measure
         cells = []
-        for t in tables.values():
+        for name, t in tables.items():
             r = t.rows[i]
             mark = {"pass": "[green]", "fail": "[red]"}.get(r.verdict, "")
-            text = f"{m.factor * r.found.worst:.4g}"
+            text = "–" if r.reason else f"{m.factor * r.found.worst:.4g}"
+            robust = report.chosen[name].robust if name in report.chosen else None
+            if robust is not None and m.name in robust.first_order:
+                text += f" ± {m.factor * robust.first_order[m.name]:.2g}"
             cells.append(f"{mark}{text}[/]" if mark else text)
         out.add_row(f"{m.name} {m.shown}".strip(), *cells)
+    if any(c.robust is not None for c in report.chosen.values()):
+        shares = [c.robust for c in report.chosen.values()]
+        out.add_row(
+            "meets all, %",
+            *[""] * len(report.beside),
+            *("" if r is None else f"{100 * r.meets:.0f} of {r.draws} drawn" for r in shares),
+        )
+    return out
+
+
+def remarks(report: Report) -> list[str]:
+    """What refinement gained, and how random machines differ from first order."""
+    from stiffmap.performance.registry import get_measure
+
+    out = []
+    for name, c in report.chosen.items():
+        gains = [
+            f"{n} {get_measure(n).factor * c.found.values[n]:.4g} → {get_measure(n).factor * c.judged.values[n]:.4g}"
+            for n in c.found.values
+            if abs(c.judged.values[n] - c.found.values[n]) > 1e-4 * abs(c.found.values[n])
+        ]
+        out.append(f"{name}, refined by gradients: {', '.join(gains) or 'nothing better nearby'}")
+        if c.robust is not None:
+            pairs = [
+                f"{n} {get_measure(n).factor * c.robust.first_order[n]:.2g} ({get_measure(n).factor * s:.2g} drawn)"
+                for n, s in c.robust.drawn.items()
+                if s > 0
+            ]
+            out.append(
+                f"{name}, standard deviations by {len(c.robust.places)} tolerances: {', '.join(pairs)}"
+            )
+    return out
+
+
+def refined(c: Chosen) -> dict[str, Any]:
+    """A chosen design as plain data, SI."""
+    out: dict[str, Any] = {"found": c.found.values, "refined": c.judged.values, "x": c.x.tolist()}
+    if c.robust is not None:
+        out["deviation"] = {"first_order": c.robust.first_order, "drawn": c.robust.drawn}
+        out["meets"] = c.robust.meets
     return out

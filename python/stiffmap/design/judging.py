@@ -9,6 +9,7 @@ import numpy as np
 from stiffmap.broadcasting import Floats
 from stiffmap.design.problem import Design
 from stiffmap.errors import StiffmapError
+from stiffmap.machine import Machine
 from stiffmap.performance.poses import read_box
 from stiffmap.performance.registry import Case, Measure, get_measure
 
@@ -31,7 +32,7 @@ def judge(design: Design, x: Floats) -> Judged:
     """Evaluate a vector of variables; a machine that cannot be is infeasible, never an error."""
     names = list(dict.fromkeys([*design.model.objectives, *(n for n, _ in design.constraints)]))
     try:
-        values = _values(design, x, names)
+        values = values_of(design, design.quick_machine(x), names)
     except StiffmapError as error:
         return Judged(
             np.full(len(design.model.objectives), IMPOSSIBLE),
@@ -46,8 +47,8 @@ def judge(design: Design, x: Floats) -> Judged:
     return Judged(objectives, violations, values)
 
 
-def _values(design: Design, x: Floats, names: list[str]) -> dict[str, float]:
-    machine = design.quick_machine(x)
+def values_of(design: Design, machine: Machine, names: list[str]) -> dict[str, float]:
+    """Worst values of measures on the search's nodes, SI."""
     task = design.requirements
     low, high = read_box(machine, None)
     if task.box is not None:

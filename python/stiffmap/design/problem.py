@@ -65,6 +65,7 @@ class DesignFile(FileModel):
     machine: str
     requirements: str | None = None
     toolpath: str | None = None
+    beside: list[str] = Field(default_factory=list)
     variables: dict[str, VariableModel] = Field(default_factory=dict)
     catalogues: dict[str, list[dict[str, float | int | str]]] = Field(default_factory=dict)
     constants: dict[str, float | int] = Field(default_factory=dict)
@@ -194,6 +195,9 @@ def load_design(path: str | PathLike[str]) -> Design:
     if model.requirements is not None:
         near = given.parent / model.requirements
         task = load_requirements(near if near.is_file() else model.requirements)
+    for name in model.beside:
+        if not (given.parent / name).is_file():
+            find(name)
     if model.toolpath is not None:
         task = replace(task, toolpath=str(given.parent / model.toolpath))
     if task.toolpath is not None:

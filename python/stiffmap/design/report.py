@@ -1,19 +1,55 @@
-"""Chosen designs as machine files, measured in full beside the machine that the search began with."""
+"""Chosen designs refined, as machine files, measured in full beside the machine that the search began with."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import yaml
 
+from stiffmap.broadcasting import Floats
+from stiffmap.design.judging import Judged
+from stiffmap.design.problem import Design
+from stiffmap.design.refining import refine
+from stiffmap.design.robustness import DRAWS, Robustness, robustness
 from stiffmap.design.search import ParetoSet
 from stiffmap.machine import load_machine
 from stiffmap.performance.table import MeasuresTable, measures
 
+SLIGHT = 0.01
+"""Weight of the other objectives while one is refined."""
 
-def measured(found: ParetoSet, place: Path, nodes: int = 21) -> dict[str, MeasuresTable]:
-    """Tables by name: ``start`` and each chosen design, whose machine file is written to `place`."""
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """A design of the Pareto set, refined by gradients, and what its tolerances do to it."""
+
+    found: Judged
+    """As the search left it."""
+    x: Floats
+    """(variables,) refined."""
+    judged: Judged
+    robust: Robustness | None
+    table: MeasuresTable
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """Machines beside each other."""
+
+    beside: dict[str, MeasuresTable]
+    """``start`` and the machines that the design file names."""
+    chosen: dict[str, Chosen]
+
+    @property
+    def tables(self) -> dict[str, MeasuresTable]:
+        """All of them by name."""
+        return {**self.beside, **{name: c.table for name, c in self.chosen.items()}}
+
+
+def measured(found: ParetoSet, place: Path, nodes: int = 21, draws: int = DRAWS) -> Report:
+    """The machine that the search began with and each chosen design, whose machine file is written to `place`."""
     design = found.design
     names = list(
         dict.fromkeys(
@@ -26,21 +62,38 @@ def measured(found: ParetoSet, place: Path, nodes: int = 21) -> dict[str, Measur
             ]
         )
     )
+    if design.toolpath is not None:
+        names += [n for n in ("path_compliance", "path_effort") if n not in names]
     task = replace(design.requirements, bounds=design.constraints)
-    out = {"start": measures(load_machine(design.machine_file), requirements=task, only=names, nodes=nodes)}
-    done: dict[int, str] = {}
+
+    def full(machine: str | Path) -> MeasuresTable:
+        return measures(load_machine(machine), requirements=task, only=names, nodes=nodes)
+
+    beside = {"start": full(design.machine_file)}
+    for other in design.model.beside:
+        near = Path(design.file).parent / other
+        beside[Path(other).stem] = full(near if near.is_file() else other)
+    chosen: dict[str, Chosen] = {}
     for name, i in found.chosen().items():
-        data = dict(design.data(found.x[i]))
-        data["name"] = f"{design.model.name}-{name}"
+        x, judged = refine(design, found.x[i], _weights(design, name))
         file = place / f"{name}.yaml"
-        values = ", ".join(f"{k} = {v:.5g}" for k, v in design.names(found.x[i]).items())
-        text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=110)
-        file.write_text(
-            f"# Written by stiffmap optimize ({design.model.name}): {values}\n{text}", encoding="utf-8"
-        )
-        if i in done:
-            out[name] = out[done[i]]
-        else:
-            out[name] = measures(load_machine(file), requirements=task, only=names, nodes=nodes)
-            done[i] = name
-    return out
+        write_machine(design, x, name, file)
+        chosen[name] = Chosen(found.judged[i], x, judged, robustness(design, x, draws=draws), full(file))
+    return Report(beside, chosen)
+
+
+def _weights(design: Design, name: str) -> Floats:
+    objectives = design.model.objectives
+    if name == "compromise":
+        return np.ones(len(objectives))
+    return np.array([1.0 if name == f"best-{n}" else SLIGHT for n in objectives])
+
+
+def write_machine(design: Design, x: Floats, name: str, file: Path) -> None:
+    """The machine file of a vector of variables."""
+    data = dict(design.data(x))
+    data["name"] = f"{design.model.name}-{name}"
+    values = ", ".join(f"{k} = {v:.5g}" for k, v in design.names(x).items())
+    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=110)
+    head = f"# Written by stiffmap optimize ({design.model.name}): {values}"
+    file.write_text(f"{head}\n{text}", encoding="utf-8")
