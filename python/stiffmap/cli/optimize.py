@@ -97,13 +97,22 @@ def write(found: ParetoSet, place: Path) -> list[str]:
     return [str(data), *(str(save(make(found), place / f"{name}.png")) for name, make in figures.items())]
 
 
+NOTHING = 1e-9
+"""Of a measure: a standard deviation that is round-off."""
+
+
 def as_table(found: ParetoSet, report: Report) -> Table:
     """Measures of the machines beside it and of the chosen designs, with the standard deviations that tolerances give."""
-    out = Table(box=box.SIMPLE, title=f"{found.design.model.name}: measured in full, ± by tolerances")
+    out = Table(
+        box=box.SIMPLE,
+        padding=(0, 0, 0, 1),
+        pad_edge=False,
+        title=f"{found.design.model.name}: measured in full, ± by tolerances",
+    )
     out.add_column("measure", no_wrap=True)
     tables = report.tables
     for name in tables:
-        out.add_column(name, justify="right", no_wrap=True)
+        out.add_column(name, justify="right", overflow="fold")
     for i, row in enumerate(next(iter(tables.values())).rows):
         m = row.measure
         cells = []
@@ -112,16 +121,17 @@ def as_table(found: ParetoSet, report: Report) -> Table:
             mark = {"pass": "[green]", "fail": "[red]"}.get(r.verdict, "")
             text = "–" if r.reason else f"{m.factor * r.found.worst:.4g}"
             robust = report.chosen[name].robust if name in report.chosen else None
-            if robust is not None and m.name in robust.first_order:
-                text += f" ± {m.factor * robust.first_order[m.name]:.2g}"
+            spread = robust.first_order.get(m.name, 0.0) if robust is not None else 0.0
+            if spread > NOTHING * abs(r.found.worst):
+                text += f" ± {m.factor * spread:.2g}"
             cells.append(f"{mark}{text}[/]" if mark else text)
         out.add_row(f"{m.name} {m.shown}".strip(), *cells)
     if any(c.robust is not None for c in report.chosen.values()):
         shares = [c.robust for c in report.chosen.values()]
         out.add_row(
-            "meets all, %",
+            "meets all (drawn) %",
             *[""] * len(report.beside),
-            *("" if r is None else f"{100 * r.meets:.0f} of {r.draws} drawn" for r in shares),
+            *("" if r is None else f"{100 * r.meets:.0f}" for r in shares),
         )
     return out
 
@@ -142,7 +152,7 @@ def remarks(report: Report) -> list[str]:
             pairs = [
                 f"{n} {get_measure(n).factor * c.robust.first_order[n]:.2g} ({get_measure(n).factor * s:.2g} drawn)"
                 for n, s in c.robust.drawn.items()
-                if s > 0
+                if s > NOTHING * abs(c.judged.values[n])
             ]
             out.append(
                 f"{name}, standard deviations by {len(c.robust.places)} tolerances: {', '.join(pairs)}"

@@ -14,14 +14,14 @@ STEP = 1e-4
 ROUNDS = 40
 RADII = (0.3, 0.1, 0.03, 0.03)
 """Of every variable's range: how far one run may go from the best design so far."""
-TIGHT = 1e-6
-"""Of each bound: how far inside constraints are asked to hold, so that they do after round-off."""
+TIGHT = 5e-4
+"""Of each bound: how far inside constraints are asked to hold, so that they do when measured in full."""
 
 
-def refine(design: Design, x: Floats, weights: Floats) -> tuple[Floats, Judged]:
+def refine(design: Design, x: Floats, weights: Floats, *, keep: bool = False) -> tuple[Floats, Judged]:
     """The design (variables,) nearby with the least weighted sum of objectives (objectives,), and its judgement.
 
-    Constraints hold; catalogue rows stay. Where nothing better is found, the design itself.
+    Constraints hold; catalogue rows stay; `keep`: no objective may become worse. Where nothing better is found, the design itself.
     """
     low, high = design.bounds
     moves = np.arange(len(design.model.variables))
@@ -39,7 +39,10 @@ def refine(design: Design, x: Floats, weights: Floats) -> tuple[Floats, Judged]:
         key = full.tobytes()
         if key not in known:
             found = known[key] = judge(design, full)
-            good = (found.violations <= 0).all() and (found.objectives < IMPOSSIBLE).all()
+            good = (found.violations <= np.where(slides, -TIGHT, 0.0)).all() and (
+                found.objectives < IMPOSSIBLE
+            ).all()
+            good &= not keep or bool((found.objectives <= first.objectives).all())
             if good and (best is None or goal_of(found) < goal_of(best)):
                 best, best_at = found, full
         return known[key]
@@ -50,7 +53,9 @@ def refine(design: Design, x: Floats, weights: Floats) -> tuple[Floats, Judged]:
     def rows(y: Floats) -> Floats:
         """Objective, then minus each violation."""
         j = at(y)
-        return np.concatenate([[goal_of(j)], -np.minimum(j.violations, 10.0)[slides] - TIGHT])
+        room = -np.minimum(j.violations, 10.0)[slides] - 1.1 * TIGHT
+        worse = (first.objectives - j.objectives) / scale if keep else np.zeros(0)
+        return np.concatenate([[goal_of(j)], room, np.maximum(worse, -10.0)])
 
     def slopes(y: Floats) -> Floats:
         """(1 + constraints, variables), one-sided, away from the nearer bound."""
@@ -75,7 +80,7 @@ def refine(design: Design, x: Floats, weights: Floats) -> tuple[Floats, Judged]:
         minimize(
             lambda y: rows(y)[0], begin, jac=lambda y: slope(y)[0], bounds=reach, method="SLSQP",
             constraints={"type": "ineq", "fun": lambda y: rows(y)[1:], "jac": lambda y: slope(y)[1:]}
-            if slides.any() else (),
+            if slides.any() or keep else (),
             options={"maxiter": ROUNDS, "ftol": 1e-7},
         )  # fmt: skip
     return best_at, best if best is not None else first

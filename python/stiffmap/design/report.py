@@ -75,7 +75,7 @@ def measured(found: ParetoSet, place: Path, nodes: int = 21, draws: int = DRAWS)
         beside[Path(other).stem] = full(near if near.is_file() else other)
     chosen: dict[str, Chosen] = {}
     for name, i in found.chosen().items():
-        x, judged = refine(design, found.x[i], _weights(design, name))
+        x, judged = refine(design, found.x[i], _weights(design, name), keep=name == "compromise")
         file = place / f"{name}.yaml"
         write_machine(design, x, name, file)
         chosen[name] = Chosen(found.judged[i], x, judged, robustness(design, x, draws=draws), full(file))
