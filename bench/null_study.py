@@ -151,7 +151,7 @@ def covered(
         [columns[..., i] - nuisance_part(problem, columns[..., i]) for i in range(len(known))], axis=-1
     )
     u = np.sqrt(np.einsum("ncp,pq,ncq->nc", columns, found.sums.covariance, columns))
-    read = e.read & (u > 0)
+    read = e.read & (u > 0) & np.isfinite(error)  # no pose that this twin cannot take
     return {
         "told": int(told.sum()),
         "told_inside": int((inside & told).sum()),

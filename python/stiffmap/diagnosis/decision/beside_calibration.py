@@ -15,6 +15,7 @@ import numpy as np
 from stiffmap.calibration import Calibration, Calibrator, Tolerances, unknowns
 from stiffmap.calibration.calibrate import pose_labels
 from stiffmap.calibration.floor import Blocks, model_form
+from stiffmap.calibration.groups import STRONG
 from stiffmap.calibration.statistics import Sums
 from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
@@ -58,7 +59,8 @@ class Answer:
 
 
 def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str, ...] = ()) -> Answer:
-    """Effects on the declared machine, or on a calibrated one where that explains the readings better."""
+    """Effects on the declared machine, or on a calibrated one unless the former explain the readings better by `STRONG`
+    nats: what tolerances may be is no cause."""
     found: Calibrator | None = None
     positions = s.experiment.quantity == "position"
     if positions:
@@ -72,7 +74,7 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
     found = found or calibrator(s, tolerances, exclude)
     if found is None:
         return first
-    if not left and sparse_evidence(first) >= spread_evidence(finding.search.problem, found):
+    if not left and sparse_evidence(first) >= spread_evidence(finding.search.problem, found) + STRONG:
         return first
     return _layered(s, found, seed, tolerances)
 
