@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from rich.table import Table
 
 from stiffmap.cli.inputs import folder, plain
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.errors import StiffmapError
 
 if TYPE_CHECKING:
     from stiffmap.design import ParetoSet
@@ -59,7 +61,7 @@ def optimize(
     found = search(problem, folder=place, generations=generations, processes=processes, progress=tell)
     report = measured(found, place)
     tables = report.tables
-    files = write(found, place)
+    files = write(found, place, report)
     console.print(f"{found.evaluated} designs in {time.monotonic() - begun:.0f} s")
     if as_json:
         print_json(
@@ -86,15 +88,18 @@ def optimize(
     finish(not all(c.table.passed for c in report.chosen.values()))
 
 
-def write(found: ParetoSet, place: Path) -> list[str]:
+def write(found: ParetoSet, place: Path, report: Report) -> list[str]:
     """The set and its pictures."""
-    from stiffmap.design.pictures import front_figure, parallel_figure, progress_figure
+    from stiffmap.design.pictures import beside_figure, front_figure, parallel_figure, progress_figure
     from stiffmap.maps.files import write_dataset
     from stiffmap.plot import save
 
     data = write_dataset(found.dataset, place / "pareto.nc")
     figures = {"fronts": front_figure, "parallel": parallel_figure, "progress": progress_figure}
-    return [str(data), *(str(save(make(found), place / f"{name}.png")) for name, make in figures.items())]
+    saved = [str(save(make(found), place / f"{name}.png")) for name, make in figures.items()]
+    with suppress(StiffmapError):  # no measure with a map is asked for
+        saved.append(str(save(beside_figure(report.tables), place / "beside.png")))
+    return [str(data), *saved]
 
 
 NOTHING = 1e-9

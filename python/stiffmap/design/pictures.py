@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from stiffmap.broadcasting import Floats
 from stiffmap.design.search import ParetoSet
+from stiffmap.errors import StiffmapError
 from stiffmap.performance.registry import get_measure
-from stiffmap.plot.style import BLUE, CYCLE, SKY, VERMILLION, new_figure, paper_style
+from stiffmap.performance.table import MeasuresTable
+from stiffmap.plot.style import BLUE, COLOURS, CYCLE, MM, SKY, VERMILLION, new_figure, paper_style
+
+MAPPED = ("deflection", "frequency", "transmission_max")
 
 
 def front_figure(found: ParetoSet) -> Figure:
@@ -66,6 +72,42 @@ def progress_figure(found: ParetoSet) -> Figure:
         axes.set_xlabel("designs evaluated")
         axes.set_ylabel("hypervolume")
     return figure
+
+
+def beside_figure(tables: Mapping[str, MeasuresTable], names: Sequence[str] = MAPPED) -> Figure:
+    """Maps on the middle plane of the box, a row per measure and a column per machine; one scale per row."""
+    rows = [n for n in names if all(_map(t, n) is not None for t in tables.values())]
+    if not rows:
+        raise StiffmapError(f"no maps to set side by side; asked for {', '.join(names)}")
+    with paper_style():
+        figure = new_figure(2.2 * len(tables) + 0.8, 2.3 * len(rows) + 0.4)
+        grid = figure.subplots(len(rows), len(tables), squeeze=False)
+        for line, name in zip(grid, rows, strict=True):
+            maps = {k: m for k, t in tables.items() if (m := _map(t, name)) is not None}
+            low = min(float(np.nanmin(m[2])) for m in maps.values())
+            high = max(float(np.nanmax(m[2])) for m in maps.values())
+            for axes, (machine, (x, y, values)) in zip(line, maps.items(), strict=True):
+                drawn = axes.contourf(
+                    MM * x, MM * y, values.T, levels=np.linspace(low, max(high, low + 1e-9), 13), cmap=COLOURS
+                )
+                axes.set_aspect("equal")
+                axes.set_title(machine)
+                axes.set_xlabel("x, mm")
+            line[0].set_ylabel("y, mm")
+            figure.colorbar(drawn, ax=list(line), label=_axis(name))
+        figure.suptitle("Middle plane of the box")
+    return figure
+
+
+def _map(table: MeasuresTable, name: str) -> tuple[Floats, Floats, Floats] | None:
+    row = next((r for r in table.rows if r.measure.name == name), None)
+    if row is None or row.found.positions is None or row.found.values is None:
+        return None
+    x, y, z = (np.unique(row.found.positions[:, i]) for i in range(3))
+    if len(x) * len(y) * len(z) != len(row.found.values) or min(len(x), len(y)) < 2:
+        return None
+    values = row.found.values.reshape(len(x), len(y), len(z))[:, :, len(z) // 2]
+    return x, y, np.asarray(row.measure.factor * values)
 
 
 def _axis(name: str) -> str:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import stiffmap as sm
 from stiffmap.design import load_design
 from stiffmap.design.judging import judge
+from stiffmap.design.pictures import beside_figure
 from stiffmap.design.refining import refine
 from stiffmap.design.robustness import robustness
 
@@ -107,6 +109,16 @@ def test_a_design_at_its_bound_holds_for_every_second_machine(tmp_path):
     height = 5 * compliance(50, 5) / 0.5e-3
     assert 0.35 < robustness(design, np.array([50.0, height]), draws=200).meets < 0.65
     assert robustness(design, np.array([50.0, 1.2 * height]), draws=50).meets == 1.0
+
+
+def test_maps_side_by_side():
+    machine = sm.load_machine("orthoglide-revised")
+    table = sm.measures(machine, only=["deflection", "mass", "transmission_max"], nodes=3, coarse=3)
+    figure = beside_figure({"one": table, "other": table})
+    titles = [a.get_title() for a in figure.axes if a.get_title()]
+    assert titles == ["one", "other"] * 2
+    with pytest.raises(sm.StiffmapError, match="no maps"):
+        beside_figure({"one": sm.measures(machine, only=["mass"], nodes=3)})
 
 
 def test_without_tolerances_there_is_nothing_to_say(tmp_path):
