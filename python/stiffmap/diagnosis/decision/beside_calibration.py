@@ -15,7 +15,6 @@ import numpy as np
 from stiffmap.calibration import Calibration, Calibrator, Tolerances, unknowns
 from stiffmap.calibration.calibrate import pose_labels
 from stiffmap.calibration.floor import Blocks, model_form
-from stiffmap.calibration.groups import STRONG
 from stiffmap.calibration.statistics import Sums
 from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
@@ -38,6 +37,8 @@ COVERED, FAINT = 0.95, 0.1
 """Share of an effect's signature that uncertain numbers imitate; those that ten standard uncertainties of show at all."""
 WORTH_A_FLOOR = 0.3
 """Noise variances per pose that no linear explanation takes: effects are then looked for at that floor at once."""
+LEAD = 3.0
+"""Nats by which effects on an exact machine must lead: odds of 20, strong evidence (Kass and Raftery 1995)."""
 REJECTED = 5.41
 """Nats by which the readings must reject the floor that a search was done at, before it is done again at the lower
 one: half the chi-square of one degree of freedom that chance exceeds once in a thousand."""
@@ -59,7 +60,7 @@ class Answer:
 
 
 def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str, ...] = ()) -> Answer:
-    """Effects on the declared machine, or on a calibrated one unless the former explain the readings better by `STRONG`
+    """Effects on the declared machine, or on a calibrated one unless the former explain the readings better by `LEAD`
     nats: what tolerances may be is no cause."""
     found: Calibrator | None = None
     positions = s.experiment.quantity == "position"
@@ -74,7 +75,7 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
     found = found or calibrator(s, tolerances, exclude)
     if found is None:
         return first
-    if not left and sparse_evidence(first) >= spread_evidence(finding.search.problem, found) + STRONG:
+    if not left and sparse_evidence(first) >= spread_evidence(finding.search.problem, found) + LEAD:
         return first
     return _layered(s, found, seed, tolerances)
 
