@@ -92,8 +92,13 @@ class Judged:
         return cls(position, none.copy(), none.copy(), np.full((n, coordinates), np.nan), {})
 
     def mark(self, name: str, rows: NDArray[np.int64], bad: NDArray[np.bool_]) -> None:
-        """These of the rows break a limit."""
-        self.broken.setdefault(name, np.zeros(len(self.position), dtype=bool))[rows] = bad
+        """These of the rows break a limit, or its other end."""
+        self.broken.setdefault(name, np.zeros(len(self.position), dtype=bool))[rows] |= bad
+
+    def forget(self, rows: NDArray[np.int64]) -> None:
+        """What an earlier attempt said of these."""
+        for table in self.broken.values():
+            table[rows] = False
 
     def causes(self) -> dict[str, NDArray[np.bool_]]:
         """(n,) by limit, reach among them, for poses that are not inside."""
@@ -204,6 +209,7 @@ class Inside:
         if sound is not None:
             closed &= sound
         inside = closed.copy()
+        out.forget(rows)
         if self.singularity is not None:
             beyond, near = self._singular(k)
             out.mark(SINGULAR, rows, closed & (beyond | near))

@@ -171,6 +171,17 @@ def test_clearance_of_bars_takes_its_part():
     assert none.drawn.causes()["clearance of bars"].all()
 
 
+def test_both_ends_of_a_range_are_told():
+    """Beside the workspace that the drives' ranges leave, nothing is out of reach."""
+    w = sm.workspace_volume(sm.load_machine("orthoglide-revised"), cells=4, region=[[-0.4] * 3, [0.5] * 3])
+    causes, p = w.drawn.causes(), w.drawn.position
+    _inverse, root = inverse_jacobian(p)
+    beyond = (p - R - root > HIGH)[:, 0] & w.drawn.closed
+    short = (p - R - root < LOW)[:, 0] & w.drawn.closed
+    assert beyond.any() and short.any() and causes["range of x.actuator"][beyond | short].all()
+    assert not causes["reach"][w.drawn.closed].any()
+
+
 def test_the_measure_and_its_picture():
     table = sm.measures(sm.load_machine("orthoglide-revised"), only=["workspace"], nodes=3, coarse=2)
     w = table["workspace"].found.extra["workspace"]
