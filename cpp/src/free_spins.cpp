@@ -227,17 +227,19 @@ class Renumbering {
 /// A spin moves passive coordinates and nothing that the closure sees, at home as anywhere: its null
 /// direction is the tangent of a finite motion, and has its like off home (axes that coincide at home only
 /// have not: a gimbal lock). One coordinate of it is held.
-void lock_spins(Mechanism& m) {
+std::vector<Index> lock_spins(Mechanism& m) {
+  std::vector<Index> out;
   ClosureWorkspace ws(m);
   const Target target{&m.home};
   for (;;) {
     const MatX spins = spins_at_home(m, ws, m.beside_home);
-    if (spins.cols() == 0) return;
+    if (spins.cols() == 0) return out;
     const VecX spin = spins.rightCols<1>();
     Index held = 0;
     winding(m, spin, ws).maxCoeff(&held);
-    if (!goes_on(m, target, spin / spin[held], ws.unknown[at(held)], ws)) return;  // singular at home, but no spin
-    m.coordinates[at(ws.unknown[at(held)])].locked = true;
+    if (!goes_on(m, target, spin / spin[held], ws.unknown[at(held)], ws)) return out;  // singular at home, but no spin
+    out.push_back(ws.unknown[at(held)]);
+    m.coordinates[at(out.back())].locked = true;
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 namespace stiffmap {
 namespace {
@@ -90,20 +91,31 @@ void reset(const Mechanism& m, std::uint32_t flags, PoseResult& out) {
   out.indeterminate.assign(static_cast<std::size_t>(m.size()), false);
 }
 
-/// Stiffness of a point at closed coordinates that nothing loads; NaN where a command is out of its table.
-Mat6 unloaded_stiffness(const Mechanism& m, const VecX& x, const NodePoint& point) {
-  Problem p(m);
-  if (!command(m, x, p)) return Mat6::Constant(nan);
-  p.secant_laws = true;
-  State state(m);
-  start_state(m, x, state);
-  Linearization lin(m);
-  SaddleSystem saddle(m);
-  linearize(m, p, state, lin);
-  saddle.assemble(m, lin);
-  StiffnessWorkspace ws(m);
-  return point_stiffness(m, lin, saddle, point.node, point.offset, ws).stiffness;
-}
+/// Stiffness of a point at closed coordinates that nothing loads.
+class Unloaded {
+ public:
+  explicit Unloaded(const Mechanism& m) : m_(m), problem_(m), state_(m), lin_(m), saddle_(m), ws_(m) {
+    problem_.secant_laws = true;
+  }
+
+  /// NaN where a command is out of its table.
+  Mat6 stiffness(const VecX& x, const NodePoint& point) {
+    if (!command(m_, x, problem_)) return Mat6::Constant(nan);
+    state_ = State(m_);
+    start_state(m_, x, state_);
+    linearize(m_, problem_, state_, lin_);
+    saddle_.assemble(m_, lin_);
+    return point_stiffness(m_, lin_, saddle_, point.node, point.offset, ws_).stiffness;
+  }
+
+ private:
+  const Mechanism& m_;
+  Problem problem_;
+  State state_;
+  Linearization lin_;
+  SaddleSystem saddle_;
+  StiffnessWorkspace ws_;
+};
 
 /// Largest difference of two stiffnesses, relative to the second one's diagonal.
 double change(const Mat6& K, const Mat6& before) {
@@ -112,20 +124,32 @@ double change(const Mat6& K, const Mat6& before) {
 }
 
 /// A held spin along which the tip's stiffness changes leaves the configuration open (theory K3): not held.
-void let_go_of_configurations(Mechanism& m) {
+/// `turned`: where each closes when it has turned; what is missing is found and added until one is let go.
+void let_go_of_configurations(Mechanism& m, std::vector<VecX>& turned) {
   const NodePoint& tip = m.points.front();
   ClosureWorkspace ws(m);
+  std::optional<Unloaded> unloaded;
   Mat6 home;
-  bool known = false;
+  std::size_t held = 0;
+  bool let_go = false;
   for (Index j = 0; j < m.size(); ++j) {
     Coordinate& c = m.coordinates[at(j)];
     if (!c.locked || c.role != Role::passive) continue;
-    if (!known) home = unloaded_stiffness(m, m.home_coordinates, tip);
-    known = true;
-    VecX x = m.home_coordinates;
-    x[j] += open_turn * m.length / m.unit(j);
-    if (close_passive(m, m.home, ws, x) > 1e-9) continue;
-    if (change(unloaded_stiffness(m, x, tip), home) > open_change) c.locked = false;
+    if (!unloaded) home = unloaded.emplace(m).stiffness(m.home_coordinates, tip);
+    VecX x;
+    if (!let_go && held < turned.size()) {
+      x = turned[held];
+    } else {
+      x = m.home_coordinates;
+      x[j] += open_turn * m.length / m.unit(j);
+      if (close_passive(m, m.home, ws, x) > 1e-9) x.resize(0);
+      if (!let_go) turned.push_back(x);
+    }
+    ++held;
+    if (x.size() == 0 || !(change(unloaded->stiffness(x, tip), home) > open_change)) continue;
+    c.locked = false;
+    let_go = true;
+    unloaded.emplace(m);
   }
 }
 
@@ -147,7 +171,7 @@ bool configuration_undetermined(const Mechanism& m, const PoseInput& in, const V
   for (Index j = 0; j < m.size(); ++j) kept = std::max(kept, std::abs(x[j] - ws.x[j]) * m.unit(j) / m.length);
   if (kept < 0.5 * stride) return false;  // came back: only an infinitesimal freedom
   const NodePoint& point = m.points[at(in.read_points.front())];
-  return !(change(unloaded_stiffness(m, x, point), stiffness) <= 1e-6);
+  return !(change(Unloaded(m).stiffness(x, point), stiffness) <= 1e-6);
 }
 
 /// Rank at the commanded configuration before any load: the four cases of theory (K3). True: go on.
@@ -346,10 +370,25 @@ void conclude_pose(const Mechanism& m, const PoseInput& in, const EquilibriumRes
 }
 
 Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs, const Task& task,
-                   HomeSearch search, HomeFit* fit) {
+                   HomeSearch search, HomeFit* fit, const Mechanism* like) {
+  const bool known = like && like->record && like->record->holds_for(root, home, task, search);
+  HomeRecord record = known ? *like->record : HomeRecord{root, home, task, search, {}, {}, {}, {}, {}};
   Mechanism m(root, home, springs);
   m.task = task;
-  const HomeFit first = close_home(m, search);
+  std::size_t closing = 0;
+  const auto close_it = [&](HomeSearch how) {
+    HomeFit found;
+    if (known) {
+      m.home_coordinates = record.closings[closing].coordinates;
+      m.home = record.closings[closing++].home;
+      found.closed = true;
+    } else {
+      found = close_home(m, how);
+      record.closings.push_back({m.home_coordinates, m.home});
+    }
+    return found;
+  };
+  const HomeFit first = close_it(search);
   if (fit) *fit = first;
   if (!first.closed) throw HomeMisfit(first);
   const auto rebuild = [&](const Chain& chain, const VecX& home_coordinates) {
@@ -357,21 +396,29 @@ Mechanism assemble(const Chain& root, const Pose& home, const std::vector<Extern
     other.task = task;
     other.home_coordinates = home_coordinates;
     m = std::move(other);
-    close_home(m, HomeSearch::near);
+    close_it(HomeSearch::near);
   };
   if (!closes_exactly(m)) rebuild(corrected(m), VecX(m.home_coordinates));
-  if (const std::vector<SpunBall> balls = balls_to_renumber(m); !balls.empty()) {
+  if (!known) record.balls = balls_to_renumber(m);
+  if (!record.balls.empty()) {
     VecX x = m.home_coordinates;
-    for (const SpunBall& b : balls) x.segment<3>(b.first).setZero();
-    rebuild(renumbered(m, balls), x);
-    m.spun_balls = balls;
+    for (const SpunBall& b : record.balls) x.segment<3>(b.first).setZero();
+    rebuild(renumbered(m, record.balls), x);
+    m.spun_balls = record.balls;
   }
   m.set_rest();
   for (Drive& d : m.drives)
     for (DriveError& e : d.errors)
       if (std::isnan(e.error.reference)) e.error.reference = m.home_coordinates[d.coordinate];
-  lock_spins(m);
-  let_go_of_configurations(m);
+  if (known) {
+    for (const Index j : record.locked) m.coordinates[at(j)].locked = true;
+    m.beside_home = record.beside_home;
+  } else {
+    record.locked = lock_spins(m);
+    record.beside_home = m.beside_home;
+  }
+  let_go_of_configurations(m, record.turned);
+  m.record = std::make_shared<const HomeRecord>(std::move(record));
   return m;
 }
 

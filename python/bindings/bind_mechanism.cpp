@@ -67,10 +67,11 @@ void bind_mechanism(py::module_& m) {
       "root"_a, "home"_a, "task"_a = full_task, "search"_a = false);
   mechanism
       .def(py::init([](const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs,
-                       const Task& task, bool search) {
-             return assemble(root, home, springs, task, search ? HomeSearch::anywhere : HomeSearch::near);
+                       const Task& task, bool search, const Mechanism* like) {
+             return assemble(root, home, springs, task, search ? HomeSearch::anywhere : HomeSearch::near, nullptr,
+                             like);
            }),
-           "root"_a, "home"_a, "springs"_a, "task"_a = full_task, "search"_a = false)
+           "root"_a, "home"_a, "springs"_a, "task"_a = full_task, "search"_a = false, "like"_a = nullptr)
       .def_property_readonly(
           "coordinates",
           [](const Mechanism& k) { return names(k.coordinates, [](const Coordinate& c) { return c.name; }); })

@@ -37,12 +37,17 @@ class Machine:
     Pickles, compares by its description, and may be shared by threads.
     """
 
-    def __init__(self, description: MachineDescription, *, start_nodes: int = 8) -> None:
-        """`start_nodes`: closures prepared along each edge of the workspace; fewer for a machine with few calls."""
+    def __init__(
+        self, description: MachineDescription, *, start_nodes: int = 8, like: Machine | None = None
+    ) -> None:
+        """`start_nodes`: closures prepared along each edge of the workspace; fewer for a machine with few calls.
+        `like`: a machine that differs in springs, errors, effects or bodies only is made faster; the numbers are the same.
+        """
         self._description = description
-        self._compiled = CompiledMachine(
-            description, start_nodes
-        )  # refuses an impossible machine when it is made
+        compiled = like._compiled if like else None
+        self._compiled: CompiledMachine = CompiledMachine(
+            description, start_nodes, compiled
+        )  # refuses an impossible machine
 
     @property
     def description(self) -> MachineDescription:
@@ -218,7 +223,9 @@ class Machine:
         self, kind: str, *, element: str | None = None, legs: Sequence[str] | None = None, **parameters: Any
     ) -> Machine:
         """A new machine with an effect added; see `stiffmap.effects`."""
-        return Machine(add_effect(self._description, kind, element=element, legs=legs, **parameters))
+        return Machine(
+            add_effect(self._description, kind, element=element, legs=legs, **parameters), like=self
+        )
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a machine file that loads back equal."""

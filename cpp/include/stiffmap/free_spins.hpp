@@ -7,8 +7,8 @@
 namespace stiffmap {
 
 /// Locks passive coordinates that spin without effect on any frame that carries load (theory C6); the home
-/// configuration must be closed.
-void lock_spins(Mechanism& m);
+/// configuration must be closed. Returns them.
+std::vector<Index> lock_spins(Mechanism& m);
 
 /// Free ball joints about which a body spins in such a way that the spin would mix with their other coordinates, with
 /// axes of which one is the line of the spin (theory C8); the home configuration must be closed.

@@ -72,7 +72,7 @@ def _predicted(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> 
     beside = predictor
     if moves:
         beside = copy.copy(predictor)
-        beside.machine = Machine(edited(predictor.machine.description, moves))
+        beside.machine = Machine(edited(predictor.machine.description, moves), like=predictor.machine)
         beside._memory = {}
     found = beside([scaled(predictor.machine.description, scale)] if scale else [])
     if own:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,6 +22,25 @@ def any_axes_do(e: Joint) -> bool:
     return e.kind == "spherical" and e.free and e.friction is None and e.limits is None
 
 
+@lru_cache(maxsize=4096)
+def _at_home(axes: tuple[tuple[float, ...], ...], home: tuple[float, ...]) -> tuple[tuple[float, ...], float]:
+    """Rotation of a ball joint at home, row by row, and the volume that its axes span there."""
+    turn, at_home = np.eye(3), []
+    for axis, angle in zip(np.array(axes), home, strict=True):
+        at_home.append(turn @ axis)
+        turn = turn @ rotation_about(axis, angle)
+    return tuple(turn.ravel().tolist()), abs(float(np.linalg.det(np.array(at_home))))
+
+
+@lru_cache(maxsize=4096)
+def _parallel(axes: tuple[tuple[float, ...], ...]) -> int:
+    """The first axis that is parallel to the next, -1: none."""
+    for i in range(len(axes) - 1):
+        if np.linalg.norm(np.cross(axes[i], axes[i + 1])) < PARALLEL:
+            return i
+    return -1
+
+
 def charted(e: Joint) -> tuple[Joint, _core.Pose | None]:
     """The joint with axes that do not lock at home, and the constant rotation before it (None: none).
 
@@ -29,23 +49,17 @@ def charted(e: Joint) -> tuple[Joint, _core.Pose | None]:
     """
     if len(e.axes) < 2:
         return e, None
-    axes = np.array(e.axes)
-    for i in range(len(axes) - 1):
-        if np.linalg.norm(np.cross(axes[i], axes[i + 1])) < PARALLEL:
-            raise StiffmapError(
-                f"joint {e.name}: axes {i + 1} and {i + 2} of a {e.kind} joint must not be parallel, "
-                f"got {e.axes[i]} and {e.axes[i + 1]}"
-            )
+    if (i := _parallel(e.axes)) >= 0:
+        raise StiffmapError(
+            f"joint {e.name}: axes {i + 1} and {i + 2} of a {e.kind} joint must not be parallel, "
+            f"got {e.axes[i]} and {e.axes[i + 1]}"
+        )
     if e.kind != "spherical":
         return e, None
-    turn, at_home = np.eye(3), []
-    for axis, angle in zip(axes, e.home, strict=True):
-        at_home.append(turn @ axis)
-        turn = turn @ rotation_about(axis, angle)
-    spread = abs(float(np.linalg.det(np.array(at_home))))
+    turn, spread = _at_home(e.axes, e.home)
     if any_axes_do(e) and spread < WIDE:
         flat = replace(e, axes=IDENTITY, home=(0.0, 0.0, 0.0))
-        return flat, _core.Pose(np.zeros(3), turn)
+        return flat, _core.Pose(np.zeros(3), np.array(turn).reshape(3, 3))
     if spread < PARALLEL:
         raise StiffmapError(
             f"joint {e.name}: the first and the last axis of this ball joint coincide at home (gimbal lock); "

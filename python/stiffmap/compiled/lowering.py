@@ -37,15 +37,20 @@ FAR = 10.0  # rad or m: end of the flat pieces of a stick law
 START = 1e-3  # rad or m: slope of a stick law in the linear start of Newton's iteration
 
 
-def build_mechanism(machine: MachineDescription) -> _core.Mechanism:
-    """Compiled mechanism; raises StiffmapError where the core refuses the description."""
+def build_mechanism(machine: MachineDescription, like: _core.Mechanism | None = None) -> _core.Mechanism:
+    """Compiled mechanism; raises StiffmapError where the core refuses the description.
+
+    like
+        A mechanism that may have the same nominal geometry: what was found out about its home is then taken over.
+    """
     try:
         root = root_chain(machine)
         springs = [
             _core.ExternalSpring(s.name, s.point, np.array(s.anchor), s.stiffness, s.length, s.tension_only)
             for s in machine.external_springs
         ]
-        return _core.Mechanism(root, pose(machine.home), springs, task(machine), machine.search_home)
+        known = () if like is None else (like,)
+        return _core.Mechanism(root, pose(machine.home), springs, task(machine), machine.search_home, *known)
     except _core.HomeMisfit as problem:
         raise StiffmapError(f"{machine.name}: {misfit_text(machine, *problem.args[1:])}") from None
     except ValueError as problem:

@@ -25,10 +25,12 @@ class CompiledMachine:
     and check before they call. Immutable; may be shared by threads.
     """
 
-    def __init__(self, description: MachineDescription, start_nodes: int = 8) -> None:
+    def __init__(
+        self, description: MachineDescription, start_nodes: int = 8, like: CompiledMachine | None = None
+    ) -> None:
         self.description = description
         self._start_nodes = start_nodes
-        self._mechanism = build_mechanism(description)
+        self._mechanism: _core.Mechanism = build_mechanism(description, like._mechanism if like else None)
 
     @cached_property
     def names(self) -> Names:

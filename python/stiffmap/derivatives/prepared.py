@@ -42,6 +42,8 @@ def prepare(machine: CompiledMachine, requests: Requests) -> Prepared:
             if p.name in arguments:
                 value = float(arguments[p.name])
                 stencil = within(value, share * p.scale, p.lower, p.upper)
-                low, high = (CompiledMachine(near.moved(i, p.name, value + h)) for h in stencil.offsets)
+                low, high = (
+                    CompiledMachine(near.moved(i, p.name, value + h), like=machine) for h in stencil.offsets
+                )
                 out.append(Moved(parameter_name(requests.effects[i], p.name), stencil, (low, high)))
-    return Prepared(CompiledMachine(near.base) if requests.effects else machine, tuple(out))
+    return Prepared(CompiledMachine(near.base, like=machine) if requests.effects else machine, tuple(out))

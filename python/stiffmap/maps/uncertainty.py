@@ -78,7 +78,7 @@ def uncertain_numbers(machine: Machine) -> Uncertain:
         names=tuple(n.name for n in numbers),
         covariance=_block_diagonal(blocks),
         steps=np.array([n.step for n in numbers]),
-        machines=tuple(Machine(_at(d, n, s * n.step)) for n in numbers for s in (-1, 1)),
+        machines=tuple(Machine(_at(d, n, s * n.step), like=machine) for n in numbers for s in (-1, 1)),
         left_out=tuple(n.name for n in plain if n not in kept),
     )
 

@@ -21,7 +21,7 @@ RANKS = (
     ("kinematics",),
     ("closure", "linearization"),
     ("saddle", "home", "free_spins", "motion"),
-    ("stability",),
+    ("stability", "home_record"),
     ("equilibrium", "stiffness", "dynamics", "enclosure"),
     ("spins",),
     ("solve", "fast_plan"),

@@ -29,7 +29,7 @@ def rigged(machine: Machine, loop: Loop) -> Machine:
         d = replace(
             d, platform=(*d.platform[:at], Point(PLATFORM.removeprefix("platform.")), *d.platform[at:])
         )
-    return machine if d is machine.description else Machine(d)
+    return machine if d is machine.description else Machine(d, like=machine)
 
 
 def _yields(elements: tuple[Element, ...]) -> bool:

@@ -95,7 +95,8 @@ class Predictor:
         mechanical = [t for t in terms if effects.get(t.kind).apply]
         if not mechanical:
             return self.machine
-        return Machine(apply_records(self.machine.description, mechanical))  # compiled once, not per effect
+        made = apply_records(self.machine.description, mechanical)
+        return Machine(made, like=self.machine)  # compiled once, not per effect
 
     def _motion(self, mechanical: Terms, load: Terms) -> Floats:
         w = true_wrench(self.experiment, load)

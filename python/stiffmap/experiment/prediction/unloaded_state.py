@@ -81,7 +81,7 @@ def lagging(machine: Machine, sign: Floats, weighs: bool = False) -> Machine:
     way = dict(zip(machine.actuators, sign.tolist(), strict=True))
     d = machine.description
     legs = tuple(replace(leg, elements=_behind(leg, way, weighs)) for leg in d.legs)
-    return Machine(replace(d, legs=legs, effects=(), declared=None))
+    return Machine(replace(d, legs=legs, effects=(), declared=None), like=machine)
 
 
 def _behind(leg: Leg, way: dict[str, float], weighs: bool) -> tuple[Element, ...]:
