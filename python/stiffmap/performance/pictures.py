@@ -17,7 +17,7 @@ from stiffmap.performance.registry import Measure
 from stiffmap.performance.table import MeasuresTable, Row
 from stiffmap.performance.workspace import Workspace
 from stiffmap.performance.workspace_pictures import workspace_figure
-from stiffmap.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, new_figure, paper_style
+from stiffmap.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, headline, new_figure, paper_style
 
 MAPPED = (
     "transmission_max",
@@ -41,23 +41,25 @@ def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy"
     if not np.isfinite(j).all():
         raise StiffmapError(f"{machine.name}: no Jacobian at {p.tolist()} m (status {int(v.status)})")
     with paper_style():
-        figure = new_figure(9.5, 3.4)
+        figure = new_figure(11.0, 4.2)
         axes = [figure.add_subplot(1, 3, i, projection="3d" if i < 3 else None) for i in (1, 2, 3)]
         _ellipsoid(axes[0], j)
-        axes[0].set_title(f"(a) sphere: {v.sphere_min:.3g} … {v.sphere_max:.3g}")
+        axes[0].set_title(f"(a) sphere: {v.sphere_min:.3g} … {v.sphere_max:.3g}", y=0.95)
         _parallelepiped(axes[1], j)
-        axes[1].set_title(f"(b) cube: {v.cube_min:.3g} … {v.cube_max:.3g}")
+        axes[1].set_title(f"(b) cube: {v.cube_min:.3g} … {v.cube_max:.3g}", y=0.95)
         for a in axes[:2]:
             a.set_xlabel("$v_x$")
             a.set_ylabel("$v_y$")
-            a.set(zlabel="$v_z$")
+            a.set_zlabel("$v_z$", labelpad=-1)
+            a.tick_params(labelsize=7, pad=0)
+            a.set_box_aspect(None, zoom=0.9)  # the layout does not know labels in space
         h = velocity_section(machine, p, plane=plane)
         _hexagon(axes[2], h.vertices, float(h.inner), float(h.outer))
         axes[2].set_title(f"(c) {plane} plane: {float(h.inner):.3g} … {float(h.outer):.3g}")
         axes[2].set_xlabel(f"$v_{plane[0]}$ per drive speed")
         axes[2].set_ylabel(f"$v_{plane[1]}$ per drive speed")
         where = ", ".join(f"{MM * x:.0f}" for x in p)
-        figure.suptitle(f"{machine.name} at ({where}) mm: velocity transmission")
+        headline(figure, f"{machine.name} at ({where}) mm: velocity transmission")
     return figure
 
 
@@ -90,7 +92,7 @@ def _hexagon(axes, vertices: Floats, inner: float, outer: float) -> None:  # typ
     axes.plot(inner * np.cos(turn), inner * np.sin(turn), "--", color=VERMILLION, label="every direction")
     axes.plot(outer * np.cos(turn), outer * np.sin(turn), ":", color=VERMILLION, label="best direction")
     axes.set_aspect("equal")
-    axes.legend(loc="upper right")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, frameon=False)
 
 
 def measure_figures(table: MeasuresTable) -> dict[str, Figure]:
