@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from stiffmap.plot.style import CYCLE, DASHES, new_figure, paper_style
+from stiffmap.plot.style import CYCLE, DASHES, headline, legend_below, new_figure, paper_style
 
 PANELS = (("effort", "effort", "effort_margin", "peak_effort"), ("rate", "speed", "speed_margin", "peak_speed"),
           ("power", "power, W", None, None))  # fmt: skip
@@ -19,6 +19,7 @@ def efforts_figure(found: xr.Dataset) -> Figure:
     with paper_style():
         figure = new_figure(6.4, 6.0)
         panels = figure.subplots(3, 1, sharex=True)
+        within = False
         for axes, (name, label, margin, peak) in zip(panels, PANELS, strict=True):
             limits: dict[float, str] = {}
             for i, drive in enumerate(drives):
@@ -30,6 +31,7 @@ def efforts_figure(found: xr.Dataset) -> Figure:
             span = float(np.abs(found[name]).max())
             for limit, colour in limits.items():
                 if np.isfinite(limit) and limit < 4 * span:
+                    within = True
                     for sign in (1, -1):
                         axes.axhline(
                             sign * limit, color="black" if len(limits) == 1 else colour, linewidth=0.6
@@ -37,8 +39,9 @@ def efforts_figure(found: xr.Dataset) -> Figure:
             axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
             axes.set_ylabel(label if margin is None else f"{label}, {_unit(turns, name == 'effort')}")
         panels[-1].set_xlabel("time, s")
-        panels[0].legend(loc="upper right", ncols=min(len(drives), 3))
-        figure.suptitle(f"{found.attrs['machine']}: drives along the motion (thin lines: declared limits)")
+        legend_below(figure, panels[0].get_legend_handles_labels()[0])
+        limits_told = "thin lines: declared limits" if within else "declared limits are far off"
+        headline(figure, f"{found.attrs['machine']}: drives along the motion ({limits_told})")
     return figure
 
 
