@@ -62,6 +62,9 @@ def compensate(
     through: Annotated[
         str | None, typer.Option(help="A point of the table's line, mm. [default: home]")
     ] = None,
+    case: Annotated[
+        str | None, typer.Option(help="Of a map with several loads: the one that the table is for, e.g. Fx.")
+    ] = None,
     zero: Annotated[
         float | None, typer.Option(help="Position (mm) of the reference point: the table is zero there.")
     ] = None,
@@ -84,7 +87,7 @@ def compensate(
 
       [cyan]stiffmap compensate travelling-column --axis z --gravity 0,0,-9.81 --format linuxcnc -o z.comp[/cyan]
 
-      [cyan]stiffmap compensate results/map.nc --axis x --format siemens -o x.mpf[/cyan]
+      [cyan]stiffmap compensate results/map.nc --case Fx --axis x --format siemens -o x.mpf[/cyan]
 
       [cyan]stiffmap compensate ur10 --effect 'zero_offset elbow error=1mrad' --urdf arm.urdf --dh arm.csv[/cyan]
 
@@ -92,7 +95,7 @@ def compensate(
     """
     out: dict[str, object] = {}
     if axis is not None:
-        out = _table(machine, effect, axis, form, points, through, zero, output, force, gravity)
+        out = _table(machine, effect, axis, form, points, through, case, zero, output, force, gravity)
         _say(out, as_json)
         return
     if poses is None and urdf is None and dh is None and check is None:
@@ -134,6 +137,7 @@ def _table(
     form: str,
     points: int,
     through: str | None,
+    case: str | None,
     zero: float | None,
     output: Path | None,
     force: str,
@@ -142,7 +146,7 @@ def _table(
     """Table of an axis, from a machine or from a map that has been written."""
     point = None if through is None else np.array(numbers(through, "through", 3)) / MM
     if machine.endswith((".nc", ".zarr")):
-        errors = axis_errors_of_map(read_dataset(machine), axis, through=point)
+        errors = axis_errors_of_map(read_dataset(machine), axis, through=point, case=case)
     else:
         m = machine_with(machine, effect)
         low, high = (

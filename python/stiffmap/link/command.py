@@ -28,11 +28,11 @@ FIELDS = {".csv", ".dat", ".frd", ".vtk", ".vtu", ".lis", ".txt"}
 EXAMPLES = """
 Examples:
 
-  stiffmap link bar.yaml --out bar-link.yaml --picture bar.png
+  [cyan]stiffmap link bar.yaml --out bar-link.yaml --picture bar.png[/cyan]
 
-  stiffmap link bracket.step --fixed face3 --loaded face7 --material aluminium --size 4
+  [cyan]stiffmap link bracket.step --fixed face3 --loaded face7 --material aluminium --size 4[/cyan]
 
-  stiffmap link field.csv --cases cases.csv --reference 310,0,0
+  [cyan]stiffmap link field.csv --cases cases.csv --reference 310,0,0[/cyan]
 """
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -42,7 +42,7 @@ def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy"
         raise StiffmapError(f"{machine.name}: no Jacobian at {p.tolist()} m (status {int(v.status)})")
     with paper_style():
         figure = new_figure(11.0, 4.2)
-        axes = [figure.add_subplot(1, 3, i, projection="3d" if i < 3 else None) for i in (1, 2, 3)]
+        axes: list[Any] = [figure.add_subplot(1, 3, i, projection="3d" if i < 3 else None) for i in (1, 2, 3)]
         _ellipsoid(axes[0], j)
         axes[0].set_title(f"(a) sphere: {v.sphere_min:.3g} … {v.sphere_max:.3g}", y=0.95)
         _parallelepiped(axes[1], j)
