@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -38,13 +38,9 @@ def add_effect(
     Raises StiffmapError for an unknown kind, element, leg or parameter, a value out of its bounds, a
     missing one, and effects that exclude each other.
     """
-    effect = registry.get(kind)
-    _refuse_measurement(effect)
-    numbers, options = split(effect, parameters)
-    place = place_of(effect, _declared(description), element, legs)
-    record = AppliedEffect(kind, *place, parameters=numbers, options=options)
-    check_exclusion(record, description.effects)
-    resolve(effect, _declared(description), record)
+    declared = _declared(description)
+    record = _checked(declared, description.effects, kind, element, legs, parameters)
+    resolve(registry.get(kind), declared, record)
     return _with_record(description, record)
 
 
@@ -58,22 +54,31 @@ def apply_records(description: MachineDescription, records: Sequence[AppliedEffe
             )
         return description
     checked: list[AppliedEffect] = []
-    for r in records:
-        effect = registry.get(r.kind)
-        _refuse_measurement(effect)
-        numbers, options = split(effect, {**dict(r.parameters), **dict(r.options)})
-        place = place_of(effect, description, r.element or None, r.legs or None)
-        one = AppliedEffect(r.kind, *place, parameters=numbers, options=options)
-        check_exclusion(one, checked)
-        checked.append(one)
+    for r in records:  # one build of them all
+        given = {**dict(r.parameters), **dict(r.options)}
+        checked.append(_checked(description, checked, r.kind, r.element or None, r.legs or None, given))
     return _build(description, tuple(checked)) if checked else description
 
 
-def _refuse_measurement(effect: EffectType) -> None:
+def _checked(
+    declared: MachineDescription,
+    beside: Sequence[AppliedEffect],
+    kind: str,
+    element: str | None,
+    legs: Sequence[str] | None,
+    parameters: Mapping[str, Any],
+) -> AppliedEffect:
+    """The record of one more effect beside others; StiffmapError for what cannot be."""
+    effect = registry.get(kind)
     if effect.measurement:
         raise StiffmapError(
-            f"{effect.kind}: lives in the measurement, not in the machine; a diagnosis applies it to readings"
+            f"{kind}: lives in the measurement, not in the machine; a diagnosis applies it to readings"
         )
+    numbers, options = split(effect, parameters)
+    place = place_of(effect, declared, element, legs)
+    record = AppliedEffect(kind, *place, parameters=numbers, options=options)
+    check_exclusion(record, beside)
+    return record
 
 
 def resolve(effect: EffectType, declared: MachineDescription, record: AppliedEffect) -> Placed:
