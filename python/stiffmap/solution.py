@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.closing import Kinematics
-from stiffmap.compiled import Answer, Flag, Names, Status
+from stiffmap.compiled import Answer, Flag, Names, Status, counted
 
 Floats = NDArray[np.float64]
 Slopes = Mapping[str, Mapping[str, Floats]]  # quantity -> name of the variable -> derivative
@@ -215,7 +215,7 @@ class Solution:
 
     def count(self) -> dict[str, int]:
         """Number of poses per status."""
-        return {s.name: int((self.status == s).sum()) for s in Status if (self.status == s).any()}
+        return counted(self.status)
 
     def _repr_html_(self) -> str:
         rows = "".join(f"<tr><td>{n}</td><td>{c}</td></tr>" for n, c in self.count().items())

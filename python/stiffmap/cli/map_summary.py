@@ -9,7 +9,7 @@ import xarray as xr
 from rich import box
 from rich.table import Table
 
-from stiffmap.status import Status
+from stiffmap.cli.statuses import failed
 
 
 def across(ds: xr.Dataset) -> str:
@@ -39,8 +39,7 @@ def _row(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]], tolerance: f
 
 def failures(ds: xr.Dataset) -> dict[str, int]:
     """Number of poses per status in which some load or direction failed."""
-    status = np.maximum(ds.direction_status.values, ds.status.max("case").values)
-    return {s.name: int((status == s).sum()) for s in Status if s and (status == s).any()}
+    return failed(np.maximum(ds.direction_status.values, ds.status.max("case").values))
 
 
 def as_table(ds: xr.Dataset, rows: list[dict[str, Any]], plane: str, tolerance: float) -> Table:

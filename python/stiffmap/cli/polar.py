@@ -30,8 +30,7 @@ from stiffmap.cli.inputs import (
     position,
 )
 from stiffmap.cli.output import JsonOption, print_json
-from stiffmap.cli.statuses import failed_in_words
-from stiffmap.compiled import Status
+from stiffmap.cli.statuses import failed, failed_in_words
 
 AtOption = Annotated[
     list[str] | None, typer.Option(help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]")
@@ -88,8 +87,7 @@ def polar(
         for p in places if vector is not None else []:
             console.print(_under(m, p, vector, how), soft_wrap=True)
         statuses = np.concatenate([d.status.values.ravel() for d in many])
-        failed = {s.name: int((statuses == s).sum()) for s in Status if s and (statuses == s).any()}
-        for line in failed_in_words(failed, "directions"):
+        for line in failed_in_words(failed(statuses), "directions"):
             console.print(f"[yellow]{line}[/yellow]", soft_wrap=True)
         if files:
             console.print(f"wrote {', '.join(files)}", soft_wrap=True)

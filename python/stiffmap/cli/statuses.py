@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from stiffmap.compiled import Status
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.compiled import Status, counted
 
 MEANINGS = {
     Status.UNREACHABLE.name: "the joints cannot get there, or a limit forbids it",
@@ -13,6 +16,11 @@ MEANINGS = {
     "early: docs/machine_files.md",
     Status.NOT_CONVERGED.name: "no equilibrium was found under the whole load",
 }
+
+
+def failed(status: NDArray[np.uint8]) -> dict[str, int]:
+    """Number of poses per status but CONVERGED."""
+    return {name: n for name, n in counted(status).items() if name != Status.CONVERGED.name}
 
 
 def failed_in_words(failed: Mapping[str, int], what: str = "poses") -> list[str]:

@@ -2,6 +2,6 @@
 
 from stiffmap.compiled.machine import Answer, CompiledMachine, kernel_levels
 from stiffmap.compiled.names import Names, Role
-from stiffmap.compiled.status import Flag, Status
+from stiffmap.compiled.status import Flag, Status, counted
 
-__all__ = ["Answer", "CompiledMachine", "Flag", "Names", "Role", "Status", "kernel_levels"]
+__all__ = ["Answer", "CompiledMachine", "Flag", "Names", "Role", "Status", "counted", "kernel_levels"]

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from enum import IntEnum, IntFlag
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 class Status(IntEnum):
     """Status of one pose; failed poses hold NaN as well."""
@@ -33,3 +36,8 @@ class Flag(IntFlag):
     LOAD_STEPPED = 1 << 12
     REFERENCE_PATH = 1 << 13
     GIMBAL_LOCK = 1 << 14
+
+
+def counted(status: NDArray[np.uint8]) -> dict[str, int]:
+    """Number of poses per status, for those that there are."""
+    return {s.name: int((status == s).sum()) for s in Status if (status == s).any()}
