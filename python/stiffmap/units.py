@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -33,6 +34,13 @@ PLANE_ANGLES: dict[str, Fraction | float] = {
 }
 ANGLES = ("rad", "deg")
 """Those of a machine file."""
+
+
+def name_and_unit(header: str) -> tuple[str, str]:
+    """``x [mm]`` is x in mm; an empty unit where none stands in square brackets."""
+    match = re.fullmatch(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", header)
+    assert match is not None  # any text is a name
+    return match[1], match[2] or ""
 
 
 def size_of(unit: str, *tables: Mapping[str, Fraction | float]) -> float:

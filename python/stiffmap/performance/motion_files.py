@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -23,10 +22,10 @@ from stiffmap.files.schema.base import FileModel, Name
 from stiffmap.machine import Machine
 from stiffmap.performance.quantities import quantity, quantity_in
 from stiffmap.performance.trajectory import Path, Trajectory, circle, line, through, timed
+from stiffmap.units import name_and_unit
 from stiffmap.yaml_text import Document, read
 
 Written = str | float | int
-_HEAD = re.compile(r"^\s*([A-Za-z]+)\s*(?:\[(.+)\])?\s*$")
 COLUMNS = {"t": "s", "x": "m", "y": "m", "z": "m", "fx": "N", "fy": "N", "fz": "N"}
 LEAST_ROWS = 6
 """Of a table over time: its spline of degree 5 wants that many."""
@@ -217,19 +216,19 @@ def _columns(place: FilePath) -> tuple[dict[str, Floats], list[int]]:
 
 
 def _head(cell: str, file: str, number: int) -> tuple[str, float]:
-    match = _HEAD.match(cell)
-    name = match[1].lower() if match else cell.strip()
-    if match is None or name not in COLUMNS:
+    head, unit = name_and_unit(cell)
+    name = head.lower()
+    if name not in COLUMNS:
         raise FileError(
             f"unknown column '{cell.strip()}'; known: {', '.join(COLUMNS)}, each with its unit as in x [mm]",
             file=file, line=number,
         )  # fmt: skip
-    if match[2] is None:
+    if not unit:
         raise FileError(
             f"the unit is missing: write {name} [{_usual(name)}]", file=file, line=number, key=name
         )
     try:
-        return name, quantity(f"1 {match[2]}", COLUMNS[name])
+        return name, quantity(f"1 {unit}", COLUMNS[name])
     except StiffmapError as error:
         raise FileError(str(error), file=file, line=number, key=name) from None
 

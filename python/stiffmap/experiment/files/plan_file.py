@@ -3,7 +3,6 @@ names: ``x [um]``."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +21,7 @@ from stiffmap.experiment.files.units import Scales
 from stiffmap.experiment.virtual.plans import MICRO
 from stiffmap.files.schema.base import suggestion
 from stiffmap.machine import Machine
+from stiffmap.units import name_and_unit
 
 KNOWN = tuple(c for c in columns.PLAN if c not in (*EULER, *TURNED2))
 
@@ -78,12 +78,12 @@ def load_plan(
 
 def _units_of_columns(table: Table) -> tuple[Table, dict[str, str]]:
     """The table with bare names of columns, and the units that stood behind them in square brackets."""
-    split = [re.fullmatch(r"(\S+)\s*\[\s*(\S+)\s*\]", h) for h in table.header]
-    names = tuple(m[1] if m else h for m, h in zip(split, table.header, strict=True))
+    split = [name_and_unit(h) for h in table.header]
+    names = tuple(name for name, _ in split)
     twice = next((n for n in names if names.count(n) > 1), None)
     if twice:
         raise FileError(f"column '{twice}' stands twice", file=table.file, line=1)
-    own = {m[1]: m[2].replace("µ", "u").replace("μ", "u") for m in split if m}
+    own = {name: unit.replace("µ", "u").replace("μ", "u") for name, unit in split if unit}
     return replace(table, header=names), own
 
 
