@@ -9,7 +9,8 @@ from matplotlib.patches import Patch, Rectangle
 
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
-from stiffmap.performance.workspace import REACH, Workspace
+from stiffmap.performance.inside import REACH
+from stiffmap.performance.workspace import Workspace
 from stiffmap.plot.style import BLACK, GREEN, MM, ORANGE, PURPLE, SKY, VERMILLION, new_figure, paper_style
 
 NODES = 90
