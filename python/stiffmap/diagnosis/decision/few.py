@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiffmap.diagnosis.candidates.candidates import clash
+from stiffmap.diagnosis.candidates.candidates import Candidate, clash
 from stiffmap.diagnosis.fitting.fit import fit
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.screen import Screen
@@ -61,22 +61,22 @@ def screened(s: Study) -> Few:
     for _ in range(MOST_EFFECTS):
         reductions = beside.delta_chi2(left[:, None])[:, 0]
         taken = [screen.variants[i].candidate for i in which]
-        for i in np.argsort(-reductions):
-            candidate = screen.variants[i].candidate
-            if reductions[i] <= 0.0 or (candidate not in taken and not clash(candidate, taken)):
-                break
-        else:
+        downward = (int(i) for i in np.argsort(-reductions) if reductions[i] > 0.0)
+        i = next((i for i in downward if _can_join(screen.variants[i].candidate, taken)), None)
+        if i is None:
             break
-        if reductions[i] <= 0.0:
-            break
-        q = beside.basis(int(i))
+        q = beside.basis(i)
         left = left - q @ (q.T @ left)
         tangent = np.column_stack([tangent, q])
         beside = screen.beside(tangent)
-        which.append(int(i))
+        which.append(i)
         chi2.append(float(left @ left))
         directions.append(int(tangent.shape[1]))
     return Few(screen, tuple(which), left, tuple(chi2), tuple(directions))
+
+
+def _can_join(candidate: Candidate, taken: list[Candidate]) -> bool:
+    return candidate not in taken and not clash(candidate, taken)
 
 
 def fitted(s: Study, few: Few) -> float | None:
