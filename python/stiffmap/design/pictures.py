@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from stiffmap.broadcasting import Floats
 from stiffmap.design.search import ParetoSet
 from stiffmap.errors import StiffmapError
+from stiffmap.performance.box_map import BoxMap, box_map, levels
 from stiffmap.performance.registry import get_measure
 from stiffmap.performance.table import MeasuresTable
 from stiffmap.plot.style import BLUE, COLOURS, CYCLE, MM, SKY, VERMILLION, new_figure, paper_style
@@ -84,12 +85,9 @@ def beside_figure(tables: Mapping[str, MeasuresTable], names: Sequence[str] = MA
         grid = figure.subplots(len(rows), len(tables), squeeze=False)
         for line, name in zip(grid, rows, strict=True):
             maps = {k: m for k, t in tables.items() if (m := _map(t, name)) is not None}
-            low = min(float(np.nanmin(m[2])) for m in maps.values())
-            high = max(float(np.nanmax(m[2])) for m in maps.values())
-            for axes, (machine, (x, y, values)) in zip(line, maps.items(), strict=True):
-                drawn = axes.contourf(
-                    MM * x, MM * y, values.T, levels=np.linspace(low, max(high, low + 1e-9), 13), cmap=COLOURS
-                )
+            steps = levels(*map(_middle, maps.values()))
+            for axes, (machine, m) in zip(line, maps.items(), strict=True):
+                drawn = axes.contourf(MM * m.x, MM * m.y, _middle(m).T, levels=steps, cmap=COLOURS)
                 axes.set_aspect("equal")
                 axes.set_title(machine)
                 axes.set_xlabel("x, mm")
@@ -99,15 +97,15 @@ def beside_figure(tables: Mapping[str, MeasuresTable], names: Sequence[str] = MA
     return figure
 
 
-def _map(table: MeasuresTable, name: str) -> tuple[Floats, Floats, Floats] | None:
+def _map(table: MeasuresTable, name: str) -> BoxMap | None:
     row = next((r for r in table.rows if r.measure.name == name), None)
-    if row is None or row.found.positions is None or row.found.values is None:
-        return None
-    x, y, z = (np.unique(row.found.positions[:, i]) for i in range(3))
-    if len(x) * len(y) * len(z) != len(row.found.values) or min(len(x), len(y)) < 2:
-        return None
-    values = row.found.values.reshape(len(x), len(y), len(z))[:, :, len(z) // 2]
-    return x, y, np.asarray(row.measure.factor * values)
+    over = None if row is None else box_map(row)
+    return None if over is None or min(len(over.x), len(over.y)) < 2 else over
+
+
+def _middle(over: BoxMap) -> Floats:
+    """(x, y) values of the plane in the middle of the box."""
+    return np.asarray(over.values[:, :, len(over.z) // 2])
 
 
 def _axis(name: str) -> str:

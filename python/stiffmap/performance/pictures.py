@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
+from stiffmap.performance.box_map import box_map, levels
 from stiffmap.performance.mode_pictures import mode_figure
 from stiffmap.performance.registry import Measure
 from stiffmap.performance.table import MeasuresTable, Row
@@ -170,22 +171,20 @@ def _bound_text(r: Row) -> str:
 
 def map_figure(table: MeasuresTable, row: Row) -> Figure:
     """A measure on the lowest, middle and highest z-plane of the box."""
-    p, values = row.found.positions, row.found.values
-    assert p is not None and values is not None
-    x, y, z = (np.unique(p[:, i]) for i in range(3))
-    grid = row.measure.factor * values.reshape(len(x), len(y), len(z))
+    over = box_map(row)
+    assert over is not None
+    x, y, z, grid = over
     planes = sorted({0, len(z) // 2, len(z) - 1})
     with paper_style():
         figure = new_figure(3.0 * len(planes) + 0.8, 3.2)
         axes = figure.subplots(1, len(planes), squeeze=False)[0]
-        levels = _levels(grid)
+        steps = levels(grid)
         for a, k in zip(axes, planes, strict=True):
-            _plane(a, row.measure, row, x, y, grid[:, :, k], levels)
+            _plane(a, row.measure, row, x, y, grid[:, :, k], steps)
             a.set_title(f"z = {MM * z[k]:.0f} mm")
-        if axes[0].collections:
-            figure.colorbar(
-                axes[0].collections[0], ax=list(axes), label=row.measure.shown or row.measure.name
-            )
+        drawn = next((a.collections[0] for a in axes if a.collections), None)
+        if drawn is not None:
+            figure.colorbar(drawn, ax=list(axes), label=row.measure.shown or row.measure.name)
         figure.suptitle(
             f"{table.machine.name}: {row.measure.title}"
             + (f" {row.found.note}" if "under" in row.found.note else "")
@@ -193,18 +192,11 @@ def map_figure(table: MeasuresTable, row: Row) -> Figure:
     return figure
 
 
-def _levels(grid: Floats) -> Floats:
-    """Thirteen that increase, from the least to the largest finite value."""
-    finite = grid[np.isfinite(grid)]
-    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
-    return np.linspace(low, high if high - low > 1e-9 * abs(high) else low + max(abs(low), 1.0), 13)
-
-
-def _plane(axes, measure: Measure, row: Row, x: Floats, y: Floats, values: Floats, levels: Floats) -> None:  # type: ignore[no-untyped-def]
+def _plane(axes, measure: Measure, row: Row, x: Floats, y: Floats, values: Floats, steps: Floats) -> None:  # type: ignore[no-untyped-def]
     if not np.isfinite(values).any():
         axes.text(0.5, 0.5, "no value in this plane", transform=axes.transAxes, ha="center", va="center")
     elif len(x) > 1 and len(y) > 1:
-        axes.contourf(MM * x, MM * y, values.T, levels=levels, cmap=COLOURS, extend="both")
+        axes.contourf(MM * x, MM * y, values.T, levels=steps, cmap=COLOURS, extend="both")
         bound = row.bound
         limit = None if bound is None else bound.at_least if bound.at_least is not None else bound.at_most
         inside = limit is not None and np.nanmin(values) < measure.factor * limit < np.nanmax(values)
@@ -216,7 +208,7 @@ def _plane(axes, measure: Measure, row: Row, x: Floats, y: Floats, values: Float
     else:
         line = values.ravel()
         axes.scatter(
-            *np.meshgrid(MM * x, MM * y, indexing="ij"), c=line, cmap=COLOURS, vmin=levels[0], vmax=levels[-1]
+            *np.meshgrid(MM * x, MM * y, indexing="ij"), c=line, cmap=COLOURS, vmin=steps[0], vmax=steps[-1]
         )
     axes.set_xlabel("x, mm")
     axes.set_ylabel("y, mm")
