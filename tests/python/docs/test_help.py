@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reader_files import ROBOT, link_tables
 
 import stiffmap as sm
 from stiffmap.cli import main
@@ -31,12 +32,6 @@ MADE_SMALLER = {
 TRACKER = """Point ID;X Nominal;Y Nominal;Z Nominal;X [mm];Y [mm];Z [mm];Temp
 A1;0,0;0,0;700,0;0,012;-0,020;700,004;20,1
 A2;50,0;20,0;700,0;50,031;19,991;699,998;20,2
-"""
-ARM = """<robot name="arm"><link name="base"/><link name="upper"/><link name="fore"/>
-<joint name="q1" type="revolute"><origin xyz="0 0 0.3"/><axis xyz="0 0 1"/><parent link="base"/>
-<child link="upper"/><limit lower="-2" upper="2" effort="100" velocity="2"/></joint>
-<joint name="q2" type="revolute"><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/><parent link="upper"/>
-<child link="fore"/><limit lower="-2" upper="2" effort="80" velocity="2"/></joint></robot>
 """
 
 
@@ -89,8 +84,8 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (at / "clocks.csv").write_text(clocks, encoding="utf-8")
     (at / "points.csv").write_text(TRACKER, encoding="utf-8")
     _workbook(at / "readings.xlsx")
-    (at / "arm.urdf").write_text(ARM, encoding="utf-8")
-    (at / "delta.urdf").write_text(ARM.replace('"arm"', '"delta"'), encoding="utf-8")
+    (at / "arm.urdf").write_text(ROBOT, encoding="utf-8")
+    (at / "delta.urdf").write_text(ROBOT.replace('"arm"', '"delta"'), encoding="utf-8")
     (at / "robot.yaml").write_text(
         "actuators:\n  q1: {stiffness: 4.0e4}\n  q2: {stiffness: 3.0e4}\n", encoding="utf-8"
     )
@@ -113,16 +108,9 @@ def _parts(at: Path) -> None:
         "material: {young: 210, poisson: 0.3}\n",
         encoding="utf-8",
     )
-    with pytest.MonkeyPatch.context() as path:
-        path.syspath_prepend(str(ROOT / "tests/python/link"))
-        import link_fields
-    points, u = link_fields.noisy_field(n=12)
-    names = ["node", *(f"{a} [m]" for a in "xyz"), *(f"u{a} [m]" for _ in range(6) for a in "xyz")]
-    rows = [[i + 1, *points[i].tolist(), *u[:, i].ravel().tolist()] for i in range(12)]
-    (at / "field.csv").write_text("\n".join(",".join(map(str, r)) for r in [names, *rows]), encoding="utf-8")
-    cases = ["fx [N],fy [N],fz [N],mx [N*m],my [N*m],mz [N*m]"]
-    cases += [",".join(map(repr, w)) for w in link_fields.WRENCHES.tolist()]
-    (at / "cases.csv").write_text("\n".join(cases), encoding="utf-8")
+    field, cases = link_tables()
+    (at / "field.csv").write_text(field, encoding="utf-8")
+    (at / "cases.csv").write_text(cases, encoding="utf-8")
     if importlib.util.find_spec("gmsh") is None:
         return
     import gmsh
