@@ -45,14 +45,19 @@ class Case:
     toolpath: Motion | None = None
     """The task's own path and force, for measures along it."""
 
+    @property
+    def motion(self) -> Motion:
+        """The toolpath; StiffmapError where there is none."""
+        if self.toolpath is None:
+            raise StiffmapError("needs a toolpath: give toolpath in the requirements, or toolpath=")
+        return self.toolpath
+
     def path(self, most: int) -> tuple[Floats, Floats]:
         """Positions (n, 3) m and forces (n, 3) N along the toolpath, `most` samples or a few more.
 
         StiffmapError where there is no toolpath.
         """
-        if self.toolpath is None:
-            raise StiffmapError("needs a toolpath: give toolpath in the requirements, or toolpath=")
-        position, force = self.toolpath.places()
+        position, force = self.motion.places()
         step = max(1, len(position) // most)
         return position[::step], force[::step]
 

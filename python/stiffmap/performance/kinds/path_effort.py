@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.errors import StiffmapError
 from stiffmap.performance.efforts import drive_efforts
 from stiffmap.performance.registry import Case, Found, Measure
 from stiffmap.performance.scaling import drive_values
@@ -12,10 +11,9 @@ from stiffmap.performance.scaling import drive_values
 
 def compute(case: Case) -> Found:
     """Inverse dynamics along the motion, forces on the tool included."""
-    if case.toolpath is None:
-        raise StiffmapError("needs a toolpath: give toolpath in the requirements, or toolpath=")
+    motion = case.motion
     most = drive_values(case.machine, "force", None, "N or N·m")
-    run = case.toolpath.trajectory(case.machine, gravity=case.gravity)
+    run = motion.trajectory(case.machine, gravity=case.gravity)
     e = drive_efforts(case.machine, run, gravity=case.gravity)
     share = np.abs(e["effort"].values) / most
     when, drive = np.unravel_index(int(np.argmax(share)), share.shape)
