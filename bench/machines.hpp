@@ -8,7 +8,7 @@
 #include <string>
 
 #include "beam.hpp"
-#include "stiffmap/solve.hpp"
+#include "stiffmap/assemble.hpp"
 
 namespace stiffmap::bench {
 

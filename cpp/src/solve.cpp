@@ -3,49 +3,17 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
-#include <optional>
+
+#include "unloaded.hpp"
 
 namespace stiffmap {
 namespace {
 
+using namespace unloaded;
+
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double open_turn = 0.4;     // of a spin, rad or shares of the length
-constexpr double open_change = 0.02;  // of the stiffness by it: more than errors of the geometry make
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
-/// Drive and guide coordinates with their errors, compliances of drives and links at that stroke (theory G1-G3, S3);
-/// false where a link has none.
-bool command(const Mechanism& m, const VecX& x, Problem& p) {
-  p.friction_sign.setZero();
-  for (Index j = 0; j < m.size(); ++j) {
-    const Coordinate& c = m.coordinates[at(j)];
-    p.base[j] = c.role == Role::spring ? 0.0 : c.from_home() ? m.rest[j] : x[j];
-  }
-  for (const Drive& d : m.drives) {
-    const double u = x[d.coordinate];
-    p.drive_scale[d.coordinate] = 1 + d.numbers.compliance_slope * (u - m.home_coordinates[d.coordinate]);
-    for (const auto& [coordinate, e] : d.errors)
-      p.base[coordinate] += e.offset + e.slope * (u - e.reference) +
-                            e.amplitude * std::sin(2 * std::numbers::pi * (u - e.reference) / e.period + e.phase);
-  }
-  bool known = true;
-  for (std::size_t i = 0; i < m.groups.size(); ++i) {
-    const SpringGroup& g = m.groups[i];
-    if (g.stroke) known = stiffness_at(*g.stroke, g.matrix, x[g.varies_with], p.springs[i]) && known;
-  }
-  return known;
-}
-
-void start_state(const Mechanism& m, const VecX& x, State& state) {
-  state.z.setZero();
-  state.lambda.setZero();
-  for (Index j = 0; j < m.size(); ++j) {
-    const Coordinate& c = m.coordinates[at(j)];
-    if (c.from_home()) state.z[j] = x[j] - m.rest[j];
-  }
-}
 
 /// The leg wrenches: multipliers of the outermost loops, and for the first leg what is left of all
 /// that pushes on the platform (theory E3).
@@ -89,68 +57,6 @@ void reset(const Mechanism& m, std::uint32_t flags, PoseResult& out) {
   out.flags = flags;
   out.point.free = 0;
   out.indeterminate.assign(static_cast<std::size_t>(m.size()), false);
-}
-
-/// Stiffness of a point at closed coordinates that nothing loads.
-class Unloaded {
- public:
-  explicit Unloaded(const Mechanism& m) : m_(m), problem_(m), state_(m), lin_(m), saddle_(m), ws_(m) {
-    problem_.secant_laws = true;
-  }
-
-  /// NaN where a command is out of its table.
-  Mat6 stiffness(const VecX& x, const NodePoint& point) {
-    if (!command(m_, x, problem_)) return Mat6::Constant(nan);
-    state_ = State(m_);
-    start_state(m_, x, state_);
-    linearize(m_, problem_, state_, lin_);
-    saddle_.assemble(m_, lin_);
-    return point_stiffness(m_, lin_, saddle_, point.node, point.offset, ws_).stiffness;
-  }
-
- private:
-  const Mechanism& m_;
-  Problem problem_;
-  State state_;
-  Linearization lin_;
-  SaddleSystem saddle_;
-  StiffnessWorkspace ws_;
-};
-
-/// Largest difference of two stiffnesses, relative to the second one's diagonal.
-double change(const Mat6& K, const Mat6& before) {
-  const Vec6 s = before.diagonal().cwiseAbs().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-  return (s.asDiagonal() * (K - before) * s.asDiagonal()).cwiseAbs().maxCoeff();
-}
-
-/// A held spin along which the tip's stiffness changes leaves the configuration open (theory K3): not held.
-/// `turned`: where each closes when it has turned; what is missing is found and added until one is let go.
-void let_go_of_configurations(Mechanism& m, std::vector<VecX>& turned) {
-  const NodePoint& tip = m.points.front();
-  ClosureWorkspace ws(m);
-  std::optional<Unloaded> unloaded;
-  Mat6 home;
-  std::size_t held = 0;
-  bool let_go = false;
-  for (Index j = 0; j < m.size(); ++j) {
-    Coordinate& c = m.coordinates[at(j)];
-    if (!c.locked || c.role != Role::passive) continue;
-    if (!unloaded) home = unloaded.emplace(m).stiffness(m.home_coordinates, tip);
-    VecX x;
-    if (!let_go && held < turned.size()) {
-      x = turned[held];
-    } else {
-      x = m.home_coordinates;
-      x[j] += open_turn * m.length / m.unit(j);
-      if (close_passive(m, m.home, ws, x) > 1e-9) x.resize(0);
-      if (!let_go) turned.push_back(x);
-    }
-    ++held;
-    if (x.size() == 0 || !(change(unloaded->stiffness(x, tip), home) > open_change)) continue;
-    c.locked = false;
-    let_go = true;
-    unloaded.emplace(m);
-  }
 }
 
 /// A free motion of passive coordinates at a pose: does it leave the stiffness as it is? Moves along
@@ -367,59 +273,6 @@ void conclude_pose(const Mechanism& m, const PoseInput& in, const EquilibriumRes
     out.flags |= gap ? flag::free_play | flag::platform_singular : flag::platform_singular;
   }
   hide_undetermined(m, ws, out);
-}
-
-Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs, const Task& task,
-                   HomeSearch search, HomeFit* fit, const Mechanism* like) {
-  const bool known = like && like->record && like->record->holds_for(root, home, task, search);
-  HomeRecord record = known ? *like->record : HomeRecord{root, home, task, search, {}, {}, {}, {}, {}};
-  Mechanism m(root, home, springs);
-  m.task = task;
-  std::size_t closing = 0;
-  const auto close_it = [&](HomeSearch how) {
-    HomeFit found;
-    if (known) {
-      m.home_coordinates = record.closings[closing].coordinates;
-      m.home = record.closings[closing++].home;
-      found.closed = true;
-    } else {
-      found = close_home(m, how);
-      record.closings.push_back({m.home_coordinates, m.home});
-    }
-    return found;
-  };
-  const HomeFit first = close_it(search);
-  if (fit) *fit = first;
-  if (!first.closed) throw HomeMisfit(first);
-  const auto rebuild = [&](const Chain& chain, const VecX& home_coordinates) {
-    Mechanism other(chain, m.home, springs);
-    other.task = task;
-    other.home_coordinates = home_coordinates;
-    m = std::move(other);
-    close_it(HomeSearch::near);
-  };
-  if (!closes_exactly(m)) rebuild(corrected(m), VecX(m.home_coordinates));
-  if (!known) record.balls = balls_to_renumber(m);
-  if (!record.balls.empty()) {
-    VecX x = m.home_coordinates;
-    for (const SpunBall& b : record.balls) x.segment<3>(b.first).setZero();
-    rebuild(renumbered(m, record.balls), x);
-    m.spun_balls = record.balls;
-  }
-  m.set_rest();
-  for (Drive& d : m.drives)
-    for (DriveError& e : d.errors)
-      if (std::isnan(e.error.reference)) e.error.reference = m.home_coordinates[d.coordinate];
-  if (known) {
-    for (const Index j : record.locked) m.coordinates[at(j)].locked = true;
-    m.beside_home = record.beside_home;
-  } else {
-    record.locked = lock_spins(m);
-    record.beside_home = m.beside_home;
-  }
-  let_go_of_configurations(m, record.turned);
-  m.record = std::make_shared<const HomeRecord>(std::move(record));
-  return m;
 }
 
 }  // namespace stiffmap

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "beam.hpp"
+#include "stiffmap/assemble.hpp"
 #include "stiffmap/solve.hpp"
 
 namespace stiffmap::test {

@@ -2,8 +2,7 @@
 // One pose from command to answer: closure, equilibrium, stiffness, and what kind of pose it is.
 #pragma once
 
-#include "stiffmap/free_spins.hpp"
-#include "stiffmap/home_record.hpp"
+#include "stiffmap/closure.hpp"
 #include "stiffmap/spins.hpp"
 
 namespace stiffmap {
@@ -64,12 +63,5 @@ void conclude_pose(const Mechanism& m, const PoseInput& in, const EquilibriumRes
 
 /// NaN and the status.
 void fail_pose(const Mechanism& m, const PoseInput& in, Status status, PoseResult& out);
-
-/// Mechanism closed at home but for round-off, spins locked: ready to solve. Throws HomeMisfit; `fit`: how the
-/// declared home configuration closes; `like`: a mechanism whose findings about home are taken over where its nominal
-/// geometry is the same.
-Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs = {},
-                   const Task& task = full_task, HomeSearch search = HomeSearch::near, HomeFit* fit = nullptr,
-                   const Mechanism* like = nullptr);
 
 }  // namespace stiffmap

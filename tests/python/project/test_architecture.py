@@ -24,7 +24,7 @@ RANKS = (
     ("stability", "home_record"),
     ("equilibrium", "stiffness", "dynamics", "enclosure"),
     ("spins",),
-    ("solve", "fast_plan"),
+    ("assemble", "solve", "fast_plan"),
     ("batch", "clamp", "follower", "modes"),
     ("path",),
 )

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+#include "unloaded.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace stiffmap::unloaded {
+namespace {
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+bool command(const Mechanism& m, const VecX& x, Problem& p) {
+  p.friction_sign.setZero();
+  for (Index j = 0; j < m.size(); ++j) {
+    const Coordinate& c = m.coordinates[at(j)];
+    p.base[j] = c.role == Role::spring ? 0.0 : c.from_home() ? m.rest[j] : x[j];
+  }
+  for (const Drive& d : m.drives) {
+    const double u = x[d.coordinate];
+    p.drive_scale[d.coordinate] = 1 + d.numbers.compliance_slope * (u - m.home_coordinates[d.coordinate]);
+    for (const auto& [coordinate, e] : d.errors)
+      p.base[coordinate] += e.offset + e.slope * (u - e.reference) +
+                            e.amplitude * std::sin(2 * std::numbers::pi * (u - e.reference) / e.period + e.phase);
+  }
+  bool known = true;
+  for (std::size_t i = 0; i < m.groups.size(); ++i) {
+    const SpringGroup& g = m.groups[i];
+    if (g.stroke) known = stiffness_at(*g.stroke, g.matrix, x[g.varies_with], p.springs[i]) && known;
+  }
+  return known;
+}
+
+void start_state(const Mechanism& m, const VecX& x, State& state) {
+  state.z.setZero();
+  state.lambda.setZero();
+  for (Index j = 0; j < m.size(); ++j) {
+    const Coordinate& c = m.coordinates[at(j)];
+    if (c.from_home()) state.z[j] = x[j] - m.rest[j];
+  }
+}
+
+Mat6 Unloaded::stiffness(const VecX& x, const NodePoint& point) {
+  if (!command(m_, x, problem_)) return Mat6::Constant(std::numeric_limits<double>::quiet_NaN());
+  state_ = State(m_);
+  start_state(m_, x, state_);
+  linearize(m_, problem_, state_, lin_);
+  saddle_.assemble(m_, lin_);
+  return point_stiffness(m_, lin_, saddle_, point.node, point.offset, ws_).stiffness;
+}
+
+double change(const Mat6& K, const Mat6& before) {
+  const Vec6 s = before.diagonal().cwiseAbs().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  return (s.asDiagonal() * (K - before) * s.asDiagonal()).cwiseAbs().maxCoeff();
+}
+
+}  // namespace stiffmap::unloaded
