@@ -99,7 +99,7 @@ struct Block {
     const double* at[W];
     for (int i = 0; i < W; ++i) at[i] = in.position + 3 * pose(i);
     Closing closing{P, s};
-    const M ok = closing.close(command, at, in.patient);
+    const M ok = closing.close(command, at, in.patience >= Patience::leaps);
     never = closing.never & ~ok;
     if (P.open_task) {  // the closed machine completes the command
       command = Closing::base_frame();
@@ -235,7 +235,7 @@ struct Block {
     Newton newton{P, in, s, e, load, e.gravity};
     V iterations = splat(0), steps;
     M done = newton.solve(usable, P.starts_linear, iterations, steps);
-    if (in.patient && !P.starts_linear && any(usable & ~done))
+    if (in.patience == Patience::path && !P.starts_linear && any(usable & ~done))
       done |= follow(usable & ~done, newton, iterations, steps);
     V K[6][6];
     newton.dense(newton.answer, K);
@@ -257,6 +257,14 @@ struct Block {
     return done;
   }
 
+  /// What becomes of a lane that was given up.
+  std::uint8_t left(int lane) const {
+    if (ended[lane]) return pose_ended;
+    if (in.patience == Patience::path) return pose_left;
+    if (closed[lane]) return pose_heavy;
+    return in.patience == Patience::leaps ? pose_left : pose_slow;
+  }
+
   void write(M done, const Newton& newton, const V (&K)[6][6], const V (&C)[6][6], V iterations, V steps) {
     const V3 offset{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
     const V6 d{newton.point - (command.p + command.R * offset), rotation_between(command.R, newton.tip.R)};
@@ -264,12 +272,7 @@ struct Block {
     put(d, moved);
     for (int i = 0; i < count; ++i) {
       const std::int64_t k = pose(i);
-      out.done[k] = done[i]      ? (unstable[i] ? pose_unstable : pose_solved)
-                    : never[i]   ? pose_unreachable
-                    : ended[i]   ? pose_ended
-                    : in.patient ? pose_left
-                    : closed[i]  ? pose_heavy
-                                 : pose_slow;
+      out.done[k] = done[i] ? (unstable[i] ? pose_unstable : pose_solved) : never[i] ? pose_unreachable : left(i);
       if (!done[i]) continue;
       for (int r = 0; r < 6; ++r) out.displacement[6 * k + r] = moved[r][i];
       if (out.stiffness)

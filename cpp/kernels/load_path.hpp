@@ -58,7 +58,9 @@ struct LoadPath {
       const M near = norm < n.in.tolerance;
       M found = iterating & near & ((factor < 1.0) | (norm < n.small) | (previous < n.in.tolerance));
       const M short_enough = finite & (norm <= largest_step) & (tries < most_tries);
-      const M shrinks = (norm <= contraction * previous) | (norm <= 1e-7);
+      // As fast as steps that all shrink enough: one that does not may follow one that shrank a hundredfold.
+      allowed *= contraction;
+      const M shrinks = (norm <= contraction * previous) | (norm <= allowed) | (norm <= 1e-7);
       M sound = (onward & short_enough) | found | (iterating & ~fresh & short_enough & shrinks) |
                 (iterating & fresh & finite & (tries < most_tries));
       // Where stability changed on a way that is too long to look closely, the change is enclosed. That only says where
@@ -76,6 +78,7 @@ struct LoadPath {
       factor = select(starts, select(ahead < 1.0 - factor, factor + ahead, splat(1)), factor);
       previous = norm;
       first_step = select(starts, norm, first_step);
+      allowed = select(starts, norm, allowed);
       tries = select(iterating & ~found, tries + 1.0, splat(1));
       looking = (looking & ~starts) | found;
       again &= ~starts;
@@ -103,7 +106,7 @@ struct LoadPath {
         factor = select(back, reached, factor);
         looking |= back;
         again |= back;
-        ended |= back & ((ahead < shortest) | (steps > most_steps));
+        ended |= back & ((ahead < shortest) | (steps > most_steps) | (aims > most_aims));
         // The reference only halves: what it passes next to a sharp turn may end here and the other way round.
         const M anew = ended & active & aimed;
         if (any(anew)) {
@@ -122,6 +125,7 @@ struct LoadPath {
   static constexpr int most_iterations = 4000;
   static constexpr double contraction = 0.2, largest_step = 0.2, most_tries = 40;
   static constexpr double shortest = 1.0 / 16384, crossing_step = 1.0 / 1024, most_steps = 400;
+  static constexpr double most_aims = 32;  // at one change: where they do not come true, halves do
   static constexpr double hint = 1.0 / 256;
   static constexpr double bend = 0.1, crossing_bend = 1e-3, bend_noise = 1e-9;
 
@@ -132,7 +136,8 @@ struct LoadPath {
   V reached = splat(0);        ///< share whose equilibrium is proven
   V ahead = splat(0);          ///< share on which a lane looks ahead
   V previous = splat(1), tries = splat(0), steps = splat(0);
-  V stable = splat(0);  ///< falling directions at the proven equilibrium
+  V allowed = splat(0);  ///< size of a step if all since the first one had shrunk just enough
+  V stable = splat(0);   ///< falling directions at the proven equilibrium
 
   // A change of stability ahead, met on a way too long to be proven: between `reached` and `change`.
   M enclosed = {}, hints = ~M{}, aimed = {}, by_halves = {};
@@ -170,7 +175,8 @@ struct LoadPath {
     by_halves |= lanes;
     fresh |= lanes;
     for (M* flag : {&ended, &aimed, &enclosed, &looking, &again}) *flag &= ~lanes;
-    for (V* number : {&factor, &reached, &ahead, &tries, &steps, &stable}) *number = select(lanes, splat(0), *number);
+    for (V* number : {&factor, &reached, &ahead, &tries, &steps, &stable, &aims})
+      *number = select(lanes, splat(0), *number);
     previous = select(lanes, splat(1), previous);
   }
 

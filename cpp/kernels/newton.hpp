@@ -292,8 +292,9 @@ struct Newton {
   M solve(M usable, bool corners, V& iterations, V& steps) {
     M done = ~usable & usable, failed = ~usable;
     LoadSteps way{P, s};
-    const double most_tries = in.max_iterations * (corners && in.patient ? 3.0 : 1.0);
-    const double whole_tries = in.patient ? 5 : 9, longest = in.patient ? 0.125 : 0.375;
+    const bool patient = in.patience == Patience::path;
+    const double most_tries = in.max_iterations * (corners && patient ? 3.0 : 1.0);
+    const double whole_tries = patient ? 5 : 9, longest = patient ? 0.125 : 0.375;
     V share = splat(1), straight = splat(0);  // of Newton's steps, where corners make them go to and fro
     way.begin(unloaded_lanes());
     for (int k = 0; k < most_iterations; ++k) {

@@ -159,6 +159,10 @@ struct Program {
   double home_p[3], home_R[9];  ///< tip pose at home, R by columns
 };
 
+/// How long a block of poses may take: a lane that needs more is left to a later pass, so that it holds up only its
+/// like.
+enum class Patience : std::int32_t { quick, leaps, path };
+
 /// What each pose asks, row-major.
 struct KernelInput {
   std::int64_t count;
@@ -169,8 +173,8 @@ struct KernelInput {
   double gravity[3];
   double point[3];  ///< reference point in the tip frame
   const std::int64_t*
-      index;             ///< the poses to solve, null: all; start, position and rotation go by place if start is given
-  std::int32_t patient;  ///< nothing is left for a second look
+      index;  ///< the poses to solve, null: all; start, position and rotation go by place if start is given
+  Patience patience;
   std::int32_t max_iterations;
   double tolerance;
   const Program* const* perturbed;    ///< variants of the program with the same operations
@@ -182,8 +186,8 @@ struct KernelInput {
 inline constexpr std::uint8_t pose_left = 0;  ///< to the reference path
 inline constexpr std::uint8_t pose_solved = 1, pose_unstable = 2, pose_unreachable = 3;
 inline constexpr std::uint8_t pose_ended = 4;  ///< the path of equilibria ends before the whole load
-inline constexpr std::uint8_t pose_slow = 5;   ///< to be looked at patiently, together with others
-inline constexpr std::uint8_t pose_heavy = 6;  ///< the same, but closed: its load is what takes long
+inline constexpr std::uint8_t pose_slow = 5;   ///< does not close at once: to be closed in leaps, together with others
+inline constexpr std::uint8_t pose_heavy = 6;  ///< closed, but its load takes long: to be followed in steps
 
 /// Row-major answers; null: not wanted. `done`: how the pose left the kernels.
 struct KernelOutput {

@@ -167,8 +167,8 @@ void* kernel_scratch(std::int64_t bytes) {
   return memory.get();
 }
 
-/// One call of the fast path: all poses in one quick pass, what that leaves packed into a patient one, the rest to the
-/// reference path.
+/// One call of the fast path: all poses in one quick pass, what that leaves packed into two patient ones, the rest to
+/// the reference path.
 class FastBatch {
  public:
   FastBatch(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const SolveOptions& options, int threads,
@@ -192,16 +192,20 @@ class FastBatch {
   }
 
   void run() {
-    kernels(in_.count, fast_chunk, nullptr);
+    kernels(in_.count, fast_chunk, nullptr, Patience::quick);
     std::vector<std::int64_t> left;
     const auto collect = [&](auto&& wanted) {
       for (Index i = 0; i < in_.count; ++i)
         if (wanted(done_[at(i)])) left.push_back(i);
     };
     // Side by side with their like: those that don't close yet, then those whose load is followed.
-    collect([](std::uint8_t how) { return how == pose_slow; });
-    collect([](std::uint8_t how) { return how == pose_heavy; });
-    if (!left.empty()) kernels(static_cast<Index>(left.size()), patient_chunk, left.data());
+    const auto again = [&](std::uint8_t which, Patience patience) {
+      left.clear();
+      collect([which](std::uint8_t how) { return how == which; });
+      if (!left.empty()) kernels(static_cast<Index>(left.size()), patient_chunk, left.data(), patience);
+    };
+    again(pose_slow, Patience::leaps);
+    again(pose_heavy, Patience::path);
     left.clear();
     collect([](std::uint8_t how) { return how == pose_left || how == pose_ended; });
     parallel_chunks(static_cast<long>(left.size()), 1, threads_, [&](int thread, long begin, long end) {
@@ -236,8 +240,8 @@ class FastBatch {
     if (thread == 0 && in_.poll) in_.poll();
   }
 
-  /// `index`: the poses of a patient pass; null: a quick pass over all.
-  void kernels(Index count, long chunk, const std::int64_t* index) {
+  /// `index`: the poses of a later pass; null: all.
+  void kernels(Index count, long chunk, const std::int64_t* index, Patience patience) {
     const KernelTable& table = kernel(count);
     const KernelOutput answer{out_.displacement,
                               options_.stiffness ? out_.stiffness : nullptr,
@@ -255,7 +259,7 @@ class FastBatch {
       Scratch& s = scratch_[at(thread)];
       KernelInput input = kernel_input(m_, in_, options_);
       input.index = index;
-      input.patient = index != nullptr;
+      input.patience = patience;
       input.perturbed = variants_.data();
       input.perturbed_leg = moved_.data();
       input.perturbed_count = out_.variants ? static_cast<std::int32_t>(variants_.size()) : 0;
