@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/enclosure.hpp"
 
-#include <Eigen/LU>
 #include <cmath>
 #include <limits>
 
@@ -18,23 +17,14 @@ bool turns(const Mechanism& m, Index j) { return m.coordinates[at(j)].type == Jo
 
 bool moves(const Coordinate& c) { return c.role == Role::actuator || (c.role == Role::passive && !c.locked); }
 
-/// (I - E)^-1 b for E >= 0; false unless that proves the spectral radius of E to be below one.
-bool majorise(const MatX& E, const MatX& b, MatX& out) {
-  const Index n = E.rows();
-  const Eigen::PartialPivLU<MatX> lu(MatX::Identity(n, n) - E);
-  const VecX one = lu.solve(VecX::Ones(n));
-  if (!(one.minCoeff() > 0) || !((one - E * one).minCoeff() > 0.5)) return false;
-  out = lu.solve(b);
-  return out.allFinite();
-}
-
 /// Approximate inverse of A from the left; its defect is accounted for by whoever uses it.
 bool left_inverse(const MatX& A, MatX& C) {
-  const Eigen::LLT<MatX> llt(A.transpose() * A);
+  const MatX N = A.transpose() * A;
+  const Eigen::LLT<MatX> llt(N);
   if (llt.info() != Eigen::Success) return false;
   C = llt.solve(A.transpose());
-  C += llt.solve(A.transpose() - (A.transpose() * A) * C);
-  return C.allFinite() && (C * A - MatX::Identity(A.cols(), A.cols())).cwiseAbs().maxCoeff() < 1e-6;
+  C += llt.solve(A.transpose() - N * C);
+  return C.allFinite();
 }
 
 }  // namespace
@@ -170,8 +160,16 @@ void Encloser::scale(const Mechanism& m, MatX& M) const {
     if (!m.task[at(i)]) M.row(i).setZero();
 }
 
+/// (I - E)^-1 b for E >= 0; false unless that proves the spectral radius of E to be below one.
+bool Encloser::Majorant::compute(const MatX& E) {
+  const Index n = E.rows();
+  lu_.compute(MatX::Identity(n, n) - E);
+  const VecX one = lu_.solve(VecX::Ones(n));
+  return one.minCoeff() > 0 && (one - E * one).minCoeff() > 0.5;
+}
+
 /// Image of `rest` under Krawczyk's operator about x_centre + G d, unknowns within `step` of the centre there.
-/// Leaves the bound of C A - I over the cell in E_.
+/// Leaves the change of A over the cell in change_.
 bool Encloser::widen(const Mechanism& m, const Vec3& half, const VecX& step, const VecX& rest, VecX& image) {
   const Index n = static_cast<Index>(unknown_.size()), rows = A_.rows();
   VecX unit(n);
@@ -217,9 +215,8 @@ bool Encloser::widen(const Mechanism& m, const Vec3& half, const VecX& step, con
     columns(m, arm, sign, row, turned, value, radius);
   });
   scale(m, radius);
-  E_ = absC_ * (change + radius) + defect_;
-  for (std::size_t k = 0; k < 3; ++k) E_ += half[static_cast<Index>(k)] * P_[k].cwiseAbs();
-  image = q_ + absC_ * (0.5 * curved + extra) + defect_ * step + E_ * rest;
+  change_ = change + radius;
+  image = q_ + absC_ * (0.5 * curved + extra + change_ * rest) + defect_ * (step + rest) + bent_ * rest;
   image.array() += cushion * m.length;
   return image.allFinite();
 }
@@ -230,6 +227,7 @@ bool Encloser::exists(const Mechanism& m, const Vec3& half) {
   if (!left_inverse(A_, C_)) return false;
   absC_ = C_.cwiseAbs();
   defect_ = (C_ * A_ - MatX::Identity(n, n)).cwiseAbs();
+  if (!(defect_.maxCoeff() < 1e-6)) return false;
   MatX B = MatX::Zero(rows, G_.cols());
   B.topRows(6) = lost_.topRows(6);
   G_ = C_ * B;
@@ -244,12 +242,14 @@ bool Encloser::exists(const Mechanism& m, const Vec3& half) {
   });
   lost_ = MatX::Zero(rows, 1);
   q_ = VecX::Zero(n);
+  bent_.setZero(n, n);
   for (std::size_t k = 0; k < 3; ++k) {
     scale(m, bend_.at[k]);
     P_[k] = C_ * bend_.at[k];
     const double h = half[static_cast<Index>(k)];
     q_ += 0.5 * h * (P_[k] * G_.leftCols(3)).cwiseAbs() * half;
     lost_ += h * (bend_.at[k] * G_.leftCols(3)).cwiseAbs() * half;
+    bent_ += h * P_[k].cwiseAbs();
   }
   const VecX step = G_.leftCols(3).cwiseAbs() * half;
   VecX rest = 1.2 * q_, image;
@@ -266,8 +266,11 @@ bool Encloser::exists(const Mechanism& m, const Vec3& half) {
   if (!found) return false;
   rest_ = rest;
   widen(m, half, step, rest_, image);
-  rest_ = image;  // still holds every solution
-  return majorise(E_, E_ * G_.cwiseAbs(), dG_);
+  rest_ = image;                                     // still holds every solution
+  E_.noalias() = absC_ * change_ + defect_ + bent_;  // of C A - I over the cell
+  if (!majorant_.compute(E_)) return false;
+  dG_ = majorant_.solve(E_ * G_.cwiseAbs());
+  return dG_.allFinite();
 }
 
 void Encloser::enclose(const Mechanism& m, const Frames& frames, const VecX& x, const Mat3& axes, const Vec3& half,
@@ -319,13 +322,11 @@ void Encloser::enclose(const Mechanism& m, const Frames& frames, const VecX& x, 
   for (std::size_t k = 0; k < 3; ++k) {
     scale(m, bend_.radius[k]);
     change[k] = -P_[k] * G_;
-    MatX slack_k;
-    if (!majorise(
-            E_, E_ * change[k].cwiseAbs() + P_[k].cwiseAbs() * dG_ + absC_ * (bend_.radius[k] * (G_.cwiseAbs() + dG_)),
-            slack_k))
-      return;
-    total += half[static_cast<Index>(k)] * slack_k;
+    const MatX right =
+        E_ * change[k].cwiseAbs() + P_[k].cwiseAbs() * dG_ + absC_ * (bend_.radius[k] * (G_.cwiseAbs() + dG_));
+    total += half[static_cast<Index>(k)] * majorant_.solve(right);
   }
+  if (!total.allFinite()) return;
   out.G.setZero(m.size(), slopes);
   out.slack.setZero(m.size(), slopes);
   out.radius.setZero(m.size());

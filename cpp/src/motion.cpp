@@ -12,6 +12,7 @@ constexpr double closed = 1e-12;        // relative to the mechanism's length
 constexpr double sound_pivot = 1e-8;    // of the normal matrix: below it, the rank is revealed
 constexpr double nearest = 0.3;         // of the length: a last pose within it is a start
 constexpr double shortest_leap = 0.02;  // of the way from home
+constexpr double shortest_step = 0.05;  // of the way from a start
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
@@ -145,11 +146,33 @@ double LoopRates::fill_normal() {
   return smallest;
 }
 
+/// A x, over the columns that each loop has.
+MatX LoopRates::product(const MatX& x) const {
+  MatX out = MatX::Zero(A_.rows(), x.cols());
+  for (std::size_t l = 0; l < columns_.size(); ++l) {
+    const Index row = 6 * static_cast<Index>(l);
+    for (Index k : columns_[l])
+      for (Index c = 0; c < x.cols(); ++c) out.col(c).segment<6>(row) += x(k, c) * A_.col(k).segment<6>(row);
+  }
+  return out;
+}
+
+/// A' e.
+MatX LoopRates::transposed_product(const MatX& e) const {
+  MatX out = MatX::Zero(A_.cols(), e.cols());
+  for (std::size_t l = 0; l < columns_.size(); ++l) {
+    const Index row = 6 * static_cast<Index>(l);
+    for (Index k : columns_[l])
+      for (Index c = 0; c < e.cols(); ++c) out(k, c) += A_.col(k).segment<6>(row).dot(e.col(c).segment<6>(row));
+  }
+  return out;
+}
+
 /// Least squares; one correction with the residual makes up for the squared condition of the normal matrix.
 MatX LoopRates::solve_scaled(const MatX& e) const {
   if (!regular_) return cod_.solve(e);
-  MatX x = llt_.solve(A_.transpose() * e);
-  x += llt_.solve(A_.transpose() * (e - A_ * x));
+  MatX x = llt_.solve(transposed_product(e));
+  x += llt_.solve(transposed_product(e - product(x)));
   return x;
 }
 
@@ -176,7 +199,7 @@ void LoopRates::motion(const Mechanism& m, const Frames& frames, Motion& out) co
   if (!passive_.empty()) {
     const MatX x = solve_scaled(-B);
     const double size = std::max(B.cwiseAbs().maxCoeff(), 1e-300);
-    out.misfit = (A_ * x + B).cwiseAbs().maxCoeff() / size;
+    out.misfit = (product(x) + B).cwiseAbs().maxCoeff() / size;
     for (std::size_t k = 0; k < passive_.size(); ++k)
       out.rates.row(passive_[k]) = x.row(static_cast<Index>(k)) / m.unit(passive_[k]);
   }
@@ -306,24 +329,28 @@ double PoseCloser::pivot(const Mechanism& m, const Pose& pose) {
   return pivots.minCoeff() / pivots.maxCoeff();
 }
 
-/// Straight continuation from home.
-bool PoseCloser::from_home(const Mechanism& m, const Pose& pose, VecX& x) {
-  x = m.home_coordinates;
-  const Vec3 turn = log_so3(pose.R * m.home.R.transpose());
+/// Straight continuation from closed coordinates `x` at another pose, in leaps that may be halved to `shortest`.
+bool PoseCloser::continued(const Mechanism& m, const Pose& from, const Pose& pose, double shortest, VecX& x) {
+  const Vec3 turn = log_so3(pose.R * from.R.transpose());
   double done = 0, leap = 1;
   while (done < 1) {
     const double s = std::min(1.0, done + leap);
-    const Pose way = s == 1 ? pose : Pose{m.home.p + s * (pose.p - m.home.p), exp_so3(s * turn) * m.home.R};
+    const Pose way = s == 1 ? pose : Pose{from.p + s * (pose.p - from.p), exp_so3(s * turn) * from.R};
     trial_ = x;
     if (newton(m, way, trial_)) {
       x = trial_;
       done = s;
       leap *= 2;
-    } else if ((leap *= 0.5) < shortest_leap) {
+    } else if ((leap *= 0.5) < shortest) {
       return false;
     }
   }
   return true;
+}
+
+bool PoseCloser::from_home(const Mechanism& m, const Pose& pose, VecX& x) {
+  x = m.home_coordinates;
+  return continued(m, m.home, pose, shortest_leap, x);
 }
 
 void PoseCloser::remember(const Pose& pose, const VecX& x) {
@@ -350,16 +377,19 @@ bool PoseCloser::extrapolated(const Pose& pose, VecX& x) const {
   return true;
 }
 
+void PoseCloser::at_rest(const Mechanism& m, VecX& x) const {
+  for (Index j = 0; j < m.size(); ++j)
+    if (m.coordinates[at(j)].role == Role::spring) x[j] = 0;
+    else if (m.coordinates[at(j)].role == Role::passive && m.coordinates[at(j)].locked) x[j] = m.home_coordinates[j];
+}
+
 ClosureResult PoseCloser::close(const Mechanism& m, const Pose& pose, VecX& x, bool patient) {
   ClosureResult out;
   const VecX given = x;
   bool ok = false;
   if (pose.p.allFinite() && pose.R.allFinite()) {
     if (given.allFinite()) {
-      for (Index j = 0; j < m.size(); ++j)
-        if (m.coordinates[at(j)].role == Role::spring) x[j] = 0;
-        else if (m.coordinates[at(j)].role == Role::passive && m.coordinates[at(j)].locked)
-          x[j] = m.home_coordinates[j];
+      at_rest(m, x);
       ok = newton(m, pose, x);
     }
     const bool near =
@@ -375,6 +405,21 @@ ClosureResult PoseCloser::close(const Mechanism& m, const Pose& pose, VecX& x, b
       if (ok) residual(m, pose, x);
     }
   }
+  return answer(m, pose, x, ok, out);
+}
+
+ClosureResult PoseCloser::continue_from(const Mechanism& m, const Pose& pose, VecX& x) {
+  bool ok = pose.p.allFinite() && pose.R.allFinite() && x.allFinite();
+  if (ok) {
+    at_rest(m, x);
+    tree_.forward(x, ws_.frames);
+    const Pose from = ws_.frames.at(m.tip);
+    ok = continued(m, from, pose, shortest_step, x);
+  }
+  return answer(m, pose, x, ok, {});
+}
+
+ClosureResult PoseCloser::answer(const Mechanism& m, const Pose& pose, const VecX& x, bool ok, ClosureResult out) {
   if (!ok) {
     has_last_ = false;
     even_ = 0;

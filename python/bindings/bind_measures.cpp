@@ -34,9 +34,9 @@ Inertias inertias_of(const Mechanism& m, const Array& values) {
 }
 
 /// Coordinates, drive Jacobian and, where wanted, the rates of all coordinates. `start`: coordinates near
-/// the answer (NaN: none known), or no rows.
+/// the answer (NaN: none known), or no rows. `only`: poses are continued from their starts and nowhere else.
 py::dict kinematics(const Mechanism& m, const Array& position, const Array& rotation, const Array& start, bool rates,
-                    bool patient, int threads) {
+                    bool patient, bool only, int threads) {
   const py::ssize_t n = count_of(position), size = m.size(), drives = static_cast<py::ssize_t>(m.drives.size());
   const double *p = data(position, {n, 3}, "position"), *R = data(rotation, {n, 3, 3}, "rotation");
   const double* x0 = count_of(start) ? data(start, {n, size}, "start") : nullptr;
@@ -60,8 +60,8 @@ py::dict kinematics(const Mechanism& m, const Array& position, const Array& rota
       for (long i = begin; i < end; ++i) {
         if (x0) x = Eigen::Map<const VecX>(x0 + size * i, size);
         else x.setConstant(nan);
-        const ClosureResult r =
-            closer.close(m, {Eigen::Map<const Vec3>(p + 3 * i), Mat3(Eigen::Map<const Row3>(R + 9 * i))}, x, patient);
+        const Pose pose{Eigen::Map<const Vec3>(p + 3 * i), Mat3(Eigen::Map<const Row3>(R + 9 * i))};
+        const ClosureResult r = only ? closer.continue_from(m, pose, x) : closer.close(m, pose, x, patient);
         states[i] = static_cast<std::uint8_t>(r.status);
         bits[i] = r.flags;
         if (r.status != Status::converged) continue;
@@ -97,13 +97,14 @@ py::dict kinematics(const Mechanism& m, const Array& position, const Array& rota
   return out;
 }
 
-/// Coordinates and their slopes over cells: centre + axes * d, |d_k| <= half_k.
+/// Coordinates and their slopes over cells: centre + axes * d, |d_k| <= half_k. `start` as above.
 py::dict enclose(const Mechanism& m, const Array& centre, const Array& half, const Array& axes, const Array& rotation,
-                 int slopes, const std::vector<Index>& watched, int threads) {
+                 const Array& start, int slopes, const std::vector<Index>& watched, int threads) {
   const py::ssize_t n = count_of(centre), size = m.size(), nodes = static_cast<py::ssize_t>(watched.size());
   const double *p = data(centre, {n, 3}, "centre"), *h = data(half, {n, 3}, "half");
   const Mat3 R = Eigen::Map<const Row3>(data(rotation, {3, 3}, "rotation")),
              along = Eigen::Map<const Row3>(data(axes, {3, 3}, "axes"));
+  const double* x0 = count_of(start) ? data(start, {n, size}, "start") : nullptr;
   auto x_out = unknown({n, size}), slope = unknown({n, size, slopes}), radius = unknown({n, size}),
        change = unknown({n, 3, size, slopes}), slack = unknown({n, size, slopes}), moved = unknown({n, nodes}),
        position = unknown({n, nodes, 3}), bend = unknown({n, 3});
@@ -120,7 +121,8 @@ py::dict enclose(const Mechanism& m, const Array& centre, const Array& half, con
       Enclosure e;
       VecX x(m.size());
       for (long i = begin; i < end; ++i) {
-        x.setConstant(nan);
+        if (x0) x = Eigen::Map<const VecX>(x0 + size * i, size);
+        else x.setConstant(nan);
         const ClosureResult r = closer.close(m, {Eigen::Map<const Vec3>(p + 3 * i), R}, x, false);
         shut[i] = r.status == Status::converged;
         good[i] = false;
@@ -267,9 +269,11 @@ void bind_measures(py::module_& m) {
                                for (const Coordinate& c : k.coordinates) out.emplace_back(c.lower, c.upper);
                                return out;
                              })
-      .def("kinematics", &kinematics, "position"_a, "rotation"_a, "start"_a, "rates"_a, "patient"_a, "threads"_a)
+      .def("kinematics", &kinematics, "position"_a, "rotation"_a, "start"_a, "rates"_a, "patient"_a, "only"_a,
+           "threads"_a)
       .def_property_readonly("not_enclosed", &Encloser::missing)
-      .def("enclose", &enclose, "centre"_a, "half"_a, "axes"_a, "rotation"_a, "slopes"_a, "watched"_a, "threads"_a)
+      .def("enclose", &enclose, "centre"_a, "half"_a, "axes"_a, "rotation"_a, "start"_a, "slopes"_a, "watched"_a,
+           "threads"_a)
       .def("dynamics", &dynamics, "inertias"_a, "coordinates"_a, "twist"_a, "twist_rate"_a, "wrench"_a, "gravity"_a,
            "threads"_a)
       .def("modes", &modes, "inertias"_a, "position"_a, "rotation"_a, "wrench"_a, "gravity"_a, "count"_a, "threads"_a);

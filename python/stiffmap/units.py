@@ -82,6 +82,20 @@ def _scale(length: str, force: str, mass: str, dimension: Dimension) -> Fraction
     )
 
 
+@lru_cache
+def _power_of_ten(scale: Fraction) -> int | None:
+    """Exponent of a scale that is a power of ten."""
+    exponent = len(str(scale.numerator)) - len(str(scale.denominator))
+    return exponent if scale == Fraction(10) ** exponent else None
+
+
+def _rounded_once(number: str, scale: Fraction) -> float:
+    exponent = _power_of_ten(scale)
+    if exponent is None or not number.replace(".", "").lstrip("-").isdigit():
+        return float(Fraction(number) * scale)
+    return float(f"{number}e{exponent}")
+
+
 @dataclass(frozen=True)
 class UnitSystem:
     """The units that a file declares once; derived units follow from them."""
@@ -95,7 +109,7 @@ class UnitSystem:
         """SI value of ``value``, rounded once: 775 mm is the double nearest to 0.775 m."""
         scale = _scale(self.length, self.force, self.mass, dimension)
         # repr gives the decimal number that was written, so that no binary rounding enters twice
-        result = value if scale == 1 else float(Fraction(repr(float(value))) * scale)
+        result = value if scale == 1 else _rounded_once(repr(float(value)), scale)
         if self.angle == "deg" and dimension.angle:
             result *= math.radians(1.0) ** dimension.angle
         return float(result)

@@ -2,6 +2,7 @@
 // Coordinates and their slopes enclosed over a whole cell of positions, springs at rest (theory D8).
 #pragma once
 
+#include <Eigen/LU>
 #include <array>
 #include <string>
 
@@ -50,6 +51,15 @@ class Encloser {
     std::array<MatX, 3> at, radius;
   };
 
+  class Majorant {
+   public:
+    bool compute(const MatX& E);
+    MatX solve(const MatX& b) const { return lu_.solve(b); }
+
+   private:
+    Eigen::PartialPivLU<MatX> lu_;
+  };
+
   void build(const Mechanism& m, const Frames& frames, Index end, Arm& arm) const;
   void bound(const Mechanism& m, const VecX& swing, Arm& arm) const;
   void columns(const Mechanism& m, const Arm& arm, double sign, Index row, double extra, MatX& at, MatX& radius) const;
@@ -64,7 +74,8 @@ class Encloser {
   Arm tip_;
   std::vector<std::array<Arm, 2>> loops_;
   std::vector<Index> unknown_;
-  MatX A_, C_, absC_, E_, G_, dG_, defect_, lost_;
+  Majorant majorant_;
+  MatX A_, C_, absC_, change_, bent_, E_, G_, dG_, defect_, lost_;
   std::array<MatX, 3> P_;
   VecX q_, rest_;
   Bend bend_;

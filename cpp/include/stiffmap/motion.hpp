@@ -63,6 +63,8 @@ class LoopRates {
 
  private:
   MatX solve_scaled(const MatX& e) const;
+  MatX product(const MatX& x) const;
+  MatX transposed_product(const MatX& e) const;
   double fill_normal();
 
   RigidTree tree_;
@@ -84,6 +86,8 @@ class PoseCloser {
   /// `x`: start (NaN: none) in, closed coordinates out. Frames of the answer are in `frames()`. Impatient:
   /// a pose that a straight continuation from home does not reach counts as out of reach.
   ClosureResult close(const Mechanism& m, const Pose& pose, VecX& x, bool patient = true);
+  /// From closed coordinates `x` of a neighbouring pose and nowhere else, so that the answer continues them.
+  ClosureResult continue_from(const Mechanism& m, const Pose& pose, VecX& x);
   const Frames& frames() const { return ws_.frames; }
   /// Of the equations at the closed pose: the smallest pivot relative to the largest, unpivoted.
   double pivot(const Mechanism& m, const Pose& pose);
@@ -91,7 +95,10 @@ class PoseCloser {
  private:
   bool newton(const Mechanism& m, const Pose& pose, VecX& x);
   void normal(const Mechanism& m, const Pose& pose);
+  bool continued(const Mechanism& m, const Pose& from, const Pose& pose, double shortest, VecX& x);
   bool from_home(const Mechanism& m, const Pose& pose, VecX& x);
+  void at_rest(const Mechanism& m, VecX& x) const;
+  ClosureResult answer(const Mechanism& m, const Pose& pose, const VecX& x, bool ok, ClosureResult out);
   void remember(const Pose& pose, const VecX& x);
   bool extrapolated(const Pose& pose, VecX& x) const;
   double residual(const Mechanism& m, const Pose& pose, const VecX& x);

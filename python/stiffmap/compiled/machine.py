@@ -222,15 +222,22 @@ class CompiledMachine:
         return tuple(self._mechanism.limits)
 
     def rates(
-        self, position: Floats, rotation: Floats, start: Floats | None, *, patient: bool, threads: int
+        self,
+        position: Floats,
+        rotation: Floats,
+        start: Floats | None,
+        *,
+        patient: bool,
+        only: bool,
+        threads: int,
     ) -> dict[str, Any]:
         """Arrays by name: closed coordinates and the drives' Jacobian of (n, 3) positions.
 
         start: (n, coordinates) near the answer, NaN where none is known. Not patient: a pose that straight
-        continuation from home does not reach is out of reach.
+        continuation from home does not reach is out of reach. Only: so is one that its start does not lead to.
         """
         begin = np.zeros((0, len(self.names.coordinates))) if start is None else start
-        return self._mechanism.kinematics(position, rotation, begin, False, patient, threads)
+        return self._mechanism.kinematics(position, rotation, begin, False, patient, only, threads)
 
     @property
     def not_enclosed(self) -> str:
@@ -244,17 +251,19 @@ class CompiledMachine:
         axes: Floats,
         rotation: Floats,
         *,
+        start: Floats | None = None,
         slopes: int,
         watched: Sequence[int],
         threads: int,
     ) -> dict[str, Any]:
         """Arrays by name: what holds over the cells (n, 3) centre, half lengths along the columns of axes (3, 3).
 
-        slopes: 3 columns (translations) or 6 (twists) of the coordinates' slopes. watched: frames whose
-        motion is bounded.
+        start: (n, coordinates) near those of the centres, NaN where none is known. slopes: 3 columns
+        (translations) or 6 (twists) of the coordinates' slopes. watched: frames whose motion is bounded.
         """
+        begin = np.zeros((0, len(self.names.coordinates))) if start is None else start
         return self._mechanism.enclose(
-            centre, half, np.ascontiguousarray(axes), rotation, slopes, list(watched), threads
+            centre, half, np.ascontiguousarray(axes), rotation, begin, slopes, list(watched), threads
         )
 
     def dynamics(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from stiffmap.description import Block, Branch, Element, MachineDescription
 from stiffmap.description.pose import Vector
-from stiffmap.design.places import indices
+from stiffmap.design.places import indices, unshared
 from stiffmap.errors import StiffmapError
 from stiffmap.files.build_elements import build_element
 from stiffmap.files.context import Context, Gathered
@@ -78,7 +77,7 @@ class Editor:
         built: dict[str, dict[Address, Element]] = {}
         known: dict[str, Element] = {}
         for (sequence, address), places in self.elements.items():
-            raw = deepcopy(self._raw(sequence, address))
+            raw = unshared(self._raw(sequence, address))
             for place, inner in places:
                 _set(raw, inner[len(address) :], values[place])
             key = repr(raw)

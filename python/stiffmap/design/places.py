@@ -86,3 +86,12 @@ def _elements(at: Any) -> list[str]:
     if not isinstance(at, list):
         return []
     return [f"{s}[{e[s]}]" for e in at if isinstance(e, dict) for s in sorts if s in e]
+
+
+def unshared(data: Any) -> Any:
+    """Anchors of YAML are one object in several places: each place gets its own."""
+    if isinstance(data, dict):
+        return {k: unshared(v) for k, v in data.items()}
+    if isinstance(data, list):
+        return [unshared(v) for v in data]
+    return data

@@ -15,7 +15,7 @@ from pydantic import Field
 from stiffmap.broadcasting import Floats
 from stiffmap.design.editing import Editor
 from stiffmap.design.expressions import evaluate
-from stiffmap.design.places import put
+from stiffmap.design.places import put, unshared
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.files.load import describe_document
 from stiffmap.files.report import validated
@@ -115,7 +115,7 @@ class Design:
 
     def data(self, x: Floats) -> Any:
         """The machine file's data with the design's numbers."""
-        data = _unshared(self.document.data)
+        data = unshared(self.document.data)
         names = self.names(x)
         for place, text in self.model.numbers.items():
             put(data, place, evaluate(text, names))
@@ -136,22 +136,13 @@ class Design:
 
     @cached_property
     def _editor(self) -> Editor:
-        document = Document(_unshared(self.document.data), self.document.lines)
+        document = Document(unshared(self.document.data), self.document.lines)
         return Editor(document, self.machine_file, list(self.model.numbers))
 
     def machine(self, x: Floats) -> Machine:
         """The machine of a vector of variables; StiffmapError where it cannot be."""
         document = Document(self.data(x), self.document.lines)
         return Machine(describe_document(document, self.machine_file, Path(self.machine_file).parent))
-
-
-def _unshared(data: Any) -> Any:
-    """Anchors of YAML are one object in several places: each place gets its own."""
-    if isinstance(data, dict):
-        return {k: _unshared(v) for k, v in data.items()}
-    if isinstance(data, list):
-        return [_unshared(v) for v in data]
-    return data
 
 
 def load_design(path: str | PathLike[str]) -> Design:
@@ -228,7 +219,7 @@ def _try(design: Design, fail: Any) -> None:
         names = design.names((low + high) / 2)
     except StiffmapError as error:
         raise fail(str(error), "derived") from None
-    data = _unshared(design.document.data)
+    data = unshared(design.document.data)
     for place, text in design.model.numbers.items():
         try:
             put(data, place, evaluate(text, names))

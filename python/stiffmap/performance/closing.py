@@ -45,6 +45,7 @@ def drive_kinematics(
     *,
     start: ArrayLike | None = None,
     patient: bool = True,
+    only_start: bool = False,
     threads: int | None = None,
 ) -> DriveKinematics:
     """Jacobian from the drives to the TCP at commanded poses (..., 3) m, rotation (..., 3, 3).
@@ -52,7 +53,8 @@ def drive_kinematics(
     Any machine: passive rates follow from all loops by rank-revealing elimination. `start`
     (..., coordinates): coordinates near the answer; None: continued from the pose before. `patient`: False
     takes a pose that straight continuation from home does not reach as UNREACHABLE, without the slow
-    second attempt. Raises StiffmapError for bad input, never for a pose.
+    second attempt. `only_start`: coordinates of a neighbouring pose, which each pose continues; one that
+    they do not lead to is UNREACHABLE. Raises StiffmapError for bad input, never for a pose.
     """
     p = trailing(position, (3,), "position", "positions (m)")
     r = trailing(
@@ -71,7 +73,11 @@ def drive_kinematics(
     begin: Floats | None = None
     if start is not None:
         begin = rows(trailing(start, (size,), "start", "coordinates"), shape, (size,))
-    out = compiled.rates(flat_p, flat_r, begin, patient=patient, threads=thread_count(threads))
+    if only_start and begin is None:
+        raise StiffmapError("only_start: needs start, coordinates of neighbouring poses")
+    out = compiled.rates(
+        flat_p, flat_r, begin, patient=patient, only=only_start, threads=thread_count(threads)
+    )
     drives = list(compiled.drives)
     shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items() if k not in ("rates", "misfit")}
     return DriveKinematics(actuators=shaped["coordinates"][..., drives], **shaped)

@@ -155,7 +155,7 @@ class Inside:
 
     def _from(self, p: Floats, start: Floats) -> DriveKinematics:
         b = self.bounds
-        return drive_kinematics(b.machine, p, b.rotation, start=start, patient=False, threads=b.threads)
+        return drive_kinematics(b.machine, p, b.rotation, start=start, only_start=True, threads=b.threads)
 
     def _judge(
         self,

@@ -15,7 +15,7 @@ from stiffmap.description.machine import TASK
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.performance.bars import Bars
-from stiffmap.performance.closing import DriveKinematics, drive_kinematics
+from stiffmap.performance.closing import DriveKinematics, drive_kinematics, kernel_starts
 from stiffmap.performance.scaling import characteristic_length, revolute_drives, weighted
 from stiffmap.performance.zonotopes import corners, inverse_rows
 from stiffmap.status import Status
@@ -75,7 +75,7 @@ class Bounds:
     """N, plane, m: force in its worst direction there, and the largest deflection."""
     threads: int | None = None
     counter: list[int] = field(default_factory=lambda: [0])
-    known: list[tuple[Floats, Floats, cKDTree]] = field(default_factory=list)
+    known: list[tuple[Floats, Floats]] = field(default_factory=list)
     """Positions and coordinates of poses that were closed, as starts for others: none or one entry."""
 
     def __post_init__(self) -> None:
@@ -134,12 +134,14 @@ class Bounds:
         return limits
 
     def closed(self, position: Floats) -> DriveKinematics:
-        """Kinematics at poses, begun at the nearest pose that was closed before."""
+        """Kinematics at poses, begun at the kernels' answer, else at the nearest pose that was closed before."""
         self.counter[0] += len(position)
-        start = None
-        if self.known:
-            _, coordinates, tree = self.known[0]
-            start = coordinates[tree.query(position)[1]]
+        start = kernel_starts(self.machine, position, self.rotation, self.threads)
+        far = np.ones(len(position), dtype=bool) if start is None else np.isnan(start[:, 0])
+        if self.known and far.any():
+            there, coordinates = self.known[0]
+            start = np.empty((len(position), coordinates.shape[1])) if start is None else start
+            start[far] = coordinates[cKDTree(there).query(position[far])[1]]
         k = drive_kinematics(
             self.machine, position, self.rotation, start=start, patient=False, threads=self.threads
         )
@@ -149,7 +151,7 @@ class Bounds:
             if self.known:
                 new = np.concatenate([self.known[0][0], new])
                 there = np.concatenate([self.known[0][1], there])
-            self.known[:] = [(new, there, cKDTree(new))]
+            self.known[:] = [(new, there)]
         return k
 
     def inside(self, position: Floats) -> NDArray[np.bool_]:
@@ -225,9 +227,10 @@ class Bounds:
         wide = self.transmission is not None and len(drives) == 6
         watched = self.bars.nodes if self.clearance is not None else ()
         rotation = compiled.home_rotation if self.rotation is None else self.rotation
+        start = kernel_starts(self.machine, centre, self.rotation, self.threads)
         e = compiled.enclose(
-            np.ascontiguousarray(centre), np.ascontiguousarray(half), axes, rotation, slopes=6 if wide else 3,
-            watched=watched, threads=thread_count(self.threads),
+            np.ascontiguousarray(centre), np.ascontiguousarray(half), axes, rotation, start=start,
+            slopes=6 if wide else 3, watched=watched, threads=thread_count(self.threads),
         )  # fmt: skip
         ok = np.asarray(e["enclosed"])
         names, most, least = (
@@ -351,9 +354,17 @@ def _spectral(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_])
     left = np.full((n, matrix.shape[1] * matrix.shape[2]), np.nan)
     ok = closed & np.isfinite(matrix).all(axis=(1, 2))
     if ok.any():
-        u, s, vh = np.linalg.svd(matrix[ok], full_matrices=False)
-        value[ok] = s[:, 0]
-        left[ok] = (u[:, :, 0, None] * vh[:, None, 0, :]).reshape(ok.sum(), -1)
+        a = matrix[ok]
+        wide = a.shape[2] > a.shape[1]
+        a = np.swapaxes(a, 1, 2) if wide else a
+        v = np.linalg.eigh(np.swapaxes(a, 1, 2) @ a)[1][
+            :, :, -1
+        ]  # quicker than svd, exact enough for the largest
+        image = (a @ v[:, :, None])[:, :, 0]
+        value[ok] = size = np.linalg.norm(image, axis=1)
+        u = image / np.maximum(size, 1e-300)[:, None]
+        u, v = (v, u) if wide else (u, v)
+        left[ok] = (u[:, :, None] * v[:, None, :]).reshape(len(a), -1)
     return Limit(name, value, most, matrix.reshape(n, left.shape[1]), left)
 
 

@@ -211,3 +211,13 @@ def test_what_is_proven_of_bars_depends_on_no_thread():
     assert np.isfinite(one).all()
     for other in more:
         np.testing.assert_allclose(other, one, rtol=1e-6)
+
+
+def test_bounds_and_volumes_depend_on_no_thread():
+    machine = sm.load_machine("orthoglide-original")
+    boxes = [sm.largest_box(machine, gap=2e-3, threads=n) for n in (1, 2)]
+    assert boxes[0].edge == boxes[1].edge
+    assert boxes[0].edge_upper == boxes[1].edge_upper
+    assert boxes[0].poses == boxes[1].poses
+    volumes = [sm.workspace_volume(machine, cells=6, threads=n).volume for n in (1, 2)]
+    assert volumes[0] == volumes[1]

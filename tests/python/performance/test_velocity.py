@@ -158,3 +158,23 @@ def test_a_bad_length_is_refused(bad):
 def test_undeclared_speeds_name_the_actuators():
     with pytest.raises(sm.StiffmapError, match=r"no speed declared for .*base"):
         sm.velocity_transmission(sm.load_machine("ur10"), [-0.8, 0, 0.3], limits="declared")
+
+
+@pytest.mark.parametrize("name", ["orthoglide-revised", "hexapod", "five-bar", "ur10"])
+def test_poses_continued_from_their_starts_alone(name):
+    """Neighbours lead to the same answer as closing from home; a start is asked for, and a false one is refused."""
+    machine = sm.load_machine(name)
+    low, high = machine.workspace
+    p = RNG.uniform(low, high, (30, 3))
+    k = drive_kinematics(machine, p)
+    p, x = p[k.status == sm.Status.CONVERGED], k.coordinates[k.status == sm.Status.CONVERGED]
+    step = 0.02 * (high - low)
+    near = drive_kinematics(machine, p + step, start=x, only_start=True)
+    both = (near.status == sm.Status.CONVERGED) & (drive_kinematics(machine, p + step).status == 0)
+    assert both.mean() > 0.9
+    back = drive_kinematics(machine, p[both], start=near.coordinates[both], only_start=True)
+    np.testing.assert_allclose(back.coordinates, x[both], atol=1e-8)
+    lost = drive_kinematics(machine, p, start=np.full_like(x, np.nan), only_start=True)
+    assert (lost.status == sm.Status.UNREACHABLE).all()
+    with pytest.raises(sm.StiffmapError, match="only_start: needs start"):
+        drive_kinematics(machine, p, only_start=True)

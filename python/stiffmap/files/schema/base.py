@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from functools import cache
 from typing import Annotated, Any, Self
 
 from pydantic import (
@@ -51,7 +52,7 @@ class FileModel(BaseModel):
         if isinstance(data, BaseModel):
             return handler(data)
         data = cls.as_mapping(data)
-        known = [f.alias or name for name, f in cls.model_fields.items()]
+        known = _keys_of(cls)
         if not isinstance(data, dict):
             raise PydanticCustomError(
                 "mapping_expected",
@@ -69,6 +70,11 @@ class FileModel(BaseModel):
             inside = [e for e in error.errors(include_url=False) if e["loc"] and e["type"] != "missing"]
             problems += [_once_more(e) for e in inside]
         raise ValidationError.from_exception_data(cls.__name__, problems)
+
+
+@cache
+def _keys_of(model: type[FileModel]) -> list[str]:
+    return [f.alias or name for name, f in model.model_fields.items()]
 
 
 def _unknown_key(key: str, known: list[str], data: Any) -> InitErrorDetails:
