@@ -4,6 +4,7 @@
 
 #include "frames.hpp"
 #include "load_steps.hpp"
+#include "serial.hpp"
 #include "steps.hpp"
 #include "tangents.hpp"
 #include "tip_springs.hpp"
@@ -168,15 +169,19 @@ struct Newton {
   /// One copy of the code, as of `evaluate` and `linearize`: two could contract differently, and a
   /// pose's last bits would tell which of them ran.
   [[gnu::noinline]] void frames_and_wrenches() {
+    frames();
+    V6 F = load;
+    V3 at = point;
+    wrenches(e, P.chains[P.root], F, at);
+  }
+
+  [[gnu::noinline]] void frames() {
     tip = {{splat(0), splat(0), splat(0)},
            {{{splat(1), splat(0), splat(0)}, {splat(0), splat(1), splat(0)}, {splat(0), splat(0), splat(1)}}}};
     walk<Build::actual>(P, P.chains[P.root], s.x, tip, s, e.only);
     point = tip.p;
     if (in.point[0] != 0 || in.point[1] != 0 || in.point[2] != 0)
       point = point + tip.R * V3{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
-    V6 F = load;
-    V3 at = point;
-    wrenches(e, P.chains[P.root], F, at);
   }
 
   /// The external springs act where the tip is now. Apart from the other passes, so that machines without such springs
@@ -281,6 +286,14 @@ struct Newton {
     back(e, P.chains[P.root], get(eta), point, V3{}, active);
   }
 
+  /// The same for an arm of joints alone, from frames alone.
+  [[gnu::noinline]] void step_joints() {
+    frames();
+    e.lowest = splat(1e300);
+    serial_step(e, point, load, pending);
+    e.transferred = splat(0);
+  }
+
   void take(M lanes, const V (&m)[6][6]) {
     answer = select(lanes, K, answer);
     for (int i = 0; i < 6; ++i)
@@ -295,35 +308,45 @@ struct Newton {
     const bool patient = in.patience == Patience::path;
     const double most_tries = in.max_iterations * (corners && patient ? 3.0 : 1.0);
     const double whole_tries = patient ? 5 : 9, longest = patient ? 0.125 : 0.375;
+    const M unloaded = unloaded_lanes();
+    M near = corners ? M{} : unloaded;        // lanes of an arm that stand, but for round-off, at their answer
     V share = splat(1), straight = splat(0);  // of Newton's steps, where corners make them go to and fro
-    way.begin(unloaded_lanes());
+    way.begin(unloaded);
     for (int k = 0; k < most_iterations; ++k) {
       const bool secant = corners && k == 0;
       const M first = way.factor > way.acting;
       put_load(way.acting, way.factor);
+      // An arm finds its joints by themselves; lanes that are there wait for the others' to be linearised together.
+      const M on = ~done & ~failed, moving = on & ~near;
+      const bool joints = P.serial_joints > 0 && any(moving);
+      const M active = joints ? moving : on;
       evaluate(secant);
-      if (P.spring_count > 0) pull();
-      linearize();
-      if (P.spring_count > 0) springs_too();
       V m[6][6];
-      dense(K, m);
-      invert(m);
-      M active = ~done & ~failed;
-      step(m, active);
+      if (joints) {
+        step_joints();
+      } else {
+        if (P.spring_count > 0) pull();
+        linearize();
+        if (P.spring_count > 0) springs_too();
+        dense(K, m);
+        invert(m);
+        step(m, active);
+      }
       const V norm = step_norm();
       iterations = select(active, iterations + 1.0, iterations);
       if (secant) {
         failed |= active & ~(norm < 1e6);
         move(active);
         failed |= start_laws(active) & active;
-        way.acting = way.factor;
+        way.acting = select(active, way.factor, way.acting);
         continue;
       }
       // Settled: this linearisation is the one at the answer. The step is taken all the same, unless
       // there is nothing to gain from it.
       const V change = larger(norm, e.transferred);
       const M whole = way.acting == 1.0;
-      M settled = active & whole & ((change < small) | ((norm < in.tolerance) & (way.previous < in.tolerance)));
+      M settled = active & whole & ~(joints ? on : M{}) &
+                  ((change < small) | ((norm < in.tolerance) & (way.previous < in.tolerance)));
       if (P.hardens && any(settled))
         settled &= (hardening_change() < same_slope) | ((norm < small) & (way.previous < small));
       failed |= settled & ~(e.lowest > pivot_floor);
@@ -341,10 +364,11 @@ struct Newton {
       if (corners) {
         // Where no corner was met, what is left of a step is what was not taken.
         const M worse = active & (way.tries > 1.0) & (norm > (1.0 - 0.5 * share) * way.previous);
-        straight = select(norm < (1.001 - share) * way.previous, straight + 1.0, splat(0));
+        straight = select(active, select(norm < (1.001 - share) * way.previous, straight + 1.0, splat(0)), straight);
         const V most = select((way.tries < whole_tries) | (straight > 1.0), splat(1), splat(longest));
         const V twice = share + share;
-        share = select(worse, larger(0.5 * share, splat(0.125)), select(twice < most, twice, most));
+        share =
+            select(worse, larger(0.5 * share, splat(0.125)), select(active, select(twice < most, twice, most), share));
         if (any(share < 1.0)) shorten(share);
       }
       // Free play is the reference's to find: a singular step would leave the gap by chance.
@@ -353,9 +377,13 @@ struct Newton {
       move(active & ~kept & ~distrusted);
       done |= settled & ~failed;
       fresh = all(kept == active);
-      way.previous = norm;
-      way.tries += 1.0;
-      way.acting = way.factor;
+      if (P.serial_joints > 0) {  // of the next step: by the ratio of the last two
+        near |= active & (way.factor == 1.0) & ((norm * norm < small * way.previous) | (norm < in.tolerance));
+        near &= ~distrusted;
+      }
+      way.previous = select(active, norm, way.previous);
+      way.tries = select(active, way.tries + 1.0, way.tries);
+      way.acting = select(active, way.factor, way.acting);
       const M arrived = active & ~whole & ~first & ~distrusted & (norm < in.tolerance);
       failed |= arrived & ~(e.lowest > pivot_floor);  // stability may change on the way: the reference looks closer
       if (any(arrived)) way.advance(arrived);

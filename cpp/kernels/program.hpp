@@ -137,13 +137,14 @@ struct Program {
   const ClosureTerm* terms;
   const ReachProgram* reach;        ///< one per leg where legs close one by one
   const TipSpringProgram* springs;  ///< external ones
+  const std::int32_t* serial;       ///< arm of joints alone: its joints that yield and its bodies, from the base
   const std::int32_t* unknowns;
   const std::int32_t* envelope;  ///< per unknown: the first one of its leg that shares an equation with one up to it
   const PlanarLeg* planar;       ///< one per leg, or null: the closure starts from the grid
   const double* grid;            ///< closure starts: nodes x row of unknowns of all legs, NaN where unreachable
   std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count,
-      spring_count;
-  std::int32_t root, legs_op;  ///< root chain; the legs' block operation
+      spring_count, serial_count, serial_joints;  ///< serial_joints 0: no such arm
+  std::int32_t root, legs_op;                     ///< root chain; the legs' block operation
   std::int32_t joint_slots, stiff_slots, group_slots, stroke_count;
   std::int32_t closes;         ///< 1: leg by leg, 2: all at once (`legs` is then the whole machine)
   std::int32_t task[6];        ///< commanded pose components, rotations about the axes of the commanded frame

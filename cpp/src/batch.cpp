@@ -280,7 +280,8 @@ class FastBatch {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const Status status = how == pose_unstable ? Status::unstable : Status::converged;
     if (out_.status) out_.status[i] = static_cast<std::uint8_t>(status);
-    if (out_.free_twists) Eigen::Map<VecX>(out_.free_twists + 36 * i, 36).setConstant(nan);
+    if (out_.nothing_free) out_.nothing_free[i] = 1;
+    else if (out_.free_twists) Eigen::Map<VecX>(out_.free_twists + 36 * i, 36).setConstant(nan);
     if (out_.indeterminate)
       for (Index j = 0; j < m_.size(); ++j) {
         const Coordinate& c = m_.coordinates[at(j)];

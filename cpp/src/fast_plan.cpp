@@ -93,6 +93,30 @@ double softest(const Mechanism& m) {
   return std::max(1e-4, least / m.stiffness);
 }
 
+/// Joints and bodies of a machine that is one row of joints without springs; false where it is something else.
+bool follow_serial(const FastPlanData& d, std::int32_t chain, std::vector<std::int32_t>& ops) {
+  const ChainProgram& c = d.chains[static_cast<std::size_t>(chain)];
+  for (std::int32_t i = c.first; i < c.first + c.count; ++i) {
+    const Op& op = d.ops[static_cast<std::size_t>(i)];
+    if (op.kind == OpKind::spring || (op.kind == OpKind::block && op.count > 1)) return false;
+    if (op.kind == OpKind::block && !follow_serial(d, op.first, ops)) return false;
+    if (op.kind == OpKind::load || (op.kind <= OpKind::prismatic && op.eliminated)) ops.push_back(i);
+  }
+  return true;
+}
+
+void find_serial(FastPlanData& d) {
+  constexpr long most_joints = 12;  // as serial.hpp of the kernels
+  if (!d.springs.empty() || !follow_serial(d, d.program.root, d.serial)) return;
+  const auto joints = std::count_if(d.serial.begin(), d.serial.end(), [&](std::int32_t i) {
+    return d.ops[static_cast<std::size_t>(i)].kind != OpKind::load;
+  });
+  if (joints > most_joints) return;
+  d.program.serial = d.serial.data();
+  d.program.serial_count = i32(d.serial.size());
+  d.program.serial_joints = static_cast<std::int32_t>(joints);
+}
+
 void link(const Mechanism& m, FastPlanData& d) {
   Program& p = d.program;
   p.ops = d.ops.data();
@@ -157,6 +181,7 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   if (leg_by_leg) recognise_planar_legs(m, *data_);
   if (leg_by_leg) bound_reach(m, *data_);
   const bool whole = !leg_by_leg && box && compile_whole_closure(m, *data_);
+  find_serial(*data_);
   link(m, *data_);
   Program& p = data_->program;
   for (std::size_t i = 0; i < 6; ++i) p.task[i] = m.task[i];

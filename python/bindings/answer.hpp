@@ -2,7 +2,11 @@
 // Answer of a call on many poses: NumPy arrays that the core writes into.
 #pragma once
 
-#include "arrays.hpp"
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "kept_memory.hpp"
 #include "stiffmap/batch.hpp"
 
 namespace stiffmap::bindings {
@@ -12,13 +16,14 @@ using Shape = std::vector<py::ssize_t>;
 /// Arrays of one call; every array has the pose as its leading axis.
 struct Answer {
   Answer(const Mechanism& m, py::ssize_t n, py::ssize_t reads, py::ssize_t moved, bool full)
-      : displacement(Shape{n, reads, 6}), status(n), flags(n), iterations(n) {
+      : displacement(KeptMemory::array<double>({n, reads, 6})), status(n), flags(n), iterations(n) {
     const py::ssize_t legs = static_cast<py::ssize_t>(m.legs.size()), k = full ? n : 0;
-    for (py::array_t<double>* a : {&stiffness, &compliance, &free_twists}) *a = py::array_t<double>(Shape{k, 6, 6});
-    effort = py::array_t<double>(Shape{k, static_cast<py::ssize_t>(m.drives.size())});
-    leg_wrench = py::array_t<double>(Shape{k, legs, 6});
-    coordinates = py::array_t<double>(Shape{k, m.size()});
-    indeterminate = py::array_t<std::uint8_t>(Shape{k, m.size()});
+    for (py::array_t<double>* a : {&stiffness, &compliance, &free_twists}) *a = KeptMemory::array<double>({k, 6, 6});
+    effort = KeptMemory::array<double>({k, static_cast<py::ssize_t>(m.drives.size())});
+    leg_wrench = KeptMemory::array<double>({k, legs, 6});
+    coordinates = KeptMemory::array<double>({k, m.size()});
+    indeterminate = KeptMemory::array<std::uint8_t>({k, m.size()});
+    nothing_free = KeptMemory::array<std::uint8_t>({k});
     variants = py::array_t<double>(Shape{moved ? n : 0, moved, 6});
     out.displacement = displacement.mutable_data();
     out.status = status.mutable_data();
@@ -29,17 +34,31 @@ struct Answer {
     out.stiffness = stiffness.mutable_data();
     out.compliance = compliance.mutable_data();
     out.free_twists = free_twists.mutable_data();
+    out.nothing_free = nothing_free.mutable_data();
+    std::fill_n(out.nothing_free, k, std::uint8_t{0});
     out.effort = effort.mutable_data();
     out.leg_wrench = leg_wrench.mutable_data();
     out.coordinates = coordinates.mutable_data();
     out.indeterminate = indeterminate.mutable_data();
   }
 
-  py::array_t<double> displacement, stiffness, compliance, free_twists, effort, leg_wrench, coordinates, variants;
+  /// NaN where there are none: written when they are asked for.
+  const py::array_t<double>& twists() {
+    for (py::ssize_t i = 0; i < nothing_free.size(); ++i)
+      if (std::exchange(out.nothing_free[i], 0))
+        std::fill_n(out.free_twists + 36 * i, 36, std::numeric_limits<double>::quiet_NaN());
+    return free_twists;
+  }
+
+  py::array_t<double> displacement, stiffness, compliance, effort, leg_wrench, coordinates, variants;
   py::array_t<std::uint8_t> indeterminate, status;
   py::array_t<std::uint32_t> flags;
   py::array_t<std::int32_t> iterations;
   BatchOutput out;
+
+ private:
+  py::array_t<double> free_twists;
+  py::array_t<std::uint8_t> nothing_free;
 };
 
 }  // namespace stiffmap::bindings

@@ -143,7 +143,7 @@ void bind_solve(py::module_& m) {
       .def_readonly("displacement", &Answer::displacement)
       .def_readonly("stiffness", &Answer::stiffness)
       .def_readonly("compliance", &Answer::compliance)
-      .def_readonly("free_twists", &Answer::free_twists)
+      .def_property_readonly("free_twists", &Answer::twists)
       .def_readonly("actuator_effort", &Answer::effort)
       .def_readonly("leg_wrench", &Answer::leg_wrench)
       .def_readonly("coordinates", &Answer::coordinates)

@@ -32,6 +32,7 @@ struct BatchOutput {
   double* stiffness = nullptr;            ///< count x 36
   double* compliance = nullptr;           ///< count x 36
   double* free_twists = nullptr;          ///< count x 36
+  std::uint8_t* nothing_free = nullptr;   ///< 1 instead of NaN in `free_twists`, where this is given
   double* effort = nullptr;               ///< count x drives
   double* leg_wrench = nullptr;           ///< count x legs x 6
   double* coordinates = nullptr;          ///< count x coordinates

@@ -28,7 +28,7 @@ struct FastPlanData {
   std::vector<LegClosure> legs;
   std::vector<ClosureEquation> equations;
   std::vector<ClosureTerm> terms;
-  std::vector<std::int32_t> unknowns, envelope;
+  std::vector<std::int32_t> unknowns, envelope, serial;
   std::vector<PlanarLeg> planar;
   std::vector<ReachProgram> reach;
   std::vector<TipSpringProgram> springs;
