@@ -17,6 +17,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.fingerprint import fingerprint
+from stiffmap.experiment.prediction.kept import Kept
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine
 
@@ -73,7 +74,7 @@ def _predicted(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> 
     if moves:
         beside = copy.copy(predictor)
         beside.machine = Machine(edited(predictor.machine.description, moves), like=predictor.machine)
-        beside._memory = {}
+        beside._memory = Kept()
     found = beside([scaled(predictor.machine.description, scale)] if scale else [])
     if own:
         columns = frame_columns(predictor.experiment, predictor())

@@ -1,12 +1,16 @@
-"""How long a diagnosis may take, what it is doing, and whether it was told to stop."""
+"""How long a diagnosis may take, how much it may try, what it is doing, and whether it was told to stop."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 Progress = Callable[[str], None]
+MOST, SHARE = 900.0, 0.2
+"""Predictions of `ROWS` rows that a diagnosis may ask for after its sensitivities, and the share of one search."""
+ROWS = 540
+"""More rows make a prediction dearer, though not in proportion: the bound goes with the root of their number."""
 
 
 @dataclass(eq=False)
@@ -20,11 +24,43 @@ class Clock:
     until: float = float("inf")
     progress: Progress | None = None
     stopped: bool = False
+    predictions: Callable[[], int] = int
+    """How many were asked for so far: unlike seconds the same on every machine."""
+    most: float = float("inf")
+    """Predictions after which no search goes on beyond what it must do to come to an end."""
+    share: float = float("inf")
+    """Predictions of one search, likewise."""
+    left_out: dict[str, None] = field(default_factory=dict)
+    """What was not tried for that."""
+    _search: float = float("inf")
 
     @staticmethod
     def of(budget: float | None, progress: Progress | None = None) -> Clock:
         """A clock that starts now; `budget` in seconds, None: no end."""
         return Clock(float("inf") if budget is None else time.monotonic() + budget, progress)
+
+    def bound(self, predictions: Callable[[], int], rows: int) -> None:
+        """From here on the search may ask for so many predictions of an experiment with so many rows."""
+        more = MOST * (ROWS / max(rows, 1)) ** 0.5
+        self.predictions, self.most, self.share = predictions, predictions() + more, SHARE * more
+
+    def begin_search(self) -> None:
+        """A search begins, with a share of its own."""
+        self._search = self.predictions() + self.share
+
+    @property
+    def tired(self) -> bool:
+        """Whether a search may only come to an end."""
+        return self.spent or self.predictions() > self._search
+
+    @property
+    def spent(self) -> bool:
+        """Whether all searches may."""
+        return self.predictions() > self.most
+
+    def leave_out(self, what: str) -> None:
+        """Note what is not tried."""
+        self.left_out[what] = None
 
     def say(self, what: str) -> None:
         """Tell what is tried now."""

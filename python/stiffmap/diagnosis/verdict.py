@@ -73,7 +73,8 @@ def diagnose(
         Kinds of effects, or groups of the calibration, that are known not to be.
     budget
         Seconds after which no new step begins; the answer is then the best so far, `stopped` is set, and so it
-        is after Ctrl-C.
+        is after Ctrl-C. None: a bound on what is tried instead, the same on every computer, which readings that
+        nothing explains reach; `not_tried` then says what was left out.
     progress
         Called with a text on what is tried.
 
@@ -87,6 +88,8 @@ def diagnose(
     clock = Clock.of(budget, progress)
     groups = tuple(n for n in exclude if n in GROUPS)
     s = study(predictor, seed, None, clock, check_kinds(n for n in exclude if n not in GROUPS))
+    if budget is None:
+        clock.bound(lambda: predictor.made, len(predictor.experiment))
     times = [time.perf_counter()]
     found = find_effects(s, seed, certified(tolerances, data), groups)
     times.append(time.perf_counter())
@@ -146,7 +149,8 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
         empirical=empirical(e, np.where(keep[:, None], after, np.nan), s.noise.sigma, seed) if left else None,
         calibration=found.calibration,
         refused=list(found.refused),
-        stopped=s.clock.stopped,
+        stopped=s.clock.stopped or bool(s.clock.left_out),
+        not_tried=list(s.clock.left_out),
         seed=seed,
         explained=explained(finding.selection.null, model, search.problem.freedom)
         if model.candidates

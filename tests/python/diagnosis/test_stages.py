@@ -92,6 +92,27 @@ def test_screen_beside_a_model_sees_what_the_model_leaves() -> None:
     assert s.delta_chi2((4 * E[1])[:, None])[:, 0] == pytest.approx([0.0, 16.0, 0.0, 0.0])
 
 
+def test_screen_beside_a_model_is_a_projection() -> None:
+    """Against columns that are projected and orthonormalised one variant at a time."""
+    rng = np.random.default_rng(3)
+    data = rng.standard_normal(40)
+    columns = [rng.standard_normal((40, p)) for p in (1, 2, 3, 2)]
+    columns[3][:, 1] = columns[3][:, 0]
+    tangent = np.linalg.qr(np.column_stack([columns[1][:, 0], rng.standard_normal(40)]))[0]
+    s = Screen.of(problem_of(data), [variant(f"v{i}", *c.T) for i, c in enumerate(columns)]).beside(tangent)
+    left = data - tangent @ (tangent.T @ data)
+    found = s.delta_chi2(left[:, None])[:, 0]
+    for i, c in enumerate(columns):
+        rest = c - tangent @ (tangent.T @ c)
+        u, size, _ = np.linalg.svd(rest, full_matrices=False)
+        q = u[:, size > 1e-8]
+        assert s.rank[i] == q.shape[1]
+        assert found[i] == pytest.approx(float(np.sum((q.T @ left) ** 2)), rel=1e-9)
+        b = s.basis(i)
+        assert b.T @ b == pytest.approx(np.eye(q.shape[1]), abs=1e-9)
+        assert b @ b.T == pytest.approx(q @ q.T, abs=1e-9)
+
+
 @pytest.mark.parametrize("number", [1, 8])
 def test_significance_counts_independent_tests(number: int) -> None:
     """The least of k uniform p-values has the median 1 - 2^(-1/k), and M = ln 2 over it."""

@@ -19,6 +19,7 @@ from stiffmap.diagnosis.search.selection import Search, additions, backward
 from stiffmap.experiment import Predictor, random_plan, simulate
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.prediction.kept import Kept
 
 TRUTH = [AppliedEffect("tilt", "actuator", ("x",), (("angle_y", 5e-4), ("angle_z", -4e-4)))]
 
@@ -90,6 +91,7 @@ def test_backward_keeps_what_cannot_be_left_out(search: Search, tilts: list[Cand
             raise sm.StiffmapError("cannot be built")
         return search.predictor(terms)
 
+    broken.tangents = Kept()  # type: ignore[attr-defined]
     hurt = replace(search, predictor=broken)  # type: ignore[arg-type]
     assert backward(hurt, model).candidates == model.candidates
 

@@ -21,7 +21,7 @@ from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
 from stiffmap.diagnosis.decision.few import MEETING, not_few, screened
 from stiffmap.diagnosis.decision.judge import judge, unexplained, with_model
 from stiffmap.diagnosis.decision.patterns import Pattern
-from stiffmap.diagnosis.fitting.fit import evaluate, fit
+from stiffmap.diagnosis.fitting.fit import evaluate, fit_without
 from stiffmap.diagnosis.fitting.interval import unseen
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.calibrated import Layer
@@ -238,7 +238,7 @@ def admissible(model: Model, finding: Finding, tolerances: Tolerances) -> tuple[
             break
         i, word = why[0]
         refused.append(f"{model.candidates[i]}: {word}")
-        model = fit(model.without(i), finding.search.predictor, finding.search.problem)
+        model = fit_without(model, i, finding.search.predictor, finding.search.problem)
     return model, tuple(refused)
 
 
@@ -291,7 +291,7 @@ def _beyond_calibration(s: Study, model: Model, finding: Finding) -> tuple[Model
     refused: list[str] = []
     for c in tuple(model.candidates):
         i = model.candidates.index(c)
-        less = fit(model.without(i), predictor, finding.search.problem)
+        less = fit_without(model, i, predictor, finding.search.problem)
         alone = problem.white(predictor(model.terms()) - predictor(model.without(i).terms()))
         if float(np.sum((q.T @ alone) ** 2)) > COVERED * float(alone @ alone):
             refused.append(f"{c}: numbers that are uncertain anyway show the same, and are within tolerance")
@@ -316,5 +316,5 @@ def _shared(model: Model, finding: Finding, held: HeldOut | None) -> tuple[Model
             drop(c, f"held-out readings gain {held.gain[0]:.2g} ± {held.gain[1]:.2g} noise variances")
     for name in refused:
         i = next(k for k, c in enumerate(model.candidates) if name.startswith(f"{c}: "))
-        model = fit(model.without(i), finding.search.predictor, finding.search.problem)
+        model = fit_without(model, i, finding.search.predictor, finding.search.problem)
     return model, tuple(refused)

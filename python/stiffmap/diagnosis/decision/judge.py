@@ -8,7 +8,7 @@ import numpy as np
 
 from stiffmap.diagnosis.decision.patterns import Pattern, patterns
 from stiffmap.diagnosis.decision.stability import SHARE, explained, steady
-from stiffmap.diagnosis.fitting.fit import evaluate, fit
+from stiffmap.diagnosis.fitting.fit import evaluate, fit_without
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.selection import Search
 from stiffmap.diagnosis.search.study import Finding, Study, alone, search_on
@@ -41,7 +41,7 @@ def outweighing(search: Search, model: Model) -> Model:
     """The model without effects that explain less than what it leaves beyond noise, the least first."""
     while model.candidates:
         trials = [
-            fit(model.without(i), search.predictor, search.problem) for i in range(len(model.candidates))
+            fit_without(model, i, search.predictor, search.problem) for i in range(len(model.candidates))
         ]
         least = min(trials, key=lambda t: t.chi2)
         if not least.usable:

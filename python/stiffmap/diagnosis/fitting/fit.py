@@ -15,13 +15,20 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from stiffmap.diagnosis.fitting.model import Model, tangent_step
+from stiffmap.diagnosis.fitting.tangents import (
+    best_known,
+    keep,
+    keep_best,
+    known_before,
+    known_jacobian,
+)
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
 
 PAYS = 1e-3
-"""Change of chi-square that is not worth another step."""
+"""Change of chi-square, per what a reading leaves where that is more than noise, that is not worth another step."""
 STEPS, FRESH = 12, 3
 BENT = 0.05
 """Share of a step's change by which a borrowed Jacobian may be wrong."""
@@ -38,12 +45,18 @@ def fit(
     *,
     fixed: Sequence[int] = (),
     near: Floats | None = None,
+    doubtful: Sequence[int] = (),
+    pays: float = PAYS,
 ) -> Model:
     """The model with the values that minimise chi-square; `fixed` indices stay.
 
     near
         (N, k) Jacobian of somewhere near, to begin with instead of differences; it serves as long as it
-        foretells what steps do.
+        foretells what steps do. Slopes that an earlier fit of the same effects has left go before it.
+    doubtful
+        Values, the last effect's, whose columns of `near` are taken anew first where it does not.
+    pays
+        Change of chi-square that is worth another step.
 
     Its residual and Jacobian belong to these values. Where the machine cannot be built or solved with
     them chi2 is infinite, residual and Jacobian are None and `problem` says why; values stay within
@@ -52,9 +65,22 @@ def fit(
     free = np.array([i for i in range(len(model.values)) if i not in {*fixed, *model.held}], dtype=np.intp)
     model = replace(model, values=np.clip(model.values, *model.bounds()))
     try:
-        return _descend(model, predictor, problem, free, None if near is None else near[:, free])
+        found = _descend(
+            model, predictor, problem, free, None if near is None else near[:, free], doubtful, pays
+        )
     except StiffmapError as error:
         return replace(model, chi2=np.inf, residual=None, jacobian=None, failure=str(error))
+    if not fixed:
+        keep_best(found, predictor)
+    return found
+
+
+def fit_without(model: Model, i: int, predictor: Predictor, problem: Problem) -> Model:
+    """The fit of a fitted model less one candidate."""
+    near = None if model.jacobian is None else np.delete(model.jacobian, model.parts()[i], axis=1)
+    less = model.without(i)
+    before = best_known(less, predictor)
+    return fit(less if before is None else replace(less, values=before), predictor, problem, near=near)
 
 
 def evaluate(model: Model, predictor: Predictor, problem: Problem) -> Model:
@@ -67,7 +93,13 @@ def evaluate(model: Model, predictor: Predictor, problem: Problem) -> Model:
 
 
 def _descend(
-    model: Model, predictor: Predictor, problem: Problem, free: NDArray[np.intp], near: Floats | None
+    model: Model,
+    predictor: Predictor,
+    problem: Problem,
+    free: NDArray[np.intp],
+    near: Floats | None,
+    doubtful: Sequence[int] = (),
+    pays: float = PAYS,
 ) -> Model:
     low, high = model.bounds()
     x = model.values
@@ -83,24 +115,35 @@ def _descend(
             return np.full(len(problem), np.inf)
 
     r = residual(x)
-    j, age = (jacobian(model, x, predictor, problem, free), 0) if near is None else (near, 1)
+    known = known_jacobian(model, x, r, predictor, problem, free) if free.size else None
+    if known is not None:  # as good as fresh
+        near, j, age = None, known[:, free], 0
+    else:
+        j, age = (jacobian(model, x, predictor, problem, free), 0) if near is None else (near, 1)
     for _ in range(STEPS if free.size else 0):
+        enough = pays * max(1.0, float(r @ r) / max(len(r), 1))
         step = np.zeros_like(x)
         step[free] = _bounded(j, r, (low - x)[free], (high - x)[free])
-        if promised(j, r, step[free]) < PAYS:
+        if promised(j, r, step[free]) < enough:
             break
         moved, tried = _shorten(tried_residual, x, step, r)
         gain = float(r @ r - tried @ tried)
         if near is not None and not _foretold(j, r, tried, (moved - x)[free]):
-            near, x, r = None, moved, tried
-            j, age = jacobian(model, x, predictor, problem, free), 0
+            x, r = moved, tried
+            again = np.isin(free, doubtful)
+            if again.any() and not again.all():
+                j, age, doubtful = j.copy(), 1, ()
+                j[:, again] = jacobian(model, x, predictor, problem, free[again])
+                continue
+            near, age = None, 0
+            j = jacobian(model, x, predictor, problem, free)
             continue
         if gain > 0:
             s = (moved - x)[free]
             j, x, r, age = j + np.outer(tried - r - j @ s, s) / (s @ s), moved, tried, age + 1
-        if gain > PAYS and age < FRESH:
+        if gain > enough and age < FRESH:
             continue
-        if age == 0 or (gain <= PAYS and age < 2):
+        if age == 0 or (gain <= enough and age < 2):
             break
         j, age = jacobian(model, x, predictor, problem, free), 0
     full = np.zeros((len(r), len(x)))
@@ -153,11 +196,16 @@ def jacobian(
     """(N, len(which)) change of the whitened residual per unit of each value."""
     here = problem.check(predictor(model.terms(values)))
     _, high = model.bounds()
-    columns = []
-    for i in which:
-        step = tangent_step(values, int(i), high[i])
-        there, step = _beside(model, values, int(i), step, predictor, problem)
-        columns.append(-problem.white((there - here) / step))
+    slopes: dict[int, Floats] = {}
+    for i in map(int, which):
+        step = tangent_step(values, i, high[i])
+        there, step = _beside(model, values, i, step, predictor, problem)
+        slopes[i] = (there - here) / step
+    all_felt = len(values) - len(model.held)
+    known = slopes if len(slopes) == all_felt else {**known_before(model, predictor), **slopes}
+    if len(known) == all_felt > 0:
+        keep(model, values, predictor, here, known)
+    columns = [-problem.white(s) for s in slopes.values()]
     return np.column_stack(columns) if columns else np.zeros((len(problem), 0))
 
 

@@ -104,7 +104,12 @@ def profile_end(
 
 
 def _rise(model: Model, predictor: Predictor, problem: Problem, i: int, at: float) -> float:
+    """Rise of chi-square with value i at a place, from where the others would go if all were straight."""
+    assert model.jacobian is not None
     moved = model.values.copy()
+    others = [k for k in range(len(moved)) if k != i and k not in model.held]
+    change = model.jacobian[:, i] * (at - moved[i])
+    moved[others] -= np.linalg.lstsq(model.jacobian[:, others], change, rcond=1e-9)[0]
     moved[i] = at
     start = replace(model, values=moved)
-    return fit(start, predictor, problem, fixed=(i,)).chi2 - model.chi2
+    return fit(start, predictor, problem, fixed=(i,), near=model.jacobian).chi2 - model.chi2

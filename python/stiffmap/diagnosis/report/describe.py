@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.diagnosis.candidates.candidates import Candidate
-from stiffmap.diagnosis.fitting.fit import fit
+from stiffmap.diagnosis.fitting.fit import fit_without
 from stiffmap.diagnosis.fitting.interval import intervals
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.report.findings import Effect
@@ -78,7 +78,7 @@ def _derived(study: Study, candidate: Candidate, rows: Floats) -> dict[str, tupl
 
 
 def _evidence(search: Search, model: Model, i: int) -> dict[str, float]:
-    reduced = fit(model.without(i), search.predictor, search.problem)
+    reduced = fit_without(model, i, search.predictor, search.problem)
     delta_chi2 = reduced.chi2 - model.chi2
     minus_log_p = minus_log_p_of(delta_chi2, len(model.candidates[i].parameters))
     return {

@@ -115,7 +115,9 @@ class Findings:
     refused: list[str] = field(default_factory=list)
     """Effects that the readings seemed to demand and that are not named, and why."""
     stopped: bool = False
-    """Whether a time budget or Ctrl-C ended it early: the answer is the best so far."""
+    """Whether a time budget, the bound on what is tried, or Ctrl-C ended it early: the answer is the best so far."""
+    not_tried: list[str] = field(default_factory=list)
+    """What the bound left out."""
     explained: float = 0.0
     """Share of the misfit beyond noise (and calibration) that the effects take away."""
     seed: int | None = None
@@ -149,6 +151,7 @@ class Findings:
             "seconds",
             "refused",
             "stopped",
+            "not_tried",
             "explained",
         )
         out: dict[str, Any] = {"verdict": self.verdict, "units": "SI (m, rad, N, N·m, kg), base axes"}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from stiffmap.diagnosis.decision.patterns import Pattern
@@ -9,6 +11,8 @@ from stiffmap.diagnosis.report.findings import Effect, Findings
 from stiffmap.diagnosis.rivals.separation import Separation
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
+LISTED = 5
+"""Steps left out that are named."""
 VERDICTS = {
     "none": "no effect above the limits of this experiment",
     "effects": "the nominal model lacks the effects below",
@@ -73,8 +77,13 @@ def _more(d: Findings) -> list[str]:
         out += [line for line in c.lines() if line.startswith(("groups:", "model-form"))]
     out += [f"not named: {why}" for why in d.refused]
     if d.stopped:
-        out.append("stopped early: this is the best so far")
+        out.append("stopped early: this is the best so far" + _not_tried(d.not_tried))
     return out
+
+
+def _not_tried(what: Sequence[str]) -> str:
+    more = f" and {len(what) - LISTED} more" if len(what) > LISTED else ""
+    return f"; not tried: {'; '.join(what[:LISTED])}{more}" if what else ""
 
 
 def in_display_units(value: float, unit: str) -> str:

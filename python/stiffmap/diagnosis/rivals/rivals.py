@@ -17,7 +17,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from stiffmap.diagnosis.candidates.candidates import Candidate
-from stiffmap.diagnosis.fitting.fit import fit
+from stiffmap.diagnosis.fitting.fit import fit_without
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.alias import AliasClass
 from stiffmap.diagnosis.search.selection import Search, additions
@@ -66,7 +66,7 @@ def rivals(search: Search, model: Model, classes: Sequence[AliasClass], number: 
     longer = {c.representative: set(c.generalisations) for c in classes}
     found: list[Rival] = []
     for i, replaced in enumerate(model.candidates):
-        reduced = fit(model.without(i), search.predictor, search.problem)
+        reduced = fit_without(model, i, search.predictor, search.problem)
         if not reduced.usable:
             continue
         explained = max(reduced.chi2 - model.chi2, 0.0)

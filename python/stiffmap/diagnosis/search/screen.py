@@ -1,7 +1,7 @@
 """Screening: how much of the residual each candidate's sensitivities can take away.
 
 All candidates at once: their whitened columns, freed of nuisances and of the effects that are already
-in the model, are orthonormalised; the reduction of chi-square is then the squared projection.
+in the model, are orthonormalised through their Gram matrices; the reduction of chi-square is then the squared projection.
 """
 
 from __future__ import annotations
@@ -20,19 +20,27 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 
 RANK = 1e-5
+FREED = 1e-3
+"""Share of a column's length below which a model's directions leave nothing of it."""
+AT_ONCE = 64
+"""Variants that are whitened together."""
 
 
 @dataclass(frozen=True, eq=False)
 class Screen:
-    """Orthonormal bases of all variants."""
+    """Whitened columns of all variants, and what makes them orthonormal beside a model."""
 
     variants: tuple[Variant, ...]
-    white: tuple[Floats, ...]
-    """Per number of parameters p: (V_p, N, p) whitened columns, freed of the model's tangent."""
-    bases: tuple[Floats, ...]
-    """Per p: (V_p, N, p) orthonormal columns, zero where the rank is less than p."""
     members: tuple[NDArray[np.intp], ...]
-    """Per p: numbers of the variants."""
+    """Per number of parameters p: numbers of the variants."""
+    white: tuple[Floats, ...]
+    """Per p: (V_p p, N) whitened columns, one per line."""
+    tangent: Floats
+    """(N, k) orthonormal directions of the model."""
+    along: tuple[Floats, ...]
+    """Per p: (V_p, p, k) the columns along the model's directions; what counts is the rest of them."""
+    roots: tuple[Floats, ...]
+    """Per p: (V_p, p, p) M: the rest of the columns times M is orthonormal, zero where the rank is less than p."""
     rank: NDArray[np.intp]
     """(V,) number of directions that are seen; 0: nothing."""
 
@@ -41,21 +49,12 @@ class Screen:
         """Screen of the variants beside an empty model."""
         sizes = np.array([v.columns.shape[-1] for v in variants], dtype=np.intp)
         members = tuple(np.flatnonzero(sizes == p) for p in np.unique(sizes))
-        white = tuple(np.stack([_white(problem, variants[int(i)].columns) for i in m]) for m in members)
-        seen = tuple(np.where(np.linalg.norm(w, axis=1, keepdims=True) > VISIBLE, w, 0.0) for w in white)
-        return _screen(tuple(variants), seen, members)
+        white = tuple(_white(problem, [variants[int(i)].columns for i in m]) for m in members)
+        return _screen(tuple(variants), members, white, np.zeros((len(problem), 0)))
 
     def beside(self, tangent: Floats) -> Screen:
         """The screen with the directions `tangent` (N, k), orthonormal, of a model projected out."""
-        if not tangent.size:
-            return self
-        white = tuple(w - tangent @ (tangent.T @ w) for w in self.white)
-        before = [np.linalg.norm(w, axis=1, keepdims=True) for w in self.white]
-        kept = tuple(
-            np.where(np.linalg.norm(w, axis=1, keepdims=True) > 1e-3 * b, w, 0.0)
-            for w, b in zip(white, before, strict=True)
-        )
-        return _screen(self.variants, kept, self.members)
+        return _screen(self.variants, self.members, self.white, tangent) if tangent.size else self
 
     def only(self, which: Sequence[int]) -> Screen:
         """The screen of some of the variants."""
@@ -66,44 +65,56 @@ class Screen:
         some = [k for k, c in enumerate(chosen) if len(c)]
         return Screen(
             tuple(self.variants[i] for i in which),
-            tuple(self.white[k][chosen[k]] for k in some),
-            tuple(self.bases[k][chosen[k]] for k in some),
             tuple(np.array([index[int(v)] for v in self.members[k][chosen[k]]], dtype=np.intp) for k in some),
+            tuple(
+                self.white[k]
+                .reshape(len(self.members[k]), -1, self.readings)[chosen[k]]
+                .reshape(-1, self.readings)
+                for k in some
+            ),
+            self.tangent,
+            tuple(self.along[k][chosen[k]] for k in some),
+            tuple(self.roots[k][chosen[k]] for k in some),
             self.rank[list(which)],
         )
 
     @property
     def readings(self) -> int:
         """N."""
-        return int(self.white[0].shape[1]) if self.white else 0
+        return int(self.tangent.shape[0])
 
     def basis(self, i: int) -> Floats:
         """(N, rank) orthonormal columns of variant i."""
-        for m, b in zip(self.members, self.bases, strict=True):
-            if i in m:
-                q = b[int(np.searchsorted(m, i))]
-                return np.asarray(q[:, np.any(q != 0.0, axis=0)])
-        raise IndexError(i)
+        g, k = self._place(i)
+        root = self.roots[g][k]
+        return np.asarray(self.columns(i) @ root[:, np.any(root != 0.0, axis=0)])
 
     def columns(self, i: int) -> Floats:
-        """(N, p) whitened columns of variant i."""
-        for m, w in zip(self.members, self.white, strict=True):
-            if i in m:
-                return np.asarray(w[int(np.searchsorted(m, i))])
+        """(N, p) whitened columns of variant i, freed of the model's directions."""
+        g, k = self._place(i)
+        p = self.roots[g].shape[-1]
+        rest = self.white[g][k * p : (k + 1) * p].T - self.tangent @ self.along[g][k].T
+        return np.asarray(np.where(np.any(self.roots[g][k] != 0.0, axis=1), rest, 0.0))
+
+    def _place(self, i: int) -> tuple[int, int]:
+        for g, m in enumerate(self.members):
+            k = int(np.searchsorted(m, i))
+            if k < len(m) and m[k] == i:
+                return g, k
         raise IndexError(i)
 
     def delta_chi2(self, residual: Floats) -> Floats:
         """(V, S) reduction of chi-square of each variant for residuals (N, S); nothing for one-parameter
         effects that would have to grow backwards."""
         out = np.zeros((len(self.variants), residual.shape[1]))
-        for m, w, b in zip(self.members, self.white, self.bases, strict=True):
-            v, n, p = b.shape
-            projected = (b.transpose(0, 2, 1).reshape(v * p, n) @ residual).reshape(v, p, -1)
-            reduction = (projected**2).sum(axis=1)
+        rest = residual - self.tangent @ (self.tangent.T @ residual)
+        for m, w, root in zip(self.members, self.white, self.roots, strict=True):
+            v, p = root.shape[:2]
+            along = (w @ rest).reshape(v, p, -1)
+            reduction = ((root.transpose(0, 2, 1) @ along) ** 2).sum(axis=1)
             if p == 1:
-                direction = np.sign(np.einsum("vn,vn->v", w[:, :, 0], b[:, :, 0]))
-                sign = direction * np.array([self.variants[i].sign[0] for i in m])
-                reduction = np.where(projected[:, 0] * sign[:, None] >= 0, reduction, 0.0)
+                sign = np.array([self.variants[i].sign[0] for i in m])
+                reduction = np.where(along[:, 0] * sign[:, None] >= 0, reduction, 0.0)
             out[m] = reduction
         return out
 
@@ -134,22 +145,38 @@ def chi2_minus_log_p(delta_chi2: Floats, freedom: NDArray[np.intp]) -> Floats:
     return np.asarray(np.where(np.isfinite(out), out, far))
 
 
-def _white(problem: Problem, columns: Floats) -> Floats:
-    return problem.white(columns)
+def _white(problem: Problem, columns: Sequence[Floats]) -> Floats:
+    """(V p, N) whitened columns of (n, c, p) each, one per line; zero where the readings don't feel them."""
+    out = [
+        problem.white(np.concatenate(columns[k : k + AT_ONCE], axis=-1)).T
+        for k in range(0, len(columns), AT_ONCE)
+    ]
+    white = np.concatenate(out)
+    return np.where(np.linalg.norm(white, axis=1, keepdims=True) > VISIBLE, white, 0.0)
 
 
 def _screen(
-    variants: tuple[Variant, ...], white: tuple[Floats, ...], members: tuple[NDArray[np.intp], ...]
+    variants: tuple[Variant, ...],
+    members: tuple[NDArray[np.intp], ...],
+    white: tuple[Floats, ...],
+    tangent: Floats,
 ) -> Screen:
     rank = np.zeros(len(variants), dtype=np.intp)
-    bases = []
+    alongs, roots = [], []
     for m, w in zip(members, white, strict=True):
-        norm = np.linalg.norm(w, axis=1, keepdims=True)
-        unit = w / np.where(norm > 0, norm, 1.0)
-        values, vectors = np.linalg.eigh(unit.transpose(0, 2, 1) @ unit)
+        lines = w.reshape(len(m), -1, w.shape[-1])
+        along = (w @ tangent).reshape(len(m), lines.shape[1], -1)
+        gram = lines @ lines.transpose(0, 2, 1)
+        before = np.diagonal(gram, axis1=1, axis2=2)
+        gram = gram - along @ along.transpose(0, 2, 1)
+        size = np.diagonal(gram, axis1=1, axis2=2)
+        kept = size > FREED**2 * before
+        scale = np.where(kept, 1.0 / np.sqrt(np.where(kept, size, 1.0)), 0.0)
+        values, vectors = np.linalg.eigh(gram * scale[:, :, None] * scale[:, None, :])
         good = values > RANK**2 * np.maximum(values[:, -1:], 1e-300)
         good &= values > 1e-9
         inverse = np.where(good, 1.0 / np.sqrt(np.where(good, values, 1.0)), 0.0)
-        bases.append(np.asarray(unit @ (vectors * inverse[:, None, :])))
+        roots.append(np.asarray(scale[:, :, None] * vectors * inverse[:, None, :]))
+        alongs.append(along)
         rank[m] = good.sum(axis=1)
-    return Screen(variants, white, tuple(bases), members, rank)
+    return Screen(variants, members, white, tangent, tuple(alongs), tuple(roots), rank)

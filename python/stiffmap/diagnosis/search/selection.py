@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from stiffmap.diagnosis.candidates.candidates import Candidate, clash
 from stiffmap.diagnosis.candidates.sensitivity import Variant
 from stiffmap.diagnosis.clock import Clock
-from stiffmap.diagnosis.fitting.fit import evaluate, fit
+from stiffmap.diagnosis.fitting.fit import evaluate, fit, fit_without
 from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.diagnosis.fitting.tangents import best_known
 from stiffmap.diagnosis.search.screen import Screen, chi2_minus_log_p
 from stiffmap.diagnosis.search.significance import ALPHA, needed
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
@@ -23,6 +25,10 @@ LARGE = 10.0
 """Scales beyond which parameters without a slope at the null get starts of their own."""
 WORTH = 0.5
 """Share of the demanded -ln p that screening must promise before anything is fitted."""
+ROUGH = 0.3
+"""Change of chi-square that decides nothing between candidates; the one that is chosen is fitted to the end."""
+FEWEST = 2
+"""Candidates that a search which may only come to an end still fits."""
 MARGIN, CLOSE = 15.0, 0.05
 """What linear screening may be wrong by: candidates this near the best get a full fit."""
 
@@ -73,9 +79,13 @@ def select(search: Search) -> Selection:
     null = evaluate(Model(), search.predictor, search.problem)
     model = null
     steps: list[str] = []
+    search.clock.begin_search()
     try:
         for _ in range(MOST_EFFECTS):
             if search.clock.over:
+                break
+            if steps and search.clock.tired:
+                search.clock.leave_out(f"a further effect beside {steps[-1]}")
                 break
             search.clock.say(f"an effect beside {steps[-1]}" if steps else "a first effect")
             best = best_addition(search, model)
@@ -91,9 +101,12 @@ def select(search: Search) -> Selection:
     return Selection(model, null, tuple(steps))
 
 
-def best_addition(search: Search, model: Model, but: Candidate | None = None) -> Finalist | None:
-    """The candidate that explains most beside the model, judged by full fits of the best few, `but` one."""
-    found = [f for f in additions(search, model, search.finalists, but=but) if f.model.usable]
+def best_addition(
+    search: Search, model: Model, but: Candidate | None = None, least: float = 0.0
+) -> Finalist | None:
+    """The candidate that explains most beside the model, judged by full fits of the best few, `but` one; whoever cannot
+    come near a -ln p of `least` is not fitted."""
+    found = [f for f in additions(search, model, search.finalists, but=but, least=least) if f.model.usable]
     best = max(found, key=lambda f: f.minus_log_p, default=None)
     return None if best is None else _polished(search, model, best)
 
@@ -108,9 +121,19 @@ def _polished(search: Search, before: Model, best: Finalist) -> Finalist:
 
 
 def additions(
-    search: Search, model: Model, number: int, margin: float = MARGIN, but: Candidate | None = None
+    search: Search,
+    model: Model,
+    number: int,
+    margin: float = MARGIN,
+    but: Candidate | None = None,
+    least: float | None = None,
 ) -> list[Finalist]:
-    """Full fits of what screening puts first: within `margin` (or `CLOSE`) of the best, `but` one that is known."""
+    """Full fits of what screening puts first: within `margin` (or `CLOSE`) of the best, `but` one that is known.
+
+    least
+        -ln p that an addition must come as near to. With it those are left out, too, of which an earlier fit, on other rows
+        or at another floor, says that they lose by as much. None: all are fitted.
+    """
     if model.residual is None:
         return []
     screen = search.screen.beside(model.tangent())
@@ -129,7 +152,42 @@ def additions(
         return []
     picked = [i for i in best_of.values() if minus_log_p[i] > top - max(margin, CLOSE * top)]
     fitted = [i for i in picked[:number] if screen.variants[i].candidate != but]
-    return [_finalist(search, model, screen, i) for i in fitted]
+    if least is not None:
+        fitted = _hopeful(search, model, screen, fitted, minus_log_p, margin, least)
+    found = [_finalist(search, model, screen, i) for i in fitted]
+    for i, f in zip(fitted, found, strict=True):
+        kept = f.minus_log_p / float(minus_log_p[i]) if f.model.usable else 0.0
+        search.predictor.tangents.put(_promise(model, screen.variants[i].candidate), kept, 0)
+    return found
+
+
+def _hopeful(
+    search: Search,
+    model: Model,
+    screen: Screen,
+    which: list[int],
+    promised: Floats,
+    margin: float,
+    least: float,
+) -> list[int]:
+    """Of some variants those that may win: what screening promises, times what an earlier fit kept of it."""
+    known = {i: search.predictor.tangents.get(_promise(model, screen.variants[i].candidate)) for i in which}
+    likely = {i: float(promised[i]) * k for i, k in known.items() if k is not None}
+    top = max([least, *likely.values()])
+
+    def hopeful(minus_log_p: float, than: float) -> bool:
+        return minus_log_p >= than - max(margin, CLOSE * than)
+
+    left = [
+        i for i in which if (hopeful(likely[i], top) if i in likely else hopeful(float(promised[i]), least))
+    ]
+    if not search.clock.tired:
+        return left
+    return sorted(left, key=lambda i: -likely.get(i, float(promised[i])))[:FEWEST]
+
+
+def _promise(model: Model, candidate: Candidate) -> tuple[str, frozenset[Candidate], Candidate]:
+    return "kept of a promise", frozenset(model.candidates), candidate
 
 
 def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
@@ -140,14 +198,29 @@ def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
     starts = start_values(variant, estimate, flat)
     held = np.flatnonzero(flat).tolist() if len(starts) == 1 else []
     begun = [model.plus(variant.candidate, s, held) for s in starts]
+    if not variant.shape:
+        begun = [_from_before(search, model, begun[0])] if len(begun) == 1 else begun
     near = _near(search.screen, model, i)
-    fits = [fit(b, search.predictor, search.problem, near=near) for b in begun]
+    own = range(len(model.values), len(begun[0].values))
+    fits = [fit(b, search.predictor, search.problem, near=near, doubtful=own, pays=ROUGH) for b in begun]
     best = min(fits, key=lambda m: m.chi2)
     if not best.usable:
         beside = f" beside {' + '.join(map(str, model.candidates))}" if model.candidates else ""
         search.failed[f"{variant.candidate}{beside}"] = best.failure
     delta_chi2 = model.chi2 - best.chi2
     return Finalist(best, delta_chi2, minus_log_p_of(delta_chi2, best.sizes()[-1]))
+
+
+def _from_before(search: Search, model: Model, begun: Model) -> Model:
+    """Where an earlier fit of the same effects ended, on other rows or at another floor, if that explains anything here."""
+    values = best_known(begun, search.predictor)
+    if values is None:
+        return begun
+    try:
+        residual = search.problem.residual(search.predictor(begun.terms(values)))
+    except StiffmapError:
+        return begun
+    return replace(begun, values=values) if float(residual @ residual) < model.chi2 else begun
 
 
 def _near(screen: Screen, model: Model, i: int) -> Floats | None:
@@ -201,7 +274,7 @@ def backward(search: Search, model: Model) -> Model:
     """Drop effects that the others make unnecessary, the least necessary first."""
     while len(model.candidates) > 1:
         trials = [
-            fit(model.without(i), search.predictor, search.problem) for i in range(len(model.candidates))
+            fit_without(model, i, search.predictor, search.problem) for i in range(len(model.candidates))
         ]
         sizes = model.sizes()
         minus_log_p = [
@@ -218,12 +291,18 @@ def backward(search: Search, model: Model) -> Model:
 def exchange(search: Search, model: Model) -> Model:
     """Replace single effects by others while that explains clearly more."""
     for _ in range(3 if len(model.candidates) > 1 else 0):
-        if search.clock.over:
-            return model
         better = model
         for i in range(len(model.candidates)):
-            reduced = fit(model.without(i), search.predictor, search.problem)
-            found = best_addition(search, reduced, model.candidates[i]) if reduced.usable else None
+            if search.clock.over:
+                return model
+            if search.clock.tired:
+                search.clock.leave_out(f"others in place of {model.candidates[i]}")
+                continue
+            reduced = fit_without(model, i, search.predictor, search.problem)
+            if not reduced.usable:
+                continue
+            now = minus_log_p_of(reduced.chi2 - model.chi2, model.sizes()[i])
+            found = best_addition(search, reduced, model.candidates[i], now)
             if found and score(found.model, search.problem) > score(better, search.problem) + 1.0:
                 better = found.model
         if better is model:

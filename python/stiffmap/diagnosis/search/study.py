@@ -162,6 +162,9 @@ def find(study: Study, rows: Mask | None = None, *, finalists: int = 5) -> Findi
         again = alone(study, _held(residual, allowed)) & allowed
         if np.array_equal(again, out):
             break
+        if study.clock.spent:
+            study.clock.leave_out("the search again without the outliers that it found")
+            break
         out = again
     else:
         search = search_on(study, allowed & ~out, finalists)

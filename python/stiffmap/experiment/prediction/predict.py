@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -18,11 +19,14 @@ from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.experiment.prediction.history import Drives, drives_of, history_motion
 from stiffmap.experiment.prediction.joints import check_joints
+from stiffmap.experiment.prediction.kept import Kept
 from stiffmap.experiment.prediction.measurement import readings, true_wrench
 from stiffmap.experiment.prediction.recorded import at_records
 from stiffmap.machine import Machine
 
 Terms = tuple[AppliedEffect, ...]
+MOST_LIKES = 200
+"""Machines with effects whose findings about home are kept for those with other values of the same effects."""
 
 
 class Predictor:
@@ -38,7 +42,10 @@ class Predictor:
         self.threads = threads
         self.machine, self.experiment = resolved(machine, located(machine, experiment))
         self.solved = 0
-        self._memory: dict[tuple[Terms, Terms], Floats] = {}
+        self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
+        self._likes: Kept[Hashable, Machine] = Kept(most=MOST_LIKES)
+        self.tangents: Kept[Hashable, Any] = Kept()
+        """Slopes of predictions by effects, kept by those who fit them."""
         self._drives: dict[tuple[Terms, Terms], Drives] = {}
         self._set_aside()
         self._close_from_here()
@@ -49,11 +56,10 @@ class Predictor:
         mechanical = tuple(t for t, kind in kinds if kind.apply)
         load = tuple(t for t, kind in kinds if kind.load)
         key = (mechanical, load)
-        if key not in self._memory:
-            if len(self._memory) > 2000:
-                self._memory.clear()
-            self._memory[key] = self._motion(mechanical, load)
-        motion = self._memory[key]
+        motion = self._memory.get(key)
+        if motion is None:
+            motion = self._motion(mechanical, load)
+            self._memory.put(key, motion, motion.nbytes)
         remembering = tuple(t for t, kind in kinds if kind.drive)
         if remembering:
             plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
@@ -61,6 +67,11 @@ class Predictor:
                 self._drives = {key: drives_of(self.with_terms(mechanical), plan)}
             motion = motion + history_motion(self._drives[key], plan, remembering)
         return readings(self.experiment, motion, terms)
+
+    @property
+    def made(self) -> int:
+        """Predictions that were not known yet when they were asked for."""
+        return self._memory.made
 
     def under(self, wrench: Floats) -> Floats:
         """(n, c) m, rad: the same readings under other wrenches (n, 6); NaN where the machine fails under them."""
@@ -96,7 +107,9 @@ class Predictor:
         if not mechanical:
             return self.machine
         made = apply_records(self.machine.description, mechanical)
-        return Machine(made, like=self.machine)  # compiled once, not per effect
+        places = tuple((t.kind, t.element, t.legs, t.options) for t in mechanical)
+        like = self._likes.get(places) or self.machine  # what stands at home is found out once per place
+        return self._likes.put(places, Machine(made, like=like), 1)
 
     def _motion(self, mechanical: Terms, load: Terms) -> Floats:
         w = true_wrench(self.experiment, load)

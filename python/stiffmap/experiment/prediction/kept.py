@@ -1,0 +1,45 @@
+"""Results that are kept while they fit into memory."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Hashable
+from typing import Generic, TypeVar
+
+K = TypeVar("K", bound=Hashable)
+V = TypeVar("V")
+MOST_BYTES = 2**28
+
+
+class Kept(Generic[K, V]):
+    """Values by key; beyond so many bytes those that were asked for longest ago go."""
+
+    def __init__(self, most: int = MOST_BYTES) -> None:
+        self.most, self.bytes, self.made = most, 0, 0
+        self._values: OrderedDict[K, tuple[V, int]] = OrderedDict()
+
+    def get(self, key: K) -> V | None:
+        """The value, None where there is none."""
+        if key not in self._values:
+            return None
+        self._values.move_to_end(key)
+        return self._values[key][0]
+
+    def put(self, key: K, value: V, size: int) -> V:
+        """Keep a value of `size` bytes; returns it."""
+        if key in self._values:
+            self.bytes -= self._values.pop(key)[1]
+        self._values[key] = value, size
+        self.bytes += size
+        self.made += 1
+        while self.bytes > self.most and len(self._values) > 1:
+            self.bytes -= self._values.popitem(last=False)[1][1]
+        return value
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._values.clear()
+        self.bytes = 0
+
+    def __len__(self) -> int:
+        return len(self._values)
