@@ -306,11 +306,9 @@ struct Newton {
     M done = ~usable & usable, failed = ~usable;
     LoadSteps way{P, s};
     const bool patient = in.patience == Patience::path;
-    const double most_tries = in.max_iterations * (corners && patient ? 3.0 : 1.0);
-    const double whole_tries = patient ? 5 : 9, longest = patient ? 0.125 : 0.375;
+    const double most_tries = in.max_iterations * (!corners ? 1.0 : patient ? 3.0 : 0.5);
     const M unloaded = unloaded_lanes();
-    M near = corners ? M{} : unloaded;        // lanes of an arm that stand, but for round-off, at their answer
-    V share = splat(1), straight = splat(0);  // of Newton's steps, where corners make them go to and fro
+    M near = corners ? M{} : unloaded;  // lanes of an arm that stand, but for round-off, at their answer
     way.begin(unloaded);
     for (int k = 0; k < most_iterations; ++k) {
       const bool secant = corners && k == 0;
@@ -361,16 +359,10 @@ struct Newton {
         const M second = (way.tries == 1.0) & (norm <= 5.0 * way.previous) & (norm <= 0.02) & (e.lowest > pivot_floor);
         distrusted |= active & ~settled & ~((norm <= 0.2 * way.previous) | (norm <= 1e-7) | second);
       }
-      if (corners) {
-        // Where no corner was met, what is left of a step is what was not taken.
-        const M worse = active & (way.tries > 1.0) & (norm > (1.0 - 0.5 * share) * way.previous);
-        straight = select(active, select(norm < (1.001 - share) * way.previous, straight + 1.0, splat(0)), straight);
-        const V most = select((way.tries < whole_tries) | (straight > 1.0), splat(1), splat(longest));
-        const V twice = share + share;
-        share =
-            select(worse, larger(0.5 * share, splat(0.125)), select(active, select(twice < most, twice, most), share));
-        if (any(share < 1.0)) shorten(share);
-      }
+      // Corners make Newton's steps go to and fro: then each goes to the next corner, patiently.
+      const M corner_steps = patient ? active & (way.tries > 1.0) : M{};
+      if (corners && any(corner_steps)) shorten(select(corner_steps, to_corner(), splat(1)));
+      if (corners && !patient) distrusted |= active & ~settled & (way.tries > 2.0) & ~(norm <= 0.5 * way.previous);
       // Free play is the reference's to find: a singular step would leave the gap by chance.
       if (corners && k == 1) distrusted |= active & open_gaps();
       distrusted |= active & ~settled & (way.tries >= most_tries);
@@ -424,6 +416,23 @@ struct Newton {
   M moment_lanes() const {
     const V6& w = whole_load;
     return absolute(w.b.x) + absolute(w.b.y) + absolute(w.b.z) > 0.0;
+  }
+
+  /// Share of the last step up to shortly behind the first corner of a law (Katzenelson 1965): piece by piece the way
+  /// to the equilibrium is found where whole steps go to and fro.
+  [[gnu::noinline]] V to_corner() const {
+    V least = splat(1);
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      const CoordinateProgram& k = P.coordinates[q];
+      if (k.law < 0 || k.locked) continue;
+      const LawProgram& law = P.laws[k.law];
+      const V behind = 1e-10 * P.length / (k.unit * absolute(s.dz[q]));
+      for (int i = 0; i < law.count; ++i) {
+        const V share = (P.knots[3 * (law.first + i) + 2] - s.z[q]) / s.dz[q];
+        least = select((share > 0.0) & (share + behind < least), share + behind, least);
+      }
+    }
+    return least;
   }
 
   /// Takes only a share of the last step.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "plan/chains.hpp"
 #include "plan/closure.hpp"
@@ -93,6 +94,16 @@ double softest(const Mechanism& m) {
   return std::max(1e-4, least / m.stiffness);
 }
 
+/// A point of a node in the tip's frame, where only constant transforms lie between the two.
+std::optional<Vec3> from_tip(const Mechanism& m, Index node, const Vec3& offset) {
+  Pose way;
+  for (Index at = m.tip; at != node; at = m.nodes[static_cast<std::size_t>(at)].parent) {
+    if (at < 0 || m.nodes[static_cast<std::size_t>(at)].coordinate >= 0) return std::nullopt;
+    way = m.nodes[static_cast<std::size_t>(at)].actual * way;
+  }
+  return Vec3(way.R.transpose() * (offset - way.p));
+}
+
 /// Joints and bodies of a machine that is one row of joints without springs; false where it is something else.
 bool follow_serial(const FastPlanData& d, std::int32_t chain, std::vector<std::int32_t>& ops) {
   const ChainProgram& c = d.chains[static_cast<std::size_t>(chain)];
@@ -162,12 +173,14 @@ void link(const Mechanism& m, FastPlanData& d) {
 FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int grid_nodes)
     : data_(std::make_unique<FastPlanData>()) {
   for (const NodeSpring& s : m.external_springs) {
-    if (s.node != m.tip) missing_ = "external springs that are not at the tip";
-    data_->springs.push_back({{s.offset[0], s.offset[1], s.offset[2]},
-                              {s.anchor[0], s.anchor[1], s.anchor[2]},
-                              s.stiffness,
-                              s.length,
-                              s.tension_only});
+    const std::optional<Vec3> offset = from_tip(m, s.node, s.offset);
+    if (!offset) missing_ = "external springs that are not at the tip";
+    else
+      data_->springs.push_back({{(*offset)[0], (*offset)[1], (*offset)[2]},
+                                {s.anchor[0], s.anchor[1], s.anchor[2]},
+                                s.stiffness,
+                                s.length,
+                                s.tension_only});
   }
   const CompiledChains chains = compile_chains(m, *data_);
   if (missing_.empty()) missing_ = chains.missing;

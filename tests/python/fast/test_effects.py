@@ -155,3 +155,39 @@ def test_external_springs_at_the_tip(name: str, tension_only: str) -> None:
         assert found.statuses == 0
         assert found.poses > 20
         assert found.worst() < TOLERANCE
+
+
+def test_an_external_spring_beside_the_tip() -> None:
+    """At a point of the same body, the nose that carries a displaced tool."""
+    machine = (
+        sm.load_machine("travelling-column")
+        .with_effect("tcp_offset", error_x=1e-3, error_z=2e-3)
+        .with_effect(
+            "external_spring",
+            element="platform.spindle_nose",
+            stiffness=2e4,
+            length=0.3,
+            anchor_x=0.1,
+            anchor_y=0.2,
+            anchor_z=2.5,
+        )
+    )
+    assert machine.fast == ""
+    position, wrench = draw(machine, 16, seed=28)
+    found = gap(machine, position, wrench)
+    assert found.statuses == 0
+    assert found.worst() < TOLERANCE
+
+
+def test_corner_after_corner() -> None:
+    """Clearance of every pin: whole steps go to and fro on a fifth of the poses."""
+    machine = sm.load_machine("swing-table")
+    pins = {name.split(".")[1] for name in machine.compiled.names.coordinates if ".pin" in name}
+    for pin in sorted(pins):
+        machine = machine.with_effect("joint_clearance", element=pin, radius=5e-6)
+    position, _ = draw(machine, 64, seed=29)
+    wrench = [100.0, 50.0, -200.0, 0.0, 0.0, 0.0]
+    assert machine.solve(position, wrench).reference_share < 0.05
+    found = gap(machine, position[:16], np.tile(wrench, (16, 1)))
+    assert found.statuses == 0
+    assert found.worst() < TOLERANCE
