@@ -58,6 +58,14 @@ def measures(
     toolpath: Annotated[
         Path | None, typer.Option(help="Motion file (CSV or YAML) for measures along the task's own path.")
     ] = None,
+    clearance: Annotated[
+        float | None,
+        typer.Option(help="mm between members of different legs that workspace and largest box keep."),
+    ] = None,
+    deflection: Annotated[
+        float | None,
+        typer.Option(help="mm of deflection under the force that workspace and largest box keep to."),
+    ] = None,
     effect: EffectsOption = None,
     gravity_: GravityOption = None,
     output: FolderOption = None,
@@ -77,6 +85,8 @@ def measures(
       [cyan]stiffmap measures ur10 --nodes 11 --force 50[/cyan]
 
       [cyan]stiffmap measures linear-delta --only largest_box,frequency --json[/cyan]
+
+      [cyan]stiffmap measures orthoglide-revised --only workspace --clearance 60 --deflection 0.5[/cyan]
     """
     from stiffmap.performance import measures as all_of
 
@@ -86,7 +96,8 @@ def measures(
         m, box=limits, force=force, plane=plane, requirements=requirements,
         only=None if only is None else [n.strip() for n in only.split(",")], nodes=nodes, coarse=coarse,
         length=None if length is None else MM * length, gravity=gravity(gravity_), threads=threads,
-        toolpath=toolpath,
+        toolpath=toolpath, clearance=None if clearance is None else MM * clearance,
+        deflection=None if deflection is None else MM * deflection,
     )  # fmt: skip
     files = write(table, folder(output)) if output else []
     if as_json:

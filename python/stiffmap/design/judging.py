@@ -66,6 +66,8 @@ def values_of(design: Design, machine: Machine, names: list[str]) -> dict[str, f
         quick=True,
         threads=1,
         toolpath=design.toolpath,
+        clearance=task.clearance,
+        deflection=task.deflection,
     )
     return {n: get_measure(n).compute(case).worst for n in names}
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,19 @@ class Case:
     threads: int | None = None
     toolpath: Motion | None = None
     """The task's own path and force, for measures along it."""
+    clearance: float | None = None
+    """m, least distance between members of different legs in the workspace; None: not asked for."""
+    deflection: float | None = None
+    """m, largest deflection under `force` in `plane` in the workspace; None: not asked for."""
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """What a pose of the workspace keeps beside ranges of drives and joints, as `largest_box` takes it."""
+        bound = None if self.deflection is None else (self.force, self.plane, self.deflection)
+        return {
+            "transmission": self.transmission, "length": self.length, "clearance": self.clearance,
+            "deflection": bound, "rotation": self.rotation, "threads": self.threads,
+        }  # fmt: skip
 
     @property
     def motion(self) -> Motion:

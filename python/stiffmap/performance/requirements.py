@@ -35,6 +35,13 @@ class BoundModel(FileModel):
     at_most: Written | None = None
 
 
+class LimitsModel(FileModel):
+    """What poses of the workspace and of the largest box keep, with units."""
+
+    clearance: Written | None = None
+    deflection: Written | None = None
+
+
 class RequirementsFile(FileModel):
     """The keys of a requirements file."""
 
@@ -45,6 +52,7 @@ class RequirementsFile(FileModel):
     plane: Literal["xy", "xz", "yz"] = "xy"
     force: Written | None = None
     toolpath: str | None = None
+    limits: LimitsModel = LimitsModel()
     requirements: dict[str, BoundModel] = Field(default_factory=dict)
 
 
@@ -78,6 +86,10 @@ class Requirements:
     bounds: tuple[tuple[str, Bound], ...] = ()
     toolpath: str | None = None
     """Motion file of the task."""
+    clearance: float | None = None
+    """m, least distance between members of different legs in the workspace."""
+    deflection: float | None = None
+    """m, largest deflection under the force in the workspace."""
 
     def bound(self, measure: str) -> Bound | None:
         """The bound on a measure, if there is one."""
@@ -142,6 +154,15 @@ def requirements_of(document: Document, file: str) -> Requirements:
         )
     force = None if model.force is None else si(model.force, "N", "force")
     toolpath = None if model.toolpath is None else str(Path(file).parent / model.toolpath)
+    limits: dict[str, float | None] = {}
+    for name, value in (("clearance", model.limits.clearance), ("deflection", model.limits.deflection)):
+        length = None if value is None else si(value, "m", "limits", name)
+        limits[name] = length
+        if length is not None and length <= 0:
+            raise FileError(
+                f"expected a positive length, found {value}",
+                file=file, line=document.line(("limits", name)), key=f"limits.{name}",
+            )  # fmt: skip
     return Requirements(
-        model.name, model.title, model.source, box, model.plane, force, tuple(bounds), toolpath
+        model.name, model.title, model.source, box, model.plane, force, tuple(bounds), toolpath, **limits
     )

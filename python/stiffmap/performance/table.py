@@ -114,6 +114,8 @@ def measures(
     rotation: ArrayLike | None = None,
     gap: float = 1e-4,
     toolpath: Motion | str | PathLike[str] | None = None,
+    clearance: float | None = None,
+    deflection: float | None = None,
     threads: int | None = None,
 ) -> MeasuresTable:
     """Table of all measures of §3: worst and best pose, requirement, margin, pass or fail.
@@ -139,6 +141,9 @@ def measures(
         m between the bounds of the largest box.
     toolpath
         A motion file (`load_motion`) for measures along the task's own path; None: the requirement's.
+    clearance, deflection
+        m, what poses of the workspace and of the largest box keep: least distance between members of different
+        legs, largest deflection under `force` in `plane`; None: the requirement's, else not asked for.
 
     Raises StiffmapError for bad input. A measure that the machine lacks the data for says so in its row.
     """
@@ -164,9 +169,17 @@ def measures(
         length=length, gravity=None if gravity is None else np.asarray(gravity, dtype=float),
         rotation=None if rotation is None else np.asarray(rotation, dtype=float), threads=threads,
         toolpath=_motion(toolpath or task.toolpath),
+        clearance=_positive("clearance", task.clearance if clearance is None else clearance),
+        deflection=_positive("deflection", task.deflection if deflection is None else deflection),
     )  # fmt: skip
     rows = tuple(_row(m, case, task.bound(m.name)) for m in chosen)
     return MeasuresTable(machine, case, task, rows, notes)
+
+
+def _positive(name: str, value: float | None) -> float | None:
+    if value is not None and not (np.isfinite(value) and value > 0):
+        raise StiffmapError(f"{name}: expected a positive length in m, got {value!r}")
+    return value
 
 
 def _motion(given: Motion | str | PathLike[str] | None) -> Motion | None:

@@ -43,6 +43,8 @@ def test_shipped_requirements_are_those_of_the_paper():
         ("{at_most: 2 mm}", "{}", r"deflection: give at_least or at_most"),
         ("{at_most: 2 mm}", "{at_most: 2 mm, at_least: 3 mm}", r"at_least \(3 mm\) is above at_most"),
         ("x: 300 mm", "x: 300", r"box.x: the unit is missing"),
+        ("force: 200 N", "limits: {clearance: 20}", r"limits.clearance: the unit is missing"),
+        ("force: 200 N", "limits: {deflection: -1 mm}", r"limits.deflection: expected a positive length"),
         ("force: 200 N", "forse: 200 N", r"unknown key 'forse' \(did you mean 'force'\?\)"),
     ],
 )
@@ -121,3 +123,22 @@ def test_a_picture_of_nothing_and_of_one_value():
 
     for grid in ([np.nan, np.inf], [3.0, 3.0], [1.0, 1.0 + 1e-16], [-2.0, np.nan, 5.0], [0.0, 0.0]):
         assert (np.diff(levels(np.array(grid))) > 0).all()
+
+
+def test_limits_of_the_workspace_from_a_file(tmp_path):
+    """As `largest_box` takes them; a deflection takes its part of the volume, bars that meet near home all of it."""
+    machine = sm.load_machine("orthoglide-revised")
+    task = load(tmp_path, FILE + "limits: {clearance: 20 mm, deflection: 0.6 mm}\n")
+    assert (task.clearance, task.deflection) == (0.02, pytest.approx(6e-4))
+    asked = {"only": ["workspace"], "nodes": 3, "coarse": 2}
+    table = sm.measures(machine, requirements=task, **asked)
+    free = sm.measures(machine, **asked)
+    assert table.case.limits["deflection"] == (200.0, "xy", task.deflection)
+    assert 0 < table["workspace"].found.worst < free["workspace"].found.worst
+    assert dict(table["workspace"].found.extra["workspace"].limited_by)["deflection"] > 0
+    same = sm.measures(machine, force=200.0, clearance=0.02, deflection=6e-4, **asked)
+    assert same["workspace"].found.worst == table["workspace"].found.worst
+    none = sm.measures(machine, only=["largest_box"], clearance=0.08, gap=0.02, nodes=3)["largest_box"].found
+    assert none.worst == 0 and none.extra["box"].guarantee == "none"
+    with pytest.raises(sm.StiffmapError, match="clearance: expected a positive"):
+        sm.measures(machine, clearance=-0.1)

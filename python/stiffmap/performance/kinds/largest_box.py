@@ -11,13 +11,10 @@ from stiffmap.status import Status
 
 
 def compute(case: Case) -> Found:
-    """Anywhere; drive ranges, joint limits and the transmission range count."""
+    """Anywhere; drive ranges, joint limits, the transmission range and the case's limits count."""
     if case.quick:
         return concentric(case)
-    b = largest_box(
-        case.machine, case.proportions, transmission=case.transmission, length=case.length,
-        rotation=case.rotation, gap=case.gap, threads=case.threads,
-    )  # fmt: skip
+    b = largest_box(case.machine, case.proportions, gap=case.gap, **case.limits)
     note = f"no box of {1e3 * b.edge_upper:.2f} mm; limited by {', '.join(b.limited_by) or 'nothing found'}; {b.guarantee}"
     return Found(b.edge, b.centre, b.edge, b.centre, note, extra={"box": b})
 
@@ -28,7 +25,8 @@ def concentric(case: Case) -> Found:
     good = k.status == Status.CONVERGED
     with np.errstate(invalid="ignore"):
         good &= (v.sphere_min >= case.transmission[0]) & (v.sphere_max <= case.transmission[1])
-        for limit in Bounds(case.machine, transmission=None).intervals(k.coordinates):
+        bounds = Bounds(case.machine, **(case.limits | {"transmission": None}))
+        for limit in bounds.limits_of(k, case.positions):
             good &= limit.value <= limit.most
     centre, half = (case.low + case.high) / 2, (case.high - case.low) / 2
     share = (np.abs(case.positions - centre) / half).max(axis=1)
