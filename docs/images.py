@@ -42,6 +42,12 @@ COMMANDS = {  # picture: the command that writes it, and the file's name where t
     for name in ("hexapod", "linear-delta", "rotary-delta", "ur10", "hybrid", "five-bar", "swing-table", "3-rps",
                  "travelling-column")
 }  # fmt: skip
+ALL_OF_IT = "measures orthoglide-revised --requirements trimming --toolpath trim --nodes 21 -o {out}"
+COMMANDS |= {
+    f"measures/{name}": (ALL_OF_IT, "")
+    for name in ("requirements.png", "transmission.png", "largest-box.png", "map-workspace.png", "map-deflection.png",
+                 "toolpath.png", "modes.gif")
+} | {"measures/efforts.png": ("efforts orthoglide-revised trim -o {out}", "")}  # fmt: skip
 PAPER = ("figure5", "figure6", "figure7-worst", "figure7-best", "figure7-Fx", "figure7-Fy")
 COMMANDS |= {f"{name}.png": ("paper -o {out}", "") for name in PAPER}
 

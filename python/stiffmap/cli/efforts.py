@@ -29,7 +29,10 @@ from stiffmap.cli.output import JsonOption, print_json
 
 def efforts(
     machine: MachineArgument,
-    trajectory: Annotated[Path, typer.Argument(help="Motion of the tool: CSV or YAML, numbers with units.")],
+    trajectory: Annotated[
+        Path,
+        typer.Argument(help="Motion of the tool: CSV or YAML, numbers with units; or a shipped one: trim."),
+    ],
     duration: Annotated[
         float | None,
         typer.Option(
@@ -55,7 +58,9 @@ def efforts(
 
     Examples:
 
-      [cyan]stiffmap efforts orthoglide-revised cut.yaml -o results[/cyan]
+      [cyan]stiffmap efforts orthoglide-revised trim -o results[/cyan]
+
+      [cyan]stiffmap efforts orthoglide-revised cut.yaml --gravity 0,0,-9.81[/cyan]
 
       [cyan]stiffmap efforts ur10 path.csv --duration 2 --gravity 0,0,-9.81 --json[/cyan]
     """

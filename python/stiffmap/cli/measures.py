@@ -56,7 +56,10 @@ def measures(
         typer.Option(help="Characteristic length in mm, where units mix; default: the machine's."),
     ] = None,
     toolpath: Annotated[
-        Path | None, typer.Option(help="Motion file (CSV or YAML) for measures along the task's own path.")
+        Path | None,
+        typer.Option(
+            help="Motion file (CSV or YAML), or a shipped one (trim), for measures along the task's own path."
+        ),
     ] = None,
     clearance: Annotated[
         float | None,
@@ -179,8 +182,9 @@ def write(table: MeasuresTable, output: Path) -> list[str]:
     """Table, maps and pictures."""
     import json
 
-    from stiffmap.performance.pictures import measure_figures
+    from stiffmap.performance.pictures import measure_figures, moving_modes
     from stiffmap.plot import save
+    from stiffmap.report.pictures import animation
 
     data = output / "measures.json"
     try:
@@ -189,10 +193,17 @@ def write(table: MeasuresTable, output: Path) -> list[str]:
         raise StiffmapError(f"{data}: cannot be written: {error.strerror}") from error
     figures = measure_figures(table)
     pictures = [save(f, output / f"{name}.png") for name, f in figures.items()]
-    return [str(p) for p in (data, *pictures, write_report(table, output / "report.html", figures))]
+    shown: dict[str, Figure | bytes] = {**figures}
+    if "modes" in figures:
+        swinging = animation(moving_modes(table))
+        shown["modes"] = swinging
+        moving = output / "modes.gif"
+        moving.write_bytes(swinging)
+        pictures.append(moving)
+    return [str(p) for p in (data, *pictures, write_report(table, output / "report.html", shown))]
 
 
-def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure]) -> Path:
+def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure | bytes]) -> Path:
     """The table as one page with its pictures."""
     from stiffmap.maps.provenance import digest
     from stiffmap.performance.pictures import caption

@@ -92,6 +92,7 @@ def write(found: ParetoSet, place: Path, report: Report) -> list[str]:
     """The set and its pictures."""
     from stiffmap.design.pictures import beside_figure, front_figure, parallel_figure, progress_figure
     from stiffmap.maps.files import write_dataset
+    from stiffmap.performance.path_pictures import path_measures_figure
     from stiffmap.plot import save
 
     data = write_dataset(found.dataset, place / "pareto.nc")
@@ -99,6 +100,8 @@ def write(found: ParetoSet, place: Path, report: Report) -> list[str]:
     saved = [str(save(make(found), place / f"{name}.png")) for name, make in figures.items()]
     with suppress(StiffmapError):  # no measure with a map is asked for
         saved.append(str(save(beside_figure(report.tables), place / "beside.png")))
+    with suppress(StiffmapError):  # no toolpath
+        saved.append(str(save(path_measures_figure(report.tables), place / "toolpath.png")))
     return [str(data), *saved]
 
 

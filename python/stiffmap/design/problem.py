@@ -22,7 +22,7 @@ from stiffmap.files.report import validated
 from stiffmap.files.schema.base import FileModel, Name
 from stiffmap.files.shipped import find
 from stiffmap.machine import Machine
-from stiffmap.performance.motion_files import Motion, load_motion
+from stiffmap.performance.motion_files import Motion, load_motion, near_or_shipped
 from stiffmap.performance.quantities import quantity
 from stiffmap.performance.registry import all_measures, get_measure
 from stiffmap.performance.requirements import Bound, Requirements, load_requirements
@@ -190,7 +190,7 @@ def load_design(path: str | PathLike[str]) -> Design:
         if not (given.parent / name).is_file():
             find(name)
     if model.toolpath is not None:
-        task = replace(task, toolpath=str(given.parent / model.toolpath))
+        task = replace(task, toolpath=near_or_shipped(model.toolpath, given.parent))
     if task.toolpath is not None:
         load_motion(task.toolpath)  # a mistake in it is told before the search
     try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ from stiffmap.performance.limits import Bounds
 from stiffmap.performance.turning import best_orientation, turned
 from stiffmap.rotations import as_rotations
 
-WORK = 60_000
+WORK = 100_000
 """Cells and poses at most; when they are used up, the bounds stay as far apart as they are."""
 
 
@@ -44,6 +44,8 @@ class LargestBox:
     """Whether the work allowed was used up before the bounds met."""
     poses: int
     """Poses and cells that were closed for it."""
+    bounds: Bounds = field(repr=False)
+    """What was asked of a pose; judges more of them."""
 
     @property
     def proven(self) -> bool:
@@ -111,7 +113,7 @@ def largest_box(
     gap
         m: search goes on until upper and lower bound are this near ...
     work
-        ... or this many poses and cells were closed; the bounds hold all the same.
+        ... or this many poses and cells were closed, those of the climb not counted; the bounds hold all the same.
 
     The lower bound is a box all of whose poses are proven by enclosures of closure and slopes (theory D8), where
     the machine's closure allows it (`LargestBox.guarantee`). The upper bound excludes every centre by a pose
@@ -141,7 +143,7 @@ def largest_box(
         edge=found.edge, edge_upper=found.upper, edges=found.edge * shape,
         centre=np.asarray((found.centre * shape) @ axes.T), orientation=axes, limited_by=found.names, region=space,
         guarantee="none" if found.edge == 0 else f"sampled: {why}" if why else "proven",
-        exhausted=found.exhausted, poses=found.poses,
+        exhausted=found.exhausted, poses=found.poses, bounds=bounds,
     )  # fmt: skip
 
 
@@ -149,7 +151,7 @@ THIN = 1e-9
 
 
 def _region(machine: Machine, region: ArrayLike | None, shape: Floats) -> tuple[Floats, Floats]:
-    """Where to look, and the box's shape: without thickness where the workspace has none."""
+    """Where to look, and the box's shape: without thickness where the workspace has none or nothing is commanded."""
     if region is not None:
         out = np.asarray(region, dtype=float)
         if out.shape != (2, 3) or not (np.isfinite(out).all() and (out[1] > out[0]).all()):
@@ -157,7 +159,7 @@ def _region(machine: Machine, region: ArrayLike | None, shape: Floats) -> tuple[
         return out, shape
     low, high = machine.workspace
     centre, half = (low + high) / 2, (high - low) / 2
-    flat = half == 0
+    flat = (half == 0) | ~np.isin(["x", "y", "z"], machine.description.task)
     thin = np.where(flat, THIN, 1.0)
     half = np.where(flat, THIN * half.max(), half)
     return np.stack([centre - 3 * half, centre + 3 * half]), shape * thin

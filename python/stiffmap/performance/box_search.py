@@ -21,8 +21,15 @@ STEP = 2e-3
 """Spacing of the differences that give slopes at a corner, times the region's size."""
 AGAIN = 8
 """Most times that the cube moves away from poses that the proof found broken."""
+SETTLED = 8
+"""Most times that a climbed cube is climbed again because a limit is broken on its surface, between its corners."""
+LESS = 1e-3
+"""A third of what is taken off a cube whose proof took too many cells; three times as much each time."""
 CROSS = np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
 FACES = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
+NEAR = 0.05
+"""Of half the edge: points that are nearer to each other count as one."""
+SURFACE = np.array([v for v in product(np.linspace(-1, 1, 25), repeat=3) if np.abs(v).max() == 1])
 MOST_CELLS = 8000
 TRIED = 24
 
@@ -53,22 +60,26 @@ class BoxSearch:
         self.best, self.centre = 0.0, (self.low + self.high) / 2
         self.names: tuple[str, ...] = ()
         self.witnesses = np.zeros((0, 3))
+        self.touched = BOX
+        """Points of the cube, -1 to 1, at which limits are watched while it climbs."""
         self.exhausted = False
+        self.climbing = 0
+        """Poses closed while climbing, which are bounded of themselves and do not count as work."""
 
     def run(self) -> Found:
         """Lower bound, then upper bound."""
         climbed = [self.climb(start, edge) for start, edge in self.starts(3)]
         for centre, edge in sorted(climbed, key=lambda c: -c[1]):
             if edge > self.best + 0.5 * self.gap:
-                self._prove(centre, edge)
+                self._prove(*self.settle(centre, edge))
         upper = self._cover()
         return Found(
             self.best, max(upper, self.best), self.centre, self.names, self.bounds.counter[0], self.exhausted
         )
 
     def estimate(self) -> tuple[Floats, float]:
-        """Centre and edge of a good cube by its corners alone: nothing is proven."""
-        found = [self.climb(*s) for s in self.starts(1)]
+        """Centre and edge of a good cube by points of its surface: nothing is proven."""
+        found = [self.settle(*self.climb(*s)) for s in self.starts(1)]
         return max(found, key=lambda f: f[1]) if found else (self.centre, 0.0)
 
     def base(self, local: Floats) -> Floats:
@@ -77,7 +88,7 @@ class BoxSearch:
 
     @property
     def _left(self) -> int:
-        return self.work - self.bounds.counter[0]
+        return self.work - self.bounds.counter[0] + self.climbing
 
     def _inside(self, local: Floats) -> NDArray[np.bool_]:
         return self.bounds.inside(self.base(local))
@@ -121,10 +132,32 @@ class BoxSearch:
         border = np.minimum(centres - self.low, self.high - centres).min(axis=1)
         return np.asarray(2 * np.minimum(near, border))
 
+    def settle(self, centre: Floats, edge: float) -> tuple[Floats, float]:
+        """Climbed until no limit is broken between the points that are watched."""
+        for _ in range(SETTLED):
+            if not self._touches(centre + SURFACE * edge / 2, SURFACE):
+                break
+            centre, edge = self.climb(centre, edge)
+        return centre, edge
+
+    def _touches(self, points: Floats, relative: Floats) -> bool:
+        """Watches the point at which each limit is broken most; whether there was a new one."""
+        closed, limits = self.bounds.at(self.base(points))
+        self.climbing += len(points)
+        new = []
+        for limit in limits:
+            excess = np.where(closed & np.isfinite(limit.value), limit.value - limit.most, -np.inf)
+            worst = int(np.argmax(excess))
+            if excess[worst] > 0 and np.abs(self.touched - relative[worst]).max(axis=1).min() > NEAR:
+                new.append(relative[worst])
+        if new:
+            self.touched = np.concatenate([self.touched, new])
+        return bool(new)
+
     def climb(self, centre: Floats, edge: float) -> tuple[Floats, float]:
-        """Linear programs over the limits at the corners, within a shrinking trust region."""
-        trust, edge = 0.1 * self.size, 0.9 * edge
-        while edge > self.gap and not self._inside(centre + BOX * edge / 2).all():
+        """Linear programs over the limits at the points watched, within a shrinking trust region."""
+        trust, edge, before = 0.1 * self.size, 0.9 * edge, self.bounds.counter[0]
+        while edge > self.gap and not self._inside(centre + self.touched * edge / 2).all():
             edge *= 0.8  # a limit between the witnesses
         for _ in range(ROUNDS):
             better = self._program(centre, edge, trust)
@@ -133,29 +166,30 @@ class BoxSearch:
                 if trust < 0.1 * self.gap:
                     break
                 continue
-            if self._inside(better[0] + BOX * better[1] / 2).all():
+            if self._inside(better[0] + self.touched * better[1] / 2).all():
                 centre, edge = better
             else:
                 trust *= 0.5
+        self.climbing += self.bounds.counter[0] - before
         return centre, edge
 
     def _program(self, centre: Floats, edge: float, reach: float) -> tuple[Floats, float] | None:
-        """Best cube with its centre within `reach`, limits at the corners taken as linear."""
-        corners = centre + BOX * edge / 2
+        """Best cube with its centre within `reach`, limits at the points watched taken as linear."""
+        points = centre + self.touched * edge / 2
         rows: list[Floats] = []
         room: list[float] = []
         step = STEP * self.size
-        closed, limits = self.bounds.at(self.base((corners[:, None] + step * CROSS).reshape(-1, 3)))
-        closed = closed.reshape(8, -1)
+        closed, limits = self.bounds.at(self.base((points[:, None] + step * CROSS).reshape(-1, 3)))
+        closed = closed.reshape(len(points), -1)
         for limit in limits:
-            arrays = limit.array.reshape(8, len(CROSS), -1)
-            left = limit.left.reshape(8, len(CROSS), -1)[:, 0]
-            for c in range(8):
+            arrays = limit.array.reshape(len(points), len(CROSS), -1)
+            left = limit.left.reshape(len(points), len(CROSS), -1)[:, 0]
+            for c in range(len(points)):
                 if not closed[c].all():
                     continue
                 value = arrays[c] @ left[c]
                 slope = (value[1:4] - value[4:7]) / (2 * step)
-                rows.append(np.array([*slope, slope @ BOX[c] / 2]))
+                rows.append(np.array([*slope, slope @ self.touched[c] / 2]))
                 room.append(limit.most - value[0])
         if not rows:
             return None
@@ -183,10 +217,12 @@ class BoxSearch:
     def _prove(self, centre: Floats, edge: float) -> None:
         """The climbed cube, shrunk to what can be proven; moved away from what was found broken."""
         edge -= 0.1 * self.gap
+        less = LESS
         for _ in range(AGAIN):
             if edge <= self.best or self._left <= self.work // 2:
                 return
             share = max((self._left - self.work // 2) // 2, 500)
+            begun = edge
             found = shrink(self.bounds, self.axes, self.shape, centre, edge, self.best, 0.5 * self.gap, share)
             self.exhausted |= found.cells + 64 > share
             self.witnesses = np.concatenate([self.witnesses, found.broken])
@@ -194,8 +230,19 @@ class BoxSearch:
                 self.best, self.centre, self.names = found.edge, centre, found.names
             elif not self.names:
                 self.names = found.names
+            if self.best > begun - self.gap:
+                return
+            if found.edge == 0 and not len(found.broken):
+                less *= 3  # limits that are all but touched: a little less is decided soon
+                edge = max(self.best, (1 - less) * begun)
+                continue
             if not len(found.broken):
                 return
+            relative = np.clip(2 * (found.broken - centre) / begun, -1, 1)
+            if self._touches(found.broken, relative):
+                centre, edge = self.settle(*self.climb(centre, max(self.best, 0.5 * begun)))
+                edge -= 0.1 * self.gap
+                continue
             centre, roomier = self._roomier(centre)
             if roomier <= self.best + 0.3 * self.gap:
                 return
@@ -223,7 +270,7 @@ class BoxSearch:
         target = self.size / 2
         last = self.best + 0.8 * self.gap
         while True:
-            target = last if target < 1.3 * last else target
+            target = last if target < 1.1 * last else target
             if not self._excluded(target):
                 self.exhausted = True
                 return upper

@@ -99,17 +99,32 @@ class Motion:
 
 
 def load_motion(file: str | PathLike[str]) -> Motion:
-    """A motion of the tool from a CSV or YAML file (docs/measures.md).
+    """A motion of the tool from a CSV or YAML file, or a shipped one by name: ``trim`` (docs/measures.md).
 
     CSV: columns ``x [mm]``, ``y [mm]``, ``z [mm]``, perhaps ``fx [N]`` …; with ``t [s]`` a motion over time,
     without it a path. YAML: ``line``, ``circle`` or ``points``, ``duration`` or ``speed``, ``force``.
     Raises FileError naming file, line, what was expected and what was found.
     """
-    place = FilePath(file)
+    place = _place(FilePath(file))
     if place.suffix.lower() in (".yaml", ".yml"):
         document = read(place)
         return _described(document, str(place))
     return _table(place)
+
+
+SHIPPED = FilePath(__file__).with_name("motions")
+
+
+def _place(given: FilePath) -> FilePath:
+    """The file itself, or the shipped one of that name."""
+    shipped = SHIPPED / (given.name if given.suffix else f"{given.name}.yaml")
+    return shipped if not given.is_file() and len(given.parts) == 1 and shipped.is_file() else given
+
+
+def near_or_shipped(name: str, folder: FilePath) -> str:
+    """What a file in this folder calls its motion: one beside it, else as `load_motion` finds it."""
+    near = folder / name
+    return str(near) if near.is_file() or not _place(FilePath(name)).is_file() else name
 
 
 def _described(document: Document, file: str) -> Motion:

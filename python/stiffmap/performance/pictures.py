@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from itertools import product
 from typing import Any, cast
 
@@ -12,8 +14,11 @@ from numpy.typing import ArrayLike
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
+from stiffmap.performance.box import LargestBox
 from stiffmap.performance.box_map import box_map, levels
-from stiffmap.performance.mode_pictures import mode_figure
+from stiffmap.performance.box_pictures import box_figure
+from stiffmap.performance.mode_pictures import mode_figure, mode_frames
+from stiffmap.performance.path_pictures import path_measures_figure, path_rows
 from stiffmap.performance.registry import Measure
 from stiffmap.performance.table import MeasuresTable, Row
 from stiffmap.performance.workspace import Workspace
@@ -108,13 +113,31 @@ def measure_figures(table: MeasuresTable) -> dict[str, Figure]:
         out["map-workspace"] = workspace_figure(
             table.machine, cast(Workspace, space.found.extra["workspace"])
         )
+    box = rows.get("largest_box")
+    if box is not None and box.found.worst > 0:
+        with suppress(StiffmapError):  # a line
+            out["largest-box"] = box_figure(table.machine, cast(LargestBox, box.found.extra["box"]))
+    if path_rows(table):
+        out["toolpath"] = path_measures_figure({table.machine.name: table})
     last = rows.get("transmission_max")
     if last is not None and last.found.worst_at is not None and np.isfinite(last.found.worst):
         out["transmission"] = transmission_figure(table.machine, last.found.worst_at, table.case.plane)
-    slow = rows.get("frequency")
-    if slow is not None and slow.found.worst_at is not None and np.isfinite(slow.found.worst):
-        out["modes"] = mode_figure(table.machine, slow.found.worst_at, gravity=table.case.gravity)
+    slow = _slowest(table)
+    if slow is not None:
+        out["modes"] = mode_figure(table.machine, slow, gravity=table.case.gravity)
     return out
+
+
+def moving_modes(table: MeasuresTable) -> Iterator[Figure]:
+    """Frames of the modes at the pose of the lowest frequency, where there is one."""
+    slow = _slowest(table)
+    if slow is not None:
+        yield from mode_frames(table.machine, slow, gravity=table.case.gravity)
+
+
+def _slowest(table: MeasuresTable) -> Floats | None:
+    row = next((r for r in table.rows if r.measure.name == "frequency"), None)
+    return row.found.worst_at if row is not None and np.isfinite(row.found.worst) else None
 
 
 CAPTIONS = {
@@ -122,7 +145,10 @@ CAPTIONS = {
     "transmission": "Velocities of the tool at the worst pose for drive rates within a sphere (a), within a cube (b), and in the "
     "plane (c).",
     "map-workspace": "Sections of the workspace through its middle, and what it ends by.",
-    "modes": "Natural modes at the pose of the lowest frequency.",
+    "largest-box": "The largest box in sections through its corner that comes nearest to a limit, and what ends the workspace "
+    "about it.",
+    "toolpath": "Along the toolpath: compliance in the direction of its force, shares of the drives' declared efforts.",
+    "modes": "Natural modes at the pose of the lowest frequency, swinging.",
 }
 
 

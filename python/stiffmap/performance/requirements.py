@@ -13,6 +13,7 @@ from pydantic import Field
 from stiffmap.errors import FileError
 from stiffmap.files.report import validated
 from stiffmap.files.schema.base import FileModel, Name
+from stiffmap.performance.motion_files import near_or_shipped
 from stiffmap.performance.quantities import quantity_in
 from stiffmap.performance.registry import all_measures, get_measure
 from stiffmap.yaml_text import Document, read
@@ -153,7 +154,7 @@ def requirements_of(document: Document, file: str) -> Requirements:
             si(model.box.z, "m", "box", "z"),
         )
     force = None if model.force is None else si(model.force, "N", "force")
-    toolpath = None if model.toolpath is None else str(Path(file).parent / model.toolpath)
+    toolpath = None if model.toolpath is None else near_or_shipped(model.toolpath, Path(file).parent)
     limits: dict[str, float | None] = {}
     for name, value in (("clearance", model.limits.clearance), ("deflection", model.limits.deflection)):
         length = None if value is None else si(value, "m", "limits", name)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
+from numpy.typing import NDArray
 
+from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.performance.inside import REACH
@@ -25,6 +30,7 @@ KINDS = (
     ("deflection", GREEN, "deflection"),
 )
 """How a limit's name begins, its colour and its words; where several are broken, the first of these counts."""
+INSIDE = {0: ("inside", SKY)}
 
 
 def workspace_figure(machine: Machine, found: Workspace, nodes: int = NODES) -> Figure:
@@ -39,7 +45,7 @@ def workspace_figure(machine: Machine, found: Workspace, nodes: int = NODES) -> 
     planes = [(a, b) for a, b in ((0, 1), (0, 2), (1, 2)) if a in moves and b in moves]
     middle = found.box.mean(axis=0)
     low, high = machine.workspace
-    seen = {0: ("inside", SKY)}
+    seen = dict(INSIDE)
     with paper_style():
         figure = new_figure(max(3.0 * len(planes) + 0.4, 4.0), 3.9)
         for axes, (a, b) in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
@@ -47,19 +53,7 @@ def workspace_figure(machine: Machine, found: Workspace, nodes: int = NODES) -> 
             p = np.tile(middle, (nodes * nodes, 1))
             p[:, a], p[:, b] = (g.ravel() for g in np.meshgrid(u, v, indexing="ij"))
             judged = found.at(p)
-            inside, broken = judged.inside, judged.causes()
-            kind = np.where(inside, 0, 1)
-            for number, (begin, colour, words) in reversed(list(enumerate(KINDS, 1))):
-                for name, bad in broken.items():
-                    if name.startswith(begin):
-                        kind[bad & ~inside] = number
-                        if (bad & ~inside).any():
-                            seen[number] = (words, colour)
-            shown = ListedColormap([SKY, *(colour for _, colour, _ in KINDS)])
-            axes.pcolormesh(
-                MM * u, MM * v, kind.reshape(nodes, nodes).T, cmap=shown, vmin=-0.5, vmax=len(KINDS) + 0.5,
-                shading="nearest", rasterized=True,
-            )  # fmt: skip
+            paint(axes, u, v, judged.inside, judged.causes(), seen)
             axes.add_patch(
                 Rectangle(MM * low[[a, b]], *(MM * (high - low)[[a, b]]), fill=False, linewidth=1.0)
             )
@@ -68,9 +62,41 @@ def workspace_figure(machine: Machine, found: Workspace, nodes: int = NODES) -> 
             (rest,) = {0, 1, 2} - {a, b}
             axes.set_title(f"{'xyz'[rest]} = {round(MM * middle[rest]) + 0:d} mm")
             axes.set_aspect("equal")
-        handles = [Patch(facecolor=c, edgecolor="0.6", label=w) for w, c in dict.fromkeys(seen.values())]
+        handles = patches(seen)
         handles.append(Patch(fill=False, edgecolor="black", label="box of the machine file"))
         figure.legend(handles=handles, loc="outside lower center", ncols=1 + len(planes))
         unit = {2: "m²", 3: "m³"}[found.dimension]
         figure.suptitle(f"{machine.name}: workspace, {found.volume:.4g} ± {found.error:.1g} {unit}")
     return figure
+
+
+Seen = dict[int, tuple[str, str]]
+"""Kinds that a picture shows: words and colour."""
+
+
+def paint(
+    axes: Axes,
+    u: Floats,
+    v: Floats,
+    inside: NDArray[np.bool_],
+    broken: Mapping[str, NDArray[np.bool_]],
+    seen: Seen,
+) -> None:
+    """Poses on the nodes of u and v (m), first axis u, coloured by what excludes them; adds what it shows to `seen`."""
+    kind = np.where(inside, 0, 1)
+    for number, (begin, colour, words) in reversed(list(enumerate(KINDS, 1))):
+        for name, bad in broken.items():
+            if name.startswith(begin):
+                kind[bad & ~inside] = number
+                if (bad & ~inside).any():
+                    seen[number] = (words, colour)
+    shown = ListedColormap([SKY, *(colour for _, colour, _ in KINDS)])
+    axes.pcolormesh(
+        MM * u, MM * v, kind.reshape(len(u), len(v)).T, cmap=shown, vmin=-0.5, vmax=len(KINDS) + 0.5,
+        shading="nearest", rasterized=True,
+    )  # fmt: skip
+
+
+def patches(seen: Seen) -> list[Patch]:
+    """Entries of a legend."""
+    return [Patch(facecolor=c, edgecolor="0.6", label=w) for w, c in dict.fromkeys(seen.values())]

@@ -30,9 +30,9 @@ class Sheet:
 
 
 def write_sheet(
-    path: str | PathLike[str], sheet: Sheet, pictures: Mapping[str, Figure], digests: dict[str, str]
+    path: str | PathLike[str], sheet: Sheet, pictures: Mapping[str, Figure | bytes], digests: dict[str, str]
 ) -> Path:
-    """Write the page; `pictures` by their captions, `digests` of what went in. Raises FileError."""
+    """Write the page; `pictures` by their captions (figures, or GIFs as bytes), `digests` of what went in. Raises FileError."""
     target = Path(path)
     text = render(
         "sheet.html",

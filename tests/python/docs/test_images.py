@@ -21,5 +21,5 @@ def test_every_picture_of_the_pages_is_made_by_the_script() -> None:
         for name in re.findall(r"\]\((?:docs/)?img/([^)]+)\)", p.read_text(encoding="utf-8"))
     }
     assert shown == set(images.pictures())
-    stored = {p.relative_to(images.TARGET).as_posix() for p in images.TARGET.rglob("*.png")}
+    stored = {p.relative_to(images.TARGET).as_posix() for p in images.TARGET.rglob("*.[pg][ni][gf]")}
     assert stored == shown

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
+from stiffmap.files.shipped import find
 from stiffmap.performance import drive_kinematics
 from stiffmap.performance.bars import segment_distance
 from stiffmap.performance.box_search import BoxSearch
@@ -215,9 +216,23 @@ def test_what_is_proven_of_bars_depends_on_no_thread():
 
 def test_bounds_and_volumes_depend_on_no_thread():
     machine = sm.load_machine("orthoglide-original")
-    boxes = [sm.largest_box(machine, gap=2e-3, threads=n) for n in (1, 2)]
+    boxes = [sm.largest_box(machine, gap=1e-2, threads=n) for n in (1, 2)]
     assert boxes[0].edge == boxes[1].edge
     assert boxes[0].edge_upper == boxes[1].edge_upper
     assert boxes[0].poses == boxes[1].poses
-    volumes = [sm.workspace_volume(machine, cells=6, threads=n).volume for n in (1, 2)]
+    volumes = [sm.workspace_volume(machine, cells=4, threads=n).volume for n in (1, 2)]
     assert volumes[0] == volumes[1]
+
+
+def test_a_drive_whose_range_ends_in_the_middle_of_a_face(tmp_path):
+    """A leg of the Orthoglide is stretched most between the corners; by its closed form a cube from -a to b fits."""
+    text = find("orthoglide-revised").read_text(encoding="utf-8").replace("[-1060, -390]", "[-1040, -390]")
+    (tmp_path / "short.yaml").write_text(text, encoding="utf-8")
+    length, r, low, high = 0.775, 0.0775, 1.040, 0.390
+    a = -(r + length - low)
+    c = high - r  # b + c = sqrt(L^2 - 2 b^2)
+    b = (-2 * c + np.sqrt(4 * c**2 + 12 * (length**2 - c**2))) / 6
+    box = sm.largest_box(tmp_path / "short.yaml", transmission=None, gap=3e-3)
+    assert box.proven
+    assert box.edge > b + a - 4e-3
+    assert box.edge_upper >= b + a

@@ -18,7 +18,10 @@ def compute(case: Case) -> Found:
     share = np.abs(e["effort"].values) / most
     when, drive = np.unravel_index(int(np.argmax(share)), share.shape)
     note = f"{case.machine.actuators[drive]}: {abs(float(e['effort'].values[when, drive])):.4g} at {run.time[when]:.3g} s"
-    return Found(float(share.max()), run.position[when], note=note)
+    return Found(
+        float(share.max()), run.position[when], note=note, positions=run.position, values=share.max(axis=1),
+        extra={"share": share, "drives": case.machine.actuators, "time": run.time},
+    )  # fmt: skip
 
 
 MEASURE = Measure(
