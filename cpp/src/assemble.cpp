@@ -14,8 +14,6 @@ using namespace unloaded;
 constexpr double open_turn = 0.4;     // of a spin, rad or shares of the length
 constexpr double open_change = 0.02;  // of the stiffness by it: more than errors of the geometry make
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 /// A held spin along which the tip's stiffness changes leaves the configuration open (theory K3): not held.
 /// `turned`: where each closes when it has turned; what is missing is found and added until one is let go.
 void let_go_of_configurations(Mechanism& m, std::vector<VecX>& turned) {

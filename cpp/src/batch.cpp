@@ -2,7 +2,6 @@
 #include "stiffmap/batch.hpp"
 
 #include <cmath>
-#include <limits>
 #include <memory>
 
 #include "../kernels/dispatch.hpp"
@@ -19,8 +18,6 @@ using RowMajor6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 constexpr long reference_chunk = 16;
 constexpr long fast_chunk = 256;
 constexpr long patient_chunk = 64;
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 void read(const BatchInput& in, Index i, PoseInput& pose) {
   pose.commanded.p = Eigen::Map<const Vec3>(in.position + 3 * i);
@@ -277,7 +274,6 @@ class FastBatch {
 
   /// Fills what the kernels leave out for a pose that they did.
   void complete(Index i, std::uint8_t how) const {
-    const double nan = std::numeric_limits<double>::quiet_NaN();
     const Status status = how == pose_unstable ? Status::unstable : Status::converged;
     if (out_.status) out_.status[i] = static_cast<std::uint8_t>(status);
     if (out_.nothing_free) out_.nothing_free[i] = 1;

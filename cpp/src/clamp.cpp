@@ -2,16 +2,12 @@
 #include "stiffmap/clamp.hpp"
 
 #include <cmath>
-#include <limits>
 
 namespace stiffmap {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double shortest_leap = 1.0 / 256;  // of the imposed displacement
-constexpr int few_iterations = 8;            // of a step that is trusted to stay on its branch
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+constexpr double shortest_held_step = 1.0 / 256;  // of the imposed displacement
+constexpr int few_iterations = 8;                 // of a step that is trusted to stay on its branch
 
 void add_frame(Mechanism& m, Index parent, const Vec3& offset) {
   const Pose shift{offset, Mat3::Identity()};
@@ -73,7 +69,7 @@ bool Clamp::follow(const Vec6& displacement, Problem& problem) {
     }
     state_ = before_;
     leap *= 0.5;
-    if (done < 0 || leap < shortest_leap) return false;
+    if (done < 0 || leap < shortest_held_step) return false;
   }
   return true;
 }

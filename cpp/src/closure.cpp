@@ -14,8 +14,6 @@ constexpr double stationary = 1e-9;     // a step that leaves what misfit there 
 constexpr double contraction = 0.25;    // Newton steps of a trusted continuation shrink at least so
 constexpr double shortest_leap = 1e-3;  // of the way from home
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 }  // namespace
 
 void select_unknowns(const Mechanism& m, bool actuators, ClosureWorkspace& ws) {

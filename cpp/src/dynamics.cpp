@@ -6,8 +6,6 @@
 namespace stiffmap {
 namespace {
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 /// Velocity and acceleration of a frame's origin, angular ones of the frame.
 struct Movement {
   Vec3 v = Vec3::Zero(), w = Vec3::Zero(), a = Vec3::Zero(), b = Vec3::Zero();

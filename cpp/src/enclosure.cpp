@@ -2,7 +2,6 @@
 #include "stiffmap/enclosure.hpp"
 
 #include <cmath>
-#include <limits>
 
 namespace stiffmap {
 namespace {
@@ -11,9 +10,7 @@ constexpr double cushion = 1e-11;  // of the length: for round-off
 constexpr double most_turn = 1.0;  // rad of a frame within a cell
 constexpr int most_rounds = 8;
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
-bool turns(const Mechanism& m, Index j) { return m.coordinates[at(j)].type == JointType::revolute; }
+bool is_revolute(const Mechanism& m, Index j) { return m.coordinates[at(j)].type == JointType::revolute; }
 
 bool moves(const Coordinate& c) { return c.role == Role::actuator || (c.role == Role::passive && !c.locked); }
 
@@ -80,7 +77,7 @@ void Encloser::build(const Mechanism& m, const Frames& frames, Index end, Arm& a
   for (std::size_t i = 0; i < arm.joint.size(); ++i) {
     const Index j = arm.joint[i], k = static_cast<Index>(i);
     arm.w.col(k) = frames.axis.col(j);
-    arm.c.col(k) = turns(m, j) ? Vec3(arm.w.col(k).cross(p - frames.origin.col(j))) : Vec3(arm.w.col(k));
+    arm.c.col(k) = is_revolute(m, j) ? Vec3(arm.w.col(k).cross(p - frames.origin.col(j))) : Vec3(arm.w.col(k));
     arm.size[k] = arm.c.col(k).norm();
   }
 }
@@ -92,13 +89,13 @@ void Encloser::bound(const Mechanism& m, const VecX& swing, Arm& arm) const {
   double turn = 0;
   for (Index k = 0; k < n; ++k) {
     arm.turn[k] = turn;
-    if (turns(m, arm.joint[at(k)])) turn += swing[arm.unknown[at(k)]];
+    if (is_revolute(m, arm.joint[at(k)])) turn += swing[arm.unknown[at(k)]];
   }
   arm.whole = turn;
   double moved = 0;
   for (Index k = n - 1; k >= 0; --k) {
     const double s = swing[arm.unknown[at(k)]];
-    if (turns(m, arm.joint[at(k)])) {
+    if (is_revolute(m, arm.joint[at(k)])) {
       moved += s * (arm.size[k] + moved);
       arm.lever[k] = moved;
     } else {
@@ -115,7 +112,7 @@ void Encloser::columns(const Mechanism& m, const Arm& arm, double sign, Index ro
     const Index u = arm.unknown[i], k = static_cast<Index>(i);
     value.col(u).segment<3>(row) += sign * arm.c.col(k);
     radius.col(u).segment<3>(row).array() += arm.turn[k] * arm.size[k] + arm.lever[k];
-    if (!turns(m, arm.joint[i])) continue;
+    if (!is_revolute(m, arm.joint[i])) continue;
     value.col(u).segment<3>(row + 3) += sign * arm.w.col(k);
     radius.col(u).segment<3>(row + 3).array() += arm.turn[k] + extra;
   }
@@ -135,7 +132,7 @@ void Encloser::second(const Mechanism& m, const Arm& arm, double sign, Index row
     }
   };
   for (Index a = 0; a < n; ++a) {  // a towards the base, b towards the end
-    if (!turns(m, arm.joint[at(a)])) continue;
+    if (!is_revolute(m, arm.joint[at(a)])) continue;
     const Index up = arm.unknown[at(a)];
     for (Index b = a; b < n; ++b) {
       const Index down = arm.unknown[at(b)];
@@ -145,7 +142,7 @@ void Encloser::second(const Mechanism& m, const Arm& arm, double sign, Index row
       add(down, up, row, h, h.norm(), change);
       if (a == b) continue;
       add(up, down, row, h, h.norm(), change);
-      if (!turns(m, arm.joint[at(b)])) continue;
+      if (!is_revolute(m, arm.joint[at(b)])) continue;
       const Vec3 g = arm.w.col(a).cross(arm.w.col(b));
       add(down, up, row + 3, g, g.norm(), arm.turn[a] * g.norm() + between);
     }
@@ -210,7 +207,7 @@ bool Encloser::widen(const Mechanism& m, const Vec3& half, const VecX& step, con
     for (const Arm* side : {static_cast<const Arm*>(&arm), static_cast<const Arm*>(other)})
       if (side)
         for (std::size_t i = 0; i < side->joint.size(); ++i)
-          if (turns(m, side->joint[i])) turned += left[side->unknown[i]];
+          if (is_revolute(m, side->joint[i])) turned += left[side->unknown[i]];
     bound(m, left, arm);
     columns(m, arm, sign, row, turned, value, radius);
   });
@@ -276,7 +273,7 @@ bool Encloser::exists(const Mechanism& m, const Vec3& half) {
 void Encloser::enclose(const Mechanism& m, const Frames& frames, const VecX& x, const Mat3& axes, const Vec3& half,
                        Index slopes, const std::vector<Index>& watched, Enclosure& out) {
   out.enclosed = false;
-  out.bend.setConstant(std::numeric_limits<double>::quiet_NaN());
+  out.bend.setConstant(nan);
   if (!x.allFinite()) return;
   const Index n = static_cast<Index>(unknown_.size()), rows = 6 + m.closures();
   build(m, frames, m.tip, tip_);
@@ -348,8 +345,8 @@ void Encloser::enclose(const Mechanism& m, const Frames& frames, const VecX& x, 
     double moved = 0;
     for (auto j = path.rbegin(); j != path.rend(); ++j) {
       if (full[*j] == 0) continue;  // springs: their axes are not in the frames
-      moved +=
-          turns(m, *j) ? full[*j] * (frames.axis.col(*j).cross(p - frames.origin.col(*j)).norm() + moved) : full[*j];
+      moved += is_revolute(m, *j) ? full[*j] * (frames.axis.col(*j).cross(p - frames.origin.col(*j)).norm() + moved)
+                                  : full[*j];
     }
     out.moved[static_cast<Index>(i)] = moved;
   }

@@ -21,8 +21,6 @@ constexpr int most_load_steps = 400;
 constexpr int patient_steps = 8;
 constexpr int most_idle = 10;  // Newton steps in which the merit is not halved once: at a singular point each one does
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 /// Laws with corners or with dry friction: Newton starts from the solution with all laws linear.
 bool has_knots(const Mechanism& m) {
   const auto has_friction = [](const Coordinate& c) { return c.friction != 0; };

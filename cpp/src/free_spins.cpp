@@ -22,8 +22,6 @@ constexpr double along = 1e-6;           // 1 - cosine: an axis that is the line
 constexpr double sign_from = 0.3137;     // component that gives a line its direction; no line is short of one
 constexpr double far_from_axis = 0.837;  // component beyond which another axis makes the perpendicular
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 /// Joints that nothing but the closure holds: what a spring resists is no spin.
 void select_free(const Mechanism& m, ClosureWorkspace& ws) {
   select_unknowns(m, false, ws);

@@ -16,8 +16,6 @@ using namespace closing;
 constexpr double near_enough = 0.05;  // declared coordinates, relative to the length
 constexpr int most_starts = 200;      // of a search
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 std::vector<Gap> gaps(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws) {
   forward(m, Geometry::nominal, x, ws.frames);
   std::vector<Gap> out;

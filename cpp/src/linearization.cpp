@@ -4,8 +4,6 @@
 namespace stiffmap {
 namespace {
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 /// Force, moment and the rule by which they follow the body's rotation.
 struct PointWrench {
   Index node;

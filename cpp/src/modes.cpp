@@ -4,16 +4,12 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 namespace stiffmap {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double massless = 1e-13;  // relative to the largest inverse square of a frequency
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// Columns: motions that springs, laws and joints allow before the loops are closed, as lengths.
 MatX allowed(const Mechanism& m, const Linearization& lin) {
@@ -117,8 +113,8 @@ void natural_modes(const Mechanism& m, const Inertias& inertias, const PoseInput
   const bool sound =
       llt.info() == Eigen::Success && pivots.cwiseAbs2().minCoeff() > 1e-13 * S.diagonal().cwiseAbs().maxCoeff();
   if (!sound) {
-    const Eigen::SelfAdjointEigenSolver<MatX> values(S, Eigen::EigenvaluesOnly);
-    const double low = values.eigenvalues()[0], high = values.eigenvalues()[K.rows() - 1];
+    const VecX values = symmetric_eigen(S).values;
+    const double low = values[0], high = values[K.rows() - 1];
     if (low <= 1e-12 * high) {
       out.status = low < -1e-9 * high ? Status::unstable : Status::singular;
       return;
@@ -131,8 +127,8 @@ void natural_modes(const Mechanism& m, const Inertias& inertias, const PoseInput
   }
   MatX X = llt.matrixL().solve(M);
   const MatX reduced = llt.matrixL().solve(X.transpose());
-  const Eigen::SelfAdjointEigenSolver<MatX> modes(0.5 * (reduced + reduced.transpose()));
-  keep(Z, modes.eigenvalues(), llt.matrixU().solve(modes.eigenvectors()), out);
+  const EigenX modes = symmetric_eigen(MatX(0.5 * (reduced + reduced.transpose())));
+  keep(Z, modes.values, llt.matrixU().solve(modes.vectors), out);
 }
 
 }  // namespace stiffmap

@@ -3,19 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace stiffmap {
 namespace {
 
-constexpr double closed = 1e-12;        // relative to the mechanism's length
-constexpr double sound_pivot = 1e-8;    // of the normal matrix: below it, the rank is revealed
-constexpr double nearest = 0.3;         // of the length: a last pose within it is a start
-constexpr double shortest_leap = 0.02;  // of the way from home
-constexpr double shortest_step = 0.05;  // of the way from a start
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+constexpr double closed = 1e-12;          // relative to the mechanism's length
+constexpr double sound_pivot = 1e-8;      // of the normal matrix: below it, the rank is revealed
+constexpr double nearest = 0.3;           // of the length: a last pose within it is a start
+constexpr double shortest_stride = 0.02;  // of the way from home
+constexpr double shortest_step = 0.05;    // of the way from a start
 
 /// Rows of angles as lengths.
 template <class Matrix>
@@ -350,7 +346,7 @@ bool PoseCloser::continued(const Mechanism& m, const Pose& from, const Pose& pos
 
 bool PoseCloser::from_home(const Mechanism& m, const Pose& pose, VecX& x) {
   x = m.home_coordinates;
-  return continued(m, m.home, pose, shortest_leap, x);
+  return continued(m, m.home, pose, shortest_stride, x);
 }
 
 void PoseCloser::remember(const Pose& pose, const VecX& x) {

@@ -4,14 +4,6 @@
 #include <cmath>
 
 namespace stiffmap {
-namespace {
-
-constexpr double pivot_alarm = 1e-5;  // below: look closer with a rank-revealing factorisation
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 Inertia symmetric_inertia(MatX& A, double threshold) {
   const double alpha = (1 + std::sqrt(17.0)) / 8;
   const Index n = A.rows();

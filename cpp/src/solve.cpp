@@ -2,7 +2,6 @@
 #include "stiffmap/solve.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "unloaded.hpp"
 
@@ -10,10 +9,6 @@ namespace stiffmap {
 namespace {
 
 using namespace unloaded;
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// The leg wrenches: multipliers of the outermost loops, and for the first leg what is left of all
 /// that pushes on the platform (theory E3).

@@ -14,8 +14,6 @@ constexpr double small_turn = 1e-12;
 constexpr int most_turns = 100;
 constexpr int most_polishing = 2;  // steps below the noise that is told from a moment
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 }  // namespace
 
 Spins::Spins(const Mechanism& m) : m_(m), force_(VecX::Zero(m.size())), closure_(VecX::Zero(m.closures())) {

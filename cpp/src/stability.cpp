@@ -4,10 +4,7 @@
 namespace stiffmap {
 namespace {
 
-constexpr double safe_pivot = 1e-3;  // of the scaled elastic block: below, the tangent is taken as a whole
-constexpr double round_off = 1e-11;  // of the scaled tangent
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+constexpr double tangent_round_off = 1e-11;  // of the scaled tangent
 
 }  // namespace
 
@@ -49,7 +46,7 @@ Index Stability::falling(const SaddleSystem& saddle) {
   }
   if (!eliminated(A)) S_ = 0.5 * (A + A.transpose());
   const Index closures = saddle.regular() ? saddle.closures() : saddle.closure_rank();
-  return std::max<Index>(0, symmetric_inertia(S_, round_off).negative - closures);
+  return std::max<Index>(0, symmetric_inertia(S_, tangent_round_off).negative - closures);
 }
 
 }  // namespace stiffmap

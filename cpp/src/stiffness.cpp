@@ -2,18 +2,12 @@
 #include "stiffmap/stiffness.hpp"
 
 #include <cmath>
-#include <limits>
 
 namespace stiffmap {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double pivot_alarm = 1e-5;
-constexpr double safe_pivot = 1e-3;     // of the scaled elastic block
 constexpr double same_answer = 1e-9;    // of two ways to the compliance
 constexpr double least_motion = 1e-10;  // beside the largest: below, a compliance is noise
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// Splits the unknowns into elastic coordinates theta and free ones q. Near a pole of k_theta^F all are
 /// left among q: then (K1) is the whole bordered tangent.

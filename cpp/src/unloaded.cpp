@@ -2,16 +2,9 @@
 #include "unloaded.hpp"
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 namespace stiffmap::unloaded {
-namespace {
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 bool command(const Mechanism& m, const VecX& x, Problem& p) {
   p.friction_sign.setZero();
   for (Index j = 0; j < m.size(); ++j) {
@@ -43,7 +36,7 @@ void start_state(const Mechanism& m, const VecX& x, State& state) {
 }
 
 Mat6 Unloaded::stiffness(const VecX& x, const NodePoint& point) {
-  if (!command(m_, x, problem_)) return Mat6::Constant(std::numeric_limits<double>::quiet_NaN());
+  if (!command(m_, x, problem_)) return Mat6::Constant(nan);
   state_ = State(m_);
   start_state(m_, x, state_);
   linearize(m_, problem_, state_, lin_);

@@ -9,10 +9,12 @@
 #include <vector>
 
 #include "stiffmap/check.hpp"
+#include "stiffmap/types.hpp"
 
 namespace stiffmap::bindings {
 
 namespace py = pybind11;
+using Row3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;  // a rotation as numpy keeps it
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 inline std::string shape_text(const py::array& a) {

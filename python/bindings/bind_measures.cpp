@@ -12,9 +12,7 @@
 namespace stiffmap::bindings {
 namespace {
 
-using Row3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using RowX = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// An array full of NaN.
 py::array_t<double> unknown(const std::vector<py::ssize_t>& shape) {

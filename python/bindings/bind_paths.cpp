@@ -11,7 +11,6 @@ namespace stiffmap::bindings {
 namespace {
 
 using Shape = std::vector<py::ssize_t>;
-using Row3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using Row6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 
 py::array_t<double> vector(const VecX& v) {
@@ -152,7 +151,6 @@ py::tuple reactions(const Mechanism& m, const Array& position, const Array& rota
         solve_pose(m, in, {}, ws, r);
         const bool known = r.status == Status::converged || r.status == Status::unstable;
         const Linearization& lin = ws.equilibrium.lin;
-        const double nan = std::numeric_limits<double>::quiet_NaN();
         Eigen::Map<VecX>(o + m.size() * i, m.size()) =
             known ? VecX(lin.tau - lin.r) : VecX(VecX::Constant(m.size(), nan));
       }

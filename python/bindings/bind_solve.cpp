@@ -74,7 +74,6 @@ py::tuple closure(const Mechanism& m, const FastPlan* plan, const Array& given, 
   double *x_out = coordinates.mutable_data(), *p_out = position.mutable_data(), *r_out = turned.mutable_data();
   std::uint8_t* s_out = status.mutable_data();
   std::uint32_t* f_out = flags.mutable_data();
-  using Row3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   {
     py::gil_scoped_release free;
     parallel_chunks(n, 64, threads, [&](int, long begin, long end) {
@@ -93,7 +92,6 @@ py::tuple closure(const Mechanism& m, const FastPlan* plan, const Array& given, 
         if (inverse && !starts && (r.status != Status::converged || r.flags & flag::branch_unverified))
           r = inverse_closure(m, {p, Eigen::Map<const Row3>(R + 9 * i)}, ws, x);
         const bool ok = r.status == Status::converged;
-        const double nan = std::numeric_limits<double>::quiet_NaN();
         Eigen::Map<VecX>(x_out + m.size() * i, m.size()) = ok ? x : VecX(VecX::Constant(m.size(), nan));
         Eigen::Map<Vec3>(p_out + 3 * i) = ok ? r.tip.p : Vec3(Vec3::Constant(nan));
         Eigen::Map<Row3>(r_out + 9 * i) = ok ? r.tip.R : Mat3(Mat3::Constant(nan));

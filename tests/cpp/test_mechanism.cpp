@@ -4,26 +4,11 @@
 #include <string>
 
 #include "machines.hpp"
+#include "messages.hpp"
 #include "numeric.hpp"
 
 using namespace stiffmap;
 using namespace stiffmap::test;
-
-namespace {
-
-template <class F>
-std::string message(F&& f) {
-  try {
-    f();
-  } catch (const std::invalid_argument& e) {
-    return e.what();
-  }
-  return "nothing thrown";
-}
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
-
-}  // namespace
 
 BOOST_AUTO_TEST_SUITE(mechanism)
 

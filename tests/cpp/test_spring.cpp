@@ -5,10 +5,13 @@
 #include <string>
 
 #include "beam.hpp"
+#include "messages.hpp"
 #include "numeric.hpp"
 #include "stiffmap/spring.hpp"
 
 using namespace stiffmap;
+using test::contains;
+using test::message;
 using test::Random;
 
 namespace {
@@ -22,19 +25,6 @@ Mat6 random_spd(unsigned seed, int rank = 6) {
   }
   return M;
 }
-
-/// Message of the exception that `f` throws.
-template <class F>
-std::string message(F&& f) {
-  try {
-    f();
-  } catch (const std::invalid_argument& e) {
-    return e.what();
-  }
-  return "nothing thrown";
-}
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 

@@ -4,7 +4,9 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 
 namespace stiffmap {
 
@@ -47,5 +49,14 @@ inline constexpr std::uint32_t gimbal_lock = 1u << 14;        ///< axes of a bal
 
 /// Dimensionless threshold of every rank decision, on matrices scaled to length and stiffness.
 inline constexpr double rank_threshold = 1e-7;
+/// Of a scaled pivot: below, look closer with a rank-revealing factorisation.
+inline constexpr double pivot_alarm = 1e-5;
+/// Of a pivot of the scaled elastic block: below, the tangent is taken as a whole.
+inline constexpr double safe_pivot = 1e-3;
+
+inline constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+/// An index of Eigen's as one of the standard library's.
+constexpr std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 }  // namespace stiffmap
