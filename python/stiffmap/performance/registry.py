@@ -146,6 +146,8 @@ class Measure:
     shown: str = ""
     factor: float = 1.0
     order: int = 50
+    apart: bool = False
+    """Whether it asks the case for numbers only, nothing that measures share, so that it may run beside them."""
 
 
 def over_poses(positions: Floats, values: Floats, better: str, note: str = "", **extra: object) -> Found:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, thread_count
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.motion_files import Motion, load_motion
@@ -172,8 +173,19 @@ def measures(
         clearance=_positive("clearance", task.clearance if clearance is None else clearance),
         deflection=_positive("deflection", task.deflection if deflection is None else deflection),
     )  # fmt: skip
-    rows = tuple(_row(m, case, task.bound(m.name)) for m in chosen)
-    return MeasuresTable(machine, case, task, rows, notes)
+    return MeasuresTable(machine, case, task, _rows(chosen, case, task), notes)
+
+
+def _rows(chosen: Sequence[Measure], case: Case, task: Requirements) -> tuple[Row, ...]:
+    """In the order given; measures of their own run beside those that share kinematics."""
+    machine = case.machine
+    beside = [m for m in chosen if m.apart] if thread_count(case.threads) > 1 else []
+    _ = machine.fast, machine.compiled.not_enclosed  # made once, before two threads ask for it
+    with ThreadPoolExecutor(1) as pool:
+        later = {m.name: pool.submit(_row, m, case, task.bound(m.name)) for m in beside}
+        rows = {m.name: _row(m, case, task.bound(m.name)) for m in chosen if m.name not in later}
+        rows |= {name: found.result() for name, found in later.items()}
+    return tuple(rows[m.name] for m in chosen)
 
 
 def _positive(name: str, value: float | None) -> float | None:

@@ -36,4 +36,6 @@ def concentric(case: Case) -> Found:
     return Found(float(edge), centre, note="about the centre, nodes only")
 
 
-MEASURE = Measure("largest_box", "edge of the largest box", "m", "high", compute, "mm", 1e3, order=5)
+MEASURE = Measure(
+    "largest_box", "edge of the largest box", "m", "high", compute, "mm", 1e3, order=5, apart=True
+)

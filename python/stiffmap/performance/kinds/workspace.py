@@ -22,4 +22,4 @@ def compute(case: Case) -> Found:
     return Found(w.volume, note=note, extra={"workspace": w})
 
 
-MEASURE = Measure("workspace", "volume of the workspace", "m^3", "high", compute, "m³", order=6)
+MEASURE = Measure("workspace", "volume of the workspace", "m^3", "high", compute, "m³", order=6, apart=True)
