@@ -24,7 +24,7 @@ class Clock:
     until: float = float("inf")
     progress: Progress | None = None
     stopped: bool = False
-    predictions: Callable[[], int] = int
+    predictions: Callable[[], float] = float
     """How many were asked for so far: unlike seconds the same on every machine."""
     most: float = float("inf")
     """Predictions after which no search goes on beyond what it must do to come to an end."""
@@ -39,7 +39,7 @@ class Clock:
         """A clock that starts now; `budget` in seconds, None: no end."""
         return Clock(float("inf") if budget is None else time.monotonic() + budget, progress)
 
-    def bound(self, predictions: Callable[[], int], rows: int) -> None:
+    def bound(self, predictions: Callable[[], float], rows: int) -> None:
         """From here on the search may ask for so many predictions of an experiment with so many rows."""
         more = MOST * (ROWS / max(rows, 1)) ** 0.5
         self.predictions, self.most, self.share = predictions, predictions() + more, SHARE * more

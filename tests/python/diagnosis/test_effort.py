@@ -31,22 +31,22 @@ def test_the_bound_counts_predictions_and_says_what_it_left_out() -> None:
 
 
 def test_a_search_has_a_share_of_the_bound() -> None:
-    made = [0]
+    made = [0.0]
     c = Clock()
     assert not c.tired
     c.bound(lambda: made[0], clock.ROWS)
     c.begin_search()
-    made[0] = int(clock.SHARE * clock.MOST) + 1
+    made[0] = clock.SHARE * clock.MOST + 1.0
     assert c.tired and not c.spent
     c.begin_search()
     assert not c.tired
-    made[0] = int(clock.MOST) + 1
+    made[0] = clock.MOST + 1.0
     assert c.tired and c.spent
 
 
 def test_more_rows_allow_fewer_predictions() -> None:
     c = Clock()
-    c.bound(lambda: 10, 4 * clock.ROWS)
+    c.bound(lambda: 10.0, 4 * clock.ROWS)
     assert c.most == 10 + clock.MOST / 2
 
 
@@ -58,4 +58,4 @@ def test_what_was_asked_for_longest_ago_goes_first() -> None:
     kept.put("c", 3, 4)
     assert (kept.get("a"), kept.get("b"), kept.get("c")) == (1, None, 3)
     kept.put("c", 4, 6)
-    assert (len(kept), kept.bytes, kept.made) == (2, 10, 4)
+    assert (len(kept), kept.bytes, kept.effort) == (2, 10, 4)

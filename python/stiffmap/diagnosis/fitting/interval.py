@@ -35,8 +35,10 @@ class Limits:
     place lies within the steps that are tried."""
 
 
-def intervals(model: Model, predictor: Predictor, problem: Problem, inflation: float = 1.0) -> Limits:
-    """Lower and upper 95 % limits of the values.
+def intervals(
+    model: Model, predictor: Predictor, problem: Problem, inflation: float = 1.0, *, straight: bool = False
+) -> Limits:
+    """Lower and upper 95 % limits of the values; by the slopes alone where `straight`.
 
     `inflation` >= 1 widens by the standard deviation of a residual that is not pure noise. A parameter that
     the readings do not determine has its whole range.
@@ -51,6 +53,9 @@ def intervals(model: Model, predictor: Predictor, problem: Problem, inflation: f
             out[i] = low[i], high[i]
             continue
         step = np.sqrt(RISE) / alone * inflation
+        if straight:
+            out[i] = np.clip([value - step, value + step], low[i], high[i])
+            continue
 
         def rise(at: float, i: int = i) -> float:
             return _rise(model, predictor, problem, i, at)

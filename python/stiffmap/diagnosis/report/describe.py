@@ -25,7 +25,10 @@ def named_effects(study: Study, search: Search, model: Model, inflation: float =
     """The effects of a model, values and 95 % intervals in SI."""
     if not model.candidates:
         return []
-    ends = intervals(model, search.predictor, search.problem, inflation)
+    spent = study.clock.spent
+    if spent:
+        study.clock.leave_out("intervals by refits: they are those of a straight line")
+    ends = intervals(model, search.predictor, search.problem, inflation, straight=spent)
     limits = ends.values * model.scales[:, None]
     return [
         Effect(

@@ -20,7 +20,7 @@ from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.fitting.fit import fit_without
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.alias import AliasClass
-from stiffmap.diagnosis.search.selection import Search, additions
+from stiffmap.diagnosis.search.selection import FEWEST, Search, additions
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 
@@ -65,6 +65,9 @@ def rivals(search: Search, model: Model, classes: Sequence[AliasClass], number: 
     """
     longer = {c.representative: set(c.generalisations) for c in classes}
     found: list[Rival] = []
+    if search.clock.spent:
+        number = FEWEST
+        search.clock.leave_out(f"more than {number} rivals of each effect")
     for i, replaced in enumerate(model.candidates):
         reduced = fit_without(model, i, search.predictor, search.problem)
         if not reduced.usable:
