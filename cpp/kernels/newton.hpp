@@ -28,6 +28,7 @@ struct Newton {
   V6 c = {};
   Sym6 answer = {};         ///< K at the answer
   V compliance[6][6] = {};  ///< inverse of the tangent of a dead wrench at the answer
+  Serial serial;            ///< of an arm of joints alone
 
   // ---- laws -----------------------------------------------------------------------------------
   void law_at(const LawProgram& law, int q) {
@@ -170,6 +171,10 @@ struct Newton {
   /// pose's last bits would tell which of them ran.
   [[gnu::noinline]] void frames_and_wrenches() {
     frames();
+    transmit();
+  }
+
+  [[gnu::noinline]] void transmit() {
     V6 F = load;
     V3 at = point;
     wrenches(e, P.chains[P.root], F, at);
@@ -290,7 +295,7 @@ struct Newton {
   [[gnu::noinline]] void step_joints() {
     frames();
     e.lowest = splat(1e300);
-    serial_step(e, point, load, pending);
+    serial.step(e, point, load, pending);
     e.transferred = splat(0);
   }
 
@@ -307,20 +312,15 @@ struct Newton {
     LoadSteps way{P, s};
     const bool patient = in.patience == Patience::path;
     const double most_tries = in.max_iterations * (!corners ? 1.0 : patient ? 3.0 : 0.5);
-    const M unloaded = unloaded_lanes();
-    M near = corners ? M{} : unloaded;  // lanes of an arm that stand, but for round-off, at their answer
-    way.begin(unloaded);
+    way.begin(unloaded_lanes());
     for (int k = 0; k < most_iterations; ++k) {
       const bool secant = corners && k == 0;
       const M first = way.factor > way.acting;
       put_load(way.acting, way.factor);
-      // An arm finds its joints by themselves; lanes that are there wait for the others' to be linearised together.
-      const M on = ~done & ~failed, moving = on & ~near;
-      const bool joints = P.serial_joints > 0 && any(moving);
-      const M active = joints ? moving : on;
       evaluate(secant);
       V m[6][6];
-      if (joints) {
+      M active = ~done & ~failed;
+      if (P.serial_joints > 0) {
         step_joints();
       } else {
         if (P.spring_count > 0) pull();
@@ -343,10 +343,10 @@ struct Newton {
       // there is nothing to gain from it.
       const V change = larger(norm, e.transferred);
       const M whole = way.acting == 1.0;
-      M settled = active & whole & ~(joints ? on : M{}) &
-                  ((change < small) | ((norm < in.tolerance) & (way.previous < in.tolerance)));
+      M settled = active & whole & ((change < small) | ((norm < in.tolerance) & (way.previous < in.tolerance)));
       if (P.hardens && any(settled))
         settled &= (hardening_change() < same_slope) | ((norm < small) & (way.previous < small));
+      if (P.serial_joints > 0 && any(settled)) serial.answer(e, point, m, K);
       failed |= settled & ~(e.lowest > pivot_floor);
       const M kept = settled & (change < nothing);
       take(settled & ~failed, m);
@@ -369,10 +369,6 @@ struct Newton {
       move(active & ~kept & ~distrusted);
       done |= settled & ~failed;
       fresh = all(kept == active);
-      if (P.serial_joints > 0) {  // of the next step: by the ratio of the last two
-        near |= active & (way.factor == 1.0) & ((norm * norm < small * way.previous) | (norm < in.tolerance));
-        near &= ~distrusted;
-      }
       way.previous = select(active, norm, way.previous);
       way.tries = select(active, way.tries + 1.0, way.tries);
       way.acting = select(active, way.factor, way.acting);
@@ -385,6 +381,7 @@ struct Newton {
     steps = way.halved;
     if (fresh) put_load(splat(1), splat(1));
     else settle();
+    if (fresh && P.serial_joints > 0) transmit();
     return done & ~failed;
   }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Newton's step of a serial arm in its joints alone: as many equations as joints, no wrench or tangent of the platform
-// (docs/fast_path.md F14). Only the linearisation at the answer needs those.
+// Tangent of a serial arm in its joints alone: as many equations as joints, no wrench or tangent of the platform
+// (docs/fast_path.md F14).
 #pragma once
 
 #include "elimination.hpp"
@@ -9,70 +9,153 @@ namespace stiffmap::kernel {
 
 inline constexpr int most_serial_joints = 12;
 
-/// Steps of all joints under `load` at `point`, of which the tangent knows, and `pending`, of which it does not (F11).
-[[gnu::noinline]] inline void serial_step(Elimination& el, V3 point, const V6& load, const V6& pending) {
-  const Program& P = el.P;
-  const int n = P.serial_joints;
+struct Serial {
+  V B[most_serial_joints][most_serial_joints];  ///< eliminated: multipliers, inverse pivots, rows
   const Op* joint[most_serial_joints];
-  V B[most_serial_joints][most_serial_joints], g[most_serial_joints];
-  for (int i = 0, k = 0; i < P.serial_count; ++i)
-    if (P.ops[P.serial[i]].kind != OpKind::load) joint[k++] = P.ops + P.serial[i];
-  // Of all that acts behind the joint: force, and the sum of its lever arms times forces; with what is pending, force
-  // and moment about the joint.
-  V3 force = load.a, all = load.a + pending.a, moment = load.b + pending.b;
-  M3 arms{};
-  const auto lever = [&](const V3& r, const V3& f) {
-    for (int k = 0; k < 3; ++k) arms.c[k] = arms.c[k] + (k == 0 ? f.x : k == 1 ? f.y : f.z) * r;
-  };
-  int b = n - 1;
-  for (int i = P.serial_count - 1; i >= 0; --i) {
-    const Op& op = P.ops[P.serial[i]];
-    const JointSlot& j = el.s.joints[op.slot];
-    const V3 r = point - j.o;
-    lever(r, force);
-    moment = moment + cross(r, all);
-    point = j.o;
-    if (op.kind == OpKind::load) {
-      if (!el.heavy) continue;
-      const V3 weight = splat(op.mass) * el.gravity, whole = weight + splat(op.mass) * el.pending;
-      lever(j.w, weight);
-      force = force + weight;
-      moment = moment + cross(j.w, whole);
-      all = all + whole;
-      continue;
+
+  Serial() {}  // not filled with zeros: 10 kB
+
+  static constexpr double regular = 1e-7;  ///< least pivot of a compliance, of its diagonal: else the reference decides
+
+  /// Steps of all joints under `load` at `point`, of which the tangent knows, and `pending`, of which it does not
+  /// (F11).
+  void step(Elimination& el, const V3& point, const V6& load, const V6& pending) {
+    return el.P.serial_joints == 6 ? step_of<6>(el, point, load, pending) : step_of<0>(el, point, load, pending);
+  }
+
+  /// Compliance J diag(a') B^-1 J^T of a dead wrench at `point`, and its inverse, the symmetric part of it.
+  void answer(Elimination& el, const V3& point, V (&C)[6][6], Sym6& K) const {
+    return el.P.serial_joints == 6 ? answer_of<6>(el, point, C, K) : answer_of<0>(el, point, C, K);
+  }
+
+ private:
+  /// N joints; 0: as many as there are.
+  template <int N>
+  [[gnu::noinline]] void step_of(Elimination& el, V3 point, const V6& load, const V6& pending) {
+    const Program& P = el.P;
+    const int n = N ? N : P.serial_joints;
+    V g[most_serial_joints];
+    for (int i = 0, k = 0; i < P.serial_count; ++i)
+      if (P.ops[P.serial[i]].kind != OpKind::load) joint[k++] = P.ops + P.serial[i];
+    // Of all that acts behind the joint: force, and the sum of its lever arms times forces; with what is pending, force
+    // and moment about the joint.
+    V3 force = load.a, all = load.a + pending.a, moment = load.b + pending.b;
+    M3 arms{};
+    const auto lever = [&](const V3& r, const V3& f) {
+      for (int k = 0; k < 3; ++k) arms.c[k] = arms.c[k] + (k == 0 ? f.x : k == 1 ? f.y : f.z) * r;
+    };
+    int b = n - 1;
+    for (int i = P.serial_count - 1; i >= 0; --i) {
+      const Op& op = P.ops[P.serial[i]];
+      const JointSlot& j = el.s.joints[op.slot];
+      const V3 r = point - j.o;
+      lever(r, force);
+      moment = moment + cross(r, all);
+      point = j.o;
+      if (op.kind == OpKind::load) {
+        if (!el.heavy) continue;
+        const V3 weight = splat(op.mass) * el.gravity, whole = weight + splat(op.mass) * el.pending;
+        lever(j.w, weight);
+        force = force + weight;
+        moment = moment + cross(j.w, whole);
+        all = all + whole;
+        continue;
+      }
+      const bool turns = op.kind == OpKind::revolute;
+      const V3 below = turns ? arms * j.w - (arms.c[0].x + arms.c[1].y + arms.c[2].z) * j.w : cross(j.w, force);
+      const V3 above = turns ? below + cross(j.w, load.b) : below;  // a dead moment: theory E4
+      for (int a = 0; a <= b; ++a) {
+        const bool both = joint[a]->kind == OpKind::revolute;
+        const V3& w = el.s.joints[joint[a]->slot].w;
+        B[a][b] = both ? -dot(w, below) : splat(0);
+        B[b][a] = both ? -dot(w, above) : splat(0);
+      }
+      g[b] = dot(j.w, turns ? moment : all) - el.s.tau[op.coordinate];
+      --b;
     }
-    const bool turns = op.kind == OpKind::revolute;
-    const V3 below = turns ? arms * j.w - (arms.c[0].x + arms.c[1].y + arms.c[2].z) * j.w : cross(j.w, force);
-    const V3 above = turns ? below + cross(j.w, load.b) : below;  // a dead moment: theory E4
-    for (int a = 0; a <= b; ++a) {
-      const bool both = joint[a]->kind == OpKind::revolute;
-      const V3& w = el.s.joints[joint[a]->slot].w;
-      B[a][b] = both ? -dot(w, below) : splat(0);
-      B[b][a] = both ? -dot(w, above) : splat(0);
+    for (int k = 0; k < n; ++k) {
+      const int q = joint[k]->coordinate;
+      for (int i = 0; i < n; ++i) B[i][k] *= el.s.da[q];
+      B[k][k] += el.s.dtau[q];
     }
-    g[b] = dot(j.w, turns ? moment : all) - el.s.tau[op.coordinate];
-    --b;
-  }
-  for (int k = 0; k < n; ++k) {
-    const int q = joint[k]->coordinate;
-    for (int i = 0; i < n; ++i) B[i][k] *= el.s.da[q];
-    B[k][k] += el.s.dtau[q];
-  }
-  for (int k = 0; k < n; ++k) {
-    el.guard(B[k][k], P.coordinates[joint[k]->coordinate].unit);
-    const V inverse = 1.0 / B[k][k];
-    for (int i = k + 1; i < n; ++i) {
-      const V f = B[i][k] * inverse;
-      for (int c = k + 1; c < n; ++c) B[i][c] -= f * B[k][c];
-      g[i] -= f * g[k];
+#pragma GCC unroll 6
+    for (int k = 0; k < n; ++k) {
+      el.guard(B[k][k], P.coordinates[joint[k]->coordinate].unit);
+      B[k][k] = 1.0 / B[k][k];
+#pragma GCC unroll 6
+      for (int i = k + 1; i < n; ++i) {
+        B[i][k] *= B[k][k];
+#pragma GCC unroll 6
+        for (int c = k + 1; c < n; ++c) B[i][c] -= B[i][k] * B[k][c];
+      }
     }
-    B[k][k] = inverse;
+    solve<N>(n, g);
+    for (int k = 0; k < n; ++k) el.s.dz[joint[k]->coordinate] = g[k];
   }
-  for (int k = n - 1; k >= 0; --k) {
-    for (int c = k + 1; c < n; ++c) g[k] -= B[k][c] * g[c];
-    g[k] *= B[k][k];
-    el.s.dz[joint[k]->coordinate] = g[k];
+
+  template <int N>
+  [[gnu::noinline]] void answer_of(Elimination& el, const V3& point, V (&C)[6][6], Sym6& K) const {
+    const int n = N ? N : el.P.serial_joints;
+    V J[6][most_serial_joints], m[6][6], x[6][6];
+    for (int k = 0; k < n; ++k) {
+      const JointSlot& j = el.s.joints[joint[k]->slot];
+      V column[6];
+      put(joint[k]->kind == OpKind::prismatic ? V6{j.w, V3{}} : V6{cross(j.w, point - j.o), j.w}, column);
+      for (int i = 0; i < 6; ++i) J[i][k] = column[i];
+    }
+    for (int r = 0; r < 6; ++r) {
+      V g[most_serial_joints];
+      for (int k = 0; k < n; ++k) g[k] = J[r][k];
+      solve<N>(n, g);
+      for (int k = 0; k < n; ++k) g[k] *= el.s.da[joint[k]->coordinate];
+#pragma GCC unroll 6
+      for (int i = 0; i < 6; ++i) {
+        C[i][r] = J[i][0] * g[0];
+#pragma GCC unroll 6
+        for (int k = 1; k < n; ++k) C[i][r] += J[i][k] * g[k];
+      }
+    }
+    M sound = ~M{};
+    for (int i = 0; i < 6; ++i)
+      for (int q = 0; q < 6; ++q) {
+        m[i][q] = C[i][q];
+        x[i][q] = splat(i == q ? 1 : 0);
+      }
+#pragma GCC unroll 6
+    for (int k = 0; k < 6; ++k) {
+      sound &= m[k][k] > regular * C[k][k];
+      const V inverse = 1.0 / m[k][k];
+#pragma GCC unroll 6
+      for (int q = 0; q < 6; ++q) (q > k ? m : x)[k][q] *= inverse;
+#pragma GCC unroll 6
+      for (int i = 0; i < 6; ++i) {
+        if (i == k) continue;
+        const V f = m[i][k];
+#pragma GCC unroll 6
+        for (int q = 0; q < 6; ++q) (q > k ? m : x)[i][q] -= f * (q > k ? m : x)[k][q];
+      }
+    }
+    const auto mean = [&](int i, int q) { return 0.5 * (x[i][q] + x[q][i]); };
+    K.A = {x[0][0], x[1][1], x[2][2], mean(0, 1), mean(0, 2), mean(1, 2)};
+    for (int q = 0; q < 3; ++q) K.B.c[q] = {mean(0, 3 + q), mean(1, 3 + q), mean(2, 3 + q)};
+    K.E = {x[3][3], x[4][4], x[5][5], mean(3, 4), mean(3, 5), mean(4, 5)};
+    el.lowest = select(sound, el.lowest, splat(-1));
   }
-}
+
+  template <int N>
+  void solve(int count, V* g) const {
+    const int n = N ? N : count;
+#pragma GCC unroll 6
+    for (int i = 1; i < n; ++i)
+#pragma GCC unroll 6
+      for (int k = 0; k < i; ++k) g[i] -= B[i][k] * g[k];
+#pragma GCC unroll 6
+    for (int k = n - 1; k >= 0; --k) {
+#pragma GCC unroll 6
+      for (int c = k + 1; c < n; ++c) g[k] -= B[k][c] * g[c];
+      g[k] *= B[k][k];
+    }
+  }
+};
 
 }  // namespace stiffmap::kernel

@@ -10,7 +10,7 @@
 #include "machines.hpp"
 #include "stiffmap/batch.hpp"
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 namespace {
 std::atomic<long> calls{0};
 }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <atomic>
 #include <boost/test/unit_test.hpp>
+#include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include "machines.hpp"
@@ -20,7 +22,7 @@ struct Answer {
   std::vector<std::uint8_t> status;
 };
 
-Answer run(const Mechanism& m, const std::vector<double>& position, int threads) {
+Answer run(const Mechanism& m, const std::vector<double>& position, int threads, const FastPlan* plan = nullptr) {
   const std::size_t n = position.size() / 3;
   std::vector<double> rotation(9 * n), wrench(6 * n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -44,7 +46,8 @@ Answer run(const Mechanism& m, const std::vector<double>& position, int threads)
   out.effort = a.effort.data();
   out.leg_wrench = a.leg_wrench.data();
   out.status = a.status.data();
-  solve_reference(m, in, {}, threads, out);
+  if (plan) solve_fast(m, *plan, in, {}, threads, out);
+  else solve_reference(m, in, {}, threads, out);
   return a;
 }
 
@@ -68,6 +71,28 @@ BOOST_AUTO_TEST_CASE(threads_do_not_change_a_bit) {
   BOOST_TEST(same_bits(one.compliance, seven.compliance));
   BOOST_TEST(same_bits(one.effort, seven.effort));
   BOOST_TEST(same_bits(one.leg_wrench, seven.leg_wrench));
+}
+
+/// Under the thread sanitizer (preset `threads`): the passes of one batch, and callers that share plan and kernels.
+BOOST_AUTO_TEST_CASE(kernels_on_many_threads_by_several_callers) {
+  const Mechanism m = Orthoglide().build();
+  std::vector<double> position(3 * 1500);  // half of them beyond the box, some out of reach
+  for (std::size_t i = 0; i < position.size(); ++i)
+    position[i] = -0.2 + 0.5 * std::fmod(0.61803398875 * static_cast<double>(i), 1.0);
+  std::vector<Answer> answers(3);
+  std::vector<std::thread> callers;
+  const FastPlan shared(m, Vec3::Constant(-0.1), Vec3::Constant(0.2));
+  for (std::size_t k = 0; k < answers.size(); ++k)
+    callers.emplace_back([&, k] {
+      const FastPlan own(m, Vec3::Constant(-0.1), Vec3::Constant(0.2));
+      answers[k] = run(m, position, static_cast<int>(k) + 1, k == 1 ? &own : &shared);
+    });
+  for (std::thread& t : callers) t.join();
+  for (const Answer& a : answers) {
+    BOOST_CHECK(same_bits(a.displacement, answers[0].displacement));
+    BOOST_CHECK(same_bits(a.stiffness, answers[0].stiffness));
+    BOOST_CHECK(a.status == answers[0].status);
+  }
 }
 
 BOOST_AUTO_TEST_CASE(earlier_poses_leave_no_trace) {
