@@ -48,6 +48,10 @@ COMMANDS |= {
     for name in ("requirements.png", "transmission.png", "largest-box.png", "map-workspace.png", "map-deflection.png",
                  "toolpath.png", "modes.gif")
 } | {"measures/efforts.png": ("efforts orthoglide-revised trim -o {out}", "")}  # fmt: skip
+COMMANDS |= {
+    f"design/{name}.png": ("optimize redesign -o {out}", "")
+    for name in ("fronts", "parallel", "beside", "toolpath")
+}
 PAPER = ("figure5", "figure6", "figure7-worst", "figure7-best", "figure7-Fx", "figure7-Fy")
 COMMANDS |= {f"{name}.png": ("paper -o {out}", "") for name in PAPER}
 

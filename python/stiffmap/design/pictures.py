@@ -14,7 +14,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.performance.box_map import BoxMap, box_map, levels
 from stiffmap.performance.registry import get_measure
 from stiffmap.performance.table import MeasuresTable
-from stiffmap.plot.style import BLUE, COLOURS, CYCLE, MM, SKY, VERMILLION, new_figure, paper_style
+from stiffmap.plot.style import BLUE, COLOURS, CYCLE, MM, SKY, VERMILLION, headline, new_figure, paper_style
 
 MAPPED = ("deflection", "frequency", "transmission_max")
 
@@ -33,7 +33,7 @@ def front_figure(found: ParetoSet) -> Figure:
             axes.set_xlabel(_axis(names[a]))
             axes.set_ylabel(_axis(names[b]))
             axes.legend()
-        figure.suptitle(f"{found.design.model.name}: {len(found.x)} designs that no other one betters")
+        headline(figure, f"{found.design.model.name}: {len(found.x)} designs that no other one betters")
     return figure
 
 
@@ -48,7 +48,7 @@ def parallel_figure(found: ParetoSet) -> Figure:
         figure = new_figure(max(6.0, 0.9 * len(labels)), 3.4)
         axes = figure.add_subplot()
         axes.plot(scaled.T, color=BLUE, alpha=0.25, linewidth=0.8)
-        axes.plot(scaled[found.chosen()["compromise"]], color=VERMILLION, linewidth=1.6, label="compromise")
+        axes.plot(scaled[found.chosen()["compromise"]], color=VERMILLION, linewidth=1.6)
         axes.set_xticks(
             range(len(labels)),
             [f"{n}\n{a:.4g}…{b:.4g}" for n, a, b in zip(labels, low, high, strict=True)],
@@ -56,10 +56,8 @@ def parallel_figure(found: ParetoSet) -> Figure:
             ha="right",
         )
         axes.set_yticks([])
-        axes.legend(loc="upper right")
-        axes.set_title(
-            f"{found.design.model.name}: variables and measures, each from its lowest to its highest"
-        )
+        told = f"{found.design.model.name}: variables and measures, each from its lowest to its highest"
+        headline(figure, f"{told}; red: compromise")
     return figure
 
 

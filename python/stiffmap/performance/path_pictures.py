@@ -13,12 +13,12 @@ from stiffmap.errors import StiffmapError
 from stiffmap.performance.table import MeasuresTable, Row
 from stiffmap.plot.style import BLACK, CYCLE, DASHES, MM, headline, legend_below, new_figure, paper_style
 
-NAMES = ("path_compliance", "path_effort")
+ALONG = ("path_compliance", "path_effort")
 
 
 def path_rows(table: MeasuresTable) -> list[Row]:
     """Measures along the path that have values there."""
-    return [r for r in table.rows if r.measure.name in NAMES and r.found.values is not None]
+    return [r for r in table.rows if r.measure.name in ALONG and r.found.values is not None]
 
 
 def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
@@ -26,7 +26,7 @@ def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
 
     Raises StiffmapError where nothing was measured along a path.
     """
-    names = [n for n in NAMES if any(r.measure.name == n for t in tables.values() for r in path_rows(t))]
+    names = [n for n in ALONG if any(r.measure.name == n for t in tables.values() for r in path_rows(t))]
     if not names:
         raise StiffmapError("no measure along a toolpath; asked for path_compliance, path_effort")
     one = len(tables) == 1

@@ -18,23 +18,12 @@ from stiffmap.performance.box import LargestBox
 from stiffmap.performance.box_map import box_map, levels
 from stiffmap.performance.box_pictures import box_figure
 from stiffmap.performance.mode_pictures import mode_figure, mode_frames
-from stiffmap.performance.path_pictures import path_measures_figure, path_rows
+from stiffmap.performance.path_pictures import ALONG, path_measures_figure, path_rows
 from stiffmap.performance.registry import Measure
 from stiffmap.performance.table import MeasuresTable, Row
 from stiffmap.performance.workspace import Workspace
 from stiffmap.performance.workspace_pictures import workspace_figure
 from stiffmap.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, headline, new_figure, paper_style
-
-MAPPED = (
-    "transmission_max",
-    "transmission_min",
-    "singularity",
-    "velocity",
-    "force",
-    "accuracy",
-    "deflection",
-    "frequency",
-)
 
 
 def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy") -> Figure:
@@ -102,10 +91,10 @@ def _hexagon(axes, vertices: Floats, inner: float, outer: float) -> None:  # typ
 
 
 def measure_figures(table: MeasuresTable) -> dict[str, Figure]:
-    """Name -> figure: the table against its requirements, maps on three planes, Figure 1 and modes at the worst poses."""
+    """Name -> figure: the table against its requirements, a map on three planes of each measure that has one, Figure 1 and modes at the worst poses."""
     out = {"requirements": requirement_figure(table)} if table.requirements.bounds else {}
     for row in table.rows:
-        if row.measure.name in MAPPED and row.found.values is not None:
+        if row.measure.name not in ALONG and box_map(row) is not None:
             out[f"map-{row.measure.name}"] = map_figure(table, row)
     rows = {r.measure.name: r for r in table.rows}
     space = rows.get("workspace")
