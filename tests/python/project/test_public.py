@@ -102,3 +102,17 @@ def test_no_test_file_lacks_an_assertion() -> None:
     claims = re.compile(r"\bassert\b|pytest\.(raises|fail)|assert_\w+\(|BOOST_(TEST|CHECK|REQUIRE)")
     files = [*(ROOT / "tests").rglob("test_*.py"), *(ROOT / "tests/cpp").glob("test_*.cpp")]
     assert files and [p.name for p in files if not claims.search(p.read_text(encoding="utf-8"))] == []
+
+
+def test_every_line_of_the_slow_list_is_a_test() -> None:
+    lines = (ROOT / "tests/python" / "slow.txt").read_text(encoding="utf-8").splitlines()
+    gone = []
+    for line in (x.split("#")[0].strip() for x in lines):
+        if not line:
+            continue
+        file, name = line.split("::", 1)
+        if not re.search(
+            rf"def {name.split('[')[0]}\(", (ROOT / "tests/python" / file).read_text(encoding="utf-8")
+        ):
+            gone.append(line)
+    assert not gone, f"slow.txt names tests that are not there: {gone}"
