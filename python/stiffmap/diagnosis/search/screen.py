@@ -152,7 +152,8 @@ def _white(problem: Problem, columns: Sequence[Floats]) -> Floats:
         for k in range(0, len(columns), AT_ONCE)
     ]
     white = np.concatenate(out)
-    return np.where(np.linalg.norm(white, axis=1, keepdims=True) > VISIBLE, white, 0.0)
+    white[np.sqrt(np.einsum("ij,ij->i", white, white)) <= VISIBLE] = 0.0
+    return white
 
 
 def _screen(

@@ -191,7 +191,8 @@ def search_on(study: Study, keep: Mask, finalists: int) -> Search:
     if keep.all():
         return Search(study.predictor, *study.whole, study.effective_trials, finalists, clock=study.clock)
     problem = study.problem_of(keep)
-    screen = _representatives(Screen.of(problem, study.plan.variants), study.classes)
+    named = {c.representative for c in study.classes}
+    screen = Screen.of(problem, [v for v in study.plan.variants if v.candidate in named])
     return Search(study.predictor, problem, screen, study.effective_trials, finalists, clock=study.clock)
 
 
