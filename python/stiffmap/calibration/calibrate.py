@@ -42,6 +42,7 @@ from stiffmap.experiment.noise.outliers import outliers
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
+from stiffmap.one_thread import on_one_thread
 
 BASE = ("zeros", "tool")
 """Groups that every machine has: the others are compared beside them."""
@@ -51,6 +52,7 @@ Size = Callable[[Floats], float]
 """rms of (n, c) residuals in the unit of the report."""
 
 
+@on_one_thread
 def calibrate(
     machine: Machine | str | PathLike[str],
     experiment: Experiment | str | PathLike[str],

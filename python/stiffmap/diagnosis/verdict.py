@@ -35,11 +35,13 @@ from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Mask
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
+from stiffmap.one_thread import on_one_thread
 
 LISTED = 20
 """Patterns that a verdict lists at most."""
 
 
+@on_one_thread
 def diagnose(
     machine: Machine | str | PathLike[str],
     experiment: Experiment | str | PathLike[str],
