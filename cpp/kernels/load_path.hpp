@@ -211,8 +211,8 @@ struct LoadPath {
       apart = larger(apart, absolute(way - forward * s.dz[q] - backward * s.slope[q]) * P.coordinates[q].unit);
     }
     const M crossed = n.e.negative != stable;
-    const V allowed = select(crossed, splat(crossing_bend), splat(bend));
-    return (apart <= bend_noise * P.length + allowed * chord) & ~(crossed & (step > crossing_step));
+    const V bound = select(crossed, splat(crossing_bend), splat(bend));
+    return (apart <= bend_noise * P.length + bound * chord) & ~(crossed & (step > crossing_step));
   }
 
   /// The equilibrium before the last step is where these lanes go back to.
