@@ -210,23 +210,42 @@ def _box(
 ) -> tuple[Floats, Floats, tuple[str, ...]]:
     if box is not None or task.box is None:
         low, high = read_box(machine, box)
-        return low, high, _reach(machine, low, high, "the box")
+        outside = _reach(machine, low, high, "the box")
+        if outside and not outside.some:
+            raise StiffmapError(f"{outside.told}: the workspace of {machine.name} is elsewhere")
+        return low, high, outside.notes
     low, high = read_box(machine, None)
     half = np.array(task.box) / 2
     wanted = ((low + high) / 2 - half, (low + high) / 2 + half)
     outside = _reach(machine, *wanted, "the required box about the centre of the workspace")
     if not outside:
         return (*wanted, ())
-    return low, high, (*outside, "measures are over the machine's own workspace instead")
+    return low, high, (*outside.notes, "measures are over the machine's own workspace instead")
 
 
-def _reach(machine: Machine, low: Floats, high: Floats, what: str) -> tuple[str, ...]:
+@dataclass(frozen=True)
+class _Outside:
+    """Nodes of a box out of reach: what is said of them, and whether some are within it."""
+
+    told: str = ""
+    some: bool = True
+
+    def __bool__(self) -> bool:
+        return bool(self.told)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return (self.told,) if self.told else ()
+
+
+def _reach(machine: Machine, low: Floats, high: Floats, what: str) -> _Outside:
     from stiffmap.performance.closing import drive_kinematics
 
     p = box_nodes(low, high, 5)
     status = drive_kinematics(machine, p, patient=False).status
     bad = status != Status.CONVERGED
     if not bad.any():
-        return ()
+        return _Outside()
     first = "({:.1f}, {:.1f}, {:.1f}) mm".format(*(1e3 * p[int(np.argmax(bad))]))
-    return (f"{what} is not within reach: {int(bad.sum())} of {len(p)} nodes, for example {first}",)
+    told = f"{what} is not within reach: {int(bad.sum())} of {len(p)} nodes, for example {first}"
+    return _Outside(told, not bad.all())

@@ -50,6 +50,13 @@ def test_one_message_and_exit_code_two(tmp_path, monkeypatch, capsys, command, w
     assert code == 2 and all(w in said for w in words), said
 
 
+def test_a_box_wholly_outside_the_reach_is_refused(capsys):
+    box = "--box=2000,2100,2000,2100,2000,2100"
+    assert main(["measures", "orthoglide-revised", box, "--only", "velocity", "--nodes", "3"]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "box is not within reach: 125 of 125 nodes" in said and "orthoglide-revised" in said
+
+
 def test_a_box_outside_the_reach_says_where(capsys):
     box = "--box=-2000,300,-200,300,-200,300"
     main(["measures", "orthoglide-revised", box, "--only", "velocity", "--nodes", "3"])
