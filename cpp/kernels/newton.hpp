@@ -28,7 +28,7 @@ struct Newton {
   V6 c = {};
   Sym6 answer = {};         ///< K at the answer
   V compliance[6][6] = {};  ///< inverse of the tangent of a dead wrench at the answer
-  Serial serial{};           ///< of an arm of joints alone
+  Serial serial{};          ///< of an arm of joints alone
 
   // ---- laws -----------------------------------------------------------------------------------
   void law_at(const LawProgram& law, int q) {
