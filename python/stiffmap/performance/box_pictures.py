@@ -13,7 +13,7 @@ from stiffmap.machine import Machine
 from stiffmap.performance.box import LargestBox
 from stiffmap.performance.inside import REACH
 from stiffmap.performance.limits import BOX
-from stiffmap.performance.workspace_pictures import INSIDE, paint, patches
+from stiffmap.performance.workspace_pictures import INSIDE, name_axes, paint, patches, planes_of, section
 from stiffmap.plot.style import BLACK, BLUE, MM, headline, legend_below, new_figure, paper_style
 
 NODES = 80
@@ -30,7 +30,7 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = NODES) -> Figure:
     if not box.edge > 0:
         raise StiffmapError(f"{machine.name}: no box was found, so there is none to draw")
     moves = [i for i in range(3) if box.edges[i] > THIN * box.edges.max()]
-    planes = [(a, b) for a, b in ((0, 1), (0, 2), (1, 2)) if a in moves and b in moves]
+    planes = planes_of(moves)
     if not planes:
         raise StiffmapError(f"{machine.name}: the largest box is a line, so there is no section to draw")
     low, high = box.corners
@@ -43,9 +43,7 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = NODES) -> Figure:
         for axes, (a, b) in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
             middle, reach = (low + high) / 2, AROUND * (high - low)
             u, v = (np.linspace(middle[i] - reach[i], middle[i] + reach[i], nodes) for i in (a, b))
-            local = np.tile(at, (nodes * nodes, 1))
-            local[:, a], local[:, b] = (g.ravel() for g in np.meshgrid(u, v, indexing="ij"))
-            closed, limits = box.bounds.at(local @ box.orientation.T)
+            closed, limits = box.bounds.at(section(at, a, b, u, v) @ box.orientation.T)
             broken = {limit.name: closed & ~(limit.value <= limit.most) for limit in limits}
             inside = closed & ~np.any([*broken.values(), np.zeros_like(closed)], axis=0)
             paint(axes, u, v, inside, broken | {REACH: ~closed}, seen)
@@ -54,13 +52,9 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = NODES) -> Figure:
                 space = machine.workspace
                 axes.add_patch(_frame(space[0], space[1], a, b, BLACK, ":", 1.0))
             axes.plot(*(MM * at[[a, b]]), "o", color=BLUE, markersize=5, clip_on=False)
-            axes.set_xlabel(f"{marks[a]}, mm")
-            axes.set_ylabel(f"{marks[b]}, mm")
-            (rest,) = {0, 1, 2} - {a, b}
-            axes.set_title(f"{marks[rest]} = {round(MM * at[rest]) + 0:d} mm")
+            name_axes(axes, a, b, at, marks)
             axes.set_xlim(MM * u[0], MM * u[-1])
             axes.set_ylim(MM * v[0], MM * v[-1])
-            axes.set_aspect("equal")
         extra: list[Patch | Line2D] = [
             Patch(fill=False, edgecolor=BLUE, linewidth=1.6, label="largest box"),
             Line2D([], [], marker="o", linestyle="", color=BLUE, label="its corner nearest to a limit"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -42,7 +42,7 @@ def workspace_figure(machine: Machine, found: Workspace, nodes: int = NODES) -> 
         raise StiffmapError(f"{machine.name}: no section of the workspace to draw")
     size = found.region[1] - found.region[0]
     moves = [i for i in range(3) if size[i] > 0]
-    planes = [(a, b) for a, b in ((0, 1), (0, 2), (1, 2)) if a in moves and b in moves]
+    planes = planes_of(moves)
     middle = found.box.mean(axis=0)
     low, high = machine.workspace
     seen = dict(INSIDE)
@@ -50,24 +50,39 @@ def workspace_figure(machine: Machine, found: Workspace, nodes: int = NODES) -> 
         figure = new_figure(max(3.0 * len(planes) + 0.4, 4.0), 3.9)
         for axes, (a, b) in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
             u, v = (np.linspace(float(found.region[0, i]), float(found.region[1, i]), nodes) for i in (a, b))
-            p = np.tile(middle, (nodes * nodes, 1))
-            p[:, a], p[:, b] = (g.ravel() for g in np.meshgrid(u, v, indexing="ij"))
-            judged = found.at(p)
+            judged = found.at(section(middle, a, b, u, v))
             paint(axes, u, v, judged.inside, judged.causes(), seen)
             axes.add_patch(
                 Rectangle(MM * low[[a, b]], *(MM * (high - low)[[a, b]]), fill=False, linewidth=1.0)
             )
-            axes.set_xlabel(f"{'xyz'[a]}, mm")
-            axes.set_ylabel(f"{'xyz'[b]}, mm")
-            (rest,) = {0, 1, 2} - {a, b}
-            axes.set_title(f"{'xyz'[rest]} = {round(MM * middle[rest]) + 0:d} mm")
-            axes.set_aspect("equal")
+            name_axes(axes, a, b, middle)
         handles = patches(seen)
         handles.append(Patch(fill=False, edgecolor="black", label="box of the machine file"))
         figure.legend(handles=handles, loc="outside lower center", ncols=1 + len(planes))
         unit = {2: "m²", 3: "m³"}[found.dimension]
         figure.suptitle(f"{machine.name}: workspace, {found.volume:.4g} ± {found.error:.1g} {unit}")
     return figure
+
+
+def planes_of(moves: Sequence[int]) -> list[tuple[int, int]]:
+    """Pairs of the axes along which the machine moves."""
+    return [(a, b) for a, b in ((0, 1), (0, 2), (1, 2)) if a in moves and b in moves]
+
+
+def section(at: Floats, a: int, b: int, u: Floats, v: Floats) -> Floats:
+    """(len(u)·len(v), 3) m: points through `at` (3,), axis `a` over `u` and axis `b` over `v`."""
+    points = np.tile(at, (len(u) * len(v), 1))
+    points[:, a], points[:, b] = (g.ravel() for g in np.meshgrid(u, v, indexing="ij"))
+    return points
+
+
+def name_axes(axes: Axes, a: int, b: int, at: Floats, marks: Sequence[str] = "xyz") -> None:
+    """Which axes a section shows, and where it lies on the third."""
+    axes.set_xlabel(f"{marks[a]}, mm")
+    axes.set_ylabel(f"{marks[b]}, mm")
+    (rest,) = {0, 1, 2} - {a, b}
+    axes.set_title(f"{marks[rest]} = {round(MM * at[rest]) + 0:d} mm")
+    axes.set_aspect("equal")
 
 
 Seen = dict[int, tuple[str, str]]
