@@ -198,8 +198,8 @@ def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
     starts = start_values(variant, estimate, flat)
     held = np.flatnonzero(flat).tolist() if len(starts) == 1 else []
     begun = [model.plus(variant.candidate, s, held) for s in starts]
-    if not variant.shape:
-        begun = [_from_before(search, model, begun[0])] if len(begun) == 1 else begun
+    if len(begun) == 1 and not variant.shape:
+        begun = [_from_before(search, model, begun[0])]
     near = _near(search.screen, model, i)
     own = range(len(model.values), len(begun[0].values))
     fits = [fit(b, search.predictor, search.problem, near=near, doubtful=own, pays=ROUGH) for b in begun]
