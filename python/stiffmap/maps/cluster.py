@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
@@ -29,26 +30,42 @@ def on_cluster(
     with client_of(scheduler) as client:
         from distributed import as_completed
 
-        [shared] = client.scatter([packed], broadcast=True)
+        shared = _scattered(client, packed)
         left = iter(indices)
-        number: dict[Any, int] = {}
+        given: dict[Any, tuple[int, int]] = {}  # of each future: its tile, and how often that was lost
 
-        def submit(index: int) -> Any:
+        def submit(index: int, lost: int = 0) -> Any:
             rows = tiles.rows_of(index)
             future = client.submit(_solve, shared, rows.start, rows.stop, pure=False, retries=RETRIES)
-            number[future] = index
+            given[future] = index, lost
             return future
 
         threads = max(1, sum(client.nthreads().values()))
         first = [submit(i) for _, i in zip(range(WAITING_PER_THREAD * threads), left, strict=False)]
         running: Any = as_completed(first, loop=client.loop)  # type: ignore[no-untyped-call]
         for future in running:
-            values = future.result()
-            yield number.pop(future), values
+            index, lost = given.pop(future)
+            try:
+                values = future.result()
+            except CancelledError as error:  # a worker took the packed plan with it; dask gives such tasks up
+                if lost == RETRIES:
+                    raise StiffmapError(
+                        f"scheduler: tile {index} was lost {lost + 1} times: {error}"
+                    ) from error
+                if shared.cancelled():
+                    shared = _scattered(client, packed)
+                running.add(submit(index, lost + 1))
+                continue
+            yield index, values
             future.release()
             following = next(left, None)
             if following is not None:
                 running.add(submit(following))
+
+
+def _scattered(client: Any, packed: bytes) -> Any:
+    """The packed plan on every worker, under a key of its own: one that was lost is not found again."""
+    return client.scatter([packed], broadcast=True, hash=False)[0]
 
 
 @contextmanager

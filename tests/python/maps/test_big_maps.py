@@ -280,7 +280,9 @@ def cluster() -> Iterator[Any]:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(
+@pytest.mark.parametrize("lost", [1, 2], ids=["one", "all, and the packed machine with them"])
+def test_a_cluster_that_loses_workers_gives_the_same_bytes(
+    lost: int,
     machine: sm.Machine,
     whole: dict[str, bytes],
     tmp_path: Path,
@@ -291,8 +293,9 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(
 
     def put(self: ZarrMap, index: int, values: dict[str, Any]) -> None:
         if not killed:
-            killed.extend(cluster.run(os.getpid).values())
-            os.kill(killed[0], signal.SIGKILL)
+            killed.extend(list(cluster.run(os.getpid).values())[:lost])
+            for process in killed:
+                os.kill(process, signal.SIGKILL)
         real(self, index, values)
 
     monkeypatch.setattr(ZarrMap, "put", put)
