@@ -3,7 +3,8 @@
     OPENBLAS_NUM_THREADS=1 python bench/odd_sets.py --machine linear-delta --quantity deflection --rows 540
 
 Deflections get a tool with couplings in all directions that changes over the workspace, positions get waves; neither is
-an effect of the library. Prints CPU seconds of all threads, the verdict, and what was not tried.
+an effect of the library. `--seed` draws others: couplings with or without symmetry, waves, cubics or what is each pose's own, of
+0.1 to 3 mm. Prints CPU seconds of all threads, the verdict, and what was not tried; `--calibrate` the verdict of a calibration.
 """
 
 from __future__ import annotations
@@ -11,34 +12,60 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, random_plan, simulate
+from stiffmap.experiment.experiment import Floats
 
 MACHINES = ("orthoglide-revised", "linear-delta", "rotary-delta", "ur10", "travelling-column")
 
 
-def odd(machine: sm.Machine, quantity: str, rows: int) -> Experiment:
-    """Readings of the declared machine, and what no effect explains."""
+def odd(machine: sm.Machine, quantity: str, rows: int, seed: int = 0) -> Experiment:
+    """Readings of the declared machine, and what no effect explains; other seeds draw other shapes and sizes."""
     deflection = quantity == "deflection"
     poses = max(rows // 12, 2) if deflection else rows // 2
     plan = random_plan(machine, quantity, poses=poses, loads=6, repeats=2, seed=1)
     if not deflection:
         plan = replace(plan, frame="unknown", tool="unknown" if machine.name == "ur10" else "known")
-    twin = simulate(machine, plan, [], seed=3)
-    reading = twin.reading.copy()
+    twin = simulate(machine, plan, [], seed=3 + seed)
     x = (twin.position - twin.position.mean(0)) / np.maximum(np.ptp(twin.position, axis=0), 1e-9)
-    if deflection:
-        c = np.random.default_rng(5).standard_normal((6, 6))
-        more = (twin.wrench / np.abs(twin.wrench).max()) @ (c @ c.T)
-        more *= 0.5 * np.nanmedian(np.abs(reading[:, :3])) / np.abs(more).max()
-        reading[:, :6] += more * (1.0 + x[:, [0]] * x[:, [1]])
-    else:
-        for a in range(3):
-            reading[:, a] += 2e-4 * np.sin(7 * x[:, a] + 5 * x[:, (a + 1) % 3] ** 2 + a)
+    shape = coupling if deflection else wandering
+    reading = twin.reading.copy()
+    more = shape(twin, x, seed)
+    reading[:, : more.shape[1]] += more
     return replace(twin, reading=np.where(twin.read, reading, np.nan), joints=None, other_joints=None)
+
+
+def coupling(twin: Experiment, x: Floats, seed: int) -> Floats:
+    """(n, 6) a tool that yields in all directions, otherwise at each place."""
+    rng = np.random.default_rng(5 + seed)
+    c = rng.standard_normal((6, 6))
+    c = c @ c.T if seed % 2 == 0 else c
+    size = 10.0 ** rng.uniform(-1.0, 0.5) if seed else 0.5
+    change = rng.standard_normal((3, 3)) if seed else np.array([[0.0, 1.0, 0.0], [0.0] * 3, [0.0] * 3])
+    more = (twin.wrench / np.abs(twin.wrench).max()) @ c
+    more *= size * np.nanmedian(np.abs(twin.reading[:, :3])) / np.abs(more).max()
+    return np.asarray(more * (1.0 + np.einsum("ni,ij,nj->n", x, change, x))[:, None])
+
+
+def wandering(twin: Experiment, x: Floats, seed: int) -> Floats:
+    """(n, 3) m, errors that no number of the machine makes."""
+    if seed == 0:
+        return np.stack(
+            [2e-4 * np.sin(7 * x[:, a] + 5 * x[:, (a + 1) % 3] ** 2 + a) for a in range(3)], axis=-1
+        )
+    rng = np.random.default_rng(5 + seed)
+    size = 1e-3 * 10.0 ** rng.uniform(-1.0, 0.5)
+    if seed % 3 == 0:  # waves
+        found = np.sin(x @ (rng.uniform(2.0, 12.0) * rng.standard_normal((3, 3))) + rng.uniform(0.0, 6.0, 3))
+    elif seed % 3 == 1:
+        found = 2.0 * np.einsum("ni,nj,nk,ijka->na", x, x, x, rng.standard_normal((3, 3, 3, 3)))
+    else:
+        found = rng.standard_normal((int(twin.groups.max()) + 1, 3))[twin.groups]
+    return np.asarray(size * found * ([0.0, 0.0, 1.0] if rng.random() < 0.3 else [1.0] * 3))
 
 
 def main() -> None:
@@ -49,19 +76,30 @@ def main() -> None:
     parser.add_argument("--machine", action="append", choices=MACHINES)
     parser.add_argument("--quantity", action="append", choices=("deflection", "position"))
     parser.add_argument("--rows", type=int, default=540)
+    parser.add_argument("--seed", type=int, action="append", help="default: 0")
+    parser.add_argument("--calibrate", action="store_true")
     o = parser.parse_args()
     for name in o.machine or MACHINES:
-        for quantity in o.quantity or ("deflection", "position"):
+        for quantity, seed in product(o.quantity or ("deflection", "position"), o.seed or [0]):
             machine = sm.load_machine(name)
-            data = odd(machine, quantity, o.rows)
+            data = odd(machine, quantity, o.rows, seed)
             begun = time.process_time()
-            d = sm.diagnose(machine, data, seed=0)
-            named = [f"{e.kind} of {e.element}" for e in d.effects]
+            told = calibrated(machine, data) if o.calibrate else diagnosed(machine, data)
             took = time.process_time() - begun
-            print(
-                f"{name} {quantity}: {took:.1f} s, {d.verdict} {named}, {len(d.not_tried)} steps not tried",
-                flush=True,
-            )
+            print(f"{name} {quantity} {seed}: {took:.1f} s, {told}", flush=True)
+
+
+def diagnosed(machine: sm.Machine, data: Experiment) -> str:
+    """What a diagnosis says."""
+    d = sm.diagnose(machine, data, seed=0)
+    named = [f"{e.kind} of {e.element}" for e in d.effects]
+    return f"{d.verdict} {named}, {len(d.not_tried)} steps not tried"
+
+
+def calibrated(machine: sm.Machine, data: Experiment) -> str:
+    """What a calibration says."""
+    c = sm.calibrate(machine, data)
+    return f"{c.verdict}; {100 * c.explained:.0f} % explained; refused {list(c.refused)}"
 
 
 if __name__ == "__main__":

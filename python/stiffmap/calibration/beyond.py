@@ -37,8 +37,23 @@ class BeyondTolerance:
     found: tuple[Beyond, ...]
     which: tuple[int, ...]
     factor: Floats
-    logarithm: Floats
-    """(p,) what a value of a factor, on which readings depend linearly, is more than its logarithm."""
+
+    def first(self, number: int) -> BeyondTolerance:
+        """Those that were found first."""
+        which = self.which[:number]
+        factor = np.ones(len(self.factor))
+        factor[list(which)] = FREE
+        return BeyondTolerance(self.found[:number], which, factor)
+
+    def built(self, values: Floats, unknowns: Sequence[Unknown], at: Floats | None = None) -> Floats:
+        """(p,) `values` (p,) with factors that are let go, on which readings depend linearly, turned into the logarithm
+        of what they are."""
+        near = np.zeros(len(values)) if at is None else at
+        out = values.copy()
+        for i in (k for k in self.which if unknowns[k].unit == "ln"):
+            times = max(as_factor(unknowns[i], float(values[i]), near[i]), LEAST)
+            out[i] = float(np.log(times)) / unknowns[i].u
+        return out
 
 
 def beyond_tolerance(
@@ -79,17 +94,12 @@ def beyond_tolerance(
         if p.unit == "ln":
             size, wide = float(np.log(times)), wide * float(np.exp(near[best] * p.u)) / times
         found.append(Beyond(p.name, size, wide, p.unit, float(gains[best]), rivals))
-    estimate = sums.scaled(factor).estimate * factor if which else np.zeros(len(unknowns))
-    more = np.zeros(len(unknowns))
-    for i in (k for k in which if unknowns[k].unit == "ln"):
-        times = max(as_factor(unknowns[i], float(estimate[i]), near[i]), LEAST)
-        more[i] = float(np.log(times)) / unknowns[i].u - float(estimate[i])
-    return BeyondTolerance(tuple(found), tuple(which), factor, more)
+    return BeyondTolerance(tuple(found), tuple(which), factor)
 
 
 def none_beyond(number: int) -> BeyondTolerance:
     """All of so many unknowns within their tolerances."""
-    return BeyondTolerance((), (), np.ones(number), np.zeros(number))
+    return BeyondTolerance((), (), np.ones(number))
 
 
 def as_factor(p: Unknown, value: float, at: float = 0.0) -> float:

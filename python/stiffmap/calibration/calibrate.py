@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from os import PathLike
 
 import numpy as np
 
-from stiffmap.calibration.beyond import beyond_tolerance, none_beyond
-from stiffmap.calibration.certificate import INSTRUMENT, certified
+from stiffmap.calibration.certificate import certified
+from stiffmap.calibration.claims import BesideField, Claims, claims, gain_of
 from stiffmap.calibration.defaults import Tolerances
 from stiffmap.calibration.edit import edited
 from stiffmap.calibration.facts import Beyond, HeldOut, Row, Wider
@@ -23,13 +23,13 @@ from stiffmap.calibration.model import (
     Sensitivity,
     bends,
     fitted,
+    predicted,
     sensitivity,
     sensitivity_at,
 )
 from stiffmap.calibration.result import Calibration
 from stiffmap.calibration.statistics import Sums, directions, independent
 from stiffmap.calibration.unknowns import GROUPS, Unknown, unknowns
-from stiffmap.calibration.width import widened
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.limitations import refuse
@@ -48,6 +48,12 @@ BASE = ("zeros", "tool")
 """Groups that every machine has: the others are compared beside them."""
 TYPICAL = 1.2
 """Robust spread of residuals, in noise floors, that still counts as a model that fits."""
+AGAIN, NEAR = 4, 0.3
+"""Fits of what is claimed through the full prediction; change of all readings together, in noise, that ends them."""
+BORNE_OUT = 0.5
+"""Share of what slopes promise of a claim that the full prediction must keep."""
+DEMANDED = 5.41
+"""Nats by which readings must demand a floor: half the chi-square of one degree of freedom of one in a thousand."""
 Size = Callable[[Floats], float]
 """rms of (n, c) residuals in the unit of the report."""
 
@@ -202,12 +208,13 @@ class Calibrator:
         raw = self.predictor.experiment.reading - prediction
         return np.asarray(raw - nuisance_part(self.problem, raw))
 
-    def blocks(self, rows: Mask | None = None) -> Blocks:
-        """Readings (of some, (N,)) in blocks of one pose and channel."""
+    def blocks(self, rows: Mask | None = None, fit: Fitted | None = None) -> Blocks:
+        """Readings (of some, (N,)) in blocks of one pose and channel; `fit`: another than the calibration's own."""
         label, q = pose_labels(self.problem), int(self.problem.nuisance.shape[1])
+        linear = (fit or self.fit).linear
         if rows is None:
-            return Blocks.of(self.columns, self.fit.linear, label, q)
-        return Blocks.of(self.columns[rows], self.fit.linear[rows], label[rows])
+            return Blocks.of(self.columns, linear, label, q)
+        return Blocks.of(self.columns[rows], linear[rows], label[rows])
 
     @property
     def sums(self) -> Sums:
@@ -226,36 +233,27 @@ class Calibrator:
         start = time.perf_counter()
         sums, members = self.sums, self.members()
         names = self.sensitivity.unknowns
-        found = beyond_tolerance(sums, names, self._folds(seed), self.sensitivity.at)
-        wider, times = widened(sums, members, (INSTRUMENT,))
-        if (
-            found.found and wider and wider[0].nats > found.found[0].nats
-        ):  # many a little rather than one by much
-            found = none_beyond(len(names))
-        elif found.found:
-            wider, times = widened(sums.scaled(found.factor), members, (INSTRUMENT,))
-        factor = found.factor * times
-        freed = sums.scaled(factor)
+        claimed, fit, rho = self._claimed(sums, members, seed)
+        factor, found, wider = claimed.factor, claimed.singles, claimed.groups
+        freed = self.blocks(fit=fit).beside(rho).scaled(factor)
         choice = compare(freed, members, [b for b in BASE if b in members])
-        fit, rho = self.fit, self.rho
-        moved = bool(found.which or wider)
-        values = freed.estimate * factor if moved else fit.values
+        built = found.built(fit.values, names, self.sensitivity.at)
         moves: dict[tuple[str, str], float] = {}
-        built = values + found.logarithm
         for p, v in zip(names, built, strict=True):
             for place, weight in p.moves if not p.setup else ():
                 moves[place] = moves.get(place, 0.0) + weight * p.u * float(v)
         e = self.predictor.experiment
-        before = self.left(self.sensitivity.base)
-        after = self.unwhite(self.residual_at(values)) if moved else self.left(fit.prediction)
+        before, after = self.left(self.sensitivity.base), self.left(fit.prediction)
         keep = ~self.out[:, None]
         unit, size, noise = _unit(e, self.noise)
         b, a = (size(np.where(keep, v, np.nan)) for v in (before, after))
-        held = self._held_out(freed, choice, factor, seed, size)
-        as_declared = sums.log_evidence <= sums.pick([]).log_evidence and not moved
+        held = self._held_out(choice, factor, fit, rho, seed, size)
+        as_declared = sums.log_evidence <= sums.pick([]).log_evidence and not claimed.any
+        rest = _outweighs(held.before, held.after, noise) if held else _outweighs(b, a, noise)
+        unexplained = (rest or bool(claimed.refused)) and not claimed.any and self._misfits(fit, factor)
         seconds = {**self.seconds, "evidence": time.perf_counter() - start}
         return Calibration(
-            verdict=_verdict(as_declared, found.found, wider),
+            verdict=_verdict(as_declared, found.found, wider, unexplained),
             rows=_rows(names, freed, factor, built),
             beyond=found.found,
             groups=choice,
@@ -268,6 +266,7 @@ class Calibrator:
             explained=1.0 - (a / b) ** 2 if b > 0 else 0.0,
             rest=_rest(e, np.where(keep, after, np.nan), size),
             wider=wider,
+            refused=claimed.refused,
             outliers=tuple(e.ids[i] for i in np.flatnonzero(self.out)),
             failed=self.sensitivity.failed,
             stopped=self.stopped,
@@ -280,14 +279,83 @@ class Calibrator:
             seconds=seconds,
         )
 
+    def _claimed(self, sums: Sums, members: dict[str, list[int]], seed: int) -> tuple[Claims, Fitted, float]:
+        """What is claimed, the fit with that let go, and its floor."""
+        judged: list[tuple[BesideField, list[Fold]]] = []
+        everything = {"all": list(range(len(sums.right)))}
+
+        def why_not(factor: Floats, trial: Floats) -> str:
+            if not judged:
+                judged.append((self._beside_field(), self._parts(self.fit, seed)))
+            field, parts = judged[0]
+            nats = field.log_evidence(trial) - field.log_evidence(factor)
+            if nats < STRONG:
+                return f"a smooth field that knows nothing of the machine explains as much ({nats:+.0f} nats beside it)"
+            if len(parts) < 2:
+                return ""
+            one, other = (
+                self._left_out(parts, everything, self.fit, self.rho, f)["all"] for f in (factor, trial)
+            )
+            gain, error = gain_of(one, other, [f.test for f in parts])
+            # a fit that is as good as noise has nothing to gain
+            holds = gain > (error if misfits else -error)
+            return "" if holds else f"held-out readings gain {gain:.2g} ± {error:.2g} noise variances"
+
+        misfits = self._misfits(self.fit, np.ones(len(sums.right)))
+        found = claims(
+            sums, self.sensitivity.unknowns, members, self._folds(seed), self.sensitivity.at, why_not
+        )
+        if not found.any:
+            return found, self.fit, self.rho
+        fit, rho = self._let_go(found)
+        if fit.converged:
+            return found, fit, rho
+        return found.withdrawn("so far off the machine does not do what its slopes say"), self.fit, self.rho
+
+    def _beside_field(self) -> BesideField:
+        label, q = pose_labels(self.problem), int(self.problem.nuisance.shape[1])
+        left = self.left(self.fit.prediction)
+        return BesideField.of(self.problem, self.columns, self.fit.linear, label, q, left)
+
+    def _let_go(self, claimed: Claims) -> tuple[Fitted, float]:
+        """The fit with what is claimed let go, and its floor: by the slopes that there are, through the full prediction."""
+        names, at = self.sensitivity.unknowns, self.sensitivity.at
+        fit, rho, promised = self.fit, self.rho, 0.0
+        before = float(fit.residual @ fit.residual)
+        for again in range(AGAIN):
+            blocks = self.blocks(fit=fit).scaled(claimed.factor)
+            rho = model_form(blocks)
+            values = blocks.beside(rho).estimate * claimed.factor
+            told = fit.linear - self.columns @ values
+            promised = promised if again else before - float(told @ told)
+            close = float(np.linalg.norm(self.columns @ (values - fit.values))) < NEAR
+            try:
+                prediction = predicted(self.predictor, names, claimed.singles.built(values, names, at))
+                residual = self.problem.residual(prediction)
+            except StiffmapError:
+                return replace(fit, converged=False), rho
+            fit = Fitted(values, prediction, residual, residual + self.columns @ values, True)
+            if close:
+                break
+        gained = before - float(fit.residual @ fit.residual)
+        return replace(fit, converged=gained > BORNE_OUT * promised), rho
+
+    def _misfits(self, fit: Fitted, factor: Floats) -> bool:
+        """Whether the readings demand a floor beyond noise."""
+        blocks = self.blocks(fit=fit).scaled(factor)
+        return blocks.log_likelihood(model_form(blocks)) - blocks.log_likelihood(0.0) > DEMANDED
+
     def _folds(self, seed: int) -> list[Sums]:
         """The sums of each fold's own readings."""
         label = folds(self.predictor.experiment, seed)[0][self.problem.index[0]]
         return [self.blocks(label == k).beside(self.rho) for k in np.unique(label)]
 
-    def residual_at(self, values: Floats) -> Floats:
-        """(N,) whitened residual at values (p,), linear in them."""
-        return np.asarray(self.fit.linear - self.columns @ values)
+    def _parts(self, fit: Fitted, seed: int) -> list[Fold]:
+        """Which readings (N,) each fold leaves out, and the others in blocks; nothing where there are not two folds."""
+        label = folds(self.predictor.experiment, seed)[0]
+        at = label[self.problem.index[0]]
+        tests = [at == k for k in range(int(label.max()) + 1)] if label.max() else []
+        return [Fold(test, self.blocks(~test, fit)) for test in tests]
 
     def unwhite(self, residual: Floats) -> Floats:
         """(n, c) SI of whitened residuals (N,)."""
@@ -295,34 +363,59 @@ class Calibrator:
         out[self.problem.index] = residual * self.problem.sigma[self.problem.index]
         return out
 
-    def _held_out(self, sums: Sums, choice: Choice, factor: Floats, seed: int, size: Size) -> HeldOut | None:
+    def _held_out(
+        self, choice: Choice, factor: Floats, fit: Fitted, rho: float, seed: int, size: Size
+    ) -> HeldOut | None:
         """Each fold predicted from the others, linear in the unknowns; frames from all readings."""
-        label, by = folds(self.predictor.experiment, seed)
-        if label.max() == 0:
+        _, by = folds(self.predictor.experiment, seed)
+        parts = self._parts(fit, seed)
+        if not parts:
             return None
         members = self.members()
         base = [i for g in BASE for i in members.get(g, [])]
-        sets = {
-            "before": [],
-            "all": list(range(len(sums.right))),
+        sets: dict[str, list[int]] = {
+            "all": list(range(len(factor))),
             "chosen": sorted({*base, *(i for g in choice.chosen for i in members[g])}),
         } | {g: sorted({*base, *i}) for g, i in members.items() if g not in BASE}
-        at = label[self.problem.index[0]]
-        left = {name: np.zeros(len(self.problem)) for name in sets}
-        for fold in range(int(label.max()) + 1):
-            test = at == fold
-            others = self.blocks(~test).beside(self.rho).scaled(factor)
-            for name, which in sets.items():
-                values = np.zeros(len(sums.right))
-                values[which] = others.pick(which).estimate * factor[which]
-                rest = self.residual_at(values)
-                left[name][test] = (rest - own_part(self.sensitivity.unknowns, self.columns, rest, test))[
-                    test
-                ]
+        left = self._left_out(parts, sets, fit, rho, factor)
         found = {name: size(self.unwhite(r)) for name, r in left.items()}
         keep = ~self.out[:, None]
-        found["before"] = size(np.where(keep, self.left(self.sensitivity.base), np.nan))
-        return HeldOut(by, found.pop("before"), found.pop("all"), found.pop("chosen"), found)
+        before = size(np.where(keep, self.left(self.sensitivity.base), np.nan))
+        return HeldOut(by, before, found.pop("all"), found.pop("chosen"), found)
+
+    def _left_out(
+        self,
+        parts: Sequence[Fold],
+        sets: Mapping[str, Sequence[int]],
+        fit: Fitted,
+        rho: float,
+        factor: Floats,
+    ) -> dict[str, Floats]:
+        """(N,) residual of each fold predicted from the others, by sets of unknowns at `factor` times their uncertainty."""
+        left = {name: np.zeros(len(self.problem)) for name in sets}
+        for fold in parts:
+            others = fold.others.beside(rho).scaled(factor)
+            for name, which in sets.items():
+                values = np.zeros(len(factor))
+                values[list(which)] = others.pick(which).estimate * factor[list(which)]
+                rest = fit.linear - self.columns @ values
+                own = own_part(self.sensitivity.unknowns, self.columns, rest, fold.test)
+                left[name][fold.test] = (rest - own)[fold.test]
+        return left
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """Readings that are left out together, and the others."""
+
+    test: Mask
+    """(N,)."""
+    others: Blocks
+
+
+def _outweighs(before: float, after: float, noise: float) -> bool:
+    """Whether of a misfit (rms) more is left than is explained, noise taken off."""
+    return after**2 - noise**2 > 0.5 * (before**2 - noise**2) > 0.0
 
 
 def pose_labels(problem: Problem) -> Integers:
@@ -349,7 +442,7 @@ def _rest(e: Experiment, left: Floats, size: Size) -> dict[str, float]:
     return out
 
 
-def _verdict(as_declared: bool, beyond: Sequence[Beyond], wider: Sequence[Wider]) -> str:
+def _verdict(as_declared: bool, beyond: Sequence[Beyond], wider: Sequence[Wider], unexplained: bool) -> str:
     single = [
         b.name if not b.rivals else f"{b.name} or {len(b.rivals)} other{'s' * (len(b.rivals) > 1)}"
         for b in beyond
@@ -357,6 +450,8 @@ def _verdict(as_declared: bool, beyond: Sequence[Beyond], wider: Sequence[Wider]
     whole = [f"{' or '.join((w.group, *w.rivals))} as a whole" for w in wider]
     if single or whole:
         return "beyond tolerance: " + ", ".join([*single, *whole])
+    if unexplained:
+        return "unattributed"
     return "as declared" if as_declared else "adjusted within tolerance"
 
 

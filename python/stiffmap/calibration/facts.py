@@ -85,7 +85,7 @@ class Facts:
     """What a machine's numbers are, given their uncertainties and the readings; SI."""
 
     verdict: str
-    """``as declared``, ``adjusted within tolerance`` or ``beyond tolerance: NAME``."""
+    """``as declared``, ``adjusted within tolerance``, ``beyond tolerance: NAME`` or ``unattributed``."""
     rows: tuple[Row, ...]
     beyond: tuple[Beyond, ...]
     groups: Choice
@@ -117,6 +117,8 @@ class Facts:
     values: Floats = field(repr=False, default_factory=lambda: np.zeros(0))
     """(p,) in standard uncertainties."""
     seconds: dict[str, float] = field(default_factory=dict)
+    refused: tuple[str, ...] = ()
+    """What the evidence asked to let go beyond tolerance and is not claimed, and why."""
 
     def to_json(self) -> str:
         """All but arrays and machines, SI; NaN is null."""
@@ -131,5 +133,6 @@ class Facts:
         out["groups"] = plain(asdict(self.groups))
         out["beyond"] = [plain(asdict(b)) for b in self.beyond]
         out["table"] = [plain(asdict(r)) for r in self.rows]
+        out["refused"] = list(self.refused)
         out["failed"] = [list(f) for f in self.failed]
         return out

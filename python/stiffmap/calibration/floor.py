@@ -46,6 +46,10 @@ class Blocks:
             Sums.of(columns, residual, len(residual) - nuisances),
         )
 
+    def scaled(self, factor: Floats) -> Blocks:
+        """The blocks with each column times a factor (p,)."""
+        return Blocks(self.number, self.columns * factor, self.residual, self.within.scaled(factor))
+
     def beside(self, rho: float) -> Sums:
         """Sums where each block has a random effect of variance rho: V = I + rho 1 1ᵀ per block."""
         c = rho / (1.0 + self.number * rho)

@@ -61,6 +61,10 @@ class Sums:
         i = np.asarray(which, dtype=np.intp)
         return Sums(self.gram[np.ix_(i, i)], self.right[i], self.square, self.number)
 
+    def weighed(self, weight: float) -> Sums:
+        """The sums of readings that count `weight` times."""
+        return Sums(weight * self.gram, weight * self.right, weight * self.square, weight * self.number)
+
     def scaled(self, factor: Floats) -> Sums:
         """The sums with each standard uncertainty times a factor (p,)."""
         return Sums(self.gram * np.outer(factor, factor), self.right * factor, self.square, self.number)

@@ -18,6 +18,7 @@ def lines(c: Facts) -> list[str]:
     out = [f"calibration: {c.verdict}{' (stopped early)' if c.stopped else ''}"]
     out += [f"  {_beyond(b)}" for b in c.beyond]
     out += [f"  {_wider(w)}" for w in c.wider]
+    out += [f"  not claimed: {r}" for r in c.refused]
     out.append(f"told by the readings: {c.rank} directions of {len(c.rows)} unknowns")
     out.append("groups: " + _groups(c))
     out.append(

@@ -34,7 +34,7 @@ def calibrate_command(
 ) -> None:
     """All uncertain numbers of a machine from readings at once, and which of them the readings can tell.
 
-    Exit codes: 0 as declared or within tolerance, 1 beyond tolerance, 2 bad input.
+    Exit codes: 0 as declared or within tolerance, 1 beyond tolerance or unattributed, 2 bad input.
 
     Examples:
 
@@ -54,7 +54,7 @@ def calibrate_command(
     if output is not None:
         write(result, output)
     print(result.to_json() if as_json else "\n".join([*result.lines(), "", *result.table(rows)]))
-    if result.beyond:
+    if result.beyond or result.wider or result.verdict == "unattributed":
         raise typer.Exit(1)
 
 

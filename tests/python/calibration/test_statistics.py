@@ -124,7 +124,7 @@ def test_a_factor_beyond_tolerance_stays_a_factor() -> None:
             (one,) = found.found
             assert abs(one.value - np.log(times)) < 3 * one.sigma
             assert one.sigma < 0.01
-            value = sums.scaled(found.factor).estimate * found.factor + found.logarithm
+            value = found.built(sums.scaled(found.factor).estimate * found.factor, [mass])
             assert abs(value[0] * mass.u - np.log(times)) < 0.01
         else:
             assert not found.found

@@ -217,10 +217,12 @@ def _left_by(s: Study, finding: Finding) -> Blocks:
 
 def _word(s: Study, finding: Finding, left: list[Pattern]) -> str:
     named = bool(finding.model.candidates)
-    wide = s.layer is not None and bool(s.layer.calibration.wider)
-    if left:
+    calibration = None if s.layer is None else s.layer.calibration
+    if left or (calibration is not None and calibration.verdict == "unattributed" and not named):
         return "effects+unattributed" if named else "unattributed"
-    if wide and not named:  # a group of numbers is beyond tolerance, and none of them stands out
+    if (
+        calibration is not None and calibration.wider and not named
+    ):  # a group of numbers is beyond tolerance, and none of them stands out
         return "ambiguous"
     return "effects" if named else "none"
 

@@ -1,7 +1,6 @@
 """An empirical correction of what nothing explains: a Gaussian process, labelled as such.
 
-Position: a smooth field over the commanded position per axis. Deflection: a smooth compliance, i.e. a
-field per force component times that component, plus a smooth field. Judged by poses it has not seen.
+A smooth field over the workspace (`noise.field`), judged by poses it has not seen.
 """
 
 from __future__ import annotations
@@ -10,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiffmap.diagnosis.decision.patterns import unit
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.summary import rms
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
+from stiffmap.experiment.noise.field import covariance
 from stiffmap.experiment.noise.folds import folds
 
 LENGTHS = (0.5, 1.0, 2.0)
@@ -56,14 +55,3 @@ def _held(e: Experiment, residual: Floats, sigma: Floats, label: Integers, lengt
             v = size * kernel[np.ix_(train, train)] + np.diag(noise**2)
             out[test, axis] = size * kernel[np.ix_(test, train)] @ np.linalg.solve(v, y)
     return out
-
-
-def covariance(e: Experiment, length: float) -> Floats:
-    """(n, n) correlation of the field between rows."""
-    x = unit(e.position)
-    distance = ((x[:, None, :] - x[None, :, :]) ** 2).sum(axis=-1)
-    smooth = np.exp(-0.5 * distance / length**2)
-    if e.quantity == "position":
-        return np.asarray(smooth)
-    w = e.wrench / max(float(np.abs(e.wrench).max()), 1e-300)
-    return np.asarray(smooth * (0.2 + w @ w.T))

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.diagnosis.decision.patterns import Pattern, unit
+from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.noise.field import unit
 from stiffmap.experiment.noise.level import Mask
 
 STEP_SHARE = 0.8

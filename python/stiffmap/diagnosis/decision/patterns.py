@@ -14,11 +14,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from stiffmap.diagnosis.search.significance import ALPHA
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.field import free_position, unit
 from stiffmap.experiment.noise.whitening import Problem, basis
-
-TOUCHED = 0.1
-"""Share of a height's spread that its sum with the commanded height keeps where the command was the reading."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ def _reduction(
 def features(problem: Problem) -> Iterator[tuple[str, Floats]]:
     """Name and (n, p) columns of every pattern."""
     e = problem.experiment
-    x = unit(_free(e))
+    x = unit(free_position(e))
     n = len(e)
     yield "constant", np.ones((n, 1))
     yield "linear trend over the workspace", x
@@ -99,20 +97,6 @@ def features(problem: Problem) -> Iterator[tuple[str, Floats]]:
         labels = np.unique(e.setup, return_inverse=True)[1]
         yield "set-ups", np.eye(labels.max() + 1)[labels]
     yield "single poses", np.eye(e.groups.max() + 1)[e.groups]
-
-
-def _free(e: Experiment) -> Floats:
-    """(n, 3) m, commanded positions; where a surface was touched, without the coordinate that was the reading."""
-    names = [c.name for c in e.channels]
-    if "hh" not in names:
-        return e.position
-    normal = np.array(e.normal)
-    height = e.position @ normal
-    reading = e.reading[:, names.index("hh")]
-    if not np.nanstd(reading + height) < TOUCHED * np.nanstd(reading):
-        return e.position
-    along = np.abs(normal) == np.abs(normal).max()
-    return np.asarray(np.where(along, 0.0, e.position - np.outer(height, normal)))
 
 
 def loads(wrench: Floats, x: Floats) -> Iterator[tuple[str, Floats]]:
@@ -137,13 +121,6 @@ def loads(wrench: Floats, x: Floats) -> Iterator[tuple[str, Floats]]:
 
 def _products(a: Floats, b: Floats) -> Floats:
     return np.asarray((a[:, :, None] * b[:, None, :]).reshape(len(a), -1))
-
-
-def unit(x: Floats) -> Floats:
-    """Columns mapped to [-1, 1]; constant ones to 0."""
-    low, high = x.min(axis=0), x.max(axis=0)
-    span = np.where(high > low, high - low, 1.0)
-    return np.asarray(np.where(high > low, 2 * (x - low) / span - 1, 0.0))
 
 
 def powers(x: Floats, degree: int) -> Floats:

@@ -72,7 +72,7 @@ def _more(d: Findings) -> list[str]:
         c = d.calibration
         out += [
             f"calibration: {c.verdict}, {c.rank} directions determined",
-            *c.lines()[1 : 1 + len(c.beyond) + len(c.wider)],
+            *c.lines()[1 : 1 + len(c.beyond) + len(c.wider) + len(c.refused)],
         ]
         out += [line for line in c.lines() if line.startswith(("groups:", "model-form"))]
     out += [f"not named: {why}" for why in d.refused]

@@ -1,0 +1,169 @@
+"""What may be claimed beyond tolerance: it must stand beside a smooth field that knows nothing of the machine, hold on
+readings that it has not seen, and be no further off than a number of this machine can be.
+
+A calibration has many numbers; some of them imitate in part whatever the readings show. Numbers that are the cause
+explain it better than any smooth function of pose and load does; numbers that imitate do not (docs/theory.md M3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from stiffmap.calibration.beyond import FREE, BeyondTolerance, beyond_tolerance, none_beyond
+from stiffmap.calibration.certificate import INSTRUMENT
+from stiffmap.calibration.facts import Wider
+from stiffmap.calibration.floor import LARGEST, Blocks
+from stiffmap.calibration.statistics import Sums
+from stiffmap.calibration.unknowns import Unknown
+from stiffmap.calibration.width import widened
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.noise.field import shapes
+from stiffmap.experiment.noise.whitening import Problem
+
+LENGTH = 1.0
+"""Correlation length of the field, in halves of the plan's extent."""
+SIZES = (0.0, 0.3, 1.0, 3.0)
+"""Standard deviations of the field that are tried, in rms of what the calibration leaves of each channel."""
+MOST_SHAPES, MOST_COLUMNS = 40, 200
+"""Of the field, per channel and in all."""
+
+
+Why = Callable[[Floats, Floats], str]
+"""Factors (p,) on the standard uncertainties before a claim and with it -> why it does not stand; empty: it does."""
+
+
+@dataclass(frozen=True, eq=False)
+class Claims:
+    """Which numbers are beyond tolerance, alone or as a group."""
+
+    singles: BeyondTolerance
+    groups: tuple[Wider, ...]
+    factor: Floats
+    """(p,) on the standard uncertainties."""
+    refused: tuple[str, ...] = ()
+    """What the evidence asked for and is not claimed, and why."""
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is claimed."""
+        return bool(self.singles.found or self.groups)
+
+    def withdrawn(self, why: str) -> Claims:
+        """Nothing of it claimed."""
+        names = (*(b.name for b in self.singles.found), *(f"{w.group} as a whole" for w in self.groups))
+        none = none_beyond(len(self.factor))
+        return Claims(none, (), none.factor, (*self.refused, *(f"{n}: {why}" for n in names)))
+
+
+def claims(
+    sums: Sums,
+    unknowns: Sequence[Unknown],
+    members: Mapping[str, Sequence[int]],
+    folds: Sequence[Sums],
+    at: Floats | None,
+    why_not: Why,
+) -> Claims:
+    """Single numbers or groups that the evidence asks for, one after the other, as far as they stand."""
+    singles = beyond_tolerance(sums, unknowns, folds, at)
+    groups, _ = widened(sums, members, (INSTRUMENT,))
+    if singles.found and groups and groups[0].nats > singles.found[0].nats:  # many a little, not one by much
+        singles = none_beyond(len(unknowns))
+    factor = np.ones(len(unknowns))
+    for k, b in enumerate(singles.found):
+        far = abs(b.value) / unknowns[singles.which[k]].u
+        trial = singles.first(k + 1).factor
+        why = f"{far:.0f} standard uncertainties are no tolerance" if far > FREE else why_not(factor, trial)
+        if why:
+            return Claims(singles.first(k), (), factor, (f"{b.name}: {why}",))
+        factor = trial
+    if singles.found:
+        groups, _ = widened(sums.scaled(factor), members, (INSTRUMENT,))
+    for k, w in enumerate(groups):
+        trial = factor.copy()
+        trial[list(members[w.group])] *= w.factor
+        why = why_not(factor, trial)
+        if why:
+            refused = (f"{w.group} as a whole: {why}",)
+            # that many numbers are off is no answer where it does not suffice
+            return (
+                Claims(singles, groups[:k], factor, refused)
+                if singles.found or not k
+                else Claims(singles, groups[:k], factor).withdrawn(f"not without {w.group}, and {why}")
+            )
+        factor = trial
+    return Claims(singles, groups, factor)
+
+
+@dataclass(frozen=True, eq=False)
+class BesideField:
+    """Readings with a smooth field of unknown size below all unknowns."""
+
+    number: Integers
+    """(m,) different numbers of readings per block of one pose."""
+    count: Integers
+    """(m,) how many blocks have so many."""
+    within: Sums
+    """All readings; columns of the unknowns, then those of the field."""
+    between: tuple[Sums, ...]
+    """(m,) sums over the blocks of each number."""
+    unknowns: int
+
+    @staticmethod
+    def of(
+        problem: Problem, columns: Floats, linear: Floats, label: Integers, nuisances: int, left: Floats
+    ) -> BesideField:
+        """`columns` (N, p) and `linear` (N,) whitened, `label` (N,) of their blocks; `left` (n, c) what the calibration
+        leaves in SI."""
+        field = problem.white(field_columns(problem.experiment, left))
+        blocks = Blocks.of(np.hstack([columns, field]), linear, label, nuisances)
+        number, count = np.unique(blocks.number, return_counts=True)
+        each = [blocks.number == m for m in number]
+        between = tuple(Sums.of(blocks.columns[w], blocks.residual[w]) for w in each)
+        return BesideField(
+            number.astype(np.intp), count.astype(np.intp), blocks.within, between, columns.shape[1]
+        )
+
+    def log_evidence(self, factor: Floats) -> float:
+        """Of the unknowns at `factor` (p,) times their uncertainties, beside the field and the floor that suit best."""
+        return max(self._at(factor, size) for size in SIZES)
+
+    def _at(self, factor: Floats, size: float) -> float:
+        which = np.arange(self.unknowns if size == 0.0 else len(self.within.right))
+        scale = np.append(factor, np.full(len(which) - self.unknowns, size))
+        within = self.within.pick(which).scaled(scale)
+        between = [s.pick(which).scaled(scale) for s in self.between]
+
+        def lost(x: float) -> float:
+            rho = float(np.expm1(x))
+            total = within
+            for m, s in zip(self.number, between, strict=True):
+                total = total - s.weighed(rho / (1.0 + float(m) * rho))
+            return 0.5 * float(self.count @ np.log1p(self.number * rho)) - total.log_evidence
+
+        found = minimize_scalar(
+            lost, bounds=(0.0, float(np.log1p(LARGEST))), method="bounded", options={"xatol": 0.1}
+        )
+        return -min(float(found.fun), lost(0.0))
+
+
+def field_columns(e: Experiment, left: Floats) -> Floats:
+    """(n, c, k) change of the readings per unit of each shape of the field: a shape for each channel that is read, as
+    large as what is left of it."""
+    read = np.flatnonzero(e.axis_read)
+    shape = shapes(e, min(MOST_SHAPES, MOST_COLUMNS // max(len(read), 1)), LENGTH)
+    size = np.sqrt(np.nanmean(left[:, read] ** 2, axis=0))
+    out = np.zeros((*left.shape, len(read), shape.shape[1]))
+    for k, c in enumerate(read):
+        out[:, c, k] = size[k] * shape
+    return np.asarray(out.reshape(*left.shape, -1))
+
+
+def gain_of(before: Floats, after: Floats, tests: Sequence[Mask]) -> tuple[float, float]:
+    """What the squares of whitened residuals (N,), held out, lose per reading: mean over the folds, standard error."""
+    lost = before**2 - after**2
+    each = np.array([float(lost[test].mean()) for test in tests if test.any()])
+    return float(each.mean()), float(each.std(ddof=1) / np.sqrt(len(each)))
