@@ -243,7 +243,7 @@ struct Block {
     if (in.perturbed_count == 0) return;
     if (P.spring_count > 0) newton.pull();
     newton.linearize();  // lanes that settled early have lost their factors
-    vary(done & ~unstable, newton, newton.compliance);
+    vary(done & ~unstable & ~newton.serial.play.lanes, newton, newton.compliance);
   }
 
   M follow(M lanes, Newton& newton, V& iterations, V& steps) {
@@ -265,6 +265,10 @@ struct Block {
     return in.patience == Patience::leaps ? pose_left : pose_slow;
   }
 
+  std::uint8_t solved(int lane, const Newton& newton) const {
+    return unstable[lane] ? pose_unstable : newton.serial.play.lanes[lane] ? pose_loose : pose_solved;
+  }
+
   void write(M done, const Newton& newton, const V (&K)[6][6], const V (&C)[6][6], V iterations, V steps) {
     const V3 offset{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
     const V6 d{newton.point - (command.p + command.R * offset), rotation_between(command.R, newton.tip.R)};
@@ -272,7 +276,7 @@ struct Block {
     put(d, moved);
     for (int i = 0; i < count; ++i) {
       const std::int64_t k = pose(i);
-      out.done[k] = done[i] ? (unstable[i] ? pose_unstable : pose_solved) : never[i] ? pose_unreachable : left(i);
+      out.done[k] = done[i] ? solved(i, newton) : never[i] ? pose_unreachable : left(i);
       if (!done[i]) continue;
       for (int r = 0; r < 6; ++r) out.displacement[6 * k + r] = moved[r][i];
       if (out.stiffness)
@@ -286,6 +290,16 @@ struct Block {
         for (int q = 0; q < P.coordinate_count; ++q) out.coordinates[P.coordinate_count * k + q] = s.x[q][i];
     }
     write_efforts(done, newton, steps);
+    if (out.free_twists && any(newton.serial.play.lanes)) write_play(done & newton.serial.play.lanes, newton);
+  }
+
+  [[gnu::noinline]] void write_play(M lanes, const Newton& newton) {
+    const V6& t = newton.serial.play.twist;
+    V twist[6];
+    put((1.0 / root(dot(t, t))) * t, twist);
+    for (int i = 0; i < count; ++i)
+      if (lanes[i])
+        for (int r = 0; r < 6; ++r) out.free_twists[36 * pose(i) + 6 * r] = twist[r][i];
   }
 
   void write_efforts(M done, const Newton& newton, V steps) {

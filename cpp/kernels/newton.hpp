@@ -295,8 +295,26 @@ struct Newton {
   [[gnu::noinline]] void step_joints() {
     frames();
     e.lowest = splat(1e300);
-    serial.step(e, point, load, pending);
+    const Sym6* pulls = nullptr;
+    if (P.spring_count > 0) pulls = &pull_arm();
+    serial.step(e, {point, load, pending, dead_load.b, pulls});
     e.transferred = splat(0);
+  }
+
+  /// The external springs' tangent at an arm's tip, their wrench in the load.
+  [[gnu::noinline]] const Sym6& pull_arm() {
+    load = dead_load;
+    K = Sym6{};
+    tip_springs(P, tip, point, load, &K);
+    return K;
+  }
+
+  /// What an arm answers where its iteration settled.
+  [[gnu::noinline]] void answer_joints(V (&m)[6][6]) {
+    serial.answer(e, point, m, K);
+    if (!any(serial.play.lanes)) return;
+    const auto column = [&](int k) { return Serial::unit_twist(e, *serial.joint[k], point); };
+    serial.play.release(e, P.serial_joints, column, m, K);
   }
 
   void take(M lanes, const V (&m)[6][6]) {
@@ -321,6 +339,7 @@ struct Newton {
       V m[6][6];
       M active = ~done & ~failed;
       if (P.serial_joints > 0) {
+        serial.play.decides = corners && k == 1;
         step_joints();
       } else {
         if (P.spring_count > 0) pull();
@@ -346,7 +365,7 @@ struct Newton {
       M settled = active & whole & ((change < small) | ((norm < in.tolerance) & (way.previous < in.tolerance)));
       if (P.hardens && any(settled))
         settled &= (hardening_change() < same_slope) | ((norm < small) & (way.previous < small));
-      if (P.serial_joints > 0 && any(settled)) serial.answer(e, point, m, K);
+      if (P.serial_joints > 0 && any(settled)) answer_joints(m);
       failed |= settled & ~(e.lowest > pivot_floor);
       const M kept = settled & (change < nothing);
       take(settled & ~failed, m);
@@ -364,7 +383,8 @@ struct Newton {
       if (corners && any(corner_steps)) shorten(select(corner_steps, to_corner(), splat(1)));
       if (corners && !patient) distrusted |= active & ~settled & (way.tries > 2.0) & ~(norm <= 0.5 * way.previous);
       // Free play is the reference's to find: a singular step would leave the gap by chance.
-      if (corners && k == 1) distrusted |= active & open_gaps();
+      if (corners && k == 1) distrusted |= active & open_gaps() & ~serial.play.lanes;
+      if (P.serial_joints > 0) distrusted |= active & serial.play.doubtful;
       distrusted |= active & ~settled & (way.tries >= most_tries);
       move(active & ~kept & ~distrusted);
       done |= settled & ~failed;
@@ -381,7 +401,10 @@ struct Newton {
     steps = way.halved;
     if (fresh) put_load(splat(1), splat(1));
     else settle();
-    if (fresh && P.serial_joints > 0) transmit();
+    if (fresh && P.serial_joints > 0) {
+      if (P.spring_count > 0) pull_arm();
+      transmit();
+    }
     return done & ~failed;
   }
 

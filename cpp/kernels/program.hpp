@@ -189,11 +189,13 @@ inline constexpr std::uint8_t pose_solved = 1, pose_unstable = 2, pose_unreachab
 inline constexpr std::uint8_t pose_ended = 4;  ///< the path of equilibria ends before the whole load
 inline constexpr std::uint8_t pose_slow = 5;   ///< does not close at once: to be closed in leaps, together with others
 inline constexpr std::uint8_t pose_heavy = 6;  ///< closed, but its load takes long: to be followed in steps
+inline constexpr std::uint8_t pose_loose = 7;  ///< solved, but a joint plays inside its gap
 
 /// Row-major answers; null: not wanted. `done`: how the pose left the kernels.
 struct KernelOutput {
   double *displacement, *stiffness, *compliance, *effort, *leg_wrench, *coordinates;
-  double* perturbed;  ///< count x variants x 6: displacement after one step from the base's answer
+  double* free_twists;  ///< count x 36: the first column, of poses that are loose
+  double* perturbed;    ///< count x variants x 6: displacement after one step from the base's answer
   std::uint8_t* done;
   std::uint32_t* flags;
   std::int32_t* iterations;

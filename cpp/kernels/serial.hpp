@@ -3,24 +3,31 @@
 // (docs/fast_path.md F14).
 #pragma once
 
-#include "elimination.hpp"
+#include "free_play.hpp"
 
 namespace stiffmap::kernel {
 
-inline constexpr int most_serial_joints = 12;
+/// What acts on an arm's tip.
+struct TipLoad {
+  V3 point;
+  V6 load;              ///< of which the tangent knows, with the external springs
+  V6 pending;           ///< of which it does not (F11)
+  V3 dead_moment;       ///< the part of the load's moment that keeps its direction
+  const Sym6* springs;  ///< tangent of the external springs at the point; null: none
+};
 
 struct Serial {
   V B[most_serial_joints][most_serial_joints];  ///< eliminated: multipliers, inverse pivots, rows
   const Op* joint[most_serial_joints];
+  FreePlay play;
 
   Serial() {}  // not filled with zeros: 10 kB
 
   static constexpr double regular = 1e-7;  ///< least pivot of a compliance, of its diagonal: else the reference decides
 
-  /// Steps of all joints under `load` at `point`, of which the tangent knows, and `pending`, of which it does not
-  /// (F11).
-  void step(Elimination& el, const V3& point, const V6& load, const V6& pending) {
-    return el.P.serial_joints == 6 ? step_of<6>(el, point, load, pending) : step_of<0>(el, point, load, pending);
+  /// Steps of all joints.
+  void step(Elimination& el, const TipLoad& tip) {
+    return el.P.serial_joints == 6 ? step_of<6>(el, tip) : step_of<0>(el, tip);
   }
 
   /// Compliance J diag(a') B^-1 J^T of a dead wrench at `point`, and its inverse, the symmetric part of it.
@@ -28,10 +35,31 @@ struct Serial {
     return el.P.serial_joints == 6 ? answer_of<6>(el, point, C, K) : answer_of<0>(el, point, C, K);
   }
 
+  /// Twist of the point by a unit of the joint.
+  static V6 unit_twist(const Elimination& el, const Op& op, const V3& point) {
+    const JointSlot& j = el.s.joints[op.slot];
+    return op.kind == OpKind::prismatic ? V6{j.w, V3{}} : V6{cross(j.w, point - j.o), j.w};
+  }
+
  private:
+  /// The external springs' tangent in the joints; their moment turns by half where the joints' axes do (F15).
+  [[gnu::noinline]] void pull_back(const Elimination& el, int n, const TipLoad& tip) {
+    const V3 half = splat(0.5) * (tip.load.b - tip.dead_moment);
+    for (int b = 0; b < n; ++b) {
+      const V6 behind = unit_twist(el, *joint[b], tip.point), force = *tip.springs * behind;
+      const V3 turned = cross(behind.b, half);
+      for (int a = 0; a <= b; ++a) {
+        const V6 before = unit_twist(el, *joint[a], tip.point);
+        const V more = dot(before, force) - dot(before.b, turned);
+        B[a][b] += more;
+        if (a < b) B[b][a] += more;
+      }
+    }
+  }
+
   /// N joints; 0: as many as there are.
   template <int N>
-  [[gnu::noinline]] void step_of(Elimination& el, V3 point, const V6& load, const V6& pending) {
+  [[gnu::noinline]] void step_of(Elimination& el, const TipLoad& tip) {
     const Program& P = el.P;
     const int n = N ? N : P.serial_joints;
     V g[most_serial_joints];
@@ -39,7 +67,7 @@ struct Serial {
       if (P.ops[P.serial[i]].kind != OpKind::load) joint[k++] = P.ops + P.serial[i];
     // Of all that acts behind the joint: force, and the sum of its lever arms times forces; with what is pending, force
     // and moment about the joint.
-    V3 force = load.a, all = load.a + pending.a, moment = load.b + pending.b;
+    V3 point = tip.point, force = tip.load.a, all = force + tip.pending.a, moment = tip.load.b + tip.pending.b;
     M3 arms{};
     const auto lever = [&](const V3& r, const V3& f) {
       for (int k = 0; k < 3; ++k) arms.c[k] = arms.c[k] + (k == 0 ? f.x : k == 1 ? f.y : f.z) * r;
@@ -63,7 +91,7 @@ struct Serial {
       }
       const bool turns = op.kind == OpKind::revolute;
       const V3 below = turns ? arms * j.w - (arms.c[0].x + arms.c[1].y + arms.c[2].z) * j.w : cross(j.w, force);
-      const V3 above = turns ? below + cross(j.w, load.b) : below;  // a dead moment: theory E4
+      const V3 above = turns ? below + cross(j.w, tip.dead_moment) : below;  // theory E4
       for (int a = 0; a <= b; ++a) {
         const bool both = joint[a]->kind == OpKind::revolute;
         const V3& w = el.s.joints[joint[a]->slot].w;
@@ -73,11 +101,13 @@ struct Serial {
       g[b] = dot(j.w, turns ? moment : all) - el.s.tau[op.coordinate];
       --b;
     }
+    if (tip.springs) pull_back(el, n, tip);
     for (int k = 0; k < n; ++k) {
       const int q = joint[k]->coordinate;
       for (int i = 0; i < n; ++i) B[i][k] *= el.s.da[q];
       B[k][k] += el.s.dtau[q];
     }
+    if (P.starts_linear) play.hold(el, joint, n, B, g);
 #pragma GCC unroll 6
     for (int k = 0; k < n; ++k) {
       el.guard(B[k][k], P.coordinates[joint[k]->coordinate].unit);
@@ -98,9 +128,8 @@ struct Serial {
     const int n = N ? N : el.P.serial_joints;
     V J[6][most_serial_joints], m[6][6], x[6][6];
     for (int k = 0; k < n; ++k) {
-      const JointSlot& j = el.s.joints[joint[k]->slot];
       V column[6];
-      put(joint[k]->kind == OpKind::prismatic ? V6{j.w, V3{}} : V6{cross(j.w, point - j.o), j.w}, column);
+      put(unit_twist(el, *joint[k], point), column);
       for (int i = 0; i < 6; ++i) J[i][k] = column[i];
     }
     for (int r = 0; r < 6; ++r) {

@@ -246,6 +246,7 @@ class FastBatch {
                               out_.effort,
                               out_.leg_wrench,
                               out_.coordinates,
+                              out_.free_twists,
                               out_.variants,
                               done_.data(),
                               flags_.data(),
@@ -265,7 +266,7 @@ class FastBatch {
       for (long place = begin; place < end; ++place) {
         const Index i = pose_at(place);
         const std::uint8_t how = done_[at(i)];
-        if (how == pose_solved || how == pose_unstable) complete(i, how);
+        if (how == pose_solved || how == pose_unstable || how == pose_loose) complete(i, how);
         else if (how == pose_unreachable) s.reference.unreachable(m_, in_, i, flags_[at(i)], out_);
         if (how != pose_solved) forget_variants(i);
       }
@@ -274,9 +275,11 @@ class FastBatch {
 
   /// Fills what the kernels leave out for a pose that they did.
   void complete(Index i, std::uint8_t how) const {
-    const Status status = how == pose_unstable ? Status::unstable : Status::converged;
+    const bool loose = how == pose_loose;
+    const Status status = how == pose_unstable ? Status::unstable : loose ? Status::singular : Status::converged;
     if (out_.status) out_.status[i] = static_cast<std::uint8_t>(status);
-    if (out_.nothing_free) out_.nothing_free[i] = 1;
+    if (loose && out_.free_twists) Eigen::Map<RowMajor6>(out_.free_twists + 36 * i).rightCols<5>().setConstant(nan);
+    else if (out_.nothing_free) out_.nothing_free[i] = 1;
     else if (out_.free_twists) Eigen::Map<VecX>(out_.free_twists + 36 * i, 36).setConstant(nan);
     if (out_.indeterminate)
       for (Index j = 0; j < m_.size(); ++j) {
@@ -284,7 +287,8 @@ class FastBatch {
         out_.indeterminate[m_.size() * i + j] = c.locked && c.role == Role::passive;
       }
     const bool moment = !Eigen::Map<const Vec3>(in_.wrench + 6 * i + 3).isZero(0);
-    if (out_.flags) out_.flags[i] = flags_[at(i)] | (moment ? flag::nonconservative : 0u);
+    const std::uint32_t play = loose ? flag::free_play | flag::platform_singular : 0u;
+    if (out_.flags) out_.flags[i] = flags_[at(i)] | play | (moment ? flag::nonconservative : 0u);
   }
 
   void forget_variants(Index i) const {

@@ -118,7 +118,7 @@ bool follow_serial(const FastPlanData& d, std::int32_t chain, std::vector<std::i
 
 void find_serial(FastPlanData& d) {
   constexpr long most_joints = 12;  // as serial.hpp of the kernels
-  if (!d.springs.empty() || !follow_serial(d, d.program.root, d.serial)) return;
+  if (!follow_serial(d, d.program.root, d.serial)) return;
   const auto joints = std::count_if(d.serial.begin(), d.serial.end(), [&](std::int32_t i) {
     return d.ops[static_cast<std::size_t>(i)].kind != OpKind::load;
   });

@@ -114,11 +114,48 @@ def test_the_slope_of_a_stiff_law_is_that_of_the_answer(name: str) -> None:
     assert found.worst() < TOLERANCE
 
 
-def test_free_play_that_bears_nothing_is_singular() -> None:
-    machine = sm.load_machine("ur10").with_effect("dead_zone", element="wrist_3", half_width=5e-6)
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -9.81)])
+def test_free_play_that_bears_nothing_is_singular(gravity: tuple[float, float, float] | None) -> None:
+    machine = sm.load_machine("ur10")
+    for drive in ("shoulder", "wrist_3"):
+        machine = machine.with_effect("dead_zone", element=drive, half_width=5e-6)
     position, _ = draw(machine, 20, seed=25)
     force = np.array([30.0, 20.0, -40.0, 0.0, 0.0, 0.0])  # no moment about the last axis, but for round-off
-    assert (machine.solve(position, force).status == sm.Status.SINGULAR).all()
+    fast, reference = (
+        machine.solve(position, force, method=m, gravity=gravity) for m in ("fast", "reference")
+    )
+    assert fast.reference_share == 0
+    assert (fast.status == sm.Status.SINGULAR).all()
+    np.testing.assert_array_equal(fast.flags, reference.flags)
+    np.testing.assert_allclose(fast.displacement, reference.displacement, rtol=1e-10, atol=1e-14)
+    assert np.isnan(fast.compliance).all()
+    size = np.abs(reference.stiffness).max(axis=(1, 2), keepdims=True)
+    assert np.abs((fast.stiffness - reference.stiffness) / size).max() < TOLERANCE
+    # The last joint plays: a turn about the tool's axis, which the stiffness does not feel.
+    twist, other = fast.free_twists[:, :, 0], reference.free_twists[:, :, 0]
+    assert np.isnan(fast.free_twists[:, :, 1:]).all()
+    np.testing.assert_allclose(np.abs(np.sum(twist * other, axis=1)), 1.0, atol=1e-12)
+    assert np.abs(np.einsum("nij,nj->ni", fast.stiffness, twist) / size[:, :, 0]).max() < 1e-12
+
+
+def test_a_joint_that_bears_through_its_gap_is_regular() -> None:
+    machine = sm.load_machine("ur10").with_effect("dead_zone", element="wrist_3", half_width=5e-6)
+    position, wrench = draw(machine, 24, seed=26)
+    fast = machine.solve(position, wrench)
+    assert fast.ok.all()
+    assert (fast.flags & sm.Flag.FREE_PLAY == 0).all()
+    found = gap(machine, position, wrench)
+    assert found.statuses == 0
+    assert found.worst() < TOLERANCE
+
+
+def test_a_payload_on_an_arm() -> None:
+    machine = sm.load_machine("ur10").with_effect("payload", mass=3.0, com_x=0.05, com_z=0.1)
+    position, wrench = draw(machine, 24, seed=27)
+    assert machine.solve(position, wrench).reference_share == 0
+    found = gap(machine, position, wrench, gravity=(0.0, 0.0, -9.81))
+    assert found.statuses == 0
+    assert found.worst() < TOLERANCE
 
 
 def test_gaps_that_bear_round_off_are_the_references() -> None:
