@@ -156,7 +156,7 @@ class Calibrator:
         fit = found.fit
         if time.monotonic() < until and bends(found.problem, s, fit.values, fit.prediction):
             s = sensitivity_at(predictor, s, fit.values, until)
-            found = Calibrator._on(predictor, s, noise, out, until, seconds, fit.values)
+            found = Calibrator._on(predictor, s, noise, out, until, seconds, fit)
         seconds["fit"] = time.perf_counter() - begun
         return found
 
@@ -168,10 +168,12 @@ class Calibrator:
         out: Mask,
         until: float,
         seconds: dict[str, float],
-        start: Floats | None = None,
+        at: Fitted | None = None,
     ) -> Calibrator:
+        """`at`: where the columns of `s` were taken anew. What frames and tools do is then taken there as well: a
+        tool's shift turned otherwise than its frame would else leave a thousandth that no frame explains."""
         e = predictor.experiment
-        problem = Problem.of(e, noise.sigma, s.base, ~out)
+        problem = Problem.of(e, noise.sigma, s.base if at is None else at.prediction, ~out)
         columns = problem.white(s.columns)
         label = pose_labels(problem)
         q = problem.nuisance.shape[1]
@@ -181,7 +183,7 @@ class Calibrator:
             rho = model_form(Blocks.of(felt, linear, label, q))
             return Blocks.of(a, linear, label, q).beside(rho).estimate, 1.0 + rho
 
-        fit = fitted(predictor, problem, s, columns, weigh, start=start, until=until)
+        fit = fitted(predictor, problem, s, columns, weigh, start=at.values if at else None, until=until)
         rho = model_form(Blocks.of(felt, fit.linear, label, q))
         return Calibrator(predictor, s, noise, problem, columns, fit, rho, out, seconds, until)
 
@@ -201,7 +203,8 @@ class Calibrator:
         seen = np.isfinite(left).any(axis=0)
         typical = np.ones(left.shape[1])
         typical[seen] = 1.4826 * np.nanmedian(np.abs(left / self.noise.sigma)[:, seen], axis=0)
-        return outliers(e, left, self.noise.sigma * np.maximum(typical / TYPICAL, 1.0))
+        by_noise = outliers(e, left, self.noise.sigma * np.maximum(typical / TYPICAL, 1.0))
+        return by_noise | outliers(e, left, self.noise.sigma * np.maximum(typical, 1.0), lone=True)
 
     def left(self, prediction: Floats) -> Floats:
         """(n, c) reading minus prediction, less the frames and zeros that fit best."""

@@ -6,6 +6,9 @@ from stiffmap.calibration.facts import Beyond, Facts, Wider
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm"), "ln": (1e2, "%")}
 
+NAMED = 12
+"""Outliers that a line names."""
+
 
 def in_display_units(value: float, unit: str) -> str:
     """A number in the units of the screen."""
@@ -36,6 +39,10 @@ def lines(c: Facts) -> list[str]:
         out.append(
             f"model-form floor: {in_display_units(c.floor, c.unit)} per pose beyond noise; left: {where}"
         )
+    if c.outliers:
+        more = f" and {len(c.outliers) - NAMED} more" if len(c.outliers) > NAMED else ""
+        plural = "s" if len(c.outliers) > 1 else ""
+        out.append(f"set aside as outlier{plural}: row{plural} {', '.join(c.outliers[:NAMED])}{more}")
     return out
 
 

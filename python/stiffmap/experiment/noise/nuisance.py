@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings import kind_of
@@ -12,7 +13,7 @@ from stiffmap.experiment.setups import setups_of, targets_of
 
 
 def nuisance_columns(experiment: Experiment, base: Floats) -> Floats:
-    """(n, c, q) changes of the readings; `base` (n, c) is the declared machine's prediction."""
+    """(n, c, q) changes of the readings of a machine that shows `base` (n, c)."""
     columns = [c for part in (_zeros, _frames, _tools, _readings) for c in part(experiment, base)]
     return np.stack(columns, axis=-1) if columns else np.zeros((*experiment.reading.shape, 0))
 
@@ -43,10 +44,16 @@ def _frames(experiment: Experiment, base: Floats) -> Iterator[Floats]:
 
 def _turns(here: Floats, experiment: Experiment, base: Floats) -> Iterator[Floats]:
     position = experiment.quantity == "position"
+    at, turned = np.nan_to_num(base[:, :3]), np.nan_to_num(base[:, 3:6])
     for axis in np.eye(3):
-        linear = np.cross(axis, experiment.position if position else base[:, :3])
-        angular = np.broadcast_to(axis, linear.shape) if position else np.cross(axis, base[:, 3:6])
+        linear = np.cross(axis, experiment.position + at if position else at)
+        angular = _of_rotation_vector(turned, axis) if position else np.cross(axis, turned)
         yield _wide(experiment, here[:, None] * np.hstack([linear, angular]))
+
+
+def _of_rotation_vector(turned: Floats, turn: Floats) -> Floats:
+    """(n, 3) change of the rotation vectors `turned` (n, 3), small, by a small further turn in base axes."""
+    return np.asarray(turn - 0.5 * np.cross(turned, turn))
 
 
 def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
@@ -54,18 +61,21 @@ def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
     if experiment.tool == "known":
         return
     label = targets_of(experiment)[0]
+    turned = np.nan_to_num(base[:, 3:6])
+    there = Rotation.from_rotvec(turned)
     for here in ((label == t).astype(float) for t in np.unique(label)):
         for k in range(3):
             arm = _tool_axis(experiment.rotation, len(experiment), k)
-            moved = np.cross(np.nan_to_num(base[:, 3:6]), arm)
-            linear = moved + arm if experiment.quantity == "position" else moved
+            held = there.apply(arm)
+            linear = held if experiment.quantity == "position" else held - arm
             column = _wide(experiment, np.hstack([linear, np.zeros_like(linear)]))
             for i, kind in ((i, kind_of(c)) for i, c in enumerate(experiment.channels)):
                 if kind and kind.tool_offset:
                     column[:, i] = kind.tool_offset(experiment, arm, k)
             yield here[:, None] * column
             if experiment.tool == "unknown" and experiment.quantity == "position":
-                yield here[:, None] * _wide(experiment, np.hstack([np.zeros_like(arm), arm]))
+                angular = _of_rotation_vector(turned, held)
+                yield here[:, None] * _wide(experiment, np.hstack([np.zeros_like(arm), angular]))
 
 
 def _readings(experiment: Experiment, base: Floats) -> Iterator[Floats]:

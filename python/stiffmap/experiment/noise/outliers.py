@@ -11,8 +11,11 @@ from stiffmap.experiment.experiment import Experiment, Floats
 Mask = NDArray[np.bool_]
 FALSE = 0.01
 """Probability of listing any row of a clean experiment."""
+FEW = 0.02
+"""Largest share of the poses that were read once and may be outliers: more of them are structure."""
 GROSS = 8.0
-"""Robust standard deviations beyond which a reading is an outlier before any effect is known."""
+"""Robust standard deviations beyond which a reading is an outlier before any effect is known; a pose that was
+read once is beyond them as a whole."""
 
 
 def row_scores(residual: Floats, sigma: Floats) -> tuple[Floats, NDArray[np.intp]]:
@@ -22,15 +25,23 @@ def row_scores(residual: Floats, sigma: Floats) -> tuple[Floats, NDArray[np.intp
     return np.nansum(z**2, axis=1), count
 
 
-def outliers(experiment: Experiment, residual: Floats, sigma: Floats) -> Mask:
+def outliers(experiment: Experiment, residual: Floats, sigma: Floats, *, lone: bool = False) -> Mask:
     """(n,) rows whose residual (n, 6) to a model that fits is too long for noise.
 
-    A pose, or a branch, of which half or more would go is no outlier: it stays whole.
+    A pose, or a branch, of which half or more would go is no outlier: it stays whole. With `lone`, poses that were read
+    once may go beyond `GROSS`, if they are `FEW`: the model is then held by all the others.
     """
     score, count = row_scores(residual, sigma)
     p = chi2.sf(score, np.maximum(count, 1))
-    found = (p < FALSE / max(len(experiment), 1)) & (count > 0)
-    return whole_stays(experiment, found)
+    found = np.asarray((p < FALSE / max(len(experiment), 1)) & (count > 0))
+    out = whole_stays(experiment, found)
+    if lone:
+        once = np.bincount(experiment.groups)[experiment.groups] == 1
+        gross = score > GROSS**2 + np.maximum(count - 1, 0)
+        alone = gross & once & whole_stays(experiment, gross, poses=False)
+        if alone.sum() <= FEW * once.sum():
+            out |= alone
+    return out
 
 
 def suspects(experiment: Experiment, residual: Floats, sigma: Floats) -> Mask:
@@ -80,10 +91,10 @@ def _worst(rows: NDArray[np.intp], z: Floats) -> NDArray[np.intp]:
     return rows[[int(np.argmax(score))]]
 
 
-def whole_stays(experiment: Experiment, found: Mask) -> Mask:
-    """`found` without the rows of poses and branches that would lose half or more of their rows."""
+def whole_stays(experiment: Experiment, found: Mask, *, poses: bool = True) -> Mask:
+    """`found` without the rows of (poses and) branches that would lose half or more of their rows."""
     out = found.copy()
-    labels = [experiment.groups]
+    labels = [experiment.groups] if poses else []
     if experiment.branch:
         labels.append(np.unique(experiment.branch, return_inverse=True)[1])
     for label in labels:

@@ -21,7 +21,11 @@ STEPS = 60
 DONE = 1e-12
 """m, rad: last step of a fit that has come to rest."""
 ARM = 0.2
-"""m: how far apart the starts of a target's place are where no orientation is seen."""
+"""m: how far apart the starts of a target's place are where no orientation is seen; and how far from the tool's point
+it may sit (one standard deviation) as far as the readings leave that open, as they do where the tool hardly turns: an
+orientation that is measured, times a metre, would make errors of position out of errors of angle."""
+ROWS = 30.0
+"""Rows that are worth as much as all rows are: they share the machine's errors."""
 PAIRS = 400
 """Relative rotations that the closed form takes."""
 HUBER = 3.0
@@ -184,6 +188,9 @@ def _refined(s: Sighting, f: Frames) -> Frames:
     for _ in range(STEPS):
         residual, columns = _linear(s, f)
         weight = _weights(residual)
+        near, slopes = _near_the_tool(s, f, residual, columns.shape[1])
+        residual, columns = np.append(residual, near), np.vstack([columns, slopes])
+        weight = np.append(weight, np.ones(len(near)))
         size = np.linalg.norm(columns, axis=0)
         scale = np.where(size > 0, size, 1.0)
         step = -np.linalg.lstsq((columns / scale) * weight[:, None], residual * weight, rcond=1e-9)[0] / scale
@@ -193,20 +200,40 @@ def _refined(s: Sighting, f: Frames) -> Frames:
     return f
 
 
+def _near_the_tool(s: Sighting, f: Frames, residual: Floats, unknown: int) -> tuple[Floats, Floats]:
+    """Places of unknown targets over `ARM`, in the size of the residuals, and their derivative."""
+    if not (s.tool_unknown and s.placed.any()):
+        return np.zeros(0), np.zeros((0, unknown))
+    scale = _typical(residual) * max(float(s.placed.sum()) / ROWS, 1.0) ** 0.5 / ARM
+    slopes = np.zeros((len(f.tool_p), 3, unknown))
+    for k in range(len(f.tool_p)):
+        first = 6 * (len(f.base_r) + k)
+        slopes[k, :, first : first + 3] = scale * np.eye(3)
+    return (scale * f.tool_p).ravel(), slopes.reshape(-1, unknown)
+
+
 def _cost(s: Sighting, f: Frames) -> float:
     residual, _ = _linear(s, f)
     return float(np.sum(np.abs(residual)))
 
 
 def _weights(residual: Floats) -> Floats:
-    typical = 1.4826 * np.median(np.abs(residual)) if residual.size else 0.0
-    far = np.abs(residual) / max(HUBER * typical, 1e-15)
+    far = np.abs(residual) / max(HUBER * _typical(residual), 1e-15)
     return np.asarray(np.sqrt(1.0 / np.maximum(far, 1.0)))
 
 
+def _typical(residual: Floats) -> float:
+    return 1.4826 * float(np.median(np.abs(residual))) if residual.size else 0.0
+
+
 def _linear(s: Sighting, f: Frames) -> tuple[Floats, Floats]:
-    """Residual of all rows, angles as lengths at the size of the motion, and its derivative."""
-    shift, turn = as_commanded(s, f)
+    """Residual of all rows, angles as lengths at the size of the motion, and its derivative.
+
+    Positions are judged at the target, on the commanded orientation: errors of angle shall not move it by the lever.
+    """
+    _, turn = as_commanded(s, f)
+    shift = np.einsum("nji,nj->ni", f.base_r[s.setup], s.q - f.base_p[s.setup]) - s.p
+    shift = shift - np.einsum("nij,nj->ni", s.r, f.tool_p[s.target])
     setups, targets = len(f.base_r), len(f.tool_r)
     n, unknown = len(s.p), 6 * setups + 6 * targets
     d = np.zeros((n, 6, unknown))
@@ -224,8 +251,6 @@ def _linear(s: Sighting, f: Frames) -> tuple[Floats, Floats]:
         d[rows, :3, x + axis] = -s.r[:, :, axis]
         if s.turn_unknown:
             d[rows, 3:, x + 3 + axis] = -s.r[:, :, axis]
-            lever = np.einsum("nij,nj->ni", s.r, f.tool_p[s.target])
-            d[rows, :3, x + 3 + axis] = np.where(s.turned[:, None], np.cross(s.r[:, :, axis], lever), 0.0)
     size = max(float(np.linalg.norm(np.ptp(s.p, axis=0))), 1e-3)
     residual = np.hstack([shift, turn * size])
     d[:, 3:] *= size
