@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/dense.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
@@ -24,10 +23,22 @@ Singular singular_vectors(const MatX& A) {
   return {svd.singularValues(), svd.matrixV()};
 }
 
+MatX Orthogonal::null_vectors() const {
+  return cod_.colsPermutation() * cod_.matrixZ().transpose().rightCols(cod_.cols() - cod_.rank());
+}
+
 Index rank_of(const MatX& A, double threshold) {
   Eigen::ColPivHouseholderQR<MatX> qr(A);
   qr.setThreshold(threshold);
   return qr.rank();
+}
+
+MatX left_null_vectors(const MatX& A, double threshold) {
+  Eigen::ColPivHouseholderQR<MatX> qr;
+  qr.setThreshold(threshold);
+  qr.compute(A);
+  const MatX Q = qr.householderQ();
+  return Q.rightCols(A.rows() - qr.rank());
 }
 
 Singular6 singular_vectors(const Mat6& A) {
@@ -47,9 +58,23 @@ EigenX symmetric_eigen(const MatX& A) {
   return {eigen.eigenvalues(), eigen.eigenvectors()};
 }
 
+ComplexEigen general_eigen(const MatX& A) {
+  const Eigen::EigenSolver<MatX> eigen(A);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
+}
+
 bool cholesky(MatX& A) {
   const Eigen::LLT<Eigen::Ref<MatX>> llt(A);
   return llt.info() == Eigen::Success;
 }
+
+bool Cholesky::compute(const MatX& A) {
+  llt_.compute(A);
+  return llt_.info() == Eigen::Success;
+}
+void Cholesky::solve(const VecX& b, VecX& x) const { x = llt_.solve(b); }
+void Cholesky::solve(const MatX& B, MatX& X) const { X = llt_.solve(B); }
+void Cholesky::solve_lower(MatX& B) const { llt_.matrixL().solveInPlace(B); }
+void Cholesky::solve_upper(MatX& B) const { llt_.matrixU().solveInPlace(B); }
 
 }  // namespace stiffmap

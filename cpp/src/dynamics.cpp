@@ -111,14 +111,13 @@ void drive_dynamics(const Mechanism& m, const Inertias& inertias, const VecX& x,
   const Mat3& R = frames.at(m.tip).R;
   Mat6X J = motion.J;
   mask(m, R, J);
-  Eigen::CompleteOrthogonalDecomposition<MatX> solver;
-  solver.setThreshold(rank_threshold);
-  solver.compute(J);
+  Orthogonal solver;
+  solver.compute(J, rank_threshold);
 
   // Rates of the drives from the tip's twist, then of everything.
   Vec6 v = in.twist;
   mask(m, R, v);
-  out.rate = solver.solve(v);
+  solver.solve(v, out.rate);
   out.misfit = v.norm() > 0 ? (J * out.rate - v).norm() / v.norm() : 0;
   const VecX rate = motion.rates * out.rate;
 
@@ -131,7 +130,7 @@ void drive_dynamics(const Mechanism& m, const Inertias& inertias, const VecX& x,
   Vec6 a;
   a << in.twist_rate.head<3>() - moved[at(m.tip)].a, in.twist_rate.tail<3>() - moved[at(m.tip)].b;
   mask(m, R, a);
-  out.acceleration = solver.solve(a);
+  solver.solve(a, out.acceleration);
   Vec6 wanted = in.twist_rate;
   mask(m, R, wanted);
   const double size = wanted.norm() + v.squaredNorm() / m.length;

@@ -17,10 +17,12 @@ bool moves(const Coordinate& c) { return c.role == Role::actuator || (c.role == 
 /// Approximate inverse of A from the left; its defect is accounted for by whoever uses it.
 bool left_inverse(const MatX& A, MatX& C) {
   const MatX N = A.transpose() * A;
-  const Eigen::LLT<MatX> llt(N);
-  if (llt.info() != Eigen::Success) return false;
-  C = llt.solve(A.transpose());
-  C += llt.solve(A.transpose() - N * C);
+  Cholesky cholesky;
+  if (!cholesky.compute(N)) return false;
+  MatX correction;
+  cholesky.solve(A.transpose(), C);
+  cholesky.solve(A.transpose() - N * C, correction);
+  C += correction;
   return C.allFinite();
 }
 
@@ -152,7 +154,7 @@ void Encloser::second(const Mechanism& m, const Arm& arm, double sign, Index row
 /// Angles as lengths, in rows and columns; rows that the task leaves open are zero.
 void Encloser::scale(const Mechanism& m, MatX& M) const {
   for (std::size_t u = 0; u < unknown_.size(); ++u) M.col(static_cast<Index>(u)) /= m.unit(unknown_[u]);
-  for (Index i = 3; i < M.rows(); i += 6) M.middleRows(i, 3) *= m.length;
+  scale_angles(m, M);
   for (Index i = 0; i < 6; ++i)
     if (!m.task[at(i)]) M.row(i).setZero();
 }
@@ -161,7 +163,8 @@ void Encloser::scale(const Mechanism& m, MatX& M) const {
 bool Encloser::Majorant::compute(const MatX& E) {
   const Index n = E.rows();
   lu_.compute(MatX::Identity(n, n) - E);
-  const VecX one = lu_.solve(VecX::Ones(n));
+  VecX one;
+  lu_.solve(VecX::Ones(n), one);
   return one.minCoeff() > 0 && (one - E * one).minCoeff() > 0.5;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/modes.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -35,12 +34,8 @@ MatX closed_motions(const Mechanism& m, const Linearization& lin) {
   const MatX P = allowed(m, lin);
   if (m.closures() == 0) return P;
   MatX C = lin.J * P;
-  for (Index i = 3; i < C.rows(); i += 6) C.middleRows<3>(i) *= m.length;
-  Eigen::ColPivHouseholderQR<MatX> qr;
-  qr.setThreshold(rank_threshold);
-  qr.compute(C.transpose());
-  const MatX Q = qr.householderQ();
-  return P * Q.rightCols(P.cols() - qr.rank());
+  scale_angles(m, C);
+  return P * left_null_vectors(C.transpose(), rank_threshold);
 }
 
 MatX tangent(const Mechanism& m, const Linearization& lin) {
@@ -63,8 +58,11 @@ void keep(const MatX& Z, const VecX& inverse_square, const MatX& vectors, ModesR
 
 /// A tangent that dead moments make unsymmetric: complex frequencies are flutter.
 bool unsymmetric(const MatX& Z, const MatX& K, const MatX& M, ModesResult& out) {
-  const Eigen::EigenSolver<MatX> solver(K.partialPivLu().solve(M));
-  const auto values = solver.eigenvalues();
+  Lu lu(K.rows());
+  lu.compute(K);
+  MatX A;
+  lu.solve(M, A);
+  const auto [values, all] = general_eigen(A);
   std::vector<Index> order(at(values.size()));
   std::iota(order.begin(), order.end(), Index{0});
   std::sort(order.begin(), order.end(), [&](Index a, Index b) { return values[a].real() < values[b].real(); });
@@ -74,7 +72,7 @@ bool unsymmetric(const MatX& Z, const MatX& K, const MatX& M, ModesResult& out) 
   for (std::size_t k = 0; k < order.size(); ++k) {
     const Index j = order[k];
     if (std::abs(values[j].imag()) > 1e-9 * largest || values[j].real() < -1e-9 * largest) return false;
-    const VecX v = solver.eigenvectors().col(j).real();
+    const VecX v = all.col(j).real();
     mu[static_cast<Index>(k)] = values[j].real();
     const double modal = v.dot(M * v);
     vectors.col(static_cast<Index>(k)) =
@@ -108,10 +106,10 @@ void natural_modes(const Mechanism& m, const Inertias& inertias, const PoseInput
     return;  // nothing moves, or nothing has mass
   }
   const MatX S = 0.5 * (K + K.transpose());
-  const Eigen::LLT<MatX> llt(S);
-  const VecX pivots = llt.matrixLLT().diagonal();
-  const bool sound =
-      llt.info() == Eigen::Success && pivots.cwiseAbs2().minCoeff() > 1e-13 * S.diagonal().cwiseAbs().maxCoeff();
+  Cholesky cholesky;
+  const bool definite = cholesky.compute(S);
+  const VecX pivots = cholesky.pivots();
+  const bool sound = definite && pivots.cwiseAbs2().minCoeff() > 1e-13 * S.diagonal().cwiseAbs().maxCoeff();
   if (!sound) {
     const VecX values = symmetric_eigen(S).values;
     const double low = values[0], high = values[K.rows() - 1];
@@ -125,10 +123,13 @@ void natural_modes(const Mechanism& m, const Inertias& inertias, const PoseInput
     if (!unsymmetric(Z, K, M, out)) out.status = Status::unstable;
     return;
   }
-  MatX X = llt.matrixL().solve(M);
-  const MatX reduced = llt.matrixL().solve(X.transpose());
-  const EigenX modes = symmetric_eigen(MatX(0.5 * (reduced + reduced.transpose())));
-  keep(Z, modes.values, llt.matrixU().solve(modes.vectors), out);
+  MatX X = M;
+  cholesky.solve_lower(X);
+  MatX reduced = X.transpose();
+  cholesky.solve_lower(reduced);
+  EigenX modes = symmetric_eigen(MatX(0.5 * (reduced + reduced.transpose())));
+  cholesky.solve_upper(modes.vectors);
+  keep(Z, modes.values, modes.vectors, out);
 }
 
 }  // namespace stiffmap

@@ -8,6 +8,7 @@
 #include "stiffmap/enclosure.hpp"
 #include "stiffmap/modes.hpp"
 #include "stiffmap/parallel.hpp"
+#include "stiffmap/pose_closer.hpp"
 
 namespace stiffmap::bindings {
 namespace {

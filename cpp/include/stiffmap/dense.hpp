@@ -2,6 +2,7 @@
 // Factorisations of dense matrices. They take minutes to compile, so that only dense.cpp does.
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
 
@@ -34,6 +35,8 @@ class Orthogonal {
   Index rank() const { return cod_.rank(); }
   void solve(const VecX& b, VecX& x) const;
   void solve(const MatX& B, MatX& X) const;
+  /// Orthonormal, of the matrix that was decomposed.
+  MatX null_vectors() const;
 
  private:
   Eigen::CompleteOrthogonalDecomposition<MatX> cod_;
@@ -46,6 +49,8 @@ struct Singular {
 };
 Singular singular_vectors(const MatX& A);
 Index rank_of(const MatX& A, double threshold);
+/// Orthonormal vectors x with A'x = 0, by pivoted QR of A.
+MatX left_null_vectors(const MatX& A, double threshold);
 
 /// The same of a 6x6, to full relative accuracy.
 struct Singular6 {
@@ -66,8 +71,31 @@ struct EigenX {
   MatX vectors;
 };
 EigenX symmetric_eigen(const MatX& A);
+/// Of any square matrix, in no order; vectors of length one.
+struct ComplexEigen {
+  Eigen::VectorXcd values;
+  Eigen::MatrixXcd vectors;
+};
+ComplexEigen general_eigen(const MatX& A);
 
 /// Cholesky factor in place below the diagonal; false where the matrix is not positive definite.
 bool cholesky(MatX& A);
+
+/// Cholesky factorisation L L' of a symmetric matrix, given below its diagonal.
+class Cholesky {
+ public:
+  /// False where the matrix is not positive definite.
+  bool compute(const MatX& A);
+  /// Diagonal of L.
+  auto pivots() const { return llt_.matrixLLT().diagonal(); }
+  void solve(const VecX& b, VecX& x) const;
+  void solve(const MatX& B, MatX& X) const;
+  /// L^-1 B and L'^-1 B, in place.
+  void solve_lower(MatX& B) const;
+  void solve_upper(MatX& B) const;
+
+ private:
+  Eigen::LLT<MatX> llt_;
+};
 
 }  // namespace stiffmap

@@ -2,7 +2,6 @@
 // Coordinates and their slopes enclosed over a whole cell of positions, springs at rest (theory D8).
 #pragma once
 
-#include <Eigen/LU>
 #include <array>
 #include <string>
 
@@ -54,10 +53,14 @@ class Encloser {
   class Majorant {
    public:
     bool compute(const MatX& E);
-    MatX solve(const MatX& b) const { return lu_.solve(b); }
+    MatX solve(const MatX& b) const {
+      MatX x;
+      lu_.solve(b, x);
+      return x;
+    }
 
    private:
-    Eigen::PartialPivLU<MatX> lu_;
+    Lu lu_;
   };
 
   void build(const Mechanism& m, const Frames& frames, Index end, Arm& arm) const;

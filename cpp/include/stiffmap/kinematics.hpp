@@ -35,6 +35,12 @@ void add_jacobian(const Mechanism& m, const Frames& f, Index node, const Vec3& p
   for (Index j : m.path[static_cast<std::size_t>(node)]) J.col(j) += sign * column(m, f, j, p);
 }
 
+/// Rows of angles, three of each six, as lengths.
+template <class Matrix>
+void scale_angles(const Mechanism& m, Matrix&& rows) {
+  for (Index i = 3; i < rows.rows(); i += 6) rows.middleRows(i, 3) *= m.length;
+}
+
 /// Twist that carries frame a to frame b: translation and rotation vector, base axes (theory C3).
 Vec6 frame_error(const Pose& a, const Pose& b);
 

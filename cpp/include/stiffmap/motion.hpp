@@ -3,12 +3,10 @@
 // springs at rest (theory D1-D3).
 #pragma once
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
-#include <array>
 #include <vector>
 
-#include "stiffmap/closure.hpp"
+#include "stiffmap/dense.hpp"
+#include "stiffmap/rigid_tree.hpp"
 
 namespace stiffmap {
 
@@ -21,32 +19,6 @@ struct Motion {
   Vec6 free_twist;    ///< of the tip, with all drives held; NaN where there is none
   double pivot = 1;   ///< smallest relative pivot of the loops' elimination: 0 where they lose rank
   double misfit = 0;  ///< loop velocity that the drives' rates leave open, relative: 0 unless they are dependent
-};
-
-/// The joints alone: springs at rest, locked coordinates at home, the constant transforms between joints multiplied.
-class RigidTree {
- public:
-  explicit RigidTree(const Mechanism& m);
-
-  /// Frames of moving joints, of the tip and of the loops' ends; axes and origins of moving joints. Others stay.
-  void forward(const VecX& x, Frames& out) const;
-  /// Drives and free passive coordinates.
-  const std::vector<Index>& moving() const { return moving_; }
-  /// Those that move the tip, from the base outwards.
-  const std::vector<Index>& tip() const { return tip_; }
-  /// Those that move one end of a loop and not the other: primary and end.
-  const std::array<std::vector<Index>, 2>& loop(std::size_t l) const { return loops_[l]; }
-
- private:
-  struct Step {
-    Index node, parent, coordinate;
-    JointType type;
-    Pose before;
-    Vec3 axis;
-  };
-  std::vector<Step> steps_;
-  std::vector<Index> moving_, tip_;
-  std::vector<std::array<std::vector<Index>, 2>> loops_;
 };
 
 /// Linear relations between the rates of passive coordinates and drives, factorised once per configuration.
@@ -73,48 +45,8 @@ class LoopRates {
   MatX J_, A_, N_;
   double pivot_ = 1;
   bool regular_ = true;
-  Eigen::LLT<MatX> llt_;
-  Eigen::CompleteOrthogonalDecomposition<MatX> cod_;
-};
-
-/// Closes many neighbouring poses: Newton from a given start or from the last pose, else by continuation
-/// from home. Frames are those of `RigidTree`.
-class PoseCloser {
- public:
-  explicit PoseCloser(const Mechanism& m);
-
-  /// `x`: start (NaN: none) in, closed coordinates out. Frames of the answer are in `frames()`. Impatient:
-  /// a pose that a straight continuation from home does not reach counts as out of reach.
-  ClosureResult close(const Mechanism& m, const Pose& pose, VecX& x, bool patient = true);
-  /// From closed coordinates `x` of a neighbouring pose and nowhere else, so that the answer continues them.
-  ClosureResult continue_from(const Mechanism& m, const Pose& pose, VecX& x);
-  const Frames& frames() const { return ws_.frames; }
-  /// Of the equations at the closed pose: the smallest pivot relative to the largest, unpivoted.
-  double pivot(const Mechanism& m, const Pose& pose);
-
- private:
-  bool newton(const Mechanism& m, const Pose& pose, VecX& x);
-  void normal(const Mechanism& m, const Pose& pose);
-  bool continued(const Mechanism& m, const Pose& from, const Pose& pose, double shortest, VecX& x);
-  bool from_home(const Mechanism& m, const Pose& pose, VecX& x);
-  void at_rest(const Mechanism& m, VecX& x) const;
-  ClosureResult answer(const Mechanism& m, const Pose& pose, const VecX& x, bool ok, ClosureResult out);
-  void remember(const Pose& pose, const VecX& x);
-  bool extrapolated(const Pose& pose, VecX& x) const;
-  double residual(const Mechanism& m, const Pose& pose, const VecX& x);
-
-  ClosureWorkspace ws_;
-  RigidTree tree_;
-  std::vector<std::vector<Index>> columns_;  ///< of the unknowns: columns of the tip's and of each loop's rows
-  MatX A_, N_;
-  VecX e_, right_, unit_, last_, trial_;
-  Eigen::LLT<MatX> llt_;
-  Pose last_pose_;
-  bool has_last_ = false;
-  // the poses before the last, while they are evenly spaced along a line
-  VecX before_, earlier_;
-  Vec3 step_ = Vec3::Zero();
-  int even_ = 0;
+  Cholesky cholesky_;
+  Orthogonal orthogonal_;
 };
 
 }  // namespace stiffmap

@@ -5,8 +5,8 @@
 
 #include "closure.hpp"
 #include "stiffmap/closure.hpp"
-#include "stiffmap/motion.hpp"
 #include "stiffmap/parallel.hpp"
+#include "stiffmap/pose_closer.hpp"
 
 namespace stiffmap {
 namespace {
