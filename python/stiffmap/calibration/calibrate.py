@@ -10,7 +10,7 @@ from os import PathLike
 import numpy as np
 
 from stiffmap.calibration.certificate import certified
-from stiffmap.calibration.claims import BesideField, Claims, claims, gain_of
+from stiffmap.calibration.claims import BesideField, Claims, claims
 from stiffmap.calibration.defaults import Tolerances
 from stiffmap.calibration.edit import edited
 from stiffmap.calibration.facts import Beyond, HeldOut, Row, Wider
@@ -18,6 +18,8 @@ from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.groups import STRONG, Choice, compare
 from stiffmap.calibration.homing import own_part, zeros_anew
 from stiffmap.calibration.model import (
+    FIRST,
+    STEPS,
     Fitted,
     Progress,
     Sensitivity,
@@ -28,7 +30,8 @@ from stiffmap.calibration.model import (
     sensitivity_at,
 )
 from stiffmap.calibration.result import Calibration
-from stiffmap.calibration.statistics import Sums, directions, independent
+from stiffmap.calibration.statistics import Sums, directions, gain_of, independent
+from stiffmap.calibration.travel import Drive, Travel, travel
 from stiffmap.calibration.unknowns import GROUPS, Unknown, unknowns
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.channels import metres
@@ -40,6 +43,7 @@ from stiffmap.experiment.noise.folds import folds
 from stiffmap.experiment.noise.level import Noise, noise_of
 from stiffmap.experiment.noise.outliers import outliers
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
 from stiffmap.one_thread import on_one_thread
@@ -148,13 +152,17 @@ class Calibrator:
         seconds = {"sensitivities": begun - start}
         first = Calibrator._on(predictor, s, noise, nobody, until, seconds)
         out = first._alone()
-        found = first if not out.any() else Calibrator._on(predictor, s, noise, out, until, seconds)
+        found = first
+        if out.any():
+            found = Calibrator._on(predictor, s, noise, out, until, seconds, start=first.fit.values)
         more = zeros_anew(s, e)
         if more is not None and found.better_with(more):
+            begin = np.append(found.fit.values, np.zeros(len(more.unknowns) - len(s.unknowns)))
             s = more
-            found = Calibrator._on(predictor, s, noise, out, until, seconds)
+            found = Calibrator._on(predictor, s, noise, out, until, seconds, start=begin)
         fit = found.fit
-        if time.monotonic() < until and bends(found.problem, s, fit.values, fit.prediction):
+        bent = not fit.converged or bends(found.problem, s, fit.values, fit.prediction)
+        if time.monotonic() < until and bent:
             s = sensitivity_at(predictor, s, fit.values, until)
             found = Calibrator._on(predictor, s, noise, out, until, seconds, fit)
         seconds["fit"] = time.perf_counter() - begun
@@ -169,8 +177,9 @@ class Calibrator:
         until: float,
         seconds: dict[str, float],
         at: Fitted | None = None,
+        start: Floats | None = None,
     ) -> Calibrator:
-        """`at`: where the columns of `s` were taken anew. What frames and tools do is then taken there as well: a
+        """`start`: values to begin with. `at`: where the columns of `s` were taken anew. What frames and tools do is then taken there as well: a
         tool's shift turned otherwise than its frame would else leave a thousandth that no frame explains."""
         e = predictor.experiment
         problem = Problem.of(e, noise.sigma, s.base if at is None else at.prediction, ~out)
@@ -183,7 +192,8 @@ class Calibrator:
             rho = model_form(Blocks.of(felt, linear, label, q))
             return Blocks.of(a, linear, label, q).beside(rho).estimate, 1.0 + rho
 
-        fit = fitted(predictor, problem, s, columns, weigh, start=at.values if at else None, until=until)
+        start, steps = (start, FIRST) if at is None else (at.values, STEPS)
+        fit = fitted(predictor, problem, s, columns, weigh, start=start, until=until, steps=steps)
         rho = model_form(Blocks.of(felt, fit.linear, label, q))
         return Calibrator(predictor, s, noise, problem, columns, fit, rho, out, seconds, until)
 
@@ -252,6 +262,7 @@ class Calibrator:
         b, a = (size(np.where(keep, v, np.nan)) for v in (before, after))
         held = self._held_out(choice, factor, fit, rho, seed, size)
         as_declared = sums.log_evidence <= sums.pick([]).log_evidence and not claimed.any
+        profiles = self._travel(fit, rho, factor, seed, size) if self._misfits(fit, factor) else None
         rest = _outweighs(held.before, held.after, noise) if held else _outweighs(b, a, noise)
         unexplained = (rest or bool(claimed.refused)) and not claimed.any and self._misfits(fit, factor)
         seconds = {**self.seconds, "evidence": time.perf_counter() - start}
@@ -270,6 +281,7 @@ class Calibrator:
             rest=_rest(e, np.where(keep, after, np.nan), size),
             wider=wider,
             refused=claimed.refused,
+            travel=profiles,
             outliers=tuple(e.ids[i] for i in np.flatnonzero(self.out)),
             failed=self.sensitivity.failed,
             stopped=self.stopped,
@@ -385,6 +397,29 @@ class Calibrator:
         keep = ~self.out[:, None]
         before = size(np.where(keep, self.left(self.sensitivity.base), np.nan))
         return HeldOut(by, before, found.pop("all"), found.pop("chosen"), found)
+
+    def _travel(self, fit: Fitted, rho: float, factor: Floats, seed: int, size: Size) -> Travel | None:
+        """What is left, as profiles over the drives' coordinates."""
+        e, s = self.predictor.experiment, self.sensitivity
+        label, by = folds(e, seed)
+        zeros = [i for i, u in enumerate(s.unknowns) if u.group == "zeros" and not u.setup]
+        if e.quantity != "position" or not zeros or self.stopped:
+            return None
+        machine = self.predictor.machine
+        at = coordinates_of(machine, e)
+        drives = [
+            Drive(name, u.unit, s.columns[..., i] / u.u, at[:, machine.compiled.names.joints[name]])
+            for i, u, name in ((i, s.unknowns[i], s.unknowns[i].moves[0][0][0]) for i in zeros)
+        ]
+
+        def own(rest: Floats, test: Mask) -> Floats:
+            return own_part(s.unknowns, self.columns, rest, test)
+
+        def told(left: Floats) -> float:
+            return size(self.unwhite(left))
+
+        label = label[self.problem.index[0]]
+        return travel(self.problem, drives, self.columns * factor, fit.linear, rho, label, by, own, told)
 
     def _left_out(
         self,

@@ -20,7 +20,7 @@ from stiffmap.calibration.floor import LARGEST, Blocks
 from stiffmap.calibration.statistics import Sums
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.calibration.width import widened
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.field import shapes
 from stiffmap.experiment.noise.whitening import Problem
 
@@ -120,12 +120,7 @@ class BesideField:
         leaves in SI."""
         field = problem.white(field_columns(problem.experiment, left))
         blocks = Blocks.of(np.hstack([columns, field]), linear, label, nuisances)
-        number, count = np.unique(blocks.number, return_counts=True)
-        each = [blocks.number == m for m in number]
-        between = tuple(Sums.of(blocks.columns[w], blocks.residual[w]) for w in each)
-        return BesideField(
-            number.astype(np.intp), count.astype(np.intp), blocks.within, between, columns.shape[1]
-        )
+        return BesideField(blocks.number, blocks.count, blocks.within, blocks.between, columns.shape[1])
 
     def log_evidence(self, factor: Floats) -> float:
         """Of the unknowns at `factor` (p,) times their uncertainties, beside the field and the floor that suit best."""
@@ -160,10 +155,3 @@ def field_columns(e: Experiment, left: Floats) -> Floats:
     for k, c in enumerate(read):
         out[:, c, k] = size[k] * shape
     return np.asarray(out.reshape(*left.shape, -1))
-
-
-def gain_of(before: Floats, after: Floats, tests: Sequence[Mask]) -> tuple[float, float]:
-    """What the squares of whitened residuals (N,), held out, lose per reading: mean over the folds, standard error."""
-    lost = before**2 - after**2
-    each = np.array([float(lost[test].mean()) for test in tests if test.any()])
-    return float(each.mean()), float(each.std(ddof=1) / np.sqrt(len(each)))

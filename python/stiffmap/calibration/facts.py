@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.calibration.groups import Choice
+from stiffmap.calibration.travel import Travel
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.machine import Machine
@@ -103,6 +104,8 @@ class Facts:
     rest: dict[str, float]
     """rms of what is left, by reading and by set-up, m or rad."""
     wider: tuple[Wider, ...]
+    travel: Travel | None
+    """Errors along the drives' travel, where they hold on readings that were not seen."""
     outliers: tuple[str, ...]
     failed: tuple[tuple[str, str], ...]
     stopped: bool
@@ -132,6 +135,7 @@ class Facts:
         out["held_out"] = plain(asdict(self.held_out)) if self.held_out else None
         out["groups"] = plain(asdict(self.groups))
         out["beyond"] = [plain(asdict(b)) for b in self.beyond]
+        out["travel"] = plain(asdict(self.travel)) if self.travel else None
         out["table"] = [plain(asdict(r)) for r in self.rows]
         out["refused"] = list(self.refused)
         out["failed"] = [list(f) for f in self.failed]

@@ -7,7 +7,7 @@ maximises the restricted likelihood (REML; Patterson and Thompson 1971). docs/th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -20,50 +20,50 @@ LARGEST = 1e8
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Whitened readings in blocks that share a random effect."""
+    """Whitened readings in blocks that share a random effect; sums over blocks, by how many readings they have."""
 
     number: Integers
-    """(K,) readings per block."""
-    columns: Floats
-    """(K, p) sums of the columns over each block."""
-    residual: Floats
-    """(K,) sums of the residuals."""
+    """(m,) different numbers of readings per block."""
+    count: Integers
+    """(m,) how many blocks have so many."""
     within: Sums
     """All readings, as if independent."""
+    between: tuple[Sums, ...]
+    """(m,) of the sums of columns and residuals over each block."""
 
     @staticmethod
     def of(columns: Floats, residual: Floats, label: Integers, nuisances: int = 0) -> Blocks:
         """`label` (N,) says which block a reading belongs to."""
-        _, at = np.unique(label, return_inverse=True)
-        at = at.reshape(-1)
-        k = int(at.max()) + 1 if len(at) else 0
-        sums = np.zeros((k, columns.shape[1]))
-        np.add.at(sums, at, columns)
-        return Blocks(
-            np.bincount(at, minlength=k).astype(np.intp),
-            sums,
-            np.asarray(np.bincount(at, residual, minlength=k), dtype=float),
-            Sums.of(columns, residual, len(residual) - nuisances),
-        )
+        within = Sums.of(columns, residual, len(residual) - nuisances)
+        if not len(label):
+            none = np.zeros(0, np.intp)
+            return Blocks(none, none, within, ())
+        order = np.argsort(label, kind="stable")
+        _, first, size = np.unique(label[order], return_index=True, return_counts=True)
+        number, count = np.unique(size, return_counts=True)
+        if number[-1] == 1:
+            between: tuple[Sums, ...] = (within,)
+        else:
+            sums = np.add.reduceat(columns[order], first, axis=0) if columns.shape[1] else columns[first]
+            rest = np.add.reduceat(residual[order], first)
+            between = tuple(Sums.of(sums[size == m], rest[size == m]) for m in number)
+        return Blocks(number.astype(np.intp), count.astype(np.intp), within, between)
 
     def scaled(self, factor: Floats) -> Blocks:
-        """The blocks with each column times a factor (p,)."""
-        return Blocks(self.number, self.columns * factor, self.residual, self.within.scaled(factor))
+        """With each standard uncertainty times a factor (p,)."""
+        between = tuple(s.scaled(factor) for s in self.between)
+        return replace(self, within=self.within.scaled(factor), between=between)
 
     def beside(self, rho: float) -> Sums:
         """Sums where each block has a random effect of variance rho: V = I + rho 1 1ᵀ per block."""
-        c = rho / (1.0 + self.number * rho)
-        s, w = self.columns, self.within
-        return Sums(
-            w.gram - s.T @ (c[:, None] * s),
-            w.right - s.T @ (c * self.residual),
-            w.square - float(c @ self.residual**2),
-            w.number,
-        )
+        out = self.within
+        for m, s in zip(self.number, self.between, strict=True):
+            out = out - s.weighed(rho / (1.0 + float(m) * rho))
+        return replace(out, number=self.within.number)
 
     def log_likelihood(self, rho: float) -> float:
         """Of rho, all unknowns integrated out over their priors."""
-        return self.beside(rho).log_evidence - 0.5 * float(np.log1p(self.number * rho).sum())
+        return self.beside(rho).log_evidence - 0.5 * float(self.count @ np.log1p(self.number * rho))
 
 
 def model_form(blocks: Blocks) -> float:

@@ -14,7 +14,7 @@ from stiffmap.calibration.certificate import INSTRUMENT, SCALE, frame_columns, s
 from stiffmap.calibration.edit import edited
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.errors import StiffmapError
-from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.kept import Kept
@@ -23,8 +23,8 @@ from stiffmap.machine import Machine
 
 STEP = 0.1
 """Of a standard uncertainty, for differences."""
-STEPS, CLOSE = 30, 1e-3
-"""Gauss-Newton steps at most; change (in standard uncertainties, or posterior ones) that ends them."""
+STEPS, FIRST, CLOSE = 30, 8, 1e-3
+"""Gauss-Newton steps at most, and before columns are taken anew; change (in standard uncertainties, or posterior ones) that ends them."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -55,12 +55,38 @@ _KEPT: OrderedDict[tuple[str, tuple[Unknown, ...]], Sensitivity] = OrderedDict()
 def predicted(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats) -> Floats:
     """(n, c) readings of the machine with unknowns at `values` (p,), in standard uncertainties."""
     pairs = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
-    out = _predicted(predictor, [(u, v) for u, v in pairs if not u.setup])
-    for name in dict.fromkeys(u.setup for u, _ in pairs if u.setup):
-        here = np.array(predictor.experiment.setup) == name
-        own = _predicted(predictor, [(u, v) for u, v in pairs if u.setup in ("", name)])
-        out = np.where(here[:, None], own, out)
-    return out
+    frame = _frame_part(predictor, pairs)
+    own = list(dict.fromkeys(u.setup for u, _ in pairs if u.setup))
+    if not own:
+        return np.asarray(_predicted(predictor, pairs) + frame)
+    label = np.array(predictor.experiment.setup)
+    others = ~np.isin(label, own)
+    out = np.full(predictor.experiment.reading.shape, np.nan)
+    if others.any():
+        out[others] = _predicted(_of_rows(predictor, others), [(u, v) for u, v in pairs if not u.setup])
+    for name in own:
+        here = label == name
+        out[here] = _predicted(_of_rows(predictor, here), [(u, v) for u, v in pairs if u.setup in ("", name)])
+    return np.asarray(out + frame)
+
+
+def _frame_part(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> Floats | float:
+    """(n, c) what frames add that are known within an uncertainty."""
+    moved = [(what, w * u.u * v) for u, v in pairs for (at, what), w in u.moves if at == INSTRUMENT]
+    moved = [(what, by) for what, by in moved if what != SCALE]
+    if not moved:
+        return 0.0
+    columns = frame_columns(predictor.experiment, predictor())
+    return np.asarray(sum(columns[what] * by for what, by in moved))
+
+
+def _of_rows(predictor: Predictor, rows: Mask) -> Predictor:
+    """The same, of some rows (n,) only."""
+    part = copy.copy(predictor)
+    part.experiment = predictor.experiment.rows(rows)
+    part._memory = Kept()
+    part._drives = {}
+    return part
 
 
 def _predicted(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> Floats:
@@ -68,18 +94,14 @@ def _predicted(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> 
     for unknown, value in pairs:
         for place, weight in unknown.moves:
             moves[place] = moves.get(place, 0.0) + weight * unknown.u * value
-    own = {what: moves.pop((at, what)) for at, what in list(moves) if at == INSTRUMENT}
-    scale = own.pop(SCALE, 0.0)
+    scale = moves.get((INSTRUMENT, SCALE), 0.0)
+    moves = {(at, what): by for (at, what), by in moves.items() if at != INSTRUMENT}
     beside = predictor
     if moves:
         beside = copy.copy(predictor)
         beside.machine = Machine(edited(predictor.machine.description, moves), like=predictor.machine)
         beside._memory = Kept()
-    found = beside([scaled(predictor.machine.description, scale)] if scale else [])
-    if own:
-        columns = frame_columns(predictor.experiment, predictor())
-        found = found + sum(columns[what] * by for what, by in own.items())
-    return found
+    return beside([scaled(predictor.machine.description, scale)] if scale else [])
 
 
 def sensitivity(
@@ -127,12 +149,25 @@ def sensitivity_at(
         moved = values.copy()
         moved[k] += STEP
         try:
-            column = (predicted(predictor, s.unknowns, moved) - base) / STEP
+            column = (_changed(predictor, s.unknowns, moved, s.unknowns[k].setup, base) - base) / STEP
         except StiffmapError:
             continue
         if np.isfinite(column[np.isfinite(base)]).all():
             columns[..., k] = column
     return replace(s, columns=columns, at=values)
+
+
+def _changed(
+    predictor: Predictor, unknowns: Sequence[Unknown], values: Floats, setup: str, base: Floats
+) -> Floats:
+    """(n, c) as `predicted`, where only rows of a set-up (of all, if there is none) differ from `base`."""
+    if not setup:
+        return predicted(predictor, unknowns, values)
+    here = np.array(predictor.experiment.setup) == setup
+    out = base.copy()
+    mine = np.array([v if u.setup in ("", setup) else 0.0 for u, v in zip(unknowns, values, strict=True)])
+    out[here] = predicted(_of_rows(predictor, here), unknowns, mine)
+    return out
 
 
 def _differences(
@@ -188,6 +223,7 @@ def fitted(
     *,
     start: Floats | None = None,
     until: float = np.inf,
+    steps: int = STEPS,
 ) -> Fitted:
     """Gauss-Newton with one Jacobian, which small errors hardly change.
 
@@ -203,10 +239,12 @@ def fitted(
     prediction = s.base if start is None else predicted(predictor, s.unknowns, start)
     residual = problem.residual(prediction)
     converged = not columns.shape[1]
-    for _ in range(STEPS if columns.shape[1] else 0):
+    for _ in range(steps if columns.shape[1] else 0):
         wanted, variance = weigh(columns, residual + columns @ values)
         step = wanted - values
-        if float(np.abs(step).max()) < CLOSE or float(np.linalg.norm(columns @ step)) < CLOSE:
+        if float(np.abs(step).max()) < CLOSE or float(np.linalg.norm(columns @ step)) < CLOSE * np.sqrt(
+            variance
+        ):
             converged = True
             break
         moved = _step(predictor, problem, s, values, step, residual, variance)

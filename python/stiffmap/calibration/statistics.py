@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.experiment.experiment import Floats, Integers
+from stiffmap.experiment.experiment import Floats, Integers, Mask
 
 FELT = 1e-3
 """Singular value below which a direction changes no reading."""
@@ -138,3 +138,10 @@ def independent(gram: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         left = left - np.outer(left[best], left[best]) / left[best, best]
     rest = [i for i in range(len(left)) if i not in kept]
     return np.array(sorted(kept), dtype=np.intp), np.array(rest, dtype=np.intp)
+
+
+def gain_of(before: Floats, after: Floats, tests: Sequence[Mask]) -> tuple[float, float]:
+    """What the squares of whitened residuals (N,), held out, lose per reading: mean over the folds, standard error."""
+    lost = before**2 - after**2
+    each = np.array([float(lost[test].mean()) for test in tests if test.any()])
+    return float(each.mean()), float(each.std(ddof=1) / np.sqrt(len(each)))

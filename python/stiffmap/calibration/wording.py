@@ -39,6 +39,15 @@ def lines(c: Facts) -> list[str]:
         out.append(
             f"model-form floor: {in_display_units(c.floor, c.unit)} per pose beyond noise; left: {where}"
         )
+    if c.travel:
+        t = c.travel
+        alone = ", ".join(
+            f"{p.drive} {100 * p.share:.0f} %" for p in sorted(t.profiles, key=lambda p: -p.share)[:4]
+        )
+        out.append(
+            f"left along the drives' travel: {100 * t.share:.0f} % of its squares on held-out {t.by}, "
+            f"{in_display_units(t.before, c.unit)} to {in_display_units(t.after, c.unit)} with a profile of each drive; alone {alone}"
+        )
     if c.outliers:
         more = f" and {len(c.outliers) - NAMED} more" if len(c.outliers) > NAMED else ""
         plural = "s" if len(c.outliers) > 1 else ""

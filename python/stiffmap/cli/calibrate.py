@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from stiffmap.calibration import Calibration, Tolerances, calibrate
+from stiffmap.calibration.travel import Travel
 from stiffmap.cli.output import JsonOption
 from stiffmap.errors import FileError
 
@@ -65,6 +67,18 @@ def write(result: Calibration, folder: Path) -> None:
         (folder / "calibration.json").write_text(result.to_json(), encoding="utf-8")
         text = "\n".join([*result.lines(), "", *result.table()]) + "\n"
         (folder / "table.txt").write_text(text, encoding="utf-8")
+        if result.travel:
+            (folder / "travel.csv").write_text("\n".join(profiles(result.travel)) + "\n", encoding="utf-8")
     except OSError as error:
         raise FileError(f"cannot be written: {error.strerror}", file=str(folder)) from error
     result.machine.save(folder / "machine.yaml")
+
+
+def profiles(travel: Travel) -> list[str]:
+    """Errors along the drives' travel as CSV, in mm and degrees."""
+    out = ["drive,coordinate,error,sigma,unit"]
+    for p in travel.profiles:
+        factor, unit = (1e3, "mm") if p.unit == "m" else (180.0 / math.pi, "deg")
+        for values in zip(p.at, p.error, p.sigma, strict=True):
+            out.append(",".join((p.drive, *(f"{factor * v:.6g}" for v in values), unit)))
+    return out

@@ -10,10 +10,10 @@ from scipy.stats import multivariate_normal
 
 import stiffmap as sm
 from stiffmap.calibration import Unknown, calibrate, unknowns
-from stiffmap.calibration.claims import SIZES, BesideField, claims, field_columns, gain_of
+from stiffmap.calibration.claims import SIZES, BesideField, claims, field_columns
 from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.model import predicted
-from stiffmap.calibration.statistics import Sums
+from stiffmap.calibration.statistics import Sums, gain_of
 from stiffmap.experiment import Experiment, Predictor, random_plan, simulate
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.field import covariance, shapes
