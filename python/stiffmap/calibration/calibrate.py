@@ -328,9 +328,8 @@ class Calibrator:
         return found.withdrawn("so far off the machine does not do what its slopes say"), self.fit, self.rho
 
     def _beside_field(self) -> BesideField:
-        label, q = pose_labels(self.problem), int(self.problem.nuisance.shape[1])
         left = self.left(self.fit.prediction)
-        return BesideField.of(self.problem, self.columns, self.fit.linear, label, q, left)
+        return BesideField.of(self.problem, self.columns, self.fit.linear, pose_labels(self.problem), left)
 
     def _let_go(self, claimed: Claims) -> tuple[Fitted, float]:
         """The fit with what is claimed let go, and its floor: by the slopes that there are, through the full prediction."""

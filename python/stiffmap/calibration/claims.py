@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import minimize_scalar
 
 from stiffmap.calibration.beyond import FREE, BeyondTolerance, beyond_tolerance, none_beyond
@@ -24,9 +25,9 @@ from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.field import shapes
 from stiffmap.experiment.noise.whitening import Problem
 
-LENGTH = 1.0
-"""Correlation length of the field, in halves of the plan's extent."""
-SIZES = (0.0, 0.3, 1.0, 3.0)
+LENGTHS = (0.75, 1.5)
+"""Correlation lengths of the field that are tried, in halves of the plan's extent."""
+SIZES = (0.3, 1.0, 3.0, 10.0)
 """Standard deviations of the field that are tried, in rms of what the calibration leaves of each channel."""
 MOST_SHAPES, MOST_COLUMNS = 40, 200
 """Of the field, per channel and in all."""
@@ -100,56 +101,75 @@ def claims(
 
 @dataclass(frozen=True, eq=False)
 class BesideField:
-    """Readings with a smooth field of unknown size below all unknowns."""
+    """Readings with a smooth field of unknown size and length below all unknowns."""
 
     number: Integers
     """(m,) different numbers of readings per block of one pose."""
     count: Integers
     """(m,) how many blocks have so many."""
-    within: Sums
-    """All readings; columns of the unknowns, then those of the field."""
-    between: tuple[Sums, ...]
-    """(m,) sums over the blocks of each number."""
+    within: tuple[Sums, ...]
+    """Per length of the field all readings; columns of the unknowns, then those of the field."""
+    between: tuple[tuple[Sums, ...], ...]
+    """Per length (m,) sums over the blocks of each number."""
     unknowns: int
 
     @staticmethod
-    def of(
-        problem: Problem, columns: Floats, linear: Floats, label: Integers, nuisances: int, left: Floats
-    ) -> BesideField:
+    def of(problem: Problem, columns: Floats, linear: Floats, label: Integers, left: Floats) -> BesideField:
         """`columns` (N, p) and `linear` (N,) whitened, `label` (N,) of their blocks; `left` (n, c) what the calibration
         leaves in SI."""
-        field = problem.white(field_columns(problem.experiment, left))
-        blocks = Blocks.of(np.hstack([columns, field]), linear, label, nuisances)
-        return BesideField(blocks.number, blocks.count, blocks.within, blocks.between, columns.shape[1])
+        within, between = [], []
+        number, count = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+        for length in LENGTHS:
+            field = problem.white(field_columns(problem.experiment, left, length))
+            blocks = Blocks.of(np.hstack([columns, field]), linear, label)
+            number, count = blocks.number, blocks.count
+            within.append(blocks.within)
+            between.append(blocks.between)
+        return BesideField(number, count, tuple(within), tuple(between), columns.shape[1])
 
     def log_evidence(self, factor: Floats) -> float:
         """Of the unknowns at `factor` (p,) times their uncertainties, beside the field and the floor that suit best."""
-        return max(self._at(factor, size) for size in SIZES)
+        best = self.at(factor, 0.0)
+        for k in range(len(self.within)):
+            before = -np.inf
+            for size in SIZES:
+                here = self.at(factor, size, k)
+                if here < before:
+                    break
+                before = here
+            best = max(best, before)
+        return best
 
-    def _at(self, factor: Floats, size: float) -> float:
-        which = np.arange(self.unknowns if size == 0.0 else len(self.within.right))
+    def at(self, factor: Floats, size: float, length: int = 0) -> float:
+        """ln of the evidence for a field of one size and length, at the floor that suits best."""
+        which = np.arange(self.unknowns if size == 0.0 else len(self.within[length].right))
         scale = np.append(factor, np.full(len(which) - self.unknowns, size))
-        within = self.within.pick(which).scaled(scale)
-        between = [s.pick(which).scaled(scale) for s in self.between]
+        within = self.within[length].pick(which).scaled(scale)
+        between = [s.pick(which).scaled(scale) for s in self.between[length]]
 
         def lost(x: float) -> float:
             rho = float(np.expm1(x))
-            total = within
+            gram, right, square = within.gram + np.eye(len(which)), within.right, within.square
             for m, s in zip(self.number, between, strict=True):
-                total = total - s.weighed(rho / (1.0 + float(m) * rho))
-            return 0.5 * float(self.count @ np.log1p(self.number * rho)) - total.log_evidence
+                c = rho / (1.0 + float(m) * rho)
+                gram, right, square = gram - c * s.gram, right - c * s.right, square - c * s.square
+            root = cholesky(gram, lower=True, check_finite=False)
+            y = solve_triangular(root, right, lower=True, check_finite=False)
+            volume = float(self.count @ np.log1p(self.number * rho)) + 2.0 * float(
+                np.log(np.diag(root)).sum()
+            )
+            return 0.5 * (square - float(y @ y) + volume)
 
-        found = minimize_scalar(
-            lost, bounds=(0.0, float(np.log1p(LARGEST))), method="bounded", options={"xatol": 0.1}
-        )
+        bounds = (0.0, float(np.log1p(LARGEST)))
+        found = minimize_scalar(lost, bounds=bounds, method="bounded", options={"xatol": 0.1})
         return -min(float(found.fun), lost(0.0))
 
 
-def field_columns(e: Experiment, left: Floats) -> Floats:
+def field_columns(e: Experiment, left: Floats, length: float) -> Floats:
     """(n, c, k) change of the readings per unit of each shape of the field: a shape for each channel that is read, as
     large as what is left of it."""
     read = np.flatnonzero(e.axis_read)
-    shape = shapes(e, min(MOST_SHAPES, MOST_COLUMNS // max(len(read), 1)), LENGTH)
+    shape = shapes(e, min(MOST_SHAPES, MOST_COLUMNS // max(len(read), 1)), length)
     size = np.sqrt(np.nanmean(left[:, read] ** 2, axis=0))
     out = np.zeros((*left.shape, len(read), shape.shape[1]))
     for k, c in enumerate(read):

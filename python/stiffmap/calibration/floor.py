@@ -49,6 +49,11 @@ class Blocks:
             between = tuple(Sums.of(sums[size == m], rest[size == m]) for m in number)
         return Blocks(number.astype(np.intp), count.astype(np.intp), within, between)
 
+    @property
+    def typical(self) -> float:
+        """Readings of the median block."""
+        return float(np.median(np.repeat(self.number, self.count)))
+
     def scaled(self, factor: Floats) -> Blocks:
         """With each standard uncertainty times a factor (p,)."""
         between = tuple(s.scaled(factor) for s in self.between)

@@ -140,7 +140,7 @@ def bends(problem: Problem, s: Sensitivity, values: Floats, prediction: Floats) 
 def sensitivity_at(
     predictor: Predictor, s: Sensitivity, values: Floats, until: float = np.inf
 ) -> Sensitivity:
-    """The same unknowns with columns at `values` (p,); those that fail there keep the old ones."""
+    """The same unknowns with columns at `values` (p,); those that fail there keep the old ones, and so do rows that do."""
     columns = s.columns.copy()
     base = predicted(predictor, s.unknowns, values)
     for k in range(len(s.unknowns)):
@@ -152,8 +152,9 @@ def sensitivity_at(
             column = (_changed(predictor, s.unknowns, moved, s.unknowns[k].setup, base) - base) / STEP
         except StiffmapError:
             continue
-        if np.isfinite(column[np.isfinite(base)]).all():
-            columns[..., k] = column
+        solved = np.isfinite(base)
+        if np.isfinite(column[solved]).all():
+            columns[..., k] = np.where(solved, column, columns[..., k])
     return replace(s, columns=columns, at=values)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -181,3 +181,21 @@ def test_a_calibration_of_compliances_ends_at_their_most_likely_values() -> None
         assert abs(slope) < 0.05
         assert bend > 0
     assert np.all(np.abs(at - [2.0, -1.5, 1.0]) < 4 * spread)
+
+
+def test_rows_that_fail_at_the_fit_keep_their_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An outlier may stand where the calibrated machine has no equilibrium: that is no column of NaN."""
+    machine, data, _ = drawn("linear-delta", 3, poses=6)
+    predictor = Predictor(machine, data)
+    s = sensitivity(predictor, unknowns(machine.description, predictor.experiment)[:3])
+
+    def failing(p: Predictor, names: Sequence[Unknown], values: Floats) -> Floats:
+        out = predicted(p, names, values)
+        return np.where(np.arange(len(out))[:, None] == 2, np.nan, out)
+
+    monkeypatch.setattr("stiffmap.calibration.model.predicted", failing)
+    again = sensitivity_at(predictor, s, np.ones(len(s.unknowns)))
+    read = predictor.experiment.read
+    assert np.isfinite(again.columns[read]).all()
+    assert (again.columns[2] == s.columns[2]).all()
+    assert not np.array_equal(again.columns[0], s.columns[0])

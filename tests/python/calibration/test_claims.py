@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 
 import stiffmap as sm
 from stiffmap.calibration import Unknown, calibrate, unknowns
-from stiffmap.calibration.claims import SIZES, BesideField, claims, field_columns
+from stiffmap.calibration.claims import LENGTHS, SIZES, BesideField, claims, field_columns
 from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.model import predicted
 from stiffmap.calibration.statistics import Sums, gain_of
@@ -139,21 +139,22 @@ def test_evidence_beside_the_field_is_the_marginal_density() -> None:
     left = 1e-4 * rng.standard_normal(data.reading.shape)
     columns, linear = rng.standard_normal((len(problem), 3)), 4.0 * rng.standard_normal(len(problem))
     label = (problem.groups * 6 + problem.index[1]).astype(np.intp)
-    field = problem.white(field_columns(data, left))
-    beside = BesideField.of(problem, columns, linear, label, 0, left)
+    field = [problem.white(field_columns(data, left, length)) for length in LENGTHS]
+    beside = BesideField.of(problem, columns, linear, label, left)
     factor = np.array([1.0, 3.0, 1.0])
     same = (label[:, None] == label[None, :]).astype(float)
     wide = columns * factor
 
-    def density(size: float, rho: float) -> float:
-        v = np.eye(len(linear)) + rho * same + wide @ wide.T + size**2 * field @ field.T
+    def density(size: float, rho: float, k: int) -> float:
+        v = np.eye(len(linear)) + rho * same + wide @ wide.T + size**2 * field[k] @ field[k].T
         return float(multivariate_normal(np.zeros(len(linear)), v).logpdf(linear))
 
-    rhos = np.expm1(np.linspace(0.0, 5.0, 200))
-    best = max(density(s, r) for s in SIZES for r in rhos) + 0.5 * len(linear) * np.log(2.0 * np.pi)
+    rhos = np.expm1(np.linspace(0.0, 5.0, 60))
+    known = max(density(s, r, k) for s in (0.0, *SIZES) for r in rhos for k in range(len(LENGTHS)))
+    best = known + 0.5 * len(linear) * np.log(2.0 * np.pi)
     assert beside.log_evidence(factor) == pytest.approx(best, abs=0.02)
     blocks = Blocks.of(wide, linear, label)
-    assert beside._at(factor, 0.0) == pytest.approx(blocks.log_likelihood(model_form(blocks)), abs=0.02)
+    assert beside.at(factor, 0.0) == pytest.approx(blocks.log_likelihood(model_form(blocks)), abs=0.02)
 
 
 @pytest.mark.parametrize("quantity", ["position", "deflection"])

@@ -11,12 +11,14 @@ import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from stiffmap.calibration import Calibration, Calibrator, Tolerances, unknowns
 from stiffmap.calibration.calibrate import pose_labels
 from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.statistics import Sums
 from stiffmap.diagnosis.candidates.candidates import Candidate
+from stiffmap.diagnosis.decision.beside_field import standing
 from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
 from stiffmap.diagnosis.decision.few import MEETING, not_few, screened
 from stiffmap.diagnosis.decision.judge import judge, unexplained, with_model
@@ -27,6 +29,7 @@ from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.calibrated import Layer
 from stiffmap.diagnosis.search.study import Finding, Study, find, search_on, study
 from stiffmap.effects import Parameter, get
+from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 
 BEYOND = 100.0
@@ -35,6 +38,8 @@ AT_BOUND, AT_SCALE = 1e-6, 1e-3
 """Share of a parameter's range, and of its typical size, within which it is at its bound."""
 COVERED, FAINT = 0.95, 0.1
 """Share of an effect's signature that uncertain numbers imitate; those that ten standard uncertainties of show at all."""
+SELDOM = 1e-3
+"""Odds of what tolerances may be by chance."""
 WORTH_A_FLOOR = 0.3
 """Noise variances per pose that no linear explanation takes: effects are then looked for at that floor at once."""
 LEAD = 3.0
@@ -103,7 +108,7 @@ def _floor_beside_screen(s: Study) -> float:
     """What the calibration and the best few effects, taken as linear, leave per pose, in noise variances."""
     left = screened(s).left
     blocks = Blocks.of(np.zeros((len(left), 0)), left, pose_labels(s.whole[0]))
-    return model_form(blocks) * float(np.median(blocks.number))
+    return model_form(blocks) * blocks.typical
 
 
 def calibrator(s: Study, tolerances: Tolerances, exclude: tuple[str, ...]) -> Calibrator | None:
@@ -174,6 +179,11 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
     more = same + more
     finding = with_model(finding, model)
     left = unexplained(s, _on(s, finding))
+    if left:
+        model, smooth = standing(s, finding)
+        if smooth:
+            finding, more = with_model(finding, model), more + smooth
+            left = unexplained(s, _on(s, finding))
     return Answer(again, finding, _word(s, finding, left), left, s.layer.calibration, held, refused + more)
 
 
@@ -196,13 +206,13 @@ def _on(s: Study, finding: Finding) -> Finding:
 def floor_of(s: Study, finding: Finding) -> float:
     """What no model explains, in noise variances of one reading: REML per pose, beside calibration and effects."""
     blocks = _left_by(s, finding)
-    return model_form(blocks) * float(np.median(blocks.number))
+    return model_form(blocks) * blocks.typical
 
 
 def rejected(s: Study, finding: Finding, rho: float) -> bool:
     """Whether what a finding leaves is likelier by `REJECTED` nats at a floor of its own than at `rho`."""
     blocks = _left_by(s, finding)
-    own, first = model_form(blocks), rho / float(np.median(blocks.number))
+    own, first = model_form(blocks), rho / blocks.typical
     return blocks.log_likelihood(own) - blocks.log_likelihood(first) > REJECTED
 
 
@@ -288,17 +298,28 @@ def _beyond_calibration(s: Study, model: Model, finding: Finding) -> tuple[Model
         return model, ()
     problem, predictor = finding.search.problem.exact, finding.search.predictor
     columns = problem.white(s.layer.columns)
-    u, size, _ = np.linalg.svd(columns, full_matrices=False)
-    q = u[:, size > FAINT]
     refused: list[str] = []
     for c in tuple(model.candidates):
         i = model.candidates.index(c)
         less = fit_without(model, i, predictor, finding.search.problem)
         alone = problem.white(predictor(model.terms()) - predictor(model.without(i).terms()))
-        if float(np.sum((q.T @ alone) ** 2)) > COVERED * float(alone @ alone):
+        if imitated(columns, alone):
             refused.append(f"{c}: numbers that are uncertain anyway show the same, and are within tolerance")
             model = less
     return model, tuple(refused)
+
+
+def imitated(columns: Floats, signature: Floats) -> bool:
+    """Whether numbers with columns (N, p) per standard uncertainty show `COVERED` of a signature (N,), none of it by being
+    off more than all of them together are once in `SELDOM`."""
+    u, size, _ = np.linalg.svd(columns, full_matrices=False)
+    felt = size > FAINT
+    along = u[:, felt].T @ signature
+    if float(along @ along) <= COVERED * float(signature @ signature):
+        return False
+    needed = along * size[felt] / (1.0 + size[felt] ** 2)  # their most likely values
+    told = size[felt] > 1.0
+    return float(needed @ needed) <= float(chi2.isf(SELDOM, max(int(told.sum()), 1)))
 
 
 def _shared(model: Model, finding: Finding, held: HeldOut | None) -> tuple[Model, tuple[str, ...]]:

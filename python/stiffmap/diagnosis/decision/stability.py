@@ -44,6 +44,6 @@ def halves(problem: Problem) -> Iterator[Integers]:
 
 
 def explained(null: Model, model: Model, freedom: int) -> float:
-    """Share of the misfit beyond noise that the model takes away."""
-    excess = null.chi2 - freedom
+    """Share of the misfit beyond noise that the model takes away; where noise is less than `freedom`, what the model leaves."""
+    excess = null.chi2 - min(float(freedom), model.chi2)
     return float((null.chi2 - model.chi2) / excess) if excess > 0 else 1.0

@@ -1,0 +1,62 @@
+"""Beside a rest that nothing explains an effect must gain beside a smooth field that knows nothing of the machine.
+
+What is left over is seldom noise: an effect with a few free parameters takes some of it away wherever it is smooth. The
+effect that is there explains in its few directions what the field needs many for (docs/theory.md M3).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiffmap.calibration.calibrate import pose_labels
+from stiffmap.calibration.claims import BesideField
+from stiffmap.calibration.groups import STRONG
+from stiffmap.diagnosis.fitting.fit import evaluate, fit_without
+from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.diagnosis.search.study import Finding, Study, search_on
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.level import Mask
+
+
+def standing(s: Study, finding: Finding) -> tuple[Model, tuple[str, ...]]:
+    """The model without effects that gain less than their price beside the field, the least first, and why."""
+    model, search = finding.model, finding.search
+    refused: list[str] = []
+    price = STRONG + float(np.log(max(search.effective_trials, 1.0)))
+    if not model.candidates or s.clock.over:
+        return model, ()
+    left = s.free(s.experiment.reading - s.plan.base, finding.outliers)
+    now = log_evidence(s, model, finding.outliers, left)
+    while model.candidates:
+        trials = [
+            fit_without(model, i, search.predictor, search.problem) for i in range(len(model.candidates))
+        ]
+        without = [log_evidence(s, t, finding.outliers, left) if t.usable else -np.inf for t in trials]
+        least = int(np.argmax(without))
+        gain = now - without[least]
+        if gain >= price:
+            break
+        refused.append(
+            f"{model.candidates[least]}: a smooth field that knows nothing of the machine explains as much "
+            f"({gain - price + STRONG:+.0f} nats beside it)"
+        )
+        model, now = trials[least], without[least]
+    return model, tuple(refused)
+
+
+def log_evidence(s: Study, model: Model, out: Mask, left: Floats) -> float:
+    """Of effects with a normal prior of their own size on each parameter, beside uncertain numbers, a smooth field as large
+    as `left` (n, c) and a floor per pose."""
+    search = search_on(s, ~out, 1)
+    problem = search.problem.exact
+    model = evaluate(model, s.predictor, problem)
+    assert model.residual is not None and model.jacobian is not None
+    residual = model.residual
+    columns = np.zeros((len(problem), 0)) if s.layer is None else problem.white(s.layer.columns)
+    if model.candidates:
+        null = np.array([float(p.null or 0.0) / p.scale for c in model.candidates for p in c.parameters])
+        sized = -model.jacobian * np.abs(model.values - null)
+        residual = residual + sized @ np.sign(model.values - null)  # as seen from without the effects
+        columns = np.hstack([columns, sized])
+    field = BesideField.of(problem, columns, residual, pose_labels(problem), left)
+    return field.log_evidence(np.ones(columns.shape[1]))
