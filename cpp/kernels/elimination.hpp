@@ -18,7 +18,8 @@ struct Elimination {
   V negative = splat(0);  ///< negative pivots: directions in which the energy falls (Haynsworth)
   V closest = splat(0);   ///< the pivot next to zero, dimensionless
   V product = splat(1), hundreds = splat(0);  ///< of all pivots' sizes: product times ten to the hundreds
-  V transferred = splat(0);                   ///< largest step of a branch's wrench, over stiffness times length
+  bool exact = false;        ///< the reference's own Newton step, also where loops are open: needs `heavy`
+  V transferred = splat(0);  ///< largest step of a branch's wrench, over stiffness times length
 
   /// A leg: only its numbers differ from those of the last pass over all, and the others' results are kept.
   static constexpr std::int32_t all = -1, all_anew = -2;  ///< all_anew: keeps the residuals of the last pass over all

@@ -5,6 +5,7 @@
 #include <initializer_list>
 
 #include "closing.hpp"
+#include "last_attempt.hpp"
 #include "load_path.hpp"
 #include "newton.hpp"
 #include "residual.hpp"
@@ -59,7 +60,7 @@ struct Block {
   V6 load;
   M never = {};  ///< lanes out of reach
   M closed = {};
-  M unstable = {}, ended = {};
+  M unstable = {}, ended = {}, unverified = {}, nowhere = {};
 
   std::int64_t place(int lane) const { return first + (lane < count ? lane : count - 1); }
   std::int64_t pose(int lane) const { return in.index ? in.index[place(lane)] : place(lane); }
@@ -165,13 +166,12 @@ struct Block {
     return hit;
   }
 
-  /// Lanes that close, but where a spring is not declared: no pose of the machine, with what the command is beyond.
-  [[gnu::noinline]] void refuse(M lanes) {
-    never |= lanes;
+  /// What is said of the command of poses without an answer.
+  [[gnu::noinline]] void flag_command(M lanes, std::uint32_t also) {
     const M lock = locked(P.near_lock);
     for (int i = 0; i < count; ++i) {
       if (!lanes[i]) continue;
-      std::uint32_t flags = lock[i] ? P.flag_lock : 0u;
+      std::uint32_t flags = also | (lock[i] ? P.flag_lock : 0u);
       for (int q = 0; q < P.coordinate_count; ++q) {
         const CoordinateProgram& k = P.coordinates[q];
         if (s.closed[q][i] < k.lower || s.closed[q][i] > k.upper) flags |= k.role == 0 ? P.flag_range : P.flag_limit;
@@ -224,7 +224,11 @@ struct Block {
   void run() {
     M usable = read();
     const M declared = set_start();
-    if (any(usable & ~declared)) refuse(usable & beyond_strokes(P, s));
+    if (any(usable & ~declared)) {  // they close, but where a spring is not declared: no pose of the machine
+      const M beyond = usable & beyond_strokes(P, s);
+      never |= beyond;
+      flag_command(beyond, 0);
+    }
     usable &= declared;
     closed = usable;
     usable &= ~locked(P.locked);
@@ -249,16 +253,30 @@ struct Block {
   M follow(M lanes, Newton& newton, V& iterations, V& steps) {
     stand_at_start(lanes);
     LoadPath path{newton};
-    const M done = path.follow(lanes, iterations, [&](M anew) { stand_at_start(anew); });
+    M done = path.follow(lanes, iterations, [&](M anew) { stand_at_start(anew); });
     unstable = path.unstable;
     ended = path.ended;
+    if (any(ended) && LastAttempt::possible(P, newton.e)) done |= attempt(newton, iterations);
     steps = select(lanes, splat(1), steps);
     newton.settle();
     return done;
   }
 
+  M attempt(Newton& newton, V& iterations) {
+    stand_at_start(ended);
+    LastAttempt last(newton);
+    iterations = select(ended, splat(0), iterations);  // as the reference counts
+    last.run(ended, iterations);
+    unverified = last.found;
+    unstable |= last.unstable;
+    nowhere = last.nowhere;
+    flag_command(nowhere, P.flag_stepped | P.flag_unverified);
+    return last.found;
+  }
+
   /// What becomes of a lane that was given up.
   std::uint8_t left(int lane) const {
+    if (nowhere[lane]) return pose_nowhere;
     if (ended[lane]) return pose_ended;
     if (in.patience == Patience::path) return pose_left;
     if (closed[lane]) return pose_heavy;
@@ -277,6 +295,7 @@ struct Block {
     for (int i = 0; i < count; ++i) {
       const std::int64_t k = pose(i);
       out.done[k] = done[i] ? solved(i, newton) : never[i] ? pose_unreachable : left(i);
+      if (out.iterations && nowhere[i]) out.iterations[k] = static_cast<std::int32_t>(iterations[i]);
       if (!done[i]) continue;
       for (int r = 0; r < 6; ++r) out.displacement[6 * k + r] = moved[r][i];
       if (out.stiffness)
@@ -325,7 +344,8 @@ struct Block {
       if (done[i])
         out.flags[pose(i)] = (lock[i] ? P.flag_lock : 0u) | (high[i] > 0 ? P.flag_force : 0u) |
                              (range[i] > 0 ? P.flag_range : 0u) | (limit[i] > 0 ? P.flag_limit : 0u) |
-                             (steps[i] > 0 ? P.flag_stepped : 0u) | P.flag_always;
+                             (steps[i] > 0 ? P.flag_stepped : 0u) | (unverified[i] ? P.flag_unverified : 0u) |
+                             P.flag_always;
     if (!out.leg_wrench || P.legs_op < 0) return;
     const Op& block = P.ops[P.legs_op];
     for (int b = 0; b < block.count; ++b) {

@@ -368,7 +368,7 @@ struct Newton {
       if (P.serial_joints > 0 && any(settled)) answer_joints(m);
       failed |= settled & ~(e.lowest > pivot_floor);
       const M kept = settled & (change < nothing);
-      take(settled & ~failed, m);
+      if (any(settled)) take(settled & ~failed, m);
       if (any(kept)) keep_wrenches(e, kept);
       M distrusted = active & ~settled & ~(norm < 1e6);
       if (!corners) {

@@ -152,7 +152,7 @@ struct Program {
   std::int32_t exact_weights;  ///< the tangent is exact with the bodies' weight too
   std::int32_t starts_linear;  ///< a law with knots or friction: Newton starts with all laws linear
   std::int32_t hardens;        ///< a law with a cubic term
-  std::uint32_t flag_force, flag_range, flag_limit, flag_lock, flag_always, flag_stepped;
+  std::uint32_t flag_force, flag_range, flag_limit, flag_lock, flag_always, flag_stepped, flag_unverified;
   std::int32_t grid_n[3], grid_row;  ///< nodes along each axis; numbers per node, a multiple of 8
   double grid_low[3], grid_step[3];
   double length, stiffness, near_lock, locked;
@@ -189,7 +189,8 @@ inline constexpr std::uint8_t pose_solved = 1, pose_unstable = 2, pose_unreachab
 inline constexpr std::uint8_t pose_ended = 4;  ///< the path of equilibria ends before the whole load
 inline constexpr std::uint8_t pose_slow = 5;   ///< does not close at once: to be closed in leaps, together with others
 inline constexpr std::uint8_t pose_heavy = 6;  ///< closed, but its load takes long: to be followed in steps
-inline constexpr std::uint8_t pose_loose = 7;  ///< solved, but a joint plays inside its gap
+inline constexpr std::uint8_t pose_nowhere = 8;  ///< beyond the end of the path of equilibria nothing was found
+inline constexpr std::uint8_t pose_loose = 7;    ///< solved, but a joint plays inside its gap
 
 /// Row-major answers; null: not wanted. `done`: how the pose left the kernels.
 struct KernelOutput {

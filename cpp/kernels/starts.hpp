@@ -15,7 +15,7 @@ struct Starts {
   /// Neighbouring nodes along one axis and their shares.
   struct Stencil {
     std::int64_t first;
-    double share[4];
+    double share[4] = {};
   };
 
   /// Lagrange's weights on `points` (2 or 4) nodes around p; false outside the grid.
@@ -50,6 +50,13 @@ struct Starts {
     const int nx = points(P.grid_n[0], cubic), ny = points(P.grid_n[1], cubic), nz = points(P.grid_n[2], cubic);
     Stencil x, y, z;
     if (!stencil(0, p[0], nx, x) || !stencil(1, p[1], ny, y) || !stencil(2, p[2], nz, z)) return false;
+    return nx == 4 && ny == 4 && nz == 4 ? sum<true>(x, y, z, 4, 4, 4, row) : sum<false>(x, y, z, nx, ny, nz, row);
+  }
+
+  /// Sum over a stencil; all of 4x4x4 nodes, or of so many.
+  template <bool All>
+  bool sum(const Stencil& x, const Stencil& y, const Stencil& z, int nx, int ny, int nz, double* row) const {
+    if constexpr (All) nx = ny = nz = 4;
     const std::int64_t dx = P.grid_row, dy = dx * P.grid_n[0], dz = dy * P.grid_n[1];
     const double* corner = P.grid + x.first * dx + y.first * dy + z.first * dz;
     V doubtful = splat(0);
@@ -66,7 +73,7 @@ struct Starts {
         whole += z.share[k] * plane;
       }
       doubtful += whole;
-      for (int i = 0; i < W; ++i) row[j + i] = whole[i];
+      __builtin_memcpy(row + j, &whole, sizeof whole);
     }
     return !any(doubtful != doubtful);
   }

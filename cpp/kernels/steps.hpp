@@ -51,10 +51,12 @@ inline void stiff_step(Elimination& el, const Op& op, const V6& zeta, const V3& 
   }
   for (int b = 0; b < op.count; ++b) {
     BranchSlot& branch = el.s.branches[op.first + b];
-    const V6 own = zeta + branch.error;
+    V6 own = zeta + branch.error;
+    if (el.exact && b > 0) own.a = own.a + cross(turn, branch.error.a);
     if (b > 0) {
       V6 step = dead(branch.K, branch.F.b, own) + branch.c + V6{cross(turn, branch.F.a), cross(turn, branch.F.b)};
       if (el.heavy) step = step + turn.x * branch.turn[0] + turn.y * branch.turn[1] + turn.z * branch.turn[2];
+      if (el.exact) step.b = step.b - splat(0.5) * cross(turn + own.b, branch.F.b);
       branch.before = branch.F;
       branch.F = {select(active, branch.F.a + step.a, branch.F.a), select(active, branch.F.b + step.b, branch.F.b)};
       const V force = larger(larger(absolute(step.a.x), absolute(step.a.y)), absolute(step.a.z));

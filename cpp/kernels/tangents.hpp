@@ -16,6 +16,7 @@ struct Tangent {
   V6 c;
   V3 p;
   Turning turning;  ///< only under gravity
+  V3 torque;        ///< on the start, from the gaps at the ends of a block's branches: only with `el.exact`
 };
 
 /// Moves the tangent to point q; F is the wrench transmitted there.
@@ -99,6 +100,7 @@ inline V6 pending_weights(const Elimination& el, const Turning& t, const V3& p) 
 inline void prepend(Elimination& el, const ChainProgram& chain, const V3& start, const V6& F, Tangent& t) {
   V6 hung{};  // pending weights beyond the joint, about t.p
   if (el.heavy) hung = pending_weights(el, t.turning, t.p);
+  if (el.exact) hung.b = hung.b - t.torque;
   for (int i = chain.first_stiff - 1; i >= chain.first; --i) {
     const Op& op = el.P.ops[i];
     if (op.kind == OpKind::load) {
@@ -115,6 +117,24 @@ inline void prepend(Elimination& el, const ChainProgram& chain, const V3& start,
 }
 
 inline Tangent tangent(Elimination& el, const ChainProgram& chain, const V3& start, const V6& F, const V3& end);
+
+/// Newton's exact step where a branch has yet to meet the first one (F17), without gravity: the gap turns with the
+/// block's start, and half of the branch's moment with its end (theory E5).
+[[gnu::noinline]] inline void turn_gap(const BranchSlot& b, Tangent& t) {
+  const V3 gap = b.error.a, none{};
+  const V3 turned[3] = {{splat(0), -gap.z, gap.y}, {gap.z, splat(0), -gap.x}, {-gap.y, gap.x, splat(0)}};
+  V6 held[3];
+  for (int k = 0; k < 3; ++k) {
+    held[k] = b.K * V6{turned[k], none};
+    t.turning.G[k] = t.turning.G[k] + held[k];
+  }
+  const auto pair = [&](int i, int k) { return dot(turned[i], held[k].a); };
+  t.turning.M = t.turning.M + S3{pair(0, 0), pair(1, 1), pair(2, 2), pair(0, 1), pair(0, 2), pair(1, 2)};
+  add_lever(t.turning.M, splat(-1), b.F.a, gap);
+  const V3 half = splat(0.5) * cross(b.F.b, b.error.b);
+  t.torque = t.torque + cross(gap, (b.K * b.error).a + b.c.a - b.F.a) + half;
+  t.c.b = t.c.b + half;
+}
 
 /// Relative tangent of a block: sum over its branches, closed to its first one (F8).
 inline void block_tangent(Elimination& el, const Op& op, Tangent& t) {
@@ -137,6 +157,7 @@ inline void block_tangent(Elimination& el, const Op& op, Tangent& t) {
     t.turning.mass += own.turning.mass;
     t.turning.lever = t.turning.lever + own.turning.lever;
     t.turning.moment = t.turning.moment + own.turning.moment;
+    if (el.exact && b) turn_gap(branch, t);
   }
 }
 
@@ -250,6 +271,7 @@ inline void append_stiff(Elimination& el, const ChainProgram& chain, const V3& s
   StiffSlot& k = el.s.stiff[op.slot];
   Tangent own;
   if (el.heavy) own.turning.clear(k.start.p);
+  if (el.exact) own.torque = V3{};
   if (op.kind == OpKind::spring) spring_tangent(el, op, k, own.K, own.c);
   else block_tangent(el, op, own);
   if (t.rigid) {
@@ -258,6 +280,7 @@ inline void append_stiff(Elimination& el, const ChainProgram& chain, const V3& s
     t.c = own.c;
     t.p = k.p;
     if (el.heavy) t.turning = own.turning;
+    if (el.exact) t.torque = own.torque;
     prepend(el, chain, start, k.F, t);
     return;
   }
@@ -266,6 +289,7 @@ inline void append_stiff(Elimination& el, const ChainProgram& chain, const V3& s
     t.K.E = t.K.E + own.turning.M;
     append_block(t.turning, own.turning);
     t.c = t.c - pending_weights(el, own.turning, t.p);
+    if (el.exact) t.c.b = t.c.b + own.torque;
   }
   move(el, t, k.p, k.F);
   factorise(el, k, t.K, own);

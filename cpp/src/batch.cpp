@@ -61,13 +61,14 @@ class Reference {
     write(m, i, result_, out);
   }
 
-  /// What is said of a pose that the kernels found out of reach.
-  void unreachable(const Mechanism& m, const BatchInput& in, Index i, std::uint32_t flags, const BatchOutput& out) {
+  /// What is said of a pose for which the kernels found that there is no answer.
+  void refuse(const Mechanism& m, const BatchInput& in, Index i, Status status, std::uint32_t flags,
+              const BatchOutput& out) {
     prepare(m, in);
     result_.flags = flags;
-    result_.iterations = 0;
+    result_.iterations = status == Status::unreachable || !out.iterations ? 0 : out.iterations[i];
     result_.indeterminate.assign(at(m.size()), false);
-    fail_pose(m, pose_, Status::unreachable, result_);
+    fail_pose(m, pose_, status, result_);
     write(m, i, result_, out);
   }
 
@@ -267,7 +268,9 @@ class FastBatch {
         const Index i = pose_at(place);
         const std::uint8_t how = done_[at(i)];
         if (how == pose_solved || how == pose_unstable || how == pose_loose) complete(i, how);
-        else if (how == pose_unreachable) s.reference.unreachable(m_, in_, i, flags_[at(i)], out_);
+        else if (how == pose_unreachable || how == pose_nowhere)
+          s.reference.refuse(m_, in_, i, how == pose_nowhere ? Status::not_converged : Status::unreachable,
+                             flags_[at(i)], out_);
         if (how != pose_solved) forget_variants(i);
       }
     });

@@ -161,6 +161,7 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.flag_limit = flag::joint_limit;
   p.flag_lock = flag::gimbal_lock;
   p.flag_stepped = flag::load_stepped;
+  p.flag_unverified = flag::branch_unverified;
   p.near_lock = near_lock;
   p.locked = locked;
   p.length = m.length;

@@ -35,6 +35,26 @@ def test_rods_that_buckle(wrench: np.ndarray) -> None:
         assert fast.reference_share < 0.02
 
 
+@pytest.mark.parametrize("name", ["orthoglide-original", "orthoglide-revised"])
+def test_beyond_the_end_of_the_path_both_paths_wander_alike(name: str) -> None:
+    machine = sm.load_machine(name)
+    position = poses(machine, 9000)
+    wrench = np.zeros((len(position), 6))
+    wrench[:, :3] = 400.0 * np.random.default_rng(43).normal(size=(len(position), 3))
+    fast = machine.solve(position, wrench)
+    beyond = np.flatnonzero(fast.flags & sm.Flag.BRANCH_UNVERIFIED)[:12]
+    assert len(beyond) == 12
+    assert fast.reference_share < 1e-3
+    reference = machine.solve(position[beyond], wrench[beyond], method="reference")
+    np.testing.assert_array_equal(fast.status[beyond], reference.status)
+    np.testing.assert_array_equal(fast.flags[beyond], reference.flags)
+    assert (reference.status == sm.Status.NOT_CONVERGED).any()
+    found = np.isfinite(reference.displacement).all(axis=1)
+    np.testing.assert_array_equal(np.isfinite(fast.displacement[beyond]).all(axis=1), found)
+    assert found.any()
+    assert displacement_gap(fast.displacement[beyond][found], reference.displacement[found]) < TOLERANCE
+
+
 def test_the_same_bits_in_any_company() -> None:
     machine = sm.load_machine("linear-delta")
     position = poses(machine, 120)
