@@ -20,13 +20,15 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+ASKED = tuple(f"{c}_cmd" for c in WRENCH)
+"""Columns of loads that were commanded, beside those that were measured."""
 BRANCHES = ("", "loading", "unloading")
 CLUSTERS = 20
 PER_ROW = (
     *("ids", "position", "wrench", "reading", "sigma", "rotation", "other", "other_rotation", "command"),
     *("approach", "repeat", "order", "hours", "temperature", "branch", "setup", "points", "load_points"),
     *("joints", "near", "other_command", "other_joints", "gravity_of", "instrument", "target"),
-    *("seen", "seen_rotation"),
+    *("seen", "seen_rotation", "asked"),
 )
 """Fields with one entry per row; None or empty where the experiment has none."""
 
@@ -67,6 +69,8 @@ class Experiment:
     """(n, c) m, rad; NaN where nothing was read. The six `AXES`, then `extra`."""
     sigma: Floats
     """(n, c) declared standard deviation of one reading; NaN where none is declared."""
+    asked: Floats | None = None
+    """(n, 6) N, N·m: the wrench that was commanded where `wrench` was measured; NaN where none was."""
     extra: tuple[Channel, ...] = ()
     """Channels after the six axes: kinds of readings, joint coordinates."""
     rotation: Floats | None = None

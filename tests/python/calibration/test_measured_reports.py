@@ -12,7 +12,13 @@ import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-REPORTS = ("measured_delta", "measured_delta_files", "measured_arm", "measured_actuator")
+REPORTS = (
+    "measured_delta",
+    "measured_delta_files",
+    "measured_arm",
+    "measured_actuator",
+    "measured_actuator_files",
+)
 
 
 def loaded(name: str) -> ModuleType:

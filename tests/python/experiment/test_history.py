@@ -11,8 +11,10 @@ from scipy.optimize import minimize_scalar
 import stiffmap as sm
 from stiffmap.cli.inputs import placed
 from stiffmap.description.tree import joints
+from stiffmap.diagnosis.decision.patterns import features
 from stiffmap.effects.library.hysteresis import deflection, spring_force
 from stiffmap.experiment import Predictor, load_experiment
+from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.history import drives_of
 from stiffmap.experiment.ramps import directions
 from stiffmap.planning import estimate
@@ -212,6 +214,8 @@ def test_a_diagnosis_finds_what_a_gear_remembers(tmp_path: Path, truth: dict[str
         assert abs(value - truth["level"]) < 3 * (high - low) / 2 / 1.96
         assert d.after.size[0] < 1.3 * np.radians(0.02)
         assert d.after.size[1] == "rad"
+        d.report(tmp_path / "report.html")
+        assert "Reading over load" in (tmp_path / "report.html").read_text()
 
 
 def test_which_way_a_load_was_reached() -> None:
@@ -235,3 +239,11 @@ def test_one_element_and_many_alike() -> None:
         np.testing.assert_array_equal(
             spring_force(force, 2.0, breakaway), spring_force(force, np.array([2.0, 2.0]), breakaway)[:, 1]
         )
+
+
+def test_one_pose_has_no_waves_over_the_workspace(gear: sm.Machine, tmp_path: Path) -> None:
+    """A wave needs a coordinate that changes; one that is constant made the diagnosis fail."""
+    e = Predictor(gear, load_experiment(ramp_folder(tmp_path / "a"))).experiment
+    names = [name for name, _ in features(Problem.of(e, e.sigma, np.zeros_like(e.reading)))]
+    assert "waves over order" in names
+    assert not any(name.startswith("waves along") for name in names)

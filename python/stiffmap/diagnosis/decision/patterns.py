@@ -83,7 +83,8 @@ def features(problem: Problem) -> Iterator[tuple[str, Floats]]:
     yield "quadratic trend over the workspace", powers(x, 2)
     yield "cubic trend over the workspace", powers(x, 3)
     for a, name in enumerate("xyz"):
-        yield f"waves along {name}", waves(x[:, a])
+        if np.ptp(x[:, a]) > 0 and np.ptp(e.position[:, a]) > 0:
+            yield f"waves along {name}", waves(x[:, a])
     if e.wrench.any():
         yield from loads(e.wrench, x)
     for name, series in (("order", e.order), ("temperature", e.temperature)):

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.diagnosis.report.findings import Findings
 from stiffmap.experiment.comparison.pictures import vector_cases
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import WRENCH, Experiment, Floats
 from stiffmap.machine import Machine
 from stiffmap.plot.loaded import loaded_figure
 
@@ -17,6 +17,8 @@ CAPTIONS = {
     "with the corrected one; both enlarged alike.",
     "residual_trends": "Residual of every reading against what may drive it. What depends on nothing here is noise.",
     "residual_histogram": "Residuals over the noise floor. With the right machine they follow the dashed line.",
+    "loops": "Reading over load in the order of time, each set-up from its own zero: what was measured, and what the machine of your file "
+    "and the corrected one show.",
     "maps": "Error of the tool over a plane of the workspace: the machine of your file, the corrected one, and what the finding changes.",
     "loaded": "The corrected machine where it deflects most in that plane: without load (dashed), under it (enlarged), and the part "
     "of each spring and drive.",
@@ -29,13 +31,45 @@ def figures(d: Findings) -> dict[str, Figure]:
     """All figures by the names of their files."""
     made = {"residual_vectors": vectors(d)} if d.experiment.axis_read[:3].any() else {}
     made |= {"residual_trends": trends(d), "residual_histogram": histogram(d)}
-    if d.effects:
+    if d.experiment.load_direction is not None:
+        made["loops"] = loops(d)
+    if d.effects and d.declared.description.workspace is not None:
         made["maps"] = maps(d)
         worst = worst_pose(d)
         made |= {"loaded": loaded_figure(d.machine, *worst)} if worst else {}
-    if d.unexplained and d.empirical:
+    if d.unexplained and d.empirical and d.experiment.groups.max() > 0:
         made["unexplained"] = left(d)
     return made
+
+
+def loops(d: Findings) -> Figure:
+    """Readings over the load that runs up and down, of the channel that moves most in noise floors."""
+    e = d.experiment
+    load = int(np.argmax(np.ptp(e.wrench, axis=0)))
+    size = [
+        np.nanstd(e.reading[:, i]) / d.noise.floor[c.name] if read else -1.0
+        for i, (c, read) in enumerate(zip(e.channels, e.axis_read, strict=True))
+    ]
+    channel = int(np.argmax(np.array(size)))
+    scale, unit = (MM, "mm") if e.channels[channel].unit == "m" else (1e3, "mrad")
+    told = (("as declared", d.residual_before, BEFORE), ("corrected", d.residual_after, AFTER))
+    figure = Figure(figsize=(9, 5), layout="constrained")
+    ax = figure.subplots()
+    assert e.order is not None
+    for k, run in enumerate(np.unique(e.runs)):
+        here = np.flatnonzero(e.runs == run)
+        here = here[np.argsort(e.order[here], kind="stable")]
+        zero = float(np.nanmean(e.reading[here, channel]))
+        x, y = e.wrench[here, load], (e.reading[here, channel] - zero) * scale
+        ax.plot(x, y, ".", ms=3, color="0.4", label=None if k else "measured")
+        for name, values, colour in told:
+            shown = y - values[here, channel] * scale
+            ax.plot(x, shown, lw=1.0, color=colour, label=None if k else name)
+    ax.set(
+        xlabel=f"{WRENCH[load]}, {'N' if load < 3 else 'N·m'}", ylabel=f"{e.channels[channel].name}, {unit}"
+    )
+    ax.legend()
+    return figure
 
 
 def left(d: Findings) -> Figure:
@@ -178,8 +212,10 @@ def maps(d: Findings) -> Figure:
 def worst_pose(d: Findings) -> tuple[Floats, Floats] | None:
     """Position (3,) m in the plane of the maps where the corrected machine deflects most, and the wrench (6,) N, N·m.
 
-    None without a force, or where no pose of the plane has an answer.
+    None without a force or a workspace, or where no pose of the plane has an answer.
     """
+    if d.declared.description.workspace is None:
+        return None
     x, y, force, _, errors = plane_errors(d)
     size = np.linalg.norm(errors, axis=-1)
     if not force.any() or not np.isfinite(size).any():

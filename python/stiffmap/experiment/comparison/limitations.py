@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.errors import StiffmapError
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import WRENCH, Experiment, Floats
 from stiffmap.experiment.noise.level import Noise
 from stiffmap.machine import Machine
 
 FEWEST = 6
 """Readings: as many as the parameters of the largest effect."""
+NEARLY_ALL, BEYOND, FLAT = 0.99, 1.1, 0.1
+"""Quantile of a load that counts as its largest; times that, from which more is commanded than is reached;
+slope of the load over its command below which it no longer follows."""
 
 
 def refuse(experiment: Experiment, base: Floats) -> None:
@@ -42,6 +45,7 @@ def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[
     """What the reader must know, in sentences."""
     e = experiment
     out = [f"left out: {told}" for told in e.out_of_reach]
+    out += saturated(e)
     out += [f"contradictory repeats: {c}" for c in noise.contradictions()]
     if int(e.read.sum()) < FEWEST:
         out.append(
@@ -49,7 +53,8 @@ def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[
         )
     if e.groups.max() == 0:
         out.append(
-            "all rows are one pose: what changes over the workspace cannot be told, nothing is held out"
+            "all rows are one pose: what changes over the workspace cannot be told"
+            + ("" if e.runs.max() > 0 else ", nothing is held out")
         )
     if not (noise.freedom > 0).any():
         out.append("no repeats: the stated noise is believed")
@@ -59,6 +64,27 @@ def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[
     if e.quantity == "deflection" and not e.branch:
         out.append("no branch column: friction is judged as if every load came from zero")
     return out + _inside_the_loop(e)
+
+
+def saturated(e: Experiment) -> list[str]:
+    """Loads that stop growing while more is commanded, in sentences."""
+    out = []
+    for i, name in enumerate(WRENCH if e.asked is not None else ()):
+        assert e.asked is not None
+        asked, got = e.asked[:, i], e.wrench[:, i]
+        known = np.isfinite(asked)
+        reached = float(np.quantile(np.abs(got[known]), NEARLY_ALL)) if known.any() else 0.0
+        beyond = known & (np.abs(asked) > BEYOND * reached)
+        if reached == 0.0 or beyond.sum() < FEWEST or np.ptp(np.abs(asked[beyond])) == 0.0:
+            continue
+        grows = float(np.polyfit(np.abs(asked[beyond]), np.abs(got[beyond]), 1)[0])
+        if grows < FLAT:
+            unit = "N" if name[0] == "f" else "N·m"
+            out.append(
+                f"{name} saturates at ±{reached:.3g} {unit}: up to {np.nanmax(np.abs(asked)):.3g} {unit} is commanded "
+                f"({int(beyond.sum())} rows beyond); the measured load is used"
+            )
+    return out
 
 
 def _inside_the_loop(e: Experiment) -> list[str]:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.errors import FileError
 from stiffmap.experiment.channels import Channel
-from stiffmap.experiment.experiment import AXES, BRANCHES, WRENCH, Floats, Integers
+from stiffmap.experiment.experiment import ASKED, AXES, BRANCHES, WRENCH, Floats, Integers
 from stiffmap.experiment.files.orientation import TURNED, TURNED2
 from stiffmap.experiment.files.schema import ExperimentFile, NoiseModel
 from stiffmap.experiment.files.table import Table
@@ -21,7 +21,7 @@ SEEN, SEEN_TURNED, SEEN_QUATERNION = ("px", "py", "pz"), ("prx", "pry", "prz"), 
 POSE, POSE2 = ("x", "y", "z"), ("x2", "y2", "z2")
 APPROACH = ("approach_x", "approach_y", "approach_z")
 COUNTED = ("repeat", "order", "hours", "temperature")
-PLAN = (*WORDS, *POSE, *TURNED, *POSE2, *TURNED2, *APPROACH, *WRENCH, *COUNTED)
+PLAN = (*WORDS, *POSE, *TURNED, *POSE2, *TURNED2, *APPROACH, *WRENCH, *ASKED, *COUNTED)
 """Columns of a plan: all but readings."""
 
 

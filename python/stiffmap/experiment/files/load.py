@@ -10,7 +10,7 @@ import numpy as np
 
 from stiffmap.errors import FileError
 from stiffmap.experiment.channels import AXIS_CHANNELS, Channel
-from stiffmap.experiment.experiment import AXES, WRENCH, Experiment, Floats, Loop
+from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Experiment, Floats, Loop
 from stiffmap.experiment.files import columns as read_columns
 from stiffmap.experiment.files.orientation import rotations
 from stiffmap.experiment.files.schema import ExperimentFile, file_model
@@ -134,6 +134,7 @@ def _rows(model: ExperimentFile, table: Table, scales: Scales) -> dict[str, Any]
         "ids": read_columns.ids(table),
         "position": read_columns.position(table, scales, bool(model.command)),
         "wrench": _wrench(model, table, scales),
+        "asked": _asked(table, scales),
         "rotation": rotation,
         "other_rotation": other_rotation,
         "command": read_columns.command(model, table, scales),
@@ -239,3 +240,11 @@ def _wrench(model: ExperimentFile, table: Table, scales: Scales) -> Floats:
     if model.quantity == "deflection" and not given:
         raise FileError("missing column: a deflection needs a load (fx, fy, fz, mx, my, mz)", file=table.file)
     return np.asarray(scales.wrench(given) * read_columns.block(table, WRENCH, blank=False, missing=0.0))
+
+
+def _asked(table: Table, scales: Scales) -> Floats | None:
+    """(n, 6) N, N·m that were commanded, NaN where nothing was; each in the unit of the load that was measured."""
+    given = [w for w, c in zip(WRENCH, ASKED, strict=True) if c in table]
+    if not given:
+        return None
+    return np.asarray(scales.wrench(given) * read_columns.block(table, ASKED, blank=True))

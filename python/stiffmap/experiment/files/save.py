@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.errors import FileError
-from stiffmap.experiment.experiment import AXES, WRENCH, Channel, Experiment, Floats, Loop
+from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Channel, Experiment, Floats, Loop
 from stiffmap.experiment.files.columns import APPROACH, POSE, POSE2, SEEN, SEEN_TURNED
 from stiffmap.experiment.files.orientation import VECTOR
 from stiffmap.experiment.readings import kinds
@@ -188,7 +188,11 @@ def _rotvec(rotation: Floats | None, names: Sequence[str]) -> dict[str, list[Any
 def _loads(e: Experiment) -> dict[str, list[Any]]:
     units = [1.0] * 3 + [MM] * 3
     used = [i for i in range(6) if e.wrench[:, i].any() or (i < 3 and e.quantity == "deflection")]
-    return {WRENCH[i]: _text(e.wrench[:, i] * units[i]) for i in used}
+    out = {WRENCH[i]: _text(e.wrench[:, i] * units[i]) for i in used}
+    if e.asked is None:
+        return out
+    given = np.flatnonzero(np.isfinite(e.asked).any(axis=0))
+    return out | {ASKED[i]: _text(e.asked[:, i] * units[i]) for i in given}
 
 
 def _text(values: Any) -> list[str]:
