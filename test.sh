@@ -14,10 +14,18 @@ fi
 
 [ -x "$venv/bin/python" ] || "${PYTHON:-python3}" -m venv "$venv"
 export PATH="$PWD/$venv/bin:$PATH"
-python -m pip install --quiet --upgrade "pip>=25.1"
-python -m pip install --quiet --group test
-python -m pip install --quiet --no-build-isolation -C build-dir="$build" -C cmake.define.STIFFMAP_TESTS=ON \
-  -C cmake.define.STIFFMAP_WERROR="${WERROR:-OFF}" .
+install="python -m pip install --quiet --no-compile"
+$install --upgrade "pip>=25.1"
+$install --group build
+
+# The core compiles while the packages that it and the tests need are fetched.
+python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir "$build/wheel" -C build-dir="$build" \
+  -C cmake.define.STIFFMAP_TESTS=ON -C cmake.define.STIFFMAP_WERROR="${WERROR:-OFF}" . &
+wheel=$!
+needs='import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["dependencies"], sep="\n")'
+$install --group test --requirement <(python -c "$needs")
+wait "$wheel"
+$install --no-deps --force-reinstall "$build"/wheel/*.whl
 
 ctest --test-dir "$build" --output-on-failure --parallel 2
 python -m pytest -n auto --dist worksteal "${lane[@]}" "$@"

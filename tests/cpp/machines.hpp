@@ -32,7 +32,7 @@ inline Joint actuator(const std::string& name, JointType type, const Vec3& axis,
   return j;
 }
 
-inline Spring spring(const std::string& name, const Mat6& stiffness) {
+inline Spring virtual_spring(const std::string& name, const Mat6& stiffness) {
   Spring s;
   s.name = name;
   s.matrix = spring_from_stiffness(stiffness, name);
@@ -53,13 +53,14 @@ struct Orthoglide {
 
   Chain bar(double side) const {
     return {{shift("out", 0, 0, side * d / 2), revolute("proximal", Vec3::UnitY()), shift("length", L, 0, 0),
-             spring("link", link_stiffness(L)), revolute("distal", Vec3::UnitY()), shift("back", 0, 0, -side * d / 2)}};
+             virtual_spring("link", link_stiffness(L)), revolute("distal", Vec3::UnitY()),
+             shift("back", 0, 0, -side * d / 2)}};
   }
   Chain leg(int axis) const {
     const Mat3 R = permutation(axis);
     return {{offset("frame", {Vec3::Zero(), R}),
              actuator("actuator", JointType::prismatic, Vec3::UnitX(), -r - L, k_actuator),
-             spring("foot", link_stiffness(0.25)), revolute("proximal", Vec3::UnitZ()),
+             virtual_spring("foot", link_stiffness(0.25)), revolute("proximal", Vec3::UnitZ()),
              Block{"bars", {{"low", bar(-1)}, {"high", bar(1)}}}, revolute("distal", Vec3::UnitZ()),
              shift("reach", r, 0, 0), offset("platform", {Vec3::Zero(), R.transpose()})}};
   }
@@ -72,9 +73,9 @@ inline Mechanism arm() {
   const double q1 = 0.3, q2 = -0.7, q3 = 1.1;
   const Chain chain{{actuator("base", JointType::revolute, Vec3::UnitZ(), q1, 2e5), shift("column", 0.1, 0, 0.6),
                      actuator("shoulder", JointType::revolute, Vec3::UnitY(), q2, 1e5), shift("upper", 0.8, 0, 0),
-                     spring("upper_link", link_stiffness()), Body{"upper_body", 12, Vec3(-0.4, 0, 0)},
+                     virtual_spring("upper_link", link_stiffness()), Body{"upper_body", 12, Vec3(-0.4, 0, 0)},
                      actuator("elbow", JointType::revolute, Vec3::UnitY(), q3, 5e4), shift("fore", 0.6, 0.05, 0),
-                     spring("fore_link", link_stiffness(0.6)), Body{"tool", 3, Vec3(0.02, 0.01, 0)},
+                     virtual_spring("fore_link", link_stiffness(0.6)), Body{"tool", 3, Vec3(0.02, 0.01, 0)},
                      Point{"hook", Vec3(-0.1, 0, 0.05)}}};
   Pose home;
   home = home * Pose{Vec3::Zero(), rotation_about(Vec3::UnitZ(), q1)} * Pose{Vec3(0.1, 0, 0.6), Mat3::Identity()};

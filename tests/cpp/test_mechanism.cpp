@@ -35,7 +35,7 @@ BOOST_AUTO_TEST_CASE(paths_lead_from_the_base_outwards) {
 }
 
 BOOST_AUTO_TEST_CASE(platform_side_of_the_legs) {
-  Chain root{{Block{"legs", {{"only", {{revolute("free", Vec3::UnitZ()), spring("link", link_stiffness())}}}}},
+  Chain root{{Block{"legs", {{"only", {{revolute("free", Vec3::UnitZ()), virtual_spring("link", link_stiffness())}}}}},
               shift("tool", 0, 0, -0.1), Body{"spindle", 6, Vec3::Zero()}}};
   const Mechanism m = assemble(root, {Vec3(0, 0, -0.1), Mat3::Identity()});
   BOOST_TEST(m.beyond_legs[static_cast<std::size_t>(m.tip)]);
@@ -52,7 +52,7 @@ BOOST_AUTO_TEST_CASE(scales_follow_the_size_of_the_machine) {
 }
 
 BOOST_AUTO_TEST_CASE(a_link_beside_the_base_has_its_reach_as_length) {
-  const Chain chain{{shift("far", 0.8, 0, 0), spring("link", link_stiffness())}};
+  const Chain chain{{shift("far", 0.8, 0, 0), virtual_spring("link", link_stiffness())}};
   BOOST_TEST(std::abs(assemble(chain, {Vec3(0.8, 0, 0), Mat3::Identity()}).length - 0.8) < 1e-12);
 }
 
@@ -92,7 +92,7 @@ BOOST_AUTO_TEST_CASE(bad_chains_are_refused_by_name) {
 
 BOOST_AUTO_TEST_CASE(a_block_that_does_not_close_is_refused_with_its_misfit) {
   const auto bar = [](double length) {
-    return Chain{{shift("length", length, 0, 0), spring("link", link_stiffness())}};
+    return Chain{{shift("length", length, 0, 0), virtual_spring("link", link_stiffness())}};
   };
   const Chain chain{{Block{"bars", {{"low", bar(0.5)}, {"high", bar(0.7)}}}}};
   const std::string text = message([&] { assemble(chain, {Vec3(0.5, 0, 0), Mat3::Identity()}); });

@@ -10,7 +10,7 @@ using namespace stiffmap::test;
 
 namespace {
 
-Mat6 random_spd(unsigned seed) {
+Mat6 random_stiffness(unsigned seed) {
   Random random(seed);
   Mat6 K = 1e6 * Mat6::Identity();
   for (int i = 0; i < 6; ++i) {
@@ -30,24 +30,25 @@ double relative(const Mat6& got, const Mat6& wanted) {
 BOOST_AUTO_TEST_SUITE(stiffness)
 
 BOOST_AUTO_TEST_CASE(series_and_parallel) {
-  const Mat6 A = random_spd(1), B = random_spd(2);
-  const Mechanism series = assemble({{spring("a", A), spring("b", B)}}, {});
+  const Mat6 A = random_stiffness(1), B = random_stiffness(2);
+  const Mechanism series = assemble({{virtual_spring("a", A), virtual_spring("b", B)}}, {});
   BOOST_TEST(relative(solve(series, {}, Vec6::Zero()).point.compliance, A.inverse() + B.inverse()) < 1e-11);
-  const Mechanism parallel = assemble({{Block{"legs", {{"a", {{spring("s", A)}}}, {"b", {{spring("s", B)}}}}}}}, {});
+  const Mechanism parallel =
+      assemble({{Block{"legs", {{"a", {{virtual_spring("s", A)}}}, {"b", {{virtual_spring("s", B)}}}}}}}, {});
   BOOST_TEST(relative(solve(parallel, {}, Vec6::Zero()).point.stiffness, A + B) < 1e-11);
 }
 
 BOOST_AUTO_TEST_CASE(cantilever_stiffness) {
   const Mat6 C = beam_compliance(0.8, {2e8, 3e4, 3e4, 2e4});
   const Mechanism m =
-      assemble({{shift("link", 0.8, 0, 0), spring("beam", C.inverse())}}, {Vec3(0.8, 0, 0), Mat3::Identity()});
+      assemble({{shift("link", 0.8, 0, 0), virtual_spring("beam", C.inverse())}}, {Vec3(0.8, 0, 0), Mat3::Identity()});
   const PoseResult r = solve(m, m.home, Vec6::Zero());
   BOOST_TEST(std::abs(r.point.stiffness(1, 1) / (12 * 3e4 / 0.512) - 1) < 1e-11);
   BOOST_TEST(relative(r.point.compliance, C) < 1e-11);
 }
 
 BOOST_AUTO_TEST_CASE(a_passive_joint_frees_its_twist) {
-  const Mechanism m = assemble({{spring("link", random_spd(3)), revolute("pin", Vec3::UnitZ())}}, {});
+  const Mechanism m = assemble({{virtual_spring("link", random_stiffness(3)), revolute("pin", Vec3::UnitZ())}}, {});
   const PoseResult r = solve(m, {}, Vec6::Zero());
   BOOST_TEST((r.status == Status::singular));
   BOOST_TEST((r.flags & flag::platform_singular) != 0u);
