@@ -113,8 +113,12 @@ def report(rows: dict, names: dict[str, str]) -> None:  # type: ignore[type-arg]
             stops.add((names[test].split()[0], round(reached)))
         if len(torque) > 1:
             values = [held_out(torque, m)[0] for m in MODELS]
-            found[names[test]].append([*values, repeat(torque)])
-    print(f"{'held-out rms, deg':40}" + "".join(f"{m:>12}" for m in (*MODELS, "repeat")) + "  dominated by")
+            found[names[test]].append([*values, repeat(torque), repeat(torque[-2:])])
+    print(
+        f"{'held-out rms, deg':40}"
+        + "".join(f"{m:>12}" for m in (*MODELS, "repeat", "last two"))
+        + "  dominated by"
+    )
     for name, values in sorted(found.items()):
         mean = np.sqrt(np.mean(np.array(values) ** 2, axis=0))
         gains = mean[:3] ** 2 - mean[1:4] ** 2

@@ -94,6 +94,12 @@ def diagnosed(out: Path, test: str, variant: str, state: str) -> dict[str, str]:
     return {k: f"{v:.4g}" if isinstance(v, float) else v for k, v in values.items()}
 
 
+def _larger(r: dict[str, str]) -> str:
+    """Which of the two makes the loop wider: play, or friction's memory over the spring."""
+    play, memory = float(r["play_mrad"]), float(r["memory_mrad"])
+    return "none" if not play + memory else "play" if play > memory else "memory"
+
+
 def table(results: list[dict[str, str]]) -> str:
     """A line per variant and state: means of its tests."""
     groups: dict[str, list[dict[str, str]]] = defaultdict(list)
@@ -103,7 +109,7 @@ def table(results: list[dict[str, str]]) -> str:
     out = [f"{'':38}tests  " + "  ".join(f"{n:>11}" for n in names) + "  larger  saturates"]
     for name, rs in sorted(groups.items()):
         mean = [sum(float(r[n]) for r in rs) / len(rs) for n in names]
-        larger = Counter("play" if float(r["play_mrad"]) > float(r["memory_mrad"]) else "memory" for r in rs)
+        larger = Counter(_larger(r) for r in rs)
         stops = Counter(r["saturates"] for r in rs if r["saturates"])
         most = larger.most_common(1)[0]
         out.append(

@@ -4,7 +4,7 @@
     python examples/measured_delta_files.py [DATA] [OUT] [EVERY]
     stiffmap calibrate OUT/flsun.yaml OUT/heights -o OUT/calibration
 
-DATA as in measured_delta.py; OUT (default: delta) gets flsun.yaml and heights/; EVERY (default 7) takes every so manyth height.
+DATA as in measured_delta.py; OUT (default: delta) gets flsun.yaml, heights/ and both/ (the same heights and 24 distances); EVERY (default 7) takes every so manyth height.
 One machine stands for all sessions: what each firmware believed is in its commands only. docs/measured_delta.md tells the result.
 """
 
@@ -25,7 +25,7 @@ TOWERS = {"a": 210, "b": 330, "c": 90}
 HEAD = """machine: ../flsun.yaml
 quantity: position
 units: {length: mm}
-noise: {hh: 0.02}
+noise: {hh: 0.02, dd: 0.04}
 surface: {normal: [0, 0, 1], shape: unknown}
 command:
 """
@@ -57,20 +57,41 @@ def machine() -> str:
     return text
 
 
+def tops(folder: Path) -> dict[str, dict[str, float]]:
+    """Height of each carriage at its endstop, mm, by session."""
+    with (folder / "sessions.csv").open(newline="", encoding="utf-8") as stream:
+        return {
+            s["session"]: {
+                t: math.sqrt(float(s[f"arm_{t}_mm"]) ** 2 - float(s["delta_radius_mm"]) ** 2)
+                + float(s[f"endstop_{t}_mm"])
+                for t in TOWERS
+            }
+            for s in csv.DictReader(stream)
+        }
+
+
+def distances(folder: Path) -> list[list[str]]:
+    """Session, heights of the carriages at both ends and the distance that a caliper read, mm."""
+    top = tops(folder)
+    with (folder / "distances.csv").open(newline="", encoding="utf-8") as stream:
+        data = list(csv.DictReader(stream))
+    out = []
+    for k, r in enumerate(data):
+        ends = [
+            f"{top[r['session']][t] - float(r[f'p{p}_travel_{t}_mm']):.6f}" for p in (1, 2) for t in TOWERS
+        ]
+        out.append([f"d{k}", r["session"], *ends[:3], "", *ends[3:], r["distance_measured_mm"]])
+    return out
+
+
 def rows(folder: Path, every: int) -> list[list[str]]:
     """Session and heights of the carriages, mm, where the probe touched."""
-    with (folder / "sessions.csv").open(newline="", encoding="utf-8") as stream:
-        sessions = {s["session"]: s for s in csv.DictReader(stream)}
+    sessions = tops(folder)
     with (folder / "heights.csv").open(newline="", encoding="utf-8") as stream:
         heights = [r for r in csv.DictReader(stream) if r["kind"] == "mesh"]
     out = []
     for i, row in list(enumerate(heights, 1))[every - 1 :: every]:
-        s = sessions[row["session"]]
-        top = {
-            t: math.sqrt(float(s[f"arm_{t}_mm"]) ** 2 - float(s["delta_radius_mm"]) ** 2)
-            + float(s[f"endstop_{t}_mm"])
-            for t in TOWERS
-        }
+        top = sessions[row["session"]]
         carriages = [f"{top[t] - float(row[f'travel_{t}_mm']):.6f}" for t in TOWERS]
         out.append([str(i), row["session"], *carriages, "0"])
     return out
@@ -83,14 +104,24 @@ def main() -> int:
     if not (folder / "heights.csv").is_file():
         print(f"skipped: no measured data in {folder} (heights.csv, see docs/measured_delta.md)")
         return 0
-    (out / "heights").mkdir(parents=True, exist_ok=True)
+    for name in ("heights", "both"):
+        (out / name).mkdir(parents=True, exist_ok=True)
     (out / "flsun.yaml").write_text(machine(), encoding="utf-8")
     columns = "".join(f"  q{t}: {{actuator: {t}.carriage, unit: mm}}\n" for t in TOWERS)
-    (out / "heights" / "experiment.yaml").write_text(HEAD + columns, encoding="utf-8")
+    (out / "heights" / "experiment.yaml").write_text(
+        HEAD.replace(", dd: 0.04", "") + columns, encoding="utf-8"
+    )
+    (out / "both" / "experiment.yaml").write_text(HEAD + columns, encoding="utf-8")
     data = rows(folder, int(given[2]) if len(given) > 2 else 7)
     with (out / "heights" / "data.csv").open("w", newline="", encoding="utf-8") as stream:
         csv.writer(stream).writerows([["id", "setup", "qa", "qb", "qc", "contact"], *data])
-    print(f"{len(data)} heights in {out / 'heights'}; machine {out / 'flsun.yaml'}")
+    more = distances(folder)
+    head = ["id", "setup", "qa", "qb", "qc", "contact", "qa2", "qb2", "qc2", "distance"]
+    with (out / "both" / "data.csv").open("w", newline="", encoding="utf-8") as stream:
+        csv.writer(stream).writerows([head, *([*r, "", "", "", ""] for r in data), *more])
+    print(
+        f"{len(data)} heights in {out / 'heights'}, with {len(more)} distances in {out / 'both'}; machine {out / 'flsun.yaml'}"
+    )
     return 0
 
 

@@ -14,6 +14,7 @@ from stiffmap.calibration.model import predicted
 from stiffmap.calibration.statistics import Sums
 from stiffmap.calibration.width import widened
 from stiffmap.experiment import Experiment, Predictor, random_plan
+from stiffmap.experiment.virtual.plans import with_distances
 
 
 def sessions(size: float) -> tuple[sm.Machine, Experiment]:
@@ -98,3 +99,22 @@ def test_a_group_within_its_uncertainties_is_left() -> None:
     found, factor = widened(drawn_sums([1.0, -1.2, 0.8, 0.5, -1.0, 0.3]), MEMBERS, ())
     assert found == () and (factor == 1.0).all()
     assert widened(drawn_sums([9.0, -7.0, 8.0, 0.5, -1.0, 0.3]), MEMBERS, ("first",))[0] == ()
+
+
+def test_a_set_up_without_distances_is_predicted_by_its_own_rows() -> None:
+    """Heights in both set-ups, distances in one: rows of a set-up are predicted by themselves."""
+    machine = sm.load_machine("linear-delta")
+    plan = with_distances(random_plan(machine, "position", poses=8, repeats=1), 1e-5)
+    first = np.arange(len(plan)) < len(plan) // 2
+    dd = [c.name for c in plan.channels].index("dd")
+    assert plan.other is not None
+    reading = plan.reading.copy()
+    reading[~first, dd] = np.nan
+    reading[~first, 0] = 0.0
+    other = np.where(first[:, None], plan.other, np.nan)
+    whole = Predictor(machine, replace(plan, other=other, reading=reading))
+    part = Predictor(machine, replace(plan, other=other, reading=reading))
+    assert np.isfinite(whole()[first, dd]).all()
+    part.experiment = part.experiment.rows(~first)
+    part._memory.clear()
+    assert np.isnan(part()[:, dd]).all()

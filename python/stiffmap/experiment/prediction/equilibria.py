@@ -67,6 +67,8 @@ def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tupl
         if not kind.pair:
             out[:, i] = kind.change(here, None)
             continue
+        if plan.other is None or not np.isfinite(plan.other).all(axis=1).any():
+            continue  # no row of these reads one
         if pairs is None:
             pairs, more = _pairs(machine, plan, bare, motion, threads)
             count += more
