@@ -4,6 +4,7 @@
 #pragma once
 
 #include "approach.hpp"
+#include "arm.hpp"
 #include "frames.hpp"
 #include "normal_equations.hpp"
 #include "planar.hpp"
@@ -45,12 +46,14 @@ struct Closing {
       for (int k = 0; k < P.leg_count; ++k) usable &= close_planar(P.planar[k], end, s.x, never);
       return usable;
     }
+    const M sure = P.arm ? close_arm(*P.arm, legs_end(tip), s.x) : M{};
+    if (all(sure)) return sure;
     alignas(64) double rows[W][most_closure_unknowns];
-    for (int i = 0; i < W; ++i) usable[i] = Starts{P}.interpolate(at[i], rows[i]) ? -1 : 0;
+    for (int i = 0; i < W; ++i) usable[i] = !sure[i] && Starts{P}.interpolate(at[i], rows[i]) ? -1 : 0;
     for (int j = 0; j < P.unknown_count; ++j)
       for (int i = 0; i < W; ++i)
         if (usable[i]) s.x[P.unknowns[j]][i] = rows[i][j];
-    return usable;
+    return usable | sure;
   }
 
   /// Adaptive continuation of theory (C5), each lane by its own leaps, from the node of the grid that is nearest
@@ -181,7 +184,7 @@ struct Closing {
     for (int step = 0; step < most_closure_steps; ++step) {
       V6 errors[most_unknowns];
       const V error = closure_errors(leg, chain, start, target, errors);
-      if (P.planar || step > 0) done |= ~failed & ((error < exact) | ((error < closed) & (previous < 1e-7)));
+      if (P.planar || P.arm || step > 0) done |= ~failed & ((error < exact) | ((error < closed) & (previous < 1e-7)));
       failed |= ~done & ~(error < 1e100);
       if (all(done | failed)) break;
       equations.assemble(P, s, leg, errors, target.R);

@@ -242,12 +242,12 @@ struct Block {
     if (in.patience == Patience::path && !P.starts_linear && any(usable & ~done))
       done |= follow(usable & ~done, newton, iterations, steps);
     V K[6][6];
-    newton.dense(newton.answer, K);
-    write(done, newton, K, newton.compliance, iterations, steps);
+    newton.dense(newton.answer.K, K);
+    write(done, newton, K, newton.answer.compliance, iterations, steps);
     if (in.perturbed_count == 0) return;
     if (P.spring_count > 0) newton.pull();
     newton.linearize();  // lanes that settled early have lost their factors
-    vary(done & ~unstable & ~newton.serial.play.lanes, newton, newton.compliance);
+    vary(done & ~unstable & ~newton.serial.play.lanes, newton, newton.answer.compliance);
   }
 
   M follow(M lanes, Newton& newton, V& iterations, V& steps) {

@@ -12,6 +12,21 @@
 
 namespace stiffmap::kernel {
 
+struct Answer {
+  Sym6 K;              ///< symmetric, at the point
+  V compliance[6][6];  ///< inverse of the tangent of a dead wrench
+  bool taken = false;  ///< by some lane
+  Answer() {}          // not filled with zeros: 4 kB
+
+  void take(M lanes, const Sym6& now, const V (&inverse)[6][6]) {
+    K = taken ? select(lanes, now, K) : now;
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j)
+        compliance[i][j] = taken ? select(lanes, inverse[i][j], compliance[i][j]) : inverse[i][j];
+    taken = true;
+  }
+};
+
 struct Newton {
   const Program& P;
   const KernelInput& in;
@@ -26,9 +41,8 @@ struct Newton {
   V3 point = {};
   Sym6 K = {};  ///< symmetric tangent at the point
   V6 c = {};
-  Sym6 answer = {};         ///< K at the answer
-  V compliance[6][6] = {};  ///< inverse of the tangent of a dead wrench at the answer
-  Serial serial{};          ///< of an arm of joints alone
+  Answer answer{};
+  Serial serial{};  ///< of an arm of joints alone
 
   // ---- laws -----------------------------------------------------------------------------------
   void law_at(const LawProgram& law, int q) {
@@ -317,11 +331,7 @@ struct Newton {
     serial.play.release(e, P.serial_joints, column, m, K);
   }
 
-  void take(M lanes, const V (&m)[6][6]) {
-    answer = select(lanes, K, answer);
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 6; ++j) compliance[i][j] = select(lanes, m[i][j], compliance[i][j]);
-  }
+  void take(M lanes, const V (&m)[6][6]) { answer.take(lanes, K, m); }
 
   /// Iterates until every lane converged or is left to the reference path; lanes never wait for
   /// the answer of others, only for their time. A lane that is not trusted halves its own load step.

@@ -107,6 +107,25 @@ struct PlanarLeg {
   std::int32_t coordinate[4];
 };
 
+/// An arm of six revolutes, the second to fourth parallel, the last two meeting, closes in closed form. Base axes, at
+/// home; angles count from there.
+struct ArmLeg {
+  double first[3], w1[3];            ///< a point of the first axis, its direction
+  double u[3], along[3], across[3];  ///< of the parallel axes, and of the plane across them
+  double second[3];                  ///< a point of the second axis
+  double w5[3], w6[3];
+  double wrist[3], fourth[3];  ///< where the last axes meet, from the leg's end; a point of the fourth axis from there
+  double end_R[9];             ///< the leg's end, by columns
+  double lean1, height1;       ///< u·w1; u·(wrist - first)
+  double A5, B5, lean5;        ///< u·R(w5, t) w6 = A5 cos t + B5 sin t + lean5
+  double a[2], b[2];           ///< second to third axis, third to fourth turned to the sine's zero; along, across
+  double sum, inverse;         ///< |a|^2 + |b|^2, 1/(2 |a| |b|)
+  double bend;                 ///< angle at the third axis
+  double side, flip, branch;   ///< signs at home: of the shoulder, the wrist, the elbow
+  double home[6], sense[6];
+  std::int32_t coordinate[6];
+};
+
 /// How far a leg can stretch beyond its first slides: from the centre of its first turning joint, in base axes, to that
 /// of its last one, in the tip's frame. A target further away, but for the slides, is out of reach for sure.
 struct ReachProgram {
@@ -141,6 +160,7 @@ struct Program {
   const std::int32_t* unknowns;
   const std::int32_t* envelope;  ///< per unknown: the first one of its leg that shares an equation with one up to it
   const PlanarLeg* planar;       ///< one per leg, or null: the closure starts from the grid
+  const ArmLeg* arm;             ///< of the only leg, or null
   const double* grid;            ///< closure starts: nodes x row of unknowns of all legs, NaN where unreachable
   std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count,
       spring_count, serial_count, serial_joints;  ///< serial_joints 0: no such arm
@@ -207,7 +227,7 @@ inline constexpr std::int64_t program_layout =
     sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) + 41 * sizeof(Op) +
     43 * sizeof(CoordinateProgram) + 47 * sizeof(DriveProgram) + 53 * sizeof(LawProgram) + 59 * sizeof(ClosureTerm) +
     71 * sizeof(ReachProgram) + 73 * sizeof(TipSpringProgram) + 67 * sizeof(ChainProgram) + 61 * sizeof(PlanarLeg) +
-    71 * sizeof(StrokeProgram);
+    71 * sizeof(StrokeProgram) + 79 * sizeof(ArmLeg);
 
 /// The one symbol that each level exports. Poses begin .. end-1; `scratch` of scratch_size() bytes.
 struct KernelTable {

@@ -45,16 +45,25 @@ struct Serial {
   /// The external springs' tangent in the joints; their moment turns by half where the joints' axes do (F15).
   [[gnu::noinline]] void pull_back(const Elimination& el, int n, const TipLoad& tip) {
     const V3 half = splat(0.5) * (tip.load.b - tip.dead_moment);
+    V6 twist[most_serial_joints];
     for (int b = 0; b < n; ++b) {
-      const V6 behind = unit_twist(el, *joint[b], tip.point), force = *tip.springs * behind;
-      const V3 turned = cross(behind.b, half);
+      twist[b] = unit_twist(el, *joint[b], tip.point);
+      V6 force = *tip.springs * twist[b];
+      force.b = force.b - cross(twist[b].b, half);
       for (int a = 0; a <= b; ++a) {
-        const V6 before = unit_twist(el, *joint[a], tip.point);
-        const V more = dot(before, force) - dot(before.b, turned);
+        const V more = dot(twist[a], force);
         B[a][b] += more;
         if (a < b) B[b][a] += more;
       }
     }
+  }
+
+  /// What turns with the joints: before the first step under a load (F11) nothing does.
+  enum class Acts { nothing, forces, moment };
+  static Acts acts(const Elimination& el, const TipLoad& tip) {
+    const auto some = [](const V3& v) { return any((v.x != 0.0) | (v.y != 0.0) | (v.z != 0.0)); };
+    if (some(tip.dead_moment)) return Acts::moment;
+    return some(tip.load.a) || some(tip.load.b) || (el.heavy && some(el.gravity)) ? Acts::forces : Acts::nothing;
   }
 
   /// N joints; 0: as many as there are.
@@ -62,6 +71,7 @@ struct Serial {
   [[gnu::noinline]] void step_of(Elimination& el, const TipLoad& tip) {
     const Program& P = el.P;
     const int n = N ? N : P.serial_joints;
+    const Acts how = acts(el, tip);
     V g[most_serial_joints];
     for (int i = 0, k = 0; i < P.serial_count; ++i)
       if (P.ops[P.serial[i]].kind != OpKind::load) joint[k++] = P.ops + P.serial[i];
@@ -90,13 +100,11 @@ struct Serial {
         continue;
       }
       const bool turns = op.kind == OpKind::revolute;
-      const V3 below = turns ? arms * j.w - (arms.c[0].x + arms.c[1].y + arms.c[2].z) * j.w : cross(j.w, force);
-      const V3 above = turns ? below + cross(j.w, tip.dead_moment) : below;  // theory E4
-      for (int a = 0; a <= b; ++a) {
-        const bool both = joint[a]->kind == OpKind::revolute;
-        const V3& w = el.s.joints[joint[a]->slot].w;
-        B[a][b] = both ? -dot(w, below) : splat(0);
-        B[b][a] = both ? -dot(w, above) : splat(0);
+      if (how == Acts::nothing) {
+        for (int a = 0; a <= b; ++a) B[a][b] = B[b][a] = splat(0);
+      } else {
+        const V3 below = turns ? arms * j.w - (arms.c[0].x + arms.c[1].y + arms.c[2].z) * j.w : cross(j.w, force);
+        couple(el, b, below, turns && how == Acts::moment ? cross(j.w, tip.dead_moment) : V3{}, how);
       }
       g[b] = dot(j.w, turns ? moment : all) - el.s.tau[op.coordinate];
       --b;
@@ -108,10 +116,29 @@ struct Serial {
       B[k][k] += el.s.dtau[q];
     }
     if (P.starts_linear) play.hold(el, joint, n, B, g);
+    factor<N>(el, n, how == Acts::nothing && !tip.springs);
+    solve<N>(n, g);
+    for (int k = 0; k < n; ++k) el.s.dz[joint[k]->coordinate] = g[k];
+  }
+
+  /// How the forces of the joints before `b` and its own turn with each other: theory E4, a dead moment's share above.
+  void couple(const Elimination& el, int b, const V3& below, const V3& moment, Acts how) {
+    for (int a = 0; a <= b; ++a) {
+      const bool both = joint[a]->kind == OpKind::revolute;
+      const V3& w = el.s.joints[joint[a]->slot].w;
+      B[a][b] = both ? -dot(w, below) : splat(0);
+      B[b][a] = how == Acts::moment && both ? -dot(w, below + moment) : B[a][b];
+    }
+  }
+
+  template <int N>
+  void factor(Elimination& el, int count, bool diagonal) {
+    const int n = N ? N : count;
 #pragma GCC unroll 6
     for (int k = 0; k < n; ++k) {
-      el.guard(B[k][k], P.coordinates[joint[k]->coordinate].unit);
+      el.guard(B[k][k], el.P.coordinates[joint[k]->coordinate].unit);
       B[k][k] = 1.0 / B[k][k];
+      if (diagonal) continue;
 #pragma GCC unroll 6
       for (int i = k + 1; i < n; ++i) {
         B[i][k] *= B[k][k];
@@ -119,8 +146,6 @@ struct Serial {
         for (int c = k + 1; c < n; ++c) B[i][c] -= B[i][k] * B[k][c];
       }
     }
-    solve<N>(n, g);
-    for (int k = 0; k < n; ++k) el.s.dz[joint[k]->coordinate] = g[k];
   }
 
   template <int N>

@@ -149,6 +149,7 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.springs = d.springs.data();
   p.spring_count = i32(d.springs.size());
   p.planar = d.planar.empty() ? nullptr : d.planar.data();
+  p.arm = d.arm.empty() ? nullptr : d.arm.data();
   p.op_count = i32(d.ops.size());
   p.chain_count = i32(d.chains.size());
   p.error_count = i32(d.errors.size());
@@ -193,6 +194,7 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   const bool box = (high - low).minCoeff() >= 0 && high.allFinite();
   const bool leg_by_leg = m.task == full_task && only_legs_have_joints(m, *data_) && compile_closure(m, *data_);
   if (leg_by_leg) recognise_planar_legs(m, *data_);
+  if (leg_by_leg) recognise_arm(m, *data_);
   if (leg_by_leg) bound_reach(m, *data_);
   const bool whole = !leg_by_leg && box && compile_whole_closure(m, *data_);
   find_serial(*data_);

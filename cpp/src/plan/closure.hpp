@@ -21,6 +21,9 @@ void bound_reach(const Mechanism& m, FastPlanData& out);
 /// Closed forms, if every leg has one.
 void recognise_planar_legs(const Mechanism& m, FastPlanData& out);
 
+/// The closed form of an arm, if the only leg has one.
+void recognise_arm(const Mechanism& m, FastPlanData& out);
+
 /// Closed configurations on a grid over a box of tip positions.
 void place_grid(const Mechanism& m, const Vec3& low, const Vec3& high, int grid_nodes, FastPlanData& out);
 

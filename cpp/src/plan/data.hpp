@@ -30,6 +30,7 @@ struct FastPlanData {
   std::vector<ClosureTerm> terms;
   std::vector<std::int32_t> unknowns, envelope, serial;
   std::vector<PlanarLeg> planar;
+  std::vector<ArmLeg> arm;  ///< one or none
   std::vector<ReachProgram> reach;
   std::vector<TipSpringProgram> springs;
   std::shared_ptr<const std::vector<double>> grid;

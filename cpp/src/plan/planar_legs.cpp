@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "closure.hpp"
+#include "home_leg.hpp"
 
 namespace stiffmap {
 namespace {
@@ -13,44 +14,6 @@ using Complex = std::complex<double>;
 
 constexpr double parallel = 1e-12;
 constexpr double shortest = 1e-3;  // arms relative to the mechanism's length, sine of the bend at home
-
-Pose pose(const Constant& c) { return {Vec3(c.p[0], c.p[1], c.p[2]), Mat3(Eigen::Map<const Mat3>(c.R))}; }
-
-struct HomeJoint {
-  std::int32_t coordinate;
-  bool prismatic;
-  Vec3 axis, point;
-};
-
-/// What moves in the closure, and the frame at a chain's end, at home in base axes.
-struct HomeLeg {
-  std::vector<HomeJoint> joints;
-  Pose end;
-};
-
-void move(const Op& op, double q, Pose& way) {
-  const Vec3 axis(op.direction[0], op.direction[1], op.direction[2]);
-  if (op.kind == OpKind::prismatic) way.p += q * (way.R * axis);
-  else way.R = way.R * Eigen::AngleAxisd(q, axis).toRotationMatrix();
-}
-
-std::optional<HomeLeg> at_home(const Mechanism& m, const FastPlanData& d, const ChainProgram& chain, Pose way) {
-  HomeLeg out;
-  for (int i = chain.first; i < chain.first + chain.count; ++i) {
-    const Op& op = d.ops[static_cast<std::size_t>(i)];
-    way = way * pose(op.nominal);
-    if (op.kind == OpKind::block) return std::nullopt;
-    if (op.kind > OpKind::prismatic) continue;
-    const Coordinate& c = m.coordinates[static_cast<std::size_t>(op.coordinate)];
-    if (c.role == Role::spring) continue;
-    if (c.role == Role::actuator || !c.locked)
-      out.joints.push_back({op.coordinate, op.kind == OpKind::prismatic,
-                            way.R * Vec3(op.direction[0], op.direction[1], op.direction[2]), way.p});
-    move(op, m.home_coordinates[op.coordinate], way);
-  }
-  out.end = way * pose(chain.nominal);
-  return out;
-}
 
 void put(const Vec3& v, double (&out)[3]) { Eigen::Map<Vec3>(static_cast<double*>(out)) = v; }
 void put(Complex z, double (&out)[2]) {
@@ -101,14 +64,10 @@ std::optional<PlanarLeg> planar(const Mechanism& m, const HomeLeg& leg) {
 }  // namespace
 
 void recognise_planar_legs(const Mechanism& m, FastPlanData& out) {
-  const ChainProgram& root = out.chains[static_cast<std::size_t>(out.program.root)];
-  Pose start;
-  for (int i = root.first; i <= out.program.legs_op; ++i)
-    start = start * pose(out.ops[static_cast<std::size_t>(i)].nominal);
   const Op& legs = out.ops[static_cast<std::size_t>(out.program.legs_op)];
   std::vector<PlanarLeg> found;
   for (int k = 0; k < legs.count; ++k) {
-    const auto home = at_home(m, out, out.chains[static_cast<std::size_t>(legs.first + k)], start);
+    const auto home = leg_at_home(m, out, k);
     const auto leg = home ? planar(m, *home) : std::nullopt;
     if (!leg) return;
     found.push_back(*leg);
