@@ -18,7 +18,7 @@ from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.kept import Kept
-from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.experiment.prediction.predict import Effort, Predictor
 from stiffmap.machine import Machine
 
 STEP = 0.1
@@ -84,7 +84,7 @@ def _of_rows(predictor: Predictor, rows: Mask) -> Predictor:
     """The same, of some rows (n,) only."""
     part = copy.copy(predictor)
     part.experiment = predictor.experiment.rows(rows)
-    part._memory = Kept()
+    part._memory, part._effort = Kept(), Effort()
     part._drives = {}
     return part
 
@@ -100,7 +100,7 @@ def _predicted(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> 
     if moves:
         beside = copy.copy(predictor)
         beside.machine = Machine(edited(predictor.machine.description, moves), like=predictor.machine)
-        beside._memory = Kept()
+        beside._memory, beside._effort = Kept(), Effort()
     return beside([scaled(predictor.machine.description, scale)] if scale else [])
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 
+from stiffmap.experiment.prediction.predict import Predictor
+
 Progress = Callable[[str], None]
-MOST, SHARE = 900.0, 0.2
-"""Predictions of `ROWS` rows that a diagnosis may ask for after its sensitivities, and the share of one search."""
+MOST, SHARE, PATIENCE = 900.0, 0.2, 300.0
+"""Predictions of `ROWS` rows that a diagnosis may ask for after its sensitivities, the share of one search, and how many one fit
+may: an honest one needs a few tens."""
 ROWS = 540
 """More rows make a prediction dearer, though not in proportion: the bound goes with the root of their number."""
 
@@ -32,6 +35,10 @@ class Clock:
     """Predictions of one search, likewise."""
     left_out: dict[str, None] = field(default_factory=dict)
     """What was not tried for that."""
+    promises: dict[Hashable, float] = field(default_factory=dict)
+    """What full fits kept of what screening had promised, by what was fitted."""
+    given_up: set[Hashable] = field(default_factory=set)
+    """What was too dear to fit, and is not tried again."""
     _search: float = float("inf")
 
     @staticmethod
@@ -39,7 +46,12 @@ class Clock:
         """A clock that starts now; `budget` in seconds, None: no end."""
         return Clock(float("inf") if budget is None else time.monotonic() + budget, progress)
 
-    def bound(self, predictions: Callable[[], float], rows: int) -> None:
+    def bound(self, predictor: Predictor) -> None:
+        """From here on the search may ask a predictor for so much, and so may each fit."""
+        self.count(lambda: predictor.effort, len(predictor.experiment))
+        predictor.patience = PATIENCE
+
+    def count(self, predictions: Callable[[], float], rows: int) -> None:
         """From here on the search may ask for so many predictions of an experiment with so many rows."""
         more = MOST * (ROWS / max(rows, 1)) ** 0.5
         self.predictions, self.most, self.share = predictions, predictions() + more, SHARE * more

@@ -91,7 +91,7 @@ def diagnose(
     groups = tuple(n for n in exclude if n in GROUPS)
     s = study(predictor, seed, None, clock, check_kinds(n for n in exclude if n not in GROUPS))
     if budget is None:
-        clock.bound(lambda: predictor.effort, len(predictor.experiment))
+        clock.bound(s.predictor)
     times = [time.perf_counter()]
     found = find_effects(s, seed, certified(tolerances, data), groups)
     times.append(time.perf_counter())

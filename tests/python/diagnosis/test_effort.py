@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 import stiffmap as sm
 from stiffmap.diagnosis import clock
+from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.clock import Clock
-from stiffmap.experiment import Experiment, random_plan, simulate
+from stiffmap.diagnosis.fitting.fit import fit
+from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.effects import get
+from stiffmap.experiment import Experiment, Predictor, random_plan, simulate
+from stiffmap.experiment.noise.level import noise_of
+from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.poses.configuration import coordinates_of, in_reach
 from stiffmap.experiment.prediction.kept import Kept
+from stiffmap.experiment.prediction.predict import DEAR, FAILURE, Effort
 
 
 def two_causes(machine: sm.Machine) -> Experiment:
@@ -34,7 +46,7 @@ def test_a_search_has_a_share_of_the_bound() -> None:
     made = [0.0]
     c = Clock()
     assert not c.tired
-    c.bound(lambda: made[0], clock.ROWS)
+    c.count(lambda: made[0], clock.ROWS)
     c.begin_search()
     made[0] = clock.SHARE * clock.MOST + 1.0
     assert c.tired and not c.spent
@@ -46,8 +58,83 @@ def test_a_search_has_a_share_of_the_bound() -> None:
 
 def test_more_rows_allow_fewer_predictions() -> None:
     c = Clock()
-    c.bound(lambda: 10.0, 4 * clock.ROWS)
+    c.count(lambda: 10.0, 4 * clock.ROWS)
     assert c.most == 10 + clock.MOST / 2
+
+
+def begun_spring(patience: float) -> tuple[Model, Predictor]:
+    """Where a fit of a spring at the tool begins, and a predictor with so much patience."""
+    machine = sm.load_machine("orthoglide-revised")
+    plan = random_plan(machine, "position", poses=6, repeats=2, seed=1)
+    predictor = Predictor(machine, simulate(machine, plan, [], seed=2))
+    effect = get("external_spring")
+    spring = Candidate("external_spring", "tcp", (), effect.parameters)
+    predictor.patience = patience
+    start = np.array([2e3, 0.5, 0.3, 0.2, 0.1]) / [p.scale for p in effect.parameters]
+    return Model((spring,), start), predictor
+
+
+def test_a_fit_is_given_up_when_its_share_is_spent() -> None:
+    for patience, given_up in ((2.0, True), (float("inf"), False)):
+        model, predictor = begun_spring(patience)
+        e = predictor.experiment
+        problem = Problem.of(e, noise_of(e).sigma, predictor())
+        before = predictor.effort
+        found = fit(model, predictor, problem)
+        assert found.given_up is given_up
+        assert found.usable is not given_up
+        if given_up:
+            assert predictor.effort <= before + patience + 1.0
+            assert "given up" in found.failure
+
+
+def test_what_is_too_dear_is_told_and_not_tried_again() -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    plan = random_plan(machine, "position", poses=8, repeats=2, seed=1)
+    pulled = machine.with_effect(
+        "external_spring",
+        element="tcp",
+        stiffness=500.0,
+        length=0.3,
+        anchor_x=0.5,
+        anchor_y=0.2,
+        anchor_z=0.3,
+    )
+    data = simulate(machine, plan, pulled.description.effects, seed=2)
+    before, clock.PATIENCE = clock.PATIENCE, 1.0
+    try:
+        d = sm.diagnose(machine, data, seed=0, cross_validate=False)
+    finally:
+        clock.PATIENCE = before
+    assert d.stopped
+    fits = [what for what in d.not_tried if what.startswith("the fit of ")]
+    assert fits and len(set(fits)) == len(fits)
+    assert not d.effects
+
+
+def test_predictions_that_leave_the_kernels_count_more() -> None:
+    effort = Effort()
+    motion = np.zeros((4, 6))
+    effort.add(motion, 0.25, declared=True)
+    assert (effort.total, effort.own_share) == (1.0, 0.25)
+    effort.add(motion, 0.25, declared=False)
+    assert effort.total == 2.0  # no dearer than the declared machine
+    effort.add(motion, 1.0, declared=False)
+    assert effort.total == 3.0 + 0.75 * DEAR
+    motion[0] = np.nan
+    effort.add(motion, 0.0, declared=False)
+    assert effort.total == 4.0 + 0.75 * DEAR + 0.25 * FAILURE
+
+
+def test_poses_out_of_reach_are_the_closures() -> None:
+    """Reach is asked of the kernels first: the same answer as the closures' own."""
+    machine = sm.load_machine("linear-delta")
+    plan = random_plan(machine, "position", poses=12, seed=1)
+    far = plan.position + np.where(np.arange(len(plan)) % 3 == 0, 5.0, 0.0)[:, None]
+    plan = replace(plan, position=far)
+    expected = np.isfinite(coordinates_of(machine, plan)).all(axis=1)
+    assert np.array_equal(in_reach(machine, plan), expected)
+    assert expected.any() and not expected.all()
 
 
 def test_what_was_asked_for_longest_ago_goes_first() -> None:
@@ -58,4 +145,4 @@ def test_what_was_asked_for_longest_ago_goes_first() -> None:
     kept.put("c", 3, 4)
     assert (kept.get("a"), kept.get("b"), kept.get("c")) == (1, None, 3)
     kept.put("c", 4, 6)
-    assert (len(kept), kept.bytes, kept.effort) == (2, 10, 4)
+    assert (len(kept), kept.bytes) == (2, 10)

@@ -91,7 +91,7 @@ def test_backward_keeps_what_cannot_be_left_out(search: Search, tilts: list[Cand
             raise sm.StiffmapError("cannot be built")
         return search.predictor(terms)
 
-    broken.tangents = Kept()  # type: ignore[attr-defined]
+    broken.tangents, broken.effort, broken.patience = Kept(), 0.0, np.inf  # type: ignore[attr-defined]
     hurt = replace(search, predictor=broken)  # type: ignore[arg-type]
     assert backward(hurt, model).candidates == model.candidates
 

@@ -172,19 +172,19 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
         lower = floor_of(s, finding)
         if lower < rho and rejected(s, finding, rho):  # the first floor held what the effects explain
             again, finding = _found_at(s, found, lower, seed)
-    held = held_out(again, finding.outliers, seed, finding)
     model, refused = admissible(finding.model, finding, tolerances)
     model, same = _beyond_calibration(s, model, finding)
+    named = with_model(finding, model)
+    left = unexplained(s, _on(s, named))
+    model, smooth = standing(s, named) if left else (model, ())
+    # what stands is held out as it was found; where nothing does, no fold is searched
+    held = held_out(again, finding.outliers, seed, finding, search=bool(model.candidates))
     model, more = _shared(model, finding, held)
-    more = same + more
-    finding = with_model(finding, model)
-    left = unexplained(s, _on(s, finding))
-    if left:
-        model, smooth = standing(s, finding)
-        if smooth:
-            finding, more = with_model(finding, model), more + smooth
-            left = unexplained(s, _on(s, finding))
-    return Answer(again, finding, _word(s, finding, left), left, s.layer.calibration, held, refused + more)
+    named = with_model(finding, model)
+    if smooth or more:
+        left = unexplained(s, _on(s, named))
+    refused = (*refused, *same, *smooth, *more)
+    return Answer(again, named, _word(s, named, left), left, s.layer.calibration, held, refused)
 
 
 def _found_at(s: Study, found: Calibrator, rho: float, seed: int) -> tuple[Study, Finding]:

@@ -49,12 +49,15 @@ class HeldOut:
         return self.gain is None or self.gain[0] > self.gain[1]
 
 
-def held_out(study: Study, listed: Mask, seed: int, known: Finding | None = None) -> HeldOut | None:
+def held_out(
+    study: Study, listed: Mask, seed: int, known: Finding | None = None, *, search: bool = True
+) -> HeldOut | None:
     """Residuals before and after on held-out groups; None where there are not two groups.
 
     Rows in `listed` (outliers of the whole experiment) and rows that the fold's own model finds
     standing alone count neither before nor after. A fold whose rows demand each effect of the `known`
-    finding, and no other, is not searched again: the effects' values are fitted to its rows.
+    finding, and no other, is not searched again: the effects' values are fitted to its rows. Without `search` no
+    fold has effects.
     """
     e = study.experiment
     label, by = folds(e, seed)
@@ -68,7 +71,9 @@ def held_out(study: Study, listed: Mask, seed: int, known: Finding | None = None
             return None
         study.clock.say(f"held-out fold {fold + 1} of {int(label.max()) + 1}")
         test = label == fold
-        model = _kept(study, known, ~test) or find(study, ~test, finalists=3).model
+        model = Model()
+        if search:
+            model = _kept(study, known, ~test) or find(study, ~test, finalists=3).model
         chosen.update(map(str, model.candidates))
         residual = study.free(e.reading - study.predictor(model.terms()), listed, ~test)
         gone = alone(study, np.where(test[:, None], residual, np.nan)) & listed

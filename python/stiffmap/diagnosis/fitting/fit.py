@@ -38,6 +38,10 @@ DAMPING = 0.01
 Residual = Callable[[Floats], Floats]
 
 
+class GivenUpError(StiffmapError):
+    """A fit's predictions are too dear to go on: their equilibria fail, or leave the kernels."""
+
+
 def fit(
     model: Model,
     predictor: Predictor,
@@ -60,7 +64,7 @@ def fit(
 
     Its residual and Jacobian belong to these values. Where the machine cannot be built or solved with
     them chi2 is infinite, residual and Jacobian are None and `problem` says why; values stay within
-    their bounds.
+    their bounds. So it is where the fit is given up for its effort (`Predictor.patience`).
     """
     free = np.array([i for i in range(len(model.values)) if i not in {*fixed, *model.held}], dtype=np.intp)
     model = replace(model, values=np.clip(model.values, *model.bounds()))
@@ -69,7 +73,10 @@ def fit(
             model, predictor, problem, free, None if near is None else near[:, free], doubtful, pays
         )
     except StiffmapError as error:
-        return replace(model, chi2=np.inf, residual=None, jacobian=None, failure=str(error))
+        given_up = isinstance(error, GivenUpError)
+        return replace(
+            model, chi2=np.inf, residual=None, jacobian=None, failure=str(error), given_up=given_up
+        )
     if not fixed:
         keep_best(found, predictor)
     return found
@@ -103,14 +110,18 @@ def _descend(
 ) -> Model:
     low, high = model.bounds()
     x = model.values
+    most = predictor.effort + predictor.patience
 
     def residual(values: Floats) -> Floats:
+        _go_on(predictor, most)
         return problem.residual(predictor(model.terms(values)))
 
     def tried_residual(values: Floats) -> Floats:
         """A step to where the machine cannot be built is one that does not pay."""
         try:
             return residual(values)
+        except GivenUpError:
+            raise
         except StiffmapError:
             return np.full(len(problem), np.inf)
 
@@ -119,7 +130,7 @@ def _descend(
     if known is not None:  # as good as fresh
         near, j, age = None, known[:, free], 0
     else:
-        j, age = (jacobian(model, x, predictor, problem, free), 0) if near is None else (near, 1)
+        j, age = (jacobian(model, x, predictor, problem, free, most), 0) if near is None else (near, 1)
     for _ in range(STEPS if free.size else 0):
         enough = pays * max(1.0, float(r @ r) / max(len(r), 1))
         step = np.zeros_like(x)
@@ -133,10 +144,10 @@ def _descend(
             again = np.isin(free, doubtful)
             if again.any() and not again.all():
                 j, age, doubtful = j.copy(), 1, ()
-                j[:, again] = jacobian(model, x, predictor, problem, free[again])
+                j[:, again] = jacobian(model, x, predictor, problem, free[again], most)
                 continue
             near, age = None, 0
-            j = jacobian(model, x, predictor, problem, free)
+            j = jacobian(model, x, predictor, problem, free, most)
             continue
         if gain > 0:
             s = (moved - x)[free]
@@ -145,7 +156,7 @@ def _descend(
             continue
         if age == 0 or (gain <= enough and age < 2):
             break
-        j, age = jacobian(model, x, predictor, problem, free), 0
+        j, age = jacobian(model, x, predictor, problem, free, most), 0
     full = np.zeros((len(r), len(x)))
     full[:, free] = j
     return replace(model, values=x, chi2=float(r @ r), residual=r, jacobian=full, failure="")
@@ -190,14 +201,26 @@ def _shorten(residual: Residual, x: Floats, step: Floats, r: Floats) -> tuple[Fl
     return x, r
 
 
+def _go_on(predictor: Predictor, most: float) -> None:
+    """Raises `GivenUpError` beyond so much effort."""
+    if predictor.effort > most:
+        raise GivenUpError("given up: its predictions fail or leave the fast path")
+
+
 def jacobian(
-    model: Model, values: Floats, predictor: Predictor, problem: Problem, which: NDArray[np.intp]
+    model: Model,
+    values: Floats,
+    predictor: Predictor,
+    problem: Problem,
+    which: NDArray[np.intp],
+    most: float = np.inf,
 ) -> Floats:
-    """(N, len(which)) change of the whitened residual per unit of each value."""
+    """(N, len(which)) change of the whitened residual per unit of each value; `GivenUpError` beyond an effort of `most`."""
     here = problem.check(predictor(model.terms(values)))
     _, high = model.bounds()
     slopes: dict[int, Floats] = {}
     for i in map(int, which):
+        _go_on(predictor, most)
         step = tangent_step(values, i, high[i])
         there, step = _beside(model, values, i, step, predictor, problem)
         slopes[i] = (there - here) / step

@@ -32,6 +32,8 @@ class Model:
     """Values that no fit moves: the readings do not feel them where the effect begins."""
     failure: str = ""
     """Why the machine cannot be built or solved with the model; chi2 is then infinite."""
+    given_up: bool = False
+    """Whether it failed for the effort that its predictions are."""
 
     @property
     def usable(self) -> bool:

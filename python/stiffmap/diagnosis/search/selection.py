@@ -145,6 +145,7 @@ def additions(
             minus_log_p[i] > 0
             and v.candidate not in model.candidates
             and not clash(v.candidate, model.candidates)
+            and frozenset((*model.candidates, v.candidate)) not in search.clock.given_up
         ):
             best_of.setdefault(v.candidate, int(i))
     top = max(minus_log_p, default=0.0)
@@ -157,7 +158,7 @@ def additions(
     found = [_finalist(search, model, screen, i) for i in fitted]
     for i, f in zip(fitted, found, strict=True):
         kept = f.minus_log_p / float(minus_log_p[i]) if f.model.usable else 0.0
-        search.predictor.tangents.put(_promise(model, screen.variants[i].candidate), kept, 0)
+        search.clock.promises[_beside(model, screen.variants[i].candidate)] = kept
     return found
 
 
@@ -171,7 +172,7 @@ def _hopeful(
     least: float,
 ) -> list[int]:
     """Of some variants those that may win: what screening promises, times what an earlier fit kept of it."""
-    known = {i: search.predictor.tangents.get(_promise(model, screen.variants[i].candidate)) for i in which}
+    known = {i: search.clock.promises.get(_beside(model, screen.variants[i].candidate)) for i in which}
     likely = {i: float(promised[i]) * k for i, k in known.items() if k is not None}
     top = max([least, *likely.values()])
 
@@ -186,8 +187,8 @@ def _hopeful(
     return sorted(left, key=lambda i: -likely.get(i, float(promised[i])))[:FEWEST]
 
 
-def _promise(model: Model, candidate: Candidate) -> tuple[str, frozenset[Candidate], Candidate]:
-    return "kept of a promise", frozenset(model.candidates), candidate
+def _beside(model: Model, candidate: Candidate) -> tuple[frozenset[Candidate], Candidate]:
+    return frozenset(model.candidates), candidate
 
 
 def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
@@ -205,6 +206,12 @@ def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
     fits = [fit(b, search.predictor, search.problem, near=near, doubtful=own, pays=ROUGH) for b in begun]
     best = min(fits, key=lambda m: m.chi2)
     if not best.usable:
+        if any(f.given_up for f in fits):
+            named = " + ".join(map(str, best.candidates))
+            search.clock.given_up.add(frozenset(best.candidates))
+            search.clock.leave_out(
+                f"the fit of {named} to its end: its predictions fail or leave the fast path"
+            )
         beside = f" beside {' + '.join(map(str, model.candidates))}" if model.candidates else ""
         search.failed[f"{variant.candidate}{beside}"] = best.failure
     delta_chi2 = model.chi2 - best.chi2

@@ -23,8 +23,25 @@ from stiffmap.solution import Solution
 from stiffmap.status import Flag, Status
 
 
-def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> tuple[Floats, int]:
-    """(n, c) m, rad of every row and channel, and how many equilibria were solved.
+@dataclass(frozen=True)
+class Work:
+    """Equilibria that were solved."""
+
+    solved: int = 0
+    slow: int = 0
+    """How many of them the kernels left to the reference path."""
+
+    def __add__(self, other: Work) -> Work:
+        return Work(self.solved + other.solved, self.slow + other.slow)
+
+    @property
+    def slow_share(self) -> float:
+        """Share of the reference path; 0 where nothing was solved."""
+        return self.slow / max(self.solved, 1)
+
+
+def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> tuple[Floats, Work]:
+    """(n, c) m, rad of every row and channel, and the equilibria solved for it.
 
     Deflection: the loaded minus the unloaded state of the same commanded pose.
     """
@@ -40,10 +57,10 @@ def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> t
     return out - rest, count + more
 
 
-def _by_gravity(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
+def _by_gravity(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, Work]:
     """Every row under its own gravity."""
     assert plan.gravity_of is not None
-    out, count = np.full((len(plan), len(plan.channels)), np.nan), 0
+    out, count = np.full((len(plan), len(plan.channels)), np.nan), Work()
     for g in np.unique(plan.gravity_of, axis=0):
         here = np.flatnonzero((plan.gravity_of == g).all(axis=1))
         part = replace(plan.rows(here), gravity=(float(g[0]), float(g[1]), float(g[2])), gravity_of=None)
@@ -52,7 +69,7 @@ def _by_gravity(machine: Machine, plan: Experiment, threads: int | None) -> tupl
     return out, count
 
 
-def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
+def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, Work]:
     """The motions of the point that is read, and what the kinds of readings make of them."""
     plain = tuple(c for c in plan.extra if kind_of(c) is None)
     bare = replace(plan, extra=plain, other=None, other_joints=None)
@@ -79,7 +96,7 @@ def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tupl
 
 def _pairs(
     machine: Machine, plan: Experiment, bare: Experiment, motion: Floats, threads: int | None
-) -> tuple[tuple[Integers, Seen, Seen], int]:
+) -> tuple[tuple[Integers, Seen, Seen], Work]:
     """Rows with a second commanded pose, and what is seen at both."""
     assert plan.other is not None
     rows = np.flatnonzero(np.isfinite(plan.other).all(axis=1))
@@ -109,11 +126,11 @@ class Solver:
     plan: Experiment
     threads: int | None
 
-    def loaded(self) -> tuple[Floats, int]:
+    def loaded(self) -> tuple[Floats, Work]:
         """(n, c) under the wrenches of the plan."""
         return self._equilibria(self.machine, self.plan)
 
-    def rest(self) -> tuple[Floats, int]:
+    def rest(self) -> tuple[Floats, Work]:
         """(n, c) without the wrenches: in the centre of every gap, or on the side of the approach."""
         bare = self.plan.without_load
         sided = self.plan.quantity == "position" or self.plan.unloaded == "approach"
@@ -121,29 +138,29 @@ class Solver:
             return self._sided(bare)
         return self._equilibria(self.machine, bare)
 
-    def _sided(self, bare: Experiment) -> tuple[Floats, int]:
+    def _sided(self, bare: Experiment) -> tuple[Floats, Work]:
         sign = signs(self.machine, bare)
-        out, count = np.full((len(bare), len(bare.channels)), np.nan), 0
+        out, count = np.full((len(bare), len(bare.channels)), np.nan), Work()
         for s in np.unique(sign, axis=0):
             here = np.flatnonzero((sign == s).all(axis=1))
             out[here], more = self._equilibria(lagging(self.machine, s, bool(bare.gravity)), bare.rows(here))
             count += more
         return out, count
 
-    def _equilibria(self, machine: Machine, plan: Experiment) -> tuple[Floats, int]:
+    def _equilibria(self, machine: Machine, plan: Experiment) -> tuple[Floats, Work]:
         if not plan.wrench.any() and not _moves_unloaded(machine, plan):
-            return _at_command(machine, plan), 0
+            return _at_command(machine, plan), Work()
         if len(set(plan.load_points)) < 2:
             return self._unique(machine, plan, plan.load_points[0] if plan.load_points else plan.load_point)
         labels = np.array(plan.load_points)
-        out, count = np.full((len(plan), len(plan.channels)), np.nan), 0
+        out, count = np.full((len(plan), len(plan.channels)), np.nan), Work()
         for point in np.unique(labels):
             here = np.flatnonzero(labels == point)
             out[here], more = self._unique(machine, plan.rows(here), str(point))
             count += more
         return out, count
 
-    def _unique(self, machine: Machine, plan: Experiment, load_point: str) -> tuple[Floats, int]:
+    def _unique(self, machine: Machine, plan: Experiment, load_point: str) -> tuple[Floats, Work]:
         """Each different (pose, wrench) is solved once."""
         once, back = plan.distinct
         read = targets(machine, plan)
@@ -164,11 +181,12 @@ class Solver:
         linear = moved[back, [wanted.index(r) for r in read]]
         if on:
             linear = seen_from(machine, plan, read, on, linear, moved[back, wanted.index(on)])
+        work = Work(len(once), int(np.count_nonzero(solution.flags & Flag.REFERENCE_PATH)))
         if not joint_channels(plan):
-            return linear, len(once)
+            return linear, work
         joints = joint_motions(machine, once, solution.coordinates, solution.coordinate_names)
         joints = np.where(ok[:, None], joints, np.nan)
-        return np.hstack([linear, joints[back]]), len(once)
+        return np.hstack([linear, joints[back]]), work
 
 
 def _solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solution:

@@ -15,7 +15,7 @@ class Kept(Generic[K, V]):
     """Values by key; beyond so many bytes those that were asked for longest ago go."""
 
     def __init__(self, most: int = MOST_BYTES) -> None:
-        self.most, self.bytes, self.effort = most, 0, 0.0
+        self.most, self.bytes = most, 0
         self._values: OrderedDict[K, tuple[V, int]] = OrderedDict()
 
     def get(self, key: K) -> V | None:
@@ -25,13 +25,12 @@ class Kept(Generic[K, V]):
         self._values.move_to_end(key)
         return self._values[key][0]
 
-    def put(self, key: K, value: V, size: int, effort: float = 1.0) -> V:
-        """Keep a value of `size` bytes that took some effort to make; returns it."""
+    def put(self, key: K, value: V, size: int) -> V:
+        """Keep a value of `size` bytes; returns it."""
         if key in self._values:
             self.bytes -= self._values.pop(key)[1]
         self._values[key] = value, size
         self.bytes += size
-        self.effort += effort
         while self.bytes > self.most and len(self._values) > 1:
             self.bytes -= self._values.popitem(last=False)[1][1]
         return value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.poses.against_command import resolved
 from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, without
 from stiffmap.experiment.poses.configuration import coordinates_of
-from stiffmap.experiment.prediction.equilibria import motions
+from stiffmap.experiment.prediction.equilibria import Work, motions
 from stiffmap.experiment.prediction.history import Drives, drives_of, history_motion
 from stiffmap.experiment.prediction.joints import check_joints
 from stiffmap.experiment.prediction.kept import Kept
@@ -27,8 +27,26 @@ from stiffmap.machine import Machine
 Terms = tuple[AppliedEffect, ...]
 FAILURE = 20.0
 """How much dearer an equilibrium is that is not found (measured: 10 to 30 times)."""
+DEAR = 100.0
+"""How much dearer one is that the kernels leave to the reference path (measured: 140 to 400 times)."""
 MOST_LIKES = 200
 """Machines with effects whose findings about home are kept for those with other values of the same effects."""
+
+
+@dataclass(eq=False)
+class Effort:
+    """What predictions have cost, in those of the declared machine."""
+
+    total: float = 0.0
+    own_share: float = 0.0
+    """Of the reference path, where the machine is as declared."""
+
+    def add(self, motion: Floats, slow_share: float, *, declared: bool) -> None:
+        """One prediction more, of motions (n, c)."""
+        if declared:
+            self.own_share = slow_share
+        failed = float(np.isnan(motion).all(axis=1).mean())
+        self.total += 1.0 + FAILURE * failed + DEAR * max(slow_share - self.own_share, 0.0)
 
 
 class Predictor:
@@ -44,6 +62,10 @@ class Predictor:
         self.threads = threads
         self.machine, self.experiment = resolved(machine, located(machine, experiment))
         self.solved = 0
+        self._effort = Effort()
+        self.patience = float("inf")
+        """Effort that one fit may cost before it is given up."""
+        self._work = Work()
         self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._likes: Kept[Hashable, Machine] = Kept(most=MOST_LIKES)
         self.tangents: Kept[Hashable, Any] = Kept()
@@ -60,9 +82,10 @@ class Predictor:
         key = (mechanical, load)
         motion = self._memory.get(key)
         if motion is None:
+            self._work = Work()
             motion = self._motion(mechanical, load)
-            failed = float(np.isnan(motion).all(axis=1).mean())
-            self._memory.put(key, motion, motion.nbytes, 1.0 + FAILURE * failed)
+            self._memory.put(key, motion, motion.nbytes)
+            self._effort.add(motion, self._work.slow_share, declared=not terms)
         remembering = tuple(t for t, kind in kinds if kind.drive)
         if remembering:
             plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
@@ -73,8 +96,9 @@ class Predictor:
 
     @property
     def effort(self) -> float:
-        """Predictions that were not known yet when they were asked for; those that fail count more."""
-        return self._memory.effort
+        """Predictions that were not known yet when they were asked for; those that fail, or that the kernels leave to the
+        reference path where they solve the declared machine, count more."""
+        return self._effort.total
 
     def under(self, wrench: Floats) -> Floats:
         """(n, c) m, rad: the same readings under other wrenches (n, 6); NaN where the machine fails under them."""
@@ -132,8 +156,9 @@ class Predictor:
         return out
 
     def _solve(self, plan: Experiment, terms: Terms) -> Floats:
-        out, count = motions(self.with_terms(terms), plan, self.threads)
-        self.solved += count
+        out, work = motions(self.with_terms(terms), plan, self.threads)
+        self.solved += work.solved
+        self._work += work
         return out
 
 
