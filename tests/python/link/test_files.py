@@ -218,6 +218,10 @@ def test_link_file_with_standard_errors_only(tmp_path):
 
 SKEWED = bar_compliance()
 SKEWED[1, 5] *= 1.01
+LARGE = np.full((6, 6), 1e308)
+np.fill_diagonal(LARGE, 1e-6)
+LARGE_FREE = np.full((6, 6), 1e308)
+np.fill_diagonal(LARGE_FREE, 0.0)
 INDEFINITE = bar_compliance()
 INDEFINITE[1, 5] = INDEFINITE[5, 1] = 1.2 * np.sqrt(INDEFINITE[1, 1] * INDEFINITE[5, 5])
 
@@ -232,6 +236,9 @@ INDEFINITE[1, 5] = INDEFINITE[5, 1] = 1.2 * np.sqrt(INDEFINITE[1, 1] * INDEFINIT
         ({"reference": "[0, 0]"}, r"reference: expected finite numbers of shape \(3,\)"),
         ({"compliance": "[[1, a]]"}, "compliance: expected numbers"),
         ({"compliance": SKEWED.tolist()}, r"symmetric matrix, got .* = 8.7e-03"),
+        ({"compliance": np.tril(LARGE).tolist()}, "symmetric matrix, got .* = inf"),
+        ({"compliance": LARGE.tolist()}, "symmetric matrix, got .* = nan"),
+        ({"compliance": LARGE_FREE.tolist()}, "expected no negative eigenvalue, got -1e"),
         ({"compliance": INDEFINITE.tolist()}, "expected no negative eigenvalue, got -0.2"),
         ({"compliance": (-bar_compliance()).tolist()}, "diagonal that is not negative"),
         ({"compliance": "[[.nan]]"}, "expected finite numbers of shape"),
