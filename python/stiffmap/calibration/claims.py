@@ -29,7 +29,7 @@ LENGTHS = (0.75, 1.5)
 """Correlation lengths of the field that are tried, in halves of the plan's extent."""
 SIZES = (0.3, 1.0, 3.0, 10.0)
 """Standard deviations of the field that are tried, in rms of what the calibration leaves of each channel."""
-MOST_SHAPES, MOST_COLUMNS = 40, 200
+MOST_SHAPES, MOST_COLUMNS = 80, 240
 """Of the field, per channel and in all."""
 
 
