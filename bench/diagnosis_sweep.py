@@ -2,6 +2,7 @@
 
     python bench/diagnosis_sweep.py --null 160 --seeds 1 --out bench/diagnosis_sweep.jsonl
 
+`--pairs 20` adds sets with two effects at once, each of the size 12; `--outliers 0.02` makes two of a hundred rows of every set wild.
 Resumable: cases that are in the file are not run again. `--table` prints the table of what is there.
 Size: rms of the effect's whitened signature that no single rival class can imitate, in noise floors.
 """
@@ -34,6 +35,7 @@ from stiffmap.experiment import Experiment, Predictor, random_plan, simulate
 from stiffmap.experiment.noise.whitening import Problem
 
 SIZES = (6.0, 12.0, 3.0, 20.0, 2.0, 1.0)
+PAIR = 12.0
 CHUNK = 25
 """Null sets between two rounds of effects: whatever is there when a run stops is a mixture."""
 
@@ -47,6 +49,8 @@ def main() -> None:
     parser.add_argument("--null", type=int, default=160, help="null sets per quantity")
     parser.add_argument("--seeds", type=int, default=1, help="seeds per effect and size")
     parser.add_argument("--every", type=int, default=1, help="every so manyth effect of each size only")
+    parser.add_argument("--pairs", type=int, default=0, help="sets with two effects at once")
+    parser.add_argument("--outliers", type=float, default=0.0, help="share of rows that are wild")
     parser.add_argument("--minutes", type=float, default=np.inf, help="no new set begins after")
     parser.add_argument("--size", type=float, action="append", help="default: all sizes")
     parser.add_argument("--quantity", action="append", choices=("position", "deflection"))
@@ -75,7 +79,7 @@ def run(options: argparse.Namespace, quantity: str) -> None:
                 break
             if case not in done:
                 begun = time.perf_counter()
-                result = one(machine, plan, effect, crc32(case.encode()), options.threads)
+                result = one(machine, plan, effect, crc32(case.encode()), options.threads, options.outliers)
                 record = {
                     "case": case,
                     "quantity": quantity,
@@ -90,12 +94,31 @@ def run(options: argparse.Namespace, quantity: str) -> None:
 
 def cases(s: Study, plan: Experiment, options: argparse.Namespace) -> Iterator[tuple[str, Any, float]]:
     """Null sets and effects in turn, so that a run that stops early is a fair sample."""
+    if options.outliers:
+        for case, effect, size in _cases(s, plan, options):
+            yield f"{case} outliers {options.outliers:g}", effect, size
+    else:
+        yield from _cases(s, plan, options)
+
+
+def _cases(s: Study, plan: Experiment, options: argparse.Namespace) -> Iterator[tuple[str, Any, float]]:
+    yield from pair_cases(s, plan, options)
     nulls = iter(range(options.null))
     for k, case in enumerate(effect_cases(s, plan, options)):
         if k % CHUNK == 0:
             yield from (null_case(plan, k) for k in islice(nulls, CHUNK))
         yield case
     yield from (null_case(plan, k) for k in nulls)
+
+
+def pair_cases(s: Study, plan: Experiment, options: argparse.Namespace) -> Iterator[tuple[str, Any, float]]:
+    """Two effects of different classes, drawn at random, each of the size `PAIR`."""
+    single = argparse.Namespace(**{**vars(options), "size": [PAIR], "every": 1, "seeds": 1})
+    known = [effect for _, effect, _ in effect_cases(s, plan, single)] if options.pairs else []
+    rng = np.random.default_rng(11)
+    for k in range(options.pairs):
+        a, b = (known[i] for i in rng.choice(len(known), 2, replace=False))
+        yield f"{plan.quantity} pair {k}: {a[0]} and {b[0]}", (a, b), PAIR
 
 
 def null_case(plan: Experiment, number: int) -> tuple[str, Any, float]:
@@ -151,17 +174,30 @@ def _within(c: Candidate, values: Any) -> Any:
     return si if inside and np.abs(values).max() <= 200 else None
 
 
-def one(machine: sm.Machine, plan: Experiment, effect: Any, seed: int, threads: int) -> dict[str, Any]:
+def one(
+    machine: sm.Machine, plan: Experiment, effect: Any, seed: int, threads: int, outliers: float = 0.0
+) -> dict[str, Any]:
     """What a diagnosis (without its cross-validation) says of one virtual experiment."""
-    terms = [] if effect is None else [effect[1]]
+    truth = [] if effect is None else list(effect) if isinstance(effect[0], tuple) else [effect]
+    if len(truth) == 1:
+        effect = truth[0]
     try:
-        twin = simulate(machine, plan, terms, seed=seed)
+        twin = simulate(machine, plan, [t for _, t in truth], seed=seed, outliers=outliers)
     except sm.StiffmapError as problem:
         return {"outcome": "not simulated", "why": str(problem)}
     s = study(Predictor(machine, twin, threads=threads), 0)
     found = find_effects(s, 0, Tolerances())
     s, finding, verdict = found.study, found.finding, found.verdict
     layered = {"layer": found.calibration is not None}
+    if len(truth) > 1:
+        why = explain(s, finding.search, finding.model)
+        named = [aliases(s, c, why) for c in why.model.candidates]
+        hits = sum(any(c in n for n in named) for c, _ in truth)
+        words = ("neither", "one of two", "both")[hits] + (
+            " named and another" if len(named) > hits else " named"
+        )
+        names = [str(c) for c in why.model.candidates]
+        return {"verdict": verdict, "names": names, "outcome": f"pair: {words}", **layered}
     if not finding.model.candidates:
         return {"verdict": verdict, "outcome": outcome(effect, [], [], verdict), **layered}
     why = explain(s, finding.search, finding.model)
@@ -231,11 +267,18 @@ def table(records: list[dict[str, Any]]) -> str:
     counts: dict[tuple[str, float], Counter[str]] = defaultdict(Counter)
     for r in records:
         if r["outcome"] != "not simulated":
-            counts[(r["quantity"], r["size"])][r["outcome"]] += 1
+            pair = r["outcome"].startswith("pair")
+            counts[(f"{r['quantity']}{', pairs' if pair else ''}", r["size"])][r["outcome"]] += 1
     lines = ["| plan | size | sets | " + " | ".join(heads) + " |", "|" + "---|" * (3 + len(heads))]
     for (quantity, size), c in sorted(counts.items()):
         label = "null" if size == 0 else f"{size:g}"
+        if any(o.startswith("pair") for o in c):
+            continue
         lines.append(f"| {quantity} | {label} | {c.total()} | " + " | ".join(str(c[h]) for h in heads) + " |")
+    for (quantity, size), c in sorted(counts.items()):
+        if any(o.startswith("pair") for o in c):
+            told = ", ".join(f"{n} {o.removeprefix('pair: ')}" for o, n in c.most_common())
+            lines.append(f"\n{quantity}, size {size:g} each, {c.total()} sets: {told}.")
     held = [v for r in records for v in r.get("inside", [])]
     lines.append(f"\nTrue values inside their 95 % intervals: {sum(held)} of {len(held)}.")
     return "\n".join(lines)
