@@ -129,7 +129,9 @@ inline void group_tangent(Elimination& el, const ChainProgram& chain, Sym6& K, V
     for (int i = 0; i < 6; ++i) J[i][a] = column[i] * (i < 3 ? 1 / el.P.length : 1.0);
   }
   const V pivot = invert_by_rows(J, k.inverse);
-  el.lowest = select(pivot > 1e-4, el.lowest, splat(-1));  // next to a singular configuration: left to the reference
+  // Next to a singular configuration: left to the reference; a load path takes negative pivots, but none next to zero.
+  el.lowest = select(pivot > 1e-4, el.lowest, splat(-1));
+  if (el.counts) el.closest = select(pivot > 1e-3, el.closest, splat(0));
   for (int a = 0; a < 6; ++a)
     for (int i = 0; i < 3; ++i) k.inverse[a][i] *= 1 / el.P.length;
   for (int a = 0; a < 6; ++a)

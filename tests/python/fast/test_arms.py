@@ -64,3 +64,14 @@ def test_joints_of_the_closed_form(turns: dict[str, float], elbow: float) -> Non
     assert fast.ok.sum() > 50
     ok = fast.ok
     np.testing.assert_allclose(fast.coordinates[ok], reference.coordinates[ok], atol=1e-12)
+
+
+def test_compliances_next_to_a_wrist_singularity() -> None:
+    machine = sm.load_machine("ur10")
+    joints = np.tile(np.radians(HOME), (6, 1))
+    joints[:, 4] = [-1e-2, -3e-3, -1e-3, -1e-4, -1e-5, -1e-6]
+    fast, reference = (machine.solve_joints(joints, np.zeros(6), method=m) for m in ("fast", "reference"))
+    np.testing.assert_array_equal(fast.status, reference.status)
+    size = np.sqrt(np.abs(np.diagonal(reference.compliance, axis1=1, axis2=2)))
+    gap = np.abs(fast.compliance - reference.compliance) / (size[:, :, None] * size[:, None, :])
+    assert gap.max() < 1e-10
