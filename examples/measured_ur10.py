@@ -8,8 +8,9 @@ CSV files in the folder given. They are read where they are and not part of stif
 
 makes an experiment of commanded joint angles and tracker positions, reduced to the robot's base by a
 hand-eye registration whose rest (frames of instrument and tool) stays unknown, and diagnoses it. With
-60 rows the residual is 0.52 mm, 17 noise floors, and the verdict `unattributed`: the arm is off in many
-small ways at once, no four effects explain 80 % of that, and so none is claimed.
+150 rows drawn from series B (held-out rms 0.47 mm, 0.17 after) the verdict is `effects+unattributed`: geometry
+within tolerance, and errors of the shoulder, base and elbow that return every 17 to 23 degrees of their turn.
+With `--rows 60` only that of the shoulder is told from a smooth field that knows nothing of the arm.
 """
 
 from __future__ import annotations
