@@ -266,14 +266,17 @@ class LoadPath {
   }
 };
 
-/// Laws with corners: the path has corners too, so that only convergence is asked of a step.
+/// Laws with corners: the path has corners too, so that of a step only convergence is asked, and that it is no leap
+/// to another assembly.
 Outcome steps_with_corners(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
                            State& state, EquilibriumResult& out) {
   double done = 0, step = 1, sign = unloaded_sign(m, p, ws, state);
   while (done < 1) {
     p.factor = std::min(1.0, done + step);
     ws.step_start = state;
-    if (newton(m, p, opt, done == 0, true, ws, state, out) == Outcome::converged) {
+    const bool found = newton(m, p, opt, done == 0, true, ws, state, out) == Outcome::converged;
+    ws.dz = state.z - ws.step_start.z;
+    if (found && ws.saddle.step_norm(m, ws.dz) < largest_step) {
       done = p.factor;
       count_sign(ws.saddle, sign, out);
       step *= 2;

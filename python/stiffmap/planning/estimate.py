@@ -20,6 +20,9 @@ from stiffmap.machine import Machine
 STEP = 1e-3
 """Share of a parameter's typical size over which predictions are differenced."""
 STEPS, DONE = 15, 1e-6
+RANK, FELT = 1e-8, 1e-6
+"""Singular values of the columns in typical sizes, relative to the largest, below which a direction is not told; the
+share of a number in such directions from which on it is not."""
 Terms = tuple[AppliedEffect, ...]
 
 
@@ -32,11 +35,11 @@ class Estimate:
     units: tuple[str, ...]
     values: Floats
     covariance: Floats
-    """(k, k) from the noise of the readings."""
+    """(k, k) from the noise of the readings; infinite variances of numbers that they do not tell."""
     terms: Terms
     chi2: float
     freedom: int
-    """Readings less nuisances less parameters."""
+    """Readings less nuisances less parameters that they tell."""
 
     @property
     def sigma(self) -> Floats:
@@ -65,17 +68,29 @@ def estimate(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEf
     for _ in range(STEPS):
         jacobian = np.column_stack([problem.white(c) for c in slopes(predictor, begun, parameters)])
         scale = np.array([p.scale for _, p in parameters])
-        step = np.linalg.lstsq(jacobian * scale, residual, rcond=1e-10)[0] * scale
+        step = np.linalg.lstsq(jacobian * scale, residual, rcond=RANK)[0] * scale
         x, moved, residual = _shortened(predictor, problem, begun, parameters, x, step, residual, (low, high))
         begun = with_values(begun, parameters, x)
         if not moved > DONE:
             break
     scale = np.array([p.scale for _, p in parameters])
-    covariance = np.linalg.pinv((jacobian * scale).T @ (jacobian * scale)) * np.outer(scale, scale)
-    freedom = problem.freedom - len(x)
+    covariance, rank = _covariance(jacobian * scale)
+    covariance = covariance * np.outer(scale, scale)
+    freedom = problem.freedom - rank
     names = tuple(f"{_place(begun[i])}: {p.name}" for i, p in parameters)
     units = tuple(p.unit for _, p in parameters)
     return Estimate(names, units, x, covariance, begun, float(residual @ residual), freedom)
+
+
+def _covariance(jacobian: Floats) -> tuple[Floats, int]:
+    """(k, k) of the numbers with columns (n, k), infinite variances of those that the readings do not tell; the rank."""
+    _, size, v = np.linalg.svd(jacobian, full_matrices=len(jacobian) < jacobian.shape[1])
+    size = np.append(size, np.zeros(len(v) - len(size)))
+    told = size > RANK * size.max(initial=0.0)
+    out: Floats = (v[told].T / size[told] ** 2) @ v[told]
+    untold = np.flatnonzero(np.linalg.norm(v[~told], axis=0) > FELT)
+    out[untold, untold] = np.inf
+    return out, int(told.sum())
 
 
 def _shortened(

@@ -36,6 +36,8 @@ class Change:
         return self.p < ALPHA
 
     def __str__(self) -> str:
+        if not np.isfinite(self.u):
+            return f"{self.name}: not told by these readings"
         word = "changed" if self.changed else "as before"
         step = self.after - self.before
         return (
@@ -76,11 +78,12 @@ def compare(
     step = b.values - a.values
     covariance = a.covariance * a.misfit**2 + b.covariance * b.misfit**2
     u = np.sqrt(np.diag(covariance))
-    single = chi2.sf((step / np.where(u > 0, u, np.inf)) ** 2, 1)
-    scaled = covariance / np.outer(u, u)
-    together = float((step / u) @ np.linalg.pinv(scaled) @ (step / u))
+    single = chi2.sf((step / u) ** 2, 1)
+    told = np.flatnonzero(np.isfinite(u))
+    scaled, pull = covariance[np.ix_(told, told)] / np.outer(u[told], u[told]), step[told] / u[told]
+    together = float(pull @ np.linalg.pinv(scaled) @ pull)
     changes = tuple(
         Change(n, s, float(x), float(y), float(w), float(min(1.0, len(step) * p)))
         for n, s, x, y, w, p in zip(a.names, a.units, a.values, b.values, u, single, strict=True)
     )
-    return Comparison(a, b, changes, float(chi2.sf(together, len(step))))
+    return Comparison(a, b, changes, float(chi2.sf(together, max(len(told), 1))))

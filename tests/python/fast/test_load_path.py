@@ -69,3 +69,12 @@ def test_the_same_bits_in_any_company() -> None:
         alone = machine.solve(position[i : i + 1], FORCE)
         np.testing.assert_array_equal(alone.displacement[0], whole.displacement[i])
         assert alone.iterations[0] == whole.iterations[i]
+
+
+def test_a_gap_is_no_way_to_another_assembly() -> None:
+    """Newton's leap across the corner of a law landed 160 mm off, balanced and unflagged (theory E9)."""
+    machine = sm.load_machine("3-rps").with_effect("dead_zone", element="strut", legs=["a"], half_width=1e-6)
+    force = np.array([200.0, 400.0, 800.0])
+    s = machine.solve(np.tile([0, 0, 0.6275], (3, 1)), force[:, None] * np.eye(6)[1])
+    assert (s.status == 0).all()
+    assert s.displacement[:, 1] == pytest.approx(4.3773e-7 * force, rel=1e-3)

@@ -14,6 +14,7 @@ from stiffmap.cli.inputs import placed
 from stiffmap.compensation import compensate
 from stiffmap.experiment import Predictor, simulate
 from stiffmap.planning import design, estimate, follow
+from stiffmap.planning.monitor import compare
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,22 @@ def test_expected_uncertainty_is_what_twins_scatter_by(orthoglide: sm.Machine) -
     scatter = np.std([f.values[0] for f in found], ddof=1)
     assert 0.65 < scatter / plan.sigma[0] < 1.45  # 40 draws: +- 11 % one sigma
     assert found[0].sigma[0] == pytest.approx(plan.sigma[0], rel=0.02)
+
+
+def test_what_no_reading_tells_is_not_known() -> None:
+    machine = sm.load_machine("ur10")  # nothing on the axis of the last joint moves when that joint yields
+    terms = [placed(machine, f"compliance {joint} arm scale=1") for joint in ("elbow", "wrist_3")]
+    plan = design(machine, terms, rows=4, poses=6)
+    assert np.isfinite(plan.sigma).tolist() == [True, False]
+    readings = [simulate(machine, plan.experiment, terms, seed=s) for s in range(2)]
+    found = estimate(machine, readings[0], terms)
+    assert found.sigma == pytest.approx(plan.sigma, rel=0.01)
+    assert found.values[1] == 1.0
+    compared = compare(machine, *readings, terms)
+    alone = compare(machine, *readings, terms[:1])
+    assert compared.p == pytest.approx(alone.p)
+    assert (compared.changes[1].p, compared.changes[1].u) == (1.0, np.inf)
+    assert "not told" in str(compared.changes[1])
 
 
 def test_rivals_are_told_apart_better_than_at_random(orthoglide: sm.Machine) -> None:
