@@ -228,6 +228,7 @@ class FastBatch {
   const SolveOptions& options_;
   const BatchOutput& out_;
   int threads_;
+  bool corners_ = has_knots(m_);
   std::vector<std::uint8_t> done_;
   std::vector<std::uint32_t> flags_;
   std::vector<Scratch> scratch_;
@@ -266,6 +267,7 @@ class FastBatch {
       table.run(&program_, &input, &answer, begin, end, kernel_scratch(table.scratch_size(&program_)));
       for (long place = begin; place < end; ++place) {
         const Index i = pose_at(place);
+        if (done_[at(i)] == pose_solved && leapt(i)) done_[at(i)] = pose_left;
         const std::uint8_t how = done_[at(i)];
         if (how == pose_solved || how == pose_unstable || how == pose_loose) complete(i, how);
         else if (how == pose_unreachable || how == pose_nowhere)
@@ -274,6 +276,13 @@ class FastBatch {
         if (how != pose_solved) forget_variants(i);
       }
     });
+  }
+
+  /// Whether corners of laws may have led a pose to another assembly: the reference path goes there in steps.
+  bool leapt(Index i) const {
+    if (!corners_ || !out_.displacement) return false;
+    const Index reads = std::max<Index>(1, static_cast<Index>(in_.read_points.size()));
+    return Eigen::Map<const Vec3>(out_.displacement + 6 * i * reads).norm() > largest_step * m_.length;
   }
 
   /// Fills what the kernels leave out for a pose that they did.

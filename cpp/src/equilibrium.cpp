@@ -10,7 +10,6 @@ namespace {
 
 constexpr double trusted_contraction = 0.2;  // of a Newton step against the last one
 constexpr double steady_contraction = 0.1;   // of the second against the first: no further proof is needed
-constexpr double largest_step = 0.2;         // of a trusted load step, relative to the length
 constexpr double shortest_load_step = 1.0 / 16384;
 constexpr double crossing_step = 1.0 / 1024;  // a change of stability is looked at this closely
 constexpr double trusted_bend = 0.1;          // of a load step: its chord against the tangents at its ends
@@ -20,14 +19,6 @@ constexpr double balanced = 1e-9;  // merit of an equilibrium, in unit deflectio
 constexpr int most_load_steps = 400;
 constexpr int patient_steps = 8;
 constexpr int most_idle = 10;  // Newton steps in which the merit is not halved once: at a singular point each one does
-
-/// Laws with corners or with dry friction: Newton starts from the solution with all laws linear.
-bool has_knots(const Mechanism& m) {
-  const auto has_friction = [](const Coordinate& c) { return c.friction != 0; };
-  if (std::any_of(m.coordinates.begin(), m.coordinates.end(), has_friction)) return true;
-  return std::any_of(m.laws.begin(), m.laws.end(),
-                     [](const Law& law) { return law.has_knots() || law.friction() != 0; });
-}
 
 /// A linear deflection below this share of the length is closure noise: the coordinate bears nothing.
 constexpr double unloaded = 1e-11;
@@ -266,18 +257,21 @@ class LoadPath {
   }
 };
 
-/// Laws with corners: the path has corners too, so that of a step only convergence is asked, and that it is no leap
-/// to another assembly.
+/// Laws with corners: the path has corners too, so that of a step only convergence is asked, and that the tip does not
+/// leap to another assembly.
 Outcome steps_with_corners(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
                            State& state, EquilibriumResult& out) {
   double done = 0, step = 1, sign = unloaded_sign(m, p, ws, state);
+  linearize(m, p, state, ws.lin);
+  Vec3 tip = ws.lin.frames.at(m.tip).p;
   while (done < 1) {
     p.factor = std::min(1.0, done + step);
     ws.step_start = state;
     const bool found = newton(m, p, opt, done == 0, true, ws, state, out) == Outcome::converged;
-    ws.dz = state.z - ws.step_start.z;
-    if (found && ws.saddle.step_norm(m, ws.dz) < largest_step) {
+    const Vec3 moved = ws.lin.frames.at(m.tip).p;
+    if (found && (moved - tip).norm() < largest_step * m.length) {
       done = p.factor;
+      tip = moved;
       count_sign(ws.saddle, sign, out);
       step *= 2;
       continue;
@@ -301,6 +295,13 @@ Outcome adaptive_steps(const Mechanism& m, Problem& p, const EquilibriumOptions&
 }
 
 }  // namespace
+
+bool has_knots(const Mechanism& m) {
+  const auto has_friction = [](const Coordinate& c) { return c.friction != 0; };
+  if (std::any_of(m.coordinates.begin(), m.coordinates.end(), has_friction)) return true;
+  return std::any_of(m.laws.begin(), m.laws.end(),
+                     [](const Law& law) { return law.has_knots() || law.friction() != 0; });
+}
 
 void force_balance(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, VecX& force) {
   for (Index j = 0; j < m.size(); ++j) {

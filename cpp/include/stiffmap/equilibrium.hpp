@@ -35,6 +35,12 @@ struct EquilibriumWorkspace {
 /// Right-hand side of the force balance; a stuck coordinate follows its own law alone.
 void force_balance(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, VecX& force);
 
+/// Most that a load moves at once, of the machine's length: beyond it the answer may be another assembly's.
+inline constexpr double largest_step = 0.2;
+
+/// Laws with corners or with dry friction: Newton starts from the solution with all laws linear.
+bool has_knots(const Mechanism& m);
+
 /// From `state` (usually the commanded configuration, all zero) to the equilibrium under `problem`.
 /// On success `ws.lin` and `ws.saddle` hold the linearisation there. Status is converged or
 /// not_converged; who asks judges stability by `falling` and `sign_changes`.
