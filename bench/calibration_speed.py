@@ -21,7 +21,7 @@ from stiffmap.calibration import Calibrator, unknowns
 from stiffmap.calibration.model import predicted
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.channels import AXES
-from stiffmap.experiment.virtual.plans import plan_of_poses
+from stiffmap.experiment.virtual.plans import plan_of_joints
 
 NOISE, ANGLE = 3e-5, 1e-4
 
@@ -31,15 +31,8 @@ def twin(poses: int, seed: int) -> tuple[sm.Machine, Experiment, dict[str, float
     machine = sm.load_machine("ur10")
     rng = np.random.default_rng(seed)
     joints = np.radians([0, -60, 90, -120, -90, 0]) + rng.uniform(-1.0, 1.0, (poses, 6))
-    at = sm.forward_kinematics(machine, joints)
     plan = replace(
-        plan_of_poses(
-            machine, "position", at.position, np.zeros((1, 6)), axes=AXES, noise=NOISE, angle_noise=ANGLE
-        ),
-        rotation=at.rotation,
-        rotation_against="base",
-        joints=joints,
-        joint_names=tuple(machine.actuators),
+        plan_of_joints(machine, joints, axes=AXES, noise=NOISE, angle_noise=ANGLE),
         frame="unknown",
         tool="unknown",
         gravity=(0.0, 0.0, -9.81),

@@ -262,9 +262,10 @@ class Calibrator:
         b, a = (size(np.where(keep, v, np.nan)) for v in (before, after))
         held = self._held_out(choice, factor, fit, rho, seed, size)
         as_declared = sums.log_evidence <= sums.pick([]).log_evidence and not claimed.any
-        profiles = self._travel(fit, rho, factor, seed, size) if self._misfits(fit, factor) else None
+        misfits = self._misfits(fit, factor)
+        profiles = self._travel(fit, rho, factor, seed, size) if misfits else None
         rest = _outweighs(held.before, held.after, noise) if held else _outweighs(b, a, noise)
-        unexplained = (rest or bool(claimed.refused)) and not claimed.any and self._misfits(fit, factor)
+        unexplained = (rest or bool(claimed.refused)) and not claimed.any and misfits
         seconds = {**self.seconds, "evidence": time.perf_counter() - start}
         return Calibration(
             verdict=_verdict(as_declared, found.found, wider, unexplained),

@@ -11,13 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
-from scipy.optimize import minimize_scalar
 
 from stiffmap.calibration.beyond import FREE, BeyondTolerance, beyond_tolerance, none_beyond
 from stiffmap.calibration.certificate import INSTRUMENT
 from stiffmap.calibration.facts import Wider
-from stiffmap.calibration.floor import LARGEST, Blocks
+from stiffmap.calibration.floor import Blocks, likeliest
 from stiffmap.calibration.statistics import Sums
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.calibration.width import widened
@@ -103,34 +101,22 @@ def claims(
 class BesideField:
     """Readings with a smooth field of unknown size and length below all unknowns."""
 
-    number: Integers
-    """(m,) different numbers of readings per block of one pose."""
-    count: Integers
-    """(m,) how many blocks have so many."""
-    within: tuple[Sums, ...]
-    """Per length of the field all readings; columns of the unknowns, then those of the field."""
-    between: tuple[tuple[Sums, ...], ...]
-    """Per length (m,) sums over the blocks of each number."""
+    blocks: tuple[Blocks, ...]
+    """Per length of the field; columns of the unknowns, then those of the field."""
     unknowns: int
 
     @staticmethod
     def of(problem: Problem, columns: Floats, linear: Floats, label: Integers, left: Floats) -> BesideField:
         """`columns` (N, p) and `linear` (N,) whitened, `label` (N,) of their blocks; `left` (n, c) what the calibration
         leaves in SI."""
-        within, between = [], []
-        number, count = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
-        for length in LENGTHS:
-            field = problem.white(field_columns(problem.experiment, left, length))
-            blocks = Blocks.of(np.hstack([columns, field]), linear, label)
-            number, count = blocks.number, blocks.count
-            within.append(blocks.within)
-            between.append(blocks.between)
-        return BesideField(number, count, tuple(within), tuple(between), columns.shape[1])
+        fields = (problem.white(field_columns(problem.experiment, left, length)) for length in LENGTHS)
+        blocks = tuple(Blocks.of(np.hstack([columns, field]), linear, label) for field in fields)
+        return BesideField(blocks, columns.shape[1])
 
     def log_evidence(self, factor: Floats) -> float:
         """Of the unknowns at `factor` (p,) times their uncertainties, beside the field and the floor that suit best."""
         best = self.at(factor, 0.0)
-        for k in range(len(self.within)):
+        for k in range(len(self.blocks)):
             before = -np.inf
             for size in SIZES:
                 here = self.at(factor, size, k)
@@ -142,27 +128,11 @@ class BesideField:
 
     def at(self, factor: Floats, size: float, length: int = 0) -> float:
         """ln of the evidence for a field of one size and length, at the floor that suits best."""
-        which = np.arange(self.unknowns if size == 0.0 else len(self.within[length].right))
+        blocks = self.blocks[length]
+        which = np.arange(self.unknowns if size == 0.0 else len(blocks.within.right))
         scale = np.append(factor, np.full(len(which) - self.unknowns, size))
-        within = self.within[length].pick(which).scaled(scale)
-        between = [s.pick(which).scaled(scale) for s in self.between[length]]
-
-        def lost(x: float) -> float:
-            rho = float(np.expm1(x))
-            gram, right, square = within.gram + np.eye(len(which)), within.right, within.square
-            for m, s in zip(self.number, between, strict=True):
-                c = rho / (1.0 + float(m) * rho)
-                gram, right, square = gram - c * s.gram, right - c * s.right, square - c * s.square
-            root = cholesky(gram, lower=True, check_finite=False)
-            y = solve_triangular(root, right, lower=True, check_finite=False)
-            volume = float(self.count @ np.log1p(self.number * rho)) + 2.0 * float(
-                np.log(np.diag(root)).sum()
-            )
-            return 0.5 * (square - float(y @ y) + volume)
-
-        bounds = (0.0, float(np.log1p(LARGEST)))
-        found = minimize_scalar(lost, bounds=bounds, method="bounded", options={"xatol": 0.1})
-        return -min(float(found.fun), lost(0.0))
+        blocks = blocks.pick(which).scaled(scale)
+        return max(likeliest(blocks, 0.1)[1], blocks.log_likelihood(0.0))
 
 
 def field_columns(e: Experiment, left: Floats, length: float) -> Floats:

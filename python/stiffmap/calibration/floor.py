@@ -7,6 +7,7 @@ maximises the restricted likelihood (REML; Patterson and Thompson 1971). docs/th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,6 +55,12 @@ class Blocks:
         """Readings of the median block."""
         return float(np.median(np.repeat(self.number, self.count)))
 
+    def pick(self, which: Sequence[int] | Integers) -> Blocks:
+        """Of some unknowns, the others at zero."""
+        return replace(
+            self, within=self.within.pick(which), between=tuple(s.pick(which) for s in self.between)
+        )
+
     def scaled(self, factor: Floats) -> Blocks:
         """With each standard uncertainty times a factor (p,)."""
         between = tuple(s.scaled(factor) for s in self.between)
@@ -75,11 +82,16 @@ def model_form(blocks: Blocks) -> float:
     """rho of the largest likelihood: variance of the model's error per pose, in noise variances."""
     if not len(blocks.number):
         return 0.0
+    rho, best = likeliest(blocks, 1e-4)
+    return rho if best > blocks.log_likelihood(0.0) + 1.0 else 0.0
+
+
+def likeliest(blocks: Blocks, within: float) -> tuple[float, float]:
+    """rho > 0 of the largest likelihood, its logarithm within so much, and the logarithm of that likelihood."""
     found = minimize_scalar(
         lambda x: -blocks.log_likelihood(float(np.expm1(x))),
         bounds=(0.0, float(np.log1p(LARGEST))),
         method="bounded",
-        options={"xatol": 1e-4},
+        options={"xatol": within},
     )
-    rho = float(np.expm1(found.x))
-    return rho if blocks.log_likelihood(rho) > blocks.log_likelihood(0.0) + 1.0 else 0.0
+    return float(np.expm1(found.x)), -float(found.fun)

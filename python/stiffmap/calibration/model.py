@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -14,11 +13,10 @@ from stiffmap.calibration.certificate import INSTRUMENT, SCALE, frame_columns, s
 from stiffmap.calibration.edit import edited
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.errors import StiffmapError
-from stiffmap.experiment.experiment import Floats, Mask
+from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.fingerprint import fingerprint
-from stiffmap.experiment.prediction.kept import Kept
-from stiffmap.experiment.prediction.predict import Effort, Predictor
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine
 
 STEP = 0.1
@@ -63,10 +61,12 @@ def predicted(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats)
     others = ~np.isin(label, own)
     out = np.full(predictor.experiment.reading.shape, np.nan)
     if others.any():
-        out[others] = _predicted(_of_rows(predictor, others), [(u, v) for u, v in pairs if not u.setup])
+        out[others] = _predicted(predictor.beside(rows=others), [(u, v) for u, v in pairs if not u.setup])
     for name in own:
         here = label == name
-        out[here] = _predicted(_of_rows(predictor, here), [(u, v) for u, v in pairs if u.setup in ("", name)])
+        out[here] = _predicted(
+            predictor.beside(rows=here), [(u, v) for u, v in pairs if u.setup in ("", name)]
+        )
     return np.asarray(out + frame)
 
 
@@ -80,15 +80,6 @@ def _frame_part(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) ->
     return np.asarray(sum(columns[what] * by for what, by in moved))
 
 
-def _of_rows(predictor: Predictor, rows: Mask) -> Predictor:
-    """The same, of some rows (n,) only."""
-    part = copy.copy(predictor)
-    part.experiment = predictor.experiment.rows(rows)
-    part._memory, part._effort = Kept(), Effort()
-    part._drives = {}
-    return part
-
-
 def _predicted(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> Floats:
     moves: dict[tuple[str, str], float] = {}
     for unknown, value in pairs:
@@ -98,9 +89,8 @@ def _predicted(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> 
     moves = {(at, what): by for (at, what), by in moves.items() if at != INSTRUMENT}
     beside = predictor
     if moves:
-        beside = copy.copy(predictor)
-        beside.machine = Machine(edited(predictor.machine.description, moves), like=predictor.machine)
-        beside._memory, beside._effort = Kept(), Effort()
+        changed = edited(predictor.machine.description, moves)
+        beside = predictor.beside(machine=Machine(changed, like=predictor.machine))
     return beside([scaled(predictor.machine.description, scale)] if scale else [])
 
 
@@ -167,7 +157,7 @@ def _changed(
     here = np.array(predictor.experiment.setup) == setup
     out = base.copy()
     mine = np.array([v if u.setup in ("", setup) else 0.0 for u, v in zip(unknowns, values, strict=True)])
-    out[here] = predicted(_of_rows(predictor, here), unknowns, mine)
+    out[here] = predicted(predictor.beside(rows=here), unknowns, mine)
     return out
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
 
 from stiffmap.experiment.experiment import Floats, Integers, Mask
 
@@ -98,9 +99,11 @@ class Sums:
     @property
     def log_evidence(self) -> float:
         """ln p(r), less the constant that all models of these readings share."""
-        sign, volume = np.linalg.slogdet(np.eye(len(self.right)) + self.gram)
-        assert sign > 0
-        return -0.5 * (self.chi2 + float(volume))
+        if not len(self.right):
+            return -0.5 * self.square
+        root = cholesky(np.eye(len(self.right)) + self.gram, lower=True, check_finite=False)
+        y = solve_triangular(root, self.right, lower=True, check_finite=False)
+        return -0.5 * (self.square - float(y @ y)) - float(np.log(np.diag(root)).sum())
 
     def root(self) -> tuple[Floats, Floats]:
         """(k, p) and (k,): R and y with RᵀR = G and Rᵀy = b, in the k directions that are felt at all."""

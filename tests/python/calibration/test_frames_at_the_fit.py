@@ -16,7 +16,7 @@ from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.poses.handeye import Sighting, find_frames
-from stiffmap.experiment.virtual.plans import plan_of_poses
+from stiffmap.experiment.virtual.plans import plan_of_joints
 
 
 def tracked(poses: int, seed: int) -> tuple[sm.Machine, Experiment]:
@@ -25,15 +25,8 @@ def tracked(poses: int, seed: int) -> tuple[sm.Machine, Experiment]:
     rng = np.random.default_rng(seed)
     home = np.radians([0, -60, 90, -120, -90, 0])
     joints = home + rng.uniform(-0.8, 0.8, (poses, 6))
-    at = sm.kinematics.forward_kinematics(machine, joints)
-    no_load = np.zeros((1, 6))
-    plan = plan_of_poses(machine, "position", at.position, no_load, axes=AXES, noise=3e-5, angle_noise=1e-4)
     plan = replace(
-        plan,
-        rotation=at.rotation,
-        rotation_against="base",
-        joints=joints,
-        joint_names=tuple(machine.actuators),
+        plan_of_joints(machine, joints, axes=AXES, noise=3e-5, angle_noise=1e-4),
         frame="unknown",
         tool="unknown",
         gravity=(0.0, 0.0, -9.81),

@@ -15,7 +15,7 @@ from stiffmap.calibration.travel import hats
 from stiffmap.cli.calibrate import write
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.experiment import Floats
-from stiffmap.experiment.virtual.plans import plan_of_poses
+from stiffmap.experiment.virtual.plans import plan_of_joints
 
 POSES = 250
 AMPLITUDE, PERIOD = 3e-4, 0.5
@@ -27,16 +27,7 @@ def arm() -> tuple[sm.Machine, Experiment, Floats]:
     machine = sm.load_machine("ur10")
     rng = np.random.default_rng(7)
     joints = np.radians([0, -60, 90, -120, -90, 0]) + rng.uniform(-0.7, 0.7, (POSES, 6))
-    at = sm.forward_kinematics(machine, joints)
-    plan = plan_of_poses(machine, "position", at.position, np.zeros((1, 6)), noise=1e-5)
-    plan = replace(
-        plan,
-        rotation=at.rotation,
-        rotation_against="base",
-        joints=joints,
-        joint_names=tuple(machine.actuators),
-        frame="unknown",
-    )
+    plan = replace(plan_of_joints(machine, joints, noise=1e-5), frame="unknown")
     return machine, plan, joints[:, 1]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -93,6 +94,14 @@ class Predictor:
                 self._drives = {key: drives_of(self.with_terms(mechanical), plan)}
             motion = motion + history_motion(self._drives[key], plan, remembering)
         return readings(self.experiment, motion, terms)
+
+    def beside(self, *, machine: Machine | None = None, rows: Mask | None = None) -> Predictor:
+        """The same of another machine, or of some rows (n,); what was solved before counts for neither."""
+        out = copy.copy(self)
+        out.machine = machine or self.machine
+        out.experiment = self.experiment if rows is None else self.experiment.rows(rows)
+        out._memory, out._effort, out._drives = Kept(), Effort(), {}
+        return out
 
     @property
     def effort(self) -> float:

@@ -11,7 +11,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings.library.distance import READING
-from stiffmap.kinematics import inverse_kinematics
+from stiffmap.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.machine import Machine
 
 MICRO = {"deflection": 3e-6, "position": 8e-6}
@@ -86,6 +86,23 @@ def plan_of_poses(
         repeat=np.tile(np.arange(repeats) + 1, len(position)),
         order=np.arange(1, n + 1, dtype=float),
     )
+
+
+def plan_of_joints(
+    machine: Machine,
+    joints: Floats,
+    *,
+    axes: Sequence[str] = AXES[:3],
+    noise: float | None = None,
+    angle_noise: float = 1e-5,
+) -> Experiment:
+    """Positions without a load where the drives are commanded (n, drives), in the order of `machine.actuators`."""
+    at = forward_kinematics(machine, joints)
+    plan = plan_of_poses(
+        machine, "position", at.position, np.zeros((1, 6)), axes=axes, noise=noise, angle_noise=angle_noise
+    )
+    names = tuple(machine.actuators)
+    return replace(plan, rotation=at.rotation, rotation_against="base", joints=joints, joint_names=names)
 
 
 def _each(loads: Floats | Sequence[Floats], number: int) -> list[Floats]:
