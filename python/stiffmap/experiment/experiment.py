@@ -203,6 +203,11 @@ class Experiment:
         return self.rows(first.astype(np.intp)), back.reshape(-1)
 
     @cached_property
+    def each_pose(self) -> Experiment:
+        """The first row of each commanded pose, in the order of `groups`."""
+        return self.rows(np.unique(self.groups, return_index=True)[1].astype(np.intp))
+
+    @cached_property
     def without_load(self) -> Experiment:
         """The same rows without their wrenches."""
         return replace(self, wrench=np.zeros_like(self.wrench)) if self.wrench.any() else self

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 import stiffmap as sm
+from stiffmap.description.rigid import nominal_geometry, straight
 from stiffmap.diagnosis import clock
 from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.clock import Clock
@@ -146,3 +147,18 @@ def test_what_was_asked_for_longest_ago_goes_first() -> None:
     assert (kept.get("a"), kept.get("b"), kept.get("c")) == (1, None, 3)
     kept.put("c", 4, 6)
     assert (len(kept), kept.bytes) == (2, 10)
+
+
+def test_reach_is_asked_once_for_all_machines_of_one_geometry() -> None:
+    """Springs, gaps and masses close no joint elsewhere; another length of the bars does."""
+    machine = sm.load_machine("linear-delta")
+    plan = random_plan(machine, "position", poses=4, seed=1)
+    play = machine.with_effect("dead_zone", element="carriage", legs=["a"], half_width=1e-4)
+    soft = machine.with_effect("compliance", element="carriage", legs=["a"], scale=2.0)
+    same = {nominal_geometry(m.description) for m in (machine, play, soft)}
+    assert len(same) == 1
+    assert nominal_geometry(sm.load_machine("rotary-delta").description) not in same
+    assert straight(machine.description) is machine.description
+    assert straight(play.description) == straight(machine.description)
+    assert in_reach(play, plan).all()
+    assert in_reach(play, plan) is not in_reach(machine, plan)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
+from stiffmap.description.rigid import nominal_geometry, straight
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
@@ -26,9 +30,23 @@ def coordinates_of(machine: Machine, plan: Experiment) -> Floats:
 
 
 def in_reach(machine: Machine, plan: Experiment) -> Mask:
-    """(n,) rows whose commanded pose the rigid machine can take."""
+    """(n,) rows whose commanded pose the rigid machine can take; found out once for all machines of one geometry."""
     if plan.joints is not None:
         return np.asarray(np.isfinite(plan.joints).all(axis=1))
+    known = _REACH.setdefault(plan, {})
+    key = nominal_geometry(machine.description)
+    if key not in known:
+        known[key] = _reached(machine, plan)
+    return known[key].copy()
+
+
+_REACH: WeakKeyDictionary[Experiment, dict[Hashable, Mask]] = WeakKeyDictionary()
+
+
+def _reached(machine: Machine, plan: Experiment) -> Mask:
+    plain = straight(machine.description)  # a gap without force has no stiffness, and would leave the kernels
+    if plain is not machine.description:
+        machine = Machine(plain, like=machine)
     out = np.zeros(len(plan), bool)
     if not machine.compiled.not_fast:  # where the kernels stand at rest the joints close, twenty times faster
         out = machine.solve(plan.position, np.zeros((len(plan), 6)), rotation=plan.rotation).ok.copy()

@@ -234,9 +234,8 @@ def seen_from(
 
 def _at_command(machine: Machine, plan: Experiment) -> Floats:
     """(n, c) zero where the pose can be reached, else NaN."""
-    _, first, back = np.unique(plan.groups, return_index=True, return_inverse=True)
-    zero = np.zeros((len(plan), len(plan.channels)))
-    return np.where(in_reach(machine, plan.rows(first))[back.reshape(-1), None], zero, np.nan)
+    there = in_reach(machine, plan.each_pose)[plan.groups]
+    return np.where(there[:, None], np.zeros((len(plan), len(plan.channels))), np.nan)
 
 
 def _moves_unloaded(machine: Machine, plan: Experiment) -> bool:
