@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -34,6 +35,7 @@ UNLIMITED = 1e300
 ROUND_OFF = 1e-12
 """Of a range's larger end: a pose that is commanded to an end is not flagged for its last digits."""
 FAR = 10.0  # rad or m: end of the flat pieces of a stick law
+KEPT_CHAINS = 128
 START = 1e-3  # rad or m: slope of a stick law in the linear start of Newton's iteration
 
 
@@ -88,8 +90,9 @@ def law(of: Law) -> _core.Law:
     return _core.Law(of.stiffness, of.cubic, list(of.knots), *friction)
 
 
-def chain(elements: Sequence[Element]) -> _core.Chain:
-    """Compiled chain of a sequence."""
+@lru_cache(maxsize=KEPT_CHAINS)
+def chain(elements: tuple[Element, ...]) -> _core.Chain:
+    """Compiled chain of a sequence, which nobody changes: variants of a machine share most of their legs."""
     out = _core.Chain()
     add_elements(out, elements)
     return out

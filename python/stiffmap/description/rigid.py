@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import replace
+from functools import lru_cache
 
 from stiffmap.description.elements import Block, Body, Element, Joint, Offset, Spring
 from stiffmap.description.laws import Law
@@ -11,31 +12,38 @@ from stiffmap.description.machine import MachineDescription
 from stiffmap.description.tree import Elements, edit_sequences
 
 Change = Callable[[Element], Element]
+KEPT = 128
+"""Sequences whose geometry is kept: variants of a machine share most of theirs."""
 
 
 def nominal_geometry(description: MachineDescription) -> Hashable:
     """Equal for machines whose joints close at the same places: they differ in springs, laws, masses and errors only."""
-    d = _edited(description, _nominal)
-    return d.base, d.legs, d.platform, d.home, d.search_home, d.task, d.workspace
+    d = description
+    parts = (_nominal_elements(d.base), _nominal_elements(d.platform))
+    legs = tuple((leg.name, _nominal_elements(leg.elements)) for leg in d.legs)
+    return *parts, legs, d.home, d.search_home, d.task, d.workspace
 
 
 def straight(description: MachineDescription) -> MachineDescription:
     """The machine with linear drives and link springs; itself where they are."""
-    d = _edited(description, _straight)
-    return description if (d.base, d.legs, d.platform) == _elements(description) else d
+    d = description
+    legs = tuple(replace(leg, elements=_edited(leg.elements, _straight)) for leg in d.legs)
+    ends = _edited(d.base, _straight), _edited(d.platform, _straight)
+    if (*ends, legs) == (d.base, d.platform, d.legs):
+        return description
+    return replace(d, base=ends[0], platform=ends[1], legs=legs, effects=(), declared=None)
 
 
-def _elements(d: MachineDescription) -> tuple[object, ...]:
-    return d.base, d.legs, d.platform
+def _edited(elements: Elements, change: Change) -> Elements:
+    def each(sequence: Elements) -> Elements:
+        return tuple(e if isinstance(e, Block) else change(e) for e in sequence)
+
+    return edit_sequences(elements, each)
 
 
-def _edited(d: MachineDescription, change: Change) -> MachineDescription:
-    def each(elements: Elements) -> Elements:
-        return tuple(e if isinstance(e, Block) else change(e) for e in elements)
-
-    legs = tuple(replace(leg, elements=edit_sequences(leg.elements, each)) for leg in d.legs)
-    ends = (edit_sequences(d.base, each), edit_sequences(d.platform, each))
-    return replace(d, base=ends[0], legs=legs, platform=ends[1], effects=(), declared=None)
+@lru_cache(maxsize=KEPT)
+def _nominal_elements(elements: Elements) -> Elements:
+    return _edited(elements, _nominal)
 
 
 def _nominal(e: Element) -> Element:

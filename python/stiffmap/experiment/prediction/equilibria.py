@@ -178,9 +178,10 @@ class Solver:
         solution = _solved(machine, once, options)
         ok = solution.ok | _in_play(solution, once)
         moved = np.where(ok[:, None, None], solution.readings[:, 1:], np.nan)
-        linear = moved[back, [wanted.index(r) for r in read]]
+        number = {point: i for i, point in enumerate(wanted)}
+        linear = moved[back, [number[r] for r in read]]
         if on:
-            linear = seen_from(machine, plan, read, on, linear, moved[back, wanted.index(on)])
+            linear = seen_from(machine, plan, read, on, linear, moved[back, number[on]])
         work = Work(len(once), int(np.count_nonzero(solution.flags & Flag.REFERENCE_PATH)))
         if not joint_channels(plan):
             return linear, work
