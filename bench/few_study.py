@@ -29,6 +29,7 @@ from stiffmap.diagnosis.decision.few import fitted, not_few, screened
 from stiffmap.diagnosis.search.selection import start_values
 from stiffmap.diagnosis.search.study import Study, study
 from stiffmap.experiment import Predictor, random_plan, simulate
+from stiffmap.experiment.noise.whitening import readings_of
 
 SIZES = (20.0, 60.0, 200.0)
 MOST = 1000.0
@@ -106,11 +107,12 @@ def cases(s: Study, o: argparse.Namespace) -> Iterator[tuple[str, list[AppliedEf
 def sized(s: Study, v: Variant, size: float) -> AppliedEffect | None:
     """The effect with values whose signature has this rms in noise floors, as far as its bounds go."""
     rng = np.random.default_rng(crc32(f"{v.candidate} {size}".encode()))
-    n = v.columns.shape[-1]
+    lines = v.array()
+    n = len(lines)
     way = rng.standard_normal(n)
     way = np.where(v.sign == 0, way, np.abs(way) * np.sign(v.sign))
-    signal = (v.columns / s.noise.sigma[..., None]) @ way
-    rms = float(np.sqrt(np.nanmean(np.where(s.experiment.read, signal, np.nan) ** 2)))
+    signal = way @ (lines / s.noise.sigma[readings_of(s.experiment, s.plan.base)])
+    rms = float(np.sqrt(np.mean(signal**2)))
     if not rms > 0:
         return None
     way = way * min(size / rms, MOST / float(np.abs(way).max()))

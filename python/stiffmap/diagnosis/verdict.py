@@ -229,7 +229,7 @@ def _noise(s: Study, finding: Finding) -> NoiseReport:
 
 def _unobservable(s: Study, finding: Finding) -> list[str]:
     seen = {c.representative for c in s.classes} | {m for c in s.classes for m in c.members}
-    all_ = dict.fromkeys(v.candidate for v in s.plan.variants)
+    all_ = {id(v.candidate): v.candidate for v in s.plan.variants}.values()
     failed = [f"{c} ({why})" for c, why in s.plan.failed]
     tried = [f"{c} (fit failed: {why})" for c, why in finding.search.failed.items()]
     return [str(c) for c in all_ if c not in seen] + failed + tried

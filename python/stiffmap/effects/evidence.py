@@ -95,6 +95,28 @@ class Tried:
 
 
 @dataclass(frozen=True, eq=False)
+class Periods:
+    """Signatures of one effect at many frequencies: sine and cosine of 2π f u, u a coordinate of each row, times a change
+    of its readings; the sum over several such coordinates."""
+
+    travels: Sequence[Floats]
+    """(n,) coordinates u, m or rad."""
+    changes: Sequence[Floats]
+    """(n, c) change of the readings with each of them."""
+    frequencies: Floats
+    """(F,) equally spaced, 1/m or 1/rad."""
+
+    def columns(self, k: int) -> Floats:
+        """(n, c, 2) of frequency k."""
+        parts = [
+            np.stack([change * np.sin(w)[:, None], change * np.cos(w)[:, None]], axis=-1)
+            for travel, change in zip(self.travels, self.changes, strict=True)
+            for w in [2 * np.pi * self.frequencies[k] * travel]
+        ]
+        return np.asarray(sum(parts))
+
+
+@dataclass(frozen=True, eq=False)
 class Signature:
     """How an effect shows in the readings to first order, for one choice of its parameters without a null.
 
@@ -108,12 +130,16 @@ class Signature:
         with a null stands at its null plus strength times scale.
     grows
         Whether strengths can only be positive.
+    period
+        In place of columns: all periods that are tried alike, and the number of this one. They are not written out
+        where rows are many.
     """
 
     values: Mapping[str, float]
     columns: Floats | None = None
     start: Callable[[Floats], Mapping[str, float]] | None = None
     grows: bool = False
+    period: tuple[Periods, int] | None = None
 
 
 Load = Callable[[Floats, Plan, AppliedEffect], Floats]

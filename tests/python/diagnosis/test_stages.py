@@ -13,6 +13,7 @@ from scipy.stats import norm
 
 from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.candidates.sensitivity import Variant
+from stiffmap.diagnosis.candidates.stack import Stack
 from stiffmap.diagnosis.decision.cross_validation import HeldOut, _gain
 from stiffmap.diagnosis.decision.empirical import empirical
 from stiffmap.diagnosis.decision.stability import explained, steady
@@ -35,10 +36,8 @@ def candidate(name: str, *scales: float) -> Candidate:
 
 def variant(name: str, *columns: Floats, sign: float = 0.0, scale: float = 1e-4) -> Variant:
     """Change of dx by each column (n,)."""
-    n, p = len(columns[0]), len(columns)
-    wide = np.zeros((n, 6, p))
-    wide[:, 0, :] = np.column_stack(columns)
-    return Variant(candidate(name, *[scale] * p), wide, np.full(p, sign))
+    p = len(columns)
+    return Variant(candidate(name, *[scale] * p), np.stack(columns), np.full(p, sign))
 
 
 def readings_of_dx(values: Floats, **more: Any) -> Experiment:
@@ -64,7 +63,7 @@ DATA = 3 * E[0] + 4 * E[1]
 def screen() -> Screen:
     both, back = variant("both", E[0], 2 * E[1]), variant("back", -E[1], sign=1.0)
     blind = variant("blind", 0 * E[0])
-    return Screen.of(problem_of(DATA), [variant("one", 2 * E[0]), both, back, blind])
+    return Screen.of(problem_of(DATA), Stack.of([variant("one", 2 * E[0]), both, back, blind]))
 
 
 def test_screen_takes_away_the_squared_projection() -> None:
@@ -99,7 +98,8 @@ def test_screen_beside_a_model_is_a_projection() -> None:
     columns = [rng.standard_normal((40, p)) for p in (1, 2, 3, 2)]
     columns[3][:, 1] = columns[3][:, 0]
     tangent = np.linalg.qr(np.column_stack([columns[1][:, 0], rng.standard_normal(40)]))[0]
-    s = Screen.of(problem_of(data), [variant(f"v{i}", *c.T) for i, c in enumerate(columns)]).beside(tangent)
+    s = Screen.of(problem_of(data), Stack.of([variant(f"v{i}", *c.T) for i, c in enumerate(columns)]))
+    s = s.beside(tangent)
     left = data - tangent @ (tangent.T @ data)
     found = s.delta_chi2(left[:, None])[:, 0]
     for i, c in enumerate(columns):
@@ -117,14 +117,14 @@ def test_screen_beside_a_model_is_a_projection() -> None:
 def test_significance_counts_independent_tests(number: int) -> None:
     """The least of k uniform p-values has the median 1 - 2^(-1/k), and M = ln 2 over it."""
     axes = np.eye(12)
-    s = Screen.of(problem_of(np.zeros(12)), [variant(f"v{i}", axes[i]) for i in range(number)])
+    s = Screen.of(problem_of(np.zeros(12)), Stack.of([variant(f"v{i}", axes[i]) for i in range(number)]))
     wanted = log(2.0) / (1 - 2 ** (-1 / number))
     assert effective_number_of_trials(s, seed=1, draws=20000) == pytest.approx(wanted, rel=0.05)
 
 
 def test_significance_counts_the_same_signature_once() -> None:
     same = [variant(f"v{i}", (i + 1.0) * E[0]) for i in range(8)]
-    s = Screen.of(problem_of(np.zeros(5)), same)
+    s = Screen.of(problem_of(np.zeros(5)), Stack.of(same))
     assert effective_number_of_trials(s, seed=1, draws=20000) == pytest.approx(2 * log(2.0), rel=0.05)
 
 
@@ -158,12 +158,14 @@ def test_stability_measures_what_is_explained() -> None:
 def test_detection_is_the_power_of_the_threshold() -> None:
     """One parameter of whitened length 4 per 0.1 mm: found with 95 % power at (√critical + 1.645)/4 scales, as the
     other tail counts for nothing; critical 5² belongs to -ln p of 5 standard deviations."""
-    s = Screen.of(problem_of(np.zeros(5)), [variant("seen", 4 * E[0]), variant("faint", 1e-3 * E[1])])
+    s = Screen.of(
+        problem_of(np.zeros(5)), Stack.of([variant("seen", 4 * E[0]), variant("faint", 1e-3 * E[1])])
+    )
     seen, faint = detectable(s, -log(erfc(5 / sqrt(2))))
     size = seen.sizes["p0"]
     assert size == pytest.approx((5 + norm.isf(0.05)) / 4 * 1e-4, rel=1e-6)
     assert faint.sizes["p0"] is None  # changes no reading by as much as counts at all
-    beyond = Screen.of(problem_of(np.zeros(5)), [variant("bound", 2 * E[1], scale=1.0)])
+    beyond = Screen.of(problem_of(np.zeros(5)), Stack.of([variant("bound", 2 * E[1], scale=1.0)]))
     assert (
         detectable(beyond, 12.0)[0].sizes["p0"] is None
     )  # (5 + 1.6)/2 m and more: larger than the parameter's bound

@@ -12,13 +12,14 @@ from stiffmap.description import AppliedEffect
 from stiffmap.diagnosis.candidates.candidates import Candidate, candidates, clash
 from stiffmap.diagnosis.candidates.probe import STEP, PlanProbe
 from stiffmap.diagnosis.candidates.sensitivity import Variant, difference
+from stiffmap.diagnosis.candidates.stack import Stack
 from stiffmap.diagnosis.fitting.fit import evaluate, fit
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.screen import Screen
 from stiffmap.diagnosis.search.selection import Search, additions, backward
 from stiffmap.experiment import Predictor, random_plan, simulate
 from stiffmap.experiment.noise.level import noise_of
-from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.noise.whitening import Problem, readings_of
 from stiffmap.experiment.prediction.kept import Kept
 
 TRUTH = [AppliedEffect("tilt", "actuator", ("x",), (("angle_y", 5e-4), ("angle_z", -4e-4)))]
@@ -38,15 +39,16 @@ def search(tilts: list[Candidate]) -> Search:
     predictor = Predictor(machine, data)
     base = predictor()
     problem = Problem.of(data, noise_of(data).sigma, base)
+    index = readings_of(data, base)
     variants = [
         Variant(
             c,
-            np.stack([difference(c, p, (), predictor, base) for p in c.linear], axis=-1),
+            np.stack([difference(c, p, (), predictor, base)[index] for p in c.linear]),
             np.zeros(len(c.linear)),
         )
         for c in tilts
     ]
-    return Search(predictor, problem, Screen.of(problem, variants), 50.0)
+    return Search(predictor, problem, Screen.of(problem, Stack.of(variants)), 50.0)
 
 
 def test_one_leg_and_all_legs_clash(tilts: list[Candidate]) -> None:

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from stiffmap.diagnosis.candidates.candidates import Candidate, candidates
+from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.candidates.probe import PlanProbe
-from stiffmap.effects import Parameter, get, kinds
-from stiffmap.effects.evidence import Tried, signatures_on_a_grid
-from stiffmap.errors import StiffmapError
+from stiffmap.diagnosis.candidates.waves import Wave, Waves
+from stiffmap.effects import Parameter, get
+from stiffmap.effects.evidence import Periods, Tried, signatures_on_a_grid
 from stiffmap.experiment.experiment import Floats
-from stiffmap.experiment.prediction.fingerprint import fingerprint
+from stiffmap.experiment.noise.whitening import readings_of
 from stiffmap.experiment.prediction.predict import Predictor
 
 Shape = tuple[tuple[str, float], ...]
+Start = Callable[[Floats], Mapping[str, float]]
+Numbers = NDArray[np.intp]
+MOST_STORED = 5_000_000
+"""Numbers that the periods of one candidate may store; more are computed anew wherever they are needed."""
 # Share of a parameter's scale for a difference: laws that only grow from their null take all of it
 SMOOTH, ONE_SIDED = 0.1, 1.0
 
@@ -26,8 +30,9 @@ SMOOTH, ONE_SIDED = 0.1, 1.0
 class Variant:
     """Linear model of a candidate at the null.
 
-    columns
-        (n, 6, p) change of the readings per `scale` of each linear parameter.
+    lines
+        (p, R) change of all readings (`readings_of`) per `scale` of each linear parameter; a `Wave` where they are not
+        stored.
     shape
         Values of the parameters without a null at which the columns hold.
     sign
@@ -37,72 +42,61 @@ class Variant:
     """
 
     candidate: Candidate
-    columns: Floats
+    lines: Floats | Wave
     sign: Floats
     shape: Shape = ()
-    start: Callable[[Floats], Mapping[str, float]] | None = None
+    start: Start | None = None
+
+    def array(self) -> Floats:
+        """(p, R) the columns, one per line."""
+        return self.lines.array() if isinstance(self.lines, Wave) else self.lines
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What does not depend on the readings."""
-
-    base: Floats
-    """(n, 6) prediction of the declared machine."""
-    variants: tuple[Variant, ...]
-    failed: tuple[tuple[Candidate, str], ...]
-    digest: str = ""
-    """Of the machine and the plan."""
-
-
-_PLANS: OrderedDict[str, Plan] = OrderedDict()
-
-
-def plan_of(predictor: Predictor) -> Plan:
-    """Sensitivities of a machine under a plan; the last eight are kept."""
-    key = fingerprint(predictor) + repr([(k, id(get(k))) for k in kinds()])  # users may register more
-    if key not in _PLANS:
-        _PLANS[key] = replace(_compute(predictor), digest=key)
-        if len(_PLANS) > 8:
-            _PLANS.popitem(last=False)
-    _PLANS.move_to_end(key)
-    return _PLANS[key]
-
-
-def _compute(predictor: Predictor) -> Plan:
-    base = predictor()
-    good: list[Variant] = []
-    failed: list[tuple[Candidate, str]] = []
-    for candidate in candidates(predictor.machine.description, predictor.experiment):
-        try:
-            found = list(variants(candidate, predictor, base))
-        except StiffmapError as problem:
-            failed.append((candidate, str(problem)))
-            continue
-        good += [v for v in found if _usable(v, base)]
-        if not any(_usable(v, base) for v in found):
-            failed.append((candidate, "the machine fails with it"))
-    return Plan(base, tuple(good), tuple(failed))
-
-
-def _usable(variant: Variant, base: Floats) -> bool:
-    return bool(np.isfinite(variant.columns[np.isfinite(base)]).all())
-
-
-def variants(candidate: Candidate, predictor: Predictor, base: Floats) -> Iterator[Variant]:
-    """One linear model per signature of a candidate."""
+def variants(candidate: Candidate, predictor: Predictor, base: Floats) -> Iterator[Variant | None]:
+    """One linear model per signature of a candidate; None where the machine fails with it."""
     tried = Tried(candidate.element, candidate.legs, candidate.parameters)
     linear = candidate.linear
+    index = readings_of(predictor.experiment, base)
+    long: dict[int, Waves | None] = {}
     for s in (get(candidate.kind).signature or signatures_on_a_grid)(PlanProbe(predictor, base), tried):
         shape = tuple(s.values.items())
-        if s.columns is not None:
+        if s.period is not None:
+            periods, k = s.period
+            if id(periods) not in long:
+                long[id(periods)] = _waves(periods, index)
+            waves = long[id(periods)]
+            lines = lines_of(periods.columns(k), base, index) if waves is None else Wave(waves, k)
+            yield _variant(candidate, lines, np.full(2, float(s.grows)), shape, s.start)
+        elif s.columns is not None:
             sign = np.full(s.columns.shape[-1], float(s.grows))
-            yield Variant(candidate, s.columns, sign, shape, s.start)
-            continue
-        single = [difference(candidate, p, shape, predictor, base) for p in linear]
-        yield Variant(
-            candidate, np.stack(single, axis=-1), np.array([side(p) for p in linear]), shape, s.start
-        )
+            yield _variant(candidate, lines_of(s.columns, base, index), sign, shape, s.start)
+        else:
+            single = [difference(candidate, p, shape, predictor, base) for p in linear]
+            found = lines_of(np.stack(single, axis=-1), base, index)
+            yield _variant(candidate, found, np.array([side(p) for p in linear]), shape, s.start)
+
+
+def _variant(
+    candidate: Candidate, lines: Floats | Wave | None, sign: Floats, shape: Shape, start: Start | None
+) -> Variant | None:
+    return None if lines is None else Variant(candidate, lines, sign, shape, start)
+
+
+def lines_of(columns: Floats, base: Floats, index: tuple[Numbers, Numbers]) -> Floats | None:
+    """(p, R) of (n, c, p): the columns of the readings, one per line; None where the machine fails."""
+    if not np.isfinite(columns[np.isfinite(base)]).all():
+        return None
+    return np.ascontiguousarray(columns[index].T)
+
+
+def _waves(periods: Periods, index: tuple[Numbers, Numbers]) -> Waves | None:
+    """Periods whose columns are not stored; None where they are few enough to be, or the machine fails."""
+    if 2 * len(periods.frequencies) * len(index[0]) <= MOST_STORED:
+        return None
+    slopes = [c[index] for c in periods.changes]
+    if not all(np.isfinite(c).all() for c in slopes):
+        return None
+    return Waves.of(index[0], periods.travels, slopes, periods.frequencies)
 
 
 def side(p: Parameter) -> int:

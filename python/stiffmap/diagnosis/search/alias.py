@@ -57,8 +57,10 @@ def alias_classes(screen: Screen, description: MachineDescription) -> list[Alias
                 tuple(screen.variants[order[b]].candidate for b in more),
             )
         )
-    shaped = dict.fromkeys(v.candidate for i, v in enumerate(screen.variants) if v.shape and screen.rank[i])
-    return out + [AliasClass(c) for c in shaped]
+    shaped = {
+        id(v.candidate): v.candidate for i, v in enumerate(screen.variants) if v.shape and screen.rank[i]
+    }
+    return out + [AliasClass(c) for c in shaped.values()]
 
 
 def containment(screen: Screen, order: Sequence[int]) -> Floats:

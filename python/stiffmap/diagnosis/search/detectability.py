@@ -25,19 +25,19 @@ class Detectable:
 
 def detectable(screen: Screen, threshold: float) -> list[Detectable]:
     """One entry per candidate; `threshold` is the -ln p that the whole search demands."""
-    out: dict[Candidate, list[dict[str, float | None]]] = {}
+    out: dict[int, list[dict[str, float | None]]] = {}
+    place: dict[int, Candidate] = {}
     for i, v in enumerate(screen.variants):
         rank = max(1, int(screen.rank[i]))
         length = _needed(threshold, rank)
-        columns = screen.columns(i)
+        columns = screen.lengths(i)
         sizes = {
-            p.name: _size(
-                float(np.linalg.norm(columns[:, k])), length, p.scale, p.upper - float(p.null or 0.0)
-            )
+            p.name: _size(float(columns[k]), length, p.scale, p.upper - float(p.null or 0.0))
             for k, p in enumerate(v.candidate.linear)
         }
-        out.setdefault(v.candidate, []).append(sizes)
-    return [Detectable(c, _middle(sizes)) for c, sizes in out.items()]
+        place[id(v.candidate)] = v.candidate
+        out.setdefault(id(v.candidate), []).append(sizes)
+    return [Detectable(place[c], _middle(sizes)) for c, sizes in out.items()]
 
 
 @cache

@@ -6,7 +6,6 @@ in the model, are orthonormalised through their Gram matrices; the reduction of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +14,7 @@ from scipy.special import gammaln
 from scipy.stats import chi2
 
 from stiffmap.diagnosis.candidates.sensitivity import Variant
+from stiffmap.diagnosis.candidates.stack import Stack
 from stiffmap.diagnosis.fitting.model import VISIBLE
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
@@ -22,61 +22,58 @@ from stiffmap.experiment.noise.whitening import Problem
 RANK = 1e-5
 FREED = 1e-3
 """Share of a column's length below which a model's directions leave nothing of it."""
-AT_ONCE = 64
-"""Variants that are whitened together."""
 
 
 @dataclass(frozen=True, eq=False)
 class Screen:
-    """Whitened columns of all variants, and what makes them orthonormal beside a model."""
+    """The columns of all variants under a problem, and what makes them orthonormal beside a model. Whitened columns are
+    made where they are asked for, and never kept."""
 
-    variants: tuple[Variant, ...]
-    members: tuple[NDArray[np.intp], ...]
-    """Per number of parameters p: numbers of the variants."""
-    white: tuple[Floats, ...]
-    """Per p: (V_p p, N) whitened columns, one per line."""
+    problem: Problem
+    stack: Stack
+    grams: tuple[Floats, ...]
+    """Per part: (V_p, p, p) products of the whitened columns of each variant; zero where the readings don't feel them."""
     tangent: Floats
     """(N, k) orthonormal directions of the model."""
     along: tuple[Floats, ...]
-    """Per p: (V_p, p, k) the columns along the model's directions; what counts is the rest of them."""
+    """Per part: (V_p, p, k) the columns along the model's directions; what counts is the rest of them."""
     roots: tuple[Floats, ...]
-    """Per p: (V_p, p, p) M: the rest of the columns times M is orthonormal, zero where the rank is less than p."""
+    """Per part: (V_p, p, p) M: the rest of the columns times M is orthonormal, zero where the rank is less than p."""
+    sizes: tuple[Floats, ...]
+    """Per part: (V_p, p) length of the rest of each column."""
     rank: NDArray[np.intp]
     """(V,) number of directions that are seen; 0: nothing."""
 
     @staticmethod
-    def of(problem: Problem, variants: Sequence[Variant]) -> Screen:
+    def of(problem: Problem, stack: Stack) -> Screen:
         """Screen of the variants beside an empty model."""
-        sizes = np.array([v.columns.shape[-1] for v in variants], dtype=np.intp)
-        members = tuple(np.flatnonzero(sizes == p) for p in np.unique(sizes))
-        white = tuple(_white(problem, [variants[int(i)].columns for i in m]) for m in members)
-        return _screen(tuple(variants), members, white, np.zeros((len(problem), 0)))
+        grams = tuple(_felt(p.gram(problem)) for p in stack.parts)
+        return _screen(problem, stack, grams, np.zeros((len(problem), 0)))
 
     def beside(self, tangent: Floats) -> Screen:
         """The screen with the directions `tangent` (N, k), orthonormal, of a model projected out."""
-        return _screen(self.variants, self.members, self.white, tangent) if tangent.size else self
+        return _screen(self.problem, self.stack, self.grams, tangent) if tangent.size else self
 
-    def only(self, which: Sequence[int]) -> Screen:
-        """The screen of some of the variants."""
-        index = {int(v): k for k, v in enumerate(which)}
-        chosen = [
-            np.array([k for k, v in enumerate(m) if int(v) in index], dtype=np.intp) for m in self.members
-        ]
+    def only(self, which: NDArray[np.intp]) -> Screen:
+        """The screen of some of the variants, in their order."""
+        kept = np.isin(np.arange(len(self.variants)), which)
+        chosen = [np.flatnonzero(kept[m]) for m in self.stack.members]
         some = [k for k, c in enumerate(chosen) if len(c)]
         return Screen(
-            tuple(self.variants[i] for i in which),
-            tuple(np.array([index[int(v)] for v in self.members[k][chosen[k]]], dtype=np.intp) for k in some),
-            tuple(
-                self.white[k]
-                .reshape(len(self.members[k]), -1, self.readings)[chosen[k]]
-                .reshape(-1, self.readings)
-                for k in some
-            ),
+            self.problem,
+            self.stack.only(which),
+            tuple(self.grams[k][chosen[k]] for k in some),
             self.tangent,
             tuple(self.along[k][chosen[k]] for k in some),
             tuple(self.roots[k][chosen[k]] for k in some),
-            self.rank[list(which)],
+            tuple(self.sizes[k][chosen[k]] for k in some),
+            self.rank[which],
         )
+
+    @property
+    def variants(self) -> tuple[Variant, ...]:
+        """All of them."""
+        return self.stack.variants
 
     @property
     def readings(self) -> int:
@@ -85,34 +82,31 @@ class Screen:
 
     def basis(self, i: int) -> Floats:
         """(N, rank) orthonormal columns of variant i."""
-        g, k = self._place(i)
+        g, k = self.stack.place(i)
         root = self.roots[g][k]
         return np.asarray(self.columns(i) @ root[:, np.any(root != 0.0, axis=0)])
 
     def columns(self, i: int) -> Floats:
         """(N, p) whitened columns of variant i, freed of the model's directions."""
-        g, k = self._place(i)
-        p = self.roots[g].shape[-1]
-        rest = self.white[g][k * p : (k + 1) * p].T - self.tangent @ self.along[g][k].T
+        g, k = self.stack.place(i)
+        white = self.problem.white_lines(self.stack.parts[g].line(k))
+        rest = white - self.tangent @ self.along[g][k].T
         return np.asarray(np.where(np.any(self.roots[g][k] != 0.0, axis=1), rest, 0.0))
 
-    def _place(self, i: int) -> tuple[int, int]:
-        for g, m in enumerate(self.members):
-            k = int(np.searchsorted(m, i))
-            if k < len(m) and m[k] == i:
-                return g, k
-        raise IndexError(i)
+    def lengths(self, i: int) -> Floats:
+        """(p,) lengths of the columns of variant i, zero where nothing is left of them."""
+        g, k = self.stack.place(i)
+        return np.asarray(np.where(np.any(self.roots[g][k] != 0.0, axis=1), self.sizes[g][k], 0.0))
 
     def delta_chi2(self, residual: Floats) -> Floats:
         """(V, S) reduction of chi-square of each variant for residuals (N, S); nothing for one-parameter
         effects that would have to grow backwards."""
         out = np.zeros((len(self.variants), residual.shape[1]))
-        rest = residual - self.tangent @ (self.tangent.T @ residual)
-        for m, w, root in zip(self.members, self.white, self.roots, strict=True):
-            v, p = root.shape[:2]
-            along = (w @ rest).reshape(v, p, -1)
+        rest = self.problem.adjoint(residual - self.tangent @ (self.tangent.T @ residual))
+        for m, part, root in zip(self.stack.members, self.stack.parts, self.roots, strict=True):
+            along = part.along(rest)
             reduction = ((root.transpose(0, 2, 1) @ along) ** 2).sum(axis=1)
-            if p == 1:
+            if along.shape[1] == 1:
                 sign = np.array([self.variants[i].sign[0] for i in m])
                 reduction = np.where(along[:, 0] * sign[:, None] >= 0, reduction, 0.0)
             out[m] = reduction
@@ -145,31 +139,20 @@ def chi2_minus_log_p(delta_chi2: Floats, freedom: NDArray[np.intp]) -> Floats:
     return np.asarray(np.where(np.isfinite(out), out, far))
 
 
-def _white(problem: Problem, columns: Sequence[Floats]) -> Floats:
-    """(V p, N) whitened columns of (n, c, p) each, one per line; zero where the readings don't feel them."""
-    out = [
-        problem.white(np.concatenate(columns[k : k + AT_ONCE], axis=-1)).T
-        for k in range(0, len(columns), AT_ONCE)
-    ]
-    white = np.concatenate(out)
-    white[np.sqrt(np.einsum("ij,ij->i", white, white)) <= VISIBLE] = 0.0
-    return white
+def _felt(gram: Floats) -> Floats:
+    """(V, p, p) without the columns that the readings don't feel."""
+    felt = np.sqrt(np.maximum(np.diagonal(gram, axis1=1, axis2=2), 0.0)) > VISIBLE
+    return np.asarray(gram * felt[:, :, None] * felt[:, None, :])
 
 
-def _screen(
-    variants: tuple[Variant, ...],
-    members: tuple[NDArray[np.intp], ...],
-    white: tuple[Floats, ...],
-    tangent: Floats,
-) -> Screen:
-    rank = np.zeros(len(variants), dtype=np.intp)
-    alongs, roots = [], []
-    for m, w in zip(members, white, strict=True):
-        lines = w.reshape(len(m), -1, w.shape[-1])
-        along = (w @ tangent).reshape(len(m), lines.shape[1], -1)
-        gram = lines @ lines.transpose(0, 2, 1)
-        before = np.diagonal(gram, axis1=1, axis2=2)
-        gram = gram - along @ along.transpose(0, 2, 1)
+def _screen(problem: Problem, stack: Stack, grams: tuple[Floats, ...], tangent: Floats) -> Screen:
+    rank = np.zeros(len(stack.variants), dtype=np.intp)
+    alongs, roots, sizes = [], [], []
+    back = problem.adjoint(tangent)
+    for m, part, whole in zip(stack.members, stack.parts, grams, strict=True):
+        before = np.diagonal(whole, axis1=1, axis2=2)
+        along = part.along(back) * (before > 0.0)[:, :, None]
+        gram = whole - along @ along.transpose(0, 2, 1)
         size = np.diagonal(gram, axis1=1, axis2=2)
         kept = size > FREED**2 * before
         scale = np.where(kept, 1.0 / np.sqrt(np.where(kept, size, 1.0)), 0.0)
@@ -179,5 +162,6 @@ def _screen(
         inverse = np.where(good, 1.0 / np.sqrt(np.where(good, values, 1.0)), 0.0)
         roots.append(np.asarray(scale[:, :, None] * vectors * inverse[:, None, :]))
         alongs.append(along)
+        sizes.append(np.sqrt(np.where(kept, size, 0.0)))
         rank[m] = good.sum(axis=1)
-    return Screen(variants, members, white, tangent, tuple(alongs), tuple(roots), rank)
+    return Screen(problem, stack, grams, tangent, tuple(alongs), tuple(roots), tuple(sizes), rank)

@@ -139,7 +139,9 @@ def additions(
     screen = search.screen.beside(model.tangent())
     minus_log_p = screen.minus_log_p(screen.delta_chi2(model.residual[:, None])[:, 0])
     best_of: dict[Candidate, int] = {}
-    for i in np.argsort(-minus_log_p):
+    order = np.argsort(-minus_log_p)
+    firsts = np.sort(np.unique(screen.stack.owner[order], return_index=True)[1])  # the best shape of each
+    for i in order[firsts]:
         v = screen.variants[i]
         if (
             minus_log_p[i] > 0

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from stiffmap.diagnosis.candidates.stack import Stack
 from stiffmap.diagnosis.search.screen import Screen
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.whitening import Problem, readings_of
 
 ALPHA = 1e-4
 """Probability of naming anything where there is nothing, over the whole search."""
 DRAWS = 1000
+ENOUGH, FEWER = 3000, 300
+"""Readings on which the worth of a search is found out, and draws where there are more: how alike the candidates are shows
+on a part of the plan."""
 
 
 def effective_number_of_trials(screen: Screen, seed: int, draws: int = DRAWS) -> float:
@@ -28,6 +34,21 @@ def effective_number_of_trials(screen: Screen, seed: int, draws: int = DRAWS) ->
     ]
     median = float(np.median(np.concatenate(best)))
     return max(1.0, float(np.log(2.0) * np.exp(median)))
+
+
+def on_enough_rows(problem: Problem, stack: Stack, columns: Floats | None, seed: int) -> Screen:
+    """The screen of the variants on whole poses, drawn until they have `ENOUGH` readings; `columns` (n, c, p) of what is
+    uncertain."""
+    e = problem.experiment
+    at, _ = readings_of(e, problem.base)
+    count = np.bincount(e.groups[at], minlength=int(e.groups.max()) + 1)
+    order = np.random.default_rng(seed).permutation(len(count))
+    drawn = order[np.cumsum(count[order]) <= ENOUGH]
+    rows = np.isin(e.groups, drawn)
+    part = e.rows(rows)
+    uncertain = None if columns is None else columns[rows]
+    few = Problem.of(part, problem.sigma[rows], problem.base[rows], None, uncertain)
+    return Screen.of(few, stack.on(rows, rows[at]))
 
 
 def global_p(minus_log_p: float, trials: float) -> float:

@@ -8,14 +8,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from stiffmap.description import MachineDescription
-from stiffmap.diagnosis.candidates.sensitivity import Plan, plan_of
+from stiffmap.diagnosis.candidates.plan import Plan, plan_of
 from stiffmap.diagnosis.clock import Clock
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.alias import AliasClass, alias_classes
 from stiffmap.diagnosis.search.calibrated import Layer
 from stiffmap.diagnosis.search.screen import Screen
 from stiffmap.diagnosis.search.selection import Search, Selection, select
-from stiffmap.diagnosis.search.significance import effective_number_of_trials
+from stiffmap.diagnosis.search.significance import (
+    ENOUGH,
+    FEWER,
+    effective_number_of_trials,
+    on_enough_rows,
+)
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.level import Mask, Noise, noise_of
 from stiffmap.experiment.noise.outliers import outliers, suspects
@@ -115,22 +120,27 @@ def study(
         clock.say("sensitivities of all candidates")
     plan = plan_of(predictor)
     if without:
-        kept = tuple(v for v in plan.variants if v.candidate.kind not in without)
-        plan = replace(plan, variants=kept, digest=plan.digest + repr(sorted(without)))
+        kept = np.flatnonzero([v.candidate.kind not in without for v in plan.variants])
+        plan = replace(plan, stack=plan.stack.only(kept), digest=plan.digest + repr(sorted(without)))
     e = predictor.experiment
     rough = noise_of(e)
     raw = e.reading - plan.base
     bare = raw - nuisance_part(Problem.of(e, rough.sigma, plan.base), raw)
     first = noise_of(e, ~suspects(e, bare, rough.sigma)) if layer is None else layer.noise
     problem = Problem.of(e, first.sigma, plan.base, None, None if layer is None else layer.columns)
-    screen = Screen.of(problem, plan.variants)
+    screen = Screen.of(problem, plan.stack)
     classes = tuple(alias_classes(screen, predictor.machine.description))
     named = _representatives(screen, classes)
     sizes = np.round(np.log(first.sigma), 2).tobytes()
     key = (plan.digest + ("" if layer is None else layer.digest), seed, sizes)
     prepared = time.perf_counter()
     if key not in _TRIALS:
-        _TRIALS[key] = effective_number_of_trials(named, seed)
+        if len(problem) > ENOUGH:
+            uncertain = None if layer is None else layer.columns
+            few = on_enough_rows(problem, named.stack, uncertain, seed)
+            _TRIALS[key] = effective_number_of_trials(few, seed, FEWER)
+        else:
+            _TRIALS[key] = effective_number_of_trials(named, seed)
     seconds = {"sensitivities": prepared - start, "null bootstrap": time.perf_counter() - prepared}
     return Study(
         predictor,
@@ -191,11 +201,10 @@ def search_on(study: Study, keep: Mask, finalists: int) -> Search:
     if keep.all():
         return Search(study.predictor, *study.whole, study.effective_trials, finalists, clock=study.clock)
     problem = study.problem_of(keep)
-    named = {c.representative for c in study.classes}
-    screen = Screen.of(problem, [v for v in study.plan.variants if v.candidate in named])
+    screen = Screen.of(problem, study.whole[1].stack)
     return Search(study.predictor, problem, screen, study.effective_trials, finalists, clock=study.clock)
 
 
 def _representatives(screen: Screen, classes: tuple[AliasClass, ...]) -> Screen:
-    named = {c.representative for c in classes}
-    return screen.only([i for i, v in enumerate(screen.variants) if v.candidate in named])
+    named = {id(c.representative) for c in classes}
+    return screen.only(np.flatnonzero([id(v.candidate) in named for v in screen.variants]))

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stiffmap.description import AppliedEffect, CommandError, MachineDescription
-from stiffmap.effects.evidence import Floats, Probe, Signature, Tried
+from stiffmap.effects.evidence import Floats, Periods, Probe, Signature, Tried
 from stiffmap.effects.library.command import add_command_error
 from stiffmap.effects.library.drive_law import in_unit_of_joint
 from stiffmap.effects.sites import at_sites, drives
@@ -60,13 +60,10 @@ def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
         sine, cosine = strengths
         return {"amplitude": float(np.hypot(sine, cosine)) * scale, "phase": float(np.arctan2(cosine, sine))}
 
-    for frequency in frequencies(reach, next(iter(travel.values()))):
-        parts = [
-            np.stack([each[g] * np.sin(w)[:, None], each[g] * np.cos(w)[:, None]], axis=-1)
-            for g in legs
-            for w in [2 * np.pi * frequency * travel[g]]
-        ]
-        yield Signature({"period": 1.0 / frequency}, np.asarray(sum(parts)), start)
+    tried_ones = frequencies(reach, next(iter(travel.values())))
+    periods = Periods(list(travel.values()), [each[g] for g in legs], tried_ones)
+    for k, frequency in enumerate(tried_ones):
+        yield Signature({"period": 1.0 / frequency}, None, start, period=(periods, k))
 
 
 def frequencies(reach: float, travel: Floats) -> Floats:

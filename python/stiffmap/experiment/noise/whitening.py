@@ -8,6 +8,7 @@ frame, unknown zero of a pose) are projected out once and for all. What is left 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +58,8 @@ class Problem:
             readings are then judged with all of them integrated out (docs/theory.md (M1)).
         """
         rows = np.ones(len(experiment), bool) if keep is None else keep
-        used = experiment.read & rows[:, None] & np.isfinite(base)
-        at, axis = np.nonzero(used)
-        index = (at.astype(np.intp), axis.astype(np.intp))
+        at, axis = readings_of(experiment, base)
+        index = (at[rows[at]], axis[rows[at]])
         none = np.zeros((len(index[0]), 0))
         bare = Problem(experiment, sigma, rows, index, none, _blocks(experiment, sigma, index), base)
         columns = nuisance_columns(experiment, base)
@@ -85,14 +85,57 @@ class Problem:
 
     def white(self, values: Floats) -> Floats:
         """(n, c, ...) -> (N, ...): whitened, nuisances projected out."""
-        sigma = self.sigma[self.index]
-        out = values[self.index] / sigma.reshape(-1, *(1,) * (values.ndim - 2))
+        return self._white(values[self.index])
+
+    def white_lines(self, lines: Floats) -> Floats:
+        """(P, R) -> (N, P): the same of all readings of the experiment, in the order of `readings_of`, one set per line."""
+        return self._white(lines.T if self.used.all() else lines[:, self.used].T)
+
+    def _white(self, picked: Floats) -> Floats:
+        out = picked / self.sigma[self.index].reshape(-1, *(1,) * (picked.ndim - 1))
         for where, inverse in self.blocks:
-            out[where] = inverse @ values[self.index][where]
+            out[where] = inverse @ picked[where]
         out = out - self.nuisance @ (self.nuisance.T @ out)
         if self.uncertain is not None:
             out = out - self.uncertain @ (self.uncertain.T @ out)
         return np.asarray(out)
+
+    def adjoint(self, white: Floats) -> Floats:
+        """(N, S) -> (R, S) y: `lines @ y` is `white_lines(lines).T @ white`."""
+        out = white
+        if self.uncertain is not None:
+            out = out - self.uncertain @ (self.uncertain.T @ out)
+        return self.unwhite(out - self.nuisance @ (self.nuisance.T @ out))
+
+    def unwhite(self, white: Floats) -> Floats:
+        """(N, S) -> (R, S): the same without any projection."""
+        out = white / self.sigma[self.index][:, None]
+        for where, inverse in self.blocks:
+            out[where] = inverse.T @ white[where]
+        wide = np.zeros((len(self.used), white.shape[1]))
+        wide[self.used] = out
+        return wide
+
+    @cached_property
+    def used(self) -> Mask:
+        """(R,) which of all readings of the experiment are in the problem."""
+        return np.asarray(self.keep[readings_of(self.experiment, self.base)[0]])
+
+    @cached_property
+    def precision(self) -> Floats:
+        """(R,) inverse variance of each reading where none share a zero; 0 where it is not in the problem."""
+        wide = np.zeros(len(self.used))
+        wide[self.used] = 1.0 / self.sigma[self.index] ** 2
+        return wide
+
+    @property
+    def projections(self) -> list[tuple[Floats, Floats]]:
+        """Directions (N, k), each orthogonal to all others, and shares (k,): (N, N) products of whitened readings are
+        I - Σ directions diag(shares) directionsᵀ."""
+        found = [(self.nuisance, np.ones(self.nuisance.shape[1]))]
+        if self.uncertain is not None:
+            found.append((self.uncertain, 2.0 - np.einsum("ij,ij->j", self.uncertain, self.uncertain)))
+        return [f for f in found if f[0].shape[1]]
 
     @property
     def exact(self) -> Problem:
@@ -113,6 +156,12 @@ class Problem:
     def residual(self, prediction: Floats) -> Floats:
         """(N,) whitened reading minus prediction; StiffmapError where a pose that it reads failed."""
         return self.white(self.experiment.reading - self.check(prediction))
+
+
+def readings_of(experiment: Experiment, base: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Row and axis of all R readings of an experiment that the declared machine's prediction (n, c) covers."""
+    at, axis = np.nonzero(experiment.read & np.isfinite(base))
+    return at.astype(np.intp), axis.astype(np.intp)
 
 
 def nuisance_part(problem: Problem, values: Floats) -> Floats:
