@@ -14,6 +14,7 @@ from stiffmap.diagnosis.candidates.fourier import Fourier
 from stiffmap.diagnosis.candidates.sensitivity import Variant
 from stiffmap.diagnosis.candidates.stack import Dense, Stack
 from stiffmap.diagnosis.candidates.waves import Wave, Waves
+from stiffmap.diagnosis.decision import patterns
 from stiffmap.diagnosis.search.screen import Screen
 from stiffmap.experiment import Experiment, random_plan, simulate
 from stiffmap.experiment.noise.level import noise_of
@@ -112,3 +113,18 @@ def test_a_diagnosis_is_the_same_whether_periods_are_stored_or_not(monkeypatch: 
     )
     assert [str(e) for e in other.effects] == [str(e) for e in stored.effects]
     assert stored.verdict == other.verdict == "effects"
+
+
+def test_wide_patterns_take_away_what_their_columns_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = positions()
+    problem = problem_of(data, True)
+    rng = np.random.default_rng(8)
+    tangent = np.linalg.qr(problem.white(rng.standard_normal((*data.reading.shape, 2))))[0]
+    residual = problem.residual(np.zeros_like(data.reading))
+    for columns in (data.groups, rng.standard_normal((len(data), 5))):
+        direct = patterns._reduction(problem, residual, tangent, 1, columns)
+        monkeypatch.setattr(patterns, "WIDE", 0)
+        found = patterns._reduction(problem, residual, tangent, 1, columns)
+        monkeypatch.undo()
+        assert found[1] == direct[1]
+        assert found[0] == pytest.approx(direct[0], rel=1e-9)

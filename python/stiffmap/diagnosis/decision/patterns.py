@@ -13,10 +13,14 @@ from itertools import combinations_with_replacement
 import numpy as np
 from scipy.stats import chi2
 
+from stiffmap.diagnosis.decision.pattern_sums import reduction_by_sums
 from stiffmap.diagnosis.search.significance import ALPHA
-from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.experiment import Floats, Integers
 from stiffmap.experiment.noise.field import free_position, unit
 from stiffmap.experiment.noise.whitening import Problem, basis
+
+WIDE = 1_000_000
+"""Numbers in the columns of a pattern beyond which only their products are made."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +66,14 @@ def patterns(problem: Problem, residual: Floats, tangent: Floats) -> list[Patter
 
 
 def _reduction(
-    problem: Problem, residual: Floats, tangent: Floats, axis: int, columns: Floats
+    problem: Problem, residual: Floats, tangent: Floats, axis: int, columns: Floats | Integers
 ) -> tuple[float, int]:
+    """Drop of chi-square and rank of columns (n, p), or of one for each of the labels (n,), on an axis."""
+    number = columns.max() + 1 if columns.ndim == 1 else columns.shape[1]
+    if number * len(problem) > WIDE and not problem.blocks:
+        return reduction_by_sums(problem, residual, tangent, axis, columns)
+    if columns.ndim == 1:
+        columns = np.eye(number)[columns]
     on_axis = np.zeros((columns.shape[1], *problem.sigma.shape))
     on_axis[:, :, axis] = columns.T
     white = np.column_stack([problem.white(c) for c in on_axis])
@@ -73,8 +83,8 @@ def _reduction(
     return float(np.sum((q.T @ residual) ** 2)), q.shape[1]
 
 
-def features(problem: Problem) -> Iterator[tuple[str, Floats]]:
-    """Name and (n, p) columns of every pattern."""
+def features(problem: Problem) -> Iterator[tuple[str, Floats | Integers]]:
+    """Name and (n, p) columns of every pattern, or (n,) labels of rows that each have a column of their own."""
     e = problem.experiment
     x = unit(free_position(e))
     n = len(e)
@@ -96,8 +106,8 @@ def features(problem: Problem) -> Iterator[tuple[str, Floats]]:
         yield "branch", np.array([b == "unloading" for b in e.branch], dtype=float)[:, None]
     if e.setup:
         labels = np.unique(e.setup, return_inverse=True)[1]
-        yield "set-ups", np.eye(labels.max() + 1)[labels]
-    yield "single poses", np.eye(e.groups.max() + 1)[e.groups]
+        yield "set-ups", labels.reshape(-1)
+    yield "single poses", e.groups
 
 
 def loads(wrench: Floats, x: Floats) -> Iterator[tuple[str, Floats]]:

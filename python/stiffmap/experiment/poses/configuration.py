@@ -8,7 +8,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from stiffmap.description.rigid import nominal_geometry, straight
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 
@@ -20,13 +20,21 @@ def coordinates_of(machine: Machine, plan: Experiment) -> Floats:
     effects that the machine did not have on which the plan was `located`: joints go by name.
     """
     if plan.joints is None:
-        return inverse_kinematics(machine, plan.position, plan.rotation).coordinates
+        once, back = poses_once(plan)
+        return inverse_kinematics(machine, once.position, once.rotation).coordinates[back]
     known = {name: i for i, name in enumerate(plan.joint_names)}
     names = machine.compiled.names.coordinates
     out = np.tile(machine.compiled.home_coordinates(), (len(plan), 1))
     mine = [i for i, name in enumerate(names) if name in known]
     out[:, mine] = plan.joints[:, [known[names[i]] for i in mine]]
     return out
+
+
+def poses_once(plan: Experiment) -> tuple[Experiment, Integers]:
+    """Rows with each commanded pose once, and (n,) which of them stands for each row."""
+    if plan.command is None and plan.joints is None:
+        return plan.each_pose, plan.groups
+    return plan, np.arange(len(plan))
 
 
 def in_reach(machine: Machine, plan: Experiment) -> Mask:

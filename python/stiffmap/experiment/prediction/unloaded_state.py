@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.description import CommandError, Element, Joint, Leg, MachineDescription
 from stiffmap.description.tree import edit_sequences
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.configuration import coordinates_of
+from stiffmap.experiment.poses.configuration import coordinates_of, poses_once
 from stiffmap.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.machine import Machine
 
@@ -60,6 +60,7 @@ def _travels(machine: Machine, experiment: Experiment, back: Floats) -> Floats:
 
 def drive_jacobian(machine: Machine, plan: Experiment, step: float = 1e-6) -> Floats:
     """(n, 6, actuators) twist of the TCP per unit of each drive of the rigid machine, in the plan's branch."""
+    plan, back = poses_once(plan)
     start = coordinates_of(machine, plan)
     drives = [machine.compiled.names.joints[a] for a in machine.actuators]
     columns = []
@@ -70,7 +71,7 @@ def drive_jacobian(machine: Machine, plan: Experiment, step: float = 1e-6) -> Fl
         lost = ~np.asarray(np.isfinite(between).all(axis=(1, 2)))[:, None, None]
         turn = Rotation.from_matrix(np.where(lost, np.eye(3), between)).as_rotvec()
         columns.append(np.hstack([up.position - down.position, turn]) / (2 * step))
-    return np.stack(columns, axis=-1)
+    return np.stack(columns, axis=-1)[back]
 
 
 def lagging(machine: Machine, sign: Floats, weighs: bool = False) -> Machine:
