@@ -109,6 +109,7 @@ def diagnose(
 def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
     s, finding, verdict, left = found.study, found.finding, found.verdict, found.left
     e, search = s.experiment, finding.search
+    s.clock.say("rivals and intervals")
     why = Explanation(finding.model) if s.clock.over else explain(s, search, finding.model)
     model, other = why.model, why.others
     finding = replace(finding, selection=replace(finding.selection, model=model))

@@ -14,9 +14,11 @@ from stiffmap.diagnosis.candidates.fourier import Fourier
 from stiffmap.diagnosis.candidates.sensitivity import Variant
 from stiffmap.diagnosis.candidates.stack import Dense, Stack
 from stiffmap.diagnosis.candidates.waves import Wave, Waves
-from stiffmap.diagnosis.decision import patterns
+from stiffmap.diagnosis.decision import empirical, patterns
 from stiffmap.diagnosis.search.screen import Screen
 from stiffmap.experiment import Experiment, random_plan, simulate
+from stiffmap.experiment.noise.field import covariance
+from stiffmap.experiment.noise.folds import folds
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import Problem, readings_of
 
@@ -128,3 +130,17 @@ def test_wide_patterns_take_away_what_their_columns_do(monkeypatch: pytest.Monke
         monkeypatch.undo()
         assert found[1] == direct[1]
         assert found[0] == pytest.approx(direct[0], rel=1e-9)
+
+
+def test_a_field_of_shapes_is_the_field() -> None:
+    """With all shapes kept, the same correction of held-out rows as by the covariance itself."""
+    data = positions()
+    rng = np.random.default_rng(9)
+    residual = 1e-5 * (np.sin(4.0 * data.position[:, :1]) + 0.1 * rng.standard_normal((len(data), 6)))
+    residual[3, 1] = np.nan
+    sigma = np.full_like(residual, 1e-6)
+    label, _ = folds(data, 1)
+    whole = empirical._held(data, residual, sigma, label, 1.0)
+    shape = np.linalg.cholesky(covariance(data, 1.0) + 1e-12 * np.eye(len(data)))
+    parts = empirical._held_by_shapes(residual, sigma, label, shape)
+    assert parts == pytest.approx(whole, abs=1e-3 * np.abs(whole).max())

@@ -87,6 +87,7 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
 
 def _layered(s: Study, found: Calibrator, seed: int, tolerances: Tolerances) -> Answer:
     """Effects on top of a calibration; at the floor of what no model explains, where something is left."""
+    s.clock.say("effects on top of a calibration")
     base = _above(s, Layer.of(found, found.answer(seed)), seed)
     rho = _floor_beside_screen(base)
     if rho < WORTH_A_FLOOR:
@@ -189,6 +190,7 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
 
 def _found_at(s: Study, found: Calibrator, rho: float, seed: int) -> tuple[Study, Finding]:
     """The search done again where `rho` noise variances of no model's count as noise."""
+    s.clock.say("the search again, where what no model explains counts as noise")
     assert s.layer is not None
     raised = Layer.of(found, s.layer.calibration, rho)
     again = study(s.predictor, seed, raised, s.clock, s.without)

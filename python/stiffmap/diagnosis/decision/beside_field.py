@@ -25,6 +25,7 @@ def standing(s: Study, finding: Finding) -> tuple[Model, tuple[str, ...]]:
     price = STRONG + float(np.log(max(search.effective_trials, 1.0)))
     if not model.candidates or s.clock.over:
         return model, ()
+    s.clock.say("a smooth field that knows nothing of the machine")
     left = s.free(s.experiment.reading - s.plan.base, finding.outliers)
     now = log_evidence(s, model, finding.outliers, left)
     while model.candidates:

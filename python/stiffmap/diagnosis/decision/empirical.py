@@ -12,10 +12,12 @@ import numpy as np
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.summary import rms
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
-from stiffmap.experiment.noise.field import covariance
+from stiffmap.experiment.noise.field import covariance, shapes
 from stiffmap.experiment.noise.folds import folds
 
 LENGTHS = (0.5, 1.0, 2.0)
+MOST_ROWS, SHAPES = 2000, 200
+"""Rows beyond which the field is made of so many shapes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,8 @@ def empirical(experiment: Experiment, residual: Floats, sigma: Floats, seed: int
 
 
 def _held(e: Experiment, residual: Floats, sigma: Floats, label: Integers, length: float) -> Floats:
+    if len(e) > MOST_ROWS:
+        return _held_by_shapes(residual, sigma, label, shapes(e, SHAPES, length))
     kernel = covariance(e, length)
     out = np.full_like(residual, np.nan)
     for axis in np.flatnonzero(np.isfinite(residual).any(axis=0)):
@@ -51,7 +55,31 @@ def _held(e: Experiment, residual: Floats, sigma: Floats, label: Integers, lengt
             train = np.flatnonzero((label != fold) & np.isfinite(residual[:, axis]))
             test = np.flatnonzero(label == fold)
             y, noise = residual[train, axis], sigma[train, axis]
-            size = max(float(np.var(y) - np.mean(noise**2)), 0.01 * float(np.mean(noise**2)))
+            size = _size(y, noise)
             v = size * kernel[np.ix_(train, train)] + np.diag(noise**2)
             out[test, axis] = size * kernel[np.ix_(test, train)] @ np.linalg.solve(v, y)
+    return out
+
+
+def _size(y: Floats, noise: Floats) -> float:
+    """Variance of the field."""
+    return max(float(np.var(y) - np.mean(noise**2)), 0.01 * float(np.mean(noise**2)))
+
+
+def _held_by_shapes(residual: Floats, sigma: Floats, label: Integers, shape: Floats) -> Floats:
+    """The same of a field with the covariance F Fᵀ of shapes F (n, k): sums over folds, and what each fold adds to them."""
+    out = np.full_like(residual, np.nan)
+    names = np.unique(label)
+    for axis in np.flatnonzero(np.isfinite(residual).any(axis=0)):
+        read = np.isfinite(residual[:, axis])
+        y, noise = np.where(read, residual[:, axis], 0.0), sigma[:, axis]
+        f = shape / np.where(read, noise, np.inf)[:, None]
+        right = y / np.where(read, noise, 1.0)
+        parts = [f[label == k].T @ f[label == k] for k in names]
+        sides = [f[label == k].T @ right[label == k] for k in names]
+        for k, part, side in zip(names, parts, sides, strict=True):
+            train = read & (label != k)
+            size = _size(y[train], noise[train])
+            normal = sum(parts) - part + np.eye(len(side)) / size
+            out[label == k, axis] = shape[label == k] @ np.linalg.solve(normal, sum(sides) - side)
     return out

@@ -24,6 +24,7 @@ def judge(s: Study, finding: Finding) -> tuple[Finding, str, list[Pattern]]:
     Beside a rest that nothing explains an effect is named only if it explains more than the rest is, if all
     together explain `SHARE` of the misfit, and if each is the same in all halves of the data.
     """
+    s.clock.say("structure in what is left")
     left = unexplained(s, finding)
     if not left:
         return finding, "effects" if finding.model.candidates else "none", left
