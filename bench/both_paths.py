@@ -4,7 +4,7 @@
 
 Rounds over all shipped machines, each plain and with each kind of effect on every element that takes it
 (effect_cases.py): random poses of the workspace box, random loads, every tenth pose without load, every other round
-under gravity. The reference solves each pose once; each level's answer is compared with it and counts as one solve.
+under gravity, two rounds each with dead, follower and semitangential loads. The reference solves each pose once; each level's answer is compared with it and counts as one solve.
 Statuses must be equal, displacement and loaded compliance within 1e-10 (tests/python/fast/agreement.py). The state
 file is written after each case: the command goes on where it was stopped. Exit code 1 where something disagrees;
 each such case is printed with what repeats it.
@@ -30,6 +30,7 @@ from stiffmap import _core
 
 POSES = 16
 GRAVITY = (0.0, 0.0, -9.81)
+LOAD_TYPES = ("dead", "follower", "semitangential")
 
 
 def cases() -> list[tuple[str, str, sm.Machine]]:
@@ -41,11 +42,11 @@ def cases() -> list[tuple[str, str, sm.Machine]]:
     return [c for c in out if c[2].fast == ""]
 
 
-def one(machine: sm.Machine, seed: int, heavy: bool, threads: int) -> dict[str, tuple[int, float]]:
+def one(machine: sm.Machine, seed: int, heavy: bool, kind: str, threads: int) -> dict[str, tuple[int, float]]:
     """Wrong statuses and largest difference of each level."""
     position, wrench = draw(machine, POSES, seed)
     wrench[::10] = 0.0
-    options = {"threads": threads, **({"gravity": GRAVITY} if heavy else {})}
+    options = {"threads": threads, "load_type": kind, **({"gravity": GRAVITY} if heavy else {})}
     reference = machine.solve(position, wrench, method="reference", **options)
     out = {}
     for level in _core.kernel_levels():
@@ -74,12 +75,13 @@ def main() -> int:
     while state["solves"] < wanted.count and time.monotonic() < end:
         lap, index = divmod(state["next"], len(every))
         name, kind, machine = every[index]
-        for level, (statuses, worst) in one(machine, state["next"], lap % 2 == 1, wanted.threads).items():
+        heavy, loads = lap % 2 == 1, LOAD_TYPES[lap // 2 % 3]
+        for level, (statuses, worst) in one(machine, state["next"], heavy, loads, wanted.threads).items():
             state["solves"] += POSES
             key = f"{name} {kind}"
             state["worst"][key] = max(state["worst"].get(key, 0.0), worst)
             if statuses or worst > TOLERANCE:
-                found = [name, kind, level, state["next"], lap % 2 == 1, statuses, worst]
+                found = [name, kind, level, state["next"], heavy, loads, statuses, worst]
                 state["failed"].append(found)
                 print("disagreement:", *found, flush=True)
         state["next"] += 1

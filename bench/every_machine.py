@@ -8,6 +8,7 @@ is a batch of random poses in the workspace box of the machine file:
     unloaded   no wrench
     loaded     F = 100, 50, -200 N
     gravity    the same force and gravity
+    follower   the same force, turning with the tool
     outside    the same force, a third of the poses beyond the box (up to half its size)
     beyond     the same force at the poses of `outside` that are out of reach
 
@@ -36,7 +37,7 @@ GRAVITY = (0.0, 0.0, -9.81)
 BASE = "orthoglide-revised"
 POSES = 4096
 MOST, MOST_OUTSIDE, MOST_SHARE = 4.0, 10.0, 1e-3
-COLUMNS = ("unloaded", "loaded", "gravity", "outside", "beyond")
+COLUMNS = ("unloaded", "loaded", "gravity", "follower", "outside", "beyond")
 
 
 def inside(machine: sm.Machine, n: int) -> np.ndarray:
@@ -98,6 +99,7 @@ def cases(machine: sm.Machine) -> Iterator[Case]:
     yield "unloaded", machine, solve(), poses
     yield "loaded", machine, solve(wrench=FORCE), poses
     yield "gravity", machine, solve(wrench=FORCE, gravity=GRAVITY), poses
+    yield "follower", machine, solve(wrench=FORCE, load_type="follower"), poses
     yield "outside", machine, solve(wrench=FORCE), wide
     far = machine.solve(wide[::3][:256], threads=1, stiffness=False).status == sm.Status.UNREACHABLE
     if far.sum() > 8:
@@ -145,7 +147,7 @@ def main() -> int:
         print(f"| {name} | {' | '.join(cells)} |", flush=True)
         for column in sorted(set(row) - set(COLUMNS), key=lambda c: -row[c][0]):
             print(
-                f"|   {column} | – | {row[column][0]:.1f} ({100 * row[column][1]:.2g} %) | | | |",
+                f"|   {column} | – | {row[column][0]:.1f} ({100 * row[column][1]:.2g} %) | | | | |",
                 flush=True,
             )
     if wanted.json:

@@ -184,7 +184,7 @@ struct Block {
   void pass(Newton& at, const Program& of) {
     set_base(of);
     at.evaluate(false);
-    if (of.spring_count > 0) at.pull();
+    if (at.load_moves()) at.pull();
     at.frames_and_wrenches();
   }
 
@@ -193,6 +193,7 @@ struct Block {
     const V3 offset{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
     Elimination own{P, s, base.e.gravity, splat(0), {}};
     Newton here{P, in, s, own, load, own.gravity};
+    here.turning = base.turning;
     pass(here, P);
     residual(own, P.chains[P.root], here.point);
     std::int32_t moved = Elimination::all;  // leg whose slots hold a variant
@@ -203,6 +204,7 @@ struct Block {
       if (e.only >= 0 && moved != Elimination::all && moved != e.only) pass(here, P);
       moved = e.only;
       Newton at{Q, in, s, e, load, e.gravity};
+      at.turning = base.turning;
       pass(at, Q);
       V c[6], eta[6];
       put(residual(e, Q.chains[Q.root], at.point), c);
@@ -237,6 +239,7 @@ struct Block {
         P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
     e.heavy = in.gravity[0] != 0 || in.gravity[1] != 0 || in.gravity[2] != 0;
     Newton newton{P, in, s, e, load, e.gravity};
+    newton.turning = {in.turns, command.R};
     V iterations = splat(0), steps;
     M done = newton.solve(usable, P.starts_linear, iterations, steps);
     if (in.patience == Patience::path && !P.starts_linear && any(usable & ~done))
@@ -245,7 +248,7 @@ struct Block {
     newton.dense(newton.answer.K, K);
     write(done, newton, K, newton.answer.compliance, iterations, steps);
     if (in.perturbed_count == 0) return;
-    if (P.spring_count > 0) newton.pull();
+    if (newton.load_moves()) newton.pull();
     newton.linearize();  // lanes that settled early have lost their factors
     vary(done & ~unstable & ~newton.serial.play.lanes, newton, newton.answer.compliance);
   }
@@ -256,7 +259,7 @@ struct Block {
     M done = path.follow(lanes, iterations, [&](M anew) { stand_at_start(anew); });
     unstable = path.unstable;
     ended = path.ended;
-    if (any(ended) && LastAttempt::possible(P, newton.e)) done |= attempt(newton, iterations);
+    if (any(ended) && LastAttempt::possible(newton)) done |= attempt(newton, iterations);
     steps = select(lanes, splat(1), steps);
     newton.settle();
     return done;

@@ -18,15 +18,17 @@ struct LastAttempt {
   explicit LastAttempt(Newton& newton) : n(newton) {}
 
   /// Whether the kernels' unknowns are the reference's, its laws smooth and its forces those at the tip alone.
-  static bool possible(const Program& P, const Elimination& e) {
-    return !P.starts_linear && !P.hardens && P.spring_count == 0 && P.group_slots == 0 && !e.heavy;
+  static bool possible(const Newton& n) {
+    const Program& P = n.P;
+    return !n.turning.turns() && !P.starts_linear && !P.hardens && P.spring_count == 0 && P.group_slots == 0 &&
+           !n.e.heavy;
   }
 
   /// From the unloaded configuration of `lanes`, which stand there.
   void run(M lanes, V& iterations) {
     Elimination& e = n.e;
     e.counts = e.exact = e.heavy = true;
-    M active = lanes & ~n.moment_lanes();
+    M active = lanes & ~n.circulatory_lanes();
     for (int pass = 0; pass < most_passes && any(active); ++pass) {
       n.put_load(factor, factor);
       e.count_anew();

@@ -28,7 +28,7 @@ struct LoadPath {
       n.put_load(factor, select(looking, factor + ahead, factor));
       e.count_anew();
       n.evaluate(false);
-      if (n.P.spring_count > 0) n.pull();
+      if (n.load_moves()) n.pull();
       n.linearize();
       if (n.P.spring_count > 0) n.springs_too();
       V m[6][6];
@@ -51,7 +51,7 @@ struct LoadPath {
       }
       fresh &= ~first;
       active &= ~arrived;
-      active &= ~(moment & (e.negative > 0.0));  // counted otherwise there (theory K4): the reference's
+      active &= ~(circulatory & (e.negative > 0.0));  // counted otherwise there (theory K4): the reference's
 
       // Newton's step, the first one of a way where the lane has looked.
       const M onward = active & looking & (proven | again), iterating = active & ~looking;
@@ -129,7 +129,7 @@ struct LoadPath {
   static constexpr double hint = 1.0 / 256;
   static constexpr double bend = 0.1, crossing_bend = 1e-3, bend_noise = 1e-9;
 
-  M moment = n.moment_lanes();
+  M circulatory = n.circulatory_lanes();
   M looking = {}, again = {};  ///< at an equilibrium; it was looked at before
   M fresh = ~M{};              ///< before the unloaded equilibrium is known
   V factor = splat(0);         ///< share of the load, of the present iterate

@@ -8,6 +8,7 @@
 #include "steps.hpp"
 #include "tangents.hpp"
 #include "tip_springs.hpp"
+#include "turning_load.hpp"
 #include "wrenches.hpp"
 
 namespace stiffmap::kernel {
@@ -35,9 +36,11 @@ struct Newton {
   V6 whole_load;  ///< external wrench at the point, base axes
   V3 whole_gravity;
   V6 load = whole_load;       ///< the share that acts, with the external springs
-  V6 dead_load = whole_load;  ///< of the load alone, a dead wrench
+  V6 dead_load = whole_load;  ///< of the load alone, as it is turned now
   V6 pending = {};            ///< what is added in this step (F11)
-  Frame tip = {};             ///< frame of the tip; the point is tip.p + tip.R point
+  TurningLoad turning = {};
+  V acting = splat(1), ahead = splat(0);  ///< shares of the whole load in `dead_load` and `pending`
+  Frame tip = {};                         ///< frame of the tip; the point is tip.p + tip.R point
   V3 point = {};
   Sym6 K = {};  ///< symmetric tangent at the point
   V6 c = {};
@@ -203,12 +206,22 @@ struct Newton {
       point = point + tip.R * V3{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
   }
 
-  /// The external springs act where the tip is now. Apart from the other passes, so that machines without such springs
-  /// keep their code and their bits.
+  /// Whether what acts on the tip depends on where it is.
+  bool load_moves() const { return P.spring_count > 0 || turning.turns(); }
+
+  /// The external springs act, and the load turns, where the tip is now. Apart from the other passes, so that machines
+  /// without such springs keep their code and their bits.
   [[gnu::noinline]] void pull() {
+    frames();
+    turn_load();
     load = dead_load;
-    frames_and_wrenches();
-    tip_springs(P, tip, point, load, nullptr);
+    if (P.spring_count > 0) tip_springs(P, tip, point, load, nullptr);
+  }
+  void turn_load() {
+    if (!turning.turns()) return;
+    const V6 now = turning.at(whole_load, tip.R);
+    load = dead_load = acting * now;
+    pending = ahead * now;
   }
   [[gnu::noinline]] void springs_too() {
     V6 again{};
@@ -223,7 +236,7 @@ struct Newton {
     c = t.c - pending;
   }
 
-  /// Tangent of a small extra dead wrench at the point, K - S(m)/2 in the rotational block.
+  /// Tangent of a small extra dead wrench at the point, K - S(m)/2 in the rotational block; the load turns.
   void dense(const Sym6& symmetric, V (&m)[6][6]) const {
     unpack(symmetric, m);
     const V3 h = splat(0.5) * dead_load.b;
@@ -233,6 +246,7 @@ struct Newton {
     m[4][5] += h.x;
     m[5][3] += h.y;
     m[5][4] -= h.x;
+    if (turning.turns()) turning.soften(acting * whole_load, tip.R, m);
   }
 
   /// Inverse without pivoting: the symmetric part is positive definite where it is used.
@@ -308,10 +322,11 @@ struct Newton {
   /// The same for an arm of joints alone, from frames alone.
   [[gnu::noinline]] void step_joints() {
     frames();
+    turn_load();
     e.lowest = splat(1e300);
     const Sym6* pulls = nullptr;
     if (P.spring_count > 0) pulls = &pull_arm();
-    serial.step(e, {point, load, pending, dead_load.b, pulls});
+    serial.step(e, {point, load, pending, dead_load.b, pulls, acting * whole_load, turning, tip.R});
     e.transferred = splat(0);
   }
 
@@ -326,6 +341,7 @@ struct Newton {
   /// What an arm answers where its iteration settled.
   [[gnu::noinline]] void answer_joints(V (&m)[6][6]) {
     serial.answer(e, point, m, K);
+    if (turning.turns()) turning.symmetric(acting * whole_load, tip.R, K);
     if (!any(serial.play.lanes)) return;
     const auto column = [&](int k) { return Serial::unit_twist(e, *serial.joint[k], point); };
     serial.play.release(e, P.serial_joints, column, m, K);
@@ -349,10 +365,10 @@ struct Newton {
       V m[6][6];
       M active = ~done & ~failed;
       if (P.serial_joints > 0) {
-        serial.play.decides = corners && k == 1;
+        serial.play.decides = corners && k == 1 && !turning.turns();
         step_joints();
       } else {
-        if (P.spring_count > 0) pull();
+        if (load_moves()) pull();
         linearize();
         if (P.spring_count > 0) springs_too();
         dense(K, m);
@@ -409,8 +425,12 @@ struct Newton {
       if (all(done | failed)) break;
     }
     steps = way.halved;
-    if (fresh) put_load(splat(1), splat(1));
-    else settle();
+    if (fresh) {
+      put_load(splat(1), splat(1));
+      turn_load();
+    } else {
+      settle();
+    }
     if (fresh && P.serial_joints > 0) {
       if (P.spring_count > 0) pull_arm();
       transmit();
@@ -422,17 +442,19 @@ struct Newton {
   void settle() {
     put_load(splat(1), splat(1));
     evaluate(false);
-    if (P.spring_count > 0) pull();
+    if (load_moves()) pull();
     frames_and_wrenches();
   }
 
   /// The share that acts, and the one whose equilibrium is sought.
-  void put_load(V acting, V factor) {
+  void put_load(V share, V factor) {
+    acting = share;
+    ahead = factor - share;
     load = acting * whole_load;
     dead_load = load;
-    pending = (factor - acting) * whole_load;
+    pending = ahead * whole_load;
     e.gravity = acting * whole_gravity;
-    e.pending = (factor - acting) * whole_gravity;
+    e.pending = ahead * whole_gravity;
   }
 
   /// Lanes under no load at all.
@@ -443,9 +465,13 @@ struct Newton {
     return sum == 0.0;
   }
 
-  M moment_lanes() const {
+  /// Lanes whose load is not conservative: a dead moment, anything that follows the tip.
+  M circulatory_lanes() const {
     const V6& w = whole_load;
-    return absolute(w.b.x) + absolute(w.b.y) + absolute(w.b.z) > 0.0;
+    const M moment = absolute(w.b.x) + absolute(w.b.y) + absolute(w.b.z) > 0.0;
+    const M force = absolute(w.a.x) + absolute(w.a.y) + absolute(w.a.z) > 0.0;
+    if (turning.how == LoadTurns::semitangential) return M{};
+    return turning.how == LoadTurns::follower ? moment | force : moment;
   }
 
   /// Share of the last step up to shortly behind the first corner of a law (Katzenelson 1965): piece by piece the way

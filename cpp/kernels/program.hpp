@@ -184,6 +184,9 @@ struct Program {
 /// like.
 enum class Patience : std::int32_t { quick, leaps, path };
 
+/// Whether a load keeps its direction as the tip turns, turns with it, or has the conservative moment (theory E6).
+enum class LoadTurns : std::int32_t { dead, follower, semitangential };
+
 /// What each pose asks, row-major.
 struct KernelInput {
   std::int64_t count;
@@ -196,6 +199,7 @@ struct KernelInput {
   const std::int64_t*
       index;  ///< the poses to solve, null: all; start, position and rotation go by place if start is given
   Patience patience;
+  LoadTurns turns;  ///< whether the wrench turns with the tip
   std::int32_t max_iterations;
   double tolerance;
   const Program* const* perturbed;    ///< variants of the program with the same operations

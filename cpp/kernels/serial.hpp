@@ -4,6 +4,7 @@
 #pragma once
 
 #include "free_play.hpp"
+#include "turning_load.hpp"
 
 namespace stiffmap::kernel {
 
@@ -14,6 +15,9 @@ struct TipLoad {
   V6 pending;           ///< of which it does not (F11)
   V3 dead_moment;       ///< the part of the load's moment that keeps its direction
   const Sym6* springs;  ///< tangent of the external springs at the point; null: none
+  V6 given;             ///< the share of the load that acts, as at the command
+  const TurningLoad& turning;
+  const M3& R;  ///< of the tip
 };
 
 struct Serial {
@@ -55,6 +59,16 @@ struct Serial {
         B[a][b] += more;
         if (a < b) B[b][a] += more;
       }
+    }
+  }
+
+  /// The load turns with the tip.
+  [[gnu::noinline]] void turn(const Elimination& el, int n, const TipLoad& tip) {
+    V6 twist[most_serial_joints];
+    for (int b = 0; b < n; ++b) twist[b] = unit_twist(el, *joint[b], tip.point);
+    for (int b = 0; b < n; ++b) {
+      const V6 more = tip.turning.change(tip.given, tip.R, twist[b].b);
+      for (int a = 0; a < n; ++a) B[a][b] -= dot(twist[a], more);
     }
   }
 
@@ -110,6 +124,7 @@ struct Serial {
       --b;
     }
     if (tip.springs) pull_back(el, n, tip);
+    if (tip.turning.turns() && how != Acts::nothing) turn(el, n, tip);
     for (int k = 0; k < n; ++k) {
       const int q = joint[k]->coordinate;
       for (int i = 0; i < n; ++i) B[i][k] *= el.s.da[q];

@@ -133,7 +133,7 @@ bool takes(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const
   if (in.load_points.size() != 1 || in.read_points.size() != 1) return false;
   const LoadPoint& load = in.load_points.front();
   const NodePoint& reading = m.points[at(in.read_points.front())];
-  if (load.type != LoadType::dead || load.node != m.tip || reading.node != m.tip) return false;
+  if (load.node != m.tip || reading.node != m.tip) return false;
   if (load.offset != reading.offset) return false;
   if (plan.heavy_spins() && !in.gravity.isZero(0)) return false;
   return in.gravity.isZero(0) || plan.program().exact_weights || !options.stiffness;
@@ -151,6 +151,7 @@ KernelInput kernel_input(const Mechanism& m, const BatchInput& in, const SolveOp
   }
   k.max_iterations = 16;
   k.tolerance = options.equilibrium.tolerance;
+  k.turns = static_cast<LoadTurns>(in.load_points.front().type);
   return k;
 }
 
@@ -298,9 +299,13 @@ class FastBatch {
         const Coordinate& c = m_.coordinates[at(j)];
         out_.indeterminate[m_.size() * i + j] = c.locked && c.role == Role::passive;
       }
+    // As `Problem::has_dead_moment`.
+    const LoadType type = in_.load_points.front().type;
+    const bool force = !Eigen::Map<const Vec3>(in_.wrench + 6 * i).isZero(0);
     const bool moment = !Eigen::Map<const Vec3>(in_.wrench + 6 * i + 3).isZero(0);
+    const bool circulatory = type == LoadType::follower ? force || moment : type == LoadType::dead && moment;
     const std::uint32_t play = loose ? flag::free_play | flag::platform_singular : 0u;
-    if (out_.flags) out_.flags[i] = flags_[at(i)] | play | (moment ? flag::nonconservative : 0u);
+    if (out_.flags) out_.flags[i] = flags_[at(i)] | play | (circulatory ? flag::nonconservative : 0u);
   }
 
   void forget_variants(Index i) const {

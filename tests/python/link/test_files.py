@@ -240,6 +240,7 @@ INDEFINITE[1, 5] = INDEFINITE[5, 1] = 1.2 * np.sqrt(INDEFINITE[1, 1] * INDEFINIT
         ({"compliance": LARGE.tolist()}, "symmetric matrix, got .* = nan"),
         ({"compliance": LARGE_FREE.tolist()}, "expected no negative eigenvalue, got -1e"),
         ({"compliance": INDEFINITE.tolist()}, "expected no negative eigenvalue, got -0.2"),
+        ({"standard_error": LARGE.tolist()}, r"standard_error: expected at most 1e\+150 .* got 1e\+308"),
         ({"compliance": (-bar_compliance()).tolist()}, "diagonal that is not negative"),
         ({"compliance": "[[.nan]]"}, "expected finite numbers of shape"),
     ],
