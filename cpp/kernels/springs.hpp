@@ -73,7 +73,9 @@ void spring_tangent(Elimination& el, const Op& op, const StiffSlot& k, const E& 
   V diagonal[6];
   for (int i = 0; i < 6; ++i) {
     diagonal[i] = entries(7 * i);
-    if (el.P.coordinates[op.coordinate + i].law >= 0) diagonal[i] += el.s.dtau[op.coordinate + i];
+    const int q = op.coordinate + i;
+    if (el.P.coordinates[q].law < 0) continue;
+    diagonal[i] += el.P.starts_linear ? el.s.dtau[q] / el.s.da[q] : el.s.dtau[q];  // by the deflection
   }
   const M3& R = k.start.R;
   const M3& Z = k.Z;

@@ -47,6 +47,8 @@ inline void stiff_step(Elimination& el, const Op& op, const V6& zeta, const V3& 
     dz[3] = r.x;
     dz[4] = r.y;
     dz[5] = r.z;
+    for (int i = 0; i < 6 && el.P.starts_linear; ++i)
+      if (el.P.coordinates[op.coordinate + i].law >= 0) dz[i] /= el.s.da[op.coordinate + i];
     return;
   }
   for (int b = 0; b < op.count; ++b) {

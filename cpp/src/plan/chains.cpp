@@ -130,23 +130,24 @@ class Compiler {
     for (int i = 0; i < 3; ++i) op.direction[i] = e.axis[i];
   }
 
-  /// A spring that is full and regular is one operation; one with uncoupled directions, some of them
-  /// rigid, free or with a law of their own, is a sequence of elastic joints.
+  /// A spring that is full and regular is one operation, and so is one with laws that always yield; one with
+  /// uncoupled directions, some of them rigid, free or stuck, is a sequence of elastic joints.
   void spring(const Spring& s, Way& way, std::vector<Op>& ops) {
     Mat6 K = s.matrix.stiffness, whole = K;
-    bool corners = false;
+    bool sticks = false;
     for (const auto& [i, law] : s.laws) {
-      corners = corners || law.has_knots() || law.friction() != 0;
+      for (std::size_t k = 1; k < law.knots().size(); ++k)
+        sticks = sticks || law.knots()[k].first == law.knots()[k - 1].first;
       K(i, i) = 0;
       whole(i, i) = law.stiffness();
     }
     const Vec6 d = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     const bool deficient = s.matrix.rotated || s.matrix.rigid.any() ||
                            symmetric_eigen(Mat6(d.asDiagonal() * whole * d.asDiagonal())).values[0] < 1e-9;
-    if (deficient || corners) {
+    if (deficient || sticks) {
       if (s.stroke) found_.missing = "a link spring with rigid or free directions that varies with a joint";
       if (s.matrix.rotated || !Mat6(K.diagonal().asDiagonal()).isApprox(K, 1e-14))
-        found_.missing = "a coupled link spring with rigid or free directions or with gaps";
+        found_.missing = "a coupled link spring with rigid, free or stuck directions";
       elastic_joints(s, K, way, ops);
       return;
     }
