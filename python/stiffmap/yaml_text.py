@@ -92,7 +92,9 @@ def parse(text: str, file: str = "") -> Document:
     except FileError:
         raise
     except RecursionError:  # beyond a fault that only the faster parser of `check_size` takes for one
-        raise FileError(f"expected at most {DEEPEST} levels inside each other, found more", file=file) from None
+        raise FileError(
+            f"expected at most {DEEPEST} levels inside each other, found more", file=file
+        ) from None
     except (yaml.YAMLError, ValueError) as error:  # ValueError: an explicit tag that does not fit, !!float x
         raise FileError(f"not valid YAML: {' '.join(str(error).split())}", file=file) from error
     finally:

@@ -116,7 +116,7 @@ def run(batch: Batch, count: int = BATCH) -> dict[str, object]:
     if machine is None:
         return {**vars(batch), "solves": 0, "refused": refused}
     key = [batch.seed, *batch.machine.encode(), *batch.effect.encode()]
-    p, load = asked(machine, np.random.default_rng(key), size_of(batch.effect, count))
+    p, load = asked(machine, np.random.default_rng(key), count)
     if load["method"] == "reference":
         p = p[:20]
         load["wrench"] = load["wrench"][:20]  # type: ignore[index]
@@ -243,7 +243,7 @@ def main() -> int:
     todo = [b for b in batches(given.machine or sm.machine_names(), int(given.count), given.batch)
             if (b.machine, b.effect, b.seed) not in seen]  # fmt: skip
     with ProcessPoolExecutor(given.jobs) as pool, given.out.open("a") as out:
-        for work in as_completed([pool.submit(run, b, given.batch) for b in todo]):
+        for work in as_completed([pool.submit(run, b, size_of(b.effect, given.batch)) for b in todo]):
             result = json.loads(json.dumps(work.result()))
             out.write(json.dumps(result) + "\n")
             out.flush()
