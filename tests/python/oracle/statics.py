@@ -373,22 +373,28 @@ def unbalanced(walk: Walk, size: float) -> tuple[Array, Array]:
     return worst, np.max(sizes, axis=0)
 
 
+BALANCED = 1e-9
+"""Residual, of the largest force, below which it is not made smaller."""
+
+
 def settle(walk: Walk, weight: Array, left: Array, given: Array, needed: Array) -> tuple[Array, Array]:
     """Residual (n,) and reactions of the loops: between what the loops can give and what the laws allow, in turns."""
     n = len(given)
     rows = [i for i, a in enumerate(walk.axes) if a.force is not None]
     steps = [i for i, a in enumerate(walk.axes) if a.allowed is not None]
     worst, reaction, todo = np.full(n, np.inf), np.zeros((n, left.shape[2])), np.arange(n)
+    inverse = least_squares(left[:, rows])
     for _ in range(60 if steps else 1):
         b = weight * (needed[todo] - given[todo])
-        reaction[todo] = least_squares(left[todo][:, rows], b[:, rows])
+        reaction[todo] = np.einsum("nij,nj->ni", inverse[todo], b[:, rows])
         held = np.einsum("nij,nj->ni", left[todo], reaction[todo])
         worst[todo] = np.minimum(worst[todo], np.abs(held - b)[:, rows].max(1, initial=0.0))
         before, after = needed[todo], needed[todo].copy()
         for i in steps:
             after[:, i] = nearest(walk.axes[i].allowed, todo, given[todo, i] + held[:, i] / weight[i])
         needed[todo] = after
-        todo = todo[(after != before).any(1)]
+        largest = np.maximum(np.abs(weight * given[todo]).max(1), np.abs(reaction[todo]).max(1, initial=0.0))
+        todo = todo[(after != before).any(1) & (worst[todo] > BALANCED * largest)]
         if not len(todo):
             break
     return worst, reaction
@@ -428,19 +434,18 @@ def nearest(allowed: tuple[Array, Array] | None, at: Array, force: Array) -> Arr
     return choice[np.arange(len(at)), best]
 
 
-def least_squares(a: Array, b: Array) -> Array:
-    """(n, columns) of least norm where the columns depend on each other."""
+def least_squares(a: Array) -> Array:
+    """(n, columns, rows) that gives the solution of least squares, of least norm where columns depend on each other."""
     if a.shape[2] == 0:
-        return np.zeros((len(a), 0))
+        return np.zeros((len(a), 0, a.shape[1]))
     q, r = np.linalg.qr(a)
     diagonal = np.abs(np.einsum("nii->ni", r))
     sound = diagonal.min(1) > 1e-8 * diagonal.max(1)
-    out = np.empty((len(a), a.shape[2]))
+    out = np.empty((len(a), a.shape[2], a.shape[1]))
     if sound.any():
-        right = np.einsum("nij,ni->nj", q[sound], b[sound])
-        out[sound] = np.linalg.solve(r[sound], right[..., None])[..., 0]
+        out[sound] = np.linalg.solve(r[sound], np.swapaxes(q[sound], 1, 2))
     if not sound.all():
-        out[~sound] = (np.linalg.pinv(a[~sound], rcond=1e-9) @ b[~sound][..., None])[..., 0]
+        out[~sound] = np.linalg.pinv(a[~sound], rcond=1e-9)
     return out
 
 
