@@ -190,7 +190,8 @@ void linearize(const Mechanism& m, const Problem& problem, const State& state, L
   add_springs(m, problem, out);
   add_loads(m, problem, out);
   if (problem.first_order) out.H.setZero();
-  for (const NodeSpring& s : m.external_springs) add_external_spring(m, s, out);
+  for (const NodeSpring& s : m.external_springs)
+    if (!problem.unpulled || s.node != m.tip) add_external_spring(m, s, out);
   add_loops(m, problem, state, out);
   out.r += out.tau;
 }

@@ -24,6 +24,7 @@ Spins::Spins(const Mechanism& m) : m_(m), force_(VecX::Zero(m.size())), closure_
   Problem p(m);
   p.base = m.home_coordinates;
   p.secant_laws = true;
+  p.unpulled = true;  // a spin leaves the tip where it is, but without equilibrium such a force would move the rest
   linearize(m, p, State(m), eq.lin);
   eq.saddle.assemble(m, eq.lin);
   eq.saddle.factorize();

@@ -31,6 +31,7 @@ struct Problem {
   double factor = 1;              ///< of wrenches and gravity: the load step
   bool secant_laws = false;       ///< take every law as linear: the first iteration of a cold start
   bool first_order = false;       ///< leave the load out of the tangent: that iteration is linear statics
+  bool unpulled = false;          ///< leave external springs at the tip out
   bool has_dead_moment() const;
   /// Rotation since the command of the body of load i, which is now at R.
   Mat3 turn(std::size_t i, const Mat3& R) const;
