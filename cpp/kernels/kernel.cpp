@@ -35,8 +35,8 @@ Scratch lay_out(const Program& P, void* memory, std::int64_t* bytes) {
   s.strokes = take<StrokeSlot>(at, P.stroke_count);
   s.branches = take<BranchSlot>(at, P.chain_count);
   const int n = P.coordinate_count;
-  for (V** v :
-       {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.friction_sign, &s.kept, &s.slope})
+  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.friction_sign, &s.kept,
+                &s.slope, &s.rest})
     *v = take<V>(at, n);
   if (bytes) *bytes = at - begin + 64;
   return s;
@@ -184,7 +184,6 @@ struct Block {
   void pass(Newton& at, const Program& of) {
     set_base(of);
     at.evaluate(false);
-    if (at.load_moves()) at.pull();
     at.frames_and_wrenches();
   }
 
@@ -248,7 +247,6 @@ struct Block {
     newton.dense(newton.answer.K, K);
     write(done, newton, K, newton.answer.compliance, iterations, steps);
     if (in.perturbed_count == 0) return;
-    if (newton.load_moves()) newton.pull();
     newton.linearize();  // lanes that settled early have lost their factors
     vary(done & ~unstable & ~newton.serial.play.lanes, newton, newton.answer.compliance);
   }
@@ -298,21 +296,30 @@ struct Block {
     for (int i = 0; i < count; ++i) {
       const std::int64_t k = pose(i);
       out.done[k] = done[i] ? solved(i, newton) : never[i] ? pose_unreachable : left(i);
-      if (out.iterations && nowhere[i]) out.iterations[k] = static_cast<std::int32_t>(iterations[i]);
-      if (!done[i]) continue;
-      for (int r = 0; r < 6; ++r) out.displacement[6 * k + r] = moved[r][i];
-      if (out.stiffness)
-        for (int r = 0; r < 6; ++r)
-          for (int c = 0; c < 6; ++c) out.stiffness[36 * k + 6 * r + c] = K[r][c][i];
-      if (out.compliance)
-        for (int r = 0; r < 6; ++r)
-          for (int c = 0; c < 6; ++c) out.compliance[36 * k + 6 * r + c] = C[r][c][i];
-      if (out.iterations) out.iterations[k] = static_cast<std::int32_t>(iterations[i]);
-      if (out.coordinates)
-        for (int q = 0; q < P.coordinate_count; ++q) out.coordinates[P.coordinate_count * k + q] = s.x[q][i];
+      if (out.iterations && (done[i] || nowhere[i])) out.iterations[k] = static_cast<std::int32_t>(iterations[i]);
     }
+    const M wanted = done & written();
+    put_out(moved, 6, wanted, out.displacement);
+    put_out(K[0], 36, wanted, out.stiffness);
+    put_out(C[0], 36, wanted, out.compliance);
+    put_out(s.x, P.coordinate_count, wanted, out.coordinates);
     write_efforts(done, newton, steps);
     if (out.free_twists && any(newton.serial.play.lanes)) write_play(done & newton.serial.play.lanes, newton);
+  }
+
+  /// Lanes that are poses of their own.
+  M written() const {
+    M own{};
+    for (int i = 0; i < count; ++i) own[i] = -1;
+    return own;
+  }
+
+  /// Each pose's `n` numbers into its row of `to`, if that is wanted.
+  void put_out(const V* values, int n, M wanted, double* to) const {
+    if (!to) return;
+    double* rows[W];
+    for (int i = 0; i < W; ++i) rows[i] = to + n * pose(i);
+    write_lanes(values, n, wanted, rows);
   }
 
   [[gnu::noinline]] void write_play(M lanes, const Newton& newton) {

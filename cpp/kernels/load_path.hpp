@@ -28,7 +28,6 @@ struct LoadPath {
       n.put_load(factor, select(looking, factor + ahead, factor));
       e.count_anew();
       n.evaluate(false);
-      if (n.load_moves()) n.pull();
       n.linearize();
       if (n.P.spring_count > 0) n.springs_too();
       V m[6][6];

@@ -16,9 +16,13 @@ struct LoadSteps {
   V previous = splat(1);  ///< Newton step before, in multiples of the length; 1: none
   V tries = splat(0);     ///< Newton steps at this factor
   V halved = splat(0);    ///< 1: the whole load was not reached in one step
+  /// No branches share the load, so the first tangent may know it (F11). Not with hardening laws, whose parameter is a
+  /// force: they start from the unloaded slope. Nor with friction, whose signs are those of linear statics.
+  const bool at_once = !P.parallel && !P.hardens && (!P.starts_linear || P.bends);
 
   void begin(M unloaded) {
     acting = select(unloaded, splat(1), acting);
+    if (at_once) acting = factor;
     keep(~M{});
   }
 
@@ -46,7 +50,7 @@ struct LoadSteps {
   void next(M lanes) {
     const V goal = reached + stride;
     factor = select(lanes, select(goal < 1.0, goal, splat(1)), factor);
-    acting = select(lanes, reached, acting);
+    acting = select(lanes, at_once ? factor : reached, acting);
     previous = select(lanes, splat(1), previous);
     tries = select(lanes, splat(0), tries);
   }

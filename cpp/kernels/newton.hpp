@@ -2,8 +2,10 @@
 // Equilibrium of a block of poses: laws, Newton by the elimination, trust test per lane.
 #pragma once
 
+#include "corners.hpp"
 #include "frames.hpp"
 #include "load_steps.hpp"
+#include "residual.hpp"
 #include "serial.hpp"
 #include "steps.hpp"
 #include "tangents.hpp"
@@ -44,8 +46,11 @@ struct Newton {
   V3 point = {};
   Sym6 K = {};  ///< symmetric tangent at the point
   V6 c = {};
+  V6 moved = {};  ///< twist of the point by the last step; not of an arm of joints alone
   Answer answer{};
-  Serial serial{};  ///< of an arm of joints alone
+  Serial serial{};     ///< of an arm of joints alone
+  M stepped = {};      ///< lanes whose last step, next to nothing, moves what is answered and no more
+  V6 stepped_by = {};  ///< the point in that step
 
   // ---- laws -----------------------------------------------------------------------------------
   void law_at(const LawProgram& law, int q) {
@@ -164,7 +169,7 @@ struct Newton {
         const double linear = s.z[q][i];
         const double share = __builtin_fabs(linear) * k.unit / P.length;
         const bool bears = share > unloaded;
-        if (share > 0.1 * unloaded && share < 10 * unloaded && !(k.law >= 0 && strictly_rises(P.laws[k.law])))
+        if (share > unloaded / doubt && share < doubt * unloaded && !(k.law >= 0 && strictly_rises(P.laws[k.law])))
           doubtful[i] = -1;
         if (k.law < 0) {
           s.friction_sign[q][i] = !bears ? 0 : linear > 0 ? 1 : -1;
@@ -188,6 +193,7 @@ struct Newton {
   /// pose's last bits would tell which of them ran.
   [[gnu::noinline]] void frames_and_wrenches() {
     frames();
+    if (load_moves()) pull();
     transmit();
   }
 
@@ -212,7 +218,6 @@ struct Newton {
   /// The external springs act, and the load turns, where the tip is now. Apart from the other passes, so that machines
   /// without such springs keep their code and their bits.
   [[gnu::noinline]] void pull() {
-    frames();
     turn_load();
     load = dead_load;
     if (P.spring_count > 0) tip_springs(P, tip, point, load, nullptr);
@@ -316,7 +321,17 @@ struct Newton {
     }
     for (int q = 0; q < P.coordinate_count; ++q) s.dz[q] = splat(0);
     e.transferred = splat(0);
-    back(e, P.chains[P.root], get(eta), point, V3{}, active);
+    moved = get(eta);
+    back(e, P.chains[P.root], moved, point, V3{}, active);
+  }
+
+  /// One more step with the factors of the last linearisation, m its inverse, from where its own step led.
+  [[gnu::noinline]] void chord_step(const V (&m)[6][6], M lanes) {
+    evaluate(false);
+    frames_and_wrenches();
+    c = residual(e, P.chains[P.root], point);
+    step(m, lanes);
+    move(lanes);
   }
 
   /// The same for an arm of joints alone, from frames alone.
@@ -355,6 +370,7 @@ struct Newton {
     M done = ~usable & usable, failed = ~usable;
     LoadSteps way{P, s};
     const bool patient = in.patience == Patience::path;
+    const bool searches = corners && P.bends && !patient && P.serial_joints == 0;
     const double most_tries = in.max_iterations * (!corners ? 1.0 : patient ? 3.0 : 0.5);
     way.begin(unloaded_lanes());
     for (int k = 0; k < most_iterations; ++k) {
@@ -368,7 +384,6 @@ struct Newton {
         serial.play.decides = corners && k == 1 && !turning.turns();
         step_joints();
       } else {
-        if (load_moves()) pull();
         linearize();
         if (P.spring_count > 0) springs_too();
         dense(K, m);
@@ -393,9 +408,10 @@ struct Newton {
         settled &= (hardening_change() < same_slope) | ((norm < small) & (way.previous < small));
       if (P.serial_joints > 0 && any(settled)) answer_joints(m);
       failed |= settled & ~(e.lowest > pivot_floor);
-      const M kept = settled & (change < nothing);
+      const M resting = settled & (change < small), kept = resting & (change < nothing);
       if (any(settled)) take(settled & ~failed, m);
       if (any(kept)) keep_wrenches(e, kept);
+      if (any(resting & ~kept)) keep_step(resting & ~kept);
       M distrusted = active & ~settled & ~(norm < 1e6);
       if (!corners) {
         distrusted |= active & ~settled & ~(norm <= 0.2);
@@ -403,47 +419,90 @@ struct Newton {
         // tangent definite, it may be as long as the first.
         const M second = (way.tries == 1.0) & (norm <= 5.0 * way.previous) & (norm <= 0.02) & (e.lowest > pivot_floor);
         distrusted |= active & ~settled & ~((norm <= 0.2 * way.previous) | (norm <= 1e-7) | second);
+        // A tangent under the whole load must be definite.
+        if (way.at_once) distrusted |= active & (way.tries == 0.0) & ~(e.lowest > pivot_floor);
       }
       // Corners make Newton's steps go to and fro: then each goes to the next corner, patiently.
       const M corner_steps = patient ? active & (way.tries > 1.0) : M{};
       if (corners && any(corner_steps)) shorten(select(corner_steps, to_corner(), splat(1)));
-      if (corners && !patient) distrusted |= active & ~settled & (way.tries > 2.0) & ~(norm <= 0.5 * way.previous);
+      if (corners && !patient && !searches)
+        distrusted |= active & ~settled & (way.tries > 2.0) & ~(norm <= 0.5 * way.previous);
       // Free play is the reference's to find: a singular step would leave the gap by chance.
       if (corners && k == 1) distrusted |= active & open_gaps() & ~serial.play.lanes;
       if (P.serial_joints > 0) distrusted |= active & serial.play.doubtful;
       distrusted |= active & ~settled & (way.tries >= most_tries);
-      move(active & ~kept & ~distrusted);
+      if (searches) {
+        const V share = k > 1 ? Corners{P, s}.share() : splat(1);
+        const M moving = active & ~resting & ~distrusted;
+        if (any(moving & (share < 1.0))) shorten(select(moving, share, splat(1)));
+        Corners{P, s}.move(moving, splat(1));
+      } else {
+        move(active & ~resting & ~distrusted);
+      }
       done |= settled & ~failed;
-      fresh = all(kept == active);
+      fresh = all(resting == active);
       way.previous = select(active, norm, way.previous);
       way.tries = select(active, way.tries + 1.0, way.tries);
       way.acting = select(active, way.factor, way.acting);
       const M arrived = active & ~whole & ~first & ~distrusted & (norm < in.tolerance);
       failed |= arrived & ~(e.lowest > pivot_floor);  // stability may change on the way: the reference looks closer
       if (any(arrived)) way.advance(arrived);
+      // What this step leaves is of its square, and what one with the same factors leaves of that is next to nothing.
+      if (P.parallel && !corners) {
+        const M soon = (change < chord_most * e.lowest) & (change < chord_longest);
+        const M near = active & whole & ~settled & ~distrusted & soon & (norm > chord_least);
+        if (any(near)) chord_step(m, near);
+      }
       if (any(distrusted)) failed |= corners ? distrusted : way.halve(distrusted);
       if (all(done | failed)) break;
     }
     steps = way.halved;
-    if (fresh) {
-      put_load(splat(1), splat(1));
-      turn_load();
-    } else {
+    if (!fresh) {
       settle();
-    }
-    if (fresh && P.serial_joints > 0) {
-      if (P.spring_count > 0) pull_arm();
-      transmit();
+    } else {
+      put_load(splat(1), splat(1));
+      if (load_moves()) pull();
+      if (P.serial_joints > 0 || any(stepped)) transmit();
+      take_step();
     }
     return done & ~failed;
+  }
+
+  /// A step that changes the tangent by nothing is taken to first order: its square is below round-off.
+  [[gnu::noinline]] void keep_step(M lanes) {
+    const bool none = !any(stepped);
+    for (int q = 0; q < P.coordinate_count; ++q) s.rest[q] = select(lanes, s.dz[q], none ? splat(0) : s.rest[q]);
+    V6 twist = moved;
+    if (P.serial_joints > 0) {
+      twist = V6{};
+      for (int k = 0; k < P.serial_joints; ++k) {
+        const int q = serial.joint[k]->coordinate;
+        twist = twist + (s.da[q] * s.dz[q]) * Serial::unit_twist(e, *serial.joint[k], point);
+      }
+    }
+    stepped_by = select(lanes, twist, stepped_by);
+    stepped |= lanes;
+  }
+
+  /// What such steps change in the answer.
+  void take_step() {
+    if (!any(stepped)) return;
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      const V step = select(stepped, s.rest[q], splat(0));
+      s.x[q] += s.da[q] * step;
+      s.tau[q] += s.dtau[q] * step;
+    }
+    const V6 twist = select(stepped, stepped_by, V6{});
+    point = point + twist.a;
+    for (V3& column : tip.R.c) column = column + cross(twist.b, column);
   }
 
   /// Frames and wrenches under the whole load at the coordinates found.
   void settle() {
     put_load(splat(1), splat(1));
     evaluate(false);
-    if (load_moves()) pull();
     frames_and_wrenches();
+    take_step();
   }
 
   /// The share that acts, and the one whose equilibrium is sought.
@@ -508,9 +567,12 @@ struct Newton {
   const double pivot_floor = 1e-5 * P.softest;
   static constexpr double small = 1e-13;  ///< step that changes the tangent by no more than that
   static constexpr double nothing = 1e-15;
+  static constexpr double chord_most = 6e-4;  ///< step before a chord step, of the softest direction's pivot
+  static constexpr double chord_longest = 1e-5, chord_least = 1e-9;
   static constexpr double same_slope = 1e-11;  ///< change of a law's slope that the compliance does not show
   static constexpr double unloaded = 1e-11;
-  bool fresh = false;  ///< frames and wrenches are those at the answer
+  static constexpr double doubt = 1.5;  ///< factor about it; closures of the two paths differ by some 1e-14
+  bool fresh = false;                   ///< frames and wrenches are those at the answer
 };
 
 }  // namespace stiffmap::kernel

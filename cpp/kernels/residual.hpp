@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Residual of a perturbed program with the factors of the last tangent (docs/fast_path.md F10).
+// Residual of a perturbed program, or a little further, with the factors of the last tangent (docs/fast_path.md F10).
 #pragma once
 
 #include "angles.hpp"
@@ -9,10 +9,11 @@
 namespace stiffmap::kernel {
 
 inline void joint_residual(Elimination& el, const Op& op, V6& c) {
-  const JointSlot& j = el.s.joints[op.slot];
+  JointSlot& j = el.s.joints[op.slot];
   const int q = op.coordinate;
   const V rho = el.s.tau[q] - dot(j.w, op.kind == OpKind::prismatic ? j.F.a : j.F.b);
-  c = c - (el.s.da[q] * ((dot(j.J, c) - rho) * j.inverse)) * j.u;
+  j.y = (dot(j.J, c) - rho) * j.inverse;
+  c = c - (el.s.da[q] * j.y) * j.u;
 }
 
 inline V6 residual(Elimination& el, const ChainProgram& chain, const V3& end);
@@ -25,15 +26,18 @@ inline V6 stiff_residual(Elimination& el, const Op& op) {
     BranchSlot& branch = el.s.branches[op.first + b];
     V6 c = branch.rest;
     if (!el.skips(op, b)) c = residual(el, el.P.chains[op.first + b], branch.end.p);
-    if (el.only == Elimination::all) branch.rest = c;
-    if (b > 0) c = c + dead(branch.K, branch.F.b, frame_error(branch.end, el.s.branches[op.first].end));
+    if (el.only == Elimination::all) branch.rest = branch.c = c;
+    if (b > 0) {
+      branch.error = frame_error(branch.end, el.s.branches[op.first].end);
+      c = c + dead(branch.K, branch.F.b, branch.error);
+    }
     sum = sum + c;
   }
   return sum;
 }
 
-inline void series_residual(const StiffSlot& k, const V6& inner, V6& c) {
-  V y[6];
+inline void series_residual(StiffSlot& k, const V6& inner, V6& c) {
+  V(&y)[6] = k.y;
   put(c - inner, y);
   for (int i = 1; i < 6; ++i)
     for (int q = 0; q < i; ++q) y[i] -= k.L[i][q] * y[q];
@@ -46,7 +50,8 @@ inline void series_residual(const StiffSlot& k, const V6& inner, V6& c) {
   c = c - get(sum);
 }
 
-/// Out-of-balance wrench at the end of a chain, at the frames and wrenches of the last passes.
+/// Out-of-balance wrench at the end of a chain, at the frames and wrenches of the last passes; what a step needs of it
+/// stays in the slots.
 inline V6 residual(Elimination& el, const ChainProgram& chain, const V3& end) {
   V6 c{};
   V3 p{};
@@ -65,7 +70,7 @@ inline V6 residual(Elimination& el, const ChainProgram& chain, const V3& end) {
       move_to(el.s.joints[op.slot].o);
       joint_residual(el, op, c);
     } else if (i > chain.first_stiff) {
-      const StiffSlot& k = el.s.stiff[op.slot];
+      StiffSlot& k = el.s.stiff[op.slot];
       move_to(k.p);
       series_residual(k, stiff_residual(el, op), c);
     } else {

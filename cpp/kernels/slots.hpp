@@ -54,9 +54,9 @@ struct Scratch {
   GroupSlot* groups;
   StrokeSlot* strokes;
   BranchSlot* branches;  ///< per chain
-  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *friction_sign, *kept,
-      *slope;  ///< friction_sign: sign of dry friction; kept: z at the last load step in equilibrium; slope: by the
-               ///< load
+  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *friction_sign, *kept, *slope,
+      *rest;  ///< friction_sign: sign of dry friction; kept: z at the last load step in equilibrium; slope: by
+              ///< the load; rest: step that is taken to first order only
 };
 
 }  // namespace stiffmap::kernel
