@@ -2,14 +2,18 @@
 
     OPENBLAS_NUM_THREADS=1 python bench/odd_sets.py --machine linear-delta --quantity deflection --rows 540
 
-Deflections get a tool with couplings in all directions that changes over the workspace, positions get waves; neither is
+`--rows 10000` for large sets, `--planted` for the same plans with a soft drive, or a drive off its zero, in place of what
+nothing explains. Deflections get a tool with couplings in all directions that changes over the workspace, positions get waves; neither is
 an effect of the library. `--seed` draws others: couplings with or without symmetry, waves, cubics or what is each pose's own, of
-0.1 to 3 mm. Prints CPU seconds of all threads, the verdict, and what was not tried; `--calibrate` the verdict of a calibration.
+0.1 to 3 mm. Prints CPU seconds of all threads, the peak of memory of a process of its own, the verdict, and what was not
+tried; `--calibrate` the verdict of a calibration.
 """
 
 from __future__ import annotations
 
 import argparse
+import multiprocessing
+import resource
 import time
 from dataclasses import replace
 from itertools import product
@@ -23,16 +27,32 @@ from stiffmap.experiment.experiment import Floats
 MACHINES = ("orthoglide-revised", "linear-delta", "rotary-delta", "ur10", "travelling-column")
 
 
-def odd(machine: sm.Machine, quantity: str, rows: int, seed: int = 0) -> Experiment:
-    """Readings of the declared machine, and what no effect explains; other seeds draw other shapes and sizes."""
+def plan_for(machine: sm.Machine, quantity: str, rows: int) -> Experiment:
+    """Random poses; positions in a frame that is unknown."""
     deflection = quantity == "deflection"
     poses = max(rows // 12, 2) if deflection else rows // 2
     plan = random_plan(machine, quantity, poses=poses, loads=6, repeats=2, seed=1)
     if not deflection:
         plan = replace(plan, frame="unknown", tool="unknown" if machine.name == "ur10" else "known")
+    return plan
+
+
+def planted(machine: sm.Machine, quantity: str, rows: int, seed: int = 0) -> Experiment:
+    """Readings of a machine whose first drive is softer, or off its zero."""
+    leg, _, element = machine.actuators[0].rpartition(".")
+    place = {"element": element, **({"legs": [leg]} if leg else {})}
+    off = {"scale": 2.0} if quantity == "deflection" else {"error": 1e-4}
+    kind = "compliance" if quantity == "deflection" else "zero_offset"
+    other = machine.with_effect(kind, **place, **off)
+    return simulate(machine, plan_for(machine, quantity, rows), other.description.effects, seed=3 + seed)
+
+
+def odd(machine: sm.Machine, quantity: str, rows: int, seed: int = 0) -> Experiment:
+    """Readings of the declared machine, and what no effect explains; other seeds draw other shapes and sizes."""
+    plan = plan_for(machine, quantity, rows)
     twin = simulate(machine, plan, [], seed=3 + seed)
     x = (twin.position - twin.position.mean(0)) / np.maximum(np.ptp(twin.position, axis=0), 1e-9)
-    shape = coupling if deflection else wandering
+    shape = coupling if quantity == "deflection" else wandering
     reading = twin.reading.copy()
     more = shape(twin, x, seed)
     reading[:, : more.shape[1]] += more
@@ -77,16 +97,24 @@ def main() -> None:
     parser.add_argument("--quantity", action="append", choices=("deflection", "position"))
     parser.add_argument("--rows", type=int, default=540)
     parser.add_argument("--seed", type=int, action="append", help="default: 0")
+    parser.add_argument("--planted", action="store_true")
     parser.add_argument("--calibrate", action="store_true")
     o = parser.parse_args()
     for name in o.machine or MACHINES:
         for quantity, seed in product(o.quantity or ("deflection", "position"), o.seed or [0]):
-            machine = sm.load_machine(name)
-            data = odd(machine, quantity, o.rows, seed)
-            begun = time.process_time()
-            told = calibrated(machine, data) if o.calibrate else diagnosed(machine, data)
-            took = time.process_time() - begun
-            print(f"{name} {quantity} {seed}: {took:.1f} s, {told}", flush=True)
+            with multiprocessing.get_context("spawn").Pool(1) as alone:
+                print(alone.apply(measured, (name, quantity, seed, o)), flush=True)
+
+
+def measured(name: str, quantity: str, seed: int, o: argparse.Namespace) -> str:
+    """The line of one set."""
+    machine = sm.load_machine(name)
+    data = (planted if o.planted else odd)(machine, quantity, o.rows, seed)
+    begun = time.process_time()
+    told = calibrated(machine, data) if o.calibrate else diagnosed(machine, data)
+    took = time.process_time() - begun
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    return f"{name} {quantity} {seed}: {took:.1f} s, {peak:.2f} GB, {told}"
 
 
 def diagnosed(machine: sm.Machine, data: Experiment) -> str:

@@ -56,8 +56,10 @@ def _test(
     if not contrasts:
         return Check(name, meaning, 0, float("nan"), float("nan"), "the plan does not allow it")
     total, rank, squares = 0.0, 0, []
-    for pose in {table.group[c[0][0][0]] for c in contrasts}:
-        here = [c for c in contrasts if table.group[c[0][0][0]] == pose]
+    of_pose: dict[int, list[Contrast]] = {}
+    for c in contrasts:
+        of_pose.setdefault(int(table.group[c[0][0][0]]), []).append(c)
+    for here in of_pose.values():
         value, covariance = table.values_of(here), table.covariance_of(here)
         squares += (value**2 / np.diag(covariance)).tolist()
         drop, r = _chi_square(value, covariance)

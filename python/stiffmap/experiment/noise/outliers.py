@@ -71,24 +71,35 @@ def _contradicting(experiment: Experiment, residual: Floats, sigma: Floats) -> M
     """In each condition whose repeats scatter too much, the row farthest from the others or from zero."""
     out = np.zeros(len(experiment), bool)
     condition = experiment.conditions
-    number = int(condition.max()) + 1
-    order = np.argsort(condition, kind="stable")
-    for rows in np.split(order, np.cumsum(np.bincount(condition, minlength=number))[:-1]):
-        if len(rows) > 1:
-            out[_worst(rows, residual / sigma)] = True
+    order, count = np.argsort(condition, kind="stable"), np.bincount(condition)
+    first = np.cumsum(count) - count
+    z = residual / sigma
+    for n in np.unique(count[count > 1]):
+        rows = order[first[count == n][:, None] + np.arange(n)]
+        out[_worst(rows, z[rows])] = True
     return out
 
 
 def _worst(rows: NDArray[np.intp], z: Floats) -> NDArray[np.intp]:
-    z = z[:, np.isfinite(z[rows]).any(axis=0)]
-    middle = np.nanmedian(z[rows], axis=0)
-    score = np.nansum((z[rows] - middle) ** 2, axis=1)
-    freedom = max(1, int(np.isfinite(z[rows]).sum() - np.isfinite(middle).sum()))
-    if chi2.sf(float(score.sum()), freedom) > 1e-5:
-        return rows[:0]
-    if len(rows) == 2:  # two that disagree: the one farther from the model
-        score = np.nansum(z[rows] ** 2, axis=1)
-    return rows[[int(np.argmax(score))]]
+    """Of conditions (g, m) rows of m repeats, whose readings are z (g, m, c), those rows that contradict the others."""
+    read = np.isfinite(z)
+    middle = _middle(z, read)
+    away = np.where(read, z - middle[:, None], 0.0)
+    score = np.sum(away**2, axis=2)
+    freedom = np.maximum(read.sum(axis=(1, 2)) - read.any(axis=1).sum(axis=1), 1)
+    found = chi2.sf(score.sum(axis=1), freedom) <= 1e-5
+    if rows.shape[1] == 2:  # two that disagree: the one farther from the model
+        score = np.sum(np.where(read, z, 0.0) ** 2, axis=2)
+    return np.asarray(rows[found, np.argmax(score[found], axis=1)])
+
+
+def _middle(z: Floats, read: Mask) -> Floats:
+    """(g, c) medians over the repeats of (g, m, c) that were read; 0 where none was."""
+    ranked = np.sort(np.where(read, z, np.inf), axis=1)
+    count = read.sum(axis=1, keepdims=True)
+    low, high = (np.take_along_axis(ranked, np.maximum(k, 0), axis=1) for k in ((count - 1) // 2, count // 2))
+    high = np.where(count % 2 == 0, high, low)
+    return np.asarray(np.where(count > 0, (low + high) / 2, 0.0)[:, 0])
 
 
 def whole_stays(experiment: Experiment, found: Mask, *, poses: bool = True) -> Mask:
