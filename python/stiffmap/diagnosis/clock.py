@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import signal
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from threading import current_thread, main_thread
+from types import FrameType
 
 from stiffmap.experiment.prediction.predict import Predictor
 
@@ -89,3 +93,24 @@ class Clock:
     def stop(self) -> None:
         """No new step, from now on."""
         self.stopped = True
+
+    @contextmanager
+    def on_interrupt(self) -> Iterator[None]:
+        """Ctrl-C stops the clock, wherever it comes; the next one raises KeyboardInterrupt, as it does where somebody
+        else handles it or outside the main thread."""
+        mine = current_thread() is main_thread()
+        before = signal.getsignal(signal.SIGINT) if mine else None
+        if before is not signal.default_int_handler:
+            yield
+            return
+
+        def once(number: int, frame: FrameType | None) -> None:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            self.stop()
+            self.say("nothing more: the best so far is the answer (Ctrl-C again: no answer)")
+
+        signal.signal(signal.SIGINT, once)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, signal.default_int_handler)

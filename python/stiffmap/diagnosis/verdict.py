@@ -92,8 +92,15 @@ def diagnose(
     s = study(predictor, seed, None, clock, check_kinds(n for n in exclude if n not in GROUPS))
     if budget is None:
         clock.bound(s.predictor)
+    with clock.on_interrupt():
+        return _diagnosed(s, seed, certified(tolerances, data), groups, cross_validate)
+
+
+def _diagnosed(
+    s: Study, seed: int, tolerances: Tolerances, groups: tuple[str, ...], cross_validate: bool
+) -> Diagnosis:
     times = [time.perf_counter()]
-    found = find_effects(s, seed, certified(tolerances, data), groups)
+    found = find_effects(s, seed, tolerances, groups)
     times.append(time.perf_counter())
     held = found.held
     if held is None and cross_validate:

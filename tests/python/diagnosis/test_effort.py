@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import stiffmap as sm
 from stiffmap.description.rigid import nominal_geometry, straight
@@ -162,3 +164,31 @@ def test_reach_is_asked_once_for_all_machines_of_one_geometry() -> None:
     assert straight(play.description) == straight(machine.description)
     assert in_reach(play, plan).all()
     assert in_reach(play, plan) is not in_reach(machine, plan)
+
+
+@pytest.mark.parametrize("when", ["a first effect", "structure in what is left", "held-out fold 2 of 5"])
+def test_ctrl_c_at_any_step_gives_the_best_so_far(when: str) -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    said: list[str] = []
+
+    def say(what: str) -> None:
+        said.append(what)
+        if what == when:
+            signal.raise_signal(signal.SIGINT)
+
+    d = sm.diagnose(machine, two_causes(machine), progress=say)
+    assert d.stopped
+    assert any(what.startswith("nothing more") for what in said)
+    assert d.effects or when != "structure in what is left"
+    assert d.held_out is None
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_ctrl_c_twice_gives_none() -> None:
+    def say(what: str) -> None:
+        if what in ("a first effect", "structure in what is left"):
+            signal.raise_signal(signal.SIGINT)
+
+    machine = sm.load_machine("orthoglide-revised")
+    with pytest.raises(KeyboardInterrupt):
+        sm.diagnose(machine, two_causes(machine), progress=say)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,23 +40,27 @@ class Plan:
 _PLANS: OrderedDict[str, Plan] = OrderedDict()
 
 
-def plan_of(predictor: Predictor) -> Plan:
-    """Sensitivities of a machine under a plan; the last eight are kept."""
+def plan_of(predictor: Predictor, say: Callable[[str], None] | None = None) -> Plan:
+    """Sensitivities of a machine under a plan; the last eight are kept. `say` is told which are computed."""
     read = hashlib.sha256(np.packbits(predictor.experiment.read).tobytes()).hexdigest()
     key = fingerprint(predictor) + read + repr([(k, id(get(k))) for k in kinds()])  # users may register more
     if key not in _PLANS:
-        _PLANS[key] = replace(_compute(predictor), digest=key)
+        _PLANS[key] = replace(_compute(predictor, say), digest=key)
         if len(_PLANS) > 8:
             _PLANS.popitem(last=False)
     _PLANS.move_to_end(key)
     return _PLANS[key]
 
 
-def _compute(predictor: Predictor) -> Plan:
+def _compute(predictor: Predictor, say: Callable[[str], None] | None) -> Plan:
     base = predictor()
     good: list[Variant] = []
     failed: list[tuple[Candidate, str]] = []
+    kind = ""
     for candidate in candidates(predictor.machine.description, predictor.experiment):
+        if say is not None and candidate.kind != kind:
+            kind = candidate.kind
+            say(f"sensitivities: {kind}")
         try:
             found = list(variants(candidate, predictor, base))
         except StiffmapError as problem:

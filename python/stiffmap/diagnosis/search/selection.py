@@ -157,8 +157,12 @@ def additions(
     fitted = [i for i in picked[:number] if screen.variants[i].candidate != but]
     if least is not None:
         fitted = _hopeful(search, model, screen, fitted, minus_log_p, margin, least)
-    found = [_finalist(search, model, screen, i) for i in fitted]
-    for i, f in zip(fitted, found, strict=True):
+    found: list[Finalist] = []
+    for i in fitted:
+        if found and search.clock.over:
+            break
+        f = _finalist(search, model, screen, i)
+        found.append(f)
         kept = f.minus_log_p / float(minus_log_p[i]) if f.model.usable else 0.0
         search.clock.promises[_beside(model, screen.variants[i].candidate)] = kept
     return found

@@ -12,7 +12,7 @@ from stiffmap.experiment.noise.whitening import Problem, readings_of
 ALPHA = 1e-4
 """Probability of naming anything where there is nothing, over the whole search."""
 DRAWS = 1000
-ENOUGH, FEWER = 3000, 300
+ENOUGH, FEWER = 4000, 300
 """Readings on which the worth of a search is found out, and draws where there are more: how alike the candidates are shows
 on a part of the plan."""
 
