@@ -156,6 +156,9 @@ def verified(
     gap, tip = closed(d, before, case, size)
     smooth = without_friction(machine, p[at], {**load, "wrench": wrench}, names)
     case = Case(command, tip.r, wrench[:, :3], wrench[:, 3:], gravity, str(load["load_type"]), before, smooth)
+    case = replace(
+        case, left_open=tuple(n for n, i in s.joint_index.items() if s.indeterminate_mask[at, i].all())
+    )
     found = balance(d, coordinates(names, s.coordinates[at]), case, size)
     stated = s.displacement[at]
     turn = Rotation.from_matrix(found.rotation @ np.swapaxes(tip.r, 1, 2)).as_rotvec()

@@ -39,6 +39,8 @@ class Case:
     smooth: dict[str, Array] = field(default_factory=dict)
     """Full name of each coordinate -> (n,) its way in linear statics without friction: friction opposes it. NaN: too
     little to tell."""
+    left_open: tuple[str, ...] = ()
+    """Full names of joints of which the answer says that they are open: held where they were, by whatever force."""
 
 
 @dataclass
@@ -50,7 +52,7 @@ class Axis:
     point: Array
     force: Array | None
     """(n,): along the axis, needed to hold the coordinate where it is; a first guess where `allowed` stands; None: a
-    rigid drive, whose force is a reaction."""
+    rigid drive or a joint that is left open, whose force is a reaction."""
     allowed: tuple[Array, Array] | None = None
     """(n, k) lower and upper ends of what a law with steps or friction allows."""
 
@@ -166,7 +168,7 @@ def through_joint(walk: Walk, e: Joint, f: Frame, name: str) -> Frame:
         full = name if len(e.axes) == 1 else f"{name}.{i + 1}"
         value = walk.x[full]
         column = f.r @ np.array(axis)
-        made = Axis(revolute, column, f.p, np.zeros_like(value))
+        made = Axis(revolute, column, f.p, None if full in walk.case.left_open else np.zeros_like(value))
         if e.actuated:
             u = walk.case.command[name]
             if walk.as_built:
