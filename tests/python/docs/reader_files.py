@@ -30,12 +30,11 @@ def link_arrays() -> dict[str, Any]:
 def link_tables() -> tuple[str, str]:
     """The same as the two tables of `stiffmap link`, mm and N·mm."""
     a = link_arrays()
-    field = ["case,x,y,z,ux,uy,uz"]
-    for case, u in enumerate(a["displacements"]):
-        for p, d in zip(a["points"], u, strict=True):
-            values = [*(1e3 * p + [310, 0, 0]), *(1e3 * d)]
-            field.append(",".join([f"c{case}", *(f"{v:.12g}" for v in values)]))
-    cases = ["case,fx,fy,fz,mx,my,mz"]
-    for case, w in enumerate(a["wrenches"]):
-        cases.append(",".join([f"c{case}", *(f"{v:g}" for v in [*w[:3], *(1e3 * w[3:])])]))
+    each = range(len(a["displacements"]))
+    field = [",".join(["x [mm],y [mm],z [mm]", *("ux [mm],uy [mm],uz [mm]" for _ in each)])]
+    for i, p in enumerate(a["points"]):
+        values = [1e3 * p + [310, 0, 0], *(1e3 * a["displacements"][case][i] for case in each)]
+        field.append(",".join(f"{v:.12g}" for three in values for v in three))
+    cases = ["fx [N],fy [N],fz [N],mx [N*mm],my [N*mm],mz [N*mm]"]
+    cases += [",".join(f"{v:g}" for v in [*w[:3], *(1e3 * w[3:])]) for w in a["wrenches"]]
     return "\n".join(field) + "\n", "\n".join(cases) + "\n"
