@@ -21,7 +21,7 @@ void count_pose(const Program& P, Block& b, Scratch& s, double* out) {
   out[bench::block] += counted([&] { b.run(); });
   const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
   Elimination e{P, s, {}, splat(1e300), {f, f, f, g, g, g}};
-  Newton n{P, b.in, s, e, b.load};
+  Newton n{P, b.in, s, e, b.load, {}};
   Frame tip = Closing::base_frame();
   V3 at;
   V6 F = b.load, c;
@@ -42,7 +42,7 @@ void count_pose(const Program& P, Block& b, Scratch& s, double* out) {
   out[bench::back] += counted([&] { back(e, P.chains[P.root], get(zero), tip.p, V3{}, M{}); });
   n.tip = tip;
   n.point = tip.p;
-  out[bench::output] += counted([&] { b.write(M{-1}, n, C, C, splat(1)); });
+  out[bench::output] += counted([&] { b.write(M{-1}, n, C, C, splat(1), splat(1)); });
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ struct V {
   V& operator+=(V b) { return ++operations, v += b.v, *this; }
   V& operator-=(V b) { return ++operations, v -= b.v, *this; }
   V& operator*=(V b) { return ++operations, v *= b.v, *this; }
+  V& operator/=(V b) { return ++operations, v /= b.v, *this; }
 };
 inline V operator+(V a, V b) { return ++operations, V(a.v + b.v); }
 inline V operator-(V a, V b) { return ++operations, V(a.v - b.v); }
@@ -53,6 +54,16 @@ inline bool any(M m) { return m.m != 0; }
 inline bool all(M m) { return m.m != 0; }
 inline V root(V x) { return ++operations, V(std::sqrt(x.v)); }
 inline V load(const double* x) { return *x; }
+inline void write_lanes(const V* values, int count, M lanes, double* const (&out)[W]) {
+  for (int i = 0; lanes[0] && i < count; ++i) out[0][i] = values[i].v;
+}
+/// As many operations as the real one.
+inline V cubic_root(V y) {
+  operations += 38;
+  double u = std::cbrt(y.v);
+  for (int k = 0; k < 60; ++k) u = (2 * u * u * u + y.v) / (3 * u * u + 1);
+  return u;
+}
 /// As many operations as the real one.
 inline void sincos(V x, V& s, V& c) {
   operations += 38;

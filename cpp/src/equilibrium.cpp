@@ -25,11 +25,12 @@ constexpr double unloaded = 1e-11;
 constexpr double gap_noise = 1e-14;  // the same for the force that a gap would have to bear at an equilibrium
 
 /// After an iteration with all laws linear: put each law where it carries the force just found. One
-/// that bears nothing stays at its centre, friction opposes the deflection just found.
+/// that bears nothing stays at its centre, friction opposes the deflection just found: at any share of the load as at
+/// the whole of it.
 void start_laws(const Mechanism& m, Problem& p, State& state) {
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
-    const bool bears = std::abs(state.z[j]) * m.unit(j) > unloaded * m.length;
+    const bool bears = std::abs(state.z[j]) * m.unit(j) > unloaded * m.length * p.factor;
     if (c.friction != 0) p.friction_sign[j] = !bears ? 0 : state.z[j] > 0 ? 1 : -1;
     if (c.law < 0 || c.locked) continue;
     const Law& law = m.laws[at(c.law)];
@@ -99,6 +100,7 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
   int idle = 0;
   out.contraction = 0;
   p.secant_laws = p.first_order = cold && knots;
+  if (p.secant_laws) p.friction_sign.setZero();  // not those of an attempt at more of the load
   linearize(m, p, state, ws.lin);
   for (int k = 0; k < opt.max_iterations; ++k) {
     ws.saddle.assemble(m, ws.lin);
