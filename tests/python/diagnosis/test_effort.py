@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -166,6 +167,15 @@ def test_reach_is_asked_once_for_all_machines_of_one_geometry() -> None:
     assert in_reach(play, plan) is not in_reach(machine, plan)
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """A job in the background ignores Ctrl-C from its start."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("when", ["a first effect", "structure in what is left", "held-out fold 2 of 5"])
 def test_ctrl_c_at_any_step_gives_the_best_so_far(when: str) -> None:
     machine = sm.load_machine("orthoglide-revised")
@@ -184,6 +194,7 @@ def test_ctrl_c_at_any_step_gives_the_best_so_far(when: str) -> None:
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_twice_gives_none() -> None:
     def say(what: str) -> None:
         if what in ("a first effect", "structure in what is left"):
