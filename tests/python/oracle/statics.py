@@ -385,7 +385,7 @@ def settle(walk: Walk, weight: Array, left: Array, given: Array, needed: Array) 
     rows = [i for i, a in enumerate(walk.axes) if a.force is not None]
     steps = [i for i, a in enumerate(walk.axes) if a.allowed is not None]
     worst, reaction, todo = np.full(n, np.inf), np.zeros((n, left.shape[2])), np.arange(n)
-    inverse = least_squares(left[:, rows])
+    inverse = pseudo_inverse(left[:, rows])
     for _ in range(60 if steps else 1):
         b = weight * (needed[todo] - given[todo])
         reaction[todo] = np.einsum("nij,nj->ni", inverse[todo], b[:, rows])
@@ -436,7 +436,7 @@ def nearest(allowed: tuple[Array, Array] | None, at: Array, force: Array) -> Arr
     return choice[np.arange(len(at)), best]
 
 
-def least_squares(a: Array) -> Array:
+def pseudo_inverse(a: Array) -> Array:
     """(n, columns, rows) that gives the solution of least squares, of least norm where columns depend on each other."""
     if a.shape[2] == 0:
         return np.zeros((len(a), 0, a.shape[1]))
