@@ -22,7 +22,8 @@ constexpr int most_idle = 10;  // Newton steps in which the merit is not halved 
 
 /// A linear deflection below this share of the length is closure noise: the coordinate bears nothing.
 constexpr double unloaded = 1e-11;
-constexpr double gap_noise = 1e-14;  // the same for the force that a gap would have to bear at an equilibrium
+/// The same for the force that a gap would have to bear at an equilibrium: certainly noise, and certainly a force.
+constexpr double gap_noise = 1e-15, gap_force = 1e-14;
 
 /// After an iteration with all laws linear: put each law where it carries the force just found. One
 /// that bears nothing stays at its centre, friction opposes the deflection just found: at any share of the load as at
@@ -41,14 +42,15 @@ void start_laws(const Mechanism& m, Problem& p, State& state) {
   }
 }
 
-/// A coordinate inside a gap that has to bear force after all goes to the end of the gap.
-bool leave_gaps(const Mechanism& m, const Problem& p, const Linearization& lin, State& state) {
+/// A coordinate inside a gap that has to bear force after all, of more than `noise` of its own stiffness times the
+/// length, goes to the end of the gap.
+bool leave_gaps(const Mechanism& m, const Problem& p, const Linearization& lin, double noise, State& state) {
   bool left = false;
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
     if (c.law < 0 || c.locked || lin.kind[at(j)] != Kind::free) continue;
     const Law& law = m.laws[at(c.law)];
-    if (std::abs(lin.r[j]) * m.unit(j) <= gap_noise * m.length * law.stiffness()) continue;
+    if (std::abs(lin.r[j]) * m.unit(j) <= noise * m.length * law.stiffness()) continue;
     state.z[j] = law.from_force(lin.tau[j] - law.friction() * p.friction_sign[j] - lin.r[j], p.drive_scale[j]);
     left = true;
   }
@@ -91,10 +93,10 @@ void line_search(const Mechanism& m, const Problem& p, EquilibriumWorkspace& ws,
   }
 }
 
-/// Newton at one load. `trusting`: leave as soon as the first steps do not shrink fast, so that the
-/// result is the continuation of the start and no other root (theory E9).
-Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bool cold, bool trusting,
-               EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
+/// Newton's steps at one load. `trusting`: leave as soon as the first steps do not shrink fast, so that the
+/// result is the continuation of the start and no other root (theory E9). A gap bears what is more than `noise`.
+Outcome iterate(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bool cold, bool trusting, double noise,
+                EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
   const bool knots = has_knots(m);
   double first = 0, previous = 0, least = std::numeric_limits<double>::infinity();
   int idle = 0;
@@ -123,7 +125,7 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
     const bool settled =
         norm < opt.tolerance && (!knots || norm < nothing || (previous > 0 && previous < opt.tolerance));
     if (settled) {
-      if (knots && !ws.saddle.regular() && leave_gaps(m, p, ws.lin, state)) {
+      if (knots && !ws.saddle.regular() && leave_gaps(m, p, ws.lin, noise, state)) {
         linearize(m, p, state, ws.lin);
         continue;
       }
@@ -155,6 +157,22 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
     }
   }
   return Outcome::failed;
+}
+
+/// Newton at one load. Whether a gap bears a force next to round-off is found by trying: where Newton does not settle
+/// with it, it was noise.
+Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bool cold, bool trusting,
+               EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
+  const Outcome outcome = iterate(m, p, opt, cold, trusting, gap_force, ws, state, out);
+  if (outcome != Outcome::converged || !has_knots(m) || ws.saddle.regular()) return outcome;
+  ws.settled = state;
+  if (!leave_gaps(m, p, ws.lin, gap_noise, state)) return outcome;
+  if (iterate(m, p, opt, false, trusting, gap_noise, ws, state, out) == Outcome::converged) return outcome;
+  state = ws.settled;
+  linearize(m, p, state, ws.lin);
+  ws.saddle.assemble(m, ws.lin);
+  ws.saddle.factorize();
+  return outcome;
 }
 
 Outcome equal_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, int steps, EquilibriumWorkspace& ws,
@@ -320,6 +338,7 @@ EquilibriumWorkspace::EquilibriumWorkspace(const Mechanism& m)
       start(m),
       step_start(m),
       before(m),
+      settled(m),
       dz(VecX::Zero(m.size())),
       dlambda(VecX::Zero(m.closures())),
       force(VecX::Zero(m.size())),

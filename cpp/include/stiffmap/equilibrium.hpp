@@ -28,7 +28,7 @@ struct EquilibriumWorkspace {
   Linearization lin;
   SaddleSystem saddle;
   Stability stability;
-  State start, step_start, before;
+  State start, step_start, before, settled;
   VecX dz, dlambda, force, slope, slope_before, no_closure;
 };
 

@@ -72,6 +72,8 @@ def _joint(e: xml.Element, file: str) -> UrdfJoint:
         raise FileError(f"type '{kind}' cannot be imported; known are {known}", file=file, key=key)
     parent, child = (_link(e, tag, file, key) for tag in ("parent", "child"))
     axis = _numbers(e.find("axis"), "xyz", X, file, key)
+    largest = float(np.abs(axis).max())  # taken out first: the square of 1e308 overflows
+    axis = axis / (largest or 1.0)
     length = float(np.linalg.norm(axis))
     if KINDS[kind] != "fixed" and length == 0:
         raise FileError("a zero-length axis has no direction", file=file, key=key)

@@ -70,6 +70,12 @@ def test_masses_of_pinocchio(tmp_path: Path) -> None:
     np.testing.assert_allclose(s.actuator_effort, wanted, rtol=1e-5, atol=1e-5)
 
 
+def test_the_length_of_an_axis_does_not_matter(tmp_path: Path) -> None:
+    (tmp_path / "b").mkdir()
+    long = machine(tmp_path, robots.ARM.replace('<axis xyz="1 0 0"/>', '<axis xyz="1e308 0 0"/>'))
+    assert long == machine(tmp_path / "b", robots.ARM)
+
+
 def test_closed_loop_is_the_five_bar_written_by_hand(tmp_path: Path) -> None:
     m = machine(tmp_path, robots.FIVE_BAR, robots.FIVE_BAR_SIDECAR)
     assert len(m.legs) == 2 and len(m.actuators) == 2
