@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/assemble.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <random>
 
 #include "unloaded.hpp"
 
@@ -13,34 +15,96 @@ using namespace unloaded;
 
 constexpr double open_turn = 0.4;     // of a spin, rad or shares of the length
 constexpr double open_change = 0.02;  // of the stiffness by it: more than errors of the geometry make
+constexpr double no_change = 1e-6;    // of it by nothing but round-off
+
+/// The mechanism without errors, with springs and laws that have nothing in common with each other: a motion that does
+/// not change its stiffness changes it for no springs and laws, since stiffness is a rational function of them.
+Mechanism with_any_springs(const Mechanism& m) {
+  Mechanism out = m;
+  std::minstd_rand random(1);
+  std::uniform_real_distribution<double> share(-1, 1);
+  for (Node& n : out.nodes) n.actual = n.nominal;
+  for (Drive& d : out.drives) {
+    d.numbers = {};
+    d.errors.clear();
+  }
+  Vec6 unit;
+  unit << Vec3::Ones(), Vec3::Constant(m.length);
+  for (SpringGroup& g : out.groups) {
+    const Mat6 any = Mat6::NullaryExpr([&] { return share(random); });
+    g.matrix = {};
+    g.matrix.stiffness =
+        m.stiffness * unit.asDiagonal() * (any * any.transpose() + Mat6::Identity()) * unit.asDiagonal();
+    g.rest.setZero();
+    g.stroke.reset();
+    for (Index k = 0; k < 6; ++k) out.coordinates[at(g.first + k)].law = -1;
+  }
+  for (Index j = 0; j < out.size(); ++j)
+    if (const Index law = out.coordinates[at(j)].law; law >= 0)
+      out.laws[at(law)] = Law(m.stiffness * m.unit(j) * m.unit(j) * (1.5 + share(random)));
+  out.external_springs.clear();
+  return out;
+}
+
+/// Whether what a settled spin says holds here: a cable may be fixed to the rod, a spring vary with a joint that turns.
+bool takes_springs_along(const Mechanism& m, const VecX& x) {
+  return m.external_springs.empty() && std::all_of(m.groups.begin(), m.groups.end(), [&](const SpringGroup& g) {
+           return !g.stroke || std::abs(x[g.varies_with] - m.home_coordinates[g.varies_with]) < 1e-9 * m.length;
+         });
+}
+
+/// Stiffnesses of the tip where spins have turned, against the one at home; nothing is computed before it is asked for.
+class Turns {
+ public:
+  explicit Turns(const Mechanism& m) : m_(m), tip_(m.points.front()) {}
+
+  double change_at(const VecX& x) {
+    if (!unloaded_) home_ = unloaded_.emplace(m_).stiffness(m_.home_coordinates, tip_);
+    return change(unloaded_->stiffness(x, tip_), home_);
+  }
+
+  /// The mechanism holds fewer spins than before; what they change still counts from where all were held.
+  void renew() { unloaded_.emplace(m_); }
+
+ private:
+  const Mechanism& m_;
+  const NodePoint& tip_;
+  std::optional<Unloaded> unloaded_;
+  Mat6 home_;
+};
 
 /// A held spin along which the tip's stiffness changes leaves the configuration open (theory K3): not held.
-/// `turned`: where each closes when it has turned; what is missing is found and added until one is let go.
-void let_go_of_configurations(Mechanism& m, std::vector<VecX>& turned) {
-  const NodePoint& tip = m.points.front();
+/// `turned`: what is missing is found and added until one is let go.
+void let_go_of_configurations(Mechanism& m, std::vector<HomeRecord::Turned>& turned) {
   ClosureWorkspace ws(m);
-  std::optional<Unloaded> unloaded;
-  Mat6 home;
+  Turns own(m);
+  std::optional<Mechanism> of_any;
+  std::optional<Turns> any;
   std::size_t held = 0;
   bool let_go = false;
   for (Index j = 0; j < m.size(); ++j) {
     Coordinate& c = m.coordinates[at(j)];
     if (!c.locked || c.role != Role::passive) continue;
-    if (!unloaded) home = unloaded.emplace(m).stiffness(m.home_coordinates, tip);
-    VecX x;
+    HomeRecord::Turned turn;
     if (!let_go && held < turned.size()) {
-      x = turned[held];
+      turn = turned[held];
     } else {
+      VecX& x = turn.coordinates;
       x = m.home_coordinates;
       x[j] += open_turn * m.length / m.unit(j);
       if (close_passive(m, m.home, ws, x) > 1e-9) x.resize(0);
-      if (!let_go) turned.push_back(x);
+      if (!let_go && x.size() != 0) {
+        if (!any) any.emplace(of_any.emplace(with_any_springs(m)));
+        turn.settled = any->change_at(x) < no_change;
+      }
+      if (!let_go) turned.push_back(turn);
     }
     ++held;
-    if (x.size() == 0 || !(change(unloaded->stiffness(x, tip), home) > open_change)) continue;
+    const VecX& x = turn.coordinates;
+    if (x.size() == 0 || (turn.settled && takes_springs_along(m, x)) || !(own.change_at(x) > open_change)) continue;
     c.locked = false;
     let_go = true;
-    unloaded.emplace(m);
+    own.renew();
   }
 }
 

@@ -15,6 +15,12 @@ struct HomeRecord {
     Pose home;
   };
 
+  /// Where a held spin has turned.
+  struct Turned {
+    VecX coordinates;      ///< closed; empty: it does not close there
+    bool settled = false;  ///< the tip's stiffness stays there as it is at home, whatever springs and laws are
+  };
+
   Chain declared;
   Pose home;
   Task task = full_task;
@@ -23,7 +29,7 @@ struct HomeRecord {
   std::vector<SpunBall> balls;    ///< renumbered
   std::vector<Index> locked;      ///< spins that are held
   VecX beside_home;               ///< as of Mechanism
-  std::vector<VecX> turned;       ///< per held spin: closed where it has turned; empty: it does not close there
+  std::vector<Turned> turned;     ///< per held spin, until one is let go
 
   /// Whether the same would be found out about this chain.
   bool holds_for(const Chain& root, const Pose& home_pose, const Task& commanded, HomeSearch how) const;

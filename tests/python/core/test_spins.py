@@ -11,10 +11,24 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
-from stiffmap.description import Body, Element, Joint, Law, Leg, MachineDescription, Offset, Point, Pose
+from stiffmap.description import (
+    Body,
+    Element,
+    ExternalSpring,
+    Joint,
+    Law,
+    Leg,
+    MachineDescription,
+    Offset,
+    Point,
+    Pose,
+    Spring,
+)
+from stiffmap.description.tree import edit_sequences
 
 SPAN, MASS, OFF, G = 0.4, 2.0, 0.05, 9.81
 GRAVITY = (0.0, 0.0, -G)
+TIP = (0.0, 0.0, 0.2)
 BALL = (b.AXES["x"], b.AXES["y"], b.AXES["z"])
 
 
@@ -157,3 +171,56 @@ def test_a_spring_about_the_rod_decides_how_far_it_turns() -> None:
     # about x alone, but for the sag: the weight's moment against the spring
     angle = brentq(lambda t: stiff * t + MASS * G * OFF * np.cos(0.4 + t), -2, 2)
     assert turn[0] == pytest.approx(angle, abs=1e-4)
+
+
+@pytest.mark.parametrize("name", ["linear-delta", "rotary-delta", "hexapod"])
+def test_no_spring_lets_go_of_a_rod_between_balls(name: str) -> None:
+    """A force along the line of the rod is all that it carries: what its springs are across changes nothing."""
+    machine = sm.load_machine(name)
+    rng = np.random.default_rng(2)
+
+    def coupled(e: Spring) -> Spring:
+        root = rng.standard_normal((6, 6))
+        size = np.sqrt(np.diag(np.array(e.compliance)))
+        return replace(e, compliance=b.matrix((root @ root.T + np.eye(6)) * np.outer(size, size)))
+
+    def edit(elements: tuple[Element, ...]) -> tuple[Element, ...]:
+        return tuple(coupled(e) if isinstance(e, Spring) and e.compliance else e for e in elements)
+
+    d = machine.description
+    legs = tuple(replace(leg, elements=edit_sequences(leg.elements, edit)) for leg in d.legs)
+    other = sm.Machine(replace(d, legs=legs), like=machine)
+    assert machine.free_spins
+    assert other.free_spins == machine.free_spins
+    assert sm.Machine(other.description).free_spins == machine.free_spins
+
+
+def swivel(*across: float) -> MachineDescription:
+    """A platform on a spring, and on a leg with a body between two hinges on one line; N/m of the body along its x and y."""
+    turning = (
+        b.revolute("low"),
+        b.shift("up", (0, 0, 0.1)),
+        b.stiff("yield", np.diag([*across, 1e6, 1e3, 1e3, 1e3])),
+        Point("hook", (0.1, 0.0, 0.0)),
+        b.shift("on", (0, 0, 0.1)),
+        b.revolute("high"),
+    )
+    hold = (b.shift("to", TIP), b.stiff("hold", np.diag([1e6, 1e6, 1e6, 1e3, 1e3, 1e3])))
+    return MachineDescription("swivel", (Leg("hold", hold), Leg("turning", turning)), home=Pose.of(TIP))
+
+
+def test_a_spin_that_springs_decide_on_is_judged_again() -> None:
+    alike, uneven = sm.Machine(swivel(1e6, 1e6)), swivel(1e6, 4e6)
+    assert len(alike.free_spins) == 1
+    for made in (sm.Machine(uneven), sm.Machine(uneven, like=alike)):
+        assert not made.free_spins
+        assert made.solve(TIP).flags & sm.Flag.CONFIGURATION_UNDETERMINED
+        assert sm.Machine(swivel(1e6, 1e6), like=made).free_spins == alike.free_spins
+
+
+def test_a_cable_on_the_body_that_turns_is_asked_for() -> None:
+    alike = sm.Machine(swivel(1e6, 1e6))
+    cable = ExternalSpring("cable", "turning.hook", (0.3, 0.0, 0.1), 2e6, 0.25)
+    pulled = replace(alike.description, external_springs=(cable,))
+    for made in (sm.Machine(pulled), sm.Machine(pulled, like=alike)):
+        assert not made.free_spins
