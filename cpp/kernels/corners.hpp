@@ -59,7 +59,7 @@ struct Corners {
     const LawProgram& of = law(q);
     const double* n = P.knots + 3 * of.first;
     const double* last = n + 3 * (of.count - 1);
-    const V k = of.stiffness / s.scale[q];
+    const V k = s.linear[q];
     V out = select(a < n[0], n[1] + k * (a - n[0]), last[1] + k * (a - last[0]));
     for (int i = 1; i < of.count; ++i) {
       const double *u = n + 3 * (i - 1), *v = u + 3;

@@ -53,9 +53,8 @@ struct FreePlay {
   }
 
   /// From the held joint's stiffness K and compliance C at the point to those of the joint that plays: K loses the
-  /// direction in which it moves the point, C has no numbers. `columns` are the joints' unit twists.
-  template <class Column>
-  [[gnu::noinline]] void release(Elimination& el, int n, const Column& column, V (&C)[6][6], Sym6& K) {
+  /// direction in which it moves the point, C has no numbers. `unit` are the joints' unit twists.
+  [[gnu::noinline]] void release(Elimination& el, int n, const V6* unit, V (&C)[6][6], Sym6& K) {
     V stiff = splat(0), soft = splat(0);
     const V own[6] = {K.A.xx, K.A.yy, K.A.zz, K.E.xx, K.E.yy, K.E.zz};
     for (int i = 0; i < 6; ++i) {
@@ -64,7 +63,7 @@ struct FreePlay {
       soft += C[i][i] * size;
     }
     V6 moved = twist;
-    for (int k = 0; k < n; ++k) moved = select(loose[k], column(k), moved);
+    for (int k = 0; k < n; ++k) moved = select(loose[k], unit[k], moved);
     twist = select(lanes, moved, twist);
     const V6 force = K * twist;
     Sym6 left = K;
@@ -84,7 +83,7 @@ struct FreePlay {
   /// Of a joint without its gap.
   static V stiffness(const Elimination& el, int q) {
     const CoordinateProgram& k = el.P.coordinates[q];
-    if (k.law >= 0) return el.P.laws[k.law].stiffness / el.s.scale[q];
+    if (k.law >= 0) return el.s.linear[q];
     return splat(k.stiffness > 0 ? k.stiffness : el.P.stiffness * k.unit * k.unit);
   }
 };

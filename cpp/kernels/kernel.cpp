@@ -35,8 +35,8 @@ Scratch lay_out(const Program& P, void* memory, std::int64_t* bytes) {
   s.strokes = take<StrokeSlot>(at, P.stroke_count);
   s.branches = take<BranchSlot>(at, P.chain_count);
   const int n = P.coordinate_count;
-  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.closed, &s.friction_sign, &s.kept,
-                &s.slope, &s.rest})
+  for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.linear, &s.curve, &s.closed,
+                &s.friction_sign, &s.kept, &s.slope, &s.rest})
     *v = take<V>(at, n);
   if (bytes) *bytes = at - begin + 64;
   return s;
@@ -121,6 +121,12 @@ struct Block {
       const DriveProgram& k = of.drives[d];
       if (k.compliance_slope != 0) s.scale[k.coordinate] = 1.0 + k.compliance_slope * (s.closed[k.coordinate] - k.home);
     }
+    for (int q = 0; q < of.coordinate_count; ++q) {
+      const CoordinateProgram& k = of.coordinates[q];
+      if (k.law < 0) continue;
+      s.linear[q] = of.laws[k.law].stiffness / s.scale[q];
+      if (k.by_force) s.curve[q] = root(of.laws[k.law].cubic / s.linear[q]);
+    }
     for (int i = 0; i < of.error_count; ++i) {
       const CommandErrorProgram& k = of.errors[i];
       const V u = s.closed[k.of] - k.reference;
@@ -148,7 +154,7 @@ struct Block {
       const CoordinateProgram& k = P.coordinates[q];
       V z = splat(0);
       if (k.from_home) z = s.closed[q] - k.rest;
-      if (k.from_home && k.by_force) z += P.laws[k.law].cubic / P.laws[k.law].stiffness * s.scale[q] * z * z * z;
+      if (k.from_home && k.by_force) z += s.curve[q] * s.curve[q] * z * z * z;
       s.z[q] = select(lanes, z, s.z[q]);
     }
     for (int k = 0; k < P.chain_count; ++k) s.branches[k].F = select(lanes, V6{}, s.branches[k].F);
@@ -332,39 +338,36 @@ struct Block {
   }
 
   void write_efforts(M done, const Newton& newton, V steps) {
-    V high = splat(0), range = splat(0), limit = splat(0);
+    M high{}, range{}, limit{};
+    V* const efforts = s.dz;  // no step is taken any more
     for (int d = 0; d < P.drive_count; ++d) {
       const DriveProgram& k = P.drives[d];
       const JointSlot& j = s.joints[k.slot];
-      const V effort =
-          P.coordinates[k.coordinate].locked ? -dot(j.w, k.prismatic ? j.F.a : j.F.b) : -s.tau[k.coordinate];
-      high = select(absolute(effort) > k.force_limit, splat(1), high);
-      if (out.effort)
-        for (int i = 0; i < count; ++i)
-          if (done[i]) out.effort[P.drive_count * pose(i) + d] = effort[i];
+      efforts[d] = P.coordinates[k.coordinate].locked ? -dot(j.w, k.prismatic ? j.F.a : j.F.b) : -s.tau[k.coordinate];
+      high |= absolute(efforts[d]) > k.force_limit;
     }
+    put_out(efforts, P.drive_count, done & written(), out.effort);
     for (int q = 0; q < P.coordinate_count; ++q) {
       const CoordinateProgram& k = P.coordinates[q];
       const M off = (s.closed[q] < k.lower) | (s.closed[q] > k.upper);
-      if (k.role == 0) range = select(off, splat(1), range);
-      if (k.role == 1) limit = select(off, splat(1), limit);
+      if (k.role == 0) range |= off;
+      if (k.role == 1) limit |= off;
     }
-    const M lock = locked(P.near_lock);
+    const M lock = locked(P.near_lock), stepped = steps > 0.0;
     for (int i = 0; i < count; ++i)
       if (done[i])
-        out.flags[pose(i)] = (lock[i] ? P.flag_lock : 0u) | (high[i] > 0 ? P.flag_force : 0u) |
-                             (range[i] > 0 ? P.flag_range : 0u) | (limit[i] > 0 ? P.flag_limit : 0u) |
-                             (steps[i] > 0 ? P.flag_stepped : 0u) | (unverified[i] ? P.flag_unverified : 0u) |
-                             P.flag_always;
+        out.flags[pose(i)] = P.flag_always | (lock[i] & P.flag_lock) | (high[i] & P.flag_force) |
+                             (range[i] & P.flag_range) | (limit[i] & P.flag_limit) | (stepped[i] & P.flag_stepped) |
+                             (unverified[i] & P.flag_unverified);
     if (!out.leg_wrench || P.legs_op < 0) return;
     const Op& block = P.ops[P.legs_op];
     for (int b = 0; b < block.count; ++b) {
       const BranchSlot& branch = s.branches[block.first + b];
       const V3 m = branch.F.b + cross(branch.end.p - newton.point, branch.F.a);
       const V w[6] = {-branch.F.a.x, -branch.F.a.y, -branch.F.a.z, -m.x, -m.y, -m.z};
-      for (int i = 0; i < count; ++i)
-        if (done[i])
-          for (int r = 0; r < 6; ++r) out.leg_wrench[6 * (block.count * pose(i) + b) + r] = w[r][i];
+      double* rows[W];
+      for (int i = 0; i < W; ++i) rows[i] = out.leg_wrench + 6 * (block.count * pose(i) + b);
+      write_lanes(w, 6, done & written(), rows);
     }
   }
 };

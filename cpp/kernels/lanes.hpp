@@ -66,12 +66,34 @@ inline void transpose(V (&rows)[W]) {
 #endif
 #endif
 
+#ifdef STIFFMAP_SHUFFLES
+/// Fewer than W numbers of each lane.
+inline void write_few(const V* values, int count, M lanes, double* const (&out)[W]) {
+  V rows[W] = {};
+  for (int k = 0; k < count; ++k) rows[k] = values[k];
+  transpose<W / 2>(rows);
+  for (int i = 0; i < W; ++i) {
+    if (!lanes[i]) continue;
+    const double* row = reinterpret_cast<const double*>(&rows[i]);
+    double* to = out[i];
+#pragma GCC unroll 4
+    for (int piece = W / 2; piece > 0; piece /= 2) {
+      if (!(count & piece)) continue;
+      __builtin_memcpy(to, row, sizeof(double) * piece);
+      row += piece;
+      to += piece;
+    }
+  }
+}
+#endif
+
 /// Writes `count` numbers of each lane in `lanes` to out[lane], one after the other.
 inline void write_lanes(const V* values, int count, M lanes, double* const (&out)[W]) {
   int from = 0;
 #ifdef STIFFMAP_SHUFFLES
+  if (count < W) return write_few(values, count, lanes, out);
   // The last W of them again where they are no multiple of W.
-  for (; from < count && count >= W; from += W) {
+  for (; from < count; from += W) {
     if (from > count - W) from = count - W;
     V rows[W];
     for (int k = 0; k < W; ++k) rows[k] = values[from + k];

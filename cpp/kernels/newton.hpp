@@ -31,6 +31,11 @@ struct Answer {
 };
 
 struct Newton {
+  /// As an aggregate it would be filled with zeros first: 26 kB for every block.
+  Newton(const Program& program, const KernelInput& input, Scratch& scratch, Elimination& elimination, const V6& wrench,
+         const V3& gravity)
+      : P(program), in(input), s(scratch), e(elimination), whole_load(wrench), whole_gravity(gravity) {}
+
   const Program& P;
   const KernelInput& in;
   Scratch& s;
@@ -54,14 +59,14 @@ struct Newton {
 
   // ---- laws -----------------------------------------------------------------------------------
   void law_at(const LawProgram& law, int q) {
-    const V k = law.stiffness / s.scale[q], z = s.z[q];
+    const V k = s.linear[q], z = s.z[q];
     if (P.coordinates[q].by_force) {
       // k z = k a + c a^3: in a, Newton's steps on the stiff part shrink by a third only.
-      const V g = law.cubic / k, size = root(g), a = cubic_root(size * z) / size;
+      const V u = cubic_root(s.curve[q] * z);
       s.tau[q] = k * z + law.friction * s.friction_sign[q];
-      s.da[q] = 1.0 / (1.0 + 3 * g * a * a);
+      s.da[q] = 1.0 / (1.0 + 3 * u * u);
       s.dtau[q] = k;
-      s.x[q] = s.a_base[q] + a;
+      s.x[q] = s.a_base[q] + u / s.curve[q];
       return;
     }
     if (law.count == 0) {
@@ -98,30 +103,30 @@ struct Newton {
   }
 
   /// Where the law carries the force that the linear start found: middle of a gap.
-  double from_force(const LawProgram& law, double tau, double scale) const {
-    const double k = law.stiffness / scale;
+  V from_force(const LawProgram& law, V tau, V k) const {
     if (law.count == 0) {
-      double a = tau / k;
+      V a = tau / k;
       for (int i = 0; i < 60 && law.cubic > 0; ++i)
         a -= (k * a + law.cubic * a * a * a - tau) / (k + 3 * law.cubic * a * a);
       return a;
     }
     const double* n = P.knots + 3 * law.first;
     const double* last = n + 3 * (law.count - 1);
-    const double* end = tau < n[1] ? n : tau > last[1] ? last : nullptr;
-    if (end) return end[2] + (tau - end[1]) / k + (tau - end[1]) / law.stiffness;
-    double lo = n[2], hi = last[2];
+    V lo = splat(n[2]), hi = splat(last[2]);
     for (int i = 1; i < law.count; ++i) {
       const double *u = n + 3 * (i - 1), *v = u + 3;
-      if (v[1] < tau) lo = v[2];
-      else if (v[1] > u[1] && u[1] < tau) lo = u[2] + (tau - u[1]) / (v[1] - u[1]) * (v[2] - u[2]);
+      const V here = v[1] > u[1] ? u[2] + (tau - u[1]) / (v[1] - u[1]) * (v[2] - u[2]) : splat(u[2]);
+      lo = select(tau > v[1], splat(v[2]), v[1] > u[1] ? select(tau > u[1], here, lo) : lo);
     }
     for (int i = law.count; i-- > 1;) {
       const double *u = n + 3 * (i - 1), *v = u + 3;
-      if (u[1] > tau) hi = u[2];
-      else if (v[1] > u[1] && v[1] > tau) hi = u[2] + (tau - u[1]) / (v[1] - u[1]) * (v[2] - u[2]);
+      const V here = v[1] > u[1] ? u[2] + (tau - u[1]) / (v[1] - u[1]) * (v[2] - u[2]) : splat(u[2]);
+      hi = select(tau<u[1], splat(u[2]), v[1]> u[1] ? select(tau < v[1], here, hi) : hi);
     }
-    return 0.5 * (lo + hi);
+    const M low = tau<n[1], high = tau> last[1];
+    const V over = tau - select(low, splat(n[1]), splat(last[1]));
+    return select(low | high, select(low, splat(n[2]), splat(last[2])) + over / k + over / law.stiffness,
+                  0.5 * (lo + hi));
   }
 
   [[gnu::noinline]] void evaluate(bool secant) {
@@ -144,7 +149,7 @@ struct Newton {
       s.x[q] = s.a_base[q];
       s.tau[q] = splat(0);
       s.da[q] = splat(1);
-      s.dtau[q] = law.stiffness / s.scale[q];
+      s.dtau[q] = s.linear[q];
     }
   }
 
@@ -159,31 +164,26 @@ struct Newton {
   /// As the reference: what bears nothing stays at its centre, friction opposes the deflection.
   /// Returns the lanes in which it is doubtful whether something bears and that matters: round-off decides, and the
   /// reference's counts.
-  M start_laws(M active) {
+  [[gnu::noinline]] M start_laws(M active) {
     M doubtful{};
+    const auto sign = [](V x) { return select(x > 0.0, splat(1), select(x < 0.0, splat(-1), splat(0))); };
     for (int q = 0; q < P.coordinate_count; ++q) {
       const CoordinateProgram& k = P.coordinates[q];
       if (k.locked || (k.law < 0 && k.friction == 0)) continue;
-      for (int i = 0; i < W; ++i) {
-        if (!active[i]) continue;
-        const double linear = s.z[q][i];
-        const double share = __builtin_fabs(linear) * k.unit / P.length;
-        const bool bears = share > unloaded;
-        if (share > unloaded / doubt && share < doubt * unloaded && !(k.law >= 0 && strictly_rises(P.laws[k.law])))
-          doubtful[i] = -1;
-        if (k.law < 0) {
-          s.friction_sign[q][i] = !bears ? 0 : linear > 0 ? 1 : -1;
-          continue;
-        }
-        const LawProgram& law = P.laws[k.law];
-        const double tau = bears ? law.stiffness / s.scale[q][i] * linear : 0.0;
-        const double sign = tau > 0 ? 1 : tau < 0 ? -1 : 0;
-        s.friction_sign[q][i] = sign;
-        const double spring = tau - law.friction * sign;
-        s.z[q][i] = !bears       ? 0.0
-                    : k.by_force ? spring * s.scale[q][i] / law.stiffness
-                                 : from_force(law, spring, s.scale[q][i]);
+      const V linear = s.z[q], share = absolute(linear) * k.unit / P.length;
+      const M bears = share > unloaded;
+      if (!(k.law >= 0 && strictly_rises(P.laws[k.law])))
+        doubtful |= active & (share > unloaded / doubt) & (share < doubt * unloaded);
+      if (k.law < 0) {
+        s.friction_sign[q] = select(active, select(bears, sign(linear), splat(0)), s.friction_sign[q]);
+        continue;
       }
+      const LawProgram& law = P.laws[k.law];
+      const V tau = select(bears, s.linear[q] * linear, splat(0)), side = sign(tau);
+      const V spring = tau - law.friction * side;
+      const V z = k.by_force ? spring / s.linear[q] : from_force(law, spring, s.linear[q]);
+      s.friction_sign[q] = select(active, side, s.friction_sign[q]);
+      s.z[q] = select(active, select(bears, z, splat(0)), s.z[q]);
     }
     return doubtful;
   }
@@ -304,9 +304,8 @@ struct Newton {
       const CoordinateProgram& k = P.coordinates[q];
       if (k.law < 0 || k.locked || !(P.laws[k.law].cubic > 0)) continue;
       const LawProgram& law = P.laws[k.law];
-      const V linear = law.stiffness / s.scale[q], a = s.x[q] - s.a_base[q], slope = linear + 3 * law.cubic * a * a;
-      const V step = k.by_force ? s.dz[q] * s.da[q] : s.dz[q];
-      worst = larger(worst, absolute(6 * law.cubic * a * step / slope));
+      const V a = s.x[q] - s.a_base[q], slope = s.linear[q] + 3 * law.cubic * a * a;
+      worst = larger(worst, absolute(slope_change(P, s, q) / slope));
     }
     return worst;
   }
@@ -354,12 +353,10 @@ struct Newton {
   }
 
   /// What an arm answers where its iteration settled.
-  [[gnu::noinline]] void answer_joints(V (&m)[6][6]) {
-    serial.answer(e, point, m, K);
+  [[gnu::noinline]] void answer_joints(M after, V (&m)[6][6]) {
+    serial.answer(e, point, after, m, K);
     if (turning.turns()) turning.symmetric(acting * whole_load, tip.R, K);
-    if (!any(serial.play.lanes)) return;
-    const auto column = [&](int k) { return Serial::unit_twist(e, *serial.joint[k], point); };
-    serial.play.release(e, P.serial_joints, column, m, K);
+    if (any(serial.play.lanes)) serial.play.release(e, P.serial_joints, serial.twist, m, K);
   }
 
   void take(M lanes, const V (&m)[6][6]) { answer.take(lanes, K, m); }
@@ -403,12 +400,20 @@ struct Newton {
       // there is nothing to gain from it.
       const V change = larger(norm, e.transferred);
       const M whole = way.acting == 1.0;
-      M settled = active & whole & ((change < small) | ((norm < in.tolerance) & (way.previous < in.tolerance)));
-      if (P.hardens && any(settled))
-        settled &= (hardening_change() < same_slope) | ((norm < small) & (way.previous < small));
-      if (P.serial_joints > 0 && any(settled)) answer_joints(m);
+      M last = change < small;
+      // An arm's axes are answered where this step leads: of the tangent only the loads' share is left behind.
+      M near = P.serial_joints > 0 ? ~last & (change < nearly * e.lowest) : M{};
+      last |= near;
+      M settled = active & whole & (last | ((norm < in.tolerance) & (way.previous < in.tolerance)));
+      if (P.hardens && any(settled)) {
+        const V bent = hardening_change();
+        const M same = (bent < same_slope) | ((norm < small) & (way.previous < small));
+        if (P.serial_joints > 0) near |= ~same & (bent < near_slope);
+        settled &= same | near;
+      }
+      if (P.serial_joints > 0 && any(settled)) answer_joints(near, m);
       failed |= settled & ~(e.lowest > pivot_floor);
-      const M resting = settled & (change < small), kept = resting & (change < nothing);
+      const M resting = settled & last, kept = resting & (change < nothing);
       if (any(settled)) take(settled & ~failed, m);
       if (any(kept)) keep_wrenches(e, kept);
       if (any(resting & ~kept)) keep_step(resting & ~kept);
@@ -450,8 +455,8 @@ struct Newton {
       // What this step leaves is of its square, and what one with the same factors leaves of that is next to nothing.
       if (P.parallel && !corners) {
         const M soon = (change < chord_most * e.lowest) & (change < chord_longest);
-        const M near = active & whole & ~settled & ~distrusted & soon & (norm > chord_least);
-        if (any(near)) chord_step(m, near);
+        const M close = active & whole & ~settled & ~distrusted & soon & (norm > chord_least);
+        if (any(close)) chord_step(m, close);
       }
       if (any(distrusted)) failed |= corners ? distrusted : way.halve(distrusted);
       if (all(done | failed)) break;
@@ -567,9 +572,11 @@ struct Newton {
   const double pivot_floor = 1e-5 * P.softest;
   static constexpr double small = 1e-13;  ///< step that changes the tangent by no more than that
   static constexpr double nothing = 1e-15;
+  static constexpr double nearly = 5e-11;     ///< the same of an arm, of its softest direction's pivot
   static constexpr double chord_most = 6e-4;  ///< step before a chord step, of the softest direction's pivot
   static constexpr double chord_longest = 1e-5, chord_least = 1e-9;
   static constexpr double same_slope = 1e-11;  ///< change of a law's slope that the compliance does not show
+  static constexpr double near_slope = 1e-7;   ///< the same where its first order is in the answer
   static constexpr double unloaded = 1e-11;
   static constexpr double doubt = 1.5;  ///< factor about it; closures of the two paths differ by some 1e-14
   bool fresh = false;                   ///< frames and wrenches are those at the answer

@@ -20,9 +20,19 @@ struct TipLoad {
   const M3& R;  ///< of the tip
 };
 
+/// Change of a hardening law's slope by the last step; 0 of another law.
+inline V slope_change(const Program& P, const Scratch& s, int q) {
+  const CoordinateProgram& k = P.coordinates[q];
+  if (k.law < 0 || k.locked || !(P.laws[k.law].cubic > 0)) return splat(0);
+  return 6 * P.laws[k.law].cubic * (s.x[q] - s.a_base[q]) * s.da[q] * s.dz[q];
+}
+
 struct Serial {
   V B[most_serial_joints][most_serial_joints];  ///< eliminated: multipliers, inverse pivots, rows
   const Op* joint[most_serial_joints];
+  V6 twist[most_serial_joints];  ///< of the point by a unit of each joint, at the answer
+  V bent[most_serial_joints];    ///< change of each joint's stiffness by the last step
+  bool bends = false;            ///< some of them
   FreePlay play;
 
   Serial() {}  // not filled with zeros: 10 kB
@@ -34,9 +44,12 @@ struct Serial {
     return el.P.serial_joints == 6 ? step_of<6>(el, tip) : step_of<0>(el, tip);
   }
 
-  /// Compliance J diag(a') B^-1 J^T of a dead wrench at `point`, and its inverse, the symmetric part of it.
-  void answer(Elimination& el, const V3& point, V (&C)[6][6], Sym6& K) const {
-    return el.P.serial_joints == 6 ? answer_of<6>(el, point, C, K) : answer_of<0>(el, point, C, K);
+  /// Compliance J diag(a') B^-1 J^T of a dead wrench at `point`, and its inverse, the symmetric part of it; with J
+  /// and the laws' slopes where the last step leads in the lanes `moved`, to first order.
+  void answer(Elimination& el, const V3& point, M moved, V (&C)[6][6], Sym6& K) {
+    twists_after(el, point, moved);
+    bend(el, moved);
+    return el.P.serial_joints == 6 ? answer_of<6>(el, C, K) : answer_of<0>(el, C, K);
   }
 
   /// Twist of the point by a unit of the joint.
@@ -46,16 +59,50 @@ struct Serial {
   }
 
  private:
+  /// Unit twists of the point after the last step in the lanes `moved`, before it in the others.
+  [[gnu::noinline]] void twists_after(const Elimination& el, V3 point, M moved) {
+    const int n = el.P.serial_joints;
+    V3 w[most_serial_joints], o[most_serial_joints];
+    for (int k = 0; k < n; ++k) {
+      const JointSlot& j = el.s.joints[joint[k]->slot];
+      w[k] = j.w;
+      o[k] = j.o;
+    }
+    if (any(moved)) {
+      V6 motion{};  // of what the joints so far carry, about the origin
+      for (int k = 0; k < n; ++k) {
+        const int q = joint[k]->coordinate;
+        const V step = select(moved, el.s.da[q] * el.s.dz[q], splat(0));
+        const V3 axis = step * w[k], at = cross(o[k], axis);
+        w[k] = w[k] + cross(motion.b, w[k]);
+        o[k] = o[k] + motion.a + cross(motion.b, o[k]);
+        const bool slides = joint[k]->kind == OpKind::prismatic;
+        motion = motion + (slides ? V6{axis, V3{}} : V6{at, axis});
+      }
+      point = point + motion.a + cross(motion.b, point);
+    }
+    for (int k = 0; k < n; ++k)
+      twist[k] = joint[k]->kind == OpKind::prismatic ? V6{w[k], V3{}} : V6{cross(w[k], point - o[k]), w[k]};
+  }
+
+  void bend(const Elimination& el, M moved) {
+    bends = el.P.hardens && any(moved);
+    for (int k = 0; bends && k < el.P.serial_joints; ++k)
+      bent[k] = select(moved, slope_change(el.P, el.s, joint[k]->coordinate), splat(0));
+  }
+
   /// The external springs' tangent in the joints; their moment turns by half where the joints' axes do (F15).
-  [[gnu::noinline]] void pull_back(const Elimination& el, int n, const TipLoad& tip) {
+  template <int N>
+  [[gnu::noinline]] void pull_back(const Elimination& el, int count, const TipLoad& tip) {
+    const int n = N ? N : count;
     const V3 half = splat(0.5) * (tip.load.b - tip.dead_moment);
-    V6 twist[most_serial_joints];
+    V6 unit[most_serial_joints];
     for (int b = 0; b < n; ++b) {
-      twist[b] = unit_twist(el, *joint[b], tip.point);
-      V6 force = *tip.springs * twist[b];
-      force.b = force.b - cross(twist[b].b, half);
+      unit[b] = unit_twist(el, *joint[b], tip.point);
+      V6 force = *tip.springs * unit[b];
+      force.b = force.b - cross(unit[b].b, half);
       for (int a = 0; a <= b; ++a) {
-        const V more = dot(twist[a], force);
+        const V more = dot(unit[a], force);
         B[a][b] += more;
         if (a < b) B[b][a] += more;
       }
@@ -63,12 +110,17 @@ struct Serial {
   }
 
   /// The load turns with the tip.
-  [[gnu::noinline]] void turn(const Elimination& el, int n, const TipLoad& tip) {
-    V6 twist[most_serial_joints];
-    for (int b = 0; b < n; ++b) twist[b] = unit_twist(el, *joint[b], tip.point);
+  template <int N>
+  [[gnu::noinline]] void turn(const Elimination& el, int count, const TipLoad& tip) {
+    const int n = N ? N : count;
+    const TurningLoad::Change change = tip.turning.change(tip.given, tip.R);
+    V6 unit[most_serial_joints];
+    for (int b = 0; b < n; ++b) unit[b] = unit_twist(el, *joint[b], tip.point);
     for (int b = 0; b < n; ++b) {
-      const V6 more = tip.turning.change(tip.given, tip.R, twist[b].b);
-      for (int a = 0; a < n; ++a) B[a][b] -= dot(twist[a], more);
+      if (joint[b]->kind == OpKind::prismatic) continue;
+      const V6 more = change.by(unit[b].b);
+#pragma GCC unroll 6
+      for (int a = 0; a < n; ++a) B[a][b] -= dot(unit[a], more);
     }
   }
 
@@ -123,8 +175,8 @@ struct Serial {
       g[b] = dot(j.w, turns ? moment : all) - el.s.tau[op.coordinate];
       --b;
     }
-    if (tip.springs) pull_back(el, n, tip);
-    if (tip.turning.turns() && how != Acts::nothing) turn(el, n, tip);
+    if (tip.springs) pull_back<N>(el, n, tip);
+    if (tip.turning.turns() && how != Acts::nothing) turn<N>(el, n, tip);
     for (int k = 0; k < n; ++k) {
       const int q = joint[k]->coordinate;
       for (int i = 0; i < n; ++i) B[i][k] *= el.s.da[q];
@@ -164,12 +216,12 @@ struct Serial {
   }
 
   template <int N>
-  [[gnu::noinline]] void answer_of(Elimination& el, const V3& point, V (&C)[6][6], Sym6& K) const {
+  [[gnu::noinline]] void answer_of(Elimination& el, V (&C)[6][6], Sym6& K) const {
     const int n = N ? N : el.P.serial_joints;
     V J[6][most_serial_joints], m[6][6], x[6][6];
     for (int k = 0; k < n; ++k) {
       V column[6];
-      put(unit_twist(el, *joint[k], point), column);
+      put(twist[k], column);
       for (int i = 0; i < 6; ++i) J[i][k] = column[i];
     }
     for (int r = 0; r < 6; ++r) {
@@ -177,6 +229,11 @@ struct Serial {
       for (int k = 0; k < n; ++k) g[k] = J[r][k];
       solve<N>(n, g);
       for (int k = 0; k < n; ++k) g[k] *= el.s.da[joint[k]->coordinate];
+      if (bends) {
+        for (int k = 0; k < n; ++k) g[k] = J[r][k] - bent[k] * g[k];
+        solve<N>(n, g);
+        for (int k = 0; k < n; ++k) g[k] *= el.s.da[joint[k]->coordinate];
+      }
 #pragma GCC unroll 6
       for (int i = 0; i < 6; ++i) {
         C[i][r] = J[i][0] * g[0];

@@ -54,9 +54,14 @@ struct Scratch {
   GroupSlot* groups;
   StrokeSlot* strokes;
   BranchSlot* branches;  ///< per chain
-  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *scale, *closed, *friction_sign, *kept, *slope,
-      *rest;  ///< friction_sign: sign of dry friction; kept: z at the last load step in equilibrium; slope: by
-              ///< the load; rest: step that is taken to first order only
+  V *x, *z, *dz, *a_base, *tau, *da, *dtau, *closed;
+  V* scale;          ///< compliance of a drive where it stands, of the declared one
+  V* linear;         ///< with it: slope of a law without its cubic term or corners
+  V* curve;          ///< root of the cubic term over that slope, of `by_force`
+  V* friction_sign;  ///< sign of dry friction
+  V* kept;           ///< z at the last load step in equilibrium
+  V* slope;          ///< by the load
+  V* rest;           ///< step that is taken to first order only
 };
 
 }  // namespace stiffmap::kernel

@@ -21,38 +21,46 @@ struct TurningLoad {
     return {w.a, splat(0.5) * (trace * w.b - back(w.b, R))};
   }
 
-  /// How the wrench changes by a turn of the tip.
-  V6 change(const V6& w, const M3& R, const V3& by) const {
-    if (how == LoadTurns::follower) return {cross(by, R * (before % w.a)), cross(by, R * (before % w.b))};
+  /// How the wrench changes by a turn of the tip about each base axis.
+  struct Change {
+    V6 about[3];
+    V6 by(const V3& turn) const { return turn.x * about[0] + turn.y * about[1] + turn.z * about[2]; }
+  };
+  Change change(const V6& w, const M3& R) const {
+    Change out;
+    if (how == LoadTurns::follower) {
+      const V6 now = at(w, R);
+      for (int k = 0; k < 3; ++k) out.about[k] = {cross(unit(k), now.a), cross(unit(k), now.b)};
+      return out;
+    }
     V3 axis{};  // d tr(Q) = axis · turn
     for (int k = 0; k < 3; ++k) axis = axis + cross(R.c[k], before.c[k]);
-    return {V3{}, splat(0.5) * (dot(axis, by) * w.b - back(cross(w.b, by), R))};
+    for (int k = 0; k < 3; ++k)
+      out.about[k] = {V3{}, splat(0.5) * (dot(axis, unit(k)) * w.b - back(cross(w.b, unit(k)), R))};
+    return out;
   }
 
   /// Takes the change from the tangent of a dead wrench.
   [[gnu::noinline]] void soften(const V6& w, const M3& R, V (&m)[6][6]) const {
+    const Change c = change(w, R);
     for (int k = 0; k < 3; ++k) {
       V column[6];
-      put(change(w, R, unit(k)), column);
+      put(c.about[k], column);
       for (int i = 0; i < 6; ++i) m[i][3 + k] -= column[i];
     }
   }
 
   /// From the symmetric part of a tangent that has the change to the one of a dead wrench.
   [[gnu::noinline]] void symmetric(const V6& w, const M3& R, Sym6& K) const {
-    V3 force[3], moment[3];
-    for (int k = 0; k < 3; ++k) {
-      const V6 c = change(w, R, unit(k));
-      force[k] = c.a;
-      moment[k] = c.b;
-    }
-    for (int k = 0; k < 3; ++k) K.B.c[k] = K.B.c[k] + splat(0.5) * force[k];
-    K.E.xx += moment[0].x;
-    K.E.yy += moment[1].y;
-    K.E.zz += moment[2].z;
-    K.E.xy += 0.5 * (moment[1].x + moment[0].y);
-    K.E.xz += 0.5 * (moment[2].x + moment[0].z);
-    K.E.yz += 0.5 * (moment[2].y + moment[1].z);
+    const Change c = change(w, R);
+    const V3 &x = c.about[0].b, &y = c.about[1].b, &z = c.about[2].b;
+    for (int k = 0; k < 3; ++k) K.B.c[k] = K.B.c[k] + splat(0.5) * c.about[k].a;
+    K.E.xx += x.x;
+    K.E.yy += y.y;
+    K.E.zz += z.z;
+    K.E.xy += 0.5 * (y.x + x.y);
+    K.E.xz += 0.5 * (z.x + x.z);
+    K.E.yz += 0.5 * (z.y + y.z);
   }
 
   static V3 unit(int k) { return {splat(k == 0), splat(k == 1), splat(k == 2)}; }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/batch.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -181,6 +182,7 @@ class FastBatch {
         done_(at(in.count), pose_slow),
         flags_(at(in.count), 0),
         scratch_(at(std::max(1, threads))) {
+    for (const Coordinate& c : m.coordinates) open_.push_back(c.locked && c.role == Role::passive);
     for (const FastPlan* v : in.variants) {
       require(v->available() && v->program().op_count == program_.op_count &&
                   v->program().coordinate_count == program_.coordinate_count,
@@ -230,6 +232,7 @@ class FastBatch {
   const BatchOutput& out_;
   int threads_;
   bool corners_ = has_knots(m_);
+  std::vector<std::uint8_t> open_;  ///< coordinates that every pose leaves open
   std::vector<std::uint8_t> done_;
   std::vector<std::uint32_t> flags_;
   std::vector<Scratch> scratch_;
@@ -294,11 +297,7 @@ class FastBatch {
     if (loose && out_.free_twists) Eigen::Map<RowMajor6>(out_.free_twists + 36 * i).rightCols<5>().setConstant(nan);
     else if (out_.nothing_free) out_.nothing_free[i] = 1;
     else if (out_.free_twists) Eigen::Map<VecX>(out_.free_twists + 36 * i, 36).setConstant(nan);
-    if (out_.indeterminate)
-      for (Index j = 0; j < m_.size(); ++j) {
-        const Coordinate& c = m_.coordinates[at(j)];
-        out_.indeterminate[m_.size() * i + j] = c.locked && c.role == Role::passive;
-      }
+    if (out_.indeterminate) std::copy(open_.begin(), open_.end(), out_.indeterminate + m_.size() * i);
     // As `Problem::has_dead_moment`.
     const LoadType type = in_.load_points.front().type;
     const bool force = !Eigen::Map<const Vec3>(in_.wrench + 6 * i).isZero(0);
