@@ -52,7 +52,7 @@ void time_block(Block& b, const M usable, Timer& time) {
   const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
   Elimination e{P, s, {}, splat(1e300), {f, f, f, g, g, g}};
   Newton n{P, b.in, s, e, b.load, e.gravity};
-  time(bench::laws, [&] { n.evaluate(false); });
+  time(bench::laws, [&] { n.laws.evaluate(false); });
   Frame tip;
   time(bench::frames, [&] {
     tip = Closing::base_frame();
@@ -70,7 +70,7 @@ void time_block(Block& b, const M usable, Timer& time) {
   V K[6][6], C[6][6], x[6] = {};
   time(bench::platform, [&] {
     n.dense(n.K, C);
-    n.invert(C);
+    invert(e, C);
     bench::keep(C);
   });
   n.dense(n.K, K);
@@ -79,10 +79,10 @@ void time_block(Block& b, const M usable, Timer& time) {
   time(bench::back, [&] { back(e, P.chains[P.root], get(x), tip.p, V3{}, M{}); });
   time(bench::output, [&] { b.write(usable, n, K, C, splat(1), splat(0)); });
   time(bench::iteration, [&] {
-    n.evaluate(false);
+    n.laws.evaluate(false);
     n.linearize();
     n.dense(n.K, C);
-    n.invert(C);
+    invert(e, C);
     bench::keep(C);
     back(e, P.chains[P.root], get(x), tip.p, V3{}, M{});
   });

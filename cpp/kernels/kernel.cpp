@@ -189,7 +189,7 @@ struct Block {
   /// Frames and wrenches of a program's machine at the coordinates found.
   void pass(Newton& at, const Program& of) {
     set_base(of);
-    at.evaluate(false);
+    at.laws.evaluate(false);
     at.frames_and_wrenches();
   }
 

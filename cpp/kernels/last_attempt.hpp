@@ -32,13 +32,13 @@ struct LastAttempt {
     for (int pass = 0; pass < most_passes && any(active); ++pass) {
       n.put_load(factor, factor);
       e.count_anew();
-      n.evaluate(false);
+      n.laws.evaluate(false);
       n.linearize();
       const V now = merit(e);
       const M accepted = active & judge(active, now);
       V m[6][6];
       n.dense(n.K, m);
-      n.invert(m);
+      invert(n.e, m);
       active &= ~(accepted & ~(e.closest > regular));  // next to a singular tangent: the reference's
       const M steps = active & accepted;
       keep(steps);
@@ -86,14 +86,15 @@ struct LastAttempt {
       share = select(back, 0.5 * share, share);
       for (int q = 0; q < n.P.coordinate_count; ++q)
         n.s.z[q] = select(back, n.s.kept[q] + 0.5 * (n.s.z[q] - n.s.kept[q]), n.s.z[q]);
-      each_wrench([&](BranchSlot& b) { b.F = select(back, b.kept + splat(0.5) * (b.F - b.kept), b.F); });
+      each_shared_wrench(n.P, n.s,
+                         [&](BranchSlot& b) { b.F = select(back, b.kept + splat(0.5) * (b.F - b.kept), b.F); });
     }
     return accepted;
   }
 
   void keep(M lanes) {
     for (int q = 0; q < n.P.coordinate_count; ++q) n.s.kept[q] = select(lanes, n.s.z[q], n.s.kept[q]);
-    each_wrench([&](BranchSlot& b) { b.kept = select(lanes, b.F, b.kept); });
+    each_shared_wrench(n.P, n.s, [&](BranchSlot& b) { b.kept = select(lanes, b.F, b.kept); });
   }
 
   void count(M lanes, V now) {
@@ -119,15 +120,6 @@ struct LastAttempt {
     tries = select(lanes, splat(0), tries);
     idle = select(lanes, splat(0), idle);
     least = select(lanes, splat(1e300), least);
-  }
-
-  /// Branches whose wrench is a state: the first of a block carries what the others leave.
-  template <class Call>
-  void each_wrench(const Call& call) {
-    for (int i = 0; i < n.P.op_count; ++i) {
-      const Op& op = n.P.ops[i];
-      for (int b = 1; op.kind == OpKind::block && b < op.count; ++b) call(n.s.branches[op.first + b]);
-    }
   }
 };
 

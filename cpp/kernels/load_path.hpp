@@ -27,12 +27,12 @@ struct LoadPath {
     for (int k = 0; k < most_iterations && any(active); ++k) {
       n.put_load(factor, select(looking, factor + ahead, factor));
       e.count_anew();
-      n.evaluate(false);
+      n.laws.evaluate(false);
       n.linearize();
       if (n.P.spring_count > 0) n.springs_too();
       V m[6][6];
       n.dense(n.K, m);
-      n.invert(m);
+      invert(n.e, m);
       n.step(m, active);
       const V norm = n.step_norm();
       iterations = select(active, iterations + 1.0, iterations);
@@ -222,7 +222,7 @@ struct LoadPath {
       s.kept[q] = select(lanes, s.z[q], s.kept[q]);
       s.slope[q] = select(lanes, slope * s.dz[q], s.slope[q]);
     }
-    each_branch([&](BranchSlot& b) { b.kept = select(lanes, b.before, b.kept); });
+    each_shared_wrench(n.P, n.s, [&](BranchSlot& b) { b.kept = select(lanes, b.before, b.kept); });
     reached = select(lanes, factor, reached);
     stable = select(lanes, n.e.negative, stable);
     steps = select(lanes, steps + 1.0, steps);
@@ -231,16 +231,7 @@ struct LoadPath {
   void restore(M lanes) {
     Scratch& s = n.s;
     for (int q = 0; q < n.P.coordinate_count; ++q) s.z[q] = select(lanes, s.kept[q], s.z[q]);
-    each_branch([&](BranchSlot& b) { b.F = select(lanes, b.kept, b.F); });
-  }
-
-  /// Branches whose wrench is a state: the first of a block carries what the others leave.
-  template <class Call>
-  void each_branch(const Call& call) {
-    for (int i = 0; i < n.P.op_count; ++i) {
-      const Op& op = n.P.ops[i];
-      for (int b = 1; op.kind == OpKind::block && b < op.count; ++b) call(n.s.branches[op.first + b]);
-    }
+    each_shared_wrench(n.P, n.s, [&](BranchSlot& b) { b.F = select(lanes, b.kept, b.F); });
   }
 };
 

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Equilibrium of a block of poses: laws, Newton by the elimination, trust test per lane.
+// Equilibrium of a block of poses: Newton by the elimination, trust test per lane.
 #pragma once
 
 #include "corners.hpp"
 #include "frames.hpp"
+#include "laws.hpp"
 #include "load_steps.hpp"
+#include "platform.hpp"
 #include "residual.hpp"
 #include "serial.hpp"
 #include "steps.hpp"
@@ -14,21 +16,6 @@
 #include "wrenches.hpp"
 
 namespace stiffmap::kernel {
-
-struct Answer {
-  Sym6 K;              ///< symmetric, at the point
-  V compliance[6][6];  ///< inverse of the tangent of a dead wrench
-  bool taken = false;  ///< by some lane
-  Answer() {}          // not filled with zeros: 4 kB
-
-  void take(M lanes, const Sym6& now, const V (&inverse)[6][6]) {
-    K = taken ? select(lanes, now, K) : now;
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 6; ++j)
-        compliance[i][j] = taken ? select(lanes, inverse[i][j], compliance[i][j]) : inverse[i][j];
-    taken = true;
-  }
-};
 
 struct Newton {
   /// As an aggregate it would be filled with zeros first: 26 kB for every block.
@@ -40,6 +27,7 @@ struct Newton {
   const KernelInput& in;
   Scratch& s;
   Elimination& e;
+  Laws laws{P, s};
   V6 whole_load;  ///< external wrench at the point, base axes
   V3 whole_gravity;
   V6 load = whole_load;       ///< the share that acts, with the external springs
@@ -56,137 +44,6 @@ struct Newton {
   Serial serial{};     ///< of an arm of joints alone
   M stepped = {};      ///< lanes whose last step, next to nothing, moves what is answered and no more
   V6 stepped_by = {};  ///< the point in that step
-
-  // ---- laws -----------------------------------------------------------------------------------
-  void law_at(const LawProgram& law, int q) {
-    const V k = s.linear[q], z = s.z[q];
-    if (P.coordinates[q].by_force) {
-      // k z = k a + c a^3: in a, Newton's steps on the stiff part shrink by a third only.
-      const V u = cubic_root(s.curve[q] * z);
-      s.tau[q] = k * z + law.friction * s.friction_sign[q];
-      s.da[q] = 1.0 / (1.0 + 3 * u * u);
-      s.dtau[q] = k;
-      s.x[q] = s.a_base[q] + u / s.curve[q];
-      return;
-    }
-    if (law.count == 0) {
-      s.tau[q] = (k + law.cubic * z * z) * z + law.friction * s.friction_sign[q];
-      s.da[q] = splat(1);
-      s.dtau[q] = k + 3 * law.cubic * z * z;
-      s.x[q] = s.a_base[q] + z;
-      return;
-    }
-    const double* n = P.knots + 3 * law.first;
-    const double* last = n + 3 * (law.count - 1);
-    // Beyond the ends with the drive's own slope, then the pieces between.
-    const V beyond = s.scale[q] / (1.0 + s.scale[q]);
-    const M low = z <= n[2];
-    const V a0 = select(low, splat(n[0]), splat(last[0])), t0 = select(low, splat(n[1]), splat(last[1]));
-    const V z0 = select(low, splat(n[2]), splat(last[2]));
-    V a = a0 + beyond * (z - z0), tau = t0 + k * beyond * (z - z0), da = beyond, dtau = k * beyond;
-    for (int i = 1; i < law.count; ++i) {
-      const double* u = n + 3 * (i - 1);
-      const double width = u[5] - u[2];
-      const M inside = (z > u[2]) & (z < u[5]);
-      const M edge = (i > 1) ? (z == u[2]) : (z != z);
-      const M here = inside | edge;
-      const V share = (z - u[2]) * (1 / width);
-      a = select(here, u[0] + share * (u[3] - u[0]), a);
-      tau = select(here, u[1] + share * (u[4] - u[1]), tau);
-      da = select(here, splat((u[3] - u[0]) / width), da);
-      dtau = select(here, splat((u[4] - u[1]) / width), dtau);
-    }
-    s.tau[q] = tau + law.friction * s.friction_sign[q];
-    s.da[q] = da;
-    s.dtau[q] = dtau;
-    s.x[q] = s.a_base[q] + a;
-  }
-
-  /// Where the law carries the force that the linear start found: middle of a gap.
-  V from_force(const LawProgram& law, V tau, V k) const {
-    if (law.count == 0) {
-      V a = tau / k;
-      for (int i = 0; i < 60 && law.cubic > 0; ++i)
-        a -= (k * a + law.cubic * a * a * a - tau) / (k + 3 * law.cubic * a * a);
-      return a;
-    }
-    const double* n = P.knots + 3 * law.first;
-    const double* last = n + 3 * (law.count - 1);
-    V lo = splat(n[2]), hi = splat(last[2]);
-    for (int i = 1; i < law.count; ++i) {
-      const double *u = n + 3 * (i - 1), *v = u + 3;
-      const V here = v[1] > u[1] ? u[2] + (tau - u[1]) / (v[1] - u[1]) * (v[2] - u[2]) : splat(u[2]);
-      lo = select(tau > v[1], splat(v[2]), v[1] > u[1] ? select(tau > u[1], here, lo) : lo);
-    }
-    for (int i = law.count; i-- > 1;) {
-      const double *u = n + 3 * (i - 1), *v = u + 3;
-      const V here = v[1] > u[1] ? u[2] + (tau - u[1]) / (v[1] - u[1]) * (v[2] - u[2]) : splat(u[2]);
-      hi = select(tau<u[1], splat(u[2]), v[1]> u[1] ? select(tau < v[1], here, hi) : hi);
-    }
-    const M low = tau<n[1], high = tau> last[1];
-    const V over = tau - select(low, splat(n[1]), splat(last[1]));
-    return select(low | high, select(low, splat(n[2]), splat(last[2])) + over / k + over / law.stiffness,
-                  0.5 * (lo + hi));
-  }
-
-  [[gnu::noinline]] void evaluate(bool secant) {
-    for (int q = 0; q < P.coordinate_count; ++q) {
-      const CoordinateProgram& k = P.coordinates[q];
-      if (k.law < 0 || k.locked) {
-        s.x[q] = s.a_base[q] + s.z[q];
-        if (k.stiffness > 0) {
-          s.tau[q] = k.stiffness * (s.x[q] - k.rest);
-          s.dtau[q] = splat(k.stiffness);
-        }
-        if (k.friction != 0) s.tau[q] = k.friction * s.friction_sign[q];
-        continue;
-      }
-      const LawProgram& law = P.laws[k.law];
-      if (!secant) {
-        law_at(law, q);
-        continue;
-      }
-      s.x[q] = s.a_base[q];
-      s.tau[q] = splat(0);
-      s.da[q] = splat(1);
-      s.dtau[q] = s.linear[q];
-    }
-  }
-
-  /// Its equilibrium does not depend on where Newton starts: no dry friction, and it yields under any force.
-  bool strictly_rises(const LawProgram& law) const {
-    const double* n = P.knots + 3 * law.first;
-    for (int i = 1; i < law.count; ++i)
-      if (n[3 * i + 1] == n[3 * i - 2]) return false;
-    return law.friction == 0;
-  }
-
-  /// As the reference: what bears nothing stays at its centre, friction opposes the deflection.
-  /// Returns the lanes in which it is doubtful whether something bears and that matters: round-off decides, and the
-  /// reference's counts.
-  [[gnu::noinline]] M start_laws(M active) {
-    M doubtful{};
-    const auto sign = [](V x) { return select(x > 0.0, splat(1), select(x < 0.0, splat(-1), splat(0))); };
-    for (int q = 0; q < P.coordinate_count; ++q) {
-      const CoordinateProgram& k = P.coordinates[q];
-      if (k.locked || (k.law < 0 && k.friction == 0)) continue;
-      const V linear = s.z[q], share = absolute(linear) * k.unit / P.length;
-      const M bears = share > unloaded;
-      if (!(k.law >= 0 && strictly_rises(P.laws[k.law])))
-        doubtful |= active & (share > unloaded / doubt) & (share < doubt * unloaded);
-      if (k.law < 0) {
-        s.friction_sign[q] = select(active, select(bears, sign(linear), splat(0)), s.friction_sign[q]);
-        continue;
-      }
-      const LawProgram& law = P.laws[k.law];
-      const V tau = select(bears, s.linear[q] * linear, splat(0)), side = sign(tau);
-      const V spring = tau - law.friction * side;
-      const V z = k.by_force ? spring / s.linear[q] : from_force(law, spring, s.linear[q]);
-      s.friction_sign[q] = select(active, side, s.friction_sign[q]);
-      s.z[q] = select(active, select(bears, z, splat(0)), s.z[q]);
-    }
-    return doubtful;
-  }
 
   // ---- one linearisation ----------------------------------------------------------------------
   /// One copy of the code, as of `evaluate` and `linearize`: two could contract differently, and a
@@ -254,60 +111,10 @@ struct Newton {
     if (turning.turns()) turning.soften(acting * whole_load, tip.R, m);
   }
 
-  /// Inverse without pivoting: the symmetric part is positive definite where it is used.
-  void invert(V (&m)[6][6]) {
-    V x[6][6];
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 6; ++j) x[i][j] = splat(i == j ? 1 : 0);
-    for (int k = 0; k < 6; ++k) {
-      const V relative = m[k][k] * (1 / (e.scale[k] * e.scale[k]));
-      e.lowest = e.lowest < relative ? e.lowest : relative;
-      if (e.counts) e.count(relative);
-      const V inverse = 1.0 / m[k][k];
-      for (int j = 0; j < 6; ++j) {
-        if (j > k) m[k][j] *= inverse;
-        if (j <= k) x[k][j] *= inverse;
-      }
-      for (int i = 0; i < 6; ++i) {
-        if (i == k) continue;
-        const V f = m[i][k];
-        for (int j = 0; j < 6; ++j) {
-          if (j > k) m[i][j] -= f * m[k][j];
-          if (j <= k) x[i][j] -= f * x[k][j];
-        }
-      }
-    }
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 6; ++j) m[i][j] = x[i][j];
-  }
-
-  /// Lanes in which a drive or spring is inside its gap.
-  M open_gaps() const {
-    M open{};
-    for (int q = 0; q < P.coordinate_count; ++q) {
-      const CoordinateProgram& k = P.coordinates[q];
-      if (k.law >= 0 && !k.locked && P.laws[k.law].count > 0) open |= s.dtau[q] == 0.0;
-    }
-    return open;
-  }
-
   V step_norm() const {
     V worst = splat(0);
     for (int q = 0; q < P.coordinate_count; ++q) worst = larger(worst, absolute(s.dz[q]) * P.coordinates[q].unit);
     return worst * (1 / P.length);
-  }
-
-  /// How much the last step changes the slope of a hardening law, relative: its answer's tangent is not that of before.
-  [[gnu::noinline]] V hardening_change() const {
-    V worst = splat(0);
-    for (int q = 0; q < P.coordinate_count; ++q) {
-      const CoordinateProgram& k = P.coordinates[q];
-      if (k.law < 0 || k.locked || !(P.laws[k.law].cubic > 0)) continue;
-      const LawProgram& law = P.laws[k.law];
-      const V a = s.x[q] - s.a_base[q], slope = s.linear[q] + 3 * law.cubic * a * a;
-      worst = larger(worst, absolute(slope_change(P, s, q) / slope));
-    }
-    return worst;
   }
 
   /// Step of all coordinates from the last linearisation, m its inverse.
@@ -326,7 +133,7 @@ struct Newton {
 
   /// One more step with the factors of the last linearisation, m its inverse, from where its own step led.
   [[gnu::noinline]] void chord_step(const V (&m)[6][6], M lanes) {
-    evaluate(false);
+    laws.evaluate(false);
     frames_and_wrenches();
     c = residual(e, P.chains[P.root], point);
     step(m, lanes);
@@ -374,7 +181,7 @@ struct Newton {
       const bool secant = corners && k == 0;
       const M first = way.factor > way.acting;
       put_load(way.acting, way.factor);
-      evaluate(secant);
+      laws.evaluate(secant);
       V m[6][6];
       M active = ~done & ~failed;
       if (P.serial_joints > 0) {
@@ -384,7 +191,7 @@ struct Newton {
         linearize();
         if (P.spring_count > 0) springs_too();
         dense(K, m);
-        invert(m);
+        invert(e, m);
         step(m, active);
       }
       const V norm = step_norm();
@@ -392,7 +199,7 @@ struct Newton {
       if (secant) {
         failed |= active & ~(norm < 1e6);
         move(active);
-        failed |= start_laws(active) & active;
+        failed |= laws.start(active) & active;
         way.acting = select(active, way.factor, way.acting);
         continue;
       }
@@ -406,7 +213,7 @@ struct Newton {
       last |= near;
       M settled = active & whole & (last | ((norm < in.tolerance) & (way.previous < in.tolerance)));
       if (P.hardens && any(settled)) {
-        const V bent = hardening_change();
+        const V bent = laws.hardening_change();
         const M same = (bent < same_slope) | ((norm < small) & (way.previous < small));
         if (P.serial_joints > 0) near |= ~same & (bent < near_slope);
         settled &= same | near;
@@ -429,11 +236,11 @@ struct Newton {
       }
       // Corners make Newton's steps go to and fro: then each goes to the next corner, patiently.
       const M corner_steps = patient ? active & (way.tries > 1.0) : M{};
-      if (corners && any(corner_steps)) shorten(select(corner_steps, to_corner(), splat(1)));
+      if (corners && any(corner_steps)) shorten(select(corner_steps, laws.to_corner(), splat(1)));
       if (corners && !patient && !searches)
         distrusted |= active & ~settled & (way.tries > 2.0) & ~(norm <= 0.5 * way.previous);
       // Free play is the reference's to find: a singular step would leave the gap by chance.
-      if (corners && k == 1) distrusted |= active & open_gaps() & ~serial.play.lanes;
+      if (corners && k == 1) distrusted |= active & laws.open_gaps() & ~serial.play.lanes;
       if (P.serial_joints > 0) distrusted |= active & serial.play.doubtful;
       distrusted |= active & ~settled & (way.tries >= most_tries);
       if (searches) {
@@ -505,7 +312,7 @@ struct Newton {
   /// Frames and wrenches under the whole load at the coordinates found.
   void settle() {
     put_load(splat(1), splat(1));
-    evaluate(false);
+    laws.evaluate(false);
     frames_and_wrenches();
     take_step();
   }
@@ -529,30 +336,13 @@ struct Newton {
     return sum == 0.0;
   }
 
-  /// Lanes whose load is not conservative: a dead moment, anything that follows the tip.
+  /// Lanes whose load is not conservative, as `nonconservative` (load.hpp).
   M circulatory_lanes() const {
     const V6& w = whole_load;
     const M moment = absolute(w.b.x) + absolute(w.b.y) + absolute(w.b.z) > 0.0;
     const M force = absolute(w.a.x) + absolute(w.a.y) + absolute(w.a.z) > 0.0;
     if (turning.how == LoadTurns::semitangential) return M{};
     return turning.how == LoadTurns::follower ? moment | force : moment;
-  }
-
-  /// Share of the last step up to shortly behind the first corner of a law (Katzenelson 1965): piece by piece the way
-  /// to the equilibrium is found where whole steps go to and fro.
-  [[gnu::noinline]] V to_corner() const {
-    V least = splat(1);
-    for (int q = 0; q < P.coordinate_count; ++q) {
-      const CoordinateProgram& k = P.coordinates[q];
-      if (k.law < 0 || k.locked) continue;
-      const LawProgram& law = P.laws[k.law];
-      const V behind = 1e-10 * P.length / (k.unit * absolute(s.dz[q]));
-      for (int i = 0; i < law.count; ++i) {
-        const V share = (P.knots[3 * (law.first + i) + 2] - s.z[q]) / s.dz[q];
-        least = select((share > 0.0) & (share + behind < least), share + behind, least);
-      }
-    }
-    return least;
   }
 
   /// Takes only a share of the last step.
@@ -577,9 +367,7 @@ struct Newton {
   static constexpr double chord_longest = 1e-5, chord_least = 1e-9;
   static constexpr double same_slope = 1e-11;  ///< change of a law's slope that the compliance does not show
   static constexpr double near_slope = 1e-7;   ///< the same where its first order is in the answer
-  static constexpr double unloaded = 1e-11;
-  static constexpr double doubt = 1.5;  ///< factor about it; closures of the two paths differ by some 1e-14
-  bool fresh = false;                   ///< frames and wrenches are those at the answer
+  bool fresh = false;                          ///< frames and wrenches are those at the answer
 };
 
 }  // namespace stiffmap::kernel

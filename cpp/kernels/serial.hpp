@@ -4,6 +4,7 @@
 #pragma once
 
 #include "free_play.hpp"
+#include "laws.hpp"
 #include "turning_load.hpp"
 
 namespace stiffmap::kernel {
@@ -19,13 +20,6 @@ struct TipLoad {
   const TurningLoad& turning;
   const M3& R;  ///< of the tip
 };
-
-/// Change of a hardening law's slope by the last step; 0 of another law.
-inline V slope_change(const Program& P, const Scratch& s, int q) {
-  const CoordinateProgram& k = P.coordinates[q];
-  if (k.law < 0 || k.locked || !(P.laws[k.law].cubic > 0)) return splat(0);
-  return 6 * P.laws[k.law].cubic * (s.x[q] - s.a_base[q]) * s.da[q] * s.dz[q];
-}
 
 struct Serial {
   V B[most_serial_joints][most_serial_joints];  ///< eliminated: multipliers, inverse pivots, rows

@@ -64,4 +64,13 @@ struct Scratch {
   V* rest;           ///< step that is taken to first order only
 };
 
+/// Branches whose wrench is a state: the first of a block carries what the others leave.
+template <class Call>
+inline void each_shared_wrench(const Program& P, Scratch& s, const Call& call) {
+  for (int i = 0; i < P.op_count; ++i) {
+    const Op& op = P.ops[i];
+    for (int b = 1; op.kind == OpKind::block && b < op.count; ++b) call(s.branches[op.first + b]);
+  }
+}
+
 }  // namespace stiffmap::kernel

@@ -104,13 +104,9 @@ inline void back(Elimination& el, const ChainProgram& chain, V6 eta, V3 p, const
 
 /// Takes the last step of the branch wrenches back where nothing else will move.
 inline void keep_wrenches(Elimination& el, M still) {
-  for (int i = 0; i < el.P.op_count; ++i) {
-    const Op& op = el.P.ops[i];
-    for (int b = 1; op.kind == OpKind::block && b < op.count; ++b) {
-      BranchSlot& branch = el.s.branches[op.first + b];
-      branch.F = {select(still, branch.before.a, branch.F.a), select(still, branch.before.b, branch.F.b)};
-    }
-  }
+  each_shared_wrench(el.P, el.s, [&](BranchSlot& branch) {
+    branch.F = {select(still, branch.before.a, branch.F.a), select(still, branch.before.b, branch.F.b)};
+  });
 }
 
 }  // namespace stiffmap::kernel
