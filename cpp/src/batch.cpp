@@ -286,7 +286,7 @@ class FastBatch {
   bool leapt(Index i) const {
     if (!corners_ || !out_.displacement) return false;
     const Index reads = std::max<Index>(1, static_cast<Index>(in_.read_points.size()));
-    return Eigen::Map<const Vec3>(out_.displacement + 6 * i * reads).norm() > largest_step * m_.length;
+    return leaps(m_, Eigen::Map<const Vec3>(out_.displacement + 6 * i * reads));
   }
 
   /// Fills what the kernels leave out for a pose that they did.
@@ -298,11 +298,7 @@ class FastBatch {
     else if (out_.nothing_free) out_.nothing_free[i] = 1;
     else if (out_.free_twists) Eigen::Map<VecX>(out_.free_twists + 36 * i, 36).setConstant(nan);
     if (out_.indeterminate) std::copy(open_.begin(), open_.end(), out_.indeterminate + m_.size() * i);
-    // As `Problem::has_dead_moment`.
-    const LoadType type = in_.load_points.front().type;
-    const bool force = !Eigen::Map<const Vec3>(in_.wrench + 6 * i).isZero(0);
-    const bool moment = !Eigen::Map<const Vec3>(in_.wrench + 6 * i + 3).isZero(0);
-    const bool circulatory = type == LoadType::follower ? force || moment : type == LoadType::dead && moment;
+    const bool circulatory = nonconservative(in_.load_points.front().type, Eigen::Map<const Vec6>(in_.wrench + 6 * i));
     const std::uint32_t play = loose ? flag::free_play | flag::platform_singular : 0u;
     if (out_.flags) out_.flags[i] = flags_[at(i)] | play | (circulatory ? flag::nonconservative : 0u);
   }

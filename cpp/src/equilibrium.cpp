@@ -73,7 +73,7 @@ void count_sign(const SaddleSystem& saddle, double& sign, EquilibriumResult& out
 
 /// Sign of the determinant before any load.
 double unloaded_sign(const Mechanism& m, Problem& p, EquilibriumWorkspace& ws, const State& state) {
-  if (!p.has_dead_moment()) return 0;
+  if (!p.is_nonconservative()) return 0;
   p.factor = 0;
   linearize(m, p, state, ws.lin);
   ws.saddle.assemble(m, ws.lin);
@@ -210,7 +210,7 @@ class LoadPath {
  public:
   LoadPath(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws, State& state,
            EquilibriumResult& out)
-      : m_(m), p_(p), opt_(opt), ws_(ws), state_(state), out_(out), by_sign_(p.has_dead_moment()) {}
+      : m_(m), p_(p), opt_(opt), ws_(ws), state_(state), out_(out), by_sign_(p.is_nonconservative()) {}
 
   /// All of the load at once, where Newton's steps shrink so fast that there is no doubt.
   bool at_once() {
@@ -289,7 +289,7 @@ Outcome steps_with_corners(const Mechanism& m, Problem& p, const EquilibriumOpti
     ws.step_start = state;
     const bool found = newton(m, p, opt, done == 0, true, ws, state, out) == Outcome::converged;
     const Vec3 moved = ws.lin.frames.at(m.tip).p;
-    if (found && (moved - tip).norm() < largest_step * m.length) {
+    if (found && !leaps(m, moved - tip)) {
       done = p.factor;
       tip = moved;
       count_sign(ws.saddle, sign, out);

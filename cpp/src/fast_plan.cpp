@@ -168,14 +168,10 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.length = m.length;
   p.stiffness = m.stiffness;
   p.softest = softest(m);
-  const auto sticks = [&](const LawProgram& law) {
-    for (std::int32_t i = law.first + 1; i < law.first + law.count; ++i)
-      if (!(d.knots[static_cast<std::size_t>(3 * i)] > d.knots[static_cast<std::size_t>(3 * i - 3)])) return true;
-    return law.friction != 0;
-  };
-  p.bends = std::any_of(d.laws.begin(), d.laws.end(), [](const LawProgram& law) { return law.count > 0; }) &&
-            std::none_of(d.laws.begin(), d.laws.end(), sticks) &&
-            std::none_of(d.coordinates.begin(), d.coordinates.end(), [](const auto& c) { return c.friction != 0; });
+  p.bends =
+      std::any_of(m.laws.begin(), m.laws.end(), [](const Law& law) { return law.has_knots(); }) &&
+      std::none_of(m.laws.begin(), m.laws.end(), [](const Law& law) { return law.sticks() || law.friction() != 0; }) &&
+      std::none_of(d.coordinates.begin(), d.coordinates.end(), [](const auto& c) { return c.friction != 0; });
   for (const Op& op : d.ops) p.parallel |= op.kind == OpKind::block && op.count > 1;
 }
 

@@ -24,6 +24,11 @@ Law::Law(double stiffness, double cubic, std::vector<std::pair<double, double>> 
   }
 }
 
+bool Law::sticks() const {
+  return std::adjacent_find(knots_.begin(), knots_.end(),
+                            [](const auto& a, const auto& b) { return a.first == b.first; }) != knots_.end();
+}
+
 LawPoint Law::at(double z, double scale) const {
   const double k = stiffness_ / scale;
   if (knots_.empty()) return {z, k * z + cubic_ * z * z * z, 1.0, k + 3 * cubic_ * z * z};

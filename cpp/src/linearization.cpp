@@ -140,11 +140,9 @@ void add_springs(const Mechanism& m, const Problem& p, Linearization& out) {
 
 }  // namespace
 
-bool Problem::has_dead_moment() const {
-  for (std::size_t i = 0; i < load_points.size(); ++i) {
-    if (load_points[i].type == LoadType::follower && !wrenches[i].isZero(0)) return true;
-    if (load_points[i].type == LoadType::dead && !wrenches[i].tail<3>().isZero(0)) return true;
-  }
+bool Problem::is_nonconservative() const {
+  for (std::size_t i = 0; i < load_points.size(); ++i)
+    if (nonconservative(load_points[i].type, wrenches[i])) return true;
   return false;
 }
 

@@ -256,7 +256,7 @@ void conclude_pose(const Mechanism& m, const PoseInput& in, const EquilibriumRes
     by_compliance(m, compliance_of(m, p, ws.equilibrium), done.saddle.regular(), out.point);
   ws.spins.release(p, ws.equilibrium, out.point);
   out.flags |= out.point.flags;
-  const bool nonconservative = ws.problem.has_dead_moment();
+  const bool nonconservative = ws.problem.is_nonconservative();
   if (nonconservative) out.flags |= flag::nonconservative;
   // No falling direction is enough under any load; a moment may leave some without harm.
   if (eq.falling > 0 && (!nonconservative || eq.sign_changes > 0)) out.status = Status::unstable;

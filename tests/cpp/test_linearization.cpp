@@ -82,13 +82,13 @@ BOOST_AUTO_TEST_CASE(conservative_loads_have_a_symmetric_tangent) {
   };
   Problem p = loaded(m, LoadType::semitangential);
   BOOST_TEST(asymmetry(p) < 1e-14);
-  BOOST_TEST(!p.has_dead_moment());
+  BOOST_TEST(!p.is_nonconservative());
   p = loaded(m, LoadType::dead);
   BOOST_TEST(asymmetry(p) > 1e-3);
-  BOOST_TEST(p.has_dead_moment());
+  BOOST_TEST(p.is_nonconservative());
   p.wrenches[0].tail<3>().setZero();
   BOOST_TEST(asymmetry(p) < 1e-14);
-  BOOST_TEST(!p.has_dead_moment());
+  BOOST_TEST(!p.is_nonconservative());
 }
 
 BOOST_AUTO_TEST_CASE(follower_and_semitangential_start_as_the_dead_load) {

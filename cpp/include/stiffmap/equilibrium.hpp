@@ -38,6 +38,9 @@ void force_balance(const Mechanism& m, const Linearization& lin, const SaddleSys
 /// Most that a load moves at once, of the machine's length: beyond it the answer may be another assembly's.
 inline constexpr double largest_step = 0.2;
 
+/// Whether the tip went that far at once: with corners of laws the load is then taken in steps.
+inline bool leaps(const Mechanism& m, const Vec3& motion) { return !(motion.norm() < largest_step * m.length); }
+
 /// Laws with corners or with dry friction: Newton starts from the solution with all laws linear.
 bool has_knots(const Mechanism& m);
 

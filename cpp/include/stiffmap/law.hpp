@@ -28,6 +28,8 @@ class Law {
 
   bool linear() const { return cubic_ == 0.0 && knots_.empty() && friction_ == 0.0; }
   bool has_knots() const { return !knots_.empty(); }
+  /// Holds a range of forces at one deflection.
+  bool sticks() const;
   double stiffness() const { return stiffness_; }
   double cubic() const { return cubic_; }
   /// Constant force against the deflection that the load would give without it: docs/effects.md.

@@ -32,7 +32,7 @@ struct Problem {
   bool secant_laws = false;       ///< take every law as linear: the first iteration of a cold start
   bool first_order = false;       ///< leave the load out of the tangent: that iteration is linear statics
   bool unpulled = false;          ///< leave external springs at the tip out
-  bool has_dead_moment() const;
+  bool is_nonconservative() const;
   /// Rotation since the command of the body of load i, which is now at R.
   Mat3 turn(std::size_t i, const Mat3& R) const;
   /// Wrench i (base axes, full load) as it acts on its body, which is now at R.

@@ -136,8 +136,7 @@ class Compiler {
     Mat6 K = s.matrix.stiffness, whole = K;
     bool sticks = false;
     for (const auto& [i, law] : s.laws) {
-      for (std::size_t k = 1; k < law.knots().size(); ++k)
-        sticks = sticks || law.knots()[k].first == law.knots()[k - 1].first;
+      sticks = sticks || law.sticks();
       K(i, i) = 0;
       whole(i, i) = law.stiffness();
     }
