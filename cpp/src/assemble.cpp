@@ -16,6 +16,7 @@ using namespace unloaded;
 constexpr double open_turn = 0.4;     // of a spin, rad or shares of the length
 constexpr double open_change = 0.02;  // of the stiffness by it: more than errors of the geometry make
 constexpr double no_change = 1e-6;    // of it by nothing but round-off
+constexpr std::size_t kept = 128;     // records of machines made like each other
 
 /// The mechanism without errors, with springs and laws that have nothing in common with each other: a motion that does
 /// not change its stiffness changes it for no springs and laws, since stiffness is a rational function of them.
@@ -108,59 +109,88 @@ void let_go_of_configurations(Mechanism& m, std::vector<HomeRecord::Turned>& tur
   }
 }
 
+/// One assembly. It finds out what stands in a record, or takes it from one that is known.
+class Assembly {
+ public:
+  Assembly(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs, const Task& task,
+           const HomeRecord* known = nullptr)
+      : springs_(springs), known_(known), m_(root, home, springs) {
+    m_.task = task;
+  }
+
+  Mechanism run(HomeSearch search, HomeFit* fit) {
+    const HomeFit first = close(search);
+    if (fit) *fit = first;
+    if (!first.closed) throw HomeMisfit(first);
+    if (!closes_exactly(m_)) rebuild(corrected(m_), VecX(m_.home_coordinates));
+    found.balls = known_ ? known_->balls : balls_to_renumber(m_);
+    if (!found.balls.empty()) {
+      VecX x = m_.home_coordinates;
+      for (const SpunBall& b : found.balls) x.segment<3>(b.first).setZero();
+      rebuild(renumbered(m_, found.balls), x);
+      m_.spun_balls = found.balls;
+    }
+    m_.set_rest();
+    for (Drive& d : m_.drives)
+      for (DriveError& e : d.errors)
+        if (std::isnan(e.error.reference)) e.error.reference = m_.home_coordinates[d.coordinate];
+    if (known_) {
+      for (const Index j : known_->locked) m_.coordinates[at(j)].locked = true;
+      m_.beside_home = known_->beside_home;
+    } else {
+      found.locked = lock_spins(m_);
+      found.beside_home = m_.beside_home;
+    }
+    if (known_) found.turned = known_->turned;
+    let_go_of_configurations(m_, found.turned);
+    return std::move(m_);
+  }
+
+  HomeRecord found;
+
+ private:
+  HomeFit close(HomeSearch how) {
+    HomeFit out;
+    if (known_) {
+      const HomeRecord::Closing& closing = known_->closings[closings_++];
+      m_.home_coordinates = closing.coordinates;
+      m_.home = closing.home;
+      out.closed = true;
+    } else {
+      out = close_home(m_, how);
+      found.closings.push_back({m_.home_coordinates, m_.home});
+    }
+    return out;
+  }
+
+  void rebuild(const Chain& chain, const VecX& home_coordinates) {
+    Mechanism other(chain, m_.home, springs_);
+    other.task = m_.task;
+    other.home_coordinates = home_coordinates;
+    m_ = std::move(other);
+    close(HomeSearch::near);
+  }
+
+  const std::vector<ExternalSpring>& springs_;
+  const HomeRecord* known_;
+  Mechanism m_;
+  std::size_t closings_ = 0;
+};
+
 }  // namespace
 
 Mechanism assemble(const Chain& root, const Pose& home, const std::vector<ExternalSpring>& springs, const Task& task,
                    HomeSearch search, HomeFit* fit, const Mechanism* like) {
-  const bool known = like && like->record && like->record->holds_for(root, home, task, search);
-  HomeRecord record = known ? *like->record : HomeRecord{root, home, task, search, {}, {}, {}, {}, {}};
-  Mechanism m(root, home, springs);
-  m.task = task;
-  std::size_t closing = 0;
-  const auto close_it = [&](HomeSearch how) {
-    HomeFit found;
-    if (known) {
-      m.home_coordinates = record.closings[closing].coordinates;
-      m.home = record.closings[closing++].home;
-      found.closed = true;
-    } else {
-      found = close_home(m, how);
-      record.closings.push_back({m.home_coordinates, m.home});
-    }
-    return found;
-  };
-  const HomeFit first = close_it(search);
-  if (fit) *fit = first;
-  if (!first.closed) throw HomeMisfit(first);
-  const auto rebuild = [&](const Chain& chain, const VecX& home_coordinates) {
-    Mechanism other(chain, m.home, springs);
-    other.task = task;
-    other.home_coordinates = home_coordinates;
-    m = std::move(other);
-    close_it(HomeSearch::near);
-  };
-  if (!closes_exactly(m)) rebuild(corrected(m), VecX(m.home_coordinates));
-  if (!known) record.balls = balls_to_renumber(m);
-  if (!record.balls.empty()) {
-    VecX x = m.home_coordinates;
-    for (const SpunBall& b : record.balls) x.segment<3>(b.first).setZero();
-    rebuild(renumbered(m, record.balls), x);
-    m.spun_balls = record.balls;
-  }
-  m.set_rest();
-  for (Drive& d : m.drives)
-    for (DriveError& e : d.errors)
-      if (std::isnan(e.error.reference)) e.error.reference = m.home_coordinates[d.coordinate];
-  if (known) {
-    for (const Index j : record.locked) m.coordinates[at(j)].locked = true;
-    m.beside_home = record.beside_home;
-  } else {
-    record.locked = lock_spins(m);
-    record.beside_home = m.beside_home;
-  }
-  let_go_of_configurations(m, record.turned);
-  m.record = std::make_shared<const HomeRecord>(std::move(record));
-  return m;
+  std::shared_ptr<HomeRecords> records = like && like->records ? like->records : std::make_shared<HomeRecords>(kept);
+  std::optional<Mechanism> made;
+  const auto record = records->get(nominal_geometry(root, home, task, search), [&] {
+    Assembly first(root, home, springs, task);
+    made = first.run(search, fit);
+    return std::make_shared<const HomeRecord>(std::move(first.found));
+  });
+  if (!made) made = Assembly(root, home, springs, task, record.get()).run(search, fit);
+  made->records = std::move(records);
+  return *std::move(made);
 }
 
 }  // namespace stiffmap

@@ -1,57 +1,78 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/home_record.hpp"
 
+#include <type_traits>
+
 namespace stiffmap {
 namespace {
 
-bool same(const Pose& a, const Pose& b) { return a.p == b.p && a.R == b.R; }
-
-bool same(const Chain& a, const Chain& b);
-
-bool same(const Offset& a, const Offset& b) { return same(a.nominal, b.nominal); }
-
-bool same(const Joint& a, const Joint& b) {
-  return a.type == b.type && a.axis == b.axis && a.actuated == b.actuated && a.home == b.home &&
-         a.law.has_value() == b.law.has_value() && a.guide_errors.size() == b.guide_errors.size() && a.ball == b.ball &&
-         a.lower == b.lower && a.upper == b.upper;
-}
-
-bool same(const Spring&, const Spring&) { return true; }  // springs rest where closure sees them
-
-bool same(const Block& a, const Block& b) {
-  if (a.name != b.name || a.branches.size() != b.branches.size()) return false;
-  for (std::size_t i = 0; i < a.branches.size(); ++i)
-    if (!same(a.branches[i].second, b.branches[i].second)) return false;
-  return true;
-}
-
-/// Bodies and points are no part of the geometry.
-bool counts(const decltype(Chain::elements)::value_type& e) {
-  return !std::holds_alternative<Body>(e) && !std::holds_alternative<Point>(e);
-}
-
-bool same(const Chain& a, const Chain& b) {
-  std::size_t i = 0, j = 0;
-  for (;; ++i, ++j) {
-    while (i < a.elements.size() && !counts(a.elements[i])) ++i;
-    while (j < b.elements.size() && !counts(b.elements[j])) ++j;
-    if (i == a.elements.size() || j == b.elements.size()) return i == a.elements.size() && j == b.elements.size();
-    if (a.elements[i].index() != b.elements[j].index()) return false;
-    const bool equal = std::visit(
-        [&](const auto& e) {
-          using Element = std::decay_t<decltype(e)>;
-          if constexpr (std::is_same_v<Element, Body> || std::is_same_v<Element, Point>) return true;
-          else return same(e, std::get<Element>(b.elements[j]));
-        },
-        a.elements[i]);
-    if (!equal) return false;
+/// Bytes of what closure sees, one after the other. Springs rest there, bodies and points are no part of the geometry,
+/// and names are none.
+class Bytes {
+ public:
+  template <class Value>
+  void put(const Value& value) {
+    static_assert(std::is_arithmetic_v<Value> || std::is_enum_v<Value>);
+    text_.append(reinterpret_cast<const char*>(&value), sizeof value);
   }
-}
+  void put(const Vec3& v) { numbers(v.data(), 3); }
+  void put(const Pose& pose) {
+    put(pose.p);
+    numbers(pose.R.data(), 9);
+  }
+  void put(const Offset& e) { put(e.nominal); }
+  void put(const Joint& e) {
+    put(e.type);
+    put(e.axis);
+    put(e.actuated);
+    put(e.home);
+    put(e.law.has_value());
+    put(e.guide_errors.size());
+    put(e.ball);
+    put(e.lower);
+    put(e.upper);
+  }
+  void put(const Spring&) {}
+  void put(const Block& e) {
+    put(e.name == "legs");
+    put(e.branches.size());
+    for (const auto& branch : e.branches) put(branch.second);
+  }
+  void put(const Chain& chain) {
+    for (const auto& element : chain.elements)
+      std::visit(
+          [&](const auto& e) {
+            using Element = std::decay_t<decltype(e)>;
+            if constexpr (!std::is_same_v<Element, Body> && !std::is_same_v<Element, Point>) {
+              put(static_cast<std::uint8_t>(element.index()));
+              put(e);
+            }
+          },
+          element);
+    put(end);
+  }
+
+  std::string take() && { return std::move(text_); }
+
+ private:
+  static constexpr std::uint8_t end = 255;
+
+  void numbers(const double* first, std::size_t count) {
+    text_.append(reinterpret_cast<const char*>(first), count * sizeof(double));
+  }
+
+  std::string text_;
+};
 
 }  // namespace
 
-bool HomeRecord::holds_for(const Chain& root, const Pose& home_pose, const Task& commanded, HomeSearch how) const {
-  return task == commanded && search == how && same(home, home_pose) && same(declared, root);
+std::string nominal_geometry(const Chain& root, const Pose& home, const Task& commanded, HomeSearch how) {
+  Bytes out;
+  out.put(how);
+  for (const bool c : commanded) out.put(c);
+  out.put(home);
+  out.put(root);
+  return std::move(out).take();
 }
 
 }  // namespace stiffmap

@@ -41,7 +41,8 @@ class Machine:
         self, description: MachineDescription, *, start_nodes: int = 8, like: Machine | None = None
     ) -> None:
         """`start_nodes`: closures prepared along each edge of the workspace; fewer for a machine with few calls.
-        `like`: a machine that differs in springs, errors, effects or bodies only is made faster; the numbers are the same.
+        `like`: a machine that differs in springs, errors, effects or bodies only, from it or from one made like it before, is made faster;
+        the numbers are the same.
         """
         self._description = description
         compiled = like._compiled if like else None

@@ -121,7 +121,7 @@ struct NodeSpring {
 using Task = std::array<bool, 6>;
 inline constexpr Task full_task{true, true, true, true, true, true};
 
-struct HomeRecord;
+struct HomeRecords;
 
 /// The legs' block is the first block of `root` whose name is "legs".
 class Mechanism {
@@ -150,8 +150,8 @@ class Mechanism {
   double length = 1;                     ///< characteristic length: turns angles into lengths in every norm
   double stiffness = 1;                  ///< characteristic stiffness, N/m: turns forces into lengths
   Index tip = -1;
-  Chain description;                         ///< what it was made from
-  std::shared_ptr<const HomeRecord> record;  ///< once assembled
+  Chain description;                     ///< what it was made from
+  std::shared_ptr<HomeRecords> records;  ///< once assembled: of all machines made like it
 
   Index size() const { return static_cast<Index>(coordinates.size()); }
   Index closures() const { return 6 * static_cast<Index>(loops.size()); }

@@ -30,8 +30,6 @@ FAILURE = 20.0
 """How much dearer an equilibrium is that is not found (measured: 10 to 30 times)."""
 DEAR = 100.0
 """How much dearer one is that the kernels leave to the reference path (measured: 140 to 400 times)."""
-MOST_LIKES = 200
-"""Machines with effects whose findings about home are kept for those with other values of the same effects."""
 
 
 @dataclass(eq=False)
@@ -68,7 +66,6 @@ class Predictor:
         """Effort that one fit may cost before it is given up."""
         self._work = Work()
         self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
-        self._likes: Kept[Hashable, Machine] = Kept(most=MOST_LIKES)
         self.tangents: Kept[Hashable, Any] = Kept()
         """Slopes of predictions by effects, kept by those who fit them."""
         self._drives: dict[tuple[Terms, Terms], Drives] = {}
@@ -142,10 +139,7 @@ class Predictor:
         mechanical = [t for t in terms if effects.get(t.kind).apply]
         if not mechanical:
             return self.machine
-        made = apply_records(self.machine.description, mechanical)
-        places = tuple((t.kind, t.element, t.legs, t.options) for t in mechanical)
-        like = self._likes.get(places) or self.machine  # what stands at home is found out once per place
-        return self._likes.put(places, Machine(made, like=like), 1)
+        return Machine(apply_records(self.machine.description, mechanical), like=self.machine)
 
     def _motion(self, mechanical: Terms, load: Terms) -> Floats:
         w = true_wrench(self.experiment, load)
