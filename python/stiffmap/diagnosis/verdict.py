@@ -75,7 +75,7 @@ def diagnose(
         Kinds of effects, or groups of the calibration, that are known not to be.
     budget
         Seconds after which no new step begins; the answer is then the best so far, `stopped` is set, and so it
-        is after Ctrl-C. None: a bound on what is tried instead, the same on every computer, which readings that
+        is after Ctrl-C, also among the sensitivities (`not_tried` lists the effects that have none). None: a bound on what is tried instead, the same on every computer, which readings that
         nothing explains reach; `not_tried` then says what was left out.
     progress
         Called with a text on what is tried.
@@ -85,14 +85,15 @@ def diagnose(
     """
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
-    predictor = Predictor(machine, data, threads=threads)
-    refuse(predictor.experiment, predictor())
     clock = Clock.of(budget, progress)
     groups = tuple(n for n in exclude if n in GROUPS)
-    s = study(predictor, seed, None, clock, check_kinds(n for n in exclude if n not in GROUPS))
-    if budget is None:
-        clock.bound(s.predictor)
+    without = check_kinds(n for n in exclude if n not in GROUPS)
     with clock.on_interrupt():
+        predictor = Predictor(machine, data, threads=threads)
+        refuse(predictor.experiment, predictor())
+        s = study(predictor, seed, None, clock, without)
+        if budget is None:
+            clock.bound(s.predictor)
         return _diagnosed(s, seed, certified(tolerances, data), groups, cross_validate)
 
 

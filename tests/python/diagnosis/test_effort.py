@@ -16,6 +16,7 @@ from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.clock import Clock
 from stiffmap.diagnosis.fitting.fit import fit
 from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.diagnosis.report.sentences import opening
 from stiffmap.effects import get
 from stiffmap.experiment import Experiment, Predictor, random_plan, simulate
 from stiffmap.experiment.noise.level import noise_of
@@ -192,6 +193,36 @@ def test_ctrl_c_at_any_step_gives_the_best_so_far(when: str) -> None:
     assert d.effects or when != "structure in what is left"
     assert d.held_out is None
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.parametrize("quantity", ["deflection", "position"])
+@pytest.mark.parametrize("when", ["sensitivities of all candidates", "sensitivities: tilt"])
+def test_ctrl_c_among_the_sensitivities_says_which_are_missing(quantity: str, when: str) -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    plan = random_plan(machine, quantity, poses=6, loads=4, repeats=2, seed=len(when))
+    off = machine.with_effect("compliance", element="actuator", legs=["x"], scale=2.0)
+    off = off.with_effect("zero_offset", element="actuator", legs=["x"], error=1e-4)
+    data = simulate(machine, plan, off.description.effects, seed=2)
+    said: list[str] = []
+
+    def say(what: str) -> None:
+        said.append(what)
+        if what == when:
+            signal.raise_signal(signal.SIGINT)
+
+    d = sm.diagnose(machine, data, progress=say)
+    assert d.stopped and not d.effects and d.verdict == "unattributed"
+    missing = [what for what in d.not_tried if what.endswith("no sensitivities")]
+    assert "tcp_offset at any place: no sensitivities" in missing
+    assert any(what.startswith("compliance at any place") for what in missing) is (
+        when != "sensitivities: tilt"
+    )
+    assert "not tried: " in d.lines()[-1]
+    assert "nothing that was tried" in opening(d)
+    assert d.to_json() and d.before.size[0] > 0
+    whole = sm.diagnose(machine, data, cross_validate=False)  # nothing of it was kept
+    assert whole.effects and not whole.stopped
 
 
 @pytest.mark.usefixtures("interruptible")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from stiffmap.diagnosis.candidates.candidates import Candidate, candidates
 from stiffmap.diagnosis.candidates.sensitivity import Variant, variants
 from stiffmap.diagnosis.candidates.stack import Stack
+from stiffmap.diagnosis.clock import Clock
 from stiffmap.effects import get, kinds
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
@@ -40,27 +40,38 @@ class Plan:
 _PLANS: OrderedDict[str, Plan] = OrderedDict()
 
 
-def plan_of(predictor: Predictor, say: Callable[[str], None] | None = None) -> Plan:
-    """Sensitivities of a machine under a plan; the last eight are kept. `say` is told which are computed."""
+def plan_of(predictor: Predictor, clock: Clock | None = None) -> Plan:
+    """Sensitivities of a machine under a plan; the last eight are kept. The clock is told which are computed; where it
+    is over those that there are make the plan, which is not kept."""
+    clock = clock or Clock()
     read = hashlib.sha256(np.packbits(predictor.experiment.read).tobytes()).hexdigest()
     key = fingerprint(predictor) + read + repr([(k, id(get(k))) for k in kinds()])  # users may register more
     if key not in _PLANS:
-        _PLANS[key] = replace(_compute(predictor, say), digest=key)
+        found, whole = _compute(predictor, clock)
+        if not whole:
+            return replace(found, digest=f"{key}, the first {len(found.variants)}")
+        _PLANS[key] = replace(found, digest=key)
         if len(_PLANS) > 8:
             _PLANS.popitem(last=False)
     _PLANS.move_to_end(key)
     return _PLANS[key]
 
 
-def _compute(predictor: Predictor, say: Callable[[str], None] | None) -> Plan:
+def _compute(predictor: Predictor, clock: Clock) -> tuple[Plan, bool]:
+    """The plan, and whether all candidates are in it."""
     base = predictor()
     good: list[Variant] = []
     failed: list[tuple[Candidate, str]] = []
-    kind = ""
+    kind, whole = "", True
     for candidate in candidates(predictor.machine.description, predictor.experiment):
-        if say is not None and candidate.kind != kind:
+        if clock.over:
+            where = "some places" if candidate.kind == kind else "any place"
+            clock.leave_out(f"{candidate.kind} at {where}: no sensitivities")
+            whole = False
+            continue
+        if candidate.kind != kind:
             kind = candidate.kind
-            say(f"sensitivities: {kind}")
+            clock.say(f"sensitivities: {kind}")
         try:
             found = list(variants(candidate, predictor, base))
         except StiffmapError as problem:
@@ -70,4 +81,4 @@ def _compute(predictor: Predictor, say: Callable[[str], None] | None) -> Plan:
         good += usable
         if not usable:
             failed.append((candidate, "the machine fails with it"))
-    return Plan(base, Stack.of(good), tuple(failed))
+    return Plan(base, Stack.of(good), tuple(failed)), whole

@@ -68,8 +68,7 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
     """Effects on the declared machine, or on a calibrated one unless the former explain the readings better by `LEAD`
     nats: what tolerances may be is no cause."""
     found: Calibrator | None = None
-    positions = s.experiment.quantity == "position"
-    if positions:
+    if s.experiment.quantity == "position" and not s.clock.over:
         found = calibrator(s, tolerances, exclude)
         if found is not None and not_few(s, screened(s), spread_evidence(s.whole[0], found)):
             return _layered(s, found, seed, tolerances)

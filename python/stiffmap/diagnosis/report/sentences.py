@@ -74,8 +74,12 @@ def opening(d: Any) -> str:
     named = "; ".join(sentence(e) for e in d.effects)
     if d.verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
         return f"No cause beside the machine's uncertain numbers; these: {d.calibration.verdict} ({size})."
+    if d.verdict == "none" and d.stopped:
+        return f"The diagnosis was stopped before it found anything ({size})."
     if d.verdict == "none":
         return f"The machine agrees with its file within what these readings can show ({size})."
+    if d.verdict == "unattributed" and d.stopped:
+        return f"The machine differs from its file ({size}), and nothing that was tried explains how."
     if d.verdict == "unattributed":
         return (
             f"The machine differs from its file ({size}), and no single cause known to stiffmap explains how."
@@ -94,6 +98,8 @@ def next_step(d: Any) -> str:
         return "Inspect the number that is beyond tolerance; the calibration's machine file has it."
     if d.verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
         return "Nothing to mend. The calibration's machine file predicts this machine better than the declared one."
+    if d.verdict == "none" and d.stopped:
+        return "Let it come to its end."
     if d.verdict == "none":
         return "Nothing to correct. Keep the readings as the record of this state."
     if d.verdict == "ambiguous" and not d.effects:

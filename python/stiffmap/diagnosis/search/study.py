@@ -118,7 +118,7 @@ def study(
     start = time.perf_counter()
     if clock is not None:
         clock.say("sensitivities of all candidates")
-    plan = plan_of(predictor, None if clock is None else clock.say)
+    plan = plan_of(predictor, clock)
     if without:
         kept = np.flatnonzero([v.candidate.kind not in without for v in plan.variants])
         plan = replace(plan, stack=plan.stack.only(kept), digest=plan.digest + repr(sorted(without)))
