@@ -17,6 +17,9 @@ class Role(IntEnum):
     SPRING = 2
 
 
+ROLES = tuple(Role)
+
+
 @dataclass(frozen=True)
 class Names:
     """In the order of the core; springs and joints with the index of their (first) coordinate."""
@@ -40,7 +43,7 @@ class Names:
 
 def names_of(core: Mechanism) -> Names:
     """All names of a mechanism."""
-    coordinates, roles = tuple(core.coordinates), tuple(Role(r) for r in core.roles)
+    coordinates, roles = tuple(core.coordinates), tuple(map(ROLES.__getitem__, core.roles))
     return Names(
         actuators=tuple(n for n, _ in core.actuators),
         legs=tuple(core.legs),

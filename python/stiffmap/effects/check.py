@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
 
 from stiffmap.description import AppliedEffect, MachineDescription
 from stiffmap.effects import registry
-from stiffmap.effects.types import EffectType, Parameter
+from stiffmap.effects.types import EffectType, Parameter, Place
 from stiffmap.errors import StiffmapError
 
 Numbers = tuple[tuple[str, float], ...]
@@ -48,7 +49,7 @@ def place_of(
     effect: EffectType, machine: MachineDescription, element: str | None, legs: Sequence[str] | None
 ) -> tuple[str, tuple[str, ...]]:
     """Element and legs (in the machine's order); raises StiffmapError listing those that exist."""
-    places = effect.places(machine)
+    places = _places(effect, machine)
     names = list(dict.fromkeys(name for name, _ in places))
     element = _element(effect, names, element)
     having = {leg for name, at in places for leg in at if name == element}
@@ -61,6 +62,21 @@ def place_of(
             raise StiffmapError(f"{effect.kind} of {element}: no leg {leg!r} has it; legs that do: {there}")
     wanted = set(legs or having)
     return element, tuple(n for n in order if n in wanted)
+
+
+_PLACES: OrderedDict[tuple[int, int], tuple[EffectType, MachineDescription, list[Place]]] = OrderedDict()
+MOST_PLACES = 256
+
+
+def _places(effect: EffectType, machine: MachineDescription) -> list[Place]:
+    """Where a machine may have an effect; asked once for the last few, since fits add the same effects again and again."""
+    key = (id(effect), id(machine))  # both are held, so that their numbers stay theirs
+    known = _PLACES.get(key)
+    if known is None:
+        known = _PLACES[key] = (effect, machine, effect.places(machine))
+        while len(_PLACES) > MOST_PLACES:
+            _PLACES.popitem(last=False)
+    return known[2]
 
 
 def _element(effect: EffectType, names: list[str], element: str | None) -> str:
