@@ -26,7 +26,6 @@ struct Serial {
   const Op* joint[most_serial_joints];
   V6 twist[most_serial_joints];  ///< of the point by a unit of each joint, at the answer
   V bent[most_serial_joints];    ///< change of each joint's stiffness by the last step
-  bool bends = false;            ///< some of them
   FreePlay play;
 
   Serial() {}  // not filled with zeros: 10 kB
@@ -43,7 +42,8 @@ struct Serial {
   void answer(Elimination& el, const V3& point, M moved, V (&C)[6][6], Sym6& K) {
     twists_after(el, point, moved);
     bend(el, moved);
-    return el.P.serial_joints == 6 ? answer_of<6>(el, C, K) : answer_of<0>(el, C, K);
+    if (el.P.hardens) return el.P.serial_joints == 6 ? answer_of<6, true>(el, C, K) : answer_of<0, true>(el, C, K);
+    return el.P.serial_joints == 6 ? answer_of<6, false>(el, C, K) : answer_of<0, false>(el, C, K);
   }
 
   /// Twist of the point by a unit of the joint.
@@ -80,15 +80,12 @@ struct Serial {
   }
 
   void bend(const Elimination& el, M moved) {
-    bends = el.P.hardens && any(moved);
-    for (int k = 0; bends && k < el.P.serial_joints; ++k)
+    for (int k = 0; el.P.hardens && k < el.P.serial_joints; ++k)
       bent[k] = select(moved, slope_change(el.P, el.s, joint[k]->coordinate), splat(0));
   }
 
   /// The external springs' tangent in the joints; their moment turns by half where the joints' axes do (F15).
-  template <int N>
-  [[gnu::noinline]] void pull_back(const Elimination& el, int count, const TipLoad& tip) {
-    const int n = N ? N : count;
+  [[gnu::noinline]] void pull_back(const Elimination& el, int n, const TipLoad& tip) {
     const V3 half = splat(0.5) * (tip.load.b - tip.dead_moment);
     V6 unit[most_serial_joints];
     for (int b = 0; b < n; ++b) {
@@ -169,7 +166,7 @@ struct Serial {
       g[b] = dot(j.w, turns ? moment : all) - el.s.tau[op.coordinate];
       --b;
     }
-    if (tip.springs) pull_back<N>(el, n, tip);
+    if (tip.springs) pull_back(el, n, tip);
     if (tip.turning.turns() && how != Acts::nothing) turn<N>(el, n, tip);
     for (int k = 0; k < n; ++k) {
       const int q = joint[k]->coordinate;
@@ -209,7 +206,7 @@ struct Serial {
     }
   }
 
-  template <int N>
+  template <int N, bool bends>
   [[gnu::noinline]] void answer_of(Elimination& el, V (&C)[6][6], Sym6& K) const {
     const int n = N ? N : el.P.serial_joints;
     V J[6][most_serial_joints], m[6][6], x[6][6];
@@ -223,7 +220,7 @@ struct Serial {
       for (int k = 0; k < n; ++k) g[k] = J[r][k];
       solve<N>(n, g);
       for (int k = 0; k < n; ++k) g[k] *= el.s.da[joint[k]->coordinate];
-      if (bends) {
+      if constexpr (bends) {
         for (int k = 0; k < n; ++k) g[k] = J[r][k] - bent[k] * g[k];
         solve<N>(n, g);
         for (int k = 0; k < n; ++k) g[k] *= el.s.da[joint[k]->coordinate];
