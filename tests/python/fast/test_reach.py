@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,3 +28,15 @@ def test_same_answer_far_outside(name: str) -> None:
         np.testing.assert_array_equal(fast.flags, reference.flags)
     if name in ("linear-delta", "travelling-column"):
         assert (fast.status == unreachable).sum() >= 5
+
+
+def test_a_box_mostly_out_of_reach_changes_no_answer() -> None:
+    # its starts are not searched to the end (closure_grid.cpp); a slip of the sign makes such a box
+    machine = sm.load_machine("rotary-delta")
+    low, high = machine.workspace
+    slipped = sm.Machine(replace(machine.description, workspace=(tuple(low), (*high[:2], -high[2]))))
+    position = np.random.default_rng(5).uniform(low, high, (200, 3))
+    load = [100.0, 50, -200, 0, 0, 0]
+    expected, found = machine.solve(position, load), slipped.solve(position, load)
+    np.testing.assert_array_equal(found.status, expected.status)
+    np.testing.assert_allclose(found.displacement, expected.displacement, rtol=0, atol=1e-12)
