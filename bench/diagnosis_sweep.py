@@ -128,7 +128,7 @@ def null_case(plan: Experiment, number: int) -> tuple[str, Any, float]:
 
 def effect_cases(s: Study, plan: Experiment, options: argparse.Namespace) -> Iterator[tuple[str, Any, float]]:
     """Each class's representative at each size."""
-    screen = Screen.of(Problem.of(plan, s.noise.sigma, s.plan.base), s.plan.variants)
+    screen = Screen.of(Problem.of(plan, s.noise.sigma, s.plan.base), s.plan.stack)
     named = [i for i, v in enumerate(s.plan.variants) if v.candidate in {c.representative for c in s.classes}]
     for turn, size in enumerate(options.size or SIZES):
         for i in named[turn % options.every :: options.every]:
