@@ -14,7 +14,8 @@ is a batch of random poses in the workspace box of the machine file:
 
 --effects adds a row per machine and kind of effect (effect_cases.py), under the same force, the worst first. Behind each
 multiple stands the share of poses that took the reference path, in percent. Coordinates are spring directions plus
-joint axes, of the machine that is solved: with its effect's, where that adds springs. Exit code 1 where a number of the table is above its limit: 4, outside the box 10, the share 0.1 %.
+joint axes, of the machine that is solved: with its effect's, where that adds springs. A number above its limit is measured again up to three
+times, and the unit with it: other work only makes both longer. Exit code 1 where a number of the table is above its limit: 4, outside the box 10, the share 0.1 %.
 """
 
 from __future__ import annotations
@@ -123,8 +124,12 @@ def main() -> int:
     parser.add_argument("--json", type=Path)
     wanted = parser.parse_args()
     base = sm.load_machine(BASE)
-    unit = cost(lambda p: base.solve(p, threads=1), inside(base, POSES), wanted.seconds)[0]
-    unit /= len(base.compiled.names.coordinates)
+
+    def measured_unit() -> float:
+        seconds, _ = cost(lambda p: base.solve(p, threads=1), inside(base, POSES), wanted.seconds)
+        return seconds / len(base.compiled.names.coordinates)
+
+    unit = measured_unit()
     print(f"unit: {1e9 * unit:.1f} ns per coordinate, {BASE} unloaded\n", flush=True)
     table: dict[str, dict[str, list[float]]] = {}
     late = 0
@@ -138,11 +143,15 @@ def main() -> int:
         ):
             seconds, answer = cost(solve, poses, wanted.seconds)
             n = len(solved.compiled.names.coordinates)
-            row[column] = [seconds / n / unit, share(answer), 1e6 * seconds]
             wide = column in ("outside", "beyond")
-            late += row[column][0] > (MOST_OUTSIDE if wide else MOST) or (
-                not wide and row[column][1] > MOST_SHARE
-            )
+            most = MOST_OUTSIDE if wide else MOST
+            for _ in range(3):
+                if seconds / n / unit <= most:
+                    break
+                unit = min(unit, measured_unit())
+                seconds = min(seconds, cost(solve, poses, wanted.seconds)[0])
+            row[column] = [seconds / n / unit, share(answer), 1e6 * seconds]
+            late += row[column][0] > most or (not wide and row[column][1] > MOST_SHARE)
         cells = [f"{row[c][0]:.1f} ({100 * row[c][1]:.2g} %)" if c in row else "–" for c in COLUMNS]
         print(f"| {name} | {' | '.join(cells)} |", flush=True)
         for column in sorted(set(row) - set(COLUMNS), key=lambda c: -row[c][0]):
