@@ -172,7 +172,7 @@ def verified(
         "force": force,
         "motion": moved / size,
     }
-    undecided = found.undecided & ~(force < FORCE)
+    undecided = (found.undecided | (found.residual < found.noise)) & ~(force < FORCE)
     errors["force"] = np.where(undecided, 0.0, force)
     limits = {"command": CLOSURE, "closure": CLOSURE, "force": FORCE, "motion": MOTION}
     bad = {}

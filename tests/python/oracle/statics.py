@@ -55,6 +55,10 @@ class Axis:
     rigid drive or a joint that is left open, whose force is a reaction."""
     allowed: tuple[Array, Array] | None = None
     """(n, k) lower and upper ends of what a law with steps or friction allows."""
+    stiffness: Array | float = 0.0
+    """(n,) or one: what a unit of round-off in the coordinate adds to the force."""
+    value: Array | float = 0.0
+    """(n,) the coordinate."""
 
 
 @dataclass
@@ -95,6 +99,8 @@ class Balance:
     """(n, 3) TCP."""
     rotation: Array
     """(n, 3, 3)."""
+    noise: Array
+    """(n,) N: what round-off of the coordinates alone, of the machine's size, adds to a force."""
     undecided: Array
     """(n,) bool: linear statics does not say which way something rubs, so that a residual proves nothing."""
 
@@ -105,7 +111,18 @@ def balance(d: MachineDescription, x: dict[str, Array], case: Case, size: float)
     load(walk, tip)
     external(walk)
     residual, scale = unbalanced(walk, size)
-    return Balance(gaps(walk, size), residual, scale, tip.p, tip.r, open_ways(walk))
+    return Balance(gaps(walk, size), residual, scale, tip.p, tip.r, noise(walk, size), open_ways(walk))
+
+
+def noise(walk: Walk, size: float) -> Array:
+    """(n,) N: some units in the last place of a coordinate, times its stiffness. Where loops close, of the machine's size."""
+    out = np.zeros(len(walk.case.force))
+    for a in walk.axes:
+        unit = np.maximum(np.abs(a.value), float(bool(walk.loops)) * (1.0 if a.revolute else size))
+        out = np.maximum(
+            out, 8 * np.finfo(float).eps * np.abs(a.stiffness) * unit / (size if a.revolute else 1.0)
+        )
+    return out
 
 
 def closed(d: MachineDescription, x: dict[str, Array], case: Case, size: float) -> tuple[Array, Frame]:
@@ -151,6 +168,7 @@ def along(walk: Walk, elements: Iterable[Any], f: Frame, prefix: str) -> Frame:
 def moved(walk: Walk, f: Frame, revolute: bool, axis: Array, value: Array, made: Axis) -> Frame:
     """Frame behind one coordinate."""
     walk.axes.append(made)
+    made.value = value
     before = (*f.before, len(walk.axes) - 1)
     if not revolute:
         return Frame(f.r, f.p + value[:, None] * made.axis, before)
@@ -183,11 +201,13 @@ def through_joint(walk: Walk, e: Joint, f: Frame, name: str) -> Frame:
                 made.force, made.allowed = law_force(
                     law, value - target, soft, levels(walk, full, law.friction)
                 )
+                made.stiffness = law.stiffness / soft
         elif law is not None:
             rest = e.rest[i] if e.rest is not None else e.home[i]
             made.force, made.allowed = law_force(
                 law, value - rest, np.ones_like(value), levels(walk, full, law.friction)
             )
+            made.stiffness = law.stiffness
         elif e.friction is not None:
             turned = value - walk.case.unloaded.get(full, value + np.inf)
             level = e.friction.level
@@ -251,24 +271,27 @@ def through_spring(walk: Walk, e: Spring, f: Frame, name: str) -> Frame:
     free: list[int] = []
     if e.stiffness is not None:
         force = own @ np.array(e.stiffness)
+        stiff = np.broadcast_to(np.diag(e.stiffness), v.shape)
     else:
         matrix = compliance(walk, e, name)
         # a rigid direction of a compliance: its force is a reaction
         free = [i for i in range(6) if not matrix[:, i].any()]
         keep = [i for i in range(6) if i not in free]
-        force = np.zeros_like(v)
-        force[:, keep] = np.linalg.solve(matrix[:, keep][:, :, keep], own[:, keep, None])[..., 0]
+        force, stiff = np.zeros_like(v), np.zeros_like(v)
+        inverse = np.linalg.inv(matrix[:, keep][:, :, keep])
+        force[:, keep] = np.einsum("nij,nj->ni", inverse, own[:, keep])
+        stiff[:, keep] = np.einsum("nii->ni", inverse)
     laws = dict(e.laws)
     basis = f.r
     for i in range(3):
-        made = Axis(False, basis[:, :, i], f.p, None if i in free else force[:, i])
+        made = Axis(False, basis[:, :, i], f.p, None if i in free else force[:, i], stiffness=stiff[:, i])
         if i in laws:
             made.force, made.allowed = law_force(
                 laws[i], own[:, i], np.ones(len(v)), levels(walk, names[i], laws[i].friction)
             )
         f = moved(walk, f, False, np.eye(3)[i], v[:, i], made)
     for i in range(3, 6):
-        made = Axis(True, f.r[:, :, i - 3], f.p, None if i in free else force[:, i])
+        made = Axis(True, f.r[:, :, i - 3], f.p, None if i in free else force[:, i], stiffness=stiff[:, i])
         if i in laws:
             made.force, made.allowed = law_force(
                 laws[i], own[:, i], np.ones(len(v)), levels(walk, names[i], laws[i].friction)

@@ -49,6 +49,13 @@ def test_a_gap_may_bear_little() -> None:
         assert s.ok.all() and not wrong
 
 
+def test_what_round_off_alone_would_do_proves_nothing() -> None:
+    # the ram of the travelling column drawn in to nothing: 3e18 N/m, and a preload of 10 um beside a deflection of 1e-16 m
+    found = run(Batch("travelling-column", "preload", 11))
+    assert found["wrong"] == {} and found["undecided"] == 1
+    assert run(Batch("hybrid", "joint_compliance", 10))["wrong"] == {}
+
+
 def test_what_bears_only_in_second_order_does_not_rub() -> None:
     # The guides of a delta bear no moment about y in linear statics: friction there has no side (theory L3).
     machine = sm.load_machine("linear-delta")
