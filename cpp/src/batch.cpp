@@ -182,7 +182,10 @@ class FastBatch {
         done_(at(in.count), pose_slow),
         flags_(at(in.count), 0),
         scratch_(at(std::max(1, threads))) {
-    for (const Coordinate& c : m.coordinates) open_.push_back(c.locked && c.role == Role::passive);
+    if (out.indeterminate) {
+      open_.reserve(m.coordinates.size());
+      for (const Coordinate& c : m.coordinates) open_.push_back(c.locked && c.role == Role::passive);
+    }
     for (const FastPlan* v : in.variants) {
       require(v->available() && v->program().op_count == program_.op_count &&
                   v->program().coordinate_count == program_.coordinate_count,
