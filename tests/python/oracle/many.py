@@ -5,7 +5,9 @@
 Machines x effects x poses in, on and beyond the workspace x loads from nothing to buckling x load types x gravity. An
 answer CONVERGED must balance to 1e-6 of the largest force in the machine, close to 1e-6 of its size, and have moved its
 TCP by the displacement that it states; every other status must come without numbers. Batches are written to --out as
-they end; the same command goes on where it was stopped. Exit code 1 where an answer is wrong.
+they end; the same command goes on where it was stopped. Of a hundredth of the batches the reference path solves 20 poses:
+ask for an eighth more than is wanted. What round-off of the coordinates alone would do proves nothing (`statics.noise`) and is
+counted as undecided. Exit code 1 where an answer is wrong.
 """
 
 from __future__ import annotations
@@ -143,8 +145,23 @@ def verified(
     machine: sm.Machine, p: np.ndarray, load: dict[str, object], s: sm.Solution, at: np.ndarray
 ) -> tuple[dict[str, float], dict[int, str], int]:
     """Largest relative errors, what is wrong by the pose, and how many poses the free bodies cannot decide."""
-    if not len(at):
-        return {}, {}, 0
+    worst: dict[str, float] = {}
+    bad: dict[int, str] = {}
+    undecided = 0
+    joints = list(s.joint_index.values())
+    patterns, which = np.unique(s.indeterminate_mask[at][:, joints], axis=0, return_inverse=True)
+    for k in range(len(patterns)):  # what an answer leaves open differs from pose to pose
+        found, wrong, unclear = verified_alike(machine, p, load, s, at[which.reshape(-1) == k])
+        worst = {w: max(v, worst.get(w, 0.0)) for w, v in found.items()}
+        bad |= wrong
+        undecided += unclear
+    return worst, bad, undecided
+
+
+def verified_alike(
+    machine: sm.Machine, p: np.ndarray, load: dict[str, object], s: sm.Solution, at: np.ndarray
+) -> tuple[dict[str, float], dict[int, str], int]:
+    """The same for poses (k,) > 0 of which the answer leaves the same joints open."""
     d, size = machine.description, machine_size(machine)
     names = s.coordinate_names
     before = commanded(machine, p[at], names)
