@@ -153,9 +153,7 @@ void Clamp::solve(PoseInput in, const Vec6& displacement, ClampResult& out) {
   ws_.problem.load_frames.push_back(ws_.nominal.at(point_.node).R);
   ws_.state.z = state_.z;
   ws_.state.lambda = state_.lambda.head(machine_.closures());
-  linearize(machine_, ws_.problem, ws_.state, ws_.equilibrium.lin);
-  ws_.equilibrium.saddle.assemble(machine_, ws_.equilibrium.lin);
-  ws_.equilibrium.saddle.factorize();
+  factorize_at(machine_, ws_.problem, ws_.state, ws_.equilibrium);
   EquilibriumResult free;
   free.falling = ws_.equilibrium.stability.falling(ws_.equilibrium.saddle);
   conclude_pose(machine_, in, free, ws_, out.pose);

@@ -75,9 +75,7 @@ void count_sign(const SaddleSystem& saddle, double& sign, EquilibriumResult& out
 double unloaded_sign(const Mechanism& m, Problem& p, EquilibriumWorkspace& ws, const State& state) {
   if (!p.is_nonconservative()) return 0;
   p.factor = 0;
-  linearize(m, p, state, ws.lin);
-  ws.saddle.assemble(m, ws.lin);
-  ws.saddle.factorize();
+  factorize_at(m, p, state, ws);
   return ws.saddle.regular() ? ws.saddle.determinant_sign() : 0;
 }
 
@@ -169,9 +167,7 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
   if (!leave_gaps(m, p, ws.lin, gap_noise, state)) return outcome;
   if (iterate(m, p, opt, false, trusting, gap_noise, ws, state, out) == Outcome::converged) return outcome;
   state = ws.settled;
-  linearize(m, p, state, ws.lin);
-  ws.saddle.assemble(m, ws.lin);
-  ws.saddle.factorize();
+  factorize_at(m, p, state, ws);
   return outcome;
 }
 
@@ -323,6 +319,12 @@ bool has_knots(const Mechanism& m) {
                      [](const Law& law) { return law.has_knots() || law.friction() != 0; });
 }
 
+void factorize_at(const Mechanism& m, const Problem& p, const State& state, EquilibriumWorkspace& ws) {
+  linearize(m, p, state, ws.lin);
+  ws.saddle.assemble(m, ws.lin);
+  ws.saddle.factorize();
+}
+
 void force_balance(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, VecX& force) {
   for (Index j = 0; j < m.size(); ++j) {
     force[j] = -lin.da[j] * lin.r[j];
@@ -367,9 +369,7 @@ EquilibriumResult solve_equilibrium(const Mechanism& m, Problem& problem, const 
   }
   problem.factor = 1;
   if (how != Outcome::converged) return out;
-  linearize(m, problem, state, ws.lin);
-  ws.saddle.assemble(m, ws.lin);
-  ws.saddle.factorize();
+  factorize_at(m, problem, state, ws);
   if (!in_balance(m, ws)) return out;
   if (out.falling < 0) out.falling = ws.stability.falling(ws.saddle);
   out.status = Status::converged;

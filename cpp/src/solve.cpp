@@ -80,9 +80,7 @@ bool examine_unloaded(const Mechanism& m, const PoseInput& in, SolveWorkspace& w
   ws.problem.factor = 0;
   ws.problem.secant_laws = true;
   EquilibriumWorkspace& eq = ws.equilibrium;
-  linearize(m, ws.problem, ws.state, eq.lin);
-  eq.saddle.assemble(m, eq.lin);
-  eq.saddle.factorize();
+  factorize_at(m, ws.problem, ws.state, eq);
   ws.problem.factor = 1;
   ws.problem.secant_laws = false;
   if (eq.saddle.regular()) return true;

@@ -25,9 +25,7 @@ Spins::Spins(const Mechanism& m) : m_(m), force_(VecX::Zero(m.size())), closure_
   p.base = m.home_coordinates;
   p.secant_laws = true;
   p.unpulled = true;  // a spin leaves the tip where it is, but without equilibrium such a force would move the rest
-  linearize(m, p, State(m), eq.lin);
-  eq.saddle.assemble(m, eq.lin);
-  eq.saddle.factorize();
+  factorize_at(m, p, State(m), eq);
   move_each(eq);
   MatX J(6, m.size());
   for (const NodeBody& b : m.bodies) {

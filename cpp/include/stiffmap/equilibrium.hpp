@@ -32,6 +32,9 @@ struct EquilibriumWorkspace {
   VecX dz, dlambda, force, slope, slope_before, no_closure;
 };
 
+/// The linearisation at `state` in `ws`, factorised.
+void factorize_at(const Mechanism& m, const Problem& p, const State& state, EquilibriumWorkspace& ws);
+
 /// Right-hand side of the force balance; a stuck coordinate follows its own law alone.
 void force_balance(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, VecX& force);
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
@@ -12,6 +11,7 @@ from stiffmap.description import AppliedEffect, MachineDescription
 from stiffmap.effects import registry
 from stiffmap.effects.types import EffectType, Parameter, Place
 from stiffmap.errors import StiffmapError
+from stiffmap.recent import Recent
 
 Numbers = tuple[tuple[str, float], ...]
 Words = tuple[tuple[str, str], ...]
@@ -64,19 +64,13 @@ def place_of(
     return element, tuple(n for n in order if n in wanted)
 
 
-_PLACES: OrderedDict[tuple[int, int], tuple[EffectType, MachineDescription, list[Place]]] = OrderedDict()
-MOST_PLACES = 256
+_PLACES = Recent[tuple[EffectType, MachineDescription, list[Place]]](256)
 
 
 def _places(effect: EffectType, machine: MachineDescription) -> list[Place]:
     """Where a machine may have an effect; asked once for the last few, since fits add the same effects again and again."""
     key = (id(effect), id(machine))  # both are held, so that their numbers stay theirs
-    known = _PLACES.get(key)
-    if known is None:
-        known = _PLACES[key] = (effect, machine, effect.places(machine))
-        while len(_PLACES) > MOST_PLACES:
-            _PLACES.popitem(last=False)
-    return known[2]
+    return _PLACES.get(key, lambda: (effect, machine, effect.places(machine)))[2]
 
 
 def _element(effect: EffectType, names: list[str], element: str | None) -> str:
