@@ -18,6 +18,7 @@ import numpy as np
 
 import stiffmap as sm
 from stiffmap.calibration import Calibrator, unknowns
+from stiffmap.calibration.conclude import conclude
 from stiffmap.calibration.model import predicted
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.channels import AXES
@@ -58,7 +59,7 @@ def main() -> int:
     wall, cpu = time.perf_counter(), time.process_time()
     predictor = Predictor(machine, data)
     found = Calibrator.of(predictor, unknowns(machine.description, predictor.experiment))
-    c = found.answer()
+    c = conclude(found)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
     spread = np.sqrt(np.diag(found.sums.covariance))

@@ -25,6 +25,7 @@ import numpy as np
 
 import stiffmap as sm
 from stiffmap.calibration import Calibrator, Tolerances, Unknown, unknowns
+from stiffmap.calibration.conclude import conclude
 from stiffmap.calibration.model import predicted, sensitivity, sensitivity_at
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
@@ -113,7 +114,7 @@ def one(k: int, scale: float | None, diagnose: bool = True) -> dict[str, Any]:
             "diagnosis_s": round(time.perf_counter() - begun, 2),
         }
     found = Calibrator.of(Predictor(machine, twin), names)
-    c = found.answer()
+    c = conclude(found)
     record |= {
         "calibration": c.verdict,
         "beyond": [b.name for b in c.beyond] + [f"{w.group} as a whole" for w in c.wider],

@@ -15,6 +15,8 @@ import numpy as np
 
 from stiffmap.calibration.statistics import Sums
 
+BASE = ("zeros", "tool")
+"""Groups that every machine has: the others are compared beside them."""
 LIKE = 0.1
 """Share of the evidence that all chosen groups gain within which another set is a rival: models are no better."""
 STRONG = 5.0

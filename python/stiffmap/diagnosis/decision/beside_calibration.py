@@ -14,7 +14,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from stiffmap.calibration import Calibration, Calibrator, Tolerances, unknowns
-from stiffmap.calibration.calibrate import pose_labels
+from stiffmap.calibration.calibrator import pose_labels
+from stiffmap.calibration.conclude import conclude
 from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.statistics import Sums
 from stiffmap.diagnosis.candidates.candidates import Candidate
@@ -87,7 +88,7 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
 def _layered(s: Study, found: Calibrator, seed: int, tolerances: Tolerances) -> Answer:
     """Effects on top of a calibration; at the floor of what no model explains, where something is left."""
     s.clock.say("effects on top of a calibration")
-    base = _above(s, Layer.of(found, found.answer(seed)), seed)
+    base = _above(s, Layer.of(found, conclude(found, seed)), seed)
     rho = _floor_beside_screen(base)
     if rho < WORTH_A_FLOOR:
         answer = _searched(base, tolerances)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.calibration.calibrate import pose_labels
+from stiffmap.calibration.calibrator import pose_labels
 from stiffmap.calibration.claims import BesideField
 from stiffmap.calibration.groups import STRONG
 from stiffmap.diagnosis.fitting.fit import evaluate, fit_without

@@ -1,0 +1,94 @@
+"""What the readings are claimed to tell, and the fit with that let go."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from stiffmap.calibration.calibrator import Calibrator, pose_labels
+from stiffmap.calibration.claims import BesideField, Claims, claims
+from stiffmap.calibration.floor import model_form
+from stiffmap.calibration.groups import STRONG
+from stiffmap.calibration.held_out import Fold, leave_out, left_out
+from stiffmap.calibration.model import Fitted, predicted
+from stiffmap.calibration.statistics import Sums, gain_of
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.folds import folds
+
+AGAIN, NEAR = 4, 0.3
+"""Fits of what is claimed through the full prediction; change of all readings together, in noise, that ends them."""
+BORNE_OUT = 0.5
+"""Share of what slopes promise of a claim that the full prediction must keep."""
+
+
+def claimed_fit(
+    ready: Calibrator, sums: Sums, members: dict[str, list[int]], seed: int
+) -> tuple[Claims, Fitted, float]:
+    """What is claimed, the fit with that let go, and its floor."""
+    judged: list[tuple[BesideField, list[Fold]]] = []
+    everything = {"all": list(range(len(sums.right)))}
+
+    def why_not(factor: Floats, trial: Floats) -> str:
+        if not judged:
+            judged.append((_beside_field(ready), leave_out(ready, ready.fit, seed)))
+        field, parts = judged[0]
+        nats = field.log_evidence(trial) - field.log_evidence(factor)
+        if nats < STRONG:
+            return f"a smooth field that knows nothing of the machine explains as much ({nats:+.0f} nats beside it)"
+        if len(parts) < 2:
+            return ""
+        one, other = (
+            left_out(ready, parts, everything, ready.fit, ready.rho, f)["all"] for f in (factor, trial)
+        )
+        gain, error = gain_of(one, other, [f.test for f in parts])
+        # a fit that is as good as noise has nothing to gain
+        holds = gain > (error if misfits else -error)
+        return "" if holds else f"held-out readings gain {gain:.2g} ± {error:.2g} noise variances"
+
+    misfits = ready.misfits(ready.fit, np.ones(len(sums.right)))
+    found = claims(
+        sums, ready.sensitivity.unknowns, members, _folds(ready, seed), ready.sensitivity.at, why_not
+    )
+    if not found.any:
+        return found, ready.fit, ready.rho
+    fit, rho = _let_go(ready, found)
+    if fit.converged:
+        return found, fit, rho
+    return found.withdrawn("so far off the machine does not do what its slopes say"), ready.fit, ready.rho
+
+
+def _folds(ready: Calibrator, seed: int) -> list[Sums]:
+    """The sums of each fold's own readings."""
+    label = folds(ready.predictor.experiment, seed)[0][ready.problem.index[0]]
+    return [ready.blocks(label == k).beside(ready.rho) for k in np.unique(label)]
+
+
+def _beside_field(ready: Calibrator) -> BesideField:
+    left = ready.left(ready.fit.prediction)
+    return BesideField.of(ready.problem, ready.columns, ready.fit.linear, pose_labels(ready.problem), left)
+
+
+def _let_go(ready: Calibrator, claimed: Claims) -> tuple[Fitted, float]:
+    """The fit with what is claimed let go, and its floor: by the slopes that there are, through the full prediction."""
+    names, at = ready.sensitivity.unknowns, ready.sensitivity.at
+    fit, rho, promised = ready.fit, ready.rho, 0.0
+    before = float(fit.residual @ fit.residual)
+    for again in range(AGAIN):
+        blocks = ready.blocks(fit=fit).scaled(claimed.factor)
+        rho = model_form(blocks)
+        values = blocks.beside(rho).estimate * claimed.factor
+        told = fit.linear - ready.columns @ values
+        promised = promised if again else before - float(told @ told)
+        close = float(np.linalg.norm(ready.columns @ (values - fit.values))) < NEAR
+        try:
+            prediction = predicted(ready.predictor, names, claimed.singles.built(values, names, at))
+            residual = ready.problem.residual(prediction)
+        except StiffmapError:
+            return replace(fit, converged=False), rho
+        fit = Fitted(values, prediction, residual, residual + ready.columns @ values, True)
+        if close:
+            break
+    gained = before - float(fit.residual @ fit.residual)
+    return replace(fit, converged=gained > BORNE_OUT * promised), rho

@@ -1,0 +1,170 @@
+"""The answer of a calibration: verdict, table, what is left and what held-out readings say."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from stiffmap.calibration.calibrator import Calibrator
+from stiffmap.calibration.claimed_fit import claimed_fit
+from stiffmap.calibration.edit import edited
+from stiffmap.calibration.facts import Beyond, Row, Wider
+from stiffmap.calibration.groups import BASE, compare
+from stiffmap.calibration.held_out import Size, held_out
+from stiffmap.calibration.homing import own_part
+from stiffmap.calibration.model import Fitted
+from stiffmap.calibration.result import Calibration
+from stiffmap.calibration.statistics import Sums, independent
+from stiffmap.calibration.travel import Drive, Travel, travel
+from stiffmap.calibration.unknowns import Unknown
+from stiffmap.experiment.channels import metres
+from stiffmap.experiment.comparison.summary import rms
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.noise.folds import folds
+from stiffmap.experiment.noise.level import Noise
+from stiffmap.experiment.poses.configuration import coordinates_of
+from stiffmap.machine import Machine
+
+
+def conclude(ready: Calibrator, seed: int = 0) -> Calibration:
+    """The calibration with its verdict."""
+    start = time.perf_counter()
+    sums, members = ready.sums, ready.members()
+    names = ready.sensitivity.unknowns
+    claimed, fit, rho = claimed_fit(ready, sums, members, seed)
+    factor, found, wider = claimed.factor, claimed.singles, claimed.groups
+    freed = ready.blocks(fit=fit).beside(rho).scaled(factor)
+    choice = compare(freed, members, [b for b in BASE if b in members])
+    built = found.built(fit.values, names, ready.sensitivity.at)
+    moves: dict[tuple[str, str], float] = {}
+    for p, v in zip(names, built, strict=True):
+        for place, weight in p.moves if not p.setup else ():
+            moves[place] = moves.get(place, 0.0) + weight * p.u * float(v)
+    e = ready.predictor.experiment
+    before, after = ready.left(ready.sensitivity.base), ready.left(fit.prediction)
+    keep = ~ready.out[:, None]
+    unit, size, noise = _unit(e, ready.noise)
+    b, a = (size(np.where(keep, v, np.nan)) for v in (before, after))
+    held = held_out(ready, choice, factor, fit, rho, seed, size)
+    as_declared = sums.log_evidence <= sums.pick([]).log_evidence and not claimed.any
+    misfits = ready.misfits(fit, factor)
+    profiles = _travel(ready, fit, rho, factor, seed, size) if misfits else None
+    rest = _outweighs(held.before, held.after, noise) if held else _outweighs(b, a, noise)
+    unexplained = (rest or bool(claimed.refused)) and not claimed.any and misfits
+    seconds = {**ready.seconds, "evidence": time.perf_counter() - start}
+    return Calibration(
+        verdict=_verdict(as_declared, found.found, wider, unexplained),
+        rows=_rows(names, freed, factor, built),
+        beyond=found.found,
+        groups=choice,
+        rank=sums.rank,
+        held_out=held,
+        rms_before=b,
+        rms_after=a,
+        noise=noise,
+        floor=float(np.sqrt(rho)) * noise,
+        explained=1.0 - (a / b) ** 2 if b > 0 else 0.0,
+        rest=_rest(e, np.where(keep, after, np.nan), size),
+        wider=wider,
+        refused=claimed.refused,
+        travel=profiles,
+        outliers=tuple(e.ids[i] for i in np.flatnonzero(ready.out)),
+        failed=ready.sensitivity.failed,
+        stopped=ready.stopped,
+        unit=unit,
+        machine=Machine(edited(ready.predictor.machine.description, moves)),
+        experiment=e,
+        residual=after,
+        unknowns=names,
+        values=built,
+        seconds=seconds,
+    )
+
+
+def _travel(
+    ready: Calibrator, fit: Fitted, rho: float, factor: Floats, seed: int, size: Size
+) -> Travel | None:
+    """What is left, as profiles over the drives' coordinates."""
+    e, s = ready.predictor.experiment, ready.sensitivity
+    label, by = folds(e, seed)
+    zeros = [i for i, u in enumerate(s.unknowns) if u.group == "zeros" and not u.setup]
+    if e.quantity != "position" or not zeros or ready.stopped:
+        return None
+    machine = ready.predictor.machine
+    at = coordinates_of(machine, e)
+    drives = [
+        Drive(name, u.unit, s.columns[..., i] / u.u, at[:, machine.compiled.names.joints[name]])
+        for i, u, name in ((i, s.unknowns[i], s.unknowns[i].moves[0][0][0]) for i in zeros)
+    ]
+
+    def own(rest: Floats, test: Mask) -> Floats:
+        return own_part(s.unknowns, ready.columns, rest, test)
+
+    def told(left: Floats) -> float:
+        return size(ready.unwhite(left))
+
+    label = label[ready.problem.index[0]]
+    return travel(ready.problem, drives, ready.columns * factor, fit.linear, rho, label, by, own, told)
+
+
+def _outweighs(before: float, after: float, noise: float) -> bool:
+    """Whether of a misfit (rms) more is left than is explained, noise taken off."""
+    return after**2 - noise**2 > 0.5 * (before**2 - noise**2) > 0.0
+
+
+def _unit(e: Experiment, noise: Noise) -> tuple[str, Size, float]:
+    """What misfits are told in: lengths, or angles where nothing else is read."""
+    lengths = metres(e.channels)
+    columns = lengths & e.axis_read if (lengths & e.axis_read).any() else e.axis_read
+    floor = float(np.sqrt(np.mean(noise.floor[columns] ** 2)))
+    return ("m" if lengths[columns].any() else "rad"), (lambda values: rms(values[:, columns])), floor
+
+
+def _rest(e: Experiment, left: Floats, size: Size) -> dict[str, float]:
+    out = {c.name: rms(left[:, [i]]) for i, c in enumerate(e.channels) if e.axis_read[i]}
+    setups = list(dict.fromkeys(e.setup))
+    if len(setups) > 1:
+        labels = np.array(e.setup)
+        out |= {f"set-up {s}": size(left[labels == s]) for s in setups[:12]}
+    return out
+
+
+def _verdict(as_declared: bool, beyond: Sequence[Beyond], wider: Sequence[Wider], unexplained: bool) -> str:
+    single = [
+        b.name if not b.rivals else f"{b.name} or {len(b.rivals)} other{'s' * (len(b.rivals) > 1)}"
+        for b in beyond
+    ]
+    whole = [f"{' or '.join((w.group, *w.rivals))} as a whole" for w in wider]
+    if single or whole:
+        return "beyond tolerance: " + ", ".join([*single, *whole])
+    if unexplained:
+        return "unattributed"
+    return "as declared" if as_declared else "adjusted within tolerance"
+
+
+def _rows(names: Sequence[Unknown], sums: Sums, factor: Floats, values: Floats) -> tuple[Row, ...]:
+    spread = np.sqrt(np.maximum(np.diag(sums.covariance), 0.0)) if len(names) else np.zeros(0)
+    kept, _ = independent(sums.gram)
+    minimal = {int(i) for i in kept}
+    out = []
+    for i, (p, v) in enumerate(zip(names, values, strict=True)):
+        told = 1.0 - spread[i] ** 2
+        u = p.u * factor[i]
+        out.append(
+            Row(
+                p.name,
+                p.group,
+                p.leg,
+                p.unit,
+                float(v * p.u),
+                p.u,
+                float(spread[i] * u),
+                float(v / factor[i] / np.sqrt(told)) if told > 1e-9 else 0.0,
+                bool(told > 0.5),
+                float(1.0 / spread[i]),
+                i in minimal,
+            )
+        )
+    return tuple(out)
