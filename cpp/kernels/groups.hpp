@@ -4,6 +4,7 @@
 #pragma once
 
 #include "elimination.hpp"
+#include "weights.hpp"
 
 namespace stiffmap::kernel {
 
@@ -148,6 +149,45 @@ inline void group_tangent(Elimination& el, const ChainProgram& chain, Sym6& K, V
   for (int q = 0; q < 3; ++q) K.B.c[q] = {entry(0, 3 + q), entry(1, 3 + q), entry(2, 3 + q)};
   K.E = {entry(3, 3), entry(4, 4), entry(5, 5), entry(3, 4), entry(3, 5), entry(4, 5)};
   c = group_residual(el, chain, pull);
+}
+
+/// How the weights up to the group's last joint answer to the turn of the chain's start (F9): `t` starts there.
+[[gnu::noinline]] inline void group_turning(const Elimination& el, const ChainProgram& chain, Turning& t) {
+  const Group group(el.P, chain);
+  const GroupSlot& k = el.s.groups[chain.group];
+  // Of the bodies behind the joint, as in group_stiffness: sum of lever arm times weight, weight.
+  M3 arms{};
+  V3 force{}, at = k.p;
+  const auto lever = [&](const V3& r, const V3& f) {
+    arms.c[0] = arms.c[0] + f.x * r;
+    arms.c[1] = arms.c[1] + f.y * r;
+    arms.c[2] = arms.c[2] + f.z * r;
+  };
+  int b = 5;
+  for (int i = chain.first_stiff; i >= chain.first; --i) {
+    const Op& op = el.P.ops[i];
+    const bool joint = op.kind <= OpKind::prismatic;
+    if (joint && !op.eliminated) continue;
+    const JointSlot& j = el.s.joints[op.slot];
+    lever(at - j.o, force);
+    at = j.o;
+    if (!joint) {
+      const V3 weight = splat(op.mass) * el.gravity;
+      lever(j.w, weight);
+      force = force + weight;
+      hang(t, op.mass, weight, j.o + j.w);
+      continue;
+    }
+    // The joint's force by the turn: W x w of what slides, w (r·W) - r (w·W) of what turns.
+    V3 s = cross(force, j.w);
+    if (op.kind == OpKind::revolute) s = (arms.c[0].x + arms.c[1].y + arms.c[2].z) * j.w - arms * j.w;
+    const V(&row)[6] = k.inverse[b--];
+    const V3 translation{row[0], row[1], row[2]}, rotation{row[3], row[4], row[5]};
+    for (int c = 0; c < 3; ++c) {
+      const V by = component(s, c);
+      t.G[c] = t.G[c] + V6{by * translation, by * rotation};
+    }
+  }
 }
 
 /// Steps of the group's joints from the twist of its end.

@@ -318,7 +318,10 @@ inline Tangent tangent(Elimination& el, const ChainProgram& chain, const V3& sta
     t.rigid = false;
     group_tangent(el, chain, t.K, t.c);
     t.p = el.s.groups[chain.group].p;
-    if (el.heavy) t.turning.clear(t.p);
+    if (el.heavy) {
+      t.turning.clear(start);
+      group_turning(el, chain, t.turning);
+    }
     from = chain.first_stiff + 1;
   }
   for (int i = from; i < chain.first + chain.count; ++i) {

@@ -136,8 +136,7 @@ bool takes(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const
   const NodePoint& reading = m.points[at(in.read_points.front())];
   if (load.node != m.tip || reading.node != m.tip) return false;
   if (load.offset != reading.offset) return false;
-  if (plan.heavy_spins() && !in.gravity.isZero(0)) return false;
-  return in.gravity.isZero(0) || plan.program().exact_weights || !options.stiffness;
+  return !plan.heavy_spins() || in.gravity.isZero(0);
 }
 
 KernelInput kernel_input(const Mechanism& m, const BatchInput& in, const SolveOptions& options) {

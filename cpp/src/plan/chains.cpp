@@ -30,23 +30,21 @@ class Compiler {
     out_.chains.emplace_back();
     out_.program.root = 0;
     out_.program.legs_op = -1;
-    out_.program.exact_weights = 1;
-    chain(m_.description, 0, true, false);
+    chain(m_.description, 0, true);
     return std::move(found_);
   }
 
  private:
   struct Way {  // what has been passed since the chain's start
     Pose nominal, actual;
-    bool rigid = true, moves = false;
+    bool rigid = true;
     int prefix = 0;
   };
 
   /// Operations of a chain are contiguous: those of its branches come before them.
-  void chain(const Chain& c, std::size_t index, bool outermost, bool start_moves) {
+  void chain(const Chain& c, std::size_t index, bool outermost) {
     std::vector<Op> ops;
     Way way;
-    way.moves = start_moves;
     for (const auto& element : c.elements) {
       if (const auto* e = std::get_if<Offset>(&element)) {
         way.nominal = way.nominal * e->nominal;
@@ -71,16 +69,15 @@ class Compiler {
       if (p.first_stiff < 0 && (ops[i].kind == OpKind::spring || ops[i].kind == OpKind::block))
         p.first_stiff = p.first + i32(i);
     p.group = -1;
-    if (p.first_stiff < 0) first_group(p, ops, start_moves);
+    if (p.first_stiff < 0) first_group(p, ops);
     if (outermost && out_.program.legs_op >= 0) out_.program.legs_op += p.first;
     out_.ops.insert(out_.ops.end(), ops.begin(), ops.end());
   }
 
   /// A chain without spring or block starts with its first six joints together (docs/fast_path.md F12).
-  void first_group(ChainProgram& p, const std::vector<Op>& ops, bool start_moves) {
+  void first_group(ChainProgram& p, const std::vector<Op>& ops) {
     int joints = 0;
     for (std::size_t i = 0; i < ops.size(); ++i) {
-      if (ops[i].kind == OpKind::load && start_moves) out_.program.exact_weights = 0;
       if (ops[i].kind > OpKind::prismatic || !ops[i].eliminated || p.first_stiff >= 0) continue;
       if (++joints < 6) continue;
       p.first_stiff = p.first + i32(i);
@@ -115,9 +112,6 @@ class Compiler {
     if (j.actuated) found_.drives.push_back({op.coordinate, op.slot, j.type == JointType::prismatic});
     if (op.eliminated && way.rigid && ++way.prefix > most_prefix)
       found_.missing = "more joints before the first link spring than are supported";
-    if (op.eliminated) {
-      way.moves = true;
-    }
     for (const GuideError& e : j.guide_errors) guide_error(e, way, ops);
   }
 
@@ -163,7 +157,6 @@ class Compiler {
       if (!s.stroke->table.empty()) std::fill(op.K, op.K + 36, 1.0);  // any entry may be there somewhere
     }
     way.rigid = false;
-    way.moves = true;
   }
 
   void elastic_joints(const Spring& s, const Mat6& K, Way& way, std::vector<Op>& ops) {
@@ -180,7 +173,6 @@ class Compiler {
       found_.elastic.push_back({next_, K(i, i), s.rest[i]});
       if (way.rigid && ++way.prefix > most_prefix)
         found_.missing = "more joints before the first link spring than are supported";
-      way.moves = true;
     }
   }
 
@@ -201,10 +193,9 @@ class Compiler {
     op.first = i32(first);
     op.count = i32(b.branches.size());
     op.slot = out_.program.stiff_slots++;
-    for (std::size_t k = 0; k < b.branches.size(); ++k) chain(b.branches[k].second, first + k, false, way.moves);
+    for (std::size_t k = 0; k < b.branches.size(); ++k) chain(b.branches[k].second, first + k, false);
     if (is_legs) out_.program.legs_op = here;
     way.rigid = false;
-    way.moves = true;
   }
 
   const Mechanism& m_;
