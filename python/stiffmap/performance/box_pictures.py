@@ -11,8 +11,8 @@ from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.performance.box import LargestBox
+from stiffmap.performance.cell import BOX
 from stiffmap.performance.inside import REACH
-from stiffmap.performance.limits import BOX
 from stiffmap.performance.workspace_pictures import INSIDE, name_axes, paint, patches, planes_of, section
 from stiffmap.plot.style import BLACK, BLUE, MM, headline, legend_below, new_figure, paper_style
 

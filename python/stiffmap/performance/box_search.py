@@ -11,8 +11,9 @@ from scipy.optimize import linprog
 from scipy.spatial import cKDTree
 
 from stiffmap.broadcasting import Floats
+from stiffmap.performance.cell import BOX
 from stiffmap.performance.cells import shrink
-from stiffmap.performance.limits import BOX, Bounds
+from stiffmap.performance.limits import Bounds
 
 SAMPLES = 9
 """Nodes along each edge of the region where poses that break a limit are looked for first."""

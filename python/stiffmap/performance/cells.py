@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.broadcasting import Floats
-from stiffmap.performance.limits import Bounds, Cells
+from stiffmap.performance.cell import Cells
+from stiffmap.performance.enclosed import enclose
+from stiffmap.performance.limits import Bounds
 from stiffmap.performance.sampled import sample
 
 FIRST = 4
@@ -32,9 +35,7 @@ class Shrunk:
 
 def judge_cells(bounds: Bounds) -> Callable[[Floats, Floats, Floats], Cells]:
     """Enclosure where it can be had, else nodes."""
-    if bounds.unproven:
-        return lambda centre, half, axes: sample(bounds, centre, half, axes)
-    return bounds.over
+    return partial(sample if bounds.unproven else enclose, bounds)
 
 
 def shrink(

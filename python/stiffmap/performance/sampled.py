@@ -7,7 +7,8 @@ from itertools import product
 import numpy as np
 
 from stiffmap.broadcasting import Floats
-from stiffmap.performance.limits import Bounds, Cells
+from stiffmap.performance.cell import Cells
+from stiffmap.performance.limits import Bounds
 
 SAFETY = 2.0
 """On second derivatives, which are second differences between the nodes of each cell."""

@@ -12,6 +12,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.cells import halved
+from stiffmap.performance.enclosed import enclose
 from stiffmap.performance.inside import Inside, Judged
 from stiffmap.performance.limits import Bounds
 from stiffmap.rotations import as_rotations
@@ -217,7 +218,7 @@ def _proven(
     while len(a) and left > 0:
         a, b = a[:left], b[:left]
         left -= len(a)
-        found = bounds.over((a + b) / 2, (b - a) / 2, np.eye(3))
+        found = enclose(bounds, (a + b) / 2, (b - a) / 2, np.eye(3))
         total += float(np.prod(b - a, axis=1)[found.inside].sum())
         open_ = ~found.inside & ~found.broken
         a, b = halved(a[open_], b[open_], found.bend[open_])

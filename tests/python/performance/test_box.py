@@ -13,7 +13,9 @@ from stiffmap.performance import drive_kinematics
 from stiffmap.performance.bars import segment_distance
 from stiffmap.performance.box_search import BoxSearch
 from stiffmap.performance.cells import shrink
-from stiffmap.performance.limits import Bounds, Limit
+from stiffmap.performance.enclosed import enclose
+from stiffmap.performance.limit import Limit
+from stiffmap.performance.limits import Bounds
 from stiffmap.performance.turning import best_orientation
 
 EDGE = 1 / np.sqrt(18) + 1 / np.sqrt(6)  # of the cube within 0.5…2, times L
@@ -112,12 +114,12 @@ def test_cube_factors_as_limits():
     bounds = Bounds(sm.load_machine("orthoglide-revised"), transmission=(0.5, 2.5), factors="cube")
     rng = np.random.default_rng(2)
     centre, half = rng.uniform(-0.1, 0.1, (20, 3)), np.full((20, 3), 2e-3)
-    cells = bounds.over(centre, half, np.eye(3))
+    cells = enclose(bounds, centre, half, np.eye(3))
     v = sm.velocity_transmission(bounds.machine, centre)
     good = (v.cube_max <= 2.5) & (v.cube_min >= 0.5)
     assert cells.inside.any() and (good | ~cells.inside).all() and (cells.inside | ~good).mean() > 0.7
     tight = Bounds(bounds.machine, transmission=(0.1, 1.7), factors="cube")
-    assert tight.over(np.zeros((1, 3)), np.full((1, 3), 1e-4), np.eye(3)).broken.all()
+    assert enclose(tight, np.zeros((1, 3)), np.full((1, 3), 1e-4), np.eye(3)).broken.all()
 
 
 def test_distance_of_segments_and_clearance_of_bars():
@@ -131,7 +133,7 @@ def test_distance_of_segments_and_clearance_of_bars():
     rng = np.random.default_rng(3)
     p = rng.uniform(*machine.workspace, (30, 3))
     half = np.full((30, 3), 5e-4)
-    cells = bounds.over(p, half, np.eye(3))
+    cells = enclose(bounds, p, half, np.eye(3))
     k = drive_kinematics(
         machine, (p[:, None] + rng.uniform(-1, 1, (30, 20, 3)) * half[:, None]).reshape(-1, 3)
     )
