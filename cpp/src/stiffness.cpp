@@ -57,6 +57,15 @@ void invert(const Mat6& scaled, const Vec6& s, StiffnessResult& out) {
   }
 }
 
+/// The compliance has next to no motion in some direction, and the stiffness there is not its inverse: in loops that
+/// are overconstrained the motion that is impossible spreads over the bordered matrix's rows, so that no residual of
+/// one shows it.
+bool cannot_move(const Singular6& motions, const Mat6& K) {
+  const Vec6 direction = motions.V.col(5);
+  const double product = motions.values[5] * direction.dot(K * direction);
+  return motions.values[5] <= least_motion * motions.values[0] && !(product > 0.5);
+}
+
 }  // namespace
 
 StiffnessWorkspace::StiffnessWorkspace(const Mechanism& m) {
@@ -151,14 +160,19 @@ void by_compliance(const Mechanism& m, const Mat6& C, bool regular, StiffnessRes
   s << Vec3::Constant(std::sqrt(m.stiffness)), Vec3::Constant(std::sqrt(m.stiffness) * m.length);
   const Mat6 scaled = unscale(C, s);
   if (!regular || !scaled.allFinite()) return;
+  const Singular6 motions = singular_vectors(scaled);
+  const Vec6& sizes = motions.values;
+  if (!rigid && cannot_move(motions, unscale(out.stiffness, s.cwiseInverse()))) {
+    out.flags |= flag::rigid_direction;
+    out.stiffness.setConstant(nan);
+  }
   // A soft direction beside very stiff ones: the tangent, with units of its own, tells it from none.
-  if (out.free > 0) {
+  if (out.free > 0 || (!rigid && out.flags & flag::rigid_direction)) {
     out.free = 0;
     out.free_twists.setConstant(nan);
     out.compliance = C;
     return;
   }
-  const Vec6 sizes = singular_vectors(scaled).values;
   if (!(sizes[5] > least_motion * sizes[0])) return;
   const Vec6 d = scaled.diagonal().cwiseAbs().cwiseSqrt().cwiseInverse();
   const Mat6 gap = unscale(unscale(out.compliance, s) - scaled, d);

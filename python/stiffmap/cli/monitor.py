@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +12,7 @@ from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.experiment import load_experiment
+from stiffmap.json_text import parse_json
 from stiffmap.machine import Machine, load_machine
 from stiffmap.planning.budget import budgets
 from stiffmap.planning.monitor import compare
@@ -58,7 +58,7 @@ def monitor(
 def _of(m: Machine, path: Path) -> list[AppliedEffect]:
     """Effects that a diagnosis named."""
     try:
-        data: Any = json.loads(path.read_text(encoding="utf-8"))
+        data: Any = parse_json(path.read_text(encoding="utf-8"))
         effects = data["effects"]
         terms = [
             AppliedEffect(

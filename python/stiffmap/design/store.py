@@ -13,6 +13,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.design.judging import Judged
 from stiffmap.design.problem import Design
 from stiffmap.errors import FileError
+from stiffmap.json_text import parse_json
 
 
 class Evaluations:
@@ -29,16 +30,30 @@ class Evaluations:
             self._read(path)
 
     def _read(self, path: Path) -> None:
-        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        if not lines:
+            return
+        self._same_design(lines[0], path)
+        for line in lines[1:]:
             try:
-                row = json.loads(line)
-            except json.JSONDecodeError:
-                continue  # the line at which the process was killed
-            if number == 1 and row.get("design") != self.mark:
-                raise FileError("holds evaluations of another design; give another folder", file=str(path))
-            if "x" in row:
-                judged = Judged(np.array(row["f"]), np.array(row["g"]), row["values"], row["reason"])
-                self.known[np.array(row["x"]).tobytes()] = judged
+                row = parse_json(line)
+                f, g, x = (np.array(row[k], dtype=float) for k in "fgx")
+                self.known[x.tobytes()] = Judged(f, g, dict(row["values"]), str(row["reason"]))
+            except (ValueError, KeyError, TypeError):
+                continue  # the line at which the process was killed, or a damaged one: judged again
+
+    def _same_design(self, line: str, path: Path) -> None:
+        try:
+            mark = parse_json(line)["design"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise FileError(
+                "is damaged: expected the mark of the design whose evaluations these are; delete the file, or give "
+                "another folder",
+                file=str(path),
+                line=1,
+            ) from error
+        if mark != self.mark:
+            raise FileError("holds evaluations of another design; give another folder", file=str(path))
 
     def missing(self, x: Floats) -> list[int]:
         """Rows that nobody judged yet."""

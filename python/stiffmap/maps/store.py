@@ -10,6 +10,8 @@ import numpy as np
 from numpy.lib.format import open_memmap
 from numpy.typing import NDArray
 
+from stiffmap.errors import FileError
+from stiffmap.json_text import parse_json
 from stiffmap.maps.differences import refuse_another_map
 from stiffmap.maps.plan import MapPlan
 
@@ -64,8 +66,23 @@ def folder_store(plan: MapPlan, folder: Path, resume: bool) -> Store:
     key = folder / "key.json"
     if not (resume and key.exists()):
         return _new(plan, folder, json.dumps(plan.attrs, sort_keys=True, default=lambda v: v.tolist()))
-    refuse_another_map(folder, json.loads(key.read_text(encoding="utf-8")), plan.attrs)
+    refuse_another_map(folder, _kept(key), plan.attrs)
     return _mapped(plan, folder, "r+")
+
+
+def _kept(key: Path) -> dict[str, Any]:
+    """Attributes of the map that a folder holds part of."""
+    try:
+        kept = parse_json(key.read_bytes())
+        if not isinstance(kept, dict) or not isinstance(parse_json(kept.get("call", "{}")), dict):
+            raise TypeError
+    except (OSError, ValueError, TypeError) as error:
+        raise FileError(
+            "is damaged: expected the attributes of an unfinished map; without them nobody can tell whose rows these "
+            "are: start again without resume (--resume)",
+            file=str(key),
+        ) from error
+    return kept
 
 
 def _new(plan: MapPlan, folder: Path, key: str) -> Store:
@@ -79,7 +96,22 @@ def _mapped(plan: MapPlan, folder: Path, mode: Any) -> Store:
     def array(name: str, dtype: str, shape: tuple[int, ...]) -> Any:
         if mode == "w+":
             return open_memmap(folder / f"{name}.npy", mode, np.dtype(dtype), shape)
-        return open_memmap(folder / f"{name}.npy", mode)
+        path = folder / f"{name}.npy"
+        try:
+            kept = open_memmap(path, mode)
+        except (OSError, ValueError) as error:
+            raise _damaged(path, shape, "none") from error
+        if (kept.shape, kept.dtype) != (shape, np.dtype(dtype)):
+            raise _damaged(path, shape, f"{kept.shape} {kept.dtype}")
+        return kept
 
     arrays = {v.name: array(v.name, v.dtype, (plan.rows, plan.x.size, *plan.tail(v))) for v in plan.variables}
     return Store(arrays, array("done", "?", (plan.rows,)))
+
+
+def _damaged(path: Path, shape: tuple[int, ...], found: str) -> FileError:
+    return FileError(
+        f"is damaged: expected an array {shape} of an unfinished map, found {found}; start again without resume "
+        "(--resume)",
+        file=str(path),
+    )

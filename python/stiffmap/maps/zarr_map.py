@@ -23,6 +23,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiffmap.errors import FileError, MissingPartError
+from stiffmap.json_text import parse_json
 from stiffmap.maps.differences import refuse_another_map
 from stiffmap.maps.files import zarr_strings
 from stiffmap.maps.plan import MapPlan
@@ -126,8 +127,8 @@ class ZarrMap:
     def _kept_attributes(self) -> dict[str, Any]:
         path = self.folder / "zarr.json"
         try:
-            kept = json.loads(path.read_text(encoding="utf-8"))["attributes"]
-            if not isinstance(kept, dict) or not isinstance(json.loads(kept["call"]), dict):
+            kept = parse_json(path.read_text(encoding="utf-8"))["attributes"]
+            if not isinstance(kept, dict) or not isinstance(parse_json(kept["call"]), dict):
                 raise TypeError
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise FileError(
@@ -179,7 +180,7 @@ def entries(journal: Path) -> Iterator[tuple[int, Any]]:
     lines = journal.read_bytes().split(b"\n")[:-1]
     for number, line in enumerate(lines, 1):
         try:
-            yield number, json.loads(line)
+            yield number, parse_json(line)
         except ValueError as error:
             raise damaged_line(journal, number) from error
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import builders as b
 import numpy as np
 import pytest
 from sampling import relative
 
 import stiffmap as sm
-from stiffmap.description import Pose
+from stiffmap.description import Block, Element, Pose, Spring
 
 METHODS = ("fast", "reference")
 LOAD = np.array([300.0, -200, 100, 20, 10, -30])
@@ -103,3 +105,36 @@ def test_a_locked_machine_with_rigid_drives(method: str) -> None:
     )
     assert s.joint_coordinates["arm.drive"] == pytest.approx(0.2, abs=1e-15)
     assert s.actuator_effort[0] == pytest.approx(-LOAD[0], rel=1e-9)
+
+
+def without_springs(elements: tuple[Element, ...], names: tuple[str, ...]) -> tuple[Element, ...]:
+    """The same chain with these springs taken out: what they stood for is rigid."""
+    kept: list[Element] = []
+    for e in elements:
+        if isinstance(e, Block):
+            branches = [replace(x, elements=without_springs(x.elements, names)) for x in e.branches]
+            kept.append(replace(e, branches=tuple(branches)))
+        elif not (isinstance(e, Spring) and e.name in names):
+            kept.append(e)
+    return tuple(kept)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_delta_whose_drives_alone_yield_cannot_turn(method: str) -> None:
+    """Gosselin's model: C = (sum of J J^T k)^-1 with q = z + sqrt(l² - h²), and no rotation at all. Its parallelograms are
+    overconstrained, so that the platform's impossible turns spread over their loops."""
+    d = sm.load_machine("linear-delta").description
+    legs = tuple(replace(x, elements=without_springs(x.elements, ("guide", "rod"))) for x in d.legs)
+    machine = sm.Machine(replace(d, legs=legs))
+    rng = np.random.default_rng(4)
+    towers = 0.3 * np.array([[np.cos(a), np.sin(a)] for a in np.radians([210, -30, 90])])
+    for p in rng.uniform((-0.1, -0.1, 0.2), (0.1, 0.1, 0.4), (8, 3)):
+        s = machine.solve(p, method=method)
+        away = p[:2] - towers
+        down = np.sqrt(0.25 - (away**2).sum(axis=1))
+        j = np.column_stack([-away / down[:, None], np.ones(3)])
+        np.testing.assert_allclose(s.compliance[:3, :3], np.linalg.inv(j.T @ j / 4e-7), rtol=1e-9, atol=1e-16)
+        assert np.abs(s.compliance[3:]).max() < 1e-15
+        assert s.flags & sm.Flag.RIGID_DIRECTION
+        assert np.isnan(s.stiffness).all()
+        assert s.status == sm.Status.CONVERGED

@@ -32,6 +32,7 @@ CALL: dict[str, Any] = {
     "wrench": [300.0, 0, 0, 0, 0, 0],
     "plane": None,
 }
+DEEP = "[" * 100_000
 
 
 @pytest.fixture(autouse=True)
@@ -182,7 +183,7 @@ def test_a_damaged_chunk_is_named_and_can_be_computed_again(
 
 
 @pytest.mark.parametrize(
-    "bad", [b"{", b"[]", b'{"tile": 99, "crc": {}}', b'{"tile": true, "crc": {}}', b"\xff"]
+    "bad", [b"{", b"[]", b'{"tile": 99, "crc": {}}', b'{"tile": true, "crc": {}}', b"\xff", DEEP.encode()]
 )
 def test_a_damaged_line_of_the_journal_is_named(
     machine: sm.Machine, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bad: bytes
@@ -209,7 +210,7 @@ def test_damaged_metadata_are_written_again(
     assert tree(out) == whole
 
 
-@pytest.mark.parametrize("text", ["", "{", '{"attributes": 3}', '{"attributes": {"call": "{"}}'])
+@pytest.mark.parametrize("text", ["", "{", '{"attributes": 3}', '{"attributes": {"call": "{"}}', DEEP])
 def test_a_map_whose_call_is_lost_is_not_taken_up(
     machine: sm.Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
 ) -> None:

@@ -109,6 +109,31 @@ def test_resume_refuses_another_map(
         sm.error_map(machine, **{**SAME, "x": BOX + 0.001}, out=out, resume=True)
 
 
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("key.json", b"{"),
+        ("key.json", b"[" * 100_000),
+        ("key.json", b'{"call": 3}'),
+        ("done.npy", b""),
+        ("deflection.npy", b"\x93NUMPY"),
+        ("deflection.npy", None),
+    ],
+)
+def test_a_damaged_part_of_an_interrupted_run_is_named(
+    machine: sm.Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, content: bytes | None
+) -> None:
+    out = tmp_path / "m.nc"
+    interrupted_map(machine, out, monkeypatch, blocks=1)
+    path = tmp_path / "m.nc.partial" / name
+    if content is None:
+        np.save(path, np.zeros(3))
+    else:
+        path.write_bytes(content)
+    with pytest.raises(sm.StiffmapError, match=rf"{name}: is damaged.*without resume"):
+        sm.error_map(machine, **SAME, out=out, resume=True)
+
+
 def test_without_resume_it_starts_afresh(
     machine: sm.Machine, ds: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

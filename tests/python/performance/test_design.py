@@ -17,6 +17,7 @@ import stiffmap.design
 from stiffmap.design import load_design, optimize
 from stiffmap.design.expressions import evaluate
 from stiffmap.design.judging import judge
+from stiffmap.design.store import Evaluations
 from stiffmap.performance import moving_mass
 
 pytest.importorskip("pymoo")
@@ -159,6 +160,14 @@ def test_quick_judgement_is_that_of_the_full_measures():
         design.machine(x), box=[full.case.low, full.case.high], force=300.0, nodes=n, refine=False
     )
     assert quick["deflection"] == pytest.approx(d.value, rel=2e-3)
+
+
+@pytest.mark.parametrize("line", ["", "[]", '{"x": 3}', "[" * 100_000])
+def test_evaluations_of_an_unknown_design_are_refused(tmp_path, line):
+    path = tmp_path / "evaluations.jsonl"
+    path.write_text(line + "\n", encoding="utf-8")
+    with pytest.raises(sm.StiffmapError, match=r"evaluations.jsonl, line 1: is damaged"):
+        Evaluations(load_design(write(tmp_path)), path)
 
 
 def test_a_search_that_is_killed_goes_on(tmp_path):
