@@ -4,7 +4,8 @@
 
 Rounds over all shipped machines, each plain and with each kind of effect on every element that takes it
 (effect_cases.py): random poses of the workspace box, random loads, every tenth pose without load, every other round
-under gravity, two rounds each with dead, follower and semitangential loads. The reference solves each pose once; each level's answer is compared with it and counts as one solve.
+under gravity, two rounds each with dead, follower and semitangential loads; then ten rounds on the same machines with
+more points: other readings, several loads of several types (`several`). The reference solves each pose once; each level's answer is compared with it and counts as one solve.
 Statuses must be equal, displacement and loaded compliance within 1e-10 (tests/python/fast/agreement.py). The state
 file is written after each case: the command goes on where it was stopped. Exit code 1 where something disagrees;
 each such case is printed with what repeats it.
@@ -22,7 +23,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests/python/fast"))
 
 import numpy as np
-from agreement import LOADS, TOLERANCE, compare, draw
+from agreement import LOADS, TOLERANCE, compare, draw, pointed, reading_gap, several
 from effect_cases import machines_with_effects
 
 import stiffmap as sm
@@ -30,7 +31,7 @@ from stiffmap import _core
 
 POSES = 16
 GRAVITY = (0.0, 0.0, -9.81)
-LOAD_TYPES = ("dead", "follower", "semitangential")
+KINDS = ("dead", "follower", "semitangential", *range(5))
 
 
 def cases() -> list[tuple[str, str, sm.Machine]]:
@@ -42,17 +43,27 @@ def cases() -> list[tuple[str, str, sm.Machine]]:
     return [c for c in out if c[2].fast == ""]
 
 
-def one(machine: sm.Machine, seed: int, heavy: bool, kind: str, threads: int) -> dict[str, tuple[int, float]]:
+def one(
+    machine: sm.Machine, seed: int, heavy: bool, kind: str | int, threads: int
+) -> dict[str, tuple[int, float]]:
     """Wrong statuses and largest difference of each level."""
     position, wrench = draw(machine, POSES, seed)
     wrench[::10] = 0.0
-    options = {"threads": threads, "load_type": kind, **({"gravity": GRAVITY} if heavy else {})}
+    options: dict[str, object] = {"threads": threads, **({"gravity": GRAVITY} if heavy else {})}
+    if isinstance(kind, int):
+        machine = pointed(machine)
+        wrench /= (1, 1, 2, 3, 3)[kind]  # together they are as large as one
+        options |= several(wrench, kind, machine)
+    else:
+        options["load_type"] = kind
     reference = machine.solve(position, wrench, method="reference", **options)
     out = {}
     for level in _core.kernel_levels():
         os.environ["STIFFMAP_ISA"] = level
-        gap = compare(machine.solve(position, wrench, **options), reference)
-        out[level] = (gap.statuses, float(np.nan_to_num(gap.worst(), nan=np.inf)))
+        answer = machine.solve(position, wrench, **options)
+        gap = compare(answer, reference)
+        worst = max(gap.worst(), reading_gap(answer, reference))
+        out[level] = (gap.statuses, float(np.nan_to_num(worst, nan=np.inf)))
     os.environ.pop("STIFFMAP_ISA", None)
     return out
 
@@ -75,7 +86,7 @@ def main() -> int:
     while state["solves"] < wanted.count and time.monotonic() < end:
         lap, index = divmod(state["next"], len(every))
         name, kind, machine = every[index]
-        heavy, loads = lap % 2 == 1, LOAD_TYPES[lap // 2 % 3]
+        heavy, loads = lap % 2 == 1, KINDS[lap // 2 % len(KINDS)]
         for level, (statuses, worst) in one(machine, state["next"], heavy, loads, wanted.threads).items():
             state["solves"] += POSES
             key = f"{name} {kind}"

@@ -9,6 +9,8 @@ is a batch of random poses in the workspace box of the machine file:
     loaded     F = 100, 50, -200 N
     gravity    the same force and gravity
     follower   the same force, turning with the tool
+    read       the same force, the motion of another point of the tool read besides
+    two loads  half of the force there, half at the tool's point
     outside    the same force, a third of the poses beyond the box (up to half its size)
     beyond     the same force at the poses of `outside` that are out of reach
 
@@ -29,6 +31,7 @@ from pathlib import Path
 
 import numpy as np
 from effect_cases import machines_with_effects
+from tests.python.fast.agreement import pointed
 
 import stiffmap as sm
 from stiffmap.files import shipped_machines
@@ -38,7 +41,7 @@ GRAVITY = (0.0, 0.0, -9.81)
 BASE = "orthoglide-revised"
 POSES = 4096
 MOST, MOST_OUTSIDE, MOST_SHARE = 4.0, 10.0, 1e-3
-COLUMNS = ("unloaded", "loaded", "gravity", "follower", "outside", "beyond")
+COLUMNS = ("unloaded", "loaded", "gravity", "follower", "read", "two loads", "outside", "beyond")
 
 
 def inside(machine: sm.Machine, n: int) -> np.ndarray:
@@ -101,6 +104,13 @@ def cases(machine: sm.Machine) -> Iterator[Case]:
     yield "loaded", machine, solve(wrench=FORCE), poses
     yield "gravity", machine, solve(wrench=FORCE, gravity=GRAVITY), poses
     yield "follower", machine, solve(wrench=FORCE, load_type="follower"), poses
+    probed = pointed(machine)
+
+    def also(**options: object) -> Callable[[np.ndarray], sm.Solution]:
+        return lambda p: probed.solve(p, threads=1, **options)  # type: ignore[arg-type]
+
+    yield "read", probed, also(wrench=FORCE, read_points=["platform.probe"]), poses
+    yield "two loads", probed, also(wrench=FORCE / 2, wrenches={"platform.probe": FORCE / 2}), poses
     yield "outside", machine, solve(wrench=FORCE), wide
     far = machine.solve(wide[::3][:256], threads=1, stiffness=False).status == sm.Status.UNREACHABLE
     if far.sum() > 8:
@@ -154,9 +164,10 @@ def main() -> int:
             late += row[column][0] > most or (not wide and row[column][1] > MOST_SHARE)
         cells = [f"{row[c][0]:.1f} ({100 * row[c][1]:.2g} %)" if c in row else "–" for c in COLUMNS]
         print(f"| {name} | {' | '.join(cells)} |", flush=True)
+        blank = " |" * (len(COLUMNS) - 2)
         for column in sorted(set(row) - set(COLUMNS), key=lambda c: -row[c][0]):
             print(
-                f"|   {column} | – | {row[column][0]:.1f} ({100 * row[column][1]:.2g} %) | | | | |",
+                f"|   {column} | – | {row[column][0]:.1f} ({100 * row[column][1]:.2g} %) |{blank}",
                 flush=True,
             )
     if wanted.json:

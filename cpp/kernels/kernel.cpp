@@ -8,6 +8,7 @@
 #include "last_attempt.hpp"
 #include "load_path.hpp"
 #include "newton.hpp"
+#include "places.hpp"
 #include "residual.hpp"
 #include "strokes.hpp"
 
@@ -76,7 +77,7 @@ struct Block {
       const std::int64_t k = in.start ? place(i) : pose(i);
       for (int c = 0; c < 3; ++c) value[c][i] = in.position[3 * k + c];
       for (int c = 0; c < 9; ++c) value[3 + c][i] = in.rotation[9 * k + c];
-      for (int c = 0; c < 6; ++c) value[12 + c][i] = in.wrench[6 * pose(i) + c];
+      for (int c = 0; c < 6; ++c) value[12 + c][i] = in.wrench[6 * (1 + in.load_count) * pose(i) + c];
     }
     for (int c = 0; c < 18; ++c) *lanes[c] = kernel::load(value[c]);
     return in.start ? given() : close();
@@ -195,7 +196,7 @@ struct Block {
 
   /// Displacement of each variant after one step from here, with the factors of the base (F10).
   void vary(M done, const Newton& base, const V (&C)[6][6]) {
-    const V3 offset{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
+    const V3 offset = commanded_offset();
     Elimination own{P, s, base.e.gravity, splat(0), {}};
     Newton here{P, in, s, own, load, own.gravity};
     here.turning = base.turning;
@@ -210,6 +211,7 @@ struct Block {
       moved = e.only;
       Newton at{Q, in, s, e, load, e.gravity};
       at.turning = base.turning;
+      at.turning.P = &Q;
       pass(at, Q);
       V c[6], eta[6];
       put(residual(e, Q.chains[Q.root], at.point), c);
@@ -244,7 +246,11 @@ struct Block {
         P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
     e.heavy = in.gravity[0] != 0 || in.gravity[1] != 0 || in.gravity[2] != 0;
     Newton newton{P, in, s, e, load, e.gravity};
-    newton.turning = {in.turns, command.R};
+    newton.turning.P = &P;
+    newton.turning.in = &in;
+    for (int i = 0; i < W; ++i) newton.turning.pose[i] = pose(i);
+    newton.turning.before = command.R;
+    newton.turning.read();
     V iterations = splat(0), steps;
     M done = newton.solve(usable, P.starts_linear, iterations, steps);
     if (in.patience == Patience::path && !P.starts_linear && any(usable & ~done))
@@ -295,7 +301,7 @@ struct Block {
   }
 
   void write(M done, const Newton& newton, const V (&K)[6][6], const V (&C)[6][6], V iterations, V steps) {
-    const V3 offset{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
+    const V3 offset = commanded_offset();
     const V6 d{newton.point - (command.p + command.R * offset), rotation_between(command.R, newton.tip.R)};
     V moved[6];
     put(d, moved);
@@ -305,7 +311,8 @@ struct Block {
       if (out.iterations && (done[i] || nowhere[i])) out.iterations[k] = static_cast<std::int32_t>(iterations[i]);
     }
     const M wanted = done & written();
-    put_out(moved, 6, wanted, out.displacement);
+    put_out(moved, 6, wanted, out.displacement, 6 * (1 + in.read_count));
+    if (in.read_count > 0 && out.displacement) write_readings(wanted, newton);
     put_out(K[0], 36, wanted, out.stiffness);
     put_out(C[0], 36, wanted, out.compliance);
     put_out(s.x, P.coordinate_count, wanted, out.coordinates);
@@ -321,11 +328,31 @@ struct Block {
   }
 
   /// Each pose's `n` numbers into its row of `to`, if that is wanted.
-  void put_out(const V* values, int n, M wanted, double* to) const {
+  void put_out(const V* values, int n, M wanted, double* to) const { put_out(values, n, wanted, to, n); }
+  void put_out(const V* values, int n, M wanted, double* to, std::int64_t row) const {
     if (!to) return;
     double* rows[W];
-    for (int i = 0; i < W; ++i) rows[i] = to + n * pose(i);
+    for (int i = 0; i < W; ++i) rows[i] = to + row * pose(i);
     write_lanes(values, n, wanted, rows);
+  }
+
+  /// The point of the answer in the tip's frame, as the command knows it.
+  V3 commanded_offset() const {
+    const double* o = P.places[in.point].nominal.p;
+    return {splat(o[0]), splat(o[1]), splat(o[2])};
+  }
+
+  /// Displacements of the further places (docs/fast_path.md F20).
+  [[gnu::noinline]] void write_readings(M wanted, const Newton& newton) const {
+    const double* o = P.places[in.point].actual.p;
+    const Frame tip{newton.point - newton.tip.R * V3{splat(o[0]), splat(o[1]), splat(o[2])}, newton.tip.R};
+    for (int k = 0; k < in.read_count; ++k) {
+      const PlaceProgram& place = P.places[in.reads[k]];
+      const Frame now = frame_of<Build::actual>(P, place, s.x, tip);
+      V moved[6];
+      put(frame_error(frame_of<Build::nominal>(P, place, s.closed, command), now), moved);
+      put_out(moved, 6, wanted, out.displacement + 6 * (1 + k), 6 * (1 + in.read_count));
+    }
   }
 
   [[gnu::noinline]] void write_play(M lanes, const Newton& newton) {

@@ -11,8 +11,8 @@
 #include "serial.hpp"
 #include "steps.hpp"
 #include "tangents.hpp"
+#include "tip_loads.hpp"
 #include "tip_springs.hpp"
-#include "turning_load.hpp"
 #include "wrenches.hpp"
 
 namespace stiffmap::kernel {
@@ -28,12 +28,12 @@ struct Newton {
   Scratch& s;
   Elimination& e;
   Laws laws{P, s};
-  V6 whole_load;  ///< external wrench at the point, base axes
+  V6 whole_load;  ///< external wrench at the point, base axes, as at the command
   V3 whole_gravity;
   V6 load = whole_load;       ///< the share that acts, with the external springs
   V6 dead_load = whole_load;  ///< of the load alone, as it is turned now
   V6 pending = {};            ///< what is added in this step (F11)
-  TurningLoad turning = {};
+  TipLoads turning;
   V acting = splat(1), ahead = splat(0);  ///< shares of the whole load in `dead_load` and `pending`
   Frame tip = {};                         ///< frame of the tip; the point is tip.p + tip.R point
   V3 point = {};
@@ -65,8 +65,8 @@ struct Newton {
            {{{splat(1), splat(0), splat(0)}, {splat(0), splat(1), splat(0)}, {splat(0), splat(0), splat(1)}}}};
     walk<Build::actual>(P, P.chains[P.root], s.x, tip, s, e.only);
     point = tip.p;
-    if (in.point[0] != 0 || in.point[1] != 0 || in.point[2] != 0)
-      point = point + tip.R * V3{splat(in.point[0]), splat(in.point[1]), splat(in.point[2])};
+    const double* o = P.places[in.point].actual.p;
+    if (o[0] != 0 || o[1] != 0 || o[2] != 0) point = point + tip.R * V3{splat(o[0]), splat(o[1]), splat(o[2])};
   }
 
   /// Whether what acts on the tip depends on where it is.
@@ -108,7 +108,7 @@ struct Newton {
     m[4][5] += h.x;
     m[5][3] += h.y;
     m[5][4] -= h.x;
-    if (turning.turns()) turning.soften(acting * whole_load, tip.R, m);
+    if (turning.turns()) turning.soften(whole_load, acting, tip.R, m);
   }
 
   V step_norm() const {
@@ -147,7 +147,10 @@ struct Newton {
     e.lowest = splat(1e300);
     const Sym6* pulls = nullptr;
     if (P.spring_count > 0) pulls = &pull_arm();
-    serial.step(e, {point, load, pending, dead_load.b, pulls, acting * whole_load, turning, tip.R});
+    const bool more = turning.several();
+    const TipLoads::Levers l = more ? turning.levers(whole_load, acting, tip.R) : TipLoads::Levers{{}, dead_load.b};
+    const V3 pulled = load.b - dead_load.b;
+    serial.step(e, {point, load, pending, l.moment, l.arms, pulled, pulls, whole_load, acting, turning, tip.R});
     e.transferred = splat(0);
   }
 
@@ -162,7 +165,7 @@ struct Newton {
   /// What an arm answers where its iteration settled.
   [[gnu::noinline]] void answer_joints(M after, V (&m)[6][6]) {
     serial.answer(e, point, after, m, K);
-    if (turning.turns()) turning.symmetric(acting * whole_load, tip.R, K);
+    if (turning.turns()) turning.symmetric(whole_load, acting, tip.R, K);
     if (any(serial.play.lanes)) serial.play.release(e, P.serial_joints, serial.twist, m, K);
   }
 
@@ -333,16 +336,14 @@ struct Newton {
     const V6& w = whole_load;
     const V sum = absolute(w.a.x) + absolute(w.a.y) + absolute(w.a.z) + absolute(w.b.x) + absolute(w.b.y) +
                   absolute(w.b.z) + (e.heavy ? splat(1) : splat(0));
+    if (turning.several()) return (sum == 0.0) & ~turning.acting();
     return sum == 0.0;
   }
 
   /// Lanes whose load is not conservative, as `nonconservative` (load.hpp).
   M circulatory_lanes() const {
-    const V6& w = whole_load;
-    const M moment = absolute(w.b.x) + absolute(w.b.y) + absolute(w.b.z) > 0.0;
-    const M force = absolute(w.a.x) + absolute(w.a.y) + absolute(w.a.z) > 0.0;
-    if (turning.how == LoadTurns::semitangential) return M{};
-    return turning.how == LoadTurns::follower ? moment | force : moment;
+    const M here = TipLoads::circulatory(in.turns, whole_load);
+    return turning.several() ? here | turning.circulatory() : here;
   }
 
   /// Takes only a share of the last step.

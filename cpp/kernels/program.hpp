@@ -141,6 +141,13 @@ struct TipSpringProgram {
   std::int32_t tension_only;
 };
 
+/// A named point. Of the tip's body: its frame in the tip's. Of another: the steps that lead to its body from the base
+/// (operations; ~chain: the end of a chain), then its frame in the body's.
+struct PlaceProgram {
+  std::int32_t on_tip, first, count;
+  Constant nominal, actual;
+};
+
 struct Program {
   const Op* ops;
   const ChainProgram* chains;
@@ -156,7 +163,9 @@ struct Program {
   const ClosureTerm* terms;
   const ReachProgram* reach;        ///< one per leg where legs close one by one
   const TipSpringProgram* springs;  ///< external ones
-  const std::int32_t* serial;       ///< arm of joints alone: its joints that yield and its bodies, from the base
+  const PlaceProgram* places;       ///< named points; the first is the tip
+  const std::int32_t* place_steps;
+  const std::int32_t* serial;  ///< arm of joints alone: its joints that yield and its bodies, from the base
   const std::int32_t* unknowns;
   const std::int32_t* envelope;  ///< per unknown: the first one of its leg that shares an equation with one up to it
   const PlanarLeg* planar;       ///< one per leg, or null: the closure starts from the grid
@@ -188,19 +197,28 @@ enum class Patience : std::int32_t { quick, leaps, path };
 /// Whether a load keeps its direction as the tip turns, turns with it, or has the conservative moment (theory E6).
 enum class LoadTurns : std::int32_t { dead, follower, semitangential };
 
+/// A load besides the one at the point of the answer, at another place of the tip's body.
+struct FurtherLoad {
+  std::int32_t place;
+  LoadTurns turns;
+};
+
 /// What each pose asks, row-major.
 struct KernelInput {
   std::int64_t count;
   const double* position;  ///< count x 3
   const double* rotation;  ///< count x 9
-  const double* wrench;    ///< count x 6 at the point
+  const double* wrench;    ///< count x (1 + load_count) x 6, the first at the point
   const double* start;     ///< count x coordinates: closed configurations; null: interpolate the grid
   double gravity[3];
-  double point[3];  ///< reference point in the tip frame
+  std::int32_t point;  ///< place of the tip's body where stiffness is answered
+  std::int32_t read_count, load_count;
+  const std::int32_t* reads;  ///< further places whose displacement is wanted
+  const FurtherLoad* loads;
   const std::int64_t*
       index;  ///< the poses to solve, null: all; start, position and rotation go by place if start is given
   Patience patience;
-  LoadTurns turns;  ///< whether the wrench turns with the tip
+  LoadTurns turns;  ///< whether the wrench at the point turns with the tip
   std::int32_t max_iterations;
   double tolerance;
   const Program* const* perturbed;    ///< variants of the program with the same operations
@@ -217,7 +235,8 @@ inline constexpr std::uint8_t pose_heavy = 6;  ///< closed, but its load takes l
 inline constexpr std::uint8_t pose_nowhere = 8;  ///< beyond the end of the path of equilibria nothing was found
 inline constexpr std::uint8_t pose_loose = 7;    ///< solved, but a joint plays inside its gap
 
-/// Row-major answers; null: not wanted. `done`: how the pose left the kernels.
+/// Row-major answers; null: not wanted. `done`: how the pose left the kernels. Displacement: count x (1 + read_count)
+/// x 6.
 struct KernelOutput {
   double *displacement, *stiffness, *compliance, *effort, *leg_wrench, *coordinates;
   double* free_twists;  ///< count x 36: the first column, of poses that are loose
@@ -232,7 +251,7 @@ inline constexpr std::int64_t program_layout =
     sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) + 41 * sizeof(Op) +
     43 * sizeof(CoordinateProgram) + 47 * sizeof(DriveProgram) + 53 * sizeof(LawProgram) + 59 * sizeof(ClosureTerm) +
     71 * sizeof(ReachProgram) + 73 * sizeof(TipSpringProgram) + 67 * sizeof(ChainProgram) + 61 * sizeof(PlanarLeg) +
-    71 * sizeof(StrokeProgram) + 79 * sizeof(ArmLeg);
+    71 * sizeof(StrokeProgram) + 79 * sizeof(ArmLeg) + 83 * sizeof(PlaceProgram) + 89 * sizeof(FurtherLoad);
 
 /// The one symbol that each level exports. Poses begin .. end-1; `scratch` of scratch_size() bytes.
 struct KernelTable {

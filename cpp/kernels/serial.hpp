@@ -5,7 +5,7 @@
 
 #include "free_play.hpp"
 #include "laws.hpp"
-#include "turning_load.hpp"
+#include "tip_loads.hpp"
 
 namespace stiffmap::kernel {
 
@@ -14,10 +14,13 @@ struct TipLoad {
   V3 point;
   V6 load;              ///< of which the tangent knows, with the external springs
   V6 pending;           ///< of which it does not (F11)
-  V3 dead_moment;       ///< the part of the load's moment that keeps its direction
+  V3 dead_moment;       ///< of the loads, without lever arms
+  M3 arms;              ///< sum of lever arms from the point times the loads' forces
+  V3 spring_moment;     ///< of the external springs
   const Sym6* springs;  ///< tangent of the external springs at the point; null: none
-  V6 given;             ///< the share of the load that acts, as at the command
-  const TurningLoad& turning;
+  V6 given;             ///< the load at the point, as at the command
+  V share;              ///< of all loads, that acts
+  const TipLoads& turning;
   const M3& R;  ///< of the tip
 };
 
@@ -86,7 +89,7 @@ struct Serial {
 
   /// The external springs' tangent in the joints; their moment turns by half where the joints' axes do (F15).
   [[gnu::noinline]] void pull_back(const Elimination& el, int n, const TipLoad& tip) {
-    const V3 half = splat(0.5) * (tip.load.b - tip.dead_moment);
+    const V3 half = splat(0.5) * tip.spring_moment;
     V6 unit[most_serial_joints];
     for (int b = 0; b < n; ++b) {
       unit[b] = unit_twist(el, *joint[b], tip.point);
@@ -104,12 +107,12 @@ struct Serial {
   template <int N>
   [[gnu::noinline]] void turn(const Elimination& el, int count, const TipLoad& tip) {
     const int n = N ? N : count;
-    const TurningLoad::Change change = tip.turning.change(tip.given, tip.R);
+    const Change change = tip.turning.change(tip.given, tip.R, false);
     V6 unit[most_serial_joints];
     for (int b = 0; b < n; ++b) unit[b] = unit_twist(el, *joint[b], tip.point);
     for (int b = 0; b < n; ++b) {
       if (joint[b]->kind == OpKind::prismatic) continue;
-      const V6 more = change.by(unit[b].b);
+      const V6 more = tip.share * change.by(unit[b].b);
 #pragma GCC unroll 6
       for (int a = 0; a < n; ++a) B[a][b] -= dot(unit[a], more);
     }
@@ -120,6 +123,8 @@ struct Serial {
   static Acts acts(const Elimination& el, const TipLoad& tip) {
     const auto some = [](const V3& v) { return any((v.x != 0.0) | (v.y != 0.0) | (v.z != 0.0)); };
     if (some(tip.dead_moment)) return Acts::moment;
+    // Several loads may turn with the joints where their sum is nothing.
+    if (tip.turning.several() && any(tip.share != 0.0)) return Acts::forces;
     return some(tip.load.a) || some(tip.load.b) || (el.heavy && some(el.gravity)) ? Acts::forces : Acts::nothing;
   }
 
@@ -135,7 +140,7 @@ struct Serial {
     // Of all that acts behind the joint: force, and the sum of its lever arms times forces; with what is pending, force
     // and moment about the joint.
     V3 point = tip.point, force = tip.load.a, all = force + tip.pending.a, moment = tip.load.b + tip.pending.b;
-    M3 arms{};
+    M3 arms = tip.arms;
     const auto lever = [&](const V3& r, const V3& f) {
       for (int k = 0; k < 3; ++k) arms.c[k] = arms.c[k] + (k == 0 ? f.x : k == 1 ? f.y : f.z) * r;
     };
@@ -167,7 +172,7 @@ struct Serial {
       --b;
     }
     if (tip.springs) pull_back(el, n, tip);
-    if (tip.turning.turns() && how != Acts::nothing) turn<N>(el, n, tip);
+    if (tip.turning.some_turns() && how != Acts::nothing) turn<N>(el, n, tip);
     for (int k = 0; k < n; ++k) {
       const int q = joint[k]->coordinate;
       for (int i = 0; i < n; ++i) B[i][k] *= el.s.da[q];

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <memory>
 
 #include "../kernels/dispatch.hpp"
+#include "plan/data.hpp"
 #include "plan/moved_leg.hpp"
 #include "stiffmap/check.hpp"
 #include "stiffmap/parallel.hpp"
@@ -128,27 +130,38 @@ class ClosedPoses {
   std::vector<double> start_, position_, rotation_;
 };
 
+/// The named point of a load.
+Index place_of(const Mechanism& m, const LoadPoint& load) {
+  const auto same = [&](const NodePoint& p) { return p.node == load.node && p.offset == load.offset; };
+  return std::find_if(m.points.begin(), m.points.end(), same) - m.points.begin();
+}
+
+/// Whether a point is of the tip's body beyond the legs, and no error turns it there.
+bool on_tip(const Mechanism& m, const Program& program, Index point) {
+  if (point == static_cast<Index>(m.points.size()) || !m.beyond_legs[at(m.points[at(point)].node)]) return false;
+  const PlaceProgram& place = program.places[point];
+  return place.on_tip && std::equal(std::begin(place.actual.R), std::end(place.actual.R), std::begin(place.nominal.R));
+}
+
 /// What the kernels do not do is left to the reference path as a whole.
 bool takes(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const SolveOptions& options) {
-  if (!plan.available() || options.equilibrium.load_steps > 0) return false;
-  if (in.load_points.size() != 1 || in.read_points.size() != 1) return false;
-  const LoadPoint& load = in.load_points.front();
+  if (!plan.available() || options.equilibrium.load_steps > 0 || in.load_points.empty()) return false;
+  const LoadPoint& first = in.load_points.front();
   const NodePoint& reading = m.points[at(in.read_points.front())];
-  if (load.node != m.tip || reading.node != m.tip) return false;
-  if (load.offset != reading.offset) return false;
+  if (first.node != reading.node || first.offset != reading.offset) return false;
+  for (const LoadPoint& load : in.load_points)
+    if (!on_tip(m, plan.program(), place_of(m, load))) return false;
   return !plan.heavy_spins() || in.gravity.isZero(0);
 }
 
-KernelInput kernel_input(const Mechanism& m, const BatchInput& in, const SolveOptions& options) {
+KernelInput kernel_input(const BatchInput& in, const SolveOptions& options) {
   KernelInput k{};
   k.count = in.count;
   k.position = in.position;
   k.rotation = in.rotation;
   k.wrench = in.wrench;
-  for (int i = 0; i < 3; ++i) {
-    k.gravity[i] = in.gravity[i];
-    k.point[i] = m.points[at(in.read_points.front())].offset[i];
-  }
+  for (int i = 0; i < 3; ++i) k.gravity[i] = in.gravity[i];
+  k.point = i32(in.read_points.front());
   k.max_iterations = 16;
   k.tolerance = options.equilibrium.tolerance;
   k.turns = static_cast<LoadTurns>(in.load_points.front().type);
@@ -185,6 +198,10 @@ class FastBatch {
       open_.reserve(m.coordinates.size());
       for (const Coordinate& c : m.coordinates) open_.push_back(c.locked && c.role == Role::passive);
     }
+    for (std::size_t k = 1; k < in.read_points.size(); ++k) reads_.push_back(i32(in.read_points[k]));
+    for (std::size_t k = 1; k < in.load_points.size(); ++k)
+      loads_.push_back(
+          {i32(place_of(m, in.load_points[k])), static_cast<LoadTurns>(static_cast<int>(in.load_points[k].type))});
     for (const FastPlan* v : in.variants) {
       require(v->available() && v->program().op_count == program_.op_count &&
                   v->program().coordinate_count == program_.coordinate_count,
@@ -238,6 +255,8 @@ class FastBatch {
   std::vector<std::uint8_t> done_;
   std::vector<std::uint32_t> flags_;
   std::vector<Scratch> scratch_;
+  std::vector<std::int32_t> reads_;  ///< reading points and loads besides the first
+  std::vector<FurtherLoad> loads_;
   std::vector<const Program*> variants_;
   std::vector<std::int32_t> moved_;
 
@@ -263,7 +282,11 @@ class FastBatch {
     parallel_chunks(count, chunk, threads_, [&](int thread, long begin, long end) {
       poll(thread);
       Scratch& s = scratch_[at(thread)];
-      KernelInput input = kernel_input(m_, in_, options_);
+      KernelInput input = kernel_input(in_, options_);
+      input.read_count = i32(reads_.size());
+      input.reads = reads_.data();
+      input.load_count = i32(loads_.size());
+      input.loads = loads_.data();
       input.index = index;
       input.patience = patience;
       input.perturbed = variants_.data();
@@ -300,7 +323,11 @@ class FastBatch {
     else if (out_.nothing_free) out_.nothing_free[i] = 1;
     else if (out_.free_twists) Eigen::Map<VecX>(out_.free_twists + 36 * i, 36).setConstant(nan);
     if (out_.indeterminate) std::copy(open_.begin(), open_.end(), out_.indeterminate + m_.size() * i);
-    const bool circulatory = nonconservative(in_.load_points.front().type, Eigen::Map<const Vec6>(in_.wrench + 6 * i));
+    bool circulatory = false;
+    const Index loads = static_cast<Index>(in_.load_points.size());
+    for (Index k = 0; k < loads; ++k)
+      circulatory = circulatory || nonconservative(in_.load_points[at(k)].type,
+                                                   Eigen::Map<const Vec6>(in_.wrench + 6 * (loads * i + k)));
     const std::uint32_t play = loose ? flag::free_play | flag::platform_singular : 0u;
     if (out_.flags) out_.flags[i] = flags_[at(i)] | play | (circulatory ? flag::nonconservative : 0u);
   }

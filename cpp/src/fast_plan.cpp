@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "plan/chains.hpp"
 #include "plan/closure.hpp"
+#include "plan/places.hpp"
 #include "stiffmap/spins.hpp"
 
 namespace stiffmap {
@@ -94,16 +94,6 @@ double softest(const Mechanism& m) {
   return std::max(1e-4, least / m.stiffness);
 }
 
-/// A point of a node in the tip's frame, where only constant transforms lie between the two.
-std::optional<Vec3> from_tip(const Mechanism& m, Index node, const Vec3& offset) {
-  Pose way;
-  for (Index at = m.tip; at != node; at = m.nodes[static_cast<std::size_t>(at)].parent) {
-    if (at < 0 || m.nodes[static_cast<std::size_t>(at)].coordinate >= 0) return std::nullopt;
-    way = m.nodes[static_cast<std::size_t>(at)].actual * way;
-  }
-  return Vec3(way.R.transpose() * (offset - way.p));
-}
-
 /// Joints and bodies of a machine that is one row of joints without springs; false where it is something else.
 bool follow_serial(const FastPlanData& d, std::int32_t chain, std::vector<std::int32_t>& ops) {
   const ChainProgram& c = d.chains[static_cast<std::size_t>(chain)];
@@ -148,6 +138,8 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.reach = d.reach.data();
   p.springs = d.springs.data();
   p.spring_count = i32(d.springs.size());
+  p.places = d.places.data();
+  p.place_steps = d.place_steps.data();
   p.planar = d.planar.empty() ? nullptr : d.planar.data();
   p.arm = d.arm.empty() ? nullptr : d.arm.data();
   p.op_count = i32(d.ops.size());
@@ -180,14 +172,12 @@ void link(const Mechanism& m, FastPlanData& d) {
 FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int grid_nodes)
     : data_(std::make_unique<FastPlanData>()) {
   for (const NodeSpring& s : m.external_springs) {
-    const std::optional<Vec3> offset = from_tip(m, s.node, s.offset);
-    if (!offset) missing_ = "external springs that are not at the tip";
+    const FromTip tip = from_tip(m, s.node);
+    const Vec3 at = tip.actual * s.offset;
+    if (!tip.rigid) missing_ = "external springs that are not at the tip";
     else
-      data_->springs.push_back({{(*offset)[0], (*offset)[1], (*offset)[2]},
-                                {s.anchor[0], s.anchor[1], s.anchor[2]},
-                                s.stiffness,
-                                s.length,
-                                s.tension_only});
+      data_->springs.push_back(
+          {{at[0], at[1], at[2]}, {s.anchor[0], s.anchor[1], s.anchor[2]}, s.stiffness, s.length, s.tension_only});
   }
   const CompiledChains chains = compile_chains(m, *data_);
   if (missing_.empty()) missing_ = chains.missing;
@@ -196,6 +186,7 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   if (!missing_.empty()) return;
   heavy_spins_ = Spins(m).heavy();
   fill_tables(m, chains, *data_);
+  compile_places(m, chains, *data_);
   const bool box = (high - low).minCoeff() >= 0 && high.allFinite();
   const bool leg_by_leg = m.task == full_task && only_legs_have_joints(m, *data_) && compile_closure(m, *data_);
   if (leg_by_leg) recognise_planar_legs(m, *data_);

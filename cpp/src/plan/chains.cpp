@@ -10,17 +10,6 @@ namespace {
 
 constexpr int most_prefix = 16;
 
-Constant constant(const Pose& T) {
-  Constant c{};
-  for (int i = 0; i < 3; ++i) {
-    c.p[i] = T.p[i];
-    for (int k = 0; k < 3; ++k) c.R[3 * k + i] = T.R(i, k);
-  }
-  c.has_rotation = !T.R.isApprox(Mat3::Identity(), 0);
-  c.has_translation = !T.p.isZero(0);
-  return c;
-}
-
 /// Walks the chains in the order in which Mechanism numbered their coordinates.
 class Compiler {
  public:
@@ -57,6 +46,9 @@ class Compiler {
         body(*b, way, ops);
       } else if (const auto* k = std::get_if<Block>(&element)) {
         block(*k, way, ops, outermost);
+      } else if (const auto* p = std::get_if<Point>(&element)) {
+        const Pose at{p->offset, Mat3::Identity()};
+        found_.places.push_back({index, ops.size(), way.nominal * at, way.actual * at});
       }
     }
     ChainProgram& p = out_.chains[index];
@@ -205,6 +197,17 @@ class Compiler {
 };
 
 }  // namespace
+
+Constant constant(const Pose& T) {
+  Constant c{};
+  for (int i = 0; i < 3; ++i) {
+    c.p[i] = T.p[i];
+    for (int k = 0; k < 3; ++k) c.R[3 * k + i] = T.R(i, k);
+  }
+  c.has_rotation = !T.R.isApprox(Mat3::Identity(), 0);
+  c.has_translation = !T.p.isZero(0);
+  return c;
+}
 
 CompiledChains compile_chains(const Mechanism& m, FastPlanData& out) { return Compiler(m, out).run(); }
 

@@ -19,11 +19,20 @@ struct ElasticJoint {
   double stiffness, rest;
 };
 
+/// Where a point of a chain is: behind how many of its operations, and its frame in theirs.
+struct PlaceInChain {
+  std::size_t chain, behind;
+  Pose nominal, actual;
+};
+
 struct CompiledChains {
   std::vector<DriveSlot> drives;
   std::vector<ElasticJoint> elastic;
-  std::string missing;  ///< why the kernels can not run it; empty: they can
+  std::vector<PlaceInChain> places;  ///< points of the mechanism but the first, which is the tip
+  std::string missing;               ///< why the kernels can not run it; empty: they can
 };
+
+Constant constant(const Pose& T);
 
 /// Fills operations and chains of `out`.
 CompiledChains compile_chains(const Mechanism& m, FastPlanData& out);

@@ -33,6 +33,8 @@ struct FastPlanData {
   std::vector<ArmLeg> arm;  ///< one or none
   std::vector<ReachProgram> reach;
   std::vector<TipSpringProgram> springs;
+  std::vector<PlaceProgram> places;
+  std::vector<std::int32_t> place_steps;
   std::shared_ptr<const std::vector<double>> grid;
 };
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 import stiffmap as sm
+from stiffmap.description import Point
 
 TOLERANCE = 1e-10
 FLOOR_TRANSLATION, FLOOR_ROTATION = 1e-14, 1e-13  # m, rad
@@ -66,6 +68,45 @@ def compliance_gap(a: np.ndarray, b: np.ndarray) -> float:
     """Largest difference of compliances (n, 6, 6), each entry in multiples of sqrt(C_ii C_jj)."""
     size = np.sqrt(np.abs(np.diagonal(b, axis1=-2, axis2=-1)))
     return float(np.max(np.abs(a - b) / (size[:, :, None] * size[:, None, :]), initial=0.0))
+
+
+def pointed(machine: sm.Machine) -> sm.Machine:
+    """The machine with two more points on its tip's body, one in the middle and one at the end of each leg, and one on
+    its base."""
+    d = machine.description
+
+    def marked(elements: tuple) -> tuple:
+        at = len(elements) // 2
+        return (*elements[:at], Point("middle", (0.01, 0.02, 0.03)), *elements[at:], Point("end"))
+
+    legs = tuple(replace(leg, elements=marked(leg.elements)) for leg in d.legs)
+    tip = (Point("probe", (0.03, 0.05, -0.12)), Point("gauge", (-0.1, 0.02, 0.06)))
+    floor = Point("floor", (0.1, 0.0, 0.0))
+    return sm.Machine(replace(d, legs=legs, platform=(*d.platform, *tip), base=(*d.base, floor)))
+
+
+def several(wrench: np.ndarray, case: int, machine: sm.Machine) -> dict[str, object]:
+    """Options of a call on a `pointed` machine with other reading points, several loads, and both."""
+    two = {"platform.probe": wrench[::-1], "tcp": np.roll(wrench, 3, axis=0)}
+    types = {"platform.probe": "follower", "tcp": "semitangential"}
+    every = [p for p in machine.points if p != "tcp"]
+    return (
+        {"read_points": every},
+        {"point": "platform.probe", "read_points": every[::-2]},
+        {"wrenches": {"platform.probe": two["platform.probe"]}, "read_points": ["platform.gauge"]},
+        {"point": "platform.gauge", "wrenches": two, "load_type": types, "read_points": every[::2]},
+        {
+            "wrenches": {"tcp": -wrench, "platform.gauge": two["tcp"]},
+            "load_type": {"platform.gauge": "follower"},
+        },
+    )[case]
+
+
+def reading_gap(a: sm.Solution, b: sm.Solution) -> float:
+    """`displacement_gap` of every reading point where both have an equilibrium."""
+    ok = a.ok & b.ok
+    pairs = zip(np.moveaxis(a.readings[ok], -2, 0), np.moveaxis(b.readings[ok], -2, 0), strict=True)
+    return max(displacement_gap(x, y) for x, y in pairs)
 
 
 def compare(fast: sm.Solution, reference: sm.Solution) -> Gap:
