@@ -49,6 +49,7 @@ struct FreePlay {
       B[k][k] = select(loose[k], own, B[k][k]);
       g[k] = select(loose[k], splat(0), g[k]);
     }
+    if (el.P.deficient) doubtful |= lanes;
     lanes &= ~doubtful;
   }
 

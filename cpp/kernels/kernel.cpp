@@ -253,7 +253,7 @@ struct Block {
     newton.turning.read();
     V iterations = splat(0), steps;
     M done = newton.solve(usable, P.starts_linear, iterations, steps);
-    if (in.patience == Patience::path && !P.starts_linear && any(usable & ~done))
+    if (in.patience == Patience::path && !P.starts_linear && !P.deficient && any(usable & ~done))
       done |= follow(usable & ~done, newton, iterations, steps);
     V K[6][6];
     newton.dense(newton.answer.K, K);

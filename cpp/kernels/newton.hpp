@@ -145,6 +145,7 @@ struct Newton {
     frames();
     turn_load();
     e.lowest = splat(1e300);
+    for (int q = 0; q < P.coordinate_count; ++q) s.dz[q] = splat(0);  // also of joints that are held
     const Sym6* pulls = nullptr;
     if (P.spring_count > 0) pulls = &pull_arm();
     const bool more = turning.several();

@@ -182,6 +182,7 @@ struct Program {
   std::int32_t hardens;        ///< a law with a cubic term
   std::int32_t bends;          ///< laws with corners, and none of them sticks: a deflection says the force
   std::int32_t parallel;       ///< branches share a load: how is known only when they have moved
+  std::int32_t deficient;      ///< arm of joints alone that cannot move its tip in every direction: no stiffness there
   std::uint32_t flag_force, flag_range, flag_limit, flag_lock, flag_always, flag_stepped, flag_unverified;
   std::int32_t grid_n[3], grid_row;  ///< nodes along each axis; numbers per node, a multiple of 8
   double grid_low[3], grid_step[3];

@@ -237,6 +237,13 @@ struct Serial {
         for (int k = 1; k < n; ++k) C[i][r] += J[i][k] * g[k];
       }
     }
+    if (el.P.deficient) {
+      const V3 none{splat(__builtin_nan("")), splat(__builtin_nan("")), splat(__builtin_nan(""))};
+      K = {{none.x, none.x, none.x, none.x, none.x, none.x},
+           {none, none, none},
+           {none.x, none.x, none.x, none.x, none.x, none.x}};
+      return;
+    }
     M sound = ~M{};
     for (int i = 0; i < 6; ++i)
       for (int q = 0; q < 6; ++q) {

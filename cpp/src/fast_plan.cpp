@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "plan/chains.hpp"
 #include "plan/closure.hpp"
@@ -118,6 +119,31 @@ void find_serial(FastPlanData& d) {
   d.program.serial_joints = static_cast<std::int32_t>(joints);
 }
 
+/// Whether the joints of an arm of joints alone leave some motion of its tip impossible, wherever they are.
+bool is_deficient(const Mechanism& m, const FastPlanData& d) {
+  if (d.program.serial_joints == 0) return false;
+  if (d.program.serial_joints < 6) return true;
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> turn(-1, 1);
+  Frames f(m);
+  MatX J(6, d.program.serial_joints);
+  for (int trial = 0; trial < 5; ++trial) {
+    VecX x = m.home_coordinates;
+    for (Index j = 0; j < m.size(); ++j) x[j] += turn(random) * m.unit(j);
+    forward(m, Geometry::nominal, x, f);
+    Index k = 0;
+    for (const std::int32_t i : d.serial) {
+      const Op& op = d.ops[static_cast<std::size_t>(i)];
+      if (op.kind == OpKind::load) continue;
+      J.col(k) = column(m, f, op.coordinate, f.at(m.tip).p) * m.unit(op.coordinate);
+      J.col(k++).tail<3>() *= m.length;
+    }
+    const VecX sizes = J.jacobiSvd().singularValues();
+    if (sizes[5] > 1e-12 * sizes[0]) return false;
+  }
+  return true;
+}
+
 void link(const Mechanism& m, FastPlanData& d) {
   Program& p = d.program;
   p.ops = d.ops.data();
@@ -181,6 +207,11 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   }
   const CompiledChains chains = compile_chains(m, *data_);
   if (missing_.empty()) missing_ = chains.missing;
+  find_serial(*data_);
+  data_->program.deficient = is_deficient(m, *data_);
+  if (data_->program.deficient) data_->program.flag_always |= flag::rigid_direction;
+  else if (missing_.empty() && chains.deficient)
+    missing_ = "a chain with neither a full link spring nor six joints that yield";
   if (data_->program.legs_op < 0) missing_ = "no legs";
   if (missing_.empty() && m.beside_home.size() > 0) missing_ = "hinges that do not lock at home";
   if (!missing_.empty()) return;
@@ -193,7 +224,6 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   if (leg_by_leg) recognise_arm(m, *data_);
   if (leg_by_leg) bound_reach(m, *data_);
   const bool whole = !leg_by_leg && box && compile_whole_closure(m, *data_);
-  find_serial(*data_);
   link(m, *data_);
   Program& p = data_->program;
   for (std::size_t i = 0; i < 6; ++i) p.task[i] = m.task[i];

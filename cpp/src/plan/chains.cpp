@@ -75,7 +75,7 @@ class Compiler {
       p.first_stiff = p.first + i32(i);
       p.group = out_.program.group_slots++;
     }
-    if (p.group < 0) found_.missing = "a chain with neither a full link spring nor six joints that yield";
+    found_.deficient |= p.group < 0;
   }
 
   Op& push(OpKind kind, Way& way, std::vector<Op>& ops) {

@@ -30,6 +30,7 @@ struct CompiledChains {
   std::vector<ElasticJoint> elastic;
   std::vector<PlaceInChain> places;  ///< points of the mechanism but the first, which is the tip
   std::string missing;               ///< why the kernels can not run it; empty: they can
+  bool deficient = false;            ///< a chain has neither a full link spring, nor a block, nor six joints that yield
 };
 
 Constant constant(const Pose& T);
