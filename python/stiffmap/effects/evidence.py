@@ -106,15 +106,6 @@ class Periods:
     frequencies: Floats
     """(F,) equally spaced, 1/m or 1/rad."""
 
-    def columns(self, k: int) -> Floats:
-        """(n, c, 2) of frequency k."""
-        parts = [
-            np.stack([change * np.sin(w)[:, None], change * np.cos(w)[:, None]], axis=-1)
-            for travel, change in zip(self.travels, self.changes, strict=True)
-            for w in [2 * np.pi * self.frequencies[k] * travel]
-        ]
-        return np.asarray(sum(parts))
-
 
 @dataclass(frozen=True, eq=False)
 class Signature:

@@ -57,16 +57,16 @@ def variants(candidate: Candidate, predictor: Predictor, base: Floats) -> Iterat
     tried = Tried(candidate.element, candidate.legs, candidate.parameters)
     linear = candidate.linear
     index = readings_of(predictor.experiment, base)
-    long: dict[int, Waves | None] = {}
+    waves: dict[int, tuple[Waves, Floats | None] | None] = {}
     for s in (get(candidate.kind).signature or signatures_on_a_grid)(PlanProbe(predictor, base), tried):
         shape = tuple(s.values.items())
         if s.period is not None:
             periods, k = s.period
-            if id(periods) not in long:
-                long[id(periods)] = _waves(periods, index)
-            waves = long[id(periods)]
-            lines = lines_of(periods.columns(k), base, index) if waves is None else Wave(waves, k)
-            yield _variant(candidate, lines, np.full(2, float(s.grows)), shape, s.start)
+            if id(periods) not in waves:
+                waves[id(periods)] = _waves(periods, base, index)
+            yield _variant(
+                candidate, _wave(waves[id(periods)], k), np.full(2, float(s.grows)), shape, s.start
+            )
         elif s.columns is not None:
             sign = np.full(s.columns.shape[-1], float(s.grows))
             yield _variant(candidate, lines_of(s.columns, base, index), sign, shape, s.start)
@@ -89,14 +89,23 @@ def lines_of(columns: Floats, base: Floats, index: tuple[Numbers, Numbers]) -> F
     return np.ascontiguousarray(columns[index].T)
 
 
-def _waves(periods: Periods, index: tuple[Numbers, Numbers]) -> Waves | None:
-    """Periods whose columns are not stored; None where they are few enough to be, or the machine fails."""
-    if 2 * len(periods.frequencies) * len(index[0]) <= MOST_STORED:
+def _waves(
+    periods: Periods, base: Floats, index: tuple[Numbers, Numbers]
+) -> tuple[Waves, Floats | None] | None:
+    """All periods, and their columns (F, 2, R) where these are few enough to be stored; None where the machine fails."""
+    solved = np.isfinite(base)
+    if not all(np.isfinite(c[solved]).all() for c in periods.changes):
         return None
-    slopes = [c[index] for c in periods.changes]
-    if not all(np.isfinite(c).all() for c in slopes):
+    waves = Waves.of(index[0], periods.travels, [c[index] for c in periods.changes], periods.frequencies)
+    stored = 2 * len(periods.frequencies) * len(index[0]) <= MOST_STORED
+    return waves, waves.arrays() if stored else None
+
+
+def _wave(found: tuple[Waves, Floats | None] | None, k: int) -> Floats | Wave | None:
+    if found is None:
         return None
-    return Waves.of(index[0], periods.travels, slopes, periods.frequencies)
+    waves, stored = found
+    return Wave(waves, k) if stored is None else np.asarray(stored[k])
 
 
 def side(p: Parameter) -> int:

@@ -99,6 +99,10 @@ class Waves:
                 sc += share * twice.imag
         return np.stack([np.stack([ss, sc], -1), np.stack([sc, cc], -1)], -2)[self.chosen]
 
+    def arrays(self) -> Floats:
+        """(V, 2, R) columns of all."""
+        return self._lines(self.chosen)
+
     def line(self, k: int) -> Floats:
         """(2, R) columns of one."""
         return np.asarray(self._lines(self.chosen[k : k + 1])[0])
