@@ -10,14 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stiffmap.calibration.certificate import INSTRUMENT, SCALE, frame_columns, scaled
-from stiffmap.calibration.edit import edited
+from stiffmap.calibration.slopes import Slopes, built, moves_of
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.machine import Machine
 
 STEP = 0.1
 """Of a standard uncertainty, for differences."""
@@ -81,16 +80,11 @@ def _frame_part(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) ->
 
 
 def _predicted(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> Floats:
-    moves: dict[tuple[str, str], float] = {}
-    for unknown, value in pairs:
-        for place, weight in unknown.moves:
-            moves[place] = moves.get(place, 0.0) + weight * unknown.u * value
-    scale = moves.get((INSTRUMENT, SCALE), 0.0)
-    moves = {(at, what): by for (at, what), by in moves.items() if at != INSTRUMENT}
+    moves = moves_of(pairs)
+    scale = moves.pop((INSTRUMENT, SCALE), 0.0)
     beside = predictor
-    if moves:
-        changed = edited(predictor.machine.description, moves)
-        beside = predictor.beside(machine=Machine(changed, like=predictor.machine))
+    if any(at != INSTRUMENT for at, _ in moves):
+        beside = predictor.beside(machine=built(predictor, moves))
     return beside([scaled(predictor.machine.description, scale)] if scale else [])
 
 
@@ -101,7 +95,7 @@ def sensitivity(
     until: float = np.inf,
     progress: Progress | None = None,
 ) -> Sensitivity:
-    """Differences of variants of the machine, one per unknown; `until` (s, of time.monotonic) ends them.
+    """Slopes of the readings, or differences of variants of the machine, one per unknown; `until` (s, of time.monotonic) ends them.
 
     The last few are kept: they do not depend on the readings.
     """
@@ -133,13 +127,16 @@ def sensitivity_at(
     """The same unknowns with columns at `values` (p,); those that fail there keep the old ones, and so do rows that do."""
     columns = s.columns.copy()
     base = predicted(predictor, s.unknowns, values)
+    slopes = Slopes(predictor, s.unknowns, values)
     for k in range(len(s.unknowns)):
         if time.monotonic() > until:
             break
         moved = values.copy()
         moved[k] += STEP
         try:
-            column = (_changed(predictor, s.unknowns, moved, s.unknowns[k].setup, base) - base) / STEP
+            column = slopes.of(k)
+            if column is None:
+                column = (_changed(predictor, s.unknowns, moved, s.unknowns[k].setup, base) - base) / STEP
         except StiffmapError:
             continue
         solved = np.isfinite(base)
@@ -169,6 +166,7 @@ def _differences(
     columns: list[Floats] = []
     failed: list[tuple[str, str]] = []
     stopped = False
+    slopes = Slopes(predictor, unknowns, np.zeros(len(unknowns)))
     for k, u in enumerate(unknowns):
         if time.monotonic() > until:
             stopped = True
@@ -176,7 +174,9 @@ def _differences(
         if progress is not None:
             progress(u.name, k, len(unknowns))
         try:
-            column = (predicted(predictor, [u], np.array([STEP])) - base) / STEP
+            column = slopes.of(k)
+            if column is None:
+                column = (predicted(predictor, [u], np.array([STEP])) - base) / STEP
         except StiffmapError as problem:
             failed.append((u.name, str(problem)))
             continue

@@ -57,9 +57,9 @@ def test_columns_of_a_set_up_are_those_of_the_zero_in_its_rows() -> None:
     assert more is not None
     for i, u in enumerate(more.unknowns):
         if u.setup:
-            moved = predicted(found.predictor, [u], np.array([0.1]))
-            expected = (moved - more.base) / 0.1
-            assert np.nan_to_num(more.columns[..., i]) == pytest.approx(np.nan_to_num(expected), abs=1e-12)
+            up, down = (predicted(found.predictor, [u], np.array([h])) for h in (0.1, -0.1))
+            expected = np.nan_to_num(up - down) / 0.2
+            assert np.nan_to_num(more.columns[..., i]) == pytest.approx(expected, rel=1e-5, abs=1e-11)
     assert zeros_anew(found.sensitivity, replace(e, setup=())) is None
 
 

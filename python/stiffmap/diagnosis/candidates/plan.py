@@ -10,6 +10,7 @@ import numpy as np
 
 from stiffmap.diagnosis.candidates.candidates import Candidate, candidates
 from stiffmap.diagnosis.candidates.sensitivity import Variant, variants
+from stiffmap.diagnosis.candidates.slopes import Slopes
 from stiffmap.diagnosis.candidates.stack import Stack
 from stiffmap.diagnosis.clock import Clock
 from stiffmap.effects import get, kinds
@@ -63,7 +64,9 @@ def _compute(predictor: Predictor, clock: Clock) -> tuple[Plan, bool]:
     good: list[Variant] = []
     failed: list[tuple[Candidate, str]] = []
     kind, whole = "", True
-    for candidate in candidates(predictor.machine.description, predictor.experiment):
+    tried = candidates(predictor.machine.description, predictor.experiment)
+    slopes = Slopes(predictor, tried)
+    for candidate in tried:
         if clock.over:
             where = "some places" if candidate.kind == kind else "any place"
             clock.leave_out(f"{candidate.kind} at {where}: no sensitivities")
@@ -73,7 +76,7 @@ def _compute(predictor: Predictor, clock: Clock) -> tuple[Plan, bool]:
             kind = candidate.kind
             clock.say(f"sensitivities: {kind}")
         try:
-            found = list(variants(candidate, predictor, base))
+            found = list(variants(candidate, predictor, base, slopes))
         except StiffmapError as problem:
             failed.append((candidate, str(problem)))
             continue

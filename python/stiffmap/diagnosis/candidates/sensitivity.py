@@ -1,4 +1,4 @@
-"""Sensitivities of every candidate at the null, by differences of predictions; kept per plan."""
+"""Sensitivities of every candidate at the null: slopes, or differences of predictions; kept per plan."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.candidates.probe import PlanProbe
+from stiffmap.diagnosis.candidates.slopes import Slopes, side
 from stiffmap.diagnosis.candidates.waves import Wave, Waves
 from stiffmap.effects import Parameter, get
 from stiffmap.effects.evidence import Periods, Tried, signatures_on_a_grid
@@ -52,8 +53,11 @@ class Variant:
         return self.lines.array() if isinstance(self.lines, Wave) else self.lines
 
 
-def variants(candidate: Candidate, predictor: Predictor, base: Floats) -> Iterator[Variant | None]:
-    """One linear model per signature of a candidate; None where the machine fails with it."""
+def variants(
+    candidate: Candidate, predictor: Predictor, base: Floats, slopes: Slopes | None = None
+) -> Iterator[Variant | None]:
+    """One linear model per signature of a candidate; None where the machine fails with it. `slopes`: told ahead."""
+    slopes = slopes or Slopes(predictor, [candidate])
     tried = Tried(candidate.element, candidate.legs, candidate.parameters)
     linear = candidate.linear
     index = readings_of(predictor.experiment, base)
@@ -71,7 +75,11 @@ def variants(candidate: Candidate, predictor: Predictor, base: Floats) -> Iterat
             sign = np.full(s.columns.shape[-1], float(s.grows))
             yield _variant(candidate, lines_of(s.columns, base, index), sign, shape, s.start)
         else:
-            single = [difference(candidate, p, shape, predictor, base) for p in linear]
+            single = [
+                difference(candidate, p, shape, predictor, base) if told is None else told
+                for p in linear
+                for told in [slopes.of(candidate, p)]
+            ]
             found = lines_of(np.stack(single, axis=-1), base, index)
             yield _variant(candidate, found, np.array([side(p) for p in linear]), shape, s.start)
 
@@ -108,15 +116,10 @@ def _wave(found: tuple[Waves, Floats | None] | None, k: int) -> Floats | Wave | 
     return Wave(waves, k) if stored is None else np.asarray(stored[k])
 
 
-def side(p: Parameter) -> int:
-    """+1 where the parameter can only grow from its null, -1 only fall, 0 both."""
-    return int(p.lower == p.null) - int(p.upper == p.null)
-
-
 def difference(
     candidate: Candidate, p: Parameter, shape: Shape, predictor: Predictor, base: Floats
 ) -> Floats:
-    """(n, 6) change of the readings per scale of parameter p, one-sided from the null."""
+    """(n, c) change of the readings per scale of parameter p, one-sided from the null, of whole predictions."""
     step = (side(p) * ONE_SIDED or SMOOTH) * p.scale
     given = dict(shape) | {p.name: float(p.null or 0.0) + step}
     values = [given.get(q.name, float(q.null or 0.0)) for q in candidate.parameters]

@@ -218,11 +218,20 @@ def jacobian(
     """(N, len(which)) change of the whitened residual per unit of each value; `GivenUpError` beyond an effort of `most`."""
     here = problem.check(predictor(model.terms(values)))
     _, high = model.bounds()
-    slopes: dict[int, Floats] = {}
-    for i in map(int, which):
+    numbers = [int(i) for i in which]
+    steps = {i: tangent_step(values, i, high[i]) for i in numbers}
+    moved = [model.terms(_moved(values, i, steps[i])) for i in numbers]
+    told: list[Floats | None] = [None] * len(numbers)
+    if len(numbers) > 1:  # one alone costs as much by a prediction
         _go_on(predictor, most)
-        step = tangent_step(values, i, high[i])
-        there, step = _beside(model, values, i, step, predictor, problem)
+        told = predictor.changes(moved, model.terms(values))
+    slopes: dict[int, Floats] = {}
+    for i, change in zip(numbers, told, strict=True):
+        if change is not None:
+            slopes[i] = change / steps[i]
+            continue
+        _go_on(predictor, most)
+        there, step = _beside(model, values, i, steps[i], predictor, problem)
         slopes[i] = (there - here) / step
     all_felt = len(values) - len(model.held)
     known = slopes if len(slopes) == all_felt else {**known_before(model, predictor), **slopes}
@@ -237,12 +246,16 @@ def _beside(
 ) -> tuple[Floats, float]:
     """Prediction with value i moved by the step, or by its opposite where the machine cannot be built or solved."""
     low, _ = model.bounds()
+    try:
+        return problem.check(predictor(model.terms(_moved(values, i, step)))), step
+    except StiffmapError:
+        back = _moved(values, i, -step)
+        if back[i] < low[i]:
+            raise
+        return problem.check(predictor(model.terms(back))), -step
+
+
+def _moved(values: Floats, i: int, step: float) -> Floats:
     moved = values.copy()
     moved[i] += step
-    try:
-        return problem.check(predictor(model.terms(moved))), step
-    except StiffmapError:
-        moved[i] -= 2 * step
-        if moved[i] < low[i]:
-            raise
-        return problem.check(predictor(model.terms(moved))), -step
+    return moved

@@ -148,7 +148,7 @@ class Solver:
         return out, count
 
     def _equilibria(self, machine: Machine, plan: Experiment) -> tuple[Floats, Work]:
-        if not plan.wrench.any() and not _moves_unloaded(machine, plan):
+        if not plan.wrench.any() and not moves_unloaded(machine, plan):
             return _at_command(machine, plan), Work()
         if len(set(plan.load_points)) < 2:
             return self._unique(machine, plan, plan.load_points[0] if plan.load_points else plan.load_point)
@@ -239,7 +239,7 @@ def _at_command(machine: Machine, plan: Experiment) -> Floats:
     return np.where(there[:, None], np.zeros((len(plan), len(plan.channels))), np.nan)
 
 
-def _moves_unloaded(machine: Machine, plan: Experiment) -> bool:
+def moves_unloaded(machine: Machine, plan: Experiment) -> bool:
     """Without load only errors, preload or weight move a machine from its command."""
     d = machine.description
     return bool(plan.gravity or d.gravity) or not rests_at_command(d)

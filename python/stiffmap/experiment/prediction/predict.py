@@ -5,12 +5,13 @@ from __future__ import annotations
 import copy
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from stiffmap import effects
-from stiffmap.description import AppliedEffect
+from stiffmap.description import AppliedEffect, MachineDescription
 from stiffmap.effects import apply_records
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
@@ -22,14 +23,19 @@ from stiffmap.experiment.prediction.history import Drives, drives_of, history_mo
 from stiffmap.experiment.prediction.joints import check_joints
 from stiffmap.experiment.prediction.kept import Kept
 from stiffmap.experiment.prediction.measurement import readings, true_wrench
-from stiffmap.experiment.prediction.recorded import at_records
+from stiffmap.experiment.prediction.nearby import FEW, Near, Nearby
+from stiffmap.experiment.prediction.recorded import at_records, records_of
 from stiffmap.machine import Machine
+from stiffmap.recent import Recent
 
 Terms = tuple[AppliedEffect, ...]
 FAILURE = 20.0
 """How much dearer an equilibrium is that is not found (measured: 10 to 30 times)."""
 DEAR = 100.0
 """How much dearer one is that the kernels leave to the reference path (measured: 140 to 400 times)."""
+
+MACHINES = 4
+"""Machines with terms that are kept."""
 
 
 @dataclass(eq=False)
@@ -66,6 +72,8 @@ class Predictor:
         """Effort that one fit may cost before it is given up."""
         self._work = Work()
         self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
+        self._changes: Kept[tuple[Terms, Terms], Floats] = Kept()
+        self._machines: Recent[Machine] = Recent(MACHINES)
         self.tangents: Kept[Hashable, Any] = Kept()
         """Slopes of predictions by effects, kept by those who fit them."""
         self._drives: dict[tuple[Terms, Terms], Drives] = {}
@@ -74,17 +82,10 @@ class Predictor:
 
     def __call__(self, terms: Sequence[AppliedEffect] = ()) -> Floats:
         """(n, c) m, rad predicted readings; NaN where a pose fails."""
-        kinds = [(t, effects.get(t.kind)) for t in terms]
-        mechanical = tuple(t for t, kind in kinds if kind.apply)
-        load = tuple(t for t, kind in kinds if kind.load)
+        mechanical, load = _parts(terms)
         key = (mechanical, load)
-        motion = self._memory.get(key)
-        if motion is None:
-            self._work = Work()
-            motion = self._motion(mechanical, load)
-            self._memory.put(key, motion, motion.nbytes)
-            self._effort.add(motion, self._work.slow_share, declared=not terms)
-        remembering = tuple(t for t, kind in kinds if kind.drive)
+        motion = self._motion_of(mechanical, load)
+        remembering = tuple(t for t in terms if effects.get(t.kind).drive)
         if remembering:
             plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
             if key not in self._drives:
@@ -92,12 +93,70 @@ class Predictor:
             motion = motion + history_motion(self._drives[key], plan, remembering)
         return readings(self.experiment, motion, terms)
 
+    def changes(
+        self,
+        moved: Sequence[Terms],
+        base: Terms = (),
+        unmoved: Sequence[Terms] | None = None,
+    ) -> list[Floats | None]:
+        """(n, c) m, rad each: how much more the readings of some sets of terms show than those of `base`, to first order in
+        what differs, many at a fraction of a prediction each. None where whole predictions must tell: other loads, laws
+        that bend, records, branches, memory of the drives, and all that `Nearby.changes` leaves.
+
+        unmoved
+            For each of `moved`, terms of the same parts with nothing off: effects at their null.
+        """
+        keys = [(base, m) for m in moved]
+        out = [self._changes.get(k) for k in keys]
+        left = [i for i, m in enumerate(moved) if out[i] is None and _only_numbers(base, m)]
+        near = {i: n for i in left if (n := self._near(moved[i], unmoved[i] if unmoved else None))}
+        if not near:
+            return out
+        mechanical, load = _parts(base)
+        motion = self._motion_of(mechanical, load)
+        before = readings(self.experiment, motion, base)
+        told = Nearby(self.with_terms(base), self._plan_under(load), self.threads)
+        for i, change in zip(near, told.changes(list(near.values())), strict=True):
+            if change is not None and np.isfinite(change[np.isfinite(motion)]).all():
+                seen = readings(self.experiment, motion + change, moved[i]) - before
+                out[i] = self._changes.put(keys[i], seen, seen.nbytes)
+                self._effort.total += 1.0
+        self.solved += told.work.solved
+        if told.work.slow_share > FEW:
+            self._effort.add(motion, told.work.slow_share, declared=False)
+        return out
+
+    def _near(self, terms: Terms, unmoved: Terms | None) -> Near | None:
+        """The machine with some terms; None where it cannot have them."""
+        try:
+            other = self._described(terms)
+        except StiffmapError:
+            return None
+        return Near(other, None if unmoved is None else partial(self._described, unmoved))
+
+    def _described(self, terms: Terms) -> MachineDescription:
+        return apply_records(self.machine.description, _parts(terms)[0])
+
+    def changes_of_machines(self, others: Sequence[Near], terms: Terms = ()) -> list[Floats | None]:
+        """(n, c) m, rad each: how much more the readings of other machines show than those of this one, as `changes`;
+        `terms` of the measurement belong to all."""
+        motion = self._motion_of(*_parts(terms))
+        before = readings(self.experiment, motion, terms)
+        told = Nearby(self.machine, self._plan_under(_parts(terms)[1]), self.threads).changes(others)
+        return [
+            readings(self.experiment, motion + change, terms) - before
+            if change is not None and np.isfinite(change[np.isfinite(motion)]).all()
+            else None
+            for change in told
+        ]
+
     def beside(self, *, machine: Machine | None = None, rows: Mask | None = None) -> Predictor:
         """The same of another machine, or of some rows (n,); what was solved before counts for neither."""
         out = copy.copy(self)
         out.machine = machine or self.machine
         out.experiment = self.experiment if rows is None else self.experiment.rows(rows)
-        out._memory, out._effort, out._drives = Kept(), Effort(), {}
+        out._memory, out._changes, out._machines = Kept(), Kept(), Recent(MACHINES)
+        out._effort, out._drives = Effort(), {}
         return out
 
     @property
@@ -136,16 +195,28 @@ class Predictor:
 
     def with_terms(self, terms: Sequence[AppliedEffect]) -> Machine:
         """The machine with the mechanical terms added."""
-        mechanical = [t for t in terms if effects.get(t.kind).apply]
+        mechanical = _parts(terms)[0]
         if not mechanical:
             return self.machine
-        return Machine(apply_records(self.machine.description, mechanical), like=self.machine)
+        return self._machines.get(
+            mechanical,
+            lambda: Machine(self._described(mechanical), like=self.machine),
+        )
 
-    def _motion(self, mechanical: Terms, load: Terms) -> Floats:
+    def _motion_of(self, mechanical: Terms, load: Terms) -> Floats:
+        """(n, c) of the machine, remembered."""
+        motion = self._memory.get((mechanical, load))
+        if motion is None:
+            self._work = Work()
+            motion = at_records(self._plan_under(load), mechanical, self._branches)
+            self._memory.put((mechanical, load), motion, motion.nbytes)
+            self._effort.add(motion, self._work.slow_share, declared=not mechanical and not load)
+        return motion
+
+    def _plan_under(self, load: Terms) -> Experiment:
+        """The plan itself where nothing changes its wrenches: what it has counted is kept."""
         w = true_wrench(self.experiment, load)
-        # the plan itself where nothing changes it: what it has counted is kept
-        plan = self.experiment if w is self.experiment.wrench else replace(self.experiment, wrench=w)
-        return at_records(plan, mechanical, self._branches)
+        return self.experiment if w is self.experiment.wrench else replace(self.experiment, wrench=w)
 
     def _branches(self, plan: Experiment, terms: Terms) -> Floats:
         if not any(_has_branch(t) for t in terms):
@@ -184,6 +255,20 @@ def check_points(machine: Machine, experiment: Experiment) -> None:
                 f"{experiment.name}: machine {machine.name} has no point '{name}'; "
                 f"it has {', '.join(machine.points)} (a machine file names more with 'point')"
             )
+
+
+def _parts(terms: Sequence[AppliedEffect]) -> tuple[Terms, Terms]:
+    """The terms of the machine, and those of its loads."""
+    kinds = [(t, effects.get(t.kind)) for t in terms]
+    return tuple(t for t, kind in kinds if kind.apply), tuple(t for t, kind in kinds if kind.load)
+
+
+def _only_numbers(base: Terms, moved: Terms) -> bool:
+    """Whether the machine is another, under the same loads, and nothing depends on rows before or on their records."""
+    every = (*base, *moved)
+    rows = any(_has_branch(t) or effects.get(t.kind).drive for t in every) or records_of(every)
+    (machine, load), (other, same) = _parts(base), _parts(moved)
+    return machine != other and load == same and not rows
 
 
 def _has_branch(term: AppliedEffect) -> bool:

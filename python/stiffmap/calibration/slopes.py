@@ -1,0 +1,80 @@
+"""Slopes of the readings by many unknowns at once, one step each from the machine's own equilibria."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+
+from stiffmap.calibration.certificate import INSTRUMENT, SCALE, scaled
+from stiffmap.calibration.edit import edited
+from stiffmap.calibration.unknowns import Unknown
+from stiffmap.description import MachineDescription
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.prediction.nearby import Near
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.machine import Machine
+
+SMALL = 2e-4
+"""Step, of a standard uncertainty."""
+AT_ONCE = 64
+"""Unknowns that are told together."""
+Moves = Mapping[tuple[str, str], float]
+
+
+def moves_of(pairs: Iterable[tuple[Unknown, float]]) -> dict[tuple[str, str], float]:
+    """By how much each number is off, of unknowns at values in standard uncertainties."""
+    moves: dict[tuple[str, str], float] = {}
+    for unknown, value in pairs:
+        for place, weight in unknown.moves:
+            moves[place] = moves.get(place, 0.0) + weight * unknown.u * value
+    return moves
+
+
+def built(predictor: Predictor, moves: Moves) -> Machine:
+    """The machine with its own numbers off; the instrument's are left out."""
+    return Machine(_edited(predictor.machine.description, moves), like=predictor.machine)
+
+
+def _edited(description: MachineDescription, moves: Moves) -> MachineDescription:
+    own = {(at, what): by for (at, what), by in moves.items() if at != INSTRUMENT}
+    return edited(description, own) if own else description
+
+
+class Slopes:
+    """Changes of the readings per standard uncertainty at some values (p,).
+
+    Those of a set-up and of the instrument, and what one step does not lead to, are for whole predictions.
+    """
+
+    def __init__(self, predictor: Predictor, unknowns: Sequence[Unknown], values: Floats) -> None:
+        self._predictor, self._unknowns = predictor, unknowns
+        pairs = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
+        self._here = moves_of(pairs)
+        self._scale = self._here.pop((INSTRUMENT, SCALE), 0.0)
+        apart = any(u.setup and not u.of_instrument for u, _ in pairs)  # a machine for each set-up
+        plain = [k for k, u in enumerate(unknowns) if not u.setup and not u.of_instrument]
+        self._wanted = [] if apart else plain
+        self._told: dict[int, Floats | None] = {}
+
+    def of(self, k: int) -> Floats | None:
+        """(n, c) of unknown k; None where whole predictions must tell."""
+        if k not in self._told and k in self._wanted:
+            first = self._wanted.index(k)
+            self._tell(self._wanted[first : first + AT_ONCE])
+        return self._told.pop(k, None)
+
+    def _tell(self, some: Sequence[int]) -> None:
+        base = self._predictor
+        if any(at != INSTRUMENT for at, _ in self._here):
+            base = base.beside(machine=built(base, self._here))
+        terms = (scaled(self._predictor.machine.description, self._scale),) if self._scale else ()
+        near = [
+            Near(self._moved(self._unknowns[k], SMALL), partial(self._moved, self._unknowns[k], 0.0))
+            for k in some
+        ]
+        for k, change in zip(some, base.changes_of_machines(near, terms), strict=True):
+            self._told[k] = None if change is None else change / SMALL
+
+    def _moved(self, u: Unknown, by: float) -> MachineDescription:
+        more = {place: self._here.get(place, 0.0) + weight * u.u * by for place, weight in u.moves}
+        return _edited(self._predictor.machine.description, {**self._here, **more})
