@@ -11,20 +11,21 @@ from stiffmap.description.machine import MachineDescription
 Elements = tuple[Element, ...]
 
 
-def alike(one: MachineDescription, other: MachineDescription) -> bool:
+def alike(one: MachineDescription, other: MachineDescription, *, heavy: bool) -> bool:
     """Whether two machines differ in numbers of smooth laws, in errors of geometry and in masses only.
 
     Where branches share a load behind something that yields, the geometry between must be the same: the step takes
-    their ends to be together already.
+    their ends to be together already. Where they are `heavy` all must be: it leaves out how their weight turns
+    with what gives way between.
     """
     if _whole(one) != _whole(other) or len(one.legs) != len(other.legs):
         return False
     shared = len(one.legs) > 1 and any(isinstance(e, (Spring, Joint)) for e in one.base)
     pairs = [(a.elements, b.elements) for a, b in zip(one.legs, other.legs, strict=True)]
     return (
-        _sequence(one.base, other.base, still=False)
-        and _sequence(one.platform, other.platform, still=False)
-        and all(_sequence(a, b, still=shared) for a, b in pairs)
+        _sequence(one.base, other.base, heavy)
+        and _sequence(one.platform, other.platform, heavy)
+        and all((_still if shared else _sequence)(a, b, heavy) for a, b in pairs)
     )
 
 
@@ -32,24 +33,36 @@ def _whole(d: MachineDescription) -> tuple[object, ...]:
     return d.home, d.search_home, d.task, d.gravity, d.external_springs
 
 
-def _sequence(one: Elements, other: Elements, *, still: bool) -> bool:
-    """`still`: the same geometry, errors included."""
+def _sequence(one: Elements, other: Elements, heavy: bool) -> bool:
     if one is other:
         return True
-    a, b = (e if still else _solid(e) for e in (one, other))
-    return len(a) == len(b) and all(_element(x, y, still) for x, y in zip(a, b, strict=True))
+    a, b = _solid(one), _solid(other)
+    return len(a) == len(b) and all(_element(x, y, heavy) for x, y in zip(a, b, strict=True))
+
+
+def _still(one: Elements, other: Elements, heavy: bool) -> bool:
+    """The same geometry, errors included."""
+    if one is other or one == other:
+        return True
+    if heavy or len(one) != len(other):
+        return False
+    return all(
+        _element(x, y, heavy)
+        and not (isinstance(x, Joint) and isinstance(y, Joint) and _frame(x) != _frame(y))
+        for x, y in zip(one, other, strict=True)
+    )
 
 
 def _solid(elements: Elements) -> Elements:
     return tuple(e for e in elements if not isinstance(e, (Offset, Point)))
 
 
-def _element(one: Element, other: Element, still: bool) -> bool:
+def _element(one: Element, other: Element, heavy: bool) -> bool:
     if one is other:
         return True
     match one, other:
         case Joint(), Joint():
-            return _joint(one, other) and not (still and _frame(one) != _frame(other))
+            return _joint(one, other)
         case Spring(), Spring():
             same = (one.laws, one.stroke) == (other.laws, other.stroke)
             return same and _rigid(one) == _rigid(other)
@@ -57,9 +70,8 @@ def _element(one: Element, other: Element, still: bool) -> bool:
             return (one.mass > 0.0) == (other.mass > 0.0)
         case Block(), Block():
             pairs = zip(one.branches, other.branches, strict=False)
-            return len(one.branches) == len(other.branches) and all(
-                _sequence(a.elements, b.elements, still=True) for a, b in pairs
-            )
+            same = len(one.branches) == len(other.branches)
+            return same and all(_still(a.elements, b.elements, heavy) for a, b in pairs)
     return one == other
 
 

@@ -1,0 +1,156 @@
+"""Slopes of the readings, told for many candidates at once, against differences of whole predictions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.description import Point
+from stiffmap.diagnosis.candidates.candidates import Candidate, candidates
+from stiffmap.diagnosis.candidates.slopes import Slopes, step_of
+from stiffmap.effects import Parameter
+from stiffmap.experiment import Experiment, Predictor, random_plan
+from stiffmap.experiment.experiment import Floats
+
+DOWN = (0.0, 0.0, -9.81)
+RELATIVE, ABSOLUTE = 1e-5, 2e-10
+"""m or rad per scale of a parameter: far below what any instrument tells of it."""
+SOME = 9
+
+
+def plan_for(machine: sm.Machine, quantity: str, gravity: tuple[float, float, float] | None) -> Experiment:
+    loads = {"loads": 2} if quantity == "deflection" else {}
+    return replace(random_plan(machine, quantity, poses=5, seed=2, **loads), gravity=gravity)
+
+
+def told(predictor: Predictor, every: int = 1) -> Iterator[tuple[Candidate, Parameter, Floats]]:
+    """Candidates and parameters whose slopes are told without whole predictions."""
+    tried = candidates(predictor.machine.description, predictor.experiment)
+    slopes = Slopes(predictor, tried)
+    columns = [(c, p, slopes.of(c, p)) for c in tried for p in c.linear]
+    found = [(c, p, s) for c, p, s in columns if s is not None]
+    assert found
+    yield from found[::every]
+
+
+def moved(candidate: Candidate, p: Parameter, share: float) -> tuple[sm.AppliedEffect, ...]:
+    values = [float(q.null or 0.0) + (share * p.scale if q is p else 0.0) for q in candidate.parameters]
+    return (candidate.term(values),)
+
+
+def fourth(predictor: Predictor, candidate: Candidate, p: Parameter) -> Floats:
+    """Central difference of whole predictions, per scale."""
+    h = 0.3 if step_of(p) > 1e-3 * p.scale else 0.02
+    far, up, down, back = (predictor(moved(candidate, p, s * h)) for s in (2, 1, -1, -2))
+    return np.asarray((8 * (up - down) - (far - back)) / (12 * h))
+
+
+def compare(predictor: Predictor, columns: Iterator[tuple[Candidate, Parameter, Floats]]) -> None:
+    for candidate, p, slope in columns:
+        true = fourth(predictor, candidate, p)
+        off = np.abs(slope - true).max()
+        assert off < RELATIVE * np.abs(true).max() + ABSOLUTE, (str(candidate), p.name)
+
+
+CASES = [
+    ("linear-delta", "deflection", None),
+    ("orthoglide-revised", "position", DOWN),
+    ("ur10", "deflection", DOWN),
+    ("travelling-column", "position", None),
+]
+
+
+@pytest.mark.parametrize(("name", "quantity", "gravity"), CASES)
+def test_some_slopes(name: str, quantity: str, gravity: tuple[float, float, float] | None) -> None:
+    machine = sm.load_machine(name)
+    predictor = Predictor(machine, plan_for(machine, quantity, gravity))
+    compare(predictor, told(predictor, SOME))
+
+
+@pytest.mark.parametrize("gravity", [None, DOWN])
+@pytest.mark.parametrize("quantity", ["deflection", "position"])
+@pytest.mark.parametrize("name", ["linear-delta", "rotary-delta", "orthoglide-revised", "ur10", "hexapod"])
+def test_all_slopes(name: str, quantity: str, gravity: tuple[float, float, float] | None) -> None:
+    machine = sm.load_machine(name)
+    predictor = Predictor(machine, plan_for(machine, quantity, gravity))
+    compare(predictor, told(predictor))
+
+
+@pytest.mark.parametrize("name", ["ur10", "linear-delta"])
+def test_order(name: str) -> None:
+    """One step leaves what is quadratic in the move; of moves in both directions what is of third order."""
+    machine = sm.load_machine(name)
+    predictor = Predictor(machine, plan_for(machine, "deflection", DOWN))
+    tried = candidates(machine.description, predictor.experiment)
+    candidate = next(c for c in tried if c.kind == "compliance" and len(c.legs) <= 1)
+    (p,) = candidate.linear
+    true = fourth(predictor, candidate, p)
+
+    def off(share: float) -> tuple[float, float]:
+        up, down = predictor.changes([moved(candidate, p, s) for s in (share, -share)])
+        assert up is not None and down is not None
+        errors = up / share - true, (up - down) / (2 * share) - true
+        return float(np.abs(errors[0]).max()), float(np.abs(errors[1]).max())
+
+    (one, central), (half, quarter) = off(0.2), off(0.1)
+    assert np.log2(one / half) == pytest.approx(1.0, abs=0.1)
+    assert np.log2(central / quarter) == pytest.approx(2.0, abs=0.2)
+
+
+def test_around_other_effects() -> None:
+    """A fit's slopes are taken where the fit stands, under loads that are not as noted."""
+    machine = sm.load_machine("orthoglide-revised")
+    predictor = Predictor(machine, plan_for(machine, "deflection", None))
+    tried = candidates(machine.description, predictor.experiment)
+    length = next(c for c in tried if c.kind == "length" and c.element == "bar")
+    soft = next(c for c in tried if c.kind == "compliance" and c.element == "foot")
+    gain = next(c for c in tried if c.kind == "load_gain")
+    base = (length.term([2e-4]), soft.term([1.3]), gain.term([1.05] * len(gain.parameters)))
+    (change,) = predictor.changes([(base[0], soft.term([1.3 + 1e-6]), base[2])], base)
+    assert change is not None
+    whole = predictor((base[0], soft.term([1.301]), base[2])) - predictor(
+        (base[0], soft.term([1.299]), base[2])
+    )
+    assert change / 1e-6 == pytest.approx(whole / 2e-3, rel=1e-5, abs=1e-10)
+
+
+def test_another_point_of_the_platform() -> None:
+    d = sm.load_machine("linear-delta").description
+    machine = sm.Machine(replace(d, platform=(*d.platform, Point("probe", (0.03, -0.02, 0.05)))))
+    for load_point, point in (("tcp", "platform.probe"), ("platform.probe", "tcp")):
+        plan = replace(plan_for(machine, "deflection", None), load_point=load_point, point=point)
+        predictor = Predictor(machine, plan)
+        compare(predictor, told(predictor, 3 * SOME))
+
+
+def kinds_told(predictor: Predictor, kinds: Sequence[str], machine: sm.Machine) -> set[str]:
+    tried = [c for c in candidates(machine.description, predictor.experiment) if c.kind in kinds]
+    assert {c.kind for c in tried} == set(kinds)
+    slopes = Slopes(predictor, tried)
+    return {c.kind for c in tried for p in c.linear if slopes.of(c, p) is not None}
+
+
+def test_what_needs_whole_predictions() -> None:
+    """Laws that only grow, geometry of branches that share a load, and gravity: their steps are large on purpose."""
+    machine = sm.load_machine("linear-delta")
+    predictor = Predictor(machine, plan_for(machine, "deflection", None))
+    whole = ("dead_zone", "hardening", "friction", "joint_compliance", "parallelogram_width", "gravity")
+    assert not kinds_told(predictor, whole, machine)
+    assert kinds_told(predictor, ("compliance", "zero_offset"), machine) == {"compliance", "zero_offset"}
+
+
+def test_plans_that_read_more() -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    plan = plan_for(machine, "deflection", None)
+    n = len(plan)
+    for other in (
+        replace(plan, gravity_of=np.tile(DOWN, (n, 1))),
+        replace(plan, loop=replace(plan.loop, force_against="platform.tool"))
+        if "platform.tool" in machine.points
+        else replace(plan, gravity_of=np.tile(DOWN, (n, 1))),
+    ):
+        assert not kinds_told(Predictor(machine, other), ("compliance", "zero_offset"), machine)
