@@ -5,6 +5,7 @@
 #include <initializer_list>
 
 #include "closing.hpp"
+#include "hanging.hpp"
 #include "last_attempt.hpp"
 #include "load_path.hpp"
 #include "newton.hpp"
@@ -62,6 +63,7 @@ struct Block {
   M never = {};  ///< lanes out of reach
   M closed = {};
   M unstable = {}, ended = {}, unverified = {}, nowhere = {};
+  M stuck = {};  ///< in equilibrium, but not where spins come to rest
 
   std::int64_t place(int lane) const { return first + (lane < count ? lane : count - 1); }
   std::int64_t pose(int lane) const { return in.index ? in.index[place(lane)] : place(lane); }
@@ -255,12 +257,27 @@ struct Block {
     M done = newton.solve(usable, P.starts_linear, iterations, steps);
     if (in.patience == Patience::path && !P.starts_linear && !P.deficient && any(usable & ~done))
       done |= follow(usable & ~done, newton, iterations, steps);
+    if (P.hanging && e.heavy) return hang(done, newton, iterations, steps);
     V K[6][6];
     newton.dense(newton.answer.K, K);
     write(done, newton, K, newton.answer.compliance, iterations, steps);
     if (in.perturbed_count == 0) return;
     newton.linearize();  // lanes that settled early have lost their factors
     vary(done & ~unstable & ~newton.serial.play.lanes, newton, newton.answer.compliance);
+  }
+
+  /// What weights turn is let go.
+  [[gnu::noinline]] void hang(M held, Newton& newton, V iterations, V steps) {
+    Elimination e = {*P.hanging, s, newton.whole_gravity, splat(0), {}};
+    for (int i = 0; i < 6; ++i) e.scale[i] = newton.e.scale[i];
+    e.heavy = true;
+    Newton loose{*P.hanging, in, s, e, load, newton.whole_gravity};
+    loose.turning = newton.turning;
+    const M done = Hanging{loose, newton}.settle(held & ~unstable, iterations);
+    stuck = held & ~done;
+    V K[6][6];
+    loose.dense(loose.answer.K, K);
+    write(done, loose, K, loose.answer.compliance, iterations, steps);
   }
 
   M follow(M lanes, Newton& newton, V& iterations, V& steps) {
@@ -291,6 +308,7 @@ struct Block {
   std::uint8_t left(int lane) const {
     if (nowhere[lane]) return pose_nowhere;
     if (ended[lane]) return pose_ended;
+    if (stuck[lane]) return pose_left;
     if (in.patience == Patience::path) return pose_left;
     if (closed[lane]) return pose_heavy;
     return in.patience == Patience::leaps ? pose_left : pose_slow;
@@ -383,7 +401,7 @@ struct Block {
     const M lock = locked(P.near_lock), stepped = steps > 0.0;
     for (int i = 0; i < count; ++i)
       if (done[i])
-        out.flags[pose(i)] = P.flag_always | (lock[i] & P.flag_lock) | (high[i] & P.flag_force) |
+        out.flags[pose(i)] = newton.P.flag_always | (lock[i] & P.flag_lock) | (high[i] & P.flag_force) |
                              (range[i] & P.flag_range) | (limit[i] & P.flag_limit) | (stepped[i] & P.flag_stepped) |
                              (unverified[i] & P.flag_unverified);
     if (!out.leg_wrench || P.legs_op < 0) return;

@@ -148,6 +148,15 @@ struct PlaceProgram {
   Constant nominal, actual;
 };
 
+/// A rod's free turn about the line between its joints: the coordinate that is held and the one that turns back, both
+/// about that line, in the order of the chain.
+struct SpinProgram {
+  std::int32_t chain, first, last;  ///< operations of the two
+  std::int32_t held;                ///< the coordinate that is held
+  std::int32_t heavy;               ///< it moves the centre of a body: under gravity it hangs
+};
+inline constexpr int most_spins = 24;
+
 struct Program {
   const Op* ops;
   const ChainProgram* chains;
@@ -165,15 +174,17 @@ struct Program {
   const TipSpringProgram* springs;  ///< external ones
   const PlaceProgram* places;       ///< named points; the first is the tip
   const std::int32_t* place_steps;
-  const std::int32_t* serial;  ///< arm of joints alone: its joints that yield and its bodies, from the base
+  const SpinProgram* spins;         ///< those that are held; none where weights turn none of them
+  const Program* hanging;           ///< the same machine, spins that weights turn let go; null where there are none
+  const std::int32_t* serial;       ///< arm of joints alone: its joints that yield and its bodies, from the base
   const std::int32_t* unknowns;
   const std::int32_t* envelope;  ///< per unknown: the first one of its leg that shares an equation with one up to it
   const PlanarLeg* planar;       ///< one per leg, or null: the closure starts from the grid
   const ArmLeg* arm;             ///< of the only leg, or null
   const double* grid;            ///< closure starts: nodes x row of unknowns of all legs, NaN where unreachable
   std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count,
-      spring_count, serial_count, serial_joints;  ///< serial_joints 0: no such arm
-  std::int32_t root, legs_op;                     ///< root chain; the legs' block operation
+      spring_count, spin_count, serial_count, serial_joints;  ///< serial_joints 0: no such arm
+  std::int32_t root, legs_op;                                 ///< root chain; the legs' block operation
   std::int32_t joint_slots, stiff_slots, group_slots, stroke_count;
   std::int32_t closes;         ///< 1: leg by leg, 2: all at once (`legs` is then the whole machine)
   std::int32_t task[6];        ///< commanded pose components, rotations about the axes of the commanded frame
@@ -252,7 +263,8 @@ inline constexpr std::int64_t program_layout =
     sizeof(Program) + 31 * sizeof(KernelInput) + 37 * sizeof(KernelOutput) + 41 * sizeof(Op) +
     43 * sizeof(CoordinateProgram) + 47 * sizeof(DriveProgram) + 53 * sizeof(LawProgram) + 59 * sizeof(ClosureTerm) +
     71 * sizeof(ReachProgram) + 73 * sizeof(TipSpringProgram) + 67 * sizeof(ChainProgram) + 61 * sizeof(PlanarLeg) +
-    71 * sizeof(StrokeProgram) + 79 * sizeof(ArmLeg) + 83 * sizeof(PlaceProgram) + 89 * sizeof(FurtherLoad);
+    71 * sizeof(StrokeProgram) + 79 * sizeof(ArmLeg) + 83 * sizeof(PlaceProgram) + 89 * sizeof(FurtherLoad) +
+    97 * sizeof(SpinProgram);
 
 /// The one symbol that each level exports. Poses begin .. end-1; `scratch` of scratch_size() bytes.
 struct KernelTable {

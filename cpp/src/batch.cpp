@@ -151,7 +151,8 @@ bool takes(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const
   if (first.node != reading.node || first.offset != reading.offset) return false;
   for (const LoadPoint& load : in.load_points)
     if (!on_tip(m, plan.program(), place_of(m, load))) return false;
-  return !plan.heavy_spins() || in.gravity.isZero(0);
+  if (!plan.heavy_spins() || in.gravity.isZero(0)) return true;
+  return plan.program().hanging && in.variants.empty() && in.load_points.size() == 1;
 }
 
 KernelInput kernel_input(const BatchInput& in, const SolveOptions& options) {
@@ -196,7 +197,11 @@ class FastBatch {
         scratch_(at(std::max(1, threads))) {
     if (out.indeterminate) {
       open_.reserve(m.coordinates.size());
-      for (const Coordinate& c : m.coordinates) open_.push_back(c.locked && c.role == Role::passive);
+      const bool heavy = !in.gravity.isZero(0);
+      for (Index j = 0; j < m.size(); ++j) {
+        const Coordinate& c = m.coordinates[at(j)];
+        open_.push_back(c.locked && c.role == Role::passive && !(heavy && plan.hangs(j)));
+      }
     }
     for (std::size_t k = 1; k < in.read_points.size(); ++k) reads_.push_back(i32(in.read_points[k]));
     for (std::size_t k = 1; k < in.load_points.size(); ++k)

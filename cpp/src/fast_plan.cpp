@@ -8,6 +8,7 @@
 #include "plan/chains.hpp"
 #include "plan/closure.hpp"
 #include "plan/places.hpp"
+#include "plan/spins.hpp"
 #include "stiffmap/spins.hpp"
 
 namespace stiffmap {
@@ -193,6 +194,18 @@ void link(const Mechanism& m, FastPlanData& d) {
   for (const Op& op : d.ops) p.parallel |= op.kind == OpKind::block && op.count > 1;
 }
 
+/// The program of what hangs: all numbers are those of `d.program`, which is complete.
+void link_hanging(FastPlanData& d) {
+  Program& p = d.program;
+  p.spins = d.spins.data();
+  p.spin_count = i32(d.spins.size());
+  d.hanging = p;
+  d.hanging.ops = d.hanging_ops.data();
+  if (std::all_of(d.spins.begin(), d.spins.end(), [](const SpinProgram& s) { return s.heavy; }))
+    d.hanging.flag_always &= ~flag::free_spin;
+  p.hanging = &d.hanging;
+}
+
 }  // namespace
 
 FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int grid_nodes)
@@ -215,7 +228,8 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   if (data_->program.legs_op < 0) missing_ = "no legs";
   if (missing_.empty() && m.beside_home.size() > 0) missing_ = "hinges that do not lock at home";
   if (!missing_.empty()) return;
-  heavy_spins_ = Spins(m).heavy();
+  const Spins spins(m);
+  heavy_spins_ = spins.heavy();
   fill_tables(m, chains, *data_);
   compile_places(m, chains, *data_);
   const bool box = (high - low).minCoeff() >= 0 && high.allFinite();
@@ -232,6 +246,7 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   p.open_task = m.task != full_task;
   p.closes = leg_by_leg && (box || p.planar) ? 1 : whole ? 2 : 0;
   if (p.closes && !p.planar) place_grid(m, low, high, grid_nodes, *data_);
+  if (heavy_spins_ && !p.deficient && let_spins_hang(m, spins, *data_)) link_hanging(*data_);
 }
 
 bool FastPlan::nearest_start(const Mechanism& m, const Vec3& position, VecX& x, Pose& at) const {
@@ -251,6 +266,11 @@ bool FastPlan::nearest_start(const Mechanism& m, const Vec3& position, VecX& x, 
   const double* g = p.grid + node * static_cast<std::size_t>(p.grid_row);
   for (std::size_t j = 0; j < data_->unknowns.size(); ++j) x[data_->unknowns[j]] = g[j];
   return x.allFinite();
+}
+
+bool FastPlan::hangs(Index coordinate) const {
+  const auto here = [coordinate](const SpinProgram& s) { return s.heavy && s.held == coordinate; };
+  return std::any_of(data_->spins.begin(), data_->spins.end(), here);
 }
 
 FastPlan::~FastPlan() = default;

@@ -28,10 +28,14 @@ Spins::Spins(const Mechanism& m) : m_(m), force_(VecX::Zero(m.size())), closure_
   factorize_at(m, p, State(m), eq);
   move_each(eq);
   MatX J(6, m.size());
+  moves_a_body_.assign(held_.size(), false);
   for (const NodeBody& b : m.bodies) {
     if (b.mass == 0) continue;
     eq.lin.point_jacobian(m, b.node, b.com, J);
-    off_axis_ = off_axis_ || (J.topRows(3) * motion_).cwiseAbs().maxCoeff() > centred * m.length;
+    const MatX moved = J.topRows(3) * motion_;
+    for (std::size_t k = 0; k < held_.size(); ++k)
+      if (moved.col(static_cast<Index>(k)).cwiseAbs().maxCoeff() > centred * m.length)
+        off_axis_ = moves_a_body_[k] = true;
   }
 }
 

@@ -25,8 +25,10 @@ class FastPlan {
 
   bool available() const { return missing_.empty(); }
   const std::string& missing() const { return missing_; }
-  /// Under gravity the reference path turns the spins (theory C10).
+  /// Under gravity weights turn spins (theory C10); the kernels can where the program has one for what hangs.
   bool heavy_spins() const { return heavy_spins_; }
+  /// This held spin is one of them, and the kernels turn it.
+  bool hangs(Index coordinate) const;
   const Program& program() const;
 
   /// Coordinates of the nearest node of the grid of closure starts and the tip pose there; false

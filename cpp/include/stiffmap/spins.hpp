@@ -13,6 +13,11 @@ class Spins {
 
   /// The weight of a body turns a spin.
   bool heavy() const { return off_axis_; }
+  /// Before any pose: the coordinates that are held, how all others move by a unit of each (columns) at home, and
+  /// whether that moves the centre of a body.
+  const std::vector<Index>& held() const { return held_; }
+  const MatX& motion() const { return motion_; }
+  const std::vector<bool>& moves_a_body() const { return moves_a_body_; }
   /// Some load of `p` may turn a spin.
   bool loaded(const Problem& p) const;
   /// From the equilibrium with the spins held to the one where each that a load turns has come to rest in
@@ -30,6 +35,7 @@ class Spins {
   const Mechanism& m_;
   std::vector<Index> held_, turning_;  ///< coordinates; turning: a load decides
   bool off_axis_ = false;              ///< a spin moves the centre of a body
+  std::vector<bool> moves_a_body_;     ///< which
   MatX motion_, wrench_;               ///< per held spin: of all coordinates and loop wrenches, by a unit of it
   MatX curve_;                         ///< derivative of the holding moments of those that turn
   VecX moment_;                        ///< that holds each of them

@@ -35,6 +35,9 @@ struct FastPlanData {
   std::vector<TipSpringProgram> springs;
   std::vector<PlaceProgram> places;
   std::vector<std::int32_t> place_steps;
+  std::vector<SpinProgram> spins;
+  std::vector<Op> hanging_ops;  ///< those of `hanging`
+  Program hanging{};            ///< spins that weights turn let go
   std::shared_ptr<const std::vector<double>> grid;
 };
 
