@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Rods whose centre of mass is off the line of their joints: from the equilibrium with their spins held to where they
-// hang (theory C10, docs/fast_path.md F20). Newton with the spins as joints of their chains; by how much one turns at
+// hang (theory C10, docs/fast_path.md F21). Newton with the spins as joints of their chains; by how much one turns at
 // once is a pendulum's to say.
 #pragma once
 
-#include "newton.hpp"
+#include "let_go.hpp"
 
 namespace stiffmap::kernel {
 
@@ -21,10 +21,16 @@ struct Hanging {
     held.put_load(splat(1), splat(1));
     least = noise();
     for (int i = 0; i < P.spin_count; ++i) s.kept[first(i).coordinate] = s.z[first(i).coordinate];
-    V weight[most_spins];
-    lanes &= swing(lanes, weight);
+    V weight[most_spins], held_pivots[most_spins];
+    for (int i = 0; i < P.spin_count; ++i) {
+      V angle;
+      weight[i] = pendulum(i, angle);
+      if (P.spins[i].heavy) turn(i, lanes, angle);
+    }
     close(lanes, iterations);
+    for (int i = 0; i < P.spin_count; ++i) held_pivots[i] = pivots(held.P, i);
     M active = lanes, done{};
+    const bool alone = LetGo::possible(held.P);
     V previous = splat(1), turned = splat(1), before[6][6];
     for (auto& row : before)
       for (V& c : row) c = splat(0);
@@ -49,7 +55,7 @@ struct Hanging {
       const M still = (largest < small_turn) | ((moment < least) & (largest > 0.1 * turned));
       // Round-off decides how far a rod turns by a load where it hardly resists: then no two compliances are the same.
       const V change = changed(m, before);
-      M settled = near & still & (change < same) & (n.e.lowest > definite) &
+      M settled = near & still & (alone ? ~M{} : change < same) & (n.e.lowest > definite) &
                   ((rest < Newton::small) | ((rest < n.in.tolerance) & (previous < n.in.tolerance)));
       if (P.hardens && any(settled)) settled &= n.laws.hardening_change() < Newton::same_slope;
       if (any(settled)) n.take(settled, m);
@@ -60,9 +66,11 @@ struct Hanging {
       turned = select(near, largest, splat(1));
       if (any(far)) swing_on(far, iterations);
     }
+    done &= clear(alone, held_pivots);
     unwind();
+    if (alone && any(done)) done &= answer(done, iterations);
     n.settle();
-    return done & light_rest();
+    return done;
   }
 
  private:
@@ -71,10 +79,11 @@ struct Hanging {
   static constexpr double small_turn = 1e-9;   ///< rad
   static constexpr double largest_step = 0.2;  ///< of the length
   static constexpr double definite = 1e-15;    ///< least pivot
-  static constexpr double certain = 2e3;       ///< weight times lever of what turns for sure, of `least`
-  static constexpr double near_by = 0.05;      ///< of the length: too near for a direction
-  static constexpr double same = 3e-11;        ///< of a compliance, from one linearisation at rest to the next
-  static constexpr double round_off = 1e-11;   ///< as Spins
+  static constexpr double certain =
+      1.2e3;                               ///< least stiffness of what turns for sure, of `least`; the reference's: 1e3
+  static constexpr double near_by = 0.05;  ///< of the length: too near for a direction
+  static constexpr double same = 3e-11;    ///< of a compliance, from one linearisation at rest to the next
+  static constexpr double round_off = 1e-11;  ///< as Spins
   static constexpr double pi = 3.14159265358979323846;
 
   const Op& first(int i) const { return P.ops[P.spins[i].first]; }
@@ -103,42 +112,41 @@ struct Hanging {
     s.z[last(i).coordinate] -= select(along > 0.0, step, -step);
   }
 
-  /// Turns each rod as if it were rigid until its centre is below the line of its joints; `weight` of each: its bodies'
-  /// weight across the line times their lever. Lanes in which the reference turns them too.
-  M swing(M lanes, V (&weight)[most_spins]) {
-    M clear = ~M{};
-    for (int i = 0; i < P.spin_count; ++i) {
-      const JointSlot &a = slot(first(i)), &b = slot(last(i));
-      V3 lever{};
-      for (int k = P.spins[i].first; k < P.spins[i].last; ++k) {
-        const Op& op = P.ops[k];
-        if (op.kind == OpKind::load) lever = lever + splat(op.mass) * (slot(op).o + slot(op).w - b.o);
-      }
-      const V3 line = b.o - a.o;
-      const V apart = root(dot(line, line));
-      const M known = apart > near_by * P.length;
-      const V3 along = select(known, (1.0 / select(known, apart, splat(1))) * line, a.w);
-      const V3 across = lever - dot(lever, along) * along, pull = n.whole_gravity - dot(n.whole_gravity, along) * along;
-      const V cosine = dot(across, pull), sine = dot(along, cross(across, pull));
-      weight[i] = root(cosine * cosine + sine * sine);
-      if (!P.spins[i].heavy) continue;
-      clear &= weight[i] > certain * least;
-      const V angle = arc_tangent(sine, cosine);
-      turn(i, lanes, select(dot(a.w, along) > 0.0, angle, -angle));
+  /// Of a rigid rod: its bodies' weight across the line of its joints times their lever, and by how much the first
+  /// coordinate turns until they are below it.
+  V pendulum(int i, V& angle) const {
+    const JointSlot &a = slot(first(i)), &b = slot(last(i));
+    V3 lever{};
+    for (int k = P.spins[i].first; k < P.spins[i].last; ++k) {
+      const Op& op = P.ops[k];
+      if (op.kind == OpKind::load) lever = lever + splat(op.mass) * (slot(op).o + slot(op).w - b.o);
     }
-    return clear;
+    const V3 line = b.o - a.o;
+    const V apart = root(dot(line, line));
+    const M known = apart > near_by * P.length;
+    const V3 along = select(known, (1.0 / select(known, apart, splat(1))) * line, a.w);
+    const V3 across = lever - dot(lever, along) * along, pull = n.whole_gravity - dot(n.whole_gravity, along) * along;
+    const V cosine = dot(across, pull), sine = dot(along, cross(across, pull));
+    const V down = arc_tangent(sine, cosine);
+    angle = select(dot(a.w, along) > 0.0, down, -down);
+    return root(cosine * cosine + sine * sine);
   }
 
   /// Lanes in which a step leads to the top: with its ends held the rod has less than no stiffness, and of the pivots
   /// of its chain an odd number is negative.
-  M uphill(int i) const {
-    V sign = splat(1);
-    const ChainProgram& chain = P.chains[P.spins[i].chain];
+  M uphill(int i) const { return pivots(P, i) < 0.0; }
+
+  /// Product of the pivots of a spin's chain.
+  V pivots(const Program& of, int i) const {
+    V product = splat(1);
+    const ChainProgram& chain = of.chains[of.spins[i].chain];
     for (int k = chain.first; k < chain.first + chain.count; ++k) {
-      const Op& op = P.ops[k];
-      if (op.kind <= OpKind::prismatic && op.eliminated) sign = select(slot(op).inverse < 0.0, -sign, sign);
+      const Op& op = of.ops[k];
+      if (op.kind <= OpKind::prismatic && op.eliminated) product *= slot(op).inverse;
+      if (op.kind == OpKind::spring && k > chain.first_stiff)
+        for (int q = 0; q < 6; ++q) product *= s.stiff[op.slot].inverse[q];
     }
-    return sign < 0.0;
+    return 1.0 / product;
   }
 
   /// The linearisation with its step and inverse.
@@ -157,6 +165,23 @@ struct Hanging {
     V m[6][6];
     step(held, m, lanes, iterations);
     held.move(lanes);
+  }
+
+  /// What the held machine has there, less what the spins take.
+  [[gnu::noinline]] M answer(M lanes, V& iterations) {
+    V m[6][6];
+    step(held, m, lanes, iterations);
+    keep_wrenches(held.e, lanes);
+    Sym6 K = held.K;
+    M sound = ~M{};
+    for (int i = 0; i < P.spin_count; ++i)
+      if (P.spins[i].heavy) sound &= LetGo(held).soften(i, K) > certain * least;
+    held.dense(K, m);
+    held.e.lowest = splat(1e300);
+    invert(held.e, m);
+    sound &= held.e.lowest > held.pivot_floor;
+    n.answer.take(lanes & sound, K, m);
+    return sound;
   }
 
   /// Turns the rods alone, by as much as a pendulum needs that is t = tan(angle) from rest or from the top.
@@ -192,11 +217,15 @@ struct Hanging {
     }
   }
 
-  /// Lanes in which no load turns one of the other spins.
-  M light_rest() const {
+  /// Lanes in which the reference, too, takes the same spins for turned by weights: what their stiffness is at rest, of
+  /// the others the moment.
+  M clear(bool known, const V (&held_pivots)[most_spins]) const {
     M out = ~M{};
     for (int i = 0; i < P.spin_count; ++i) {
-      if (P.spins[i].heavy) continue;
+      if (P.spins[i].heavy) {
+        if (!known) out &= pivots(P, i) > certain * least * held_pivots[i];
+        continue;
+      }
       const Op& its = first(i).coordinate == P.spins[i].held ? first(i) : last(i);
       out &= 2.0 * absolute(dot(slot(its).w, slot(its).F.b)) < least;
     }

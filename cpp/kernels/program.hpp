@@ -174,9 +174,9 @@ struct Program {
   const TipSpringProgram* springs;  ///< external ones
   const PlaceProgram* places;       ///< named points; the first is the tip
   const std::int32_t* place_steps;
-  const SpinProgram* spins;         ///< those that are held; none where weights turn none of them
-  const Program* hanging;           ///< the same machine, spins that weights turn let go; null where there are none
-  const std::int32_t* serial;       ///< arm of joints alone: its joints that yield and its bodies, from the base
+  const SpinProgram* spins;    ///< those that are held; none where weights turn none of them
+  const Program* hanging;      ///< the same machine, spins that weights turn let go; null where there are none
+  const std::int32_t* serial;  ///< arm of joints alone: its joints that yield and its bodies, from the base
   const std::int32_t* unknowns;
   const std::int32_t* envelope;  ///< per unknown: the first one of its leg that shares an equation with one up to it
   const PlanarLeg* planar;       ///< one per leg, or null: the closure starts from the grid

@@ -1,5 +1,5 @@
 """Rods whose centre of mass is off the line of their balls hang, in the kernels as in the reference path (theory C10,
-docs/fast_path.md F20)."""
+docs/fast_path.md F21)."""
 
 from __future__ import annotations
 
@@ -70,6 +70,37 @@ def test_only_the_rods_that_weights_turn_are_let_go() -> None:
     np.testing.assert_array_equal(found.indeterminate_mask, expected.indeterminate_mask)
     assert found.indeterminate_mask.sum(axis=1).tolist() == [4] * 8
     assert compare(found, expected).worst() < TOLERANCE
+
+
+@pytest.mark.parametrize("times", [1.0, 5.0])
+def test_a_large_load_beside_light_rods(times: float) -> None:
+    """Which spins a load turns is told by a moment of round-off of all loads: next to that the reference decides."""
+    machine = with_hanging_rods("linear-delta")
+    position, _ = draw(machine, 16, seed=5)
+    force = times * np.array([100.0, 50, -200, 0, 0, 0])
+    found = machine.solve(position, force, gravity=GRAVITY)
+    expected = machine.solve(position, force, gravity=GRAVITY, method="reference")
+    np.testing.assert_array_equal(found.indeterminate_mask, expected.indeterminate_mask)
+    np.testing.assert_array_equal((found.flags ^ expected.flags) & sm.Flag.FREE_SPIN, 0)
+    assert compare(found, expected).worst() < TOLERANCE
+
+
+@pytest.mark.parametrize("name", ["hexapod", "linear-delta"])
+def test_every_joint_is_off_its_place(name: str) -> None:
+    """Axes that are not in line with the balls: on the hexapod a spin then pulls at the platform."""
+    machine = sm.load_machine(name)
+    for element in {
+        "hexapod": ("cardan", "strut", "ball"),
+        "linear-delta": ("carriage", "ball_upper", "ball_lower"),
+    }[name]:
+        machine = machine.with_effect("position_offset", element=element, **OFFSET)
+    machine = machine.with_effect("position_offset", element="base", **OFFSET)
+    position, wrench = draw(machine, 16, seed=11)
+    found = machine.solve(position, wrench, gravity=GRAVITY)
+    assert found.reference_share == 0
+    gap = compare(found, machine.solve(position, wrench, gravity=GRAVITY, method="reference"))
+    assert gap.statuses == 0
+    assert gap.worst() < TOLERANCE
 
 
 def rod(angle: float) -> sm.Machine:
