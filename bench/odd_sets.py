@@ -6,7 +6,7 @@
 nothing explains. Deflections get a tool with couplings in all directions that changes over the workspace, positions get waves; neither is
 an effect of the library. `--seed` draws others: couplings with or without symmetry, waves, cubics or what is each pose's own, of
 0.1 to 3 mm. Prints CPU seconds of all threads, the peak of memory of a process of its own, the verdict, and what was not
-tried; `--calibrate` the verdict of a calibration.
+tried; `--calibrate` the verdict of a calibration; `--elsewhere` the same where the load does not hang at the point that is read.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from itertools import product
 import numpy as np
 
 import stiffmap as sm
+from stiffmap.description import Point
 from stiffmap.experiment import Experiment, random_plan, simulate
 from stiffmap.experiment.experiment import Floats
 
@@ -30,11 +31,19 @@ MACHINES = ("orthoglide-revised", "linear-delta", "rotary-delta", "ur10", "trave
 def plan_for(machine: sm.Machine, quantity: str, rows: int) -> Experiment:
     """Random poses; positions in a frame that is unknown."""
     deflection = quantity == "deflection"
+    marked = "platform.gauge" in machine.points
     poses = max(rows // 12, 2) if deflection else rows // 2
     plan = random_plan(machine, quantity, poses=poses, loads=6, repeats=2, seed=1)
     if not deflection:
         plan = replace(plan, frame="unknown", tool="unknown" if machine.name == "ur10" else "known")
-    return plan
+    return replace(plan, point="platform.gauge", load_point="platform.hook") if marked else plan
+
+
+def elsewhere(machine: sm.Machine) -> sm.Machine:
+    """With a hook for the load on the platform, and a point beside it that the dial gauges read."""
+    d = machine.description
+    marks = (Point("hook", (0.02, -0.03, -0.05)), Point("gauge", (-0.06, 0.04, 0.02)))
+    return sm.Machine(replace(d, platform=(*d.platform, *marks)))
 
 
 def planted(machine: sm.Machine, quantity: str, rows: int, seed: int = 0) -> Experiment:
@@ -98,6 +107,7 @@ def main() -> None:
     parser.add_argument("--rows", type=int, default=540)
     parser.add_argument("--seed", type=int, action="append", help="default: 0")
     parser.add_argument("--planted", action="store_true")
+    parser.add_argument("--elsewhere", action="store_true", help="the load hangs beside what is read")
     parser.add_argument("--calibrate", action="store_true")
     o = parser.parse_args()
     for name in o.machine or MACHINES:
@@ -108,7 +118,7 @@ def main() -> None:
 
 def measured(name: str, quantity: str, seed: int, o: argparse.Namespace) -> str:
     """The line of one set."""
-    machine = sm.load_machine(name)
+    machine = elsewhere(sm.load_machine(name)) if o.elsewhere else sm.load_machine(name)
     data = (planted if o.planted else odd)(machine, quantity, o.rows, seed)
     begun = time.process_time()
     told = calibrated(machine, data) if o.calibrate else diagnosed(machine, data)

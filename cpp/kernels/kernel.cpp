@@ -214,6 +214,7 @@ struct Block {
       Newton at{Q, in, s, e, load, e.gravity};
       at.turning = base.turning;
       at.turning.P = &Q;
+      at.turning.read();
       pass(at, Q);
       V c[6], eta[6];
       put(residual(e, Q.chains[Q.root], at.point), c);
@@ -224,7 +225,8 @@ struct Block {
       const V6 step = get(eta);
       // Rotation vectors add to first order only: turn the frame by the step, then compare.
       const M3 R = turned_by(at.tip.R, step.b);
-      const V6 d{at.point + step.a - (command.p + command.R * offset), rotation_between(command.R, R)};
+      const V6 d{at.point + step.a - (command.p + command.R * offset),
+                 rotation_since(Q.places[in.point], command.R, R)};
       put(d, c);
       for (int i = 0; i < count; ++i)
         if (done[i])
@@ -251,7 +253,7 @@ struct Block {
     newton.turning.P = &P;
     newton.turning.in = &in;
     for (int i = 0; i < W; ++i) newton.turning.pose[i] = pose(i);
-    newton.turning.before = command.R;
+    newton.turning.command = command.R;
     newton.turning.read();
     V iterations = splat(0), steps;
     M done = newton.solve(usable, P.starts_linear, iterations, steps);
@@ -320,7 +322,8 @@ struct Block {
 
   void write(M done, const Newton& newton, const V (&K)[6][6], const V (&C)[6][6], V iterations, V steps) {
     const V3 offset = commanded_offset();
-    const V6 d{newton.point - (command.p + command.R * offset), rotation_between(command.R, newton.tip.R)};
+    const V6 d{newton.point - (command.p + command.R * offset),
+               rotation_since(P.places[in.point], command.R, newton.tip.R)};
     V moved[6];
     put(d, moved);
     for (int i = 0; i < count; ++i) {

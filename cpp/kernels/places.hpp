@@ -2,9 +2,16 @@
 // Where a named point is: rigidly with the tip, or along the operations that lead to its body.
 #pragma once
 
+#include "angles.hpp"
 #include "frames.hpp"
 
 namespace stiffmap::kernel {
+
+/// Rotation from where the tip's body stood at the command to where it is, R, as a place of it turned.
+inline V3 rotation_since(const PlaceProgram& place, const M3& command, const M3& R) {
+  if (!place.turned) return rotation_between(command, R);
+  return rotation_between(command * constant_rotation(place.nominal.R), R * constant_rotation(place.actual.R));
+}
 
 /// Frame of a place, at coordinates x and the frame of the tip.
 template <Build B>

@@ -145,6 +145,7 @@ struct TipSpringProgram {
 /// (operations; ~chain: the end of a chain), then its frame in the body's.
 struct PlaceProgram {
   std::int32_t on_tip, first, count;
+  std::int32_t turned;  ///< by an error: nominal and actual rotation differ
   Constant nominal, actual;
 };
 

@@ -4,6 +4,7 @@
 // one dead load at the point keeps its code and its bits.
 #pragma once
 
+#include "frames.hpp"
 #include "turning_load.hpp"
 
 namespace stiffmap::kernel {
@@ -12,13 +13,15 @@ struct TipLoads {
   static constexpr int most_near = 4;
   const Program* P = nullptr;
   const KernelInput* in = nullptr;
-  M3 before;             ///< the tip's rotation at the command
+  M3 command;            ///< the tip's rotation at the command
+  M3 before;             ///< the same as the point of the answer turned
   std::int64_t pose[W];  ///< of each lane
   V6 near[most_near];    ///< the first further loads as they were given, about their own points
   TipLoads() {}          // not filled with zeros
 
   /// After the other members.
   void read() {
+    before = before_of(in->point);
     for (int i = 0; i < in->load_count && i < most_near; ++i) near[i] = read(i);
   }
 
@@ -43,7 +46,7 @@ struct TipLoads {
   [[gnu::noinline]] V6 at(const V6& w, const M3& R) const {
     V6 sum = TurningLoad{in->turns, before}.at(w, R);
     for (int i = 0; i < in->load_count; ++i) {
-      const V6 now = TurningLoad{in->loads[i].turns, before}.at(given(i), R);
+      const V6 now = load_at(i, R);
       sum = sum + V6{now.a, now.b + cross(R * arm(i), now.a)};
     }
     return sum;
@@ -52,7 +55,7 @@ struct TipLoads {
   [[gnu::noinline]] Levers levers(const V6& w, V share, const M3& R) const {
     Levers out{{}, share * TurningLoad{in->turns, before}.at(w, R).b};
     for (int i = 0; i < in->load_count; ++i) {
-      const V6 now = share * TurningLoad{in->loads[i].turns, before}.at(given(i), R);
+      const V6 now = share * load_at(i, R);
       const V3 r = R * arm(i);
       for (int k = 0; k < 3; ++k) out.arms.c[k] = out.arms.c[k] + (k == 0 ? now.a.x : k == 1 ? now.a.y : now.a.z) * r;
       out.moment = out.moment + now.b;
@@ -64,7 +67,8 @@ struct TipLoads {
   [[gnu::noinline]] Change change(const V6& w, const M3& R, bool rigid = true) const {
     Change out = TurningLoad{in->turns, before}.change(w, R);
     for (int i = 0; i < in->load_count; ++i) {
-      const TurningLoad load{in->loads[i].turns, before};
+      const M3 then = before_of(in->loads[i].place);
+      const TurningLoad load{in->loads[i].turns, then};
       const V6 wrench = given(i);
       const V3 force = load.at(wrench, R).a, r = R * arm(i);
       const Change own = load.change(wrench, R);
@@ -121,6 +125,21 @@ struct TipLoads {
  private:
   static M pushes(const V3& v) { return absolute(v.x) + absolute(v.y) + absolute(v.z) > 0.0; }
 
+  /// The rotation that an error's turn of a place leaves of the command's.
+  M3 before_of(std::int32_t at) const {
+    const PlaceProgram& place = P->places[at];
+    if (!place.turned) return command;
+    const M3 nominal = constant_rotation(place.nominal.R), a = constant_rotation(place.actual.R);
+    const M3 back{{{a.c[0].x, a.c[1].x, a.c[2].x}, {a.c[0].y, a.c[1].y, a.c[2].y}, {a.c[0].z, a.c[1].z, a.c[2].z}}};
+    return command * (nominal * back);
+  }
+
+  V6 load_at(int i, const M3& R) const {
+    const M3 then = before_of(in->loads[i].place);
+    return TurningLoad{in->loads[i].turns, then}.at(given(i), R);
+  }
+
+  /// Load i as it was given, about its own point.
   V6 given(int i) const { return i < most_near ? near[i] : read(i); }
 
   [[gnu::noinline]] V6 read(int i) const {

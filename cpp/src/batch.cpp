@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <memory>
 
 #include "../kernels/dispatch.hpp"
@@ -136,11 +135,10 @@ Index place_of(const Mechanism& m, const LoadPoint& load) {
   return std::find_if(m.points.begin(), m.points.end(), same) - m.points.begin();
 }
 
-/// Whether a point is of the tip's body beyond the legs, and no error turns it there.
+/// Whether a point is of the tip's body beyond the legs.
 bool on_tip(const Mechanism& m, const Program& program, Index point) {
   if (point == static_cast<Index>(m.points.size()) || !m.beyond_legs[at(m.points[at(point)].node)]) return false;
-  const PlaceProgram& place = program.places[point];
-  return place.on_tip && std::equal(std::begin(place.actual.R), std::end(place.actual.R), std::begin(place.nominal.R));
+  return program.places[point].on_tip;
 }
 
 /// What the kernels do not do is left to the reference path as a whole.

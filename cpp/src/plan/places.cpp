@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "places.hpp"
 
+#include <algorithm>
+#include <iterator>
+
 namespace stiffmap {
 namespace {
 
@@ -69,11 +72,12 @@ void compile_places(const Mechanism& m, const CompiledChains& chains, FastPlanDa
   for (std::size_t i = 0; i < m.points.size(); ++i) {
     const Pose offset{m.points[i].offset, Mat3::Identity()};
     const FromTip tip = from_tip(m, m.points[i].node);
-    PlaceProgram p{tip.rigid, i32(d.place_steps.size()), 0, {}, {}};
+    PlaceProgram p{tip.rigid, i32(d.place_steps.size()), 0, 0, {}, {}};
     if (!tip.rigid) ways.to(chains.places[i - 1]);
     p.count = i32(d.place_steps.size()) - p.first;
     p.nominal = constant(tip.rigid ? tip.nominal * offset : chains.places[i - 1].nominal);
     p.actual = constant(tip.rigid ? tip.actual * offset : chains.places[i - 1].actual);
+    p.turned = !std::equal(std::begin(p.actual.R), std::end(p.actual.R), std::begin(p.nominal.R));
     d.places.push_back(p);
   }
 }

@@ -152,8 +152,10 @@ def test_a_point_behind_a_transform_with_an_error() -> None:
         {"read_points": ["platform.flange"]},
         {"point": "platform.flange", "read_points": ["tcp"]},
         {"wrenches": {"platform.flange": wrench[::-1]}, "load_type": {"platform.flange": "follower"}},
+        {"point": "platform.flange", "load_type": "semitangential"},
     ):
-        agrees(moved, position, wrench, **options)
+        assert agrees(moved, position, wrench, **options) > 5
+        assert moved.solve(position, wrench, **options).reference_share == 0
 
 
 def test_one_pose_reads_as_many() -> None:
