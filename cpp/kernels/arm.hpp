@@ -12,7 +12,9 @@ namespace stiffmap::kernel {
 struct AxisTurn {
   V3 w;
   V c, s;
-  V3 operator*(const V3& x) const { return c * x + s * cross(w, x) + ((1.0 - c) * dot(w, x)) * w; }
+  [[gnu::always_inline]] V3 operator*(const V3& x) const {
+    return c * x + s * cross(w, x) + ((1.0 - c) * dot(w, x)) * w;
+  }
   AxisTurn back() const { return {w, c, -s}; }
 };
 

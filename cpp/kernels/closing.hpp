@@ -164,7 +164,7 @@ struct Closing {
     return after;
   }
 
-  static void undo(const Constant& T, Frame& f) {
+  [[gnu::always_inline]] static void undo(const Constant& T, Frame& f) {
     if (T.has_rotation) {
       const M3 R = f.R;
       for (int i = 0; i < 3; ++i) {

@@ -37,7 +37,7 @@ inline void turn(M3& R, int axis, V s, V c) {
   R.c[j] = c * v - s * u;
 }
 
-inline void turn_about(M3& R, const double* d, V s, V c) {
+[[gnu::always_inline]] inline void turn_about(M3& R, const double* d, V s, V c) {
   const V h = 1.0 - c;
   const V x = splat(d[0]), y = splat(d[1]), z = splat(d[2]);
   const M3 Q{{{c + h * x * x, h * x * y + s * z, h * x * z - s * y},
@@ -51,7 +51,7 @@ inline V3 axis_of(const Op& op, const M3& R) {
   return R * V3{splat(op.direction[0]), splat(op.direction[1]), splat(op.direction[2])};
 }
 
-inline void move_joint(const Op& op, V q, Frame& f, JointSlot& slot) {
+[[gnu::always_inline]] inline void move_joint(const Op& op, V q, Frame& f, JointSlot& slot) {
   slot.w = axis_of(op, f.R);
   if (op.kind == OpKind::prismatic) {
     f.p = f.p + q * slot.w;
@@ -65,7 +65,7 @@ inline void move_joint(const Op& op, V q, Frame& f, JointSlot& slot) {
 }
 
 /// p + R t, R Rx Ry Rz; Z turns moments by its own coordinates into moments in base axes (F5).
-inline void move_spring(const V* x, Frame& f, StiffSlot& slot) {
+[[gnu::always_inline]] inline void move_spring(const V* x, Frame& f, StiffSlot& slot) {
   slot.start = f;
   f.p = f.p + f.R * V3{x[0], x[1], x[2]};
   slot.p = f.p;

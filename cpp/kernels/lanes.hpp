@@ -55,7 +55,7 @@ inline void exchange(V& low, V& high, std::integer_sequence<int, I...>) {
 }
 
 template <int H>
-inline void transpose(V (&rows)[W]) {
+[[gnu::always_inline]] inline void transpose(V (&rows)[W]) {
   if constexpr (H > 0) {
 #pragma GCC unroll 8
     for (int i = 0; i < W; ++i)

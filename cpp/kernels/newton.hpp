@@ -99,7 +99,7 @@ struct Newton {
   }
 
   /// Tangent of a small extra dead wrench at the point, K - S(m)/2 in the rotational block; the load turns.
-  void dense(const Sym6& symmetric, V (&m)[6][6]) const {
+  [[gnu::always_inline]] void dense(const Sym6& symmetric, V (&m)[6][6]) const {
     unpack(symmetric, m);
     const V3 h = splat(0.5) * dead_load.b;
     m[3][4] += h.z;

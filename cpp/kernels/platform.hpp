@@ -23,7 +23,7 @@ struct Answer {
 };
 
 /// Inverse without pivoting: the symmetric part is positive definite where it is used.
-inline void invert(Elimination& e, V (&m)[6][6]) {
+[[gnu::always_inline]] inline void invert(Elimination& e, V (&m)[6][6]) {
   V x[6][6];
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j) x[i][j] = splat(i == j ? 1 : 0);

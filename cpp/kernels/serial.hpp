@@ -107,12 +107,17 @@ struct Serial {
   template <int N>
   [[gnu::noinline]] void turn(const Elimination& el, int count, const TipLoad& tip) {
     const int n = N ? N : count;
-    const Change change = tip.turning.change(tip.given, tip.R, false);
+    const bool follows = tip.turning.one_follower();
+    Change change;
+    V6 now;
+    if (follows) now = tip.share * tip.turning.at(tip.given, tip.R);
+    else change = tip.turning.change(tip.given, tip.R, false);
     V6 unit[most_serial_joints];
     for (int b = 0; b < n; ++b) unit[b] = unit_twist(el, *joint[b], tip.point);
     for (int b = 0; b < n; ++b) {
       if (joint[b]->kind == OpKind::prismatic) continue;
-      const V6 more = tip.share * change.by(unit[b].b);
+      const V3& w = unit[b].b;
+      const V6 more = follows ? V6{cross(w, now.a), cross(w, now.b)} : tip.share * change.by(w);
 #pragma GCC unroll 6
       for (int a = 0; a < n; ++a) B[a][b] -= dot(unit[a], more);
     }
@@ -120,7 +125,7 @@ struct Serial {
 
   /// What turns with the joints: before the first step under a load (F11) nothing does.
   enum class Acts { nothing, forces, moment };
-  static Acts acts(const Elimination& el, const TipLoad& tip) {
+  [[gnu::always_inline]] static Acts acts(const Elimination& el, const TipLoad& tip) {
     const auto some = [](const V3& v) { return any((v.x != 0.0) | (v.y != 0.0) | (v.z != 0.0)); };
     if (some(tip.dead_moment)) return Acts::moment;
     // Several loads may turn with the joints where their sum is nothing.

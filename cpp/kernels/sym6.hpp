@@ -48,7 +48,7 @@ inline V6 dead(const Sym6& K, const V3& m, const V6& t) {
 }
 
 /// K -= u u^T s.
-inline void downdate(Sym6& K, const V6& u, V s) {
+[[gnu::always_inline]] inline void downdate(Sym6& K, const V6& u, V s) {
   const V3 a = s * u.a, b = s * u.b;
   K.A.xx -= a.x * u.a.x;
   K.A.yy -= a.y * u.a.y;
@@ -68,7 +68,7 @@ inline void downdate(Sym6& K, const V6& u, V s) {
 }
 
 /// E += s (sym(r f^T) - (f·r) I): the lever arm of a dead force (F3).
-inline void add_lever(S3& E, V s, const V3& f, const V3& r) {
+[[gnu::always_inline]] inline void add_lever(S3& E, V s, const V3& f, const V3& r) {
   const V h = 0.5 * s, d = s * dot(f, r);
   E.xx += s * r.x * f.x - d;
   E.yy += s * r.y * f.y - d;
@@ -102,7 +102,7 @@ inline void transport(Sym6& K, V6& c, const V3& r, const V3& f) {
 }
 
 /// Full matrix, row by row, for the dense steps.
-inline void unpack(const Sym6& K, V (&m)[6][6]) {
+[[gnu::always_inline]] inline void unpack(const Sym6& K, V (&m)[6][6]) {
   m[0][0] = K.A.xx;
   m[1][1] = K.A.yy;
   m[2][2] = K.A.zz;

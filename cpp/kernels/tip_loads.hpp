@@ -27,6 +27,7 @@ struct TipLoads {
 
   /// Whether the wrench about the point is another when the tip turns.
   bool turns() const { return in->turns != LoadTurns::dead || in->load_count > 0; }
+  bool one_follower() const { return in->turns == LoadTurns::follower && in->load_count == 0; }
   bool several() const { return in->load_count > 0; }
   /// Whether some load does not keep its direction.
   bool some_turns() const {
@@ -44,6 +45,7 @@ struct TipLoads {
 
   /// The wrench about the point where the tip stands at R; `w` is what acts at the point itself.
   [[gnu::noinline]] V6 at(const V6& w, const M3& R) const {
+    if (!several()) return TurningLoad{in->turns, before}.at(w, R);
     V6 sum = TurningLoad{in->turns, before}.at(w, R);
     for (int i = 0; i < in->load_count; ++i) {
       const V6 now = load_at(i, R);
@@ -65,6 +67,7 @@ struct TipLoads {
 
   /// `rigid`: with the turning of the lever arms, the forces as they are; else what the loads' own turning makes.
   [[gnu::noinline]] Change change(const V6& w, const M3& R, bool rigid = true) const {
+    if (!several()) return TurningLoad{in->turns, before}.change(w, R);
     Change out = TurningLoad{in->turns, before}.change(w, R);
     for (int i = 0; i < in->load_count; ++i) {
       const M3 then = before_of(in->loads[i].place);

@@ -27,7 +27,9 @@ struct M3 {
 inline V3 operator*(const M3& R, const V3& a) { return a.x * R.c[0] + a.y * R.c[1] + a.z * R.c[2]; }
 inline M3 operator*(const M3& A, const M3& B) { return {{A * B.c[0], A * B.c[1], A * B.c[2]}}; }
 /// Transposed times a vector.
-inline V3 operator%(const M3& R, const V3& a) { return {dot(R.c[0], a), dot(R.c[1], a), dot(R.c[2], a)}; }
+[[gnu::always_inline]] inline V3 operator%(const M3& R, const V3& a) {
+  return {dot(R.c[0], a), dot(R.c[1], a), dot(R.c[2], a)};
+}
 
 struct Frame {
   V3 p;

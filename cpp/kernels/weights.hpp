@@ -28,7 +28,7 @@ struct Turning {
 inline V component(const V3& v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
 
 /// S -= scale a a^T.
-inline void downdate(S3& S, const V3& a, V scale) {
+[[gnu::always_inline]] inline void downdate(S3& S, const V3& a, V scale) {
   const V3 b = scale * a;
   S.xx -= b.x * a.x;
   S.yy -= b.y * a.y;
@@ -39,7 +39,7 @@ inline void downdate(S3& S, const V3& a, V scale) {
 }
 
 /// A body joins the chain rigidly: the lever arm of its weight about the start.
-inline void hang(Turning& t, double mass, const V3& weight, const V3& centre) {
+[[gnu::always_inline]] inline void hang(Turning& t, double mass, const V3& weight, const V3& centre) {
   t.mass += mass;
   t.lever = t.lever + splat(mass) * (centre - t.start);
   add_lever(t.M, splat(-1.0), weight, centre - t.start);
