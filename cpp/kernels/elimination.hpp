@@ -24,6 +24,7 @@ struct Elimination {
   /// A leg: only its numbers differ from those of the last pass over all, and the others' results are kept.
   static constexpr std::int32_t all = -1, all_anew = -2;  ///< all_anew: keeps the residuals of the last pass over all
   std::int32_t only = all;
+  bool together = false;  ///< branches pull at the block's end, though their own ends are apart: of a variant (F10)
 
   bool skips(const Op& op, int branch) const { return only >= 0 && &op == P.ops + P.legs_op && branch != only; }
 

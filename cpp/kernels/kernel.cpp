@@ -208,6 +208,7 @@ struct Block {
     for (int v = 0; v < in.perturbed_count; ++v) {
       const Program& Q = *in.perturbed[v];
       Elimination e{Q, s, base.e.gravity, splat(0), {}};
+      e.together = true;
       e.only = in.perturbed_leg[v] < 0 ? Elimination::all_anew : in.perturbed_leg[v];
       if (e.only >= 0 && moved != Elimination::all && moved != e.only) pass(here, P);
       moved = e.only;

@@ -64,6 +64,7 @@ inline void block_wrenches(Elimination& el, const Op& op, V6& F, V3& p) {
     V3 pb = branch.end.p;
     wrenches(el, el.P.chains[op.first + b], Fb, pb);
     shift(Fb, pb, p);
+    if (el.together && b > 0) Fb.b = Fb.b + cross(first.end.p - branch.end.p, branch.F.a);
     start = start + Fb;
   }
   F = start;

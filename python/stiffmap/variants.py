@@ -9,6 +9,7 @@ import numpy as np
 
 from stiffmap.broadcasting import Floats
 from stiffmap.compiled import CompiledMachine
+from stiffmap.description.alike import alike
 from stiffmap.solution import Solution
 from stiffmap.solving import Call, solve_call
 
@@ -19,11 +20,18 @@ def solve_varied(
     """The answer, and the displacements (..., variants, 6) of machines with a parameter moved a little.
 
     One step through the factors of the answer, exact to second order in the move (docs/fast_path.md F10). Poses of
-    the reference path and variants under another gravity are solved in full. NaN where a pose failed.
+    the reference path, variants under another gravity, and under gravity those to which one step does not lead
+    (`alike`) are solved in full. NaN where a pose failed.
     """
     solution, varied = solve_call(machine, call, variants)
     gravity = machine.description.gravity
-    heavier = [call.options.gravity is None and m.description.gravity != gravity for m in variants]
+    acting = gravity if call.options.gravity is None else call.options.gravity
+    heavy = acting is not None and bool(np.any(acting))
+    heavier = [
+        (call.options.gravity is None and m.description.gravity != gravity)
+        or (heavy and not alike(machine.description, m.description, heavy=True))
+        for m in variants
+    ]
     if not any(heavier) and not np.isnan(varied.sum()):  # nothing is missing
         return solution, varied
     for i, (m, other) in enumerate(zip(variants, heavier, strict=True)):

@@ -153,7 +153,7 @@ class ZarrMap:
         """Tile and checksums of its chunks by a line of the journal."""
         try:
             index, checks = entry["tile"], entry["crc"]
-            known = isinstance(index, int) and 0 <= index < self.tiles.count
+            known = type(index) is int and 0 <= index < self.tiles.count
             if not known or set(checks) != {v.name for v in self.plan.variables}:
                 raise ValueError
             return index, {self.chunk(n, index): value for n, value in checks.items()}

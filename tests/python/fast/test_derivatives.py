@@ -238,3 +238,41 @@ def test_failed_poses_have_no_slope() -> None:
         for q in of:
             for slope in slopes(s, q).values():
                 assert np.isfinite(slope[0]).all() and np.isnan(slope[1]).all()
+
+
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -9.81)], ids=["weightless", "heavy"])
+@pytest.mark.parametrize(
+    ("name", "kind", "element"),
+    [
+        ("linear-delta", "parallelogram_width", "parallelogram"),
+        ("linear-delta", "parallelogram_parallelism", "parallelogram"),
+        ("rotary-delta", "length_difference", "parallelogram"),
+        ("orthoglide-revised", "parallelogram_width", "parallelogram"),
+        ("hybrid", "length", "rod"),
+    ],
+)
+def test_branches_that_end_apart(
+    name: str, kind: str, element: str, gravity: tuple[float, ...] | None
+) -> None:
+    """At the coordinates of the machine the branches of a neighbour's block do not meet, and they share a load."""
+    machine = sm.load_machine(name)
+    low, high = machine.workspace
+    poses = np.random.default_rng(8).uniform(low, high, (4, 3))
+    force = np.array([60.0, -40.0, 50.0, 0.5, -0.2, 0.3])
+    leg = machine.legs[0]
+    for p in get(kind).parameters:
+        null = float(p.null or 0.0)
+        given = {q.name: float(q.null or 0.0) for q in get(kind).parameters}
+        where = {"element": element, "legs": [leg]}
+        s = machine.solve(poses, force, gravity=gravity, derivatives=[(kind, {**where, **given})])
+        found = next(v for k, v in s.derivatives.items() if k.endswith(f" {p.name}"))
+
+        def moved(
+            h: float, p: Any = p, where: Any = where, given: Any = given, null: float = null
+        ) -> np.ndarray:
+            other = machine.with_effect(kind, **where, **{**given, p.name: null + h})
+            return np.asarray(other.solve(poses, force, gravity=gravity, method="reference").displacement)
+
+        true = richardson(moved, 0.02 * p.scale)
+        if np.abs(true).max() * p.scale > 1e-9:  # else it moves nothing, but for round-off
+            assert off(found, true) < 1e-5
