@@ -72,13 +72,33 @@ def test_some_slopes(name: str, quantity: str, gravity: tuple[float, float, floa
     compare(predictor, told(predictor, SOME))
 
 
-@pytest.mark.parametrize("gravity", [None, DOWN])
+HOLD_SPINS = ("linear-delta", "rotary-delta", "hexapod")
+
+
 @pytest.mark.parametrize("quantity", ["deflection", "position"])
-@pytest.mark.parametrize("name", ["linear-delta", "rotary-delta", "orthoglide-revised", "ur10", "hexapod"])
+@pytest.mark.parametrize(
+    ("name", "gravity"),
+    [
+        *((name, None) for name in (*HOLD_SPINS, "orthoglide-revised", "ur10")),
+        ("orthoglide-revised", DOWN),
+        ("ur10", DOWN),
+    ],
+)
 def test_all_slopes(name: str, quantity: str, gravity: tuple[float, float, float] | None) -> None:
     machine = sm.load_machine(name)
     predictor = Predictor(machine, plan_for(machine, quantity, gravity))
     compare(predictor, told(predictor))
+
+
+@pytest.mark.parametrize("name", HOLD_SPINS)
+def test_weights_that_may_turn_spins_leave_no_slopes(name: str) -> None:
+    machine = sm.load_machine(name)
+    predictor = Predictor(machine, plan_for(machine, "deflection", DOWN))
+    tried = candidates(machine.description, predictor.experiment)
+    slopes = Slopes(predictor, tried)
+    assert all(
+        slopes.of(c, p) is None for c in tried for p in c.linear if p.name == "error" or c.kind == "length"
+    )
 
 
 @pytest.mark.parametrize("name", ["ur10", "linear-delta"])
