@@ -12,8 +12,8 @@ namespace stiffmap {
 namespace {
 
 constexpr std::size_t cached_grids = 32;
-constexpr double sound = 0.05;   // least pivot of a node that is far from singular
-constexpr int most_failed = 64;  // nodes searched in vain: a box that is mostly out of reach is not searched to its end
+constexpr double sound = 0.05;     // least pivot of a node that is far from singular
+constexpr int most_steps = 12000;  // of searches, in all: a box mostly far or out of reach is not searched on
 
 /// Everything that the nominal closure depends on, as a key: joints and the constant transforms between
 /// them. Springs, weights and errors are left out, so that variants of one machine share their grid.
@@ -87,7 +87,7 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
   std::vector<VecX> x(nodes);
   ClosureWorkspace ws(m);
   PoseCloser quick(m);
-  int failed = 0;
+  int steps = 0;
   for (int k = 0; k < p.grid_n[2]; ++k)
     for (int j = 0; j < p.grid_n[1]; ++j)
       for (int i = 0; i < p.grid_n[0]; ++i) {
@@ -117,16 +117,17 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
           keep(found);
           continue;
         }
-        if (failed == most_failed) continue;
+        if (steps > most_steps) continue;
         found.setZero();
         ClosureResult r =
             from ? inverse_closure(m, pose, ws, found, *from, start) : inverse_closure(m, pose, ws, found);
-        if (from && (r.status != Status::converged || r.flags & flag::branch_unverified))
+        const auto lost = [&r] { return r.status != Status::converged || r.flags & flag::branch_unverified; };
+        steps += r.iterations;
+        if (from && lost()) {
           r = inverse_closure(m, pose, ws, found);
-        if (r.status != Status::converged || r.flags & flag::branch_unverified) {
-          ++failed;
-          continue;
+          steps += r.iterations;
         }
+        if (lost()) continue;
         x[node] = found;
         if (!nearly_singular(ws)) keep(found);
       }
