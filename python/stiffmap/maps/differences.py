@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from stiffmap.errors import StiffmapError
+from stiffmap.errors import FileError, StiffmapError
+from stiffmap.json_text import parse_json
 
 WORDS = {"machine_digest": "the machine's description", "stiffmap_version": "the version of stiffmap"}
 LEFT_OUT = (
@@ -21,6 +22,21 @@ LEFT_OUT = (
 )
 """What follows from another attribute."""
 LONG = 60
+
+
+def kept_attributes(path: Path, attributes: Callable[[Any], Any] = lambda whole: whole) -> dict[str, Any]:
+    """Attributes of an unfinished map in a JSON file, where `attributes` finds them; FileError where it is damaged."""
+    try:
+        kept = attributes(parse_json(path.read_bytes()))
+        if not isinstance(kept, dict) or not isinstance(parse_json(kept["call"]), dict):
+            raise TypeError
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise FileError(
+            "is damaged: expected the attributes of an unfinished map; without them nobody can tell whose values "
+            "these are: start again without resume (--resume)",
+            file=str(path),
+        ) from error
+    return kept
 
 
 def refuse_another_map(folder: Path, kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:

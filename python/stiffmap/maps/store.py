@@ -11,8 +11,7 @@ from numpy.lib.format import open_memmap
 from numpy.typing import NDArray
 
 from stiffmap.errors import FileError
-from stiffmap.json_text import parse_json
-from stiffmap.maps.differences import refuse_another_map
+from stiffmap.maps.differences import kept_attributes, refuse_another_map
 from stiffmap.maps.plan import MapPlan
 
 BLOCKS_PER_FLUSH = 32
@@ -66,23 +65,8 @@ def folder_store(plan: MapPlan, folder: Path, resume: bool) -> Store:
     key = folder / "key.json"
     if not (resume and key.exists()):
         return _new(plan, folder, json.dumps(plan.attrs, sort_keys=True, default=lambda v: v.tolist()))
-    refuse_another_map(folder, _kept(key), plan.attrs)
+    refuse_another_map(folder, kept_attributes(key), plan.attrs)
     return _mapped(plan, folder, "r+")
-
-
-def _kept(key: Path) -> dict[str, Any]:
-    """Attributes of the map that a folder holds part of."""
-    try:
-        kept = parse_json(key.read_bytes())
-        if not isinstance(kept, dict) or not isinstance(parse_json(kept.get("call", "{}")), dict):
-            raise TypeError
-    except (OSError, ValueError, TypeError) as error:
-        raise FileError(
-            "is damaged: expected the attributes of an unfinished map; without them nobody can tell whose rows these "
-            "are: start again without resume (--resume)",
-            file=str(key),
-        ) from error
-    return kept
 
 
 def _new(plan: MapPlan, folder: Path, key: str) -> Store:

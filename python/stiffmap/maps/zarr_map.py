@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from stiffmap.errors import FileError, MissingPartError
 from stiffmap.json_text import parse_json
-from stiffmap.maps.differences import refuse_another_map
+from stiffmap.maps.differences import kept_attributes, refuse_another_map
 from stiffmap.maps.files import zarr_strings
 from stiffmap.maps.plan import MapPlan
 from stiffmap.maps.store import FILL
@@ -109,7 +109,8 @@ class ZarrMap:
 
         StiffmapError where it belongs to another map, FileError for a chunk that is damaged.
         """
-        refuse_another_map(self.folder, self._kept_attributes(), self.plan.attrs)
+        kept = kept_attributes(self.folder / "zarr.json", lambda whole: whole["attributes"])
+        refuse_another_map(self.folder, kept, self.plan.attrs)
         self._mend_frame()
         for scrap in self.folder.rglob("*.partial"):  # chunks that zarr had not put in their place
             scrap.unlink()
@@ -123,20 +124,6 @@ class ZarrMap:
                         file=str(path),
                     )
             self.done[index] = all(path.exists() for path in checks)
-
-    def _kept_attributes(self) -> dict[str, Any]:
-        path = self.folder / "zarr.json"
-        try:
-            kept = parse_json(path.read_text(encoding="utf-8"))["attributes"]
-            if not isinstance(kept, dict) or not isinstance(parse_json(kept["call"]), dict):
-                raise TypeError
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise FileError(
-                "is damaged: expected the attributes of an unfinished map; without them nobody can tell whose "
-                "tiles these are: start again without resume (--resume)",
-                file=str(path),
-            ) from error
-        return kept
 
     def _mend_frame(self) -> None:
         """Metadata and coordinates follow from the plan: what is damaged is written again."""
