@@ -25,8 +25,7 @@ def solve_varied(
     """
     solution, varied = solve_call(machine, call, variants)
     gravity = machine.description.gravity
-    acting = gravity if call.options.gravity is None else call.options.gravity
-    heavy = acting is not None and bool(np.any(acting))
+    heavy = bool(machine.gravity(call.options.gravity).any())
     heavier = [
         (call.options.gravity is None and m.description.gravity != gravity)
         or (heavy and not alike(machine.description, m.description, heavy=True))

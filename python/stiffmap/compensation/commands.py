@@ -21,8 +21,8 @@ from stiffmap.description import TASK
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.experiment.experiment import AXES, Experiment
 from stiffmap.experiment.poses.configuration import coordinates_of
+from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
 from stiffmap.experiment.prediction.equilibria import motions
-from stiffmap.experiment.prediction.unloaded_state import drive_jacobian
 from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
 from stiffmap.machine import Machine, takes_machine
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
-from stiffmap.description.rigid import nominal_geometry, straight
+from stiffmap.description.rigid import straight
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.poses.once import Once
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 
@@ -38,17 +36,14 @@ def poses_once(plan: Experiment) -> tuple[Experiment, Integers]:
 
 
 def in_reach(machine: Machine, plan: Experiment) -> Mask:
-    """(n,) rows whose commanded pose the rigid machine can take; found out once for all machines of one geometry."""
+    """(n,) rows whose commanded pose the rigid machine can take; found out once for all machines of one geometry;
+    not to be written to."""
     if plan.joints is not None:
         return np.asarray(np.isfinite(plan.joints).all(axis=1))
-    known = _REACH.setdefault(plan, {})
-    key = nominal_geometry(machine.description)
-    if key not in known:
-        known[key] = _reached(machine, plan)
-    return known[key].copy()
+    return _REACH.get(plan, machine, lambda: _reached(machine, plan))
 
 
-_REACH: WeakKeyDictionary[Experiment, dict[Hashable, Mask]] = WeakKeyDictionary()
+_REACH: Once[Mask] = Once()
 
 
 def _reached(machine: Machine, plan: Experiment) -> Mask:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
-from stiffmap.description.rigid import nominal_geometry
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import coordinates_of
+from stiffmap.experiment.poses.once import Once
 from stiffmap.machine import Machine
 
 
@@ -20,15 +17,16 @@ def point_positions(machine: Machine, name: str, plan: Experiment) -> Floats:
     """
     if name == "tcp":
         return plan.position
-    known = _KNOWN.setdefault(plan, {})
-    key = name, nominal_geometry(machine.description)
-    if key not in known:
-        known[key] = _found(machine, name, plan)
-        known[key].flags.writeable = False
-    return known[key]
+    return _KNOWN.get(plan, machine, lambda: _found(machine, name, plan), name)
 
 
-_KNOWN: WeakKeyDictionary[Experiment, dict[Hashable, Floats]] = WeakKeyDictionary()
+def positions_of(machine: Machine, plan: Experiment, read: tuple[str, ...]) -> Floats:
+    """(n, 3) m, where the point of each row is as commanded."""
+    at = {p: point_positions(machine, p, plan) for p in set(read)}
+    return np.stack([at[p][i] for i, p in enumerate(read)])
+
+
+_KNOWN: Once[Floats] = Once()
 
 
 def _found(machine: Machine, name: str, plan: Experiment) -> Floats:

@@ -12,7 +12,7 @@ from stiffmap.description.strain import rests_at_command
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.level import Mask
 from stiffmap.experiment.poses.configuration import coordinates_of, in_reach
-from stiffmap.experiment.poses.point_kinematics import point_positions
+from stiffmap.experiment.poses.point_kinematics import point_positions, positions_of
 from stiffmap.experiment.prediction.joints import joint_channels, joint_motions
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
 from stiffmap.experiment.prediction.unloaded_state import lagging, lags, signs
@@ -175,7 +175,7 @@ class Solver:
             stiffness=bool(joint_channels(plan)),
             threads=self.threads,
         )
-        solution = _solved(machine, once, options)
+        solution = solved(machine, once, options)
         ok = solution.ok | _in_play(solution, once)
         moved = np.where(ok[:, None, None], solution.readings[:, 1:], np.nan)
         number = {point: i for i, point in enumerate(wanted)}
@@ -190,7 +190,7 @@ class Solver:
         return np.hstack([linear, joints[back]]), work
 
 
-def _solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solution:
+def solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solution:
     """Each row at its pose, or at its joints in the branch in which they are commanded."""
     if plan.joints is None:
         known = plan.near is not None and tuple(machine.compiled.names.coordinates) == plan.near_names
@@ -206,12 +206,6 @@ def _in_play(solution: Solution, plan: Experiment) -> Mask:
     """Rows without load where nothing but play is loose: the drives stand in the middle of their gaps."""
     loose = (solution.status == Status.SINGULAR) & (solution.flags & Flag.FREE_PLAY > 0)
     return np.asarray(loose & ~plan.wrench.any(axis=1))
-
-
-def positions_of(machine: Machine, plan: Experiment, read: tuple[str, ...]) -> Floats:
-    """(n, 3) m, where the point of each row is as commanded."""
-    at = {p: point_positions(machine, p, plan) for p in set(read)}
-    return np.stack([at[p][i] for i, p in enumerate(read)])
 
 
 def _reaction(machine: Machine, plan: Experiment, load_point: str, against: str) -> dict[str, Floats]:

@@ -17,10 +17,10 @@ from stiffmap.effects.evidence import Drive
 from stiffmap.effects.registry import get
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.configuration import coordinates_of
-from stiffmap.experiment.poses.point_kinematics import point_positions
+from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
+from stiffmap.experiment.poses.point_kinematics import positions_of
+from stiffmap.experiment.prediction.equilibria import solved
 from stiffmap.experiment.prediction.metrology_loop import targets
-from stiffmap.experiment.prediction.unloaded_state import drive_jacobian
 from stiffmap.experiment.readings import Seen, kind_of
 from stiffmap.machine import Machine
 from stiffmap.options import SolveOptions
@@ -68,16 +68,15 @@ def history_motion(drives: Drives, plan: Experiment, terms: tuple[AppliedEffect,
 
 def _efforts(machine: Machine, plan: Experiment) -> Floats:
     """(n, actuators) of the drives on their legs."""
-    start = coordinates_of(machine, plan)
-    drives = [machine.compiled.names.joints[a] for a in machine.actuators]
     points = plan.load_points or (plan.load_point,) * len(plan)
     gravity = np.zeros((len(plan), 0)) if plan.gravity_of is None else plan.gravity_of
-    out = np.empty((len(plan), len(drives)))
-    for key in dict.fromkeys(zip(points, map(tuple, gravity.tolist()), strict=True)):
-        here = [i for i, k in enumerate(zip(points, map(tuple, gravity.tolist()), strict=True)) if k == key]
-        options = SolveOptions(start=start[here], gravity=key[1] or plan.gravity, point=key[0])
-        found = machine.solve_joints(start[here][:, drives], plan.wrench[here], options=options)
-        out[here] = found.actuator_effort
+    keys = list(zip(points, map(tuple, gravity.tolist()), strict=True))
+    out = np.empty((len(plan), len(machine.actuators)))
+    for key in dict.fromkeys(keys):
+        here = np.array([i for i, k in enumerate(keys) if k == key])
+        once, back = (plan if len(here) == len(plan) else plan.rows(here)).distinct
+        options = SolveOptions(gravity=key[1] or plan.gravity, point=key[0])
+        out[here] = solved(machine, once, options).actuator_effort[back]
     return out
 
 
@@ -104,9 +103,7 @@ def _extra(
 def _seen(machine: Machine, plan: Experiment, name: str, column: Floats, more: Floats) -> Floats:
     """(n, c) what every channel shows of a drive's extra deflection."""
     twist = column * more[:, None]
-    read = targets(machine, plan)
-    at = {p: point_positions(machine, p, plan) for p in set(read)}
-    arm = np.stack([at[p][i] for i, p in enumerate(read)]) - plan.position
+    arm = positions_of(machine, plan, targets(machine, plan)) - plan.position
     linear = twist[:, :3] + np.cross(twist[:, 3:], arm)
     out = np.zeros((len(plan), len(plan.channels)))
     out[:, :6] = np.hstack([linear, twist[:, 3:]])

@@ -15,7 +15,7 @@ from stiffmap.description import Body, MachineDescription, Offset, Point
 from stiffmap.description.alike import alike
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.point_kinematics import point_positions
+from stiffmap.experiment.poses.point_kinematics import point_positions, positions_of
 from stiffmap.experiment.prediction.equilibria import Work, moves_unloaded
 from stiffmap.experiment.prediction.joints import joint_channels
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
@@ -182,10 +182,9 @@ def _points(machine: Machine, plan: Experiment) -> set[str]:
     return {*targets(machine, plan), *(plan.load_points or (plan.load_point,))}
 
 
-def _seen_at(machine: Machine, plan: Experiment, point: str, read: Sequence[str], found: Floats) -> Floats:
+def _seen_at(machine: Machine, plan: Experiment, point: str, read: tuple[str, ...], found: Floats) -> Floats:
     """(others, n, 6) at other points of the same rigid body, from (1 + others, n, 6) at one."""
-    at = {p: point_positions(machine, p, plan) for p in {*read, point}}
-    arm = np.stack([at[p][i] for i, p in enumerate(read)]) - at[point]
+    arm = positions_of(machine, plan, read) - point_positions(machine, point, plan)
     motion = found.copy()
     lost = ~np.isfinite(motion).all(axis=-1, keepdims=True)
     turn = Rotation.from_rotvec(np.where(lost, 0.0, motion[..., 3:]).reshape(-1, 3))

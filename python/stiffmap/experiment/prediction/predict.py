@@ -87,7 +87,7 @@ class Predictor:
         motion = self._motion_of(mechanical, load)
         remembering = tuple(t for t in terms if effects.get(t.kind).drive)
         if remembering:
-            plan = replace(self.experiment, wrench=true_wrench(self.experiment, load))
+            plan = self._plan_under(load)
             if key not in self._drives:
                 self._drives = {key: drives_of(self.with_terms(mechanical), plan)}
             motion = motion + history_motion(self._drives[key], plan, remembering)

@@ -6,13 +6,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from stiffmap.description import CommandError, Element, Joint, Leg, MachineDescription
 from stiffmap.description.tree import edit_sequences
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.configuration import coordinates_of, poses_once
-from stiffmap.kinematics import forward_kinematics, inverse_kinematics
+from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
+from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 
 TRAVEL = 1e-3
@@ -56,22 +55,6 @@ def _travels(machine: Machine, experiment: Experiment, back: Floats) -> Floats:
         return np.asarray(here - there)
     twist = np.hstack([back, np.zeros_like(back)])
     return np.asarray(np.einsum("nai,ni->na", np.linalg.pinv(drive_jacobian(machine, experiment)), twist))
-
-
-def drive_jacobian(machine: Machine, plan: Experiment, step: float = 1e-6) -> Floats:
-    """(n, 6, actuators) twist of the TCP per unit of each drive of the rigid machine, in the plan's branch."""
-    plan, back = poses_once(plan)
-    start = coordinates_of(machine, plan)
-    drives = [machine.compiled.names.joints[a] for a in machine.actuators]
-    columns = []
-    for k in range(len(drives)):
-        unit = step * np.eye(len(drives))[k]
-        up, down = (forward_kinematics(machine, start[:, drives] + s * unit, start=start) for s in (1, -1))
-        between = up.rotation @ np.swapaxes(down.rotation, 1, 2)
-        lost = ~np.asarray(np.isfinite(between).all(axis=(1, 2)))[:, None, None]
-        turn = Rotation.from_matrix(np.where(lost, np.eye(3), between)).as_rotvec()
-        columns.append(np.hstack([up.position - down.position, turn]) / (2 * step))
-    return np.stack(columns, axis=-1)[back]
 
 
 def lagging(machine: Machine, sign: Floats, weighs: bool = False) -> Machine:
