@@ -2,6 +2,13 @@
 # symbol: objects of one source for several levels must not meet in one link.
 include(CheckCXXCompilerFlag)
 
+# Structs of some kB are copied and cleared at every turn; GCC would do that by string instructions, which start slowly.
+set(copies -mmemcpy-strategy=vector_loop:-1:align -mmemset-strategy=vector_loop:-1:align)
+check_cxx_compiler_flag("${copies}" STIFFMAP_HAS_VECTOR_COPIES)
+if(NOT STIFFMAP_HAS_VECTOR_COPIES)
+  set(copies)
+endif()
+
 # Each wide level has a narrow companion for calls on one or two poses: `name` is the level or the level and _pair.
 function(stiffmap_kernel name lanes)
   set(target stiffmap_kernel_${name})
@@ -10,7 +17,7 @@ function(stiffmap_kernel name lanes)
   target_compile_definitions(${target} PRIVATE
     STIFFMAP_LANES=${lanes} STIFFMAP_LEVEL="${level}" STIFFMAP_ENTRY=${target})
   target_compile_options(${target} PRIVATE -fno-math-errno -fno-trapping-math -ffp-contract=fast -fno-semantic-interposition
-    $<$<CONFIG:Release>:-O3> ${ARGN})
+    $<$<CONFIG:Release>:-O3> ${copies} ${ARGN})
   stiffmap_compile_options(${target})
   set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden)
   if(SKBUILD)

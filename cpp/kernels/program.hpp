@@ -37,6 +37,7 @@ struct ChainProgram {
   std::int32_t
       first_stiff;     ///< the first spring or block, or the last joint of the group: before it the chain is rigid
   std::int32_t group;  ///< slot of the six joints with which a chain without spring or block begins (F12); -1: none
+  std::int32_t still;  ///< nothing before its start moves: it never turns
   Constant nominal, actual;  ///< after the last operation
 };
 

@@ -18,14 +18,14 @@ inline void joint_step(Elimination& el, const Op& op, V6& eta, const V3& turn) {
 
 inline void move_twist(V6& eta, const V3& from, const V3& to) { eta.a = eta.a + cross(eta.b, to - from); }
 
-/// Relative twist of a spring or block from the twist behind it and the turn of the chain's start.
-inline V6 relative_twist(const Elimination& el, const StiffSlot& k, const V6& eta, const V3& turn) {
+/// Relative twist of a spring or block from the twist behind it and the turn of the chain's start, where that `turns`.
+inline V6 relative_twist(const StiffSlot& k, const V6& eta, const V3& turn, bool turns) {
   V e[6], z[6];
   put(eta, e);
   for (int i = 0; i < 6; ++i) {
     V sum = k.y[i];
     for (int col = 0; col < 6; ++col) sum += k.X[i][col] * e[col];
-    if (el.heavy) sum += k.turn[0][i] * turn.x + k.turn[1][i] * turn.y + k.turn[2][i] * turn.z;
+    if (turns) sum += k.turn[0][i] * turn.x + k.turn[1][i] * turn.y + k.turn[2][i] * turn.z;
     z[i] = k.inverse[i] * sum;
   }
   for (int i = 4; i >= 0; --i)
@@ -83,7 +83,7 @@ inline void back(Elimination& el, const ChainProgram& chain, V6 eta, V3 p, const
     }
     const StiffSlot& k = el.s.stiff[op.slot];
     move_twist(eta, p, k.p);
-    const V6 zeta = relative_twist(el, k, eta, turn);
+    const V6 zeta = relative_twist(k, eta, turn, el.heavy && !chain.still);
     eta = eta - zeta;
     p = k.p;
     stiff_step(el, op, zeta, turn + eta.b, active);

@@ -19,16 +19,17 @@ struct Tangent {
   V3 torque;        ///< on the start, from the gaps at the ends of a block's branches: only with `el.exact`
 };
 
-/// Moves the tangent to point q; F is the wrench transmitted there.
-inline void move(const Elimination& el, Tangent& t, const V3& q, const V6& F) {
+/// Moves the tangent to point q; F is the wrench transmitted there. `turns`: the chain's start may, and weights with
+/// it.
+inline void move(Tangent& t, const V3& q, const V6& F, bool turns) {
   transport(t.K, t.c, q - t.p, F.a);
-  if (el.heavy) transport(t.turning, q - t.p);
+  if (turns) transport(t.turning, q - t.p);
   t.p = q;
 }
 
 /// Rank-one step of a coordinate with row u = K J + g, own stiffness d (F4), coupling to the start's turn s;
 /// `pull` is the pending weights' share of its force (F11).
-inline void eliminate(Elimination& el, const Op& op, JointSlot& j, V d, const V3& s, V pull, Tangent& t) {
+inline void eliminate(Elimination& el, const Op& op, JointSlot& j, V d, const V3& s, V pull, Tangent& t, bool turns) {
   const int q = op.coordinate;
   const V da = el.s.da[q];
   const V pivot = da * d + el.s.dtau[q];
@@ -39,13 +40,13 @@ inline void eliminate(Elimination& el, const Op& op, JointSlot& j, V d, const V3
   downdate(t.K, j.u, da * j.inverse);
   t.c = t.c - (da * j.y) * j.u;
   j.turn = s;
-  if (el.heavy) eliminate(t.turning, j.u, s, da * j.inverse);
+  if (turns) eliminate(t.turning, j.u, s, da * j.inverse);
 }
 
-inline void append_joint(Elimination& el, const Op& op, Tangent& t) {
+inline void append_joint(Elimination& el, const Op& op, Tangent& t, bool turns) {
   JointSlot& j = el.s.joints[op.slot];
   if (!op.eliminated || t.rigid) return;
-  move(el, t, j.o, j.F);
+  move(t, j.o, j.F, turns);
   V6 g{};
   if (op.kind == OpKind::prismatic) {
     j.J = {j.w, V3{}};
@@ -56,7 +57,7 @@ inline void append_joint(Elimination& el, const Op& op, Tangent& t) {
   }
   const V6 KJ = t.K * j.J;
   j.u = KJ + g;
-  eliminate(el, op, j, dot(j.J, KJ), el.heavy ? along(t.turning, j.J) : V3{}, splat(0), t);
+  eliminate(el, op, j, dot(j.J, KJ), turns ? along(t.turning, j.J) : V3{}, splat(0), t, turns);
 }
 
 /// A joint before the first compliance of a chain whose start is held (F6); F at t.p.
@@ -87,7 +88,7 @@ inline void prepend_joint(Elimination& el, const Op& op, const V6& F, const V6& 
       s = s + cross(j.w, t.turning.weight);  // what slides is heavy
     }
   }
-  eliminate(el, op, j, d, s, el.heavy ? dot(j.J, hung) : splat(0), t);
+  eliminate(el, op, j, d, s, el.heavy ? dot(j.J, hung) : splat(0), t, el.heavy);
 }
 
 /// Weights of a chain's bodies that act, but are not in the wrenches yet (F11), about p.
@@ -162,13 +163,13 @@ inline void block_tangent(Elimination& el, const Op& op, Tangent& t) {
 }
 
 /// D = K + K_e + [0, S(f); -S(f), 0], factorised in the slot (F7).
-inline void factorise(Elimination& el, StiffSlot& k, const Sym6& K, const Tangent& own) {
+inline void factorise(Elimination& el, StiffSlot& k, const Sym6& K, const Tangent& own, bool heavy) {
   const V3 f = k.F.a;
   Sym6 D = K + own.K;
   D.B.c[0] = D.B.c[0] + V3{splat(0), f.z, -f.y};
   D.B.c[1] = D.B.c[1] + V3{-f.z, splat(0), f.x};
   D.B.c[2] = D.B.c[2] + V3{f.y, -f.x, splat(0)};
-  if (el.heavy) {
+  if (heavy) {
     const V6* G = own.turning.G;
     for (int i = 0; i < 3; ++i) D.B.c[i] = D.B.c[i] - G[i].a;
     D.E.xx -= 2.0 * G[0].b.x;
@@ -185,7 +186,7 @@ inline void factorise(Elimination& el, StiffSlot& k, const Sym6& K, const Tangen
 }
 
 /// X = K + [0, S(f); 0, S(m)/2] and y, both times L^-1.
-inline void couple(const Elimination& el, StiffSlot& k, const Sym6& K, const V6& y, const Tangent& own) {
+inline void couple(StiffSlot& k, const Sym6& K, const V6& y, const Tangent& own, bool heavy) {
   const V3 f = k.F.a, h = splat(0.5) * k.F.b;
   unpack(K, k.X);
   k.X[0][4] -= f.z;
@@ -200,7 +201,7 @@ inline void couple(const Elimination& el, StiffSlot& k, const Sym6& K, const V6&
   k.X[4][5] -= h.x;
   k.X[5][3] -= h.y;
   k.X[5][4] += h.x;
-  for (int q = 0; q < 3 && el.heavy; ++q) {
+  for (int q = 0; q < 3 && heavy; ++q) {
     V g[6];
     put(own.turning.G[q], g);
     for (int i = 0; i < 6; ++i) k.X[i][3 + q] -= g[i];
@@ -250,11 +251,11 @@ inline void condense(const StiffSlot& k, Sym6& K, V6& c) {
   c = c - get(full);
 }
 
-/// The same elimination in G and M of the chain (F9).
-inline void condense(StiffSlot& k, const V6 (&inner)[3], Turning& t) {
+/// The same elimination in G and M of the chain (F9); `inner`: the block's own G, null for a spring.
+inline void condense(StiffSlot& k, const V6* inner, Turning& t) {
   for (int q = 0; q < 3; ++q) {
     V(&y)[6] = k.turn[q];
-    put(t.G[q] - inner[q], y);
+    put(inner ? t.G[q] - inner[q] : t.G[q], y);
     V sum[6] = {};
     for (int i = 0; i < 6; ++i) {
       for (int r = 0; r < i; ++r) y[i] -= k.L[i][r] * y[r];
@@ -266,46 +267,51 @@ inline void condense(StiffSlot& k, const V6 (&inner)[3], Turning& t) {
   for (int i = 0; i < 6; ++i) downdate(t.M, {k.turn[0][i], k.turn[1][i], k.turn[2][i]}, k.inverse[i]);
 }
 
+/// A spring's or block's own tangent; `heavy`: what its weights make of a turn of its start, too.
+inline void own_tangent(Elimination& el, const Op& op, const StiffSlot& k, Tangent& t, bool heavy) {
+  if (heavy) t.turning.clear(k.start.p);
+  if (el.exact) t.torque = V3{};
+  if (op.kind == OpKind::spring) spring_tangent(el, op, k, t.K, t.c);
+  else block_tangent(el, op, t);
+}
+
+/// The first spring or block of a chain, and the joints before it.
+inline void begin_stiff(Elimination& el, const ChainProgram& chain, const V3& start, const Op& op, Tangent& t) {
+  const StiffSlot& k = el.s.stiff[op.slot];
+  own_tangent(el, op, k, t, el.heavy);
+  t.rigid = false;
+  t.p = k.p;
+  prepend(el, chain, start, k.F, t);
+}
+
 /// A spring or block behind what came before: its relative twist is eliminated (F7).
-inline void append_stiff(Elimination& el, const ChainProgram& chain, const V3& start, const Op& op, Tangent& t) {
+inline void append_stiff(Elimination& el, const Op& op, Tangent& t, bool turns) {
   StiffSlot& k = el.s.stiff[op.slot];
+  const bool heavy = el.heavy && op.kind == OpKind::block;  // there are weights inside
   Tangent own;
-  if (el.heavy) own.turning.clear(k.start.p);
-  if (el.exact) own.torque = V3{};
-  if (op.kind == OpKind::spring) spring_tangent(el, op, k, own.K, own.c);
-  else block_tangent(el, op, own);
-  if (t.rigid) {
-    t.rigid = false;
-    t.K = own.K;
-    t.c = own.c;
-    t.p = k.p;
-    if (el.heavy) t.turning = own.turning;
-    if (el.exact) t.torque = own.torque;
-    prepend(el, chain, start, k.F, t);
-    return;
-  }
-  if (el.heavy && op.kind == OpKind::block) {
-    move(el, t, k.start.p, {k.F.a + own.turning.weight, V3{}});
+  own_tangent(el, op, k, own, heavy);
+  if (heavy) {
+    move(t, k.start.p, {k.F.a + own.turning.weight, V3{}}, turns);
     t.K.E = t.K.E + own.turning.M;
-    append_block(t.turning, own.turning);
+    if (turns) append_block(t.turning, own.turning);
     t.c = t.c - pending_weights(el, own.turning, t.p);
     if (el.exact) t.c.b = t.c.b + own.torque;
   }
-  move(el, t, k.p, k.F);
-  factorise(el, k, t.K, own);
-  couple(el, k, t.K, t.c - own.c, own);
-  if (el.heavy) condense(k, own.turning.G, t.turning);
+  move(t, k.p, k.F, turns);
+  factorise(el, k, t.K, own, heavy);
+  couple(k, t.K, t.c - own.c, own, heavy);
+  if (turns) condense(k, heavy ? own.turning.G : nullptr, t.turning);
   condense(k, t.K, t.c);
 }
 
 /// A body's weight: transmitted wrench and lever arm change (F9).
-inline void append_load(Elimination& el, const Op& op, Tangent& t) {
+inline void append_load(Elimination& el, const Op& op, Tangent& t, bool turns) {
   if (t.rigid) return;
   const JointSlot& j = el.s.joints[op.slot];
-  move(el, t, j.o, j.F);
+  move(t, j.o, j.F, turns);
   add_lever(t.K.E, splat(-op.mass), el.gravity, j.w);
   if (!el.heavy) return;
-  append_weight(t.turning, op.mass, splat(op.mass) * el.gravity, j.o + j.w, j.o);
+  if (turns) append_weight(t.turning, op.mass, splat(op.mass) * el.gravity, j.o + j.w, j.o);
   const V3 w = splat(op.mass) * el.pending;
   t.c = t.c - V6{w, cross(j.w, w)};
 }
@@ -313,15 +319,14 @@ inline void append_load(Elimination& el, const Op& op, Tangent& t) {
 /// Tangent of a chain at point `end` under the end wrench F, its start frame at point `start` held.
 inline Tangent tangent(Elimination& el, const ChainProgram& chain, const V3& start, const V6& F, const V3& end) {
   Tangent t;
+  const bool turns = el.heavy && !chain.still;
   int from = chain.first;
   if (chain.group >= 0) {
     t.rigid = false;
     group_tangent(el, chain, t.K, t.c);
     t.p = el.s.groups[chain.group].p;
-    if (el.heavy) {
-      t.turning.clear(start);
-      group_turning(el, chain, t.turning);
-    }
+    if (el.heavy) t.turning.clear(start);
+    if (turns) group_turning(el, chain, t.turning);
     from = chain.first_stiff + 1;
   }
   for (int i = from; i < chain.first + chain.count; ++i) {
@@ -329,18 +334,19 @@ inline Tangent tangent(Elimination& el, const ChainProgram& chain, const V3& sta
     switch (op.kind) {
       case OpKind::revolute:
       case OpKind::prismatic:
-        append_joint(el, op, t);
+        append_joint(el, op, t, turns);
         break;
       case OpKind::spring:
       case OpKind::block:
-        append_stiff(el, chain, start, op, t);
+        if (t.rigid) begin_stiff(el, chain, start, op, t);
+        else append_stiff(el, op, t, turns);
         break;
       case OpKind::load:
-        append_load(el, op, t);
+        append_load(el, op, t, turns);
         break;
     }
   }
-  move(el, t, end, F);
+  move(t, end, F, turns);
   return t;
 }
 

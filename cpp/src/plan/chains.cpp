@@ -19,7 +19,7 @@ class Compiler {
     out_.chains.emplace_back();
     out_.program.root = 0;
     out_.program.legs_op = -1;
-    chain(m_.description, 0, true);
+    chain(m_.description, 0, true, true);
     return std::move(found_);
   }
 
@@ -31,7 +31,7 @@ class Compiler {
   };
 
   /// Operations of a chain are contiguous: those of its branches come before them.
-  void chain(const Chain& c, std::size_t index, bool outermost) {
+  void chain(const Chain& c, std::size_t index, bool outermost, bool still) {
     std::vector<Op> ops;
     Way way;
     for (const auto& element : c.elements) {
@@ -45,7 +45,7 @@ class Compiler {
       } else if (const auto* b = std::get_if<Body>(&element)) {
         body(*b, way, ops);
       } else if (const auto* k = std::get_if<Block>(&element)) {
-        block(*k, way, ops, outermost);
+        block(*k, way, ops, outermost, still);
       } else if (const auto* p = std::get_if<Point>(&element)) {
         const Pose at{p->offset, Mat3::Identity()};
         found_.places.push_back({index, ops.size(), way.nominal * at, way.actual * at});
@@ -56,6 +56,7 @@ class Compiler {
     p.count = i32(ops.size());
     p.nominal = constant(way.nominal);
     p.actual = constant(way.actual);
+    p.still = still;
     p.first_stiff = -1;
     for (std::size_t i = 0; i < ops.size(); ++i)
       if (p.first_stiff < 0 && (ops[i].kind == OpKind::spring || ops[i].kind == OpKind::block))
@@ -176,16 +177,17 @@ class Compiler {
     for (int i = 0; i < 3; ++i) op.com[i] = b.com[i];
   }
 
-  void block(const Block& b, Way& way, std::vector<Op>& ops, bool outermost) {
+  void block(const Block& b, Way& way, std::vector<Op>& ops, bool outermost, bool still) {
     const std::size_t first = out_.chains.size();
     out_.chains.resize(first + b.branches.size());
     const bool is_legs = outermost && b.name == "legs" && out_.program.legs_op < 0;
     const int here = i32(ops.size());
+    for (const Op& before : ops) still = still && before.kind == OpKind::load;
     Op& op = push(OpKind::block, way, ops);
     op.first = i32(first);
     op.count = i32(b.branches.size());
     op.slot = out_.program.stiff_slots++;
-    for (std::size_t k = 0; k < b.branches.size(); ++k) chain(b.branches[k].second, first + k, false);
+    for (std::size_t k = 0; k < b.branches.size(); ++k) chain(b.branches[k].second, first + k, false, still);
     if (is_legs) out_.program.legs_op = here;
     way.rigid = false;
   }
