@@ -78,10 +78,12 @@ struct Block {
     for (int i = 0; i < W; ++i) {
       const std::int64_t k = in.start ? place(i) : pose(i);
       for (int c = 0; c < 3; ++c) value[c][i] = in.position[3 * k + c];
-      for (int c = 0; c < 9; ++c) value[3 + c][i] = in.rotation[9 * k + c];
-      for (int c = 0; c < 6; ++c) value[12 + c][i] = in.wrench[6 * (1 + in.load_count) * pose(i) + c];
+      for (int c = 0; c < 9 && !in.one_rotation; ++c) value[3 + c][i] = in.rotation[9 * k + c];
+      for (int c = 0; c < 6 && !in.one_wrench; ++c) value[12 + c][i] = in.wrench[6 * (1 + in.load_count) * pose(i) + c];
     }
-    for (int c = 0; c < 18; ++c) *lanes[c] = kernel::load(value[c]);
+    for (int c = 0; c < 3; ++c) *lanes[c] = kernel::load(value[c]);
+    for (int c = 0; c < 9; ++c) *lanes[3 + c] = in.one_rotation ? splat(in.rotation[c]) : kernel::load(value[3 + c]);
+    for (int c = 0; c < 6; ++c) *lanes[12 + c] = in.one_wrench ? splat(in.wrench[c]) : kernel::load(value[12 + c]);
     return in.start ? given() : close();
   }
 

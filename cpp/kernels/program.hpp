@@ -221,9 +221,10 @@ struct FurtherLoad {
 struct KernelInput {
   std::int64_t count;
   const double* position;  ///< count x 3
-  const double* rotation;  ///< count x 9
-  const double* wrench;    ///< count x (1 + load_count) x 6, the first at the point
-  const double* start;     ///< count x coordinates: closed configurations; null: interpolate the grid
+  const double* rotation;  ///< count x 9, or one for all
+  const double* wrench;    ///< count x (1 + load_count) x 6, the first at the point; or those of one pose for all
+  std::int32_t one_rotation, one_wrench;
+  const double* start;  ///< count x coordinates: closed configurations; null: interpolate the grid
   double gravity[3];
   std::int32_t point;  ///< place of the tip's body where stiffness is answered
   std::int32_t read_count, load_count;

@@ -148,7 +148,7 @@ struct TipLoads {
   [[gnu::noinline]] V6 read(int i) const {
     alignas(64) double value[6][W];
     for (int lane = 0; lane < W; ++lane) {
-      const double* w = in->wrench + 6 * ((1 + in->load_count) * pose[lane] + 1 + i);
+      const double* w = in->wrench + 6 * ((in->one_wrench ? 0 : (1 + in->load_count) * pose[lane]) + 1 + i);
       for (int c = 0; c < 6; ++c) value[c][lane] = w[c];
     }
     V v[6];

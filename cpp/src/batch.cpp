@@ -22,10 +22,9 @@ constexpr long fast_chunk = 256;
 constexpr long patient_chunk = 64;
 
 void read(const BatchInput& in, Index i, PoseInput& pose) {
-  pose.commanded.p = Eigen::Map<const Vec3>(in.position + 3 * i);
-  pose.commanded.R = Eigen::Map<const RowMajor3>(in.rotation + 9 * i);
+  pose.commanded = in.commanded(i);
   const Index loads = static_cast<Index>(in.load_points.size());
-  for (Index k = 0; k < loads; ++k) pose.wrenches[at(k)] = Eigen::Map<const Vec6>(in.wrench + 6 * (i * loads + k));
+  for (Index k = 0; k < loads; ++k) pose.wrenches[at(k)] = in.load(i, k);
 }
 
 void write(const Mechanism& m, Index i, const PoseResult& r, const BatchOutput& out) {
@@ -78,7 +77,7 @@ class Reference {
   /// the task leaves some of it open.
   void close(const Mechanism& m, const BatchInput& in, Index i, double* x, Pose& reached) {
     if (!closure_) closure_ = std::make_unique<ClosureWorkspace>(m);
-    const Pose pose{Eigen::Map<const Vec3>(in.position + 3 * i), Eigen::Map<const RowMajor3>(in.rotation + 9 * i)};
+    const Pose pose = in.commanded(i);
     VecX found(m.size());
     if (in.closed) found = Eigen::Map<const VecX>(in.closed + m.size() * i, m.size());
     const ClosureResult r = in.closed ? given_closure(m, *closure_, found) : inverse_closure(m, pose, *closure_, found);
@@ -123,6 +122,7 @@ class ClosedPoses {
     out.start = start_.data() - m.size() * begin;
     out.position = position_.data() - 3 * begin;
     out.rotation = rotation_.data() - 9 * begin;
+    out.one_rotation = false;
   }
 
  private:
@@ -159,6 +159,8 @@ KernelInput kernel_input(const BatchInput& in, const SolveOptions& options) {
   k.position = in.position;
   k.rotation = in.rotation;
   k.wrench = in.wrench;
+  k.one_rotation = in.one_rotation;
+  k.one_wrench = in.one_wrench;
   for (int i = 0; i < 3; ++i) k.gravity[i] = in.gravity[i];
   k.point = i32(in.read_points.front());
   k.max_iterations = 16;
@@ -329,8 +331,7 @@ class FastBatch {
     bool circulatory = false;
     const Index loads = static_cast<Index>(in_.load_points.size());
     for (Index k = 0; k < loads; ++k)
-      circulatory = circulatory || nonconservative(in_.load_points[at(k)].type,
-                                                   Eigen::Map<const Vec6>(in_.wrench + 6 * (loads * i + k)));
+      circulatory = circulatory || nonconservative(in_.load_points[at(k)].type, in_.load(i, k));
     const std::uint32_t play = loose ? flag::free_play | flag::platform_singular : 0u;
     if (out_.flags) out_.flags[i] = flags_[at(i)] | play | (circulatory ? flag::nonconservative : 0u);
   }

@@ -24,7 +24,8 @@ std::vector<Index> point_indices(const Mechanism& m, const std::vector<std::stri
   return out;
 }
 
-/// All poses in one call: by the kernels where a plan is given, else by the reference path.
+/// All poses in one call: by the kernels where a plan is given, else by the reference path. One row of rotations or
+/// wrenches is meant for all.
 Answer solve(const Mechanism& m, const FastPlan* plan, const Array& position, const Array& rotation,
              const Array& wrench, const std::vector<std::string>& load_points, const std::vector<int>& load_types,
              const std::vector<std::string>& read_points, const Array& gravity, int load_steps, int threads, bool full,
@@ -33,8 +34,10 @@ Answer solve(const Mechanism& m, const FastPlan* plan, const Array& position, co
   BatchInput in;
   in.count = n;
   in.position = data(position, {n, 3}, "position");
-  in.rotation = data(rotation, {n, 3, 3}, "rotation");
-  in.wrench = data(wrench, {n, static_cast<py::ssize_t>(load_points.size()), 6}, "wrench");
+  in.one_rotation = rotation.ndim() > 0 && rotation.shape(0) == 1;
+  in.one_wrench = wrench.ndim() > 0 && wrench.shape(0) == 1;
+  in.rotation = data(rotation, {in.one_rotation ? 1 : n, 3, 3}, "rotation");
+  in.wrench = data(wrench, {in.one_wrench ? 1 : n, static_cast<py::ssize_t>(load_points.size()), 6}, "wrench");
   if (closed) in.closed = data(*closed, {n, m.size()}, "closed coordinates");
   in.gravity = Eigen::Map<const Vec3>(data(gravity, {3}, "gravity"));
   in.poll = &stop_where_interrupted;

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing, wrench_array
+from stiffmap.broadcasting import Floats, batch, rows, rows_or_one, thread_count, trailing, wrench_array
 from stiffmap.closing import Kinematics, close_actuators, close_poses
 from stiffmap.compiled import CompiledMachine
 from stiffmap.compiled.machine import LOAD_TYPES
@@ -95,8 +95,8 @@ def _solve(
     read = reading_points(machine, o, loaded)
     answer = machine.solve(
         rows(p, shape, (3,)),
-        rows(r, shape, (3, 3)),
-        np.stack([rows(v, shape, (6,)) for v in (w, *extra.values())], axis=1),
+        rows_or_one(r, shape, (3, 3)),
+        _stacked([w, *extra.values()], shape),
         load_points=loaded,
         load_types=types,
         read_points=read,
@@ -116,6 +116,15 @@ def _solve(
     order = (0, *(read.index(n) for n in o.read_points))
     solution = Solution(answer, shape, machine.names, o.point, order, unloaded=unloaded)
     return solution, answer.variants.reshape((*shape, len(variants), 6) if variants else (0,))
+
+
+def _stacked(wrenches: Sequence[Floats], shape: tuple[int, ...]) -> Floats:
+    """(n or 1, loads, 6) of all load points."""
+    if all(w.ndim == 1 for w in wrenches):
+        return np.array([wrenches])
+    if len(wrenches) == 1:
+        return rows(wrenches[0], shape, (6,))[:, None]
+    return np.stack([rows(w, shape, (6,)) for w in wrenches], axis=1)
 
 
 def _arrays(machine: CompiledMachine, call: Call) -> tuple[Floats, Floats, Floats, dict[str, Floats]]:

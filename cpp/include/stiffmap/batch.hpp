@@ -16,14 +16,26 @@ inline constexpr std::uint32_t reference_path = 1u << 13;
 struct BatchInput {
   Index count = 0;
   const double* position = nullptr;  ///< count x 3
-  const double* rotation = nullptr;  ///< count x 9
-  const double* wrench = nullptr;    ///< count x load points x 6
-  const double* closed = nullptr;    ///< count x coordinates already closed at the poses; null: found by closure
+  const double* rotation = nullptr;  ///< count x 9, or one for all
+  const double* wrench = nullptr;    ///< count x load points x 6, or one for all
+  bool one_rotation = false, one_wrench = false;
+  const double* closed = nullptr;  ///< count x coordinates already closed at the poses; null: found by closure
   std::vector<LoadPoint> load_points;
   std::vector<Index> read_points;
   Vec3 gravity = Vec3::Zero();
   std::vector<const FastPlan*> variants;  ///< plans of the same machine with a parameter moved
   void (*poll)() = nullptr;               ///< called now and then on the calling thread; throws to stop the batch
+
+  /// Of pose i: its commanded frame, and a load's wrench.
+  Pose commanded(Index i) const {
+    const double* const R = rotation + (one_rotation ? 0 : 9 * i);
+    return {Eigen::Map<const Vec3>(position + 3 * i),
+            Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(R)};
+  }
+  Eigen::Map<const Vec6> load(Index i, Index k) const {
+    const Index loads = static_cast<Index>(load_points.size());
+    return Eigen::Map<const Vec6>(wrench + 6 * ((one_wrench ? 0 : i * loads) + k));
+  }
 };
 
 /// Row-major outputs; null pointers are not written.

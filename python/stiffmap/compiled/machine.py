@@ -123,7 +123,7 @@ class CompiledMachine:
         variants: Sequence[CompiledMachine] = (),
         closed: Floats | None = None,
     ) -> _core.Answer:
-        """Equilibria of (n, 3) positions, (n, 3, 3) rotations and (n, load points, 6) wrenches.
+        """Equilibria of (n, 3) positions, (n or 1, 3, 3) rotations and (n or 1, load points, 6) wrenches.
 
         closed: (n, coordinates) already closed at these poses, NaN out of reach; None: found by closure.
         """
