@@ -405,11 +405,11 @@ struct Block {
       if (k.role == 1) limit |= off;
     }
     const M lock = locked(P.near_lock), stepped = steps > 0.0;
-    for (int i = 0; i < count; ++i)
-      if (done[i])
-        out.flags[pose(i)] = newton.P.flag_always | (lock[i] & P.flag_lock) | (high[i] & P.flag_force) |
-                             (range[i] & P.flag_range) | (limit[i] & P.flag_limit) | (stepped[i] & P.flag_stepped) |
-                             (unverified[i] & P.flag_unverified);
+    const auto bits = [](std::uint32_t which) { return M{} + static_cast<std::int64_t>(which); };
+    const M flags = bits(newton.P.flag_always) | (lock & bits(P.flag_lock)) | (high & bits(P.flag_force)) |
+                    (range & bits(P.flag_range)) | (limit & bits(P.flag_limit)) | (stepped & bits(P.flag_stepped)) |
+                    (unverified & bits(P.flag_unverified));
+    each_lane(done & written(), [&](int i) { out.flags[pose(i)] = static_cast<std::uint32_t>(flags[i]); });
     if (!out.leg_wrench || P.legs_op < 0) return;
     const Op& block = P.ops[P.legs_op];
     for (int b = 0; b < block.count; ++b) {

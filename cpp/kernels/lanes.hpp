@@ -66,24 +66,26 @@ template <int H>
 #endif
 #endif
 
+/// Calls put(lane) for each of `lanes`; all of them, the usual case, without asking each.
+template <class Put>
+[[gnu::always_inline]] inline void each_lane(M lanes, const Put& put) {
+  if (all(lanes)) {
+#pragma GCC unroll 8
+    for (int i = 0; i < W; ++i) put(i);
+    return;
+  }
+  for (int i = 0; i < W; ++i)
+    if (lanes[i]) put(i);
+}
+
 #ifdef STIFFMAP_SHUFFLES
 /// Fewer than W numbers of each lane.
-inline void write_few(const V* values, int count, M lanes, double* const (&out)[W]) {
+template <int count>
+[[gnu::noinline]] inline void write_few(const V* values, M lanes, double* const (&out)[W]) {
   V rows[W] = {};
   for (int k = 0; k < count; ++k) rows[k] = values[k];
   transpose<W / 2>(rows);
-  for (int i = 0; i < W; ++i) {
-    if (!lanes[i]) continue;
-    const double* row = reinterpret_cast<const double*>(&rows[i]);
-    double* to = out[i];
-#pragma GCC unroll 4
-    for (int piece = W / 2; piece > 0; piece /= 2) {
-      if (!(count & piece)) continue;
-      __builtin_memcpy(to, row, sizeof(double) * piece);
-      row += piece;
-      to += piece;
-    }
-  }
+  each_lane(lanes, [&](int i) { __builtin_memcpy(out[i], &rows[i], sizeof(double) * count); });
 }
 #endif
 
@@ -91,15 +93,15 @@ inline void write_few(const V* values, int count, M lanes, double* const (&out)[
 inline void write_lanes(const V* values, int count, M lanes, double* const (&out)[W]) {
   int from = 0;
 #ifdef STIFFMAP_SHUFFLES
-  if (count < W) return write_few(values, count, lanes, out);
+  if constexpr (W > 6)
+    if (count == 6) return write_few<6>(values, lanes, out);
   // The last W of them again where they are no multiple of W.
-  for (; from < count; from += W) {
+  for (; from < count && count >= W; from += W) {
     if (from > count - W) from = count - W;
     V rows[W];
     for (int k = 0; k < W; ++k) rows[k] = values[from + k];
     transpose<W / 2>(rows);
-    for (int i = 0; i < W; ++i)
-      if (lanes[i]) __builtin_memcpy(out[i] + from, &rows[i], sizeof(V));
+    each_lane(lanes, [&](int i) { __builtin_memcpy(out[i] + from, &rows[i], sizeof(V)); });
   }
 #endif
   for (; from < count; ++from)
