@@ -55,27 +55,22 @@ inline V invert_by_rows(V (&m)[6][6], V (&x)[6][6]) {
 inline void group_stiffness(const Elimination& el, const ChainProgram& chain, const V6& F, const V3& end, V (&A)[6][6],
                             V (&pull)[6]) {
   const Group group(el.P, chain);
-  // Sum of lever arm times force of all that acts behind the joint: A w = sum r (f·w), trace = sum r·f.
+  // Of all that acts behind the joint: lever arms times forces, force.
   M3 arms{};
   V3 force = F.a, pending{}, moment{};
   V3 at = end;
-  const auto lever = [&](const V3& r, const V3& f) {
-    arms.c[0] = arms.c[0] + f.x * r;
-    arms.c[1] = arms.c[1] + f.y * r;
-    arms.c[2] = arms.c[2] + f.z * r;
-  };
   int b = 5;
   for (int i = chain.first_stiff; i >= chain.first && b >= 0; --i) {
     const Op& op = el.P.ops[i];
     const bool joint = op.kind <= OpKind::prismatic;
     if (joint && !op.eliminated) continue;
     const JointSlot& j = el.s.joints[op.slot];
-    lever(at - j.o, force);
+    add_lever(arms, at - j.o, force);
     moment = moment + cross(at - j.o, pending);
     at = j.o;
     if (!joint) {
       const V3 weight = splat(op.mass) * el.gravity, more = splat(op.mass) * el.pending;
-      lever(j.w, weight);
+      add_lever(arms, j.w, weight);
       force = force + weight;
       moment = moment + cross(j.w, more);
       pending = pending + more;
@@ -86,8 +81,7 @@ inline void group_stiffness(const Elimination& el, const ChainProgram& chain, co
       g = cross(j.w, force);
       pull[b] = dot(j.w, pending);
     } else {
-      const V trace = arms.c[0].x + arms.c[1].y + arms.c[2].z;
-      g = arms * j.w - trace * j.w + splat(0.5) * cross(j.w, F.b);
+      g = arms * j.w - trace(arms) * j.w + splat(0.5) * cross(j.w, F.b);
       pull[b] = dot(j.w, moment);
     }
     for (int a = 0; a <= b; ++a) {
@@ -158,29 +152,24 @@ inline void group_tangent(Elimination& el, const ChainProgram& chain, Sym6& K, V
   // Of the bodies behind the joint, as in group_stiffness: sum of lever arm times weight, weight.
   M3 arms{};
   V3 force{}, at = k.p;
-  const auto lever = [&](const V3& r, const V3& f) {
-    arms.c[0] = arms.c[0] + f.x * r;
-    arms.c[1] = arms.c[1] + f.y * r;
-    arms.c[2] = arms.c[2] + f.z * r;
-  };
   int b = 5;
   for (int i = chain.first_stiff; i >= chain.first; --i) {
     const Op& op = el.P.ops[i];
     const bool joint = op.kind <= OpKind::prismatic;
     if (joint && !op.eliminated) continue;
     const JointSlot& j = el.s.joints[op.slot];
-    lever(at - j.o, force);
+    add_lever(arms, at - j.o, force);
     at = j.o;
     if (!joint) {
       const V3 weight = splat(op.mass) * el.gravity;
-      lever(j.w, weight);
+      add_lever(arms, j.w, weight);
       force = force + weight;
       hang(t, op.mass, weight, j.o + j.w);
       continue;
     }
     // The joint's force by the turn: W x w of what slides, w (r·W) - r (w·W) of what turns.
     V3 s = cross(force, j.w);
-    if (op.kind == OpKind::revolute) s = (arms.c[0].x + arms.c[1].y + arms.c[2].z) * j.w - arms * j.w;
+    if (op.kind == OpKind::revolute) s = trace(arms) * j.w - arms * j.w;
     const V(&row)[6] = k.inverse[b--];
     const V3 translation{row[0], row[1], row[2]}, rotation{row[3], row[4], row[5]};
     for (int c = 0; c < 3; ++c) {

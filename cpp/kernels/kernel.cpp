@@ -216,8 +216,7 @@ struct Block {
       moved = e.only;
       Newton at{Q, in, s, e, load, e.gravity};
       at.turning = base.turning;
-      at.turning.P = &Q;
-      at.turning.read();
+      at.turning.stand_on(Q);
       pass(at, Q);
       V c[6], eta[6];
       put(residual(e, Q.chains[Q.root], at.point), c);
@@ -253,11 +252,7 @@ struct Block {
         P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
     e.heavy = in.gravity[0] != 0 || in.gravity[1] != 0 || in.gravity[2] != 0;
     Newton newton{P, in, s, e, load, e.gravity};
-    newton.turning.P = &P;
-    newton.turning.in = &in;
-    for (int i = 0; i < W; ++i) newton.turning.pose[i] = pose(i);
-    newton.turning.command = command.R;
-    newton.turning.read();
+    newton.turning.read(P, in, command.R, [&](int lane) { return pose(lane); });
     V iterations = splat(0), steps;
     M done = newton.solve(usable, P.starts_linear, iterations, steps);
     if (in.patience == Patience::path && !P.starts_linear && !P.deficient && any(usable & ~done))

@@ -146,21 +146,18 @@ struct Serial {
     // and moment about the joint.
     V3 point = tip.point, force = tip.load.a, all = force + tip.pending.a, moment = tip.load.b + tip.pending.b;
     M3 arms = tip.arms;
-    const auto lever = [&](const V3& r, const V3& f) {
-      for (int k = 0; k < 3; ++k) arms.c[k] = arms.c[k] + (k == 0 ? f.x : k == 1 ? f.y : f.z) * r;
-    };
     int b = n - 1;
     for (int i = P.serial_count - 1; i >= 0; --i) {
       const Op& op = P.ops[P.serial[i]];
       const JointSlot& j = el.s.joints[op.slot];
       const V3 r = point - j.o;
-      lever(r, force);
+      add_lever(arms, r, force);
       moment = moment + cross(r, all);
       point = j.o;
       if (op.kind == OpKind::load) {
         if (!el.heavy) continue;
         const V3 weight = splat(op.mass) * el.gravity, whole = weight + splat(op.mass) * el.pending;
-        lever(j.w, weight);
+        add_lever(arms, j.w, weight);
         force = force + weight;
         moment = moment + cross(j.w, whole);
         all = all + whole;
@@ -170,7 +167,7 @@ struct Serial {
       if (how == Acts::nothing) {
         for (int a = 0; a <= b; ++a) B[a][b] = B[b][a] = splat(0);
       } else {
-        const V3 below = turns ? arms * j.w - (arms.c[0].x + arms.c[1].y + arms.c[2].z) * j.w : cross(j.w, force);
+        const V3 below = turns ? arms * j.w - trace(arms) * j.w : cross(j.w, force);
         couple(el, b, below, turns && how == Acts::moment ? cross(j.w, tip.dead_moment) : V3{}, how);
       }
       g[b] = dot(j.w, turns ? moment : all) - el.s.tau[op.coordinate];

@@ -19,10 +19,20 @@ struct TipLoads {
   V6 near[most_near];    ///< the first further loads as they were given, about their own points
   TipLoads() {}          // not filled with zeros
 
-  /// After the other members.
-  void read() {
-    before = before_of(in->point);
+  /// Loads of the poses `of` a block, whose tips stand at `R` by their command.
+  template <class PoseOf>
+  void read(const Program& program, const KernelInput& input, const M3& R, const PoseOf& of) {
+    in = &input;
+    command = R;
+    for (int i = 0; i < W; ++i) pose[i] = of(i);
+    stand_on(program);
     for (int i = 0; i < in->load_count && i < most_near; ++i) near[i] = read(i);
+  }
+
+  /// The same loads on a variant of the machine.
+  void stand_on(const Program& program) {
+    P = &program;
+    before = before_of(in->point);
   }
 
   /// Whether the wrench about the point is another when the tip turns.
@@ -59,7 +69,7 @@ struct TipLoads {
     for (int i = 0; i < in->load_count; ++i) {
       const V6 now = share * load_at(i, R);
       const V3 r = R * arm(i);
-      for (int k = 0; k < 3; ++k) out.arms.c[k] = out.arms.c[k] + (k == 0 ? now.a.x : k == 1 ? now.a.y : now.a.z) * r;
+      add_lever(out.arms, r, now.a);
       out.moment = out.moment + now.b;
     }
     return out;

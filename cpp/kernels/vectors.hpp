@@ -31,6 +31,14 @@ inline M3 operator*(const M3& A, const M3& B) { return {{A * B.c[0], A * B.c[1],
   return {dot(R.c[0], a), dot(R.c[1], a), dot(R.c[2], a)};
 }
 
+inline V trace(const M3& A) { return A.c[0].x + A.c[1].y + A.c[2].z; }
+/// Adds r fᵀ: of lever arms r and forces f, the sum times w is that of r (f·w), its trace that of r·f.
+[[gnu::always_inline]] inline void add_lever(M3& sum, const V3& r, const V3& f) {
+  sum.c[0] = sum.c[0] + f.x * r;
+  sum.c[1] = sum.c[1] + f.y * r;
+  sum.c[2] = sum.c[2] + f.z * r;
+}
+
 struct Frame {
   V3 p;
   M3 R;
