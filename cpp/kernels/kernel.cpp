@@ -4,12 +4,11 @@
 #include <cstddef>
 #include <initializer_list>
 
+#include "answers.hpp"
 #include "closing.hpp"
 #include "hanging.hpp"
 #include "last_attempt.hpp"
 #include "load_path.hpp"
-#include "newton.hpp"
-#include "places.hpp"
 #include "residual.hpp"
 #include "strokes.hpp"
 
@@ -50,23 +49,9 @@ std::int64_t scratch_size(const Program* P) {
   return bytes;
 }
 
-/// One block of W poses; lanes beyond `count` repeat the last pose and are not written.
-struct Block {
-  const Program& P;
-  const KernelInput& in;
-  const KernelOutput& out;
-  Scratch& s;
-  std::int64_t first;
-  int count;
-  Frame command;
-  V6 load;
-  M never = {};  ///< lanes out of reach
-  M closed = {};
-  M unstable = {}, ended = {}, unverified = {}, nowhere = {};
-  M stuck = {};  ///< in equilibrium, but not where spins come to rest
-
-  std::int64_t place(int lane) const { return first + (lane < count ? lane : count - 1); }
-  std::int64_t pose(int lane) const { return in.index ? in.index[place(lane)] : place(lane); }
+/// One block of poses, from what is asked to what is answered.
+struct Block : Answers {
+  V6 load = {};
 
   /// What the poses ask; where they are given, the closed coordinates too: lanes without are not usable.
   M read() {
@@ -163,32 +148,6 @@ struct Block {
       s.z[q] = select(lanes, z, s.z[q]);
     }
     for (int k = 0; k < P.chain_count; ++k) s.branches[k].F = select(lanes, V6{}, s.branches[k].F);
-  }
-
-  /// Lanes in which a ball joint's axes are less than `least` from coinciding.
-  M locked(double least) const {
-    M hit{};
-    for (int q = 0; q < P.coordinate_count; ++q) {
-      if (!P.coordinates[q].ball) continue;
-      V sn, cs;
-      sincos(s.closed[q] - P.coordinates[q].middle, sn, cs);
-      hit |= absolute(cs) < least;
-    }
-    return hit;
-  }
-
-  /// What is said of the command of poses without an answer.
-  [[gnu::noinline]] void flag_command(M lanes, std::uint32_t also) {
-    const M lock = locked(P.near_lock);
-    for (int i = 0; i < count; ++i) {
-      if (!lanes[i]) continue;
-      std::uint32_t flags = also | (lock[i] ? P.flag_lock : 0u);
-      for (int q = 0; q < P.coordinate_count; ++q) {
-        const CoordinateProgram& k = P.coordinates[q];
-        if (s.closed[q][i] < k.lower || s.closed[q][i] > k.upper) flags |= k.role == 0 ? P.flag_range : P.flag_limit;
-      }
-      out.flags[pose(i)] = flags;
-    }
   }
 
   /// Frames and wrenches of a program's machine at the coordinates found.
@@ -303,119 +262,6 @@ struct Block {
     flag_command(nowhere, P.flag_stepped | P.flag_unverified);
     return last.found;
   }
-
-  /// What becomes of a lane that was given up.
-  std::uint8_t left(int lane) const {
-    if (nowhere[lane]) return pose_nowhere;
-    if (ended[lane]) return pose_ended;
-    if (stuck[lane]) return pose_left;
-    if (in.patience == Patience::path) return pose_left;
-    if (closed[lane]) return pose_heavy;
-    return in.patience == Patience::leaps ? pose_left : pose_slow;
-  }
-
-  std::uint8_t solved(int lane, const Newton& newton) const {
-    return unstable[lane] ? pose_unstable : newton.serial.play.lanes[lane] ? pose_loose : pose_solved;
-  }
-
-  void write(M done, const Newton& newton, const V (&K)[6][6], const V (&C)[6][6], V iterations, V steps) {
-    const V3 offset = commanded_offset();
-    const V6 d{newton.point - (command.p + command.R * offset),
-               rotation_since(P.places[in.point], command.R, newton.tip.R)};
-    V moved[6];
-    put(d, moved);
-    for (int i = 0; i < count; ++i) {
-      const std::int64_t k = pose(i);
-      out.done[k] = done[i] ? solved(i, newton) : never[i] ? pose_unreachable : left(i);
-      if (out.iterations && (done[i] || nowhere[i])) out.iterations[k] = static_cast<std::int32_t>(iterations[i]);
-    }
-    const M wanted = done & written();
-    put_out(moved, 6, wanted, out.displacement, 6 * (1 + in.read_count));
-    if (in.read_count > 0 && out.displacement) write_readings(wanted, newton);
-    put_out(K[0], 36, wanted, out.stiffness);
-    put_out(C[0], 36, wanted, out.compliance);
-    put_out(s.x, P.coordinate_count, wanted, out.coordinates);
-    write_efforts(done, newton, steps);
-    if (out.free_twists && any(newton.serial.play.lanes)) write_play(done & newton.serial.play.lanes, newton);
-  }
-
-  /// Lanes that are poses of their own.
-  M written() const {
-    M own{};
-    for (int i = 0; i < count; ++i) own[i] = -1;
-    return own;
-  }
-
-  /// Each pose's `n` numbers into its row of `to`, if that is wanted.
-  void put_out(const V* values, int n, M wanted, double* to) const { put_out(values, n, wanted, to, n); }
-  void put_out(const V* values, int n, M wanted, double* to, std::int64_t row) const {
-    if (!to) return;
-    double* rows[W];
-    for (int i = 0; i < W; ++i) rows[i] = to + row * pose(i);
-    write_lanes(values, n, wanted, rows);
-  }
-
-  /// The point of the answer in the tip's frame, as the command knows it.
-  V3 commanded_offset() const {
-    const double* o = P.places[in.point].nominal.p;
-    return {splat(o[0]), splat(o[1]), splat(o[2])};
-  }
-
-  /// Displacements of the further places (docs/fast_path.md F20).
-  [[gnu::noinline]] void write_readings(M wanted, const Newton& newton) const {
-    const double* o = P.places[in.point].actual.p;
-    const Frame tip{newton.point - newton.tip.R * V3{splat(o[0]), splat(o[1]), splat(o[2])}, newton.tip.R};
-    for (int k = 0; k < in.read_count; ++k) {
-      const PlaceProgram& place = P.places[in.reads[k]];
-      const Frame now = frame_of<Build::actual>(P, place, s.x, tip);
-      V moved[6];
-      put(frame_error(frame_of<Build::nominal>(P, place, s.closed, command), now), moved);
-      put_out(moved, 6, wanted, out.displacement + 6 * (1 + k), 6 * (1 + in.read_count));
-    }
-  }
-
-  [[gnu::noinline]] void write_play(M lanes, const Newton& newton) {
-    const V6& t = newton.serial.play.twist;
-    V twist[6];
-    put((1.0 / root(dot(t, t))) * t, twist);
-    for (int i = 0; i < count; ++i)
-      if (lanes[i])
-        for (int r = 0; r < 6; ++r) out.free_twists[36 * pose(i) + 6 * r] = twist[r][i];
-  }
-
-  void write_efforts(M done, const Newton& newton, V steps) {
-    M high{}, range{}, limit{};
-    V* const efforts = s.dz;  // no step is taken any more
-    for (int d = 0; d < P.drive_count; ++d) {
-      const DriveProgram& k = P.drives[d];
-      const JointSlot& j = s.joints[k.slot];
-      efforts[d] = P.coordinates[k.coordinate].locked ? -dot(j.w, k.prismatic ? j.F.a : j.F.b) : -s.tau[k.coordinate];
-      high |= absolute(efforts[d]) > k.force_limit;
-    }
-    put_out(efforts, P.drive_count, done & written(), out.effort);
-    for (int q = 0; q < P.coordinate_count; ++q) {
-      const CoordinateProgram& k = P.coordinates[q];
-      const M off = (s.closed[q] < k.lower) | (s.closed[q] > k.upper);
-      if (k.role == 0) range |= off;
-      if (k.role == 1) limit |= off;
-    }
-    const M lock = locked(P.near_lock), stepped = steps > 0.0;
-    const auto bits = [](std::uint32_t which) { return M{} + static_cast<std::int64_t>(which); };
-    const M flags = bits(newton.P.flag_always) | (lock & bits(P.flag_lock)) | (high & bits(P.flag_force)) |
-                    (range & bits(P.flag_range)) | (limit & bits(P.flag_limit)) | (stepped & bits(P.flag_stepped)) |
-                    (unverified & bits(P.flag_unverified));
-    each_lane(done & written(), [&](int i) { out.flags[pose(i)] = static_cast<std::uint32_t>(flags[i]); });
-    if (!out.leg_wrench || P.legs_op < 0) return;
-    const Op& block = P.ops[P.legs_op];
-    for (int b = 0; b < block.count; ++b) {
-      const BranchSlot& branch = s.branches[block.first + b];
-      const V3 m = branch.F.b + cross(branch.end.p - newton.point, branch.F.a);
-      const V w[6] = {-branch.F.a.x, -branch.F.a.y, -branch.F.a.z, -m.x, -m.y, -m.z};
-      double* rows[W];
-      for (int i = 0; i < W; ++i) rows[i] = out.leg_wrench + 6 * (block.count * pose(i) + b);
-      write_lanes(w, 6, done & written(), rows);
-    }
-  }
 };
 
 void run(const Program* P, const KernelInput* in, const KernelOutput* out, std::int64_t begin, std::int64_t end,
@@ -423,7 +269,7 @@ void run(const Program* P, const KernelInput* in, const KernelOutput* out, std::
   Scratch s = lay_out(*P, scratch, nullptr);
   for (std::int64_t i = begin; i < end; i += W) {
     const int count = static_cast<int>(end - i < W ? end - i : W);
-    Block block{*P, *in, *out, s, i, count, {}, {}, {}};
+    Block block{{*P, *in, *out, s, i, count}};
     block.run();
   }
 }
