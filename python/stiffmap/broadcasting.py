@@ -54,7 +54,7 @@ def rows(values: Floats, shape: tuple[int, ...], tail: tuple[int, ...]) -> Float
 
 
 def rows_or_one(values: Floats, shape: tuple[int, ...], tail: tuple[int, ...]) -> Floats:
-    """The same, or (1, *tail) where one is meant for all."""
+    """C-contiguous copy of shape (batch size, *tail), or (1, *tail) where one is meant for all."""
     return rows(values, () if values.ndim == len(tail) else shape, tail)
 
 

@@ -24,6 +24,17 @@ def solve_varied(
     (`alike`) are solved in full. NaN where a pose failed.
     """
     solution, varied = solve_call(machine, call, variants)
+    return solution, fill_holes(machine, call, variants, solution, varied)
+
+
+def fill_holes(
+    machine: CompiledMachine,
+    call: Call,
+    variants: Sequence[CompiledMachine],
+    solution: Solution,
+    varied: Floats,
+) -> Floats:
+    """The same displacements, those that one step does not tell solved in full."""
     gravity = machine.description.gravity
     heavy = bool(machine.gravity(call.options.gravity).any())
     heavier = [
@@ -32,11 +43,11 @@ def solve_varied(
         for m in variants
     ]
     if not any(heavier) and not np.isnan(varied.sum()):  # nothing is missing
-        return solution, varied
+        return varied
     for i, (m, other) in enumerate(zip(variants, heavier, strict=True)):
         hole = solution.ok & (other | np.isnan(varied[..., i, :]).any(axis=-1))
         if hole.any():
             part = call.only(hole)
             part = replace(part, options=replace(part.options, stiffness=False))
             varied[hole, i] = solve_call(m, part)[0].displacement
-    return solution, varied
+    return varied

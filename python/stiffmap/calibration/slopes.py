@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 
 from stiffmap.calibration.certificate import INSTRUMENT, SCALE, scaled
 from stiffmap.calibration.edit import edited
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.description import MachineDescription
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.prediction.ahead import Ahead
 from stiffmap.experiment.prediction.nearby import Near
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine
@@ -53,27 +55,32 @@ class Slopes:
         self._scale = self._here.pop((INSTRUMENT, SCALE), 0.0)
         apart = any(u.setup and not u.of_instrument for u, _ in pairs)  # a machine for each set-up
         plain = [k for k, u in enumerate(unknowns) if not u.setup and not u.of_instrument]
-        self._wanted = [] if apart else plain
-        self._told: dict[int, Floats | None] = {}
+        self._ahead = Ahead([] if apart else plain, AT_ONCE, self._tell)
 
     def of(self, k: int) -> Floats | None:
         """(n, c) of unknown k; None where whole predictions must tell."""
-        if k not in self._told and k in self._wanted:
-            first = self._wanted.index(k)
-            self._tell(self._wanted[first : first + AT_ONCE])
-        return self._told.pop(k, None)
+        return self._ahead.of(k)
 
-    def _tell(self, some: Sequence[int]) -> None:
+    def _tell(self, some: Sequence[int]) -> list[Floats | None]:
+        terms = (scaled(self._predictor.machine.description, self._scale),) if self._scale else ()
+        near = {k: n for k in some if (n := self._near(self._unknowns[k]))}
+        told = dict(zip(near, self._base.changes_of_machines(list(near.values()), terms), strict=True))
+        return [None if (change := told.get(k)) is None else change / SMALL for k in some]
+
+    @cached_property
+    def _base(self) -> Predictor:
+        """Of the machine with these values."""
         base = self._predictor
         if any(at != INSTRUMENT for at, _ in self._here):
             base = base.beside(machine=built(base, self._here))
-        terms = (scaled(self._predictor.machine.description, self._scale),) if self._scale else ()
-        near = [
-            Near(self._moved(self._unknowns[k], SMALL), partial(self._moved, self._unknowns[k], 0.0))
-            for k in some
-        ]
-        for k, change in zip(some, base.changes_of_machines(near, terms), strict=True):
-            self._told[k] = None if change is None else change / SMALL
+        return base
+
+    def _near(self, u: Unknown) -> Near | None:
+        """The machine with an unknown moved; None where it cannot be built: its own prediction will say why."""
+        try:
+            return Near(self._moved(u, SMALL), partial(self._moved, u, 0.0))
+        except StiffmapError:
+            return None
 
     def _moved(self, u: Unknown, by: float) -> MachineDescription:
         more = {place: self._here.get(place, 0.0) + weight * u.u * by for place, weight in u.moves}

@@ -71,7 +71,7 @@ def _of(m: Machine, path: Path) -> list[AppliedEffect]:
         ]
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError):
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError):
         raise FileError(
             "expected a diagnosis as `stiffmap diagnose --json` writes it", file=str(path)
         ) from None

@@ -20,7 +20,7 @@ def alike(one: MachineDescription, other: MachineDescription, *, heavy: bool) ->
     """
     if _whole(one) != _whole(other) or len(one.legs) != len(other.legs):
         return False
-    shared = len(one.legs) > 1 and any(isinstance(e, (Spring, Joint)) for e in one.base)
+    shared = len(one.legs) > 1 and any(isinstance(e, (Spring, Joint, Block)) for e in one.base)
     pairs = [(a.elements, b.elements) for a, b in zip(one.legs, other.legs, strict=True)]
     return (
         _sequence(one.base, other.base, heavy)

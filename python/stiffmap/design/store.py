@@ -26,6 +26,7 @@ class Evaluations:
     def __init__(self, design: Design, path: Path | None) -> None:
         self.path, self.known = path, dict[bytes, Judged]()
         self.mark = fingerprint(design)
+        self._sizes = (len(design.model.objectives),), (len(design.constraints),)
         if path is not None and path.exists():
             self._read(path)
 
@@ -38,8 +39,10 @@ class Evaluations:
             try:
                 row = parse_json(line)
                 f, g, x = (np.array(row[k], dtype=float) for k in "fgx")
+                if (f.shape, g.shape) != self._sizes:
+                    raise ValueError
                 self.known[x.tobytes()] = Judged(f, g, dict(row["values"]), str(row["reason"]))
-            except (ValueError, KeyError, TypeError):
+            except (ValueError, KeyError, TypeError, OverflowError):
                 continue  # the line at which the process was killed, or a damaged one: judged again
 
     def _same_design(self, line: str, path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -83,7 +84,13 @@ def _mapped(plan: MapPlan, folder: Path, mode: Any) -> Store:
         path = folder / f"{name}.npy"
         try:
             kept = open_memmap(path, mode)
-        except (OSError, ValueError) as error:
+        except (
+            OSError,
+            ValueError,
+            TypeError,
+            SyntaxError,
+            TokenError,
+        ) as error:  # headers are Python's text
             raise _damaged(path, shape, "none") from error
         if (kept.shape, kept.dtype) != (shape, np.dtype(dtype)):
             raise _damaged(path, shape, f"{kept.shape} {kept.dtype}")

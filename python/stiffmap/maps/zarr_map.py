@@ -141,7 +141,11 @@ class ZarrMap:
         try:
             index, checks = entry["tile"], entry["crc"]
             known = type(index) is int and 0 <= index < self.tiles.count
-            if not known or set(checks) != {v.name for v in self.plan.variables}:
+            if (
+                not known
+                or not isinstance(checks, dict)
+                or set(checks) != {v.name for v in self.plan.variables}
+            ):
                 raise ValueError
             return index, {self.chunk(n, index): value for n, value in checks.items()}
         except (KeyError, TypeError, ValueError) as error:

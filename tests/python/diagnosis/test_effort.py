@@ -165,7 +165,9 @@ def test_reach_is_asked_once_for_all_machines_of_one_geometry() -> None:
     assert straight(machine.description) is machine.description
     assert straight(play.description) == straight(machine.description)
     assert in_reach(play, plan).all()
+    assert in_reach(play, plan) is in_reach(machine, plan)
     assert not in_reach(play, plan).flags.writeable
+    assert in_reach(sm.load_machine("rotary-delta"), plan) is not in_reach(machine, plan)
 
 
 @pytest.fixture

@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.description import Point
+from stiffmap.description import Block, Branch, Point, Spring
 from stiffmap.diagnosis.candidates.candidates import Candidate, candidates
 from stiffmap.diagnosis.candidates.slopes import Slopes, step_of
+from stiffmap.diagnosis.fitting.fit import jacobian
+from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.effects import Parameter
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.whitening import Problem
 
 DOWN = (0.0, 0.0, -9.81)
 RELATIVE, ABSOLUTE = 1e-5, 2e-10
@@ -195,3 +198,60 @@ def test_a_place_is_told_once() -> None:
     again = predictor.changes(terms)
     assert predictor.effort == before
     assert all(a is b for a, b in zip(first, again, strict=True))
+
+
+def test_what_cannot_show_is_told_as_nothing() -> None:
+    """Deflections without a load are from the unloaded state to itself, whatever has moved it."""
+    machine = sm.load_machine("linear-delta")
+    bare = plan_for(machine, "deflection", None)
+    predictor = Predictor(machine, replace(bare, wrench=np.zeros_like(bare.wrench)))
+    candidate = next(c for c in candidates(machine.description, bare) if c.kind == "zero_offset")
+    (change,) = predictor.changes([moved(candidate, candidate.parameters[0], 1e-3)])
+    assert change is not None
+    assert not change.any()
+
+
+def test_from_what_is_off_to_what_is_not() -> None:
+    """The machine as declared rests at its commands, the one that it is told from does not."""
+    machine = sm.load_machine("linear-delta")
+    predictor = Predictor(machine, plan_for(machine, "position", None))
+    candidate = next(
+        c for c in candidates(machine.description, predictor.experiment) if c.kind == "zero_offset"
+    )
+    off, null = (moved(candidate, candidate.parameters[0], share) for share in (1e-2, 0.0))
+    (change,) = predictor.changes([null], off)
+    assert change is not None
+    assert change == pytest.approx(predictor(null) - predictor(off), rel=1e-4, abs=1e-12)
+    assert np.abs(change).max() > 1e-7
+
+
+def test_a_base_of_branches_yields_as_well() -> None:
+    """Where branches share a load behind a block, geometry between them is for whole predictions."""
+    d = sm.load_machine("orthoglide-revised").description
+    spring = Spring("soft", compliance=tuple(tuple(1e-6 * (i == k) for i in range(6)) for k in range(6)))
+    block = Block("pair", (Branch("a", (spring,)), Branch("b", (spring,))))
+    machine = sm.Machine(replace(d, base=(block, *d.base)))
+    predictor = Predictor(machine, plan_for(machine, "deflection", DOWN))
+    assert not kinds_told(predictor, ("zero_offset", "tilt", "length"), machine)
+
+
+@pytest.mark.parametrize("value", [0.002, 0.01, 1.0])
+def test_a_fit_of_compliances_that_are_hardly_there(value: float) -> None:
+    """Of an added compliance one step leaves its share of what is there: columns by central differences of predictions."""
+    machine = sm.load_machine("orthoglide-revised")
+    plan = replace(plan_for(machine, "deflection", None), gravity=None)
+    predictor = Predictor(machine, plan)
+    tried = candidates(machine.description, plan)
+    chosen = [
+        next(c for c in tried if c.kind == kind and c.parameters[0].name == "translation")
+        for kind in ("base_compliance", "tool_compliance")
+    ]
+    model = Model(tuple(chosen), np.full(sum(len(c.parameters) for c in chosen), value))
+    which = np.arange(len(model.values))
+    problem = Problem.of(plan, plan.sigma, predictor())
+    columns = jacobian(model, model.values, predictor, problem, which)
+    for k in which:
+        h = 0.3 * value * np.eye(len(which))[k]
+        up, down = (predictor(model.terms(model.values + s * h)) for s in (1, -1))
+        true = -problem.white((up - down) / (0.6 * value))
+        assert np.abs(columns[:, k] - true).max() < 5e-4 * np.abs(true).max() + 1e-6, model.parameters[k].name

@@ -13,8 +13,9 @@ from stiffmap.cli.inputs import placed
 from stiffmap.description.tree import joints
 from stiffmap.diagnosis.decision.patterns import features
 from stiffmap.effects.library.hysteresis import deflection, spring_force
-from stiffmap.experiment import Predictor, load_experiment
+from stiffmap.experiment import Predictor, load_experiment, random_plan
 from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.history import drives_of
 from stiffmap.experiment.ramps import directions
 from stiffmap.planning import estimate
@@ -247,3 +248,17 @@ def test_one_pose_has_no_waves_over_the_workspace(gear: sm.Machine, tmp_path: Pa
     names = [name for name, _ in features(Problem.of(e, e.sigma, np.zeros_like(e.reading)))]
     assert "waves over order" in names
     assert not any(name.startswith("waves along") for name in names)
+
+
+@pytest.mark.parametrize("name", ["orthoglide-revised", "linear-delta", "ur10"])
+def test_efforts_are_those_where_the_drives_are_commanded(name: str) -> None:
+    """Solved at the poses, or with the drives held where these poses have them: the same machine."""
+    machine = sm.load_machine(name)
+    plan = random_plan(machine, poses=3, loads=3, seed=4)
+    start = coordinates_of(machine, plan)
+    drives = [machine.compiled.names.joints[a] for a in machine.actuators]
+    held = machine.solve_joints(start[:, drives], plan.wrench, start=start)
+    found = drives_of(machine, plan)
+    assert found.effort == pytest.approx(held.actuator_effort, rel=1e-9, abs=1e-9)
+    soft = machine.with_effect("compliance", element=machine.actuators[0].rpartition(".")[2], scale=2.0)
+    assert drives_of(soft, plan).jacobian is found.jacobian  # of the rigid machine, found out once

@@ -49,7 +49,7 @@ def test_beyond_the_box(name: str) -> None:
     machine = pointed(sm.load_machine(name))
     position, wrench = draw(machine, 24, seed=42, margin=-0.5)
     for case in (0, 3):
-        agrees(machine, position, wrench, **several(wrench, case, machine))
+        assert agrees(machine, position, wrench, **several(wrench, case, machine)) > 2
 
 
 @pytest.mark.parametrize("level", _core.kernel_levels())

@@ -117,6 +117,8 @@ def test_resume_refuses_another_map(
         ("key.json", b'{"call": 3}'),
         ("done.npy", b""),
         ("deflection.npy", b"\x93NUMPY"),
+        ("deflection.npy", b"\x93NUMPY\x01\x00\x0b\x00{'descr': \n\n"),
+        ("deflection.npy", b"\x93NUMPY\x01\x00\x0b\x00[] + {1, 2}\n"),
         ("deflection.npy", None),
     ],
 )

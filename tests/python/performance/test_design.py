@@ -58,8 +58,12 @@ def test_the_same_seed_finds_the_same_set_also_after_a_kill(tmp_path):
     lines = (tmp_path / "a/evaluations.jsonl").read_text(encoding="utf-8").splitlines()
     broken = tmp_path / "b"
     broken.mkdir()
+    kept = lines[:11]
+    row = json.loads(kept[4])
+    kept[4] = json.dumps({**row, "f": [10**400]})  # more than a number holds
+    kept[5] = json.dumps({**json.loads(kept[5]), "g": [0.0] * 9})  # not of this design
     # killed in the middle of writing a line of the second generation
-    (broken / "evaluations.jsonl").write_text("\n".join(lines[:11]) + "\n" + lines[11][:20], encoding="utf-8")
+    (broken / "evaluations.jsonl").write_text("\n".join(kept) + "\n" + lines[11][:20], encoding="utf-8")
     again = optimize(path, folder=broken, processes=1)
     np.testing.assert_array_equal(whole.x, again.x)
     assert whole.history == again.history

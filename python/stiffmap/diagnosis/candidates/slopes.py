@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.effects import Parameter, get
 from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.prediction.ahead import Ahead
 from stiffmap.experiment.prediction.predict import Predictor
 
 AT_ONCE = 48
 """Slopes that are told together; between two candidates a diagnosis may be stopped."""
 # Shares of a parameter's scale for a slope. One step leaves of it what is quadratic in the change: of a length or an angle
-# little, whose deflections need the larger step against round-off; of a factor on a compliance the factor's change itself.
+# little, whose deflections need the larger step against round-off; of a factor on a compliance the factor's change itself,
+# and of a compliance that is added its share of what is there.
 LENGTHS, OTHERS = 1e-2, 2e-5
-Key = tuple[Candidate, str]
+PRESENT, LEAST = 1e-4, 1e-3
+"""Of what only grows: share of its value, and the least value, in scales."""
+Key = tuple[Candidate, Parameter]
 
 
 class Slopes:
@@ -23,28 +27,22 @@ class Slopes:
     def __init__(self, predictor: Predictor, candidates: Iterable[Candidate]) -> None:
         self._predictor = predictor
         wanted = [(c, p) for c in candidates if _is_smooth(c) for p in c.linear if side(p) == 0]
-        self._wanted = wanted
-        self._place = {(c, p.name): i for i, (c, p) in enumerate(wanted)}
-        self._told: dict[Key, Floats | None] = {}
+        self._ahead = Ahead(wanted, AT_ONCE, self._tell)
 
     def of(self, candidate: Candidate, p: Parameter) -> Floats | None:
         """(n, c) change of the readings per scale of a parameter; None where a whole prediction must tell."""
-        key = (candidate, p.name)
-        if key not in self._place:
-            return None
-        if key not in self._told:
-            self._tell(self._place[key])
-        return self._told.pop(key)
+        return self._ahead.of((candidate, p))
 
-    def _tell(self, first: int) -> None:
-        some = self._wanted[first : first + AT_ONCE]
+    def _tell(self, some: Sequence[Key]) -> list[Floats | None]:
         moved = [
             (c.term([_null(q) + (step_of(p) if q is p else 0.0) for q in c.parameters]),) for c, p in some
         ]
         unmoved = [(c.term([_null(q) for q in c.parameters]),) for c, _ in some]
         changes = self._predictor.changes(moved, unmoved=unmoved)
-        for (c, p), change in zip(some, changes, strict=True):
-            self._told[c, p.name] = None if change is None else change / (step_of(p) / p.scale)
+        return [
+            None if change is None else change / (step_of(p) / p.scale)
+            for (_, p), change in zip(some, changes, strict=True)
+        ]
 
 
 def _is_smooth(candidate: Candidate) -> bool:
@@ -63,5 +61,14 @@ def side(p: Parameter) -> int:
 
 
 def step_of(p: Parameter) -> float:
-    """By how much a parameter is moved for its slope."""
-    return (LENGTHS if p.unit.split("/")[0] in ("m", "rad") else OTHERS) * p.scale
+    """By how much a parameter is moved for its slope at the null."""
+    smooth = p.null is not None and p.unit.split("/")[0] in ("m", "rad") and "N" not in p.unit
+    return (LENGTHS if smooth else OTHERS) * p.scale
+
+
+def step_at(p: Parameter, value: float) -> float | None:
+    """The same at another value (SI); None where there is too little of it for one step."""
+    if side(p) == 0:
+        return step_of(p)
+    there = abs(value - _null(p))
+    return min(step_of(p), PRESENT * there) if there >= LEAST * p.scale else None

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from stiffmap.diagnosis.candidates.slopes import step_at
 from stiffmap.diagnosis.fitting.model import Model, tangent_step
 from stiffmap.diagnosis.fitting.tangents import (
     best_known,
@@ -219,26 +220,35 @@ def jacobian(
     here = problem.check(predictor(model.terms(values)))
     _, high = model.bounds()
     numbers = [int(i) for i in which]
-    steps = {i: tangent_step(values, i, high[i]) for i in numbers}
-    moved = [model.terms(_moved(values, i, steps[i])) for i in numbers]
-    told: list[Floats | None] = [None] * len(numbers)
+    slopes: dict[int, Floats] = {}
     if len(numbers) > 1:  # one alone costs as much by a prediction
         _go_on(predictor, most)
-        told = predictor.changes(moved, model.terms(values))
-    slopes: dict[int, Floats] = {}
-    for i, change in zip(numbers, told, strict=True):
-        if change is not None:
-            slopes[i] = change / steps[i]
-            continue
-        _go_on(predictor, most)
-        there, step = _beside(model, values, i, steps[i], predictor, problem)
-        slopes[i] = (there - here) / step
+        slopes = _told(model, values, predictor, numbers)
+    for i in numbers:
+        if i not in slopes:
+            _go_on(predictor, most)
+            there, step = _beside(model, values, i, tangent_step(values, i, high[i]), predictor, problem)
+            slopes[i] = (there - here) / step
     all_felt = len(values) - len(model.held)
     known = slopes if len(slopes) == all_felt else {**known_before(model, predictor), **slopes}
     if len(known) == all_felt > 0:
         keep(model, values, predictor, here, known)
-    columns = [-problem.white(s) for s in slopes.values()]
+    columns = [-problem.white(slopes[i]) for i in numbers]
     return np.column_stack(columns) if columns else np.zeros((len(problem), 0))
+
+
+def _told(model: Model, values: Floats, predictor: Predictor, numbers: Sequence[int]) -> dict[int, Floats]:
+    """Slopes of the predictions by those of the values that one step from the equilibria tells, per unit of each."""
+    _, high = model.bounds()
+    sizes = {i: step_at(p, values[i] * p.scale) for i, p in enumerate(model.parameters) if i in numbers}
+    steps = {
+        i: tangent_step(values, i, high[i], size / model.parameters[i].scale)
+        for i, size in sizes.items()
+        if size is not None
+    }
+    moved = [model.terms(_moved(values, i, step)) for i, step in steps.items()]
+    changes = predictor.changes(moved, model.terms(values)) if moved else []
+    return {i: c / steps[i] for i, c in zip(steps, changes, strict=True) if c is not None}
 
 
 def _beside(

@@ -9,6 +9,7 @@ import numpy as np
 
 from stiffmap.description import AppliedEffect
 from stiffmap.diagnosis.candidates.candidates import Candidate
+from stiffmap.effects import Parameter
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import basis
 
@@ -41,9 +42,14 @@ class Model:
         return self.residual is not None and bool(np.isfinite(self.chi2))
 
     @property
+    def parameters(self) -> list[Parameter]:
+        """Of all candidates, in the order of the values."""
+        return [p for c in self.candidates for p in c.parameters]
+
+    @property
     def scales(self) -> Floats:
         """(k,) SI size of one unit of each value."""
-        return np.array([p.scale for c in self.candidates for p in c.parameters])
+        return np.array([p.scale for p in self.parameters])
 
     @property
     def si(self) -> Floats:
@@ -64,10 +70,9 @@ class Model:
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Bounds of the values, in scales."""
-        parameters = [p for c in self.candidates for p in c.parameters]
         return (
-            np.array([p.lower / p.scale for p in parameters]),
-            np.array([p.upper / p.scale for p in parameters]),
+            np.array([p.lower / p.scale for p in self.parameters]),
+            np.array([p.upper / p.scale for p in self.parameters]),
         )
 
     def terms(self, values: Floats | None = None) -> tuple[AppliedEffect, ...]:
@@ -102,6 +107,6 @@ class Model:
         return np.zeros((0, 0)) if self.jacobian is None else basis(self.jacobian)
 
 
-def tangent_step(values: Floats, i: int, upper: float) -> float:
+def tangent_step(values: Floats, i: int, upper: float, size: float = STEP) -> float:
     """Difference step of value i: away from its upper bound."""
-    return -STEP if values[i] + STEP > upper else STEP
+    return -size if values[i] + size > upper else size

@@ -18,7 +18,7 @@ STEP = 1e-6
 def drive_jacobian(machine: Machine, plan: Experiment) -> Floats:
     """(n, 6, actuators) twist of the TCP per unit of each drive of the rigid machine, in the plan's branch.
 
-    Found out once for all machines of one geometry; not to be written to.
+    NaN in a column where the drive cannot move to both sides. Found out once for all machines of one geometry; not to be written to.
     """
     return _KNOWN.get(plan, machine, lambda: _found(machine, plan))
 
@@ -37,5 +37,6 @@ def _found(machine: Machine, plan: Experiment) -> Floats:
         between = up.rotation @ np.swapaxes(down.rotation, 1, 2)
         lost = ~np.asarray(np.isfinite(between).all(axis=(1, 2)))[:, None, None]
         turn = Rotation.from_matrix(np.where(lost, np.eye(3), between)).as_rotvec()
+        turn = np.where(lost[:, 0], np.nan, turn)
         columns.append(np.hstack([up.position - down.position, turn]) / (2 * STEP))
     return np.stack(columns, axis=-1)[back]

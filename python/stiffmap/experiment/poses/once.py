@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -11,22 +11,27 @@ from numpy.typing import NDArray
 from stiffmap.description.rigid import nominal_geometry
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.machine import Machine
+from stiffmap.recent import Recent
 
 Array = TypeVar("Array", bound=NDArray[Any])
 
 
+KEPT = 32
+"""Arrays of one plan: a fit that moves a nominal point makes another geometry with every trial."""
+
+
 class Once(Generic[Array]):
-    """Arrays by plan, geometry and name, as long as the plan lives; not to be written to."""
+    """Arrays by plan, geometry and name, the last ones as long as the plan lives; not to be written to."""
 
     def __init__(self) -> None:
-        self._known: WeakKeyDictionary[Experiment, dict[Hashable, Array]] = WeakKeyDictionary()
+        self._known: WeakKeyDictionary[Experiment, Recent[Array]] = WeakKeyDictionary()
 
     def get(self, plan: Experiment, machine: Machine, make: Callable[[], Array], name: str = "") -> Array:
         """The array of these; `make` is called where it is not known."""
-        known = self._known.setdefault(plan, {})
         key = name, nominal_geometry(machine.description)
-        if key not in known:
-            made = make()
-            made.flags.writeable = False
-            known[key] = made
-        return known[key]
+        return self._known.setdefault(plan, Recent(KEPT)).get(key, lambda: _frozen(make()))
+
+
+def _frozen(made: Array) -> Array:
+    made.flags.writeable = False
+    return made

@@ -23,9 +23,9 @@ from stiffmap.experiment.prediction.unloaded_state import lags
 from stiffmap.experiment.readings import kind_of
 from stiffmap.machine import Machine
 from stiffmap.options import SolveOptions
-from stiffmap.solving import Call
+from stiffmap.solving import Call, solve_call
 from stiffmap.status import Flag
-from stiffmap.variants import solve_varied
+from stiffmap.variants import fill_holes
 
 MOST_BYTES = 2**25
 """Of the displacements of all machines of one call."""
@@ -88,6 +88,8 @@ class Nearby:
     def _from(self, machine: Machine, others: Sequence[Machine]) -> Floats | None:
         """(others, n, c); None where the kernels leave too many poses."""
         out = np.zeros((len(others), len(self.plan), len(self.plan.channels)))
+        if self.plan.quantity == "deflection" and not self.plan.wrench.any():
+            return out  # from the state without load to itself
         at_once = max(1, MOST_BYTES // (48 * max(len(self.plan.distinct[0]), 1)) - 1)
         for first in range(0, len(others), at_once):
             some = slice(first, first + at_once)
@@ -95,7 +97,7 @@ class Nearby:
             if loaded is None:
                 return None
             out[some, :, :6] = loaded
-            if self.plan.quantity == "deflection" and self.plan.wrench.any():
+            if self.plan.quantity == "deflection":
                 rest = self._states(machine, self.plan.without_load, others[some])
                 if rest is None:
                     return None
@@ -105,7 +107,8 @@ class Nearby:
     def _states(self, machine: Machine, plan: Experiment, others: Sequence[Machine]) -> Floats | None:
         """(others, n, 6) of one state, loaded or not."""
         out = np.zeros((len(others), len(plan), 6))
-        moved = [i for i, m in enumerate(others) if plan.wrench.any() or moves_unloaded(m, plan)]
+        all_move = bool(plan.wrench.any()) or moves_unloaded(machine, plan)
+        moved = [i for i, m in enumerate(others) if all_move or moves_unloaded(m, plan)]
         if not moved:
             return out
         read = np.array(targets(machine, plan))
@@ -129,10 +132,14 @@ class Nearby:
         call = Call(once.position, once.wrench, options)
         # the machine itself is one of the others: what its last step leaves is theirs as well
         same = [machine.compiled, *(m.compiled for m in others)]
-        solution, varied = solve_varied(machine.compiled, call, same)
+        solution, varied = solve_call(machine.compiled, call, same)
         slow = (solution.flags & Flag.REFERENCE_PATH) > 0
         self.work += Work(len(once), int(slow.sum()))
-        if slow.mean() > FEW or not np.isfinite(varied[solution.ok]).all():
+        untold = solution.ok & np.isnan(varied).any(axis=(-2, -1))
+        if (slow | untold).mean() > FEW:
+            return None
+        varied = fill_holes(machine.compiled, call, same, solution, varied)
+        if not np.isfinite(varied[solution.ok]).all():
             return None
         found = np.moveaxis(varied, 1, 0)
         read = targets(machine, plan)

@@ -100,7 +100,7 @@ class Predictor:
         unmoved: Sequence[Terms] | None = None,
     ) -> list[Floats | None]:
         """(n, c) m, rad each: how much more the readings of some sets of terms show than those of `base`, to first order in
-        what differs, many at a fraction of a prediction each. None where whole predictions must tell: other loads, laws
+        what differs, many at a fraction of a prediction each; not to be written to. None where whole predictions must tell: other loads, laws
         that bend, records, branches, memory of the drives, and all that `Nearby.changes` leaves.
 
         unmoved
@@ -116,12 +116,12 @@ class Predictor:
         motion = self._motion_of(mechanical, load)
         before = readings(self.experiment, motion, base)
         told = Nearby(self.with_terms(base), self._plan_under(load), self.threads)
-        for i, change in zip(near, told.changes(list(near.values())), strict=True):
-            if change is not None and np.isfinite(change[np.isfinite(motion)]).all():
-                seen = readings(self.experiment, motion + change, moved[i]) - before
+        shown = self._shown(told, list(near.values()), motion, before, [moved[i] for i in near])
+        for i, seen in zip(near, shown, strict=True):
+            if seen is not None:
+                seen.flags.writeable = False
                 out[i] = self._changes.put(keys[i], seen, seen.nbytes)
                 self._effort.total += 1.0
-        self.solved += told.work.solved
         if told.work.slow_share > FEW:
             self._effort.add(motion, told.work.slow_share, declared=False)
         return out
@@ -138,17 +138,24 @@ class Predictor:
         return apply_records(self.machine.description, _parts(terms)[0])
 
     def changes_of_machines(self, others: Sequence[Near], terms: Terms = ()) -> list[Floats | None]:
-        """(n, c) m, rad each: how much more the readings of other machines show than those of this one, as `changes`;
-        `terms` of the measurement belong to all."""
+        """The same of other machines beside this one, of which nothing is kept; `terms` of the measurement belong to all."""
         motion = self._motion_of(*_parts(terms))
         before = readings(self.experiment, motion, terms)
-        told = Nearby(self.machine, self._plan_under(_parts(terms)[1]), self.threads).changes(others)
-        return [
-            readings(self.experiment, motion + change, terms) - before
+        told = Nearby(self.machine, self._plan_under(_parts(terms)[1]), self.threads)
+        return self._shown(told, others, motion, before, [terms] * len(others))
+
+    def _shown(
+        self, told: Nearby, others: Sequence[Near], motion: Floats, before: Floats, terms: Sequence[Terms]
+    ) -> list[Floats | None]:
+        """What readings show of the motions of others, beyond `before`."""
+        out = [
+            readings(self.experiment, motion + change, t) - before
             if change is not None and np.isfinite(change[np.isfinite(motion)]).all()
             else None
-            for change in told
+            for change, t in zip(told.changes(others), terms, strict=True)
         ]
+        self.solved += told.work.solved
+        return out
 
     def beside(self, *, machine: Machine | None = None, rows: Mask | None = None) -> Predictor:
         """The same of another machine, or of some rows (n,); what was solved before counts for neither."""

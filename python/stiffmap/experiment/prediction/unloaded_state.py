@@ -54,7 +54,9 @@ def _travels(machine: Machine, experiment: Experiment, back: Floats) -> Floats:
         there = inverse_kinematics(machine, experiment.position - back, experiment.rotation).actuators
         return np.asarray(here - there)
     twist = np.hstack([back, np.zeros_like(back)])
-    return np.asarray(np.einsum("nai,ni->na", np.linalg.pinv(drive_jacobian(machine, experiment)), twist))
+    return np.asarray(
+        np.einsum("nai,ni->na", np.linalg.pinv(np.nan_to_num(drive_jacobian(machine, experiment))), twist)
+    )
 
 
 def lagging(machine: Machine, sign: Floats, weighs: bool = False) -> Machine:
