@@ -22,6 +22,7 @@ void count_pose(const Program& P, Block& b, Scratch& s, double* out) {
   const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
   Elimination e{P, s, {}, splat(1e300), {f, f, f, g, g, g}};
   Newton n{P, b.in, s, e, b.load, {}};
+  n.turning.read(P, b.in, b.command.R, [&](int lane) { return b.pose(lane); });
   Frame tip = Closing::base_frame();
   V3 at;
   V6 F = b.load, c;
@@ -55,7 +56,7 @@ stiffmap::bench::Counts stiffmap::bench::count_operations(const Program& P, cons
   Scratch s = lay_out(P, scratch.data(), nullptr);
   Counts counts{};
   for (std::int64_t i = 0; i < in.count; ++i) {
-    kernel::Block b{P, in, out, s, i, 1, {}, {}};
+    kernel::Block b{{P, in, out, s, i, 1}};
     count_pose(P, b, s, counts.operations);
   }
   for (double& n : counts.operations) n /= static_cast<double>(in.count);

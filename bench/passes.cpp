@@ -52,6 +52,7 @@ void time_block(Block& b, const M usable, Timer& time) {
   const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
   Elimination e{P, s, {}, splat(1e300), {f, f, f, g, g, g}};
   Newton n{P, b.in, s, e, b.load, e.gravity};
+  n.turning.read(P, b.in, b.command.R, [&](int lane) { return b.pose(lane); });
   time(bench::laws, [&] { n.laws.evaluate(false); });
   Frame tip;
   time(bench::frames, [&] {
@@ -93,7 +94,7 @@ void measure(const Program* P, const KernelInput* in, const KernelOutput* out, v
   Scratch s = lay_out(*P, scratch, nullptr);
   std::int64_t blocks = 0;
   for (std::int64_t i = 0; i + W <= in->count; i += W, ++blocks) {
-    Block b{*P, *in, *out, s, i, W, {}, {}};
+    Block b{{*P, *in, *out, s, i, W}};
     Timer time{repeats, W, seconds};
     M closed{};
     time(bench::closure, [&] { closed = b.read(); });

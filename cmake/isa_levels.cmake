@@ -2,11 +2,15 @@
 # symbol: objects of one source for several levels must not meet in one link.
 include(CheckCXXCompilerFlag)
 
+# What every build of the kernels' source is compiled with, here and in bench.
+add_library(stiffmap_kernel_options INTERFACE)
+target_compile_options(stiffmap_kernel_options INTERFACE
+  -fno-math-errno -fno-trapping-math -ffp-contract=fast -fno-semantic-interposition $<$<CONFIG:Release>:-O3>)
 # Structs of some kB are copied and cleared at every turn; GCC would do that by string instructions, which start slowly.
 set(copies -mmemcpy-strategy=vector_loop:-1:align -mmemset-strategy=vector_loop:-1:align)
 check_cxx_compiler_flag("${copies}" STIFFMAP_HAS_VECTOR_COPIES)
-if(NOT STIFFMAP_HAS_VECTOR_COPIES)
-  set(copies)
+if(STIFFMAP_HAS_VECTOR_COPIES)
+  target_compile_options(stiffmap_kernel_options INTERFACE ${copies})
 endif()
 
 # Each wide level has a narrow companion for calls on one or two poses: `name` is the level or the level and _pair.
@@ -16,8 +20,8 @@ function(stiffmap_kernel name lanes)
   add_library(${target} SHARED ${PROJECT_SOURCE_DIR}/cpp/kernels/kernel.cpp)
   target_compile_definitions(${target} PRIVATE
     STIFFMAP_LANES=${lanes} STIFFMAP_LEVEL="${level}" STIFFMAP_ENTRY=${target})
-  target_compile_options(${target} PRIVATE -fno-math-errno -fno-trapping-math -ffp-contract=fast -fno-semantic-interposition
-    $<$<CONFIG:Release>:-O3> ${copies} ${ARGN})
+  target_link_libraries(${target} PRIVATE stiffmap_kernel_options)
+  target_compile_options(${target} PRIVATE ${ARGN})
   stiffmap_compile_options(${target})
   set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden)
   if(SKBUILD)

@@ -47,6 +47,7 @@ inline M operator==(V a, V b) { return {a.v == b.v ? -1 : 0}; }
 inline M operator!=(V a, V b) { return {a.v != b.v ? -1 : 0}; }
 
 inline V splat(double x) { return x; }
+inline M bits(std::uint32_t which) { return {which}; }
 inline V select(M m, V a, V b) { return m ? a : b; }
 inline V absolute(V x) { return std::fabs(x.v); }
 inline V larger(V a, V b) { return a.v > b.v ? a : b; }
@@ -54,6 +55,10 @@ inline bool any(M m) { return m.m != 0; }
 inline bool all(M m) { return m.m != 0; }
 inline V root(V x) { return ++operations, V(std::sqrt(x.v)); }
 inline V load(const double* x) { return *x; }
+template <class Put>
+inline void each_lane(M lanes, const Put& put) {
+  if (lanes) put(0);
+}
 inline void write_lanes(const V* values, int count, M lanes, double* const (&out)[W]) {
   for (int i = 0; lanes[0] && i < count; ++i) out[0][i] = values[i].v;
 }

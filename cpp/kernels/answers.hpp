@@ -138,7 +138,6 @@ struct Answers {
       if (k.role == 1) limit |= off;
     }
     const M lock = locked(P.near_lock), stepped = steps > 0.0;
-    const auto bits = [](std::uint32_t which) { return M{} + static_cast<std::int64_t>(which); };
     const M flags = bits(always) | (lock & bits(P.flag_lock)) | (high & bits(P.flag_force)) |
                     (range & bits(P.flag_range)) | (limit & bits(P.flag_limit)) | (stepped & bits(P.flag_stepped)) |
                     (unverified & bits(P.flag_unverified));

@@ -18,6 +18,7 @@ using V = double __attribute__((vector_size(8 * W)));
 using M = std::int64_t __attribute__((vector_size(8 * W)));  // lane masks: all bits set or none
 
 inline V splat(double x) { return V{} + x; }
+inline M bits(std::uint32_t which) { return M{} + static_cast<std::int64_t>(which); }
 inline V select(M m, V a, V b) { return m ? a : b; }
 inline V absolute(V x) { return x < 0.0 ? -x : x; }
 inline V larger(V a, V b) { return a > b ? a : b; }
