@@ -4,7 +4,7 @@
 #include <atomic>
 #include <cstdlib>
 
-#ifdef __GLIBC__
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers bring their own
 namespace {
 std::atomic<long> calls{0};
 }
