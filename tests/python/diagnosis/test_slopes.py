@@ -19,6 +19,7 @@ from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.prediction.nearby import Near, Nearby
 
 DOWN = (0.0, 0.0, -9.81)
 RELATIVE, ABSOLUTE = 1e-5, 2e-10
@@ -218,10 +219,11 @@ def test_from_what_is_off_to_what_is_not() -> None:
     candidate = next(
         c for c in candidates(machine.description, predictor.experiment) if c.kind == "zero_offset"
     )
-    off, null = (moved(candidate, candidate.parameters[0], share) for share in (1e-2, 0.0))
-    (change,) = predictor.changes([null], off)
+    off = predictor.with_terms(moved(candidate, candidate.parameters[0], 1e-2))
+    (change,) = Nearby(off, predictor.experiment, None).changes([Near(machine.description)])
     assert change is not None
-    assert change == pytest.approx(predictor(null) - predictor(off), rel=1e-4, abs=1e-12)
+    whole = predictor() - predictor(moved(candidate, candidate.parameters[0], 1e-2))
+    assert change == pytest.approx(whole, rel=1e-4, abs=1e-12)
     assert np.abs(change).max() > 1e-7
 
 
