@@ -17,6 +17,8 @@ from stiffmap.maps.plan import MapPlan
 
 BLOCKS_PER_FLUSH = 32
 """Blocks that a power cut may cost; writing back after each would take a third of the time."""
+UNREADABLE = (OSError, ValueError, TypeError, SyntaxError, TokenError)
+"""What numpy raises for a damaged array: its header is Python's text."""
 FILL = {"u1": 255, "u4": 0, "f8": np.nan}
 
 
@@ -84,13 +86,7 @@ def _mapped(plan: MapPlan, folder: Path, mode: Any) -> Store:
         path = folder / f"{name}.npy"
         try:
             kept = open_memmap(path, mode)
-        except (
-            OSError,
-            ValueError,
-            TypeError,
-            SyntaxError,
-            TokenError,
-        ) as error:  # headers are Python's text
+        except UNREADABLE as error:
             raise _damaged(path, shape, "none") from error
         if (kept.shape, kept.dtype) != (shape, np.dtype(dtype)):
             raise _damaged(path, shape, f"{kept.shape} {kept.dtype}")

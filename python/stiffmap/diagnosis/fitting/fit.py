@@ -240,12 +240,11 @@ def jacobian(
 def _told(model: Model, values: Floats, predictor: Predictor, numbers: Sequence[int]) -> dict[int, Floats]:
     """Slopes of the predictions by those of the values that one step from the equilibria tells, per unit of each."""
     _, high = model.bounds()
-    sizes = {i: step_at(p, values[i] * p.scale) for i, p in enumerate(model.parameters) if i in numbers}
-    steps = {
-        i: tangent_step(values, i, high[i], size / model.parameters[i].scale)
-        for i, size in sizes.items()
-        if size is not None
-    }
+    parameters, steps = model.parameters, dict[int, float]()
+    for i in numbers:
+        size = step_at(parameters[i], values[i] * parameters[i].scale)
+        if size is not None:
+            steps[i] = tangent_step(values, i, high[i], size / parameters[i].scale)
     moved = [model.terms(_moved(values, i, step)) for i, step in steps.items()]
     changes = predictor.changes(moved, model.terms(values)) if moved else []
     return {i: c / steps[i] for i, c in zip(steps, changes, strict=True) if c is not None}
