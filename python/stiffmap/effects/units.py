@@ -12,6 +12,8 @@ from stiffmap.units import FORCES, LENGTHS, MASSES, PLANE_ANGLES
 _MICRO = Fraction(1, 10**6)
 _PLAIN = {"1": Fraction(1), "%": Fraction(1, 100), "ppm": _MICRO}
 _NUMBER = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)$")
+LONGEST_NUMBER = 100
+"""Characters."""
 _ATOM = re.compile(r"^([^\d^]+|1)(?:\^?(\d))?$")
 
 _WORKSHOP = {"m": ("um", "mm"), "rad": ("mrad", "deg"), "m/N": ("mm/N", "um/N"), "N/m": ("N/mm", "N/um")}
@@ -74,6 +76,9 @@ def read_value(text: str, expected: str) -> float:
     if not match:
         raise StiffmapError(f"expected a number with a unit ({expected}), got {text!r}")
     number, unit = match[1], match[2].strip()
+    exponent = number.lower().partition("e")[2]
+    if len(number) > LONGEST_NUMBER or len(exponent) > 4:  # exact fractions of such would fill the memory
+        raise StiffmapError(f"expected a number that is neither endless nor enormous, got {text!r}")
     want = unit_factor(expected)[1]
     if not unit:
         if want:

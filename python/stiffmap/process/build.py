@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.files.report import key_text, validated
+from stiffmap.files.schema.base import describe
 from stiffmap.performance.quantities import quantity
 from stiffmap.process.description import Cut, EndMill, Kienzle, Law, Process, Tool, Trimming
 from stiffmap.process.schema import ProcessFile, Quantity
@@ -19,6 +20,7 @@ UNITS = {
     **dict.fromkeys(("Ktc", "Krc", "Kac", "kc11", "rubbing", "specific_energy"), PRESSURE),
     **dict.fromkeys(("Kte", "Kre", "Kae"), EDGE),
 }
+LARGEST = 10**30
 LONGEST = 1.0
 """m of a tool or a cut: above, millimetres were meant."""
 
@@ -37,6 +39,8 @@ class Reader:
 
     def si(self, value: object, unit: str, *keys: str | int) -> float:
         """SI value of a number with its unit."""
+        if isinstance(value, int) and abs(value) > LARGEST:
+            self.fail("the number is too large", *keys)
         text = str(value).replace("J/", "N*m/") if unit == PRESSURE else value
         try:
             out = quantity(text, unit)
@@ -102,7 +106,7 @@ def _tool(m: ProcessFile, r: Reader) -> Tool:
     diameter = r.positive(t.diameter, "m", "tool", "diameter", most=LONGEST)
     coated = t.teeth == "coated"
     if not coated and (not isinstance(t.teeth, int) or not 1 <= t.teeth <= 1000):
-        r.fail(f"expected 1 to 1000 teeth, or coated; found {t.teeth!r}", "tool", "teeth")
+        r.fail(f"expected 1 to 1000 teeth, or coated; found {describe(t.teeth)}", "tool", "teeth")
     teeth = t.teeth if isinstance(t.teeth, int) else 0
     helix = r.si(t.helix, "rad", "tool", "helix")
     if not abs(helix) < pi / 2 * 0.95:

@@ -22,10 +22,12 @@ from stiffmap.maps import tiles
 from stiffmap.maps.zarr_map import ZarrMap
 from stiffmap.spreadsheet.convert import understand, write_folder
 from stiffmap.spreadsheet.sheet import read_sheet
+from stiffmap.toolpath import load_path, outline_text, sampled
 from stiffmap.urdf.importing import import_urdf
 
 ROOT = Path(__file__).parents[3]
 MACHINES = ROOT / "python/stiffmap/machines"
+PROCESSES = ROOT / "python/stiffmap/process/library"
 EXPERIMENTS = ROOT / "tests/data/experiments"
 
 
@@ -74,6 +76,23 @@ def _urdf(text: str, folder: Path) -> None:
     path = folder / "m.urdf"
     path.write_text(text, encoding="utf-8", errors="surrogatepass")
     import_urdf(path, None, meshes=False)
+
+
+def _gcode(text: str, folder: Path) -> None:
+    path = folder / "p.ngc"
+    path.write_text(text, encoding="utf-8", errors="surrogatepass")
+    p = load_path(path)
+    assert np.isfinite(p.length).all(), "a move without a length"
+    if p.cuts.any():
+        q = sampled(p, max(1e-3, float(p.length.sum()) / 1e4))
+        assert np.isfinite(q.position).all(), "a point that is nowhere"
+        assert np.isfinite(q.tangent).all(), "a point without a direction"
+
+
+def _process(text: str, folder: Path) -> None:
+    path = folder / "p.yaml"
+    path.write_text(text, encoding="utf-8", errors="surrogatepass")
+    assert np.isfinite(sm.cutting_force(path).mean).all(), "a force that is no number"
 
 
 def _sheet(text: str, folder: Path) -> None:
@@ -187,6 +206,12 @@ SHEETS = (
     "x\ty\tz\tdx\n1\t2\t3\t0.1\n4\t5\t6\t-0.1\n",
 )
 
+GCODE = (
+    "%\n(part) G21 G90 G17 G94 G40 G54\nS6000 M3\nG0 X10 Y0 Z5\nG1 Z-1 F300\nG3 X0 Y10 I-10 J0\n/G2 X10 Y0 R-10 Z-3\nG91 G1 X5 (side) Y-5\n"
+    "G90.1 G3 X10 Y0 I0 J0 P2\nG18 G2 X0 Z7 R20\nG93 G1 X1 F20\nN90 M5\nM30\n",
+    "G20 G90 F10 S100 M3\ng0x+0. 12 34y 7\nG1 X1 Y1 ; end\nG19 G2 Y2 Z1 J.5 K.5\nG43 H1\nG64 P0.01\nG53 G0 Z0\nM2\n",
+)
+
 TARGETS = {
     "machine": Target(lambda: [p.read_text() for p in sorted(MACHINES.glob("*.yaml"))], _machine),
     "experiment": Target(
@@ -196,6 +221,8 @@ TARGETS = {
     "field": Target(_field_seed, _field),
     "link": Target(_link_seed, _link),
     "urdf": Target(lambda: [URDF], _urdf),
+    "gcode": Target(lambda: [*GCODE, outline_text("washbasin")], _gcode),
+    "process": Target(lambda: [p.read_text() for p in sorted(PROCESSES.glob("*.yaml"))], _process),
     "sheet": Target(lambda: list(SHEETS), _sheet),
     "zarr": Target(_zarr_seeds, _zarr),
 }

@@ -69,3 +69,9 @@ def test_file_and_line_are_named(tmp_path: Path) -> None:
 def test_unknown_name() -> None:
     with pytest.raises(FileError, match=r"did you mean 'trimming'.*slot, trimming"):
         sm.load_process("triming")
+
+
+@pytest.mark.parametrize("feed", ["1e999999999 mm/min", "0." + "1" * 6000 + " mm/min", 10**400])
+def test_endless_numbers(feed: object) -> None:
+    with pytest.raises(FileError, match=r"feed: .*(endless|too large)"):
+        sm.load_process(changed(feed=feed))

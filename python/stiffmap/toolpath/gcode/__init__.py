@@ -1,0 +1,1 @@
+"""G-code: reading to moves, writing with positions changed."""

@@ -1,0 +1,58 @@
+"""What lines before have set, and what words mean (RS-274, as LinuxCNC's documentation has it)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import pi
+
+MM, INCH = 1e-3, 25.4e-3
+AXES = "XYZ"
+MOTIONS = {0.0: "G0", 1.0: "G1", 2.0: "G2", 3.0: "G3"}
+PLANES = {17.0: 2, 18.0: 1, 19.0: 0}
+OFFSETS = (54.0, 55.0, 56.0, 57.0, 58.0, 59.0)
+CENTRES = {2: "IJ", 1: "IK", 0: "JK"}
+"""Words of an arc's centre by the axis that it turns about."""
+IGNORED_G = {40.0, 49.0, 61.0, 61.1, 64.0, 80.0}
+"""Without meaning for the path: modes of tracking, cancelled compensation and cycles."""
+IGNORED_M = {0.0, 1.0, 6.0, 7.0, 8.0, 9.0}
+ENDS = {2.0, 30.0}
+REFUSED_G = {
+    5.0: "splines", 5.1: "splines", 5.2: "NURBS", 10.0: "tables set by the program", 28.0: "moves to the machine's home",
+    30.0: "moves to the machine's home", 33.0: "threads", 38.2: "probing", 41.0: "cutter radius compensation (write the path of the centre, G40)",
+    42.0: "cutter radius compensation (write the path of the centre, G40)", 92.0: "offsets set by the program",
+    95.0: "feed per revolution (write G94)", 96.0: "constant surface speed",
+    **dict.fromkeys((73.0, 76.0, 81.0, 82.0, 83.0, 84.0, 85.0, 86.0, 87.0, 88.0, 89.0), "drilling cycles"),
+}  # fmt: skip
+REFUSED_M = {98.0: "subprograms", 99.0: "subprograms", 97.0: "subprograms"}
+
+
+@dataclass
+class State:
+    """Modal words; lengths of the program become m by `unit`."""
+
+    unit: float = 0.0
+    """0: neither G20 nor G21 stood yet."""
+    motion: str = ""
+    plane: int = 2
+    absolute: bool = True
+    absolute_centres: bool = False
+    inverse_time: bool = False
+    feed: float | None = None
+    """As written: per minute, or moves per minute under G93."""
+    speed: float | None = None
+    """rpm."""
+    spindle: int | None = None
+    """1 clockwise, -1 counter-clockwise, 0 off, None: never said."""
+    offset: str = "G54"
+    length: int | None = None
+    """Register of the tool's length (G43 H)."""
+    position: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    known: list[bool] = field(default_factory=lambda: [False, False, False])
+    ended: bool = False
+
+    @property
+    def rate(self) -> float:
+        """rad/s of the spindle; 0 off, NaN where the program never says."""
+        if self.spindle is None:
+            return float("nan") if self.speed is None else 0.0
+        return self.spindle * (self.speed or 0.0) * pi / 30 if self.spindle else 0.0
