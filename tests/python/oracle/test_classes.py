@@ -1,0 +1,75 @@
+"""Random machines of classes that nobody ships, against Cartesian bodies; and machines of `unseen`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.description import Pose
+
+from .alter import slopes, with_one_effect
+from .check import checks
+from .classes import CLASSES, Classes
+from .energy import Loads
+from .nightly import SLOPE, judge, summary
+from .tasks import Task
+from .unseen import UNSEEN
+
+FLAGGED = ("over-actuated", "cables")  # forward kinematics of more drives than freedoms
+
+
+def objections(task: Task) -> list[str]:
+    truth, found = checks(task)
+    assert truth.found and len(found) >= 2
+    doubted = task.description.name in FLAGGED
+    return [
+        f"{c.how}: {c.wrong}" for c in found if c.wrong and not (doubted and "drives" in c.how and c.flagged)
+    ]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("name", CLASSES)
+def test_every_class_agrees(name: str, seed: int) -> None:
+    assert not objections(Classes(seed).task(name))
+
+
+@pytest.mark.parametrize("name", [n for n in CLASSES if n != "few"])
+def test_effects_agree(name: str) -> None:
+    task, what = with_one_effect(Classes(4).task(name), np.random.default_rng(4))
+    assert what and not objections(task), what
+
+
+@pytest.mark.parametrize("name", ["over-actuated", "gantry", "leaves", "locked balls"])
+def test_slopes_agree(name: str) -> None:
+    found = slopes(Classes(0).task(name), np.random.default_rng((0, 7)))
+    assert found
+    for s in found:
+        assert s.off < SLOPE + s.noise < 1e-3, s
+
+
+@pytest.mark.parametrize("name", UNSEEN)
+def test_unseen_machines_agree(name: str) -> None:
+    d = UNSEEN[name]()
+    gravity = np.array(d.gravity if d.gravity is not None else (0.0, 0.0, -9.81))
+    size = 0.3 if name.startswith("leaf") else 20.0
+    loads = Loads(size * np.array([1.0, -0.7, 0.5]), 0.01 * size * np.array([0.3, 1.0, -0.6]), gravity, {})
+    assert not objections(Task(d, Pose.of(d.home.p, d.home.r), None, loads, "dead", True))
+
+
+def test_a_wrong_answer_is_noticed() -> None:
+    """The core is asked about a machine that differs by 1e-6 in one stiffness."""
+    task = Classes(1).task("gantry")
+    stiffer = sm.Machine(task.description).with_effect(
+        "compliance", element="x", legs=["gantry"], scale=1.000001
+    )
+    truth, found = checks(task, stiffer)
+    assert truth.found
+    for c in found:
+        assert "another translation" in c.wrong
+
+
+def test_a_seed_is_judged_and_summed_up() -> None:
+    results = [judge(seed) for seed in (4, 5)]
+    assert [r["seed"] for r in results] == [4, 5] and not any(r["wrong"] for r in results)
+    assert summary(results).startswith("2 machines (")
