@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from stiffmap.cli.commands import COMMANDS, Command
+from stiffmap.cli.streams import plain_streams
 from stiffmap.cli.vectors import joined
 from stiffmap.errors import FileErrors, MissingPartError, StiffmapError
 
@@ -24,8 +25,8 @@ TRACEBACK = "STIFFMAP_TRACEBACK"
 HELP = """How far is a loaded machine pushed off its commanded position?
 
 Lengths in mm, forces in N, angles in deg. Every command has [bold]--help[/bold] with
-examples and [bold]--json[/bold]. Exit codes: 0 done, 1 done with findings, 2 bad input, 70 a defect of stiffmap,
-130 interrupted.
+examples and [bold]--json[/bold]. Exit codes: 0 done, 1 done with findings, 2 bad input or a system that refuses (no space,
+no memory), 70 a defect of stiffmap, 130 interrupted.
 """
 
 
@@ -33,13 +34,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``stiffmap`` (default: with the process's arguments); returns the exit code."""
     given = joined(sys.argv[1:] if arguments is None else arguments)
     try:
-        build_app(given)(args=given, prog_name="stiffmap")
+        with plain_streams():
+            build_app(given)(args=given, prog_name="stiffmap")
     except StiffmapError as error:
         for problem in error.problems if isinstance(error, FileErrors) else (error,):
             print(f"stiffmap: {one_line(problem)}", file=sys.stderr)
         return BAD_INPUT
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, typer.Abort):
         return INTERRUPTED
+    except MemoryError as error:
+        print(f"stiffmap: out of memory{f': {one_line(error)}' if str(error) else ''}", file=sys.stderr)
+        return BAD_INPUT
+    except OSError as error:
+        print(f"stiffmap: {_refusal(error)}", file=sys.stderr)
+        return BAD_INPUT
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
     except Exception as error:
@@ -48,6 +56,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"stiffmap: {_defect(error)}", file=sys.stderr)
         return DEFECT
     return 0
+
+
+def _refusal(error: OSError) -> str:
+    """What the system refused, of which file."""
+    what = error.strerror or one_line(error)
+    return what if error.filename is None else f"{os.fsdecode(error.filename)}: {what}"
 
 
 def _defect(error: Exception) -> str:

@@ -11,15 +11,14 @@ import typer
 from stiffmap.calibration import Calibration, Tolerances, calibrate
 from stiffmap.calibration.travel import Travel
 from stiffmap.cli.output import JsonOption
-from stiffmap.errors import FileError
+from stiffmap.outputs import make_folder, write_rows, write_text
+from stiffmap.outputs.option import written
 
 
 def calibrate_command(
     machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
     data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for calibration.json and table.txt.")
-    ] = None,
+    output: Annotated[Path | None, written(help="Folder for calibration.json and table.txt.")] = None,
     tolerance: Annotated[
         float, typer.Option(min=1e-3, help="Factor on the default standard uncertainties of the machine.")
     ] = 1.0,
@@ -62,23 +61,18 @@ def calibrate_command(
 
 def write(result: Calibration, folder: Path) -> None:
     """All files of a calibration; raises `FileError` where the folder cannot be written."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "calibration.json").write_text(result.to_json(), encoding="utf-8")
-        text = "\n".join([*result.lines(), "", *result.table()]) + "\n"
-        (folder / "table.txt").write_text(text, encoding="utf-8")
-        if result.travel:
-            (folder / "travel.csv").write_text("\n".join(profiles(result.travel)) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(folder)) from error
+    write_text(make_folder(folder) / "calibration.json", result.to_json())
+    write_text(folder / "table.txt", "\n".join([*result.lines(), "", *result.table()]) + "\n")
+    if result.travel:
+        write_rows(folder / "travel.csv", *profiles(result.travel))
     result.machine.save(folder / "machine.yaml")
 
 
-def profiles(travel: Travel) -> list[str]:
-    """Errors along the drives' travel as CSV, in mm and degrees."""
-    out = ["drive,coordinate,error,sigma,unit"]
+def profiles(travel: Travel) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of the errors along the drives' travel, in mm and degrees."""
+    out = []
     for p in travel.profiles:
         factor, unit = (1e3, "mm") if p.unit == "m" else (180.0 / math.pi, "deg")
         for values in zip(p.at, p.error, p.sigma, strict=True):
-            out.append(",".join((p.drive, *(f"{factor * v:.6g}" for v in values), unit)))
-    return out
+            out.append([p.drive, *(f"{factor * v:.6g}" for v in values), unit])
+    return ["drive", "coordinate", "error", "sigma", "unit"], out

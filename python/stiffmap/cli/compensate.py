@@ -22,13 +22,15 @@ from stiffmap.compensation import (
 )
 from stiffmap.compensation import compensate as compute
 from stiffmap.description import MachineDescription
-from stiffmap.errors import FileError, StiffmapError
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment.comparison.prediction_error import left_by
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.files.plan_file import load_plan
 from stiffmap.experiment.poses.orientation import against_base
 from stiffmap.machine import Machine
 from stiffmap.maps.files import read_dataset
+from stiffmap.outputs import write_text
+from stiffmap.outputs.option import written
 
 MM = 1e3
 
@@ -40,17 +42,17 @@ def compensate(
     poses: Annotated[
         Path | None, typer.Argument(help="CSV of wanted poses: x,y,z in mm, loads, approach_x …")
     ] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="CSV of commands.")] = None,
+    output: Annotated[Path | None, written(help="CSV of commands.")] = None,
     effect: EffectsOption = None,
     force: Annotated[
         str, typer.Option(help="Force at the tool in every pose, N, where the CSV has none.")
     ] = "0,0,0",
     gravity: Annotated[str | None, typer.Option(help="m/s², base axes, as 0,0,-9.81.")] = None,
     urdf: Annotated[
-        Path | None, typer.Option(help="Write the corrected geometry of a serial arm as URDF.")
+        Path | None, written("--urdf", help="Write the corrected geometry of a serial arm as URDF.")
     ] = None,
     dh: Annotated[
-        Path | None, typer.Option(help="Write it as a list of Denavit-Hartenberg rows (CSV).")
+        Path | None, written("--dh", help="Write it as a list of Denavit-Hartenberg rows (CSV).")
     ] = None,
     axis: Annotated[
         str | None, typer.Option(help="Instead of poses: a controller's table of this axis, x, y or z.")
@@ -197,13 +199,10 @@ def _commands(
 
 def _geometry(m: Machine, urdf: Path | None, dh: Path | None) -> dict[str, object]:
     corrected, left = corrected_geometry(m.description)
-    try:
-        if urdf is not None:
-            urdf.write_text(urdf_text(corrected), encoding="utf-8")
-        if dh is not None:
-            dh.write_text(_dh_text(corrected), encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(urdf or dh)) from error
+    if urdf is not None:
+        write_text(urdf, urdf_text(corrected))
+    if dh is not None:
+        write_text(dh, _dh_text(corrected))
     return {"not in the geometry": "; ".join(left) or "nothing"}
 
 

@@ -13,15 +13,14 @@ from stiffmap.calibration import Tolerances
 from stiffmap.cli.output import JsonOption
 from stiffmap.diagnosis import Diagnosis, diagnose
 from stiffmap.diagnosis.report.sentences import next_step
-from stiffmap.errors import FileError
+from stiffmap.outputs import make_folder, write_picture, write_text
+from stiffmap.outputs.option import written
 
 
 def diagnose_command(
     machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
     data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for report and files.")
-    ] = None,
+    output: Annotated[Path | None, written(help="Folder for report and files.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of folds and simulated noise.")] = 0,
     threads: Annotated[int | None, typer.Option(help="Threads; default: all cores.")] = None,
     exclude: Annotated[
@@ -81,13 +80,9 @@ def write(result: Diagnosis, folder: Path, date: str | None = None, inputs: Sequ
     """All files of a diagnosis; raises `FileError` where the folder cannot be written."""
     from stiffmap.diagnosis.report.pictures import figures
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "diagnosis.json").write_text(result.to_json(), encoding="utf-8")
-        for name, figure in figures(result).items():
-            figure.savefig(folder / f"{name}.png", dpi=130)
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(folder)) from error
+    write_text(make_folder(folder) / "diagnosis.json", result.to_json())
+    for name, figure in figures(result).items():
+        write_picture(folder / f"{name}.png", figure, dpi=130)
     result.report(folder / "report.html", date=date, inputs=inputs)
     result.machine.save(folder / "machine.yaml")
     if result.calibration is not None:

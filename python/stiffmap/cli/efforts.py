@@ -19,12 +19,12 @@ from stiffmap.cli.inputs import (
     MachineArgument,
     ThreadsOption,
     finish,
-    folder,
     gravity,
     machine_with,
     plain,
 )
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.outputs import make_folder
 
 
 def efforts(
@@ -70,7 +70,7 @@ def efforts(
     g = gravity(gravity_)
     run = load_motion(trajectory).trajectory(m, duration=duration, gravity=g)
     found = drive_efforts(m, run, gravity=g, friction=friction, threads=threads)
-    files = write(found, folder(output)) if output else []
+    files = write(found, make_folder(output)) if output else []
     if as_json:
         names = (
             "peak_effort",

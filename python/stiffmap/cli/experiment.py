@@ -14,6 +14,7 @@ from rich.table import Table
 
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import FileError, StiffmapError
+from stiffmap.outputs.option import written
 
 if TYPE_CHECKING:
     from stiffmap.experiment import Experiment
@@ -26,7 +27,7 @@ def experiment(
         Path, typer.Argument(help="Spreadsheet: .xlsx, .csv, .txt (any separator and decimal sign).")
     ],
     machine: Annotated[str, typer.Option(help="Declared machine: shipped name or machine file.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the experiment.")],
+    output: Annotated[Path, written(help="Folder of the experiment.")],
     quantity: Annotated[
         str | None,
         typer.Option(

@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import FileError
+from stiffmap.outputs.option import written
 
 
 def import_urdf(
@@ -18,9 +19,7 @@ def import_urdf(
     sidecar: Annotated[
         Path | None, typer.Option(help="YAML with what a URDF lacks: loops, motors, compliances.")
     ] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Machine file to write. [default: NAME.yaml]")
-    ] = None,
+    output: Annotated[Path | None, written(help="Machine file to write. [default: NAME.yaml]")] = None,
     without_meshes: Annotated[bool, typer.Option("--without-meshes", help="Do not look for meshes.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing file.")] = False,
     as_json: JsonOption = False,

@@ -12,7 +12,8 @@ import numpy as np
 import typer
 
 from stiffmap.broadcasting import Floats
-from stiffmap.errors import FileError, StiffmapError
+from stiffmap.errors import StiffmapError
+from stiffmap.outputs.option import written
 
 if TYPE_CHECKING:
     from stiffmap.description import AppliedEffect
@@ -42,7 +43,7 @@ MethodOption = Annotated[str, typer.Option(help="fast or reference.")]
 ThreadsOption = Annotated[int | None, typer.Option(help="Threads; default: all cores.")]
 ToleranceOption = Annotated[float, typer.Option(help="Tolerated deflection, mm.")]
 PlaneOption = Annotated[str, typer.Option(help="Plane in which the force turns: xy, xz or yz.")]
-FolderOption = Annotated[Path | None, typer.Option("-o", "--output", help="Folder for files and pictures.")]
+FolderOption = Annotated[Path | None, written(help="Folder for files and pictures.")]
 RotationOption = Annotated[
     str | None,
     typer.Option(
@@ -125,15 +126,6 @@ def placed(machine: Machine, text: str) -> AppliedEffect:
     given = {**dict(term.parameters), **dict(term.options)}
     added = machine.with_effect(term.kind, element=term.element or None, legs=term.legs or None, **given)
     return added.description.effects[-1]
-
-
-def folder(path: Path) -> Path:
-    """The folder for results, made where it is missing."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
-    return path
 
 
 def plain(value: Any) -> Any:

@@ -18,7 +18,6 @@ from stiffmap.cli.inputs import (
     ThreadsOption,
     ToleranceOption,
     finish,
-    folder,
     gravity,
     machine_with,
     plain,
@@ -51,6 +50,7 @@ from stiffmap.cli.map_worst import in_words, worst_pose
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.cli.statuses import failed_in_words
 from stiffmap.machine import Machine
+from stiffmap.outputs import make_folder
 
 
 def map_command(
@@ -132,7 +132,7 @@ def map_command(
     elif statistics:
         print_statistics(m, call, plane, scheduler, as_json)
     else:
-        target = folder(output) / ("map.zarr" if zarr else "map.nc")
+        target = make_folder(output) / ("map.zarr" if zarr else "map.nc")
         how = {
             "scheduler": scheduler,
             "progress": False if as_json else None,

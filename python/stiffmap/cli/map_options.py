@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-OutputOption = Annotated[Path, typer.Option("-o", "--output", help="Folder for the map and its pictures.")]
+from stiffmap.outputs.option import written
+
+OutputOption = Annotated[Path, written(help="Folder for the map and its pictures.")]
 ZOption = Annotated[
     list[float] | None,
     typer.Option(help="z-plane in mm; repeatable. [default: lowest, 0, highest of the workspace]"),

@@ -19,7 +19,6 @@ from stiffmap.cli.inputs import (
     MachineArgument,
     ThreadsOption,
     finish,
-    folder,
     gravity,
     machine_with,
     numbers,
@@ -27,7 +26,7 @@ from stiffmap.cli.inputs import (
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.cli.table_text import as_text
-from stiffmap.errors import StiffmapError
+from stiffmap.outputs import make_folder, write_text, writing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,7 +101,7 @@ def measures(
         toolpath=toolpath, clearance=None if clearance is None else MM * clearance,
         deflection=None if deflection is None else MM * deflection,
     )  # fmt: skip
-    files = write(table, folder(output)) if output else []
+    files = write(table, make_folder(output)) if output else []
     if as_json:
         print_json({**plain(table.as_plain()), "files": files})
     else:
@@ -187,10 +186,7 @@ def write(table: MeasuresTable, output: Path) -> list[str]:
     from stiffmap.report.pictures import animation
 
     data = output / "measures.json"
-    try:
-        data.write_text(json.dumps(plain(table.as_plain()), indent=2, ensure_ascii=False), encoding="utf-8")
-    except OSError as error:
-        raise StiffmapError(f"{data}: cannot be written: {error.strerror}") from error
+    write_text(data, json.dumps(plain(table.as_plain()), indent=2, ensure_ascii=False))
     figures = measure_figures(table)
     pictures = [save(f, output / f"{name}.png") for name, f in figures.items()]
     shown: dict[str, Figure | bytes] = {**figures}
@@ -198,7 +194,8 @@ def write(table: MeasuresTable, output: Path) -> list[str]:
         swinging = animation(moving_modes(table))
         shown["modes"] = swinging
         moving = output / "modes.gif"
-        moving.write_bytes(swinging)
+        with writing(moving) as fresh:
+            fresh.write_bytes(swinging)
         pictures.append(moving)
     return [str(p) for p in (data, *pictures, write_report(table, output / "report.html", shown))]
 

@@ -13,6 +13,7 @@ from rich.markup import escape
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import FileError
 from stiffmap.files.starter import starter_text
+from stiffmap.outputs import write_text
 
 
 def new(
@@ -31,10 +32,7 @@ def new(
     if file.exists() and not overwrite:
         raise FileError("exists already; use --overwrite to replace it", file=str(file))
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
-    try:
-        file.write_text(starter_text(name), encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(file)) from error
+    write_text(file, starter_text(name))
     if as_json:
         print_json({"file": str(file), "name": name})
     else:

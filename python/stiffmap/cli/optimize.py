@@ -12,9 +12,11 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from stiffmap.cli.inputs import folder, plain
+from stiffmap.cli.inputs import plain
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
+from stiffmap.outputs import make_folder
+from stiffmap.outputs.option import written
 
 if TYPE_CHECKING:
     from stiffmap.design import ParetoSet
@@ -23,9 +25,7 @@ if TYPE_CHECKING:
 
 def optimize(
     design: Annotated[str, typer.Argument(help="Design file, or a shipped one by name: redesign.")],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder for results; resumed from there.")
-    ] = Path("design"),
+    output: Annotated[Path, written(help="Folder for results; resumed from there.")] = Path("design"),
     generations: Annotated[int | None, typer.Option(help="Generations; default: the file's.")] = None,
     processes: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
     as_json: JsonOption = False,
@@ -57,7 +57,7 @@ def optimize(
         console.print(f"generation {generation}: {count} designs, {good} feasible, hypervolume {volume:.4f}")
 
     problem = load_design(design)
-    place = folder(output)
+    place = make_folder(output)
     found = search(problem, folder=place, generations=generations, processes=processes, progress=tell)
     report = measured(found, place)
     tables = report.tables

@@ -8,18 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from stiffmap.cli.inputs import ThreadsOption, folder, plain
+from stiffmap.cli.inputs import ThreadsOption, plain
 from stiffmap.cli.output import JsonOption, print_json
-from stiffmap.errors import FileError
+from stiffmap.outputs import make_folder, write_text
+from stiffmap.outputs.option import written
 
 if TYPE_CHECKING:
     from stiffmap.paper import Results, Statement
 
 
 def paper(
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for figures and tables.")
-    ] = None,
+    output: Annotated[Path | None, written(help="Folder for figures and tables.")] = None,
     points: Annotated[int, typer.Option(help="Positions along x and y of the error maps.")] = 101,
     figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 7 (with -o).")] = True,
     threads: ThreadsOption = None,
@@ -44,7 +43,7 @@ def paper(
     from stiffmap.paper import all_statements, compute
     from stiffmap.paper.table import as_plain, as_rich, count
 
-    target = folder(output) if output else None
+    target = make_folder(output) if output else None
     results = compute(points, threads=threads, progress=False if as_json else None)
     statements = all_statements(results)
     files = [str(f) for f in write(results, statements, target, figures)] if target else []
@@ -65,10 +64,5 @@ def write(results: Results, statements: list[Statement], target: Path, figures: 
 
     out = save_all(results, target) if figures else []
     for name, text in (("statements.csv", as_csv(statements)), ("statements.md", as_markdown(statements))):
-        file = target / name
-        try:
-            file.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise FileError(f"cannot be written: {error.strerror}", file=str(file)) from error
-        out.append(file)
+        out.append(write_text(target / name, text))
     return out

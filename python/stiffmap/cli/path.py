@@ -12,9 +12,10 @@ from rich.console import Console
 from rich.table import Table
 
 from stiffmap.broadcasting import Floats
-from stiffmap.cli.inputs import finish, folder, plain
+from stiffmap.cli.inputs import finish, plain
 from stiffmap.cli.output import print_json
 from stiffmap.machine import Machine
+from stiffmap.outputs import make_folder
 from stiffmap.status import Status
 
 SHOWN = 20
@@ -38,7 +39,7 @@ def path(
     ds = stiffmap.sweep(
         machine, at, direction, control=control, limit=limit, steps=steps, cross=cross, gravity=gravity
     )
-    files = write(machine, ds, folder(output)) if output else []
+    files = write(machine, ds, make_folder(output)) if output else []
     if as_json:
         counted = ds.assign(unstable_modes=ds.unstable_modes.astype(int))
         names = ("force", "deflection", "deflection_along", "unstable_modes", "status", "branch", "critical_force",

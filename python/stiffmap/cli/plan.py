@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,10 +12,12 @@ import typer
 from stiffmap.cli.inputs import numbers, placed, plain
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import AppliedEffect
-from stiffmap.errors import FileError, StiffmapError
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment import simulate
 from stiffmap.experiment.files.save import plan_columns
 from stiffmap.machine import Machine, load_machine
+from stiffmap.outputs import write_rows
+from stiffmap.outputs.option import written
 from stiffmap.planning import Design, design, follow
 from stiffmap.planning.estimate import fitted
 
@@ -31,9 +32,7 @@ def plan(
             "--identify", help="Effect whose numbers are to be told, at the value given; repeatable."
         ),
     ],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="CSV file of the rows chosen.")
-    ] = None,
+    output: Annotated[Path | None, written(help="CSV file of the rows chosen.")] = None,
     rival: Annotated[
         list[str] | None, typer.Option("--rival", help="Explanation to separate from; repeatable.")
     ] = None,
@@ -128,13 +127,7 @@ def _sequential(
 
 def _write(found: Design, path: Path) -> None:
     columns = plan_columns(found.experiment)
-    try:
-        with path.open("w", newline="", encoding="utf-8") as stream:
-            out = csv.writer(stream)
-            out.writerow(columns)
-            out.writerows(zip(*columns.values(), strict=True))
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
+    write_rows(path, list(columns), zip(*columns.values(), strict=True))
 
 
 def _plain(d: Design) -> dict[str, object]:

@@ -22,7 +22,6 @@ from stiffmap.cli.inputs import (
     PlaneOption,
     ToleranceOption,
     finish,
-    folder,
     force_given,
     gravity,
     machine_with,
@@ -31,6 +30,7 @@ from stiffmap.cli.inputs import (
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.cli.statuses import failed, failed_in_words
+from stiffmap.outputs import make_folder
 
 AtOption = Annotated[
     list[str] | None, typer.Option(help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]")
@@ -74,7 +74,7 @@ def polar(
     size, vector = force_given(force)
     how: dict[str, Any] = {"gravity": gravity(gravity_), "method": method}
     many = [stiffmap.polar(m, p, size, plane, directions=directions, **how) for p in places]
-    files = write(many, folder(output), plane, MM * tolerance) if output else []
+    files = write(many, make_folder(output), plane, MM * tolerance) if output else []
     if as_json:
         data = {"machine": m.name, "diagrams": [as_plain(d, plane) for d in many], "files": files}
         if vector is not None:

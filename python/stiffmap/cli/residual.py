@@ -15,6 +15,7 @@ from stiffmap.experiment import Experiment, Residual, load_experiment
 from stiffmap.experiment import residual as compute
 from stiffmap.experiment.channels import Channel
 from stiffmap.machine import load_machine
+from stiffmap.outputs import make_folder, write_picture, write_text
 
 
 def residual(
@@ -55,15 +56,14 @@ def residual(
 def _write(r: Residual, rows: int, output: Path) -> None:
     import json
 
-    from stiffmap.cli.inputs import folder
     from stiffmap.experiment.comparison.pictures import figures
     from stiffmap.experiment.comparison.table import write_table
 
-    place = folder(output)
+    place = make_folder(output)
     write_table(r, place / "residual.csv")
-    (place / "residual.json").write_text(json.dumps(as_plain(r, rows), indent=2), encoding="utf-8")
+    write_text(place / "residual.json", json.dumps(as_plain(r, rows), indent=2))
     for name, figure in figures(r).items():
-        figure.savefig(place / f"{name}.png", dpi=130)
+        write_picture(place / f"{name}.png", figure, dpi=130)
 
 
 def as_plain(r: Residual, rows: int) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 from stiffmap.mobility import Mobility, mobility
+from stiffmap.outputs.option import written
 from stiffmap.status import Status
 
 
@@ -36,16 +37,15 @@ def show(
     machine: MachineArgument,
     at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
     turned: RotationOption = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Picture to write. [default: MACHINE.png]")
-    ] = None,
+    output: Annotated[Path | None, written(help="Picture to write. [default: MACHINE.png]")] = None,
     effect: EffectsOption = None,
     load: Annotated[
         str | None,
         typer.Option(help="Force on the tool in N, e.g. 300,0,0: draw the machine deformed by it."),
     ] = None,
     page: Annotated[
-        Path | None, typer.Option(help="With --load: also write a page (HTML) in which the machine turns.")
+        Path | None,
+        written("--page", help="With --load: also write a page (HTML) in which the machine turns."),
     ] = None,
     view: Annotated[
         str | None,

@@ -15,6 +15,7 @@ from stiffmap.experiment import Loop, save_experiment
 from stiffmap.experiment import simulate as run
 from stiffmap.experiment.virtual import plans as make
 from stiffmap.machine import load_machine
+from stiffmap.outputs.option import written
 
 Effects = Annotated[
     list[str] | None,
@@ -24,7 +25,7 @@ Effects = Annotated[
 
 def simulate(
     machine: Annotated[str, typer.Argument(help="Machine: shipped name or machine file.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the virtual experiment.")],
+    output: Annotated[Path, written(help="Folder of the virtual experiment.")],
     effect: Effects = None,
     plan: Annotated[
         str,

@@ -16,7 +16,6 @@ from stiffmap.cli.inputs import (
     MachineArgument,
     RotationOption,
     finish,
-    folder,
     gravity,
     machine_with,
     plain,
@@ -25,6 +24,7 @@ from stiffmap.cli.inputs import (
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.internal_wrenches import InternalWrenches
+from stiffmap.outputs import make_folder
 from stiffmap.status import Status
 
 
@@ -61,7 +61,11 @@ def stress(
         from stiffmap.plot import save, stress_figure
 
         files.append(
-            str(save(stress_figure(result, f"{m.name}: internal wrenches"), folder(output) / "stress.png"))
+            str(
+                save(
+                    stress_figure(result, f"{m.name}: internal wrenches"), make_folder(output) / "stress.png"
+                )
+            )
         )
     status = Status(int(result.status))
     if as_json:

@@ -20,7 +20,6 @@ from stiffmap.cli.inputs import (
     MethodOption,
     ToleranceOption,
     finish,
-    folder,
     gravity,
     machine_with,
     numbers,
@@ -29,6 +28,7 @@ from stiffmap.cli.inputs import (
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.cli.path import path
+from stiffmap.outputs import make_folder
 from stiffmap.status import Status
 
 
@@ -99,7 +99,7 @@ def sweep(
     forces = np.linspace(from_, to, max(points, 0))
     place, u = position(at, m), numbers(direction, "direction", 3)
     ds = stiffmap.sweep(m, place, u, forces, gravity=gravity(gravity_), method=method)
-    files = write(ds, folder(output), MM * tolerance) if output else []
+    files = write(ds, make_folder(output), MM * tolerance) if output else []
     if as_json:
         names = ("position", "direction", "force", "deflection", "deflection_along", "displacement", "status")
         print_json(plain({"machine": m.name} | {n: ds[n].values for n in names} | {"files": files}))

@@ -7,10 +7,8 @@ is solved with the declared machine's Jacobian; the deviations change it little,
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass, replace
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,13 +16,14 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.broadcasting import Floats, trailing, wrench_array
 from stiffmap.description import TASK
-from stiffmap.errors import FileError, StiffmapError
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import AXES, Experiment
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
 from stiffmap.machine import Machine, takes_machine
+from stiffmap.outputs import write_rows
 
 STEPS = 25
 DONE = 1e-10
@@ -86,14 +85,10 @@ class Commands:
         columns |= {f"pose_rot{a}_deg": turn[:, i] for i, a in enumerate("xyz")}
         for word, values in (("before", self.before), ("after", self.after)):
             columns |= {f"{word}_{a}_mm": values[:, i] * MM for i, a in enumerate(AXES[:3])}
-        try:
-            with Path(path).open("w", newline="", encoding="utf-8") as stream:
-                out = csv.writer(stream)
-                out.writerow(columns)
-                for row in zip(*columns.values(), strict=True):
-                    out.writerow(["" if not np.isfinite(v) else f"{v:.9g}" for v in row])
-        except OSError as error:
-            raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
+        rows = zip(*columns.values(), strict=True)
+        write_rows(
+            path, list(columns), (["" if not np.isfinite(v) else f"{v:.9g}" for v in row] for row in rows)
+        )
 
 
 @takes_machine

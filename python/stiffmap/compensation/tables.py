@@ -16,6 +16,7 @@ import numpy as np
 from stiffmap.broadcasting import Floats
 from stiffmap.compensation.axis_errors import AxisErrors
 from stiffmap.errors import FileError, StiffmapError
+from stiffmap.outputs import write_text
 
 MM = 1e3
 
@@ -105,12 +106,7 @@ def compensation_table(errors: AxisErrors, form: str) -> str:
 
 def write_table(errors: AxisErrors, path: str | PathLike[str], form: str) -> Path:
     """Write a table; raises FileError where it cannot be."""
-    text = compensation_table(errors, form)
-    try:
-        Path(path).write_text(text, encoding="ascii", errors="replace")
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
-    return Path(path)
+    return write_text(path, compensation_table(errors, form), encoding="ascii", errors="replace")
 
 
 def read_table(path: str | PathLike[str], form: str) -> tuple[Floats, Floats, Floats]:

@@ -15,6 +15,7 @@ from stiffmap.design.refining import refine
 from stiffmap.design.robustness import DRAWS, Robustness, robustness
 from stiffmap.design.search import ParetoSet
 from stiffmap.machine import load_machine
+from stiffmap.outputs import write_text
 from stiffmap.performance.table import MeasuresTable, measures
 
 SLIGHT = 0.01
@@ -96,4 +97,4 @@ def write_machine(design: Design, x: Floats, name: str, file: Path) -> None:
     values = ", ".join(f"{k} = {v:.5g}" for k, v in design.names(x).items())
     text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=110)
     head = f"# Written by stiffmap optimize ({design.model.name}): {values}"
-    file.write_text(f"{head}\n{text}", encoding="utf-8")
+    write_text(file, f"{head}\n{text}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from multiprocessing import get_context
 from os import PathLike
@@ -19,6 +19,7 @@ from stiffmap.design.judging import IMPOSSIBLE, Judged, judge
 from stiffmap.design.problem import Design, load_design
 from stiffmap.design.store import Evaluations
 from stiffmap.errors import MissingPartError, StiffmapError
+from stiffmap.outputs import make_folder, only_job
 from stiffmap.performance.registry import get_measure
 
 
@@ -96,8 +97,17 @@ def optimize(
     """
     problem = design if isinstance(design, Design) else load_design(design)
     place = None if folder is None else Path(folder)
-    if place is not None:
-        place.mkdir(parents=True, exist_ok=True)
+    with nullcontext() if place is None else only_job(make_folder(place)):
+        return _searched(problem, place, generations, processes, progress)
+
+
+def _searched(
+    problem: Design,
+    place: Path | None,
+    generations: int | None,
+    processes: int | None,
+    progress: Progress | None,
+) -> ParetoSet:
     kept = Evaluations(problem, None if place is None else place / "evaluations.jsonl")
     count = generations or problem.model.search.generations
     algorithm = _algorithm(problem, count)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from stiffmap.design.judging import Judged
 from stiffmap.design.problem import Design
 from stiffmap.errors import FileError
 from stiffmap.json_text import parse_json
+from stiffmap.outputs import add_lines
 
 
 class Evaluations:
@@ -68,23 +69,20 @@ class Evaluations:
             self.known[row.tobytes()] = one
         if self.path is None or not judged:
             return
-        before = self.path.read_bytes() if self.path.exists() else b""
-        with self.path.open("a", encoding="utf-8") as file:
-            if not before:
-                file.write(json.dumps({"design": self.mark}) + "\n")
-            elif not before.endswith(b"\n"):  # killed while writing
-                file.write("\n")
-            for row, one in zip(x, judged, strict=True):
-                line = {
+        lines: list[dict[str, Any]] = (
+            [] if self.path.exists() and self.path.stat().st_size else [{"design": self.mark}]
+        )
+        for row, one in zip(x, judged, strict=True):
+            lines.append(
+                {
                     "x": row.tolist(),
                     "f": one.objectives.tolist(),
                     "g": one.violations.tolist(),
                     "values": one.values,
                     "reason": one.reason,
                 }
-                file.write(json.dumps(line) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
+            )
+        add_lines(self.path, [json.dumps(line) for line in lines])
 
     def get(self, x: Floats) -> Judged:
         """The judgement of one row."""

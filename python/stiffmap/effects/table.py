@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from stiffmap.effects import registry
 from stiffmap.effects.types import EffectType, Parameter
+from stiffmap.outputs import write_text
 
 
 def overview() -> str:
@@ -80,7 +81,7 @@ def main() -> None:
     page = Path(sys.argv[1])
     before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
     after = rest.partition(END)[2]
-    page.write_text(f"{before}{BEGIN}\n\n{reference()}\n\n{END}{after}", encoding="utf-8")
+    write_text(page, f"{before}{BEGIN}\n\n{reference()}\n\n{END}{after}")
 
 
 BEGIN = "<!-- kinds: begin (written by python -m stiffmap.effects.table docs/effects.md) -->"

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
 from typing import Any
 
 from stiffmap.files.schema import MachineFile
+from stiffmap.outputs import write_text
 
 
 def machine_schema() -> dict[str, Any]:
@@ -29,4 +29,4 @@ def schema_text() -> str:
 
 
 if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(schema_text(), encoding="utf-8")
+    write_text(sys.argv[1], schema_text())

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import fields
 from os import PathLike
-from pathlib import Path
 
 import yaml
 
 from stiffmap.description import MachineDescription
-from stiffmap.errors import FileError, StiffmapError
+from stiffmap.errors import StiffmapError
 from stiffmap.files.dump import dump
 from stiffmap.files.load import description_from_text
+from stiffmap.outputs import write_text
 from stiffmap.yaml_text import text_of
 
 
@@ -21,11 +21,7 @@ def save_description(description: MachineDescription, path: str | PathLike[str])
     A machine with effects is saved as the declared machine and its effect records.
     Raises `StiffmapError` where a file cannot hold the machine, or cannot be written.
     """
-    text = description_text(description)
-    try:
-        Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
+    write_text(path, description_text(description))
 
 
 def description_text(description: MachineDescription) -> str:

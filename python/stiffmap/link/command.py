@@ -22,6 +22,7 @@ from stiffmap.link.pipeline import PartLink, Solver, Support, link_from_part
 from stiffmap.link.readers import read_field
 from stiffmap.link.result import Link
 from stiffmap.link.solve import Material, Setup
+from stiffmap.outputs.option import written
 
 FIELDS = {".csv", ".dat", ".frd", ".vtk", ".vtu", ".lis", ".txt"}
 
@@ -63,8 +64,8 @@ def link_command(
         ),
     ] = "bed",
     zeros: Annotated[bool, typer.Option("--zeros", help="Set insignificant entries to zero.")] = False,
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Link file to write (YAML).")] = None,
-    picture: Annotated[Path | None, typer.Option(help="PNG to write.")] = None,
+    out: Annotated[Path | None, written("-o", "--out", help="Link file to write (YAML).")] = None,
+    picture: Annotated[Path | None, written("--picture", help="PNG to write.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, SI.")] = False,
 ) -> None:
     """Identify a link's 6x6 spring, with error bars, from a part or a displacement field."""

@@ -11,6 +11,7 @@ import yaml
 
 from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Floats
+from stiffmap.outputs import write_text
 from stiffmap.yaml_text import read
 
 SYMMETRY = 1e-6  # of sqrt(C_ii C_jj)
@@ -50,10 +51,7 @@ def save_link(link: LinkFile, path: str | Path) -> None:
         "provenance": link.provenance,
     }
     text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=10_000, allow_unicode=True)
-    try:
-        Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise StiffmapError(f"{path}: cannot write ({error.strerror})") from None
+    write_text(path, text)
 
 
 def load_link(path: str | Path) -> LinkFile:

@@ -9,11 +9,11 @@ from typing import Any
 import matplotlib
 import numpy as np
 
-from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Floats, Ints
 from stiffmap.link.pipeline import PartLink
 from stiffmap.link.report import unit_factor, unit_name
 from stiffmap.link.result import Link
+from stiffmap.outputs import write_picture
 
 matplotlib.use("Agg", force=False)
 BLUE, GREY = "#0072B2", "#999999"
@@ -131,10 +131,6 @@ def _save(figure: Any, path: str | Path) -> None:
     from matplotlib import pyplot as plt
 
     try:
-        figure.savefig(path, dpi=110)
-    except (OSError, ValueError) as error:
-        raise StiffmapError(
-            f"{path}: cannot write the picture ({' '.join(str(error).split())[:80]})"
-        ) from None
+        write_picture(path, figure, dpi=110)
     finally:
         plt.close(figure)

@@ -7,10 +7,10 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Floats
 from stiffmap.link.plan import planned_error
 from stiffmap.link.report import unit_factor, unit_name
+from stiffmap.outputs import write_picture
 
 matplotlib.use("Agg", force=False)
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9")
@@ -44,10 +44,6 @@ def draw_plan(points: Floats, wrenches: Floats, reference: Floats, sigma: float,
     for axes in (left, right):
         axes.grid(which="both", alpha=0.2)
     try:
-        figure.savefig(path, dpi=110)
-    except (OSError, ValueError) as error_:
-        raise StiffmapError(
-            f"{path}: cannot write the picture ({' '.join(str(error_).split())[:80]})"
-        ) from None
+        write_picture(path, figure, dpi=110)
     finally:
         plt.close(figure)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from stiffmap.errors import FileError, MissingPartError
+from stiffmap.outputs import needs_space, only_job, put_folder, writing
 
 
 def is_zarr(path: Path) -> bool:
@@ -25,25 +25,28 @@ def write_dataset(ds: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Raises FileError where `path` cannot be written.
     """
     target = Path(path)
-    fresh = target.with_name(f"{target.name}.writing")
-    try:
-        _write(ds, fresh, is_zarr(target))
-        if target.is_dir() and is_zarr(target):
-            shutil.rmtree(target)
-        os.replace(fresh, target)
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror or error}", file=str(target)) from error
+    needs_space(target, ds.nbytes, "the map")
+    if is_zarr(target):
+        with only_job(target):
+            _write_zarr(ds, target)
+        return target
+    with writing(target) as fresh:
+        try:
+            ds.to_netcdf(fresh, engine="netcdf4")
+        except RuntimeError as error:  # what the NetCDF library says where the disk refuses
+            raise FileError(f"cannot be written: {error}; is the disk full?", file=str(target)) from error
     return target
 
 
-def _write(ds: xr.Dataset, path: Path, zarr: bool) -> None:
-    if not zarr:
-        ds.to_netcdf(path, engine="netcdf4")
-        return
+def _write_zarr(ds: xr.Dataset, target: Path) -> None:
+    fresh = target.with_name(f".{target.name}.writing")
     try:
-        zarr_strings(ds).to_zarr(path, mode="w", zarr_format=3, consolidated=False)
+        zarr_strings(ds).to_zarr(fresh, mode="w", zarr_format=3, consolidated=False)
+        put_folder(fresh, target)
     except ImportError as error:
         raise MissingPartError("writing Zarr needs the package zarr: pip install 'stiffmap[zarr]'") from error
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror or error}", file=str(target)) from error
 
 
 def read_dataset(path: str | os.PathLike[str]) -> xr.Dataset:

@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.compiled import Status
-from stiffmap.errors import StiffmapError
+from stiffmap.errors import FileError, StiffmapError
 from stiffmap.machine import Machine, hint_metres, takes_machine
 from stiffmap.maps.block import solve_block
 from stiffmap.maps.cluster import on_cluster
@@ -25,6 +25,7 @@ from stiffmap.maps.request import map_plan
 from stiffmap.maps.store import Store, folder_store, memory_store
 from stiffmap.maps.tiles import POSES_AT_ONCE, Tiles, blocks_of, solve_rows, tiles_of
 from stiffmap.maps.zarr_map import open_zarr_map
+from stiffmap.outputs import needs_space, only_job
 
 
 @takes_machine
@@ -127,10 +128,11 @@ def error_map(
         hint_metres(machine, np.r_[plan.x, plan.y, plan.z], bool((ds.status == Status.UNREACHABLE).all()))
         return ds
     target = Path(out)
-    if is_zarr(target):
-        _to_zarr(plan, target, resume, solver, progress)
-    else:
-        _to_netcdf(plan, target, resume, chunk, progress, None if scheduler is None else solver)
+    with only_job(target):
+        if is_zarr(target):
+            _to_zarr(plan, target, resume, solver, progress)
+        else:
+            _to_netcdf(plan, target, resume, chunk, progress, None if scheduler is None else solver)
     return read_dataset(target)
 
 
@@ -171,7 +173,14 @@ def _to_netcdf(
     plan: MapPlan, out: Path, resume: bool, chunk: int | None, progress: bool | None, solver: Solver | None
 ) -> None:
     folder = partial_folder(out)
-    store = folder_store(plan, folder, resume)
+    try:
+        store = folder_store(plan, folder, resume)
+    except OSError as error:
+        raise FileError(
+            f"cannot be written: {error.strerror or error}; a map of {plan.rows * plan.x.size} poses",
+            file=str(out),
+        ) from error
+    needs_space(out, sum(a.nbytes for a in store.arrays.values()), "the finished map")
     fill(plan, store, chunk, progress) if solver is None else _fill(plan, store, solver, progress)
     write_dataset(plan.dataset(store.arrays), out)
     shutil.rmtree(folder)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from stiffmap.errors import FileError
 from stiffmap.maps.differences import kept_attributes, refuse_another_map
 from stiffmap.maps.plan import MapPlan
+from stiffmap.outputs import mapped_array, write_text
 
 BLOCKS_PER_FLUSH = 32
 """Blocks that a power cut may cost; writing back after each would take a third of the time."""
@@ -75,14 +76,14 @@ def folder_store(plan: MapPlan, folder: Path, resume: bool) -> Store:
 def _new(plan: MapPlan, folder: Path, key: str) -> Store:
     (folder / "key.json").unlink(missing_ok=True)
     store = _mapped(plan, folder, "w+")
-    (folder / "key.json").write_text(key, encoding="utf-8")
+    write_text(folder / "key.json", key)
     return store
 
 
 def _mapped(plan: MapPlan, folder: Path, mode: Any) -> Store:
     def array(name: str, dtype: str, shape: tuple[int, ...]) -> Any:
         if mode == "w+":
-            return open_memmap(folder / f"{name}.npy", mode, np.dtype(dtype), shape)
+            return mapped_array(folder / f"{name}.npy", dtype, shape)
         path = folder / f"{name}.npy"
         try:
             kept = open_memmap(path, mode)

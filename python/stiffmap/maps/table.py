@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
@@ -12,10 +11,12 @@ import numpy as np
 import xarray as xr
 
 from stiffmap.compiled import Status
-from stiffmap.errors import FileError, MissingPartError, StiffmapError
+from stiffmap.errors import MissingPartError, StiffmapError
 from stiffmap.maps.variables import COMPONENTS
+from stiffmap.outputs import write_rows, writing
 
 MICRON, MM = 1e6, 1e3
+LONGEST_CELL = 32767  # characters, of Excel
 LENGTHS = ("deflection", "worst_deflection", "best_deflection")
 ANGLES = ("worst_direction", "best_direction")
 
@@ -71,36 +72,37 @@ def write_map_table(ds: xr.Dataset, path: str | PathLike[str]) -> Path:
     """
     target = Path(path)
     names, rows = map_table(ds)
-    try:
-        if target.suffix == ".csv":
-            with target.open("w", newline="", encoding="utf-8-sig") as stream:
-                out = csv.writer(stream)
-                out.writerow(names)
-                out.writerows(
-                    ["" if v is None else f"{v:.9g}" if isinstance(v, float) else v for v in row]
-                    for row in rows
-                )
-        elif target.suffix == ".xlsx":
-            _write_xlsx(ds, target, names, rows)
-        else:
-            raise StiffmapError(f"{target.name}: expected .csv or .xlsx")
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(target)) from error
-    return target
+    if target.suffix == ".csv":
+        text = (["" if v is None else f"{v:.9g}" if isinstance(v, float) else v for v in row] for row in rows)
+        return write_rows(target, names, text, encoding="utf-8-sig")
+    if target.suffix == ".xlsx":
+        return _write_xlsx(ds, target, names, rows)
+    raise StiffmapError(f"{target.name}: expected .csv or .xlsx")
 
 
-def _write_xlsx(ds: xr.Dataset, target: Path, names: list[str], rows: Iterator[list[Any]]) -> None:
+def _write_xlsx(ds: xr.Dataset, target: Path, names: list[str], rows: Iterator[list[Any]]) -> Path:
     try:
         from openpyxl import Workbook
+        from openpyxl.cell import WriteOnlyCell
+        from openpyxl.cell.cell import ILLEGAL_CHARACTERS_RE
     except ImportError as error:
         raise MissingPartError("writing Excel files needs openpyxl: pip install 'stiffmap[excel]'") from error
     book = Workbook(write_only=True)
     sheet = book.create_sheet("map")
     sheet.freeze_panes = "D2"
-    sheet.append(names)
+
+    def text(value: str) -> WriteOnlyCell:
+        """A cell that is never a formula."""
+        cell = WriteOnlyCell(sheet, ILLEGAL_CHARACTERS_RE.sub("�", value))
+        cell.data_type = "s"
+        return cell
+
+    sheet.append([text(n) for n in names])
     for row in rows:
         sheet.append(row)
     about = book.create_sheet("about")
     for key, value in ds.attrs.items():
-        about.append([str(key), str(value)])
-    book.save(target)
+        about.append([text(str(key)), text(str(value)[:LONGEST_CELL])])
+    with writing(target) as fresh:
+        book.save(fresh)
+    return target

@@ -8,7 +8,6 @@ don't depend on interruptions, threads or the order of the tiles.
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import tempfile
 import zlib
@@ -16,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -29,6 +28,7 @@ from stiffmap.maps.files import zarr_strings
 from stiffmap.maps.plan import MapPlan
 from stiffmap.maps.store import FILL
 from stiffmap.maps.tiles import Tiles, tiles_of
+from stiffmap.outputs import add_lines, put_folder, write_text
 
 JOURNAL = "journal.jsonl"
 
@@ -47,8 +47,7 @@ class ZarrMap:
             for name, array in values.items():
                 self._arrays[name][plane, y] = array
             line = json.dumps({"tile": index, "crc": {n: crc(self.chunk(n, index)) for n in values}})
-            with (self.folder / JOURNAL).open("a", encoding="utf-8") as journal:
-                journal.write(line + "\n")
+            add_lines(self.folder / JOURNAL, [line], flushed=False)
         except OSError as error:
             raise FileError(
                 f"cannot be written: {error.strerror or error}; {int(self.done.sum())} of {self.tiles.count} "
@@ -74,14 +73,12 @@ class ZarrMap:
     def finish(self, out: Path) -> None:
         """Put the complete map in its place."""
         (self.folder / JOURNAL).unlink(missing_ok=True)
-        if out.is_dir():
-            shutil.rmtree(out)
-        os.replace(self.folder, out)
+        put_folder(self.folder, out)
 
     def begin(self) -> None:
         """Write the empty map and an empty journal."""
         self._frame(self.folder)
-        (self.folder / JOURNAL).write_text("", encoding="utf-8")
+        write_text(self.folder / JOURNAL, "")
 
     def _frame(self, folder: Path) -> None:
         """Write metadata and coordinates."""
@@ -187,38 +184,15 @@ def damaged_line(journal: Path, line: int) -> FileError:
 
 
 @contextmanager
-def only_job(folder: Path) -> Iterator[None]:
-    """Hold the folder for this process; FileError where another one has it."""
-    path = folder.with_name(f"{folder.name}.lock")
-    with path.open("w") as handle:
-        lock(handle, folder)
-        yield
-        path.unlink()
-
-
-def lock(handle: IO[str], folder: Path) -> None:
-    """An advisory lock, given back when the process ends, however it ends."""
-    try:
-        import fcntl
-    except ImportError:  # not on this system: two jobs are then not told apart
-        return
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        raise FileError("is being written by another job", file=str(folder)) from error
-
-
-@contextmanager
 def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> Iterator[ZarrMap]:
-    """The unfinished map in `folder`, new or taken up, held for this process alone."""
+    """The unfinished map in `folder`, new or taken up."""
     zarr_package()
-    with only_job(folder):
-        out = ZarrMap(plan, folder, tiles_of(plan))
-        try:
-            if resume and (folder / JOURNAL).exists():
-                out.recover()
-            else:
-                out.begin()
-        except OSError as error:
-            raise FileError(f"cannot be written: {error.strerror or error}", file=str(folder)) from error
-        yield out
+    out = ZarrMap(plan, folder, tiles_of(plan))
+    try:
+        if resume and (folder / JOURNAL).exists():
+            out.recover()
+        else:
+            out.begin()
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror or error}", file=str(folder)) from error
+    yield out

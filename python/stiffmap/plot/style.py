@@ -13,7 +13,7 @@ import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from stiffmap.errors import FileError, StiffmapError
+from stiffmap.outputs import write_picture
 
 MM = 1e3
 # Okabe and Ito's palette: eight colours that the common colour blindnesses keep apart.
@@ -95,12 +95,5 @@ def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> Path:
 
     Raises FileError where the file cannot be written, StiffmapError for an unknown format.
     """
-    target = Path(path)
-    try:
-        with paper_style():
-            figure.savefig(target, dpi=dpi, metadata={"Software": None} if target.suffix == ".png" else None)
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror or error}", file=str(target)) from error
-    except ValueError as error:
-        raise StiffmapError(f"{target}: {error}") from error
-    return target
+    with paper_style():
+        return write_picture(path, figure, dpi)

@@ -10,8 +10,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from stiffmap.budget import deflection_budget
-from stiffmap.errors import FileError
 from stiffmap.machine import Machine
+from stiffmap.outputs import write_text
 from stiffmap.plot.loaded import LoadedShape, loaded_shape
 from stiffmap.plot.style import BLACK, CYCLE
 
@@ -25,7 +25,6 @@ def write_page(
     rotation: ArrayLike | None = None,
 ) -> Path:
     """Write the page; raises FileError where it cannot be written, StiffmapError for a failed pose."""
-    target = Path(path)
     shape = loaded_shape(machine, position, wrench, rotation=rotation)
     budget = deflection_budget(machine, position, wrench, rotation=rotation)
     from stiffmap.report.templates import render
@@ -42,11 +41,7 @@ def write_page(
         budget=[(n, 1e6 * size * s, 100 * s) for n, _, s in budget.ranked()],
         data=json.dumps(scene(shape, machine.legs)),
     )
-    try:
-        target.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(target)) from error
-    return target
+    return write_text(path, text)
 
 
 def scene(shape: LoadedShape, legs: tuple[str, ...]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from stiffmap.errors import FileError
+from stiffmap.outputs import write_text
 from stiffmap.report.pictures import inline
 from stiffmap.report.provenance import provenance
 from stiffmap.report.templates import render
@@ -33,15 +33,10 @@ def write_sheet(
     path: str | PathLike[str], sheet: Sheet, pictures: Mapping[str, Figure | bytes], digests: dict[str, str]
 ) -> Path:
     """Write the page; `pictures` by their captions (figures, or GIFs as bytes), `digests` of what went in. Raises FileError."""
-    target = Path(path)
     text = render(
         "sheet.html",
         sheet=sheet,
         pictures=[(caption, inline(figure)) for caption, figure in pictures.items()],
         provenance=provenance(None, None, (), digests)[1:],  # a command has no date of its own
     )
-    try:
-        target.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(target)) from error
-    return target
+    return write_text(path, text)

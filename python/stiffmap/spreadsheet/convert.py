@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from stiffmap.errors import FileError, StiffmapError
+from stiffmap.errors import StiffmapError
+from stiffmap.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.spreadsheet.guess import FORCES, LENGTHS, READINGS, Column, guess, known_unit
 from stiffmap.spreadsheet.sheet import Sheet
 from stiffmap.yaml_text import text_of
@@ -149,15 +149,13 @@ def write_folder(
     }
     if noise:
         head["noise"] = dict(noise)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "experiment.yaml").write_text(text_of(head), encoding="utf-8")
-        _write(folder / "data.csv", found.header, found.rows)
+    head["rows"] = len(found.rows)
+    with only_job(make_folder(folder)):
+        write_rows(folder / "data.csv", found.header, found.rows)
         if found.notes:
-            kept = [[row[c.index] for c in found.notes] for row in sheet.rows]
-            _write(folder / "notes.csv", [sheet.header[c.index] for c in found.notes], kept)
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(folder)) from error
+            kept = ([row[c.index] for c in found.notes] for row in sheet.rows)
+            write_rows(folder / "notes.csv", [sheet.header[c.index] for c in found.notes], kept)
+        write_text(folder / "experiment.yaml", text_of(head))
 
 
 def head_units(found: Imported) -> dict[str, str]:
@@ -176,10 +174,3 @@ def head_units(found: Imported) -> dict[str, str]:
         elif unit not in common.values():
             out[meaning] = unit
     return out
-
-
-def _write(path: Path, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(header)
-        writer.writerows(rows)

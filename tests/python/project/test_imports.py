@@ -18,7 +18,7 @@ PACKAGE = Path(__file__).parents[3] / "python/stiffmap"
 # listed (maps, experiments, diagnoses, commands ...) builds on all of them.
 RANKS = (
     ("_core", "version", "errors", "recent", "units", "html", "beams"),
-    ("description", "broadcasting", "yaml_limits", "python_file"),
+    ("description", "broadcasting", "yaml_limits", "python_file", "outputs"),
     ("rotations", "yaml_text", "home"),
     ("compiled", "link"),
     ("status", "branches"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Sequence
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,9 +16,9 @@ from stiffmap.diagnosis.report.findings import Detectability, Effect, Findings
 from stiffmap.diagnosis.report.sentences import UNITS, next_step, opening
 from stiffmap.diagnosis.report.wording import effect_text, five_lines, separation_text
 from stiffmap.effects import registry
-from stiffmap.errors import FileError
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.machine import Machine
+from stiffmap.outputs import write_text
 
 SHOWN = 12
 """Detectable effects above the fold."""
@@ -35,11 +34,7 @@ def write_report(
     inputs: Iterable[str | PathLike[str]] = (),
 ) -> None:
     """Write the file; raises `FileError` where it cannot be written."""
-    text = html(d, date=date, inputs=inputs)
-    try:
-        Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
+    write_text(path, html(d, date=date, inputs=inputs))
 
 
 def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLike[str]] = ()) -> str:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stiffmap.errors import FileError
 from stiffmap.experiment.comparison.residual import Residual
+from stiffmap.outputs import write_rows
 
 MM = 1e3
 
@@ -20,13 +19,7 @@ def write_table(r: Residual, path: Path) -> None:
     Raises `FileError` where it cannot be written.
     """
     columns = _columns(r)
-    try:
-        with path.open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream)
-            writer.writerow(columns)
-            writer.writerows(zip(*columns.values(), strict=True))
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
+    write_rows(path, list(columns), zip(*columns.values(), strict=True))
 
 
 def _columns(r: Residual) -> dict[str, list[Any]]:

@@ -36,7 +36,7 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
     document = read(file)
     expected = "an experiment file is a mapping with machine, quantity and units"
     model = validated(file_model(), document, str(file), expected)
-    table = _rename(read_table(file.parent / model.data), model.columns)
+    table = _rename(read_table(file.parent / model.data, model.rows), model.columns)
     seconds = [f"{c}2" for c in model.command if f"{c}2" in table]
     _known_columns(table, (*model.joints, *model.command, *seconds))
     return _assemble(model, table, Scales.of(model, str(file)), file)

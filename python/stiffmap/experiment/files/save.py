@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
@@ -11,11 +10,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.errors import FileError
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Channel, Experiment, Floats, Loop
 from stiffmap.experiment.files.columns import APPROACH, POSE, POSE2, SEEN, SEEN_TURNED
 from stiffmap.experiment.files.orientation import VECTOR
 from stiffmap.experiment.readings import kinds
+from stiffmap.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.yaml_text import text_of
 
 MM = 1e3
@@ -32,17 +31,11 @@ WORDS = {
 
 def save_experiment(experiment: Experiment, folder: str | PathLike[str], title: str = "") -> None:
     """Write the folder; raises `FileError` where it cannot be written."""
-    place = Path(folder)
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-        (place / "experiment.yaml").write_text(text_of(_head(experiment, title)), encoding="utf-8")
-        with (place / "data.csv").open("w", newline="", encoding="utf-8") as stream:
-            columns = _columns(experiment)
-            writer = csv.writer(stream)
-            writer.writerow(columns)
-            writer.writerows(zip(*columns.values(), strict=True))
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(place)) from error
+    columns = _columns(experiment)
+    head = _head(experiment, title) | {"rows": len(experiment)}
+    with only_job(make_folder(folder)):
+        write_rows(Path(folder) / "data.csv", list(columns), zip(*columns.values(), strict=True))
+        write_text(Path(folder) / "experiment.yaml", text_of(head))
 
 
 def _head(e: Experiment, title: str) -> dict[str, Any]:

@@ -151,6 +151,8 @@ class ExperimentFile(FileModel):
     units: UnitsModel
     title: str = ""
     data: str = "data.csv"
+    rows: Annotated[int, Field(gt=0)] | None = None
+    """Rows of the data, where the writer says it: a table that was cut off is refused."""
     point: str = "tcp"
     load_point: str | None = None
     axes: Literal["base"] = "base"

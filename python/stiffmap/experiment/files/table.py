@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from stiffmap.errors import FileError
 from stiffmap.files.schema.base import suggestion
+from stiffmap.outputs import unguarded
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +40,7 @@ class Table:
                 f"missing column '{column}'{near}; found {', '.join(self.header)}", file=self.file
             )
         i = self.header.index(column)
-        return [row[i].strip() for row in self.rows]
+        return [unguarded(row[i].strip()) for row in self.rows]
 
     def numbers(self, column: str, *, blank: bool = False) -> Floats:
         """A column as floats; with `blank`, empty cells are NaN (a value that was not read)."""
@@ -62,8 +64,8 @@ class Table:
         return value
 
 
-def read_table(path: Path) -> Table:
-    """Cells of a CSV file with a header line; raises `FileError`."""
+def read_table(path: Path, expected: int | None = None) -> Table:
+    """Cells of a CSV file with a header line and, where it is known, an expected number of rows; raises `FileError`."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             reader = csv.reader(stream)
@@ -76,9 +78,25 @@ def read_table(path: Path) -> Table:
         raise FileError("expected a header line and at least one row", file=str(path))
     header = tuple(c.strip() for c in numbered[0][1])
     _check(header, numbered[1:], str(path))
+    if expected is not None:
+        _whole(path, expected, len(numbered) - 1)
     return Table(
         str(path), header, tuple(tuple(row) for _, row in numbered[1:]), tuple(n for n, _ in numbered[1:])
     )
+
+
+def _whole(path: Path, expected: int, found: int) -> None:
+    """FileError for a table that was cut off."""
+    with path.open("rb") as stream:
+        stream.seek(-1, os.SEEK_END)
+        ended = stream.read(1) in b"\r\n"
+    if found != expected or not ended:
+        what = f"found {found}" if found != expected else "found no end of the last line"
+        raise FileError(
+            f"expected {expected} rows, as 'rows' in the experiment's YAML file says; {what}: the table was cut off, "
+            "or changed by hand (then correct or delete 'rows')",
+            file=str(path),
+        )
 
 
 def _check(header: Sequence[str], rows: Sequence[tuple[int, list[str]]], file: str) -> None:
