@@ -202,7 +202,7 @@ def write(table: MeasuresTable, output: Path) -> list[str]:
 
 def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure | bytes]) -> Path:
     """The table as one page with its pictures."""
-    from stiffmap.maps.provenance import digest
+    from stiffmap.maps.provenance import machine_digest
     from stiffmap.performance.pictures import caption
     from stiffmap.report.sheet import Sheet, write_sheet
 
@@ -216,7 +216,7 @@ def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure | b
         rows=rows,
         numbers=(2, 4, 5, 6, 7),
     )
-    digests = {f"machine {table.machine.name}, as loaded": digest(table.machine)}
+    digests = {f"machine {table.machine.name}, as loaded": machine_digest(table.machine)}
     return write_sheet(path, sheet, {caption(n): f for n, f in figures.items()}, digests)
 
 

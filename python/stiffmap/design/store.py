@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,8 @@ from stiffmap.broadcasting import Floats
 from stiffmap.design.judging import Judged
 from stiffmap.design.problem import Design
 from stiffmap.errors import FileError
+from stiffmap.files.shipped import find
+from stiffmap.fingerprints import code, digest, file_digest, named_files
 from stiffmap.json_text import parse_json
 from stiffmap.outputs import add_lines
 
@@ -90,16 +91,16 @@ class Evaluations:
 
 
 def fingerprint(design: Design) -> str:
-    """Of everything that the answers depend on."""
-    text = json.dumps(
-        [design.model.model_dump(), design.document.data, repr(design.requirements), _toolpath(design)],
-        default=str,
-    )
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def _toolpath(design: Design) -> list[object]:
-    if design.toolpath is None:
-        return []
-    position, force = design.toolpath.places()
-    return [position.tolist(), force.tolist(), design.toolpath.duration, design.toolpath.speed]
+    """Of everything that the answers depend on: the files as read, those that they name, code."""
+    near, beside = Path(design.file).parent, Path(design.machine_file).parent
+    return digest(
+        design.model.model_dump(),
+        design.document.data,
+        design.requirements,
+        design.constraints,
+        named_files(design.model.model_dump(), near),
+        named_files(design.document.data, beside),
+        [file_digest(find(name)) for name in design.model.beside if not (near / name).is_file()],
+        design.toolpath,
+        code(),
+    )[:16]

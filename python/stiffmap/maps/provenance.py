@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from typing import Any
 
 import numpy as np
 
+from stiffmap.fingerprints import code, digest
 from stiffmap.machine import Machine
 from stiffmap.maps.loading import Loading
 from stiffmap.version import __version__
@@ -23,7 +23,7 @@ def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, An
         "title": f"{title}: {machine.name}",
         "machine": machine.name,
         "machine_title": machine.description.title,
-        "machine_digest": digest(machine),
+        "machine_digest": machine_digest(machine),
         "effects": json.dumps([plain_effect(e) for e in machine.description.effects]),
         "stiffmap_version": __version__,
         "call": json.dumps(plain(call) | loading.options.as_plain(), ensure_ascii=False),
@@ -38,9 +38,9 @@ def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, An
     }
 
 
-def digest(machine: Machine) -> str:
-    """Fingerprint of everything that a machine is made of."""
-    return hashlib.sha256(repr(machine.description).encode()).hexdigest()[:16]
+def machine_digest(machine: Machine) -> str:
+    """Fingerprint of everything that a machine is made of, link files and users' kinds of effects among it."""
+    return digest(machine.description, code()[1:] if machine.description.effects else [])[:16]
 
 
 def plain(call: dict[str, Any]) -> dict[str, Any]:

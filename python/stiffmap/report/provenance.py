@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 
-from stiffmap.errors import FileError
+from stiffmap.fingerprints import file_digest
 from stiffmap.version import __version__
 
 SHOWN = 16
@@ -34,7 +33,4 @@ def _files(inputs: Iterable[str | PathLike[str]]) -> list[Path]:
 
 def digest_of(path: Path) -> str:
     """First digits of the SHA-256 of a file; raises FileError where it cannot be read."""
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()[:SHOWN]
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
+    return file_digest(path)[:SHOWN]

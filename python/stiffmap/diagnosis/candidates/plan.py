@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import OrderedDict
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from stiffmap.diagnosis.candidates.candidates import Candidate, candidates
 from stiffmap.diagnosis.candidates.sensitivity import Variant, variants
@@ -18,6 +15,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.fingerprints import digest
 
 
 @dataclass(frozen=True)
@@ -45,8 +43,8 @@ def plan_of(predictor: Predictor, clock: Clock | None = None) -> Plan:
     """Sensitivities of a machine under a plan; the last eight are kept. The clock is told which are computed; where it
     is over those that there are make the plan, which is not kept."""
     clock = clock or Clock()
-    read = hashlib.sha256(np.packbits(predictor.experiment.read).tobytes()).hexdigest()
-    key = fingerprint(predictor) + read + repr([(k, id(get(k))) for k in kinds()])  # users may register more
+    registered = [(k, id(get(k))) for k in kinds()]  # users may register more
+    key = digest(fingerprint(predictor), predictor.experiment.read, registered)
     if key not in _PLANS:
         found, whole = _compute(predictor, clock)
         if not whole:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Sequence
 from os import PathLike
 from typing import Any
@@ -17,7 +16,7 @@ from stiffmap.diagnosis.report.sentences import UNITS, next_step, opening
 from stiffmap.diagnosis.report.wording import effect_text, five_lines, separation_text
 from stiffmap.effects import registry
 from stiffmap.experiment.noise.checks import Check
-from stiffmap.machine import Machine
+from stiffmap.fingerprints import digest
 from stiffmap.outputs import write_text
 
 SHOWN = 12
@@ -195,12 +194,7 @@ def _one_seen(x: Detectability, turning: set[str]) -> tuple[float, tuple[str, st
 def _digests(d: Findings) -> dict[str, str]:
     """Of the machine and the readings as they were used."""
     e = d.experiment
-    readings = b"".join(np.ascontiguousarray(a).tobytes() for a in (e.position, e.wrench, e.reading, e.sigma))
     return {
-        f"machine {d.declared.name}, as loaded": _digest(d.declared),
-        f"readings of {e.name}, SI": hashlib.sha256(readings).hexdigest(),
+        f"machine {d.declared.name}, as loaded": digest(d.declared.description),
+        f"readings of {e.name}, SI": digest(e.position, e.wrench, e.reading, e.sigma),
     }
-
-
-def _digest(machine: Machine) -> str:
-    return hashlib.sha256(repr(machine.description).encode()).hexdigest()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +11,7 @@ from stiffmap.calibration.statistics import Sums
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.level import Mask, Noise
 from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.fingerprints import digest
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Layer:
     @property
     def digest(self) -> str:
         """Of the uncertain numbers, for what is kept per plan."""
-        return hashlib.sha256(np.ascontiguousarray(self.columns).tobytes()).hexdigest()
+        return digest(self.columns)
 
     def straight(self, experiment: Experiment) -> Experiment:
         """The readings less what is not linear in the uncertain numbers."""

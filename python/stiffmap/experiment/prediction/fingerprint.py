@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
-
-import numpy as np
-
 from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.fingerprints import code, digest
 
 
 def fingerprint(predictor: Predictor) -> str:
@@ -26,7 +23,4 @@ def fingerprint(predictor: Predictor) -> str:
     parts += [e.frame, e.tool, e.instrument, e.target, e.surface, e.normal, e.joint_names]
     arrays = [e.position, e.wrench, e.rotation, e.other, e.other_rotation, e.approach, e.order, e.temperature]
     arrays += [e.joints, e.other_joints, e.gravity_of, e.hours]
-    raw = repr(parts).encode() + b"".join(
-        b"-" if a is None else np.ascontiguousarray(a).tobytes() for a in arrays
-    )
-    return hashlib.sha256(raw).hexdigest()
+    return digest(parts, arrays, code())
