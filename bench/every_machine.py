@@ -22,7 +22,7 @@ times, and the unit with it: other work only makes both longer.
 
 --random measures machines that nobody shipped instead (random_cases.py): hand-made ones of further classes and so many
 of the nightly oracle's generator. Loads have one size and random directions; `far` is nearly the largest load (a power
-of two times 230 N) that 95 % of the poses bear. The cases above their limit are listed, the worst first.
+of two times 230 N) that 95 % of the poses bear without moving the tip by the machine's length. The cases above their limit are listed, the worst first.
 
 Exit code 1 where a number of the table is above its limit: 4, outside the box 10, the share 0.1 %;
 of --random where fewer than 99 % of the cases are within 4, one is above 10, or the mean share is above 0.1 %.

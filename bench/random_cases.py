@@ -58,10 +58,10 @@ def columns(machine: sm.Machine) -> Iterator[tuple[str, Solve, np.ndarray]]:
         return lambda rows: machine.solve(rows[:, :3], size * rows[:, 3:], threads=1, **options)  # type: ignore[arg-type]
 
     rows, few = np.hstack([p, w]), np.hstack([p, w])[:64]
-    borne = level(lambda size: at(size)(few), FORCE)
+    borne = level(lambda size: at(size)(few), FORCE, machine.compiled.length)
     yield "unloaded", lambda rows: machine.solve(rows[:, :3], threads=1), rows
     yield "loaded", at(min(borne, FORCE)), rows
-    heavy = level(lambda size: at(size, gravity=GRAVITY)(few), FORCE, most=FORCE)
+    heavy = level(lambda size: at(size, gravity=GRAVITY)(few), FORCE, machine.compiled.length, most=FORCE)
     yield "gravity", at(heavy, gravity=GRAVITY), rows
     if borne > FORCE:
         yield "far", at(borne), rows
@@ -73,11 +73,13 @@ def columns(machine: sm.Machine) -> Iterator[tuple[str, Solve, np.ndarray]]:
         yield "joints, loaded", lambda q: machine.solve_joints(q, force, threads=1), turned
 
 
-def level(solve: Callable[[float], sm.Solution], start: float, most: float = 1e7) -> float:
-    """A force (N) that nearly all poses bear, of which the double they do not; at most `most`."""
+def level(solve: Callable[[float], sm.Solution], start: float, length: float, most: float = 1e7) -> float:
+    """A force (N) that nearly all poses bear, no tip moving further than `length` (m), of which the double they do not; at most `most`."""
 
     def bears(size: float) -> bool:
-        return bool((solve(size).status == sm.Status.CONVERGED).mean() > 1 - MOST_FAILED)
+        s = solve(size)
+        moved = np.linalg.norm(s.displacement[s.ok, :3], axis=1)
+        return bool((s.status == sm.Status.CONVERGED).mean() > 1 - MOST_FAILED and np.all(moved < length))
 
     size = start
     while size > 1e-3 * start and not bears(size):

@@ -37,7 +37,7 @@ Scratch lay_out(const Program& P, void* memory, std::int64_t* bytes) {
   s.branches = take<BranchSlot>(at, P.chain_count);
   const int n = P.coordinate_count;
   for (V** v : {&s.x, &s.z, &s.dz, &s.a_base, &s.tau, &s.da, &s.dtau, &s.scale, &s.linear, &s.curve, &s.closed,
-                &s.friction_sign, &s.kept, &s.slope, &s.rest})
+                &s.friction_sign, &s.kept, &s.slope, &s.second, &s.third, &s.rest})
     *v = take<V>(at, n);
   if (bytes) *bytes = at - begin + 64;
   return s;

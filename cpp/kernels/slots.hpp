@@ -29,7 +29,9 @@ struct BranchSlot {
   V6 F;       ///< wrench that acts on its end
   V6 before;  ///< the same before the last step
   V6 kept;    ///< the same at the last load step in equilibrium
-  V6 error;   ///< twist from its end to the end of the block's first branch
+  V6 slope;   ///< by the load, and the next two terms of its series along the path
+  V6 second, third;
+  V6 error;  ///< twist from its end to the end of the block's first branch
   Sym6 K;
   V6 c;
   V6 turn[3];  ///< its wrench by the turn of the block's start, only under gravity
@@ -61,7 +63,9 @@ struct Scratch {
   V* friction_sign;  ///< sign of dry friction
   V* kept;           ///< z at the last load step in equilibrium
   V* slope;          ///< by the load
-  V* rest;           ///< step that is taken to first order only
+  V* second;         ///< and the next two terms of z's series along the path
+  V* third;
+  V* rest;  ///< step that is taken to first order only
 };
 
 /// Branches whose wrench is a state: the first of a block carries what the others leave.

@@ -78,6 +78,12 @@ class Reference {
   void close(const Mechanism& m, const BatchInput& in, Index i, double* x, Pose& reached) {
     if (!closure_) closure_ = std::make_unique<ClosureWorkspace>(m);
     const Pose pose = in.commanded(i);
+    if (in.closed && m.loops.empty() &&
+        m.task == full_task) {  // nothing to close, and the tip is where it is commanded
+      std::copy_n(in.closed + m.size() * i, m.size(), x);
+      reached = pose;
+      return;
+    }
     VecX found(m.size());
     if (in.closed) found = Eigen::Map<const VecX>(in.closed + m.size() * i, m.size());
     const ClosureResult r = in.closed ? given_closure(m, *closure_, found) : inverse_closure(m, pose, *closure_, found);
