@@ -12,9 +12,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from stiffmap.description import Block, Body, Joint, MachineDescription, Offset, Point, Spring, TableStroke
+
+from .laws import command_error, law_force
+from .reactions import open_ways, unbalanced
 
 Array = np.ndarray
 
@@ -68,6 +70,10 @@ class Frame:
     r: Array
     p: Array
     before: tuple[int, ...] = ()
+
+    def of(self, at: Array) -> Frame:
+        """At some of the poses."""
+        return Frame(self.r[at], self.p[at], self.before)
 
 
 @dataclass
@@ -220,13 +226,6 @@ def through_joint(walk: Walk, e: Joint, f: Frame, name: str) -> Frame:
     return f
 
 
-def command_error(c: Any, u: Array, e: Joint) -> Array:
-    """Added to the command u."""
-    v = u - (e.home[0] if c.reference is None else c.reference)
-    out: Array = c.offset + c.slope * v + c.amplitude * np.sin(2 * np.pi * v / c.period + c.phase)
-    return out
-
-
 def levels(walk: Walk, name: str, level: float) -> Array:
     """(n, 3) forces that sliding friction may add: one where its way is known, both and none where it is not."""
     out: Array = level * np.array([-1.0, 0.0, 1.0]) * np.ones((len(walk.case.force), 1))
@@ -234,33 +233,6 @@ def levels(walk: Walk, name: str, level: float) -> Array:
     known = np.isfinite(way)
     out[known] = level * np.sign(way[known, None])
     return out
-
-
-def law_force(law: Any, a: Array, soft: Array, rubs: Array) -> tuple[Array, tuple[Array, Array] | None]:
-    """Force of a law at deflections a (n,), the compliance being `soft` times as large; what it allows if it is
-    not one number."""
-    if law.knots:
-        low, high = polyline(law, a, soft)
-        return (low + high) / 2, (low[:, None], high[:, None])
-    force: Array = law.stiffness * a / soft + law.cubic * a**3
-    if law.friction:
-        both = force[:, None] + rubs
-        known = rubs.min(1) == rubs.max(1)
-        return np.where(known, both[:, 0], 0.0), (both, both)  # what is second order is small
-    return force, None
-
-
-def polyline(law: Any, a: Array, soft: Array) -> tuple[Array, Array]:
-    """Least and largest force at a deflection within round-off of a."""
-    k = np.array(law.knots)
-    reach = 1e-12 + 1e-9 * np.abs(k[:, 0]).max()
-    out = []
-    for side in (-reach, reach):
-        v = a + side
-        force = np.interp(v, k[:, 0], k[:, 1])
-        force = np.where(v < k[0, 0], k[0, 1] + law.stiffness / soft * (v - k[0, 0]), force)
-        out.append(np.where(v > k[-1, 0], k[-1, 1] + law.stiffness / soft * (v - k[-1, 0]), force))
-    return out[0], out[1]
 
 
 def through_spring(walk: Walk, e: Spring, f: Frame, name: str) -> Frame:
@@ -278,7 +250,9 @@ def through_spring(walk: Walk, e: Spring, f: Frame, name: str) -> Frame:
         free = [i for i in range(6) if not matrix[:, i].any()]
         keep = [i for i in range(6) if i not in free]
         force, stiff = np.zeros_like(v), np.zeros_like(v)
-        inverse = np.linalg.inv(matrix[:, keep][:, :, keep])
+        one = matrix if e.stroke is not None else matrix[:1]
+        inverse = np.linalg.inv(one[:, keep][:, :, keep])
+        inverse = np.broadcast_to(inverse, (len(v), *inverse.shape[1:]))
         force[:, keep] = np.einsum("nij,nj->ni", inverse, own[:, keep])
         stiff[:, keep] = np.einsum("nii->ni", inverse)
     laws = dict(e.laws)
@@ -343,135 +317,6 @@ def external(walk: Walk) -> None:
         if s.tension_only:
             pull = np.maximum(pull, 0.0)
         walk.known.append((f, at, (pull / length)[:, None] * line, np.zeros_like(at)))
-
-
-def work(axis: Axis, point: Array, force: Array, moment: Array) -> Array:
-    """(n,) of a wrench on a unit of the coordinate."""
-    if not axis.revolute:
-        return np.einsum("ni,ni->n", axis.axis, force)
-    return np.einsum("ni,ni->n", axis.axis, moment + np.cross(point - axis.point, force))
-
-
-def unbalanced(walk: Walk, size: float) -> tuple[Array, Array]:
-    """Residual and scale (n,) N."""
-    n, m = len(walk.case.force), len(walk.axes)
-    weight = np.array([1.0 / size if a.revolute else 1.0 for a in walk.axes])
-    needed, given = np.zeros((n, m)), np.zeros((n, m))
-    for i, a in enumerate(walk.axes):
-        if a.force is not None:
-            needed[:, i] = a.force
-        if a.allowed is not None:
-            needed[:, i] = nearest(a.allowed, np.arange(n), needed[:, i])
-    for f, at, force, moment in walk.known:
-        for i in f.before:
-            given[:, i] += work(walk.axes[i], at, force, moment)
-    columns = np.zeros((n, m, 6 * len(walk.loops)))
-    for k, (first, other) in enumerate(walk.loops):
-        for f, sign in ((other, 1.0), (first, -1.0)):
-            for i in f.before:
-                a = walk.axes[i]
-                if a.revolute:
-                    columns[:, i, 6 * k : 6 * k + 3] += sign * np.cross(a.axis, first.p - a.point)
-                    columns[:, i, 6 * k + 3 : 6 * k + 6] += sign * size * a.axis
-                else:
-                    columns[:, i, 6 * k : 6 * k + 3] += sign * a.axis
-    left = weight[:, None] * columns
-    worst, reaction = settle(walk, weight, left, given, needed)
-    if any(
-        a.allowed is not None for a in walk.axes
-    ):  # what rubs where its way is second order: from the middle too
-        other = needed.copy()
-        for i, a in enumerate(walk.axes):
-            if a.allowed is not None:
-                middle = a.allowed[0].shape[1] // 2
-                other[:, i] = (a.allowed[0][:, middle] + a.allowed[1][:, middle]) / 2
-        again, pull = settle(walk, weight, left, given, other)
-        better = again < worst
-        worst, reaction = np.where(better, again, worst), np.where(better[:, None], pull, reaction)
-        for j in np.flatnonzero(worst > 1e-8 * np.abs(reaction).max(1, initial=0.0)):
-            worst[j] = min(worst[j], bounded(walk, weight, left[j], given, needed, int(j)))
-    sizes = [
-        np.abs(weight * needed).max(1),
-        np.abs(weight * given).max(1),
-        np.abs(reaction).max(1, initial=0.0),
-    ]
-    return worst, np.max(sizes, axis=0)
-
-
-BALANCED = 1e-9
-"""Residual, of the largest force, below which it is not made smaller."""
-
-
-def settle(walk: Walk, weight: Array, left: Array, given: Array, needed: Array) -> tuple[Array, Array]:
-    """Residual (n,) and reactions of the loops: between what the loops can give and what the laws allow, in turns."""
-    n = len(given)
-    rows = [i for i, a in enumerate(walk.axes) if a.force is not None]
-    steps = [i for i, a in enumerate(walk.axes) if a.allowed is not None]
-    worst, reaction, todo = np.full(n, np.inf), np.zeros((n, left.shape[2])), np.arange(n)
-    inverse = pseudo_inverse(left[:, rows])
-    for _ in range(60 if steps else 1):
-        b = weight * (needed[todo] - given[todo])
-        reaction[todo] = np.einsum("nij,nj->ni", inverse[todo], b[:, rows])
-        held = np.einsum("nij,nj->ni", left[todo], reaction[todo])
-        worst[todo] = np.minimum(worst[todo], np.abs(held - b)[:, rows].max(1, initial=0.0))
-        before, after = needed[todo], needed[todo].copy()
-        for i in steps:
-            after[:, i] = nearest(walk.axes[i].allowed, todo, given[todo, i] + held[:, i] / weight[i])
-        needed[todo] = after
-        largest = np.maximum(np.abs(weight * given[todo]).max(1), np.abs(reaction[todo]).max(1, initial=0.0))
-        todo = todo[(after != before).any(1) & (worst[todo] > BALANCED * largest)]
-        if not len(todo):
-            break
-    return worst, reaction
-
-
-def bounded(walk: Walk, weight: Array, left: Array, given: Array, needed: Array, j: int) -> float:
-    """Residual of one pose by bounded least squares over the reactions and the forces inside steps of laws."""
-    rows = [i for i, a in enumerate(walk.axes) if a.force is not None]
-    inside = [i for i in rows if (a := walk.axes[i].allowed) is not None and a[0][j, 0] < a[1][j, 0]]
-    if not inside:
-        return np.inf
-    unit = np.zeros((len(walk.axes), len(inside)))
-    unit[inside, range(len(inside))] = -weight[inside]
-    b = weight * (np.where(np.isin(np.arange(len(weight)), inside), 0.0, needed[j]) - given[j])
-    ends = [(walk.axes[i].allowed[0][j, 0], walk.axes[i].allowed[1][j, 0]) for i in inside]  # type: ignore[index]
-    free = [(-np.inf, np.inf)] * left.shape[1]
-    low, high = np.transpose(np.array([*free, *ends]))
-    a = np.hstack([left, unit])[rows]
-    return float(np.abs(a @ lsq_linear(a, b[rows], (low, high), tol=1e-15).x - b[rows]).max())
-
-
-def open_ways(walk: Walk) -> Array:
-    """(n,) bool."""
-    out = np.zeros(len(walk.case.force), dtype=bool)
-    for a in walk.axes:
-        if a.allowed is not None:
-            out |= (a.allowed[0] == a.allowed[1]).all(1) & (np.ptp(a.allowed[0], axis=1) > 0)
-    return out
-
-
-def nearest(allowed: tuple[Array, Array] | None, at: Array, force: Array) -> Array:
-    """Of the intervals that a law allows at these poses, the force that lies nearest."""
-    assert allowed is not None
-    low, high = (v[at] for v in allowed)
-    choice = np.clip(force[:, None], low, high)
-    best = np.abs(choice - force[:, None]).argmin(1)
-    return choice[np.arange(len(at)), best]
-
-
-def pseudo_inverse(a: Array) -> Array:
-    """(n, columns, rows) that gives the solution of least squares, of least norm where columns depend on each other."""
-    if a.shape[2] == 0:
-        return np.zeros((len(a), 0, a.shape[1]))
-    q, r = np.linalg.qr(a)
-    diagonal = np.abs(np.einsum("nii->ni", r))
-    sound = diagonal.min(1) > 1e-8 * diagonal.max(1)
-    out = np.empty((len(a), a.shape[2], a.shape[1]))
-    if sound.any():
-        out[sound] = np.linalg.solve(r[sound], np.swapaxes(q[sound], 1, 2))
-    if not sound.all():
-        out[~sound] = np.linalg.pinv(a[~sound], rcond=1e-9)
-    return out
 
 
 def gaps(walk: Walk, size: float) -> Array:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.python.oracle.many import Batch, asked, changed, run, verified
+from tests.python.oracle.crowd import KINDS
+from tests.python.oracle.many import RANDOM, Batch, asked, changed, question_at, run
 from tests.python.oracle.statics import Case, balance, closed, coordinates
+from tests.python.oracle.verify import verified
 
 import stiffmap as sm
 
@@ -37,6 +39,13 @@ def test_answers_with_an_effect_at_every_place_are_equilibria(machine: str, effe
     assert found["undecided"] <= 2  # type: ignore[operator]
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_answers_of_random_machines_are_equilibria(kind: str) -> None:
+    found = run(Batch(kind, RANDOM, 4), count=20)
+    assert found["wrong"] == {}
+    assert found["status"]["CONVERGED"] >= 10  # type: ignore[index]
+
+
 def test_a_gap_may_bear_little() -> None:
     # 1e-5 N beside 14 N is no round-off: the gap is closed, 20 um from its middle (theory L1)
     for seed, at in ((1, 27), (3, 66)):
@@ -45,8 +54,8 @@ def test_a_gap_may_bear_little() -> None:
         p, load = asked(machine, np.random.default_rng([seed, *b"tripteron", *b"dead_zone"]), 100)
         one = {**load, "wrench": load["wrench"][at : at + 1]}  # type: ignore[index]
         s = machine.solve(p[at : at + 1], **one)  # type: ignore[arg-type]
-        _, wrong, _ = verified(machine, p[at : at + 1], one, s, np.array([0]))
-        assert s.ok.all() and not wrong
+        verdict = verified(question_at(machine, p[at : at + 1], one), s, np.array([0]))
+        assert s.ok.all() and not verdict.bad
 
 
 def test_what_round_off_alone_would_do_proves_nothing() -> None:
@@ -85,3 +94,25 @@ def test_a_wrong_coordinate_is_noticed_by_its_size() -> None:
     spoilt = balance(machine.description, x, case, 1.0)
     law = next(e.law for e in machine.description.legs[0].elements if e.name == "elbow")
     assert spoilt.residual[0] == pytest.approx(1e-6 * law.stiffness, rel=1e-2)
+
+
+def test_a_wrong_force_in_a_loop_is_noticed_by_its_size() -> None:
+    # the wrenches of the loops take a wrong force of one leg over, but not that of a drive with a rigid leg behind it
+    machine = sm.load_machine("orthoglide-revised")
+    p = np.array([[0.05, -0.1, 0.12]])
+    load = {"wrench": np.array([[100.0, -50.0, 80.0, 0, 0, 0]]), "gravity": [0.0] * 3, "load_type": "dead"}
+    q = question_at(machine, p, load)
+    s = q.solve()
+    command = {n: q.before[n] for n in s.actuators}
+    case = Case(
+        command, np.eye(3)[None], load["wrench"][:, :3], np.zeros((1, 3)), np.zeros(3), "dead", q.before
+    )  # type: ignore[index, arg-type]
+    x = coordinates(s.coordinate_names, s.coordinates)
+    sound = balance(machine.description, x, case, q.size)
+    assert sound.residual[0] < 1e-9 * sound.scale[0]
+    x["x.foot.tx"] = x["x.foot.tx"] + 1e-6
+    x["x.actuator"] = x["x.actuator"] - 1e-6  # along the same line: everything behind them stays
+    spoilt = balance(machine.description, x, case, q.size)
+    assert spoilt.gap[0] < 1e-9
+    stiffness = 1 / 1.4e-7  # of the drive, N/m
+    assert 0.1 * 1e-6 * stiffness < spoilt.residual[0] < 10 * 1e-6 * stiffness
