@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from stiffmap.link import identify_link
     from stiffmap.machine import Machine, load_machine
     from stiffmap.maps import error_map, map_estimate, map_statistics, polar, sweep, uncertainty_ranking
+    from stiffmap.milling import mill
     from stiffmap.performance import (
         accuracy_transmission,
         drive_efforts,
@@ -76,6 +77,7 @@ _HOME = {
     "cutting_force": "stiffmap.process",
     "identify_process": "stiffmap.process",
     "load_process": "stiffmap.process",
+    "mill": "stiffmap.milling",
     "Kinematics": "stiffmap.kinematics",
     "Machine": "stiffmap.machine",
     "Solution": "stiffmap.solution",
@@ -134,6 +136,7 @@ __all__ = [
     "map_estimate",
     "map_statistics",
     "measures",
+    "mill",
     "natural_frequencies",
     "polar",
     "residual",

@@ -54,5 +54,6 @@ COMMANDS = (
     Command(
         "compensate", "stiffmap.cli.compensate", "compensate", "Commands that cancel what a machine lacks."
     ),
+    Command("mill", "stiffmap.cli.mill", "mill", "The part as it is cut, and a program that makes it right."),
     Command("bench", "stiffmap.cli.bench", "bench", "Speed of this installation on this computer."),
 )

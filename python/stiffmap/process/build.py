@@ -121,7 +121,10 @@ def _tool(m: ProcessFile, r: Reader) -> Tool:
                 "tool", "runout", "offset",
             )  # fmt: skip
     stick = r.si(t.stick_out, "m", "tool", "stick_out")
-    return Tool(diameter, teeth, helix, out, angle, stick)
+    if stick < 0:
+        r.fail(f"expected a length of zero or more, found {t.stick_out!r}", "tool", "stick_out")
+    modulus = 0.0 if t.modulus is None else r.positive(t.modulus, PRESSURE, "tool", "modulus")
+    return Tool(diameter, teeth, helix, out, angle, stick, modulus)
 
 
 def _feed(value: object, tool: Tool, spindle: float, r: Reader) -> float:

@@ -27,6 +27,15 @@ class Tool:
     runout_angle: float = 0.0
     """Of that distance, from the first tooth's tip against the sense of the cut."""
     stick_out: float = 0.0
+    modulus: float = 0.0
+    """N/m² of the tool's shank, which bends by its stick-out; 0: rigid."""
+
+    @property
+    def compliance(self) -> float:
+        """m/N at the tip, across the tool: a cantilever of the tool's diameter."""
+        if not self.modulus:
+            return 0.0
+        return 64 * self.stick_out**3 / (3 * pi * self.modulus * self.diameter**4)
 
 
 @dataclass(frozen=True)

@@ -67,10 +67,16 @@ def engaged(process: Process, width: Floats) -> tuple[Floats, Floats]:
     return (zero, arc) if process.cut.side == "conventional" else (half - half, half)
 
 
-def mean_force(process: Process, width: ArrayLike, axial: ArrayLike) -> Floats:
-    """(..., 3) N, mean force for straight cuts of this width and depth (m); of a slot the width does not count."""
-    w, a = np.broadcast_arrays(np.asarray(width, float), np.asarray(axial, float))
-    edge, chip = densities(process)
+def mean_force(process: Process, width: ArrayLike, axial: ArrayLike, faster: ArrayLike = 1.0) -> Floats:
+    """(..., 3) N, mean force for straight cuts of this width and depth (m); of a slot the width does not count.
+
+    faster: (...) feed per revolution as a multiple of the process's own.
+    """
+    w, a, more = np.broadcast_arrays(
+        np.asarray(width, float), np.asarray(axial, float), np.asarray(faster, float)
+    )
+    edge, each = densities(process)
+    chip = [more * k for k in each]
     f, t = engaged(process, w)
     cos, sin = np.cos(t) - np.cos(f), np.sin(t) - np.sin(f)
     square = (np.sin(t) ** 2 - np.sin(f) ** 2) / 2

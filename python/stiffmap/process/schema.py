@@ -43,6 +43,7 @@ class ToolModel(FileModel):
     helix: Written = "0 deg"
     runout: RunoutModel | None = None
     stick_out: Written = "0 mm"
+    modulus: Written | None = None
 
 
 class EndMillModel(FileModel):

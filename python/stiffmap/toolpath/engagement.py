@@ -74,8 +74,20 @@ def engagement(
         radial, axial = _in_box(points, process, stock, side)
     if process.cut.side == "slot":
         return Engagement(radial, np.zeros(m), np.zeros(m), axial)
-    curvature = -side * (points.bend * points.normal).sum(axis=1)
+    curvature = _over_contact(points, process, -side * (points.bend * points.normal).sum(axis=1))
     return Engagement(radial, curvature, _corners(points, path, process, radial, side), axial)
+
+
+def _over_contact(points: Points, process: Process, curvature: Floats) -> Floats:
+    """Mean over the way from abeam to the front end of the contact: where a line becomes an arc the cut changes over that way."""
+    ahead = process.tool.diameter / 2 * np.sin(min(process.arc, np.pi / 2))
+    step = np.diff(points.way, prepend=points.way[:1])
+    before = np.r_[curvature[:1], curvature[:-1]]
+    turned = np.cumsum(step * (curvature + before) / 2)
+    end = np.minimum(points.way + ahead, points.way[-1])
+    length = end - points.way
+    mean = np.interp(end, points.way, turned) - turned
+    return np.where(length > 1e-9, mean / np.maximum(length, 1e-12), curvature)
 
 
 def _in_box(points: Points, process: Process, stock: Box, side: float) -> tuple[Floats, Floats]:

@@ -58,7 +58,11 @@ def sampled(path: Toolpath, step: float = 2e-3) -> Points:
     if not cuts.size:
         raise StiffmapError(f"{path.name}: no move cuts (moves at a feed across the tool)")
     length = path.length[cuts]
-    count = np.maximum(1, np.ceil(length / step - 1e-9)) + 1
+    count = np.maximum(1, np.ceil(length / step - 1e-9))
+    arcs = (
+        path.kind[cuts] == Kind.ARC
+    )  # an even number of intervals, and enough for an arc through three of their ends
+    count = np.where(arcs, np.maximum(2 * np.ceil(count / 2), 8), count) + 1
     if count.sum() > MOST:
         raise StiffmapError(
             f"step: {count.sum():.3g} points; expected at most {MOST:.0e}: take a larger step"
@@ -73,6 +77,10 @@ def sampled(path: Toolpath, step: float = 2e-3) -> Points:
         turn = path.at(cuts[1:], np.zeros(len(cuts) - 1))[1] - path.at(cuts[:-1], np.ones(len(cuts) - 1))[1]
         bent = turn / ((length[1:] + length[:-1]) / 2)[:, None]
         last, opens = np.cumsum(n) - 1, np.cumsum(n) - n
+        bend[last[1:][smooth]] = bent[
+            smooth
+        ]  # the end of a curve bends like its last joint, its start like its first
+        bend[opens[:-1][smooth]] = bent[smooth]
         bend[last[:-1][smooth]] = bent[smooth]
         keep[opens[1:][smooth]] = False
     before = np.repeat(np.cumsum(length) - length, n)

@@ -65,11 +65,17 @@ def test_a_curve_of_points_is_a_curve() -> None:
     assert len(q) == 401
     process = sm.load_process("trimming")
     e = engagement(q, p, process)
-    assert e.curvature[1:-1] == pytest.approx(np.full(399, -10.0), rel=1e-3)
+    assert e.curvature == pytest.approx(np.full(401, -10.0), rel=1e-3)
     pocket = outline("pocket")
-    k = engagement(sampled(pocket), pocket, process).curvature
+    q = sampled(pocket, 1e-4)
+    k = engagement(q, pocket, process).curvature
     assert k.max() == pytest.approx(100.0)
-    assert k.min() == 0.0
+    assert k.min() == pytest.approx(0.0, abs=1e-9)
+    # from a line to an arc over the way that the contact reaches ahead
+    reach = process.tool.diameter / 2 * np.sin(process.arc)
+    corner = q.way[np.flatnonzero(pocket.kind[q.move] == 2)[0]]
+    half = np.interp(corner - reach / 2, q.way, k)
+    assert half == pytest.approx(50.0, rel=0.02)
 
 
 def test_an_inside_corner_of_a_pocket() -> None:

@@ -1,0 +1,135 @@
+"""``stiffmap mill``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from stiffmap.cli.inputs import EffectsOption, ThreadsOption, finish, machine_with, numbers, plain
+from stiffmap.cli.inputs import folder as make_folder
+from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.errors import StiffmapError
+from stiffmap.machine import load_machine
+from stiffmap.milling import mill_job
+from stiffmap.milling.report import summary, write_report
+from stiffmap.process import Process, load_process
+from stiffmap.status import Status
+from stiffmap.toolpath import load_path
+
+MM = 1e-3
+
+
+def mill(
+    machine: Annotated[
+        str, typer.Argument(help="Corrected machine: file with its effects, or a shipped name.")
+    ],
+    path: Annotated[
+        str,
+        typer.Argument(
+            help="G-code, CL or CSV file; or an outline: washbasin, bathtub, rectangle, circle, pocket."
+        ),
+    ],
+    process: Annotated[str, typer.Option(help="Process file, or a shipped name: trimming, slot.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for report and program.")
+    ] = None,
+    at: Annotated[
+        str | None, typer.Option(help="Origin of the part on the machine, mm. [default: the machine's home]")
+    ] = None,
+    turn: Annotated[float, typer.Option(help="Turn of the part about z, deg.")] = 0.0,
+    size: Annotated[
+        str | None, typer.Option(help="Of a built-in outline, mm, e.g. 340,240 (width,depth).")
+    ] = None,
+    offset: Annotated[
+        list[str] | None, typer.Option(help="Work offset of the G-code, mm, e.g. 'G55=10,0,0'; repeatable.")
+    ] = None,
+    effect: EffectsOption = None,
+    true_machine: Annotated[
+        str | None, typer.Option("--true", help="Machine file that the program is also simulated on.")
+    ] = None,
+    step: Annotated[float, typer.Option(help="Distance of the points along the path, mm.")] = 2.0,
+    within: Annotated[float, typer.Option(help="Chord error of the compensated program, mm.")] = 0.001,
+    thickness: Annotated[
+        float | None, typer.Option(help="Width to trim, mm; default: the process's.")
+    ] = None,
+    tolerance: Annotated[float | None, typer.Option(help="Tolerance, mm; default: the process's.")] = None,
+    passes: Annotated[int, typer.Option(help="Passes along the same program.")] = 1,
+    band: Annotated[bool, typer.Option(help="Also under 80 and 120 % of the force.")] = False,
+    threads: ThreadsOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """The part as a machine will cut it, and a program that makes it right.
+
+    The cutting force and the deflection are found together; the compensated program is read back and simulated.
+    Exit code 1: a point without an equilibrium, a broken limit, or an error beyond the tolerance after compensation.
+
+    Examples:
+
+      [cyan]stiffmap mill orthoglide-revised outline.ngc --process trimming --at 50,50,0 -o result[/cyan]
+
+      [cyan]stiffmap mill linear-delta rectangle --size 120,80,15 --process trimming.yaml --at 0,0,300 -o result[/cyan]
+
+      [cyan]stiffmap mill result/machine.yaml outline.ngc --process trimming --true measured.yaml --band -o result[/cyan]
+    """
+    m = machine_with(machine, effect)
+    p = load_path(
+        path,
+        size=None if size is None else tuple(float(v) * MM for v in numbers(size, "size")),
+        offsets=_offsets(offset),
+    )
+    cut = _process(process, tolerance)
+    found = mill_job(
+        m, p, cut,
+        at=None if at is None else MM * numbers(at, "at", 3), turn=float(np.radians(turn)), step=MM * step, within=MM * within,
+        true_machine=None if true_machine is None else load_machine(true_machine),
+        thickness=None if thickness is None else MM * thickness, passes=passes, band=band, threads=threads,
+    )  # fmt: skip
+    out = summary(found)
+    if output is not None:
+        make_folder(output)
+        out["files"] = {k: str(output / v) for k, v in write_report(found, output).items()}
+    if as_json:
+        print_json(plain(out))
+    else:
+        _say(out)
+    states: Any = found.dataset.status.values
+    t = cut.tolerance
+    after = found.dataset.error_normal_after.values
+    finish(bool((states != Status.CONVERGED).any() or (t is not None and np.nanmax(np.abs(after)) > t)))
+
+
+def _process(name: str, tolerance: float | None) -> Process:
+    p = load_process(name)
+    if tolerance is None:
+        return p
+    if not tolerance > 0:
+        raise StiffmapError(f"--tolerance: expected a number above zero, got {tolerance}")
+    return replace(p, tolerance=MM * tolerance)
+
+
+def _offsets(given: list[str] | None) -> dict[str, list[float]] | None:
+    if not given:
+        return None
+    out = {"G54": [0.0, 0.0, 0.0]}
+    for text in given:
+        name, sign, values = text.partition("=")
+        if not sign or name.strip().upper() not in {f"G{n}" for n in range(54, 60)}:
+            raise StiffmapError(f"--offset: expected such as G55=10,0,0; got '{text}'")
+        out[name.strip().upper()] = [float(v) * MM for v in numbers(values, "offset", 3)]
+    return out
+
+
+def _say(out: dict[str, object]) -> None:
+    print(out["verdict"])
+    for key, value in out.items():
+        if key == "verdict":
+            continue
+        if isinstance(value, dict):
+            text = ", ".join(f"{k} {v:.6g}" if isinstance(v, float) else f"{k} {v}" for k, v in value.items())
+        else:
+            text = f"{value:.6g}" if isinstance(value, float) else str(value)
+        print(f"{key}: {text}")

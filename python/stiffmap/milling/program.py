@@ -1,0 +1,87 @@
+"""Compensated commands as a program: pieces of each move, joined where the error jumps."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.broadcasting import Floats
+from stiffmap.milling.setting import Setting
+from stiffmap.toolpath.gcode.load import load_gcode
+from stiffmap.toolpath.gcode.write import rewritten
+from stiffmap.toolpath.path import Kind, Toolpath, path_of
+from stiffmap.toolpath.pieces import MovedPiece, arc_pieces, line_pieces
+
+WITHIN = 1e-6
+"""m: chord error of the pieces."""
+TOUCH = 2e-7
+"""m: ends of neighbouring moves that are nearer than this are one point."""
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A path with compensated positions."""
+
+    text: str
+    suffix: str
+    path: Toolpath
+    """The program as its own reader sees it."""
+    origin: NDArray[np.int64]
+    """(moves of `path`,) the move of the wanted path that each is a piece of."""
+    pieces: int
+    """Cutting moves that were written."""
+
+
+def program(job: Setting, command: Floats, within: float = WITHIN) -> Program:
+    """G-code with the structure of the original, or a table where the path came from one.
+
+    command: (m, 3) m, base axes. within: chord error, m.
+    """
+    path, points = job.path, job.points
+    part = job.place.back(command)
+    first = np.flatnonzero(np.diff(points.move, prepend=-1) != 0)
+    last = np.r_[first[1:], len(points)]
+    if not path.text:
+        return _table(job, part)
+    moved: dict[int, list[MovedPiece]] = {}
+    starts: dict[int, Floats] = {}
+    end_before: Floats | None = None
+    for a, b in zip(first, last, strict=True):
+        i = int(points.move[a])
+        q = part[a:b]
+        if points.share[a] > 0:  # the joint with the move before stands there
+            assert end_before is not None
+            q = np.vstack([end_before, q])
+        pieces = []
+        joined = end_before is not None and i > 0 and path.cuts[i - 1]
+        if joined and end_before is not None and np.linalg.norm(q[0] - end_before) > TOUCH:
+            pieces.append(MovedPiece(Kind.LINE, q[0], np.full(3, np.nan), 0.0))
+        if path.kind[i] == Kind.ARC:
+            pieces += arc_pieces(q, int(path.normal[i]), float(np.sign(path.sweep[i])), within)
+        else:
+            pieces += line_pieces(q, within)
+        moved[i], starts[i], end_before = pieces, q[0], q[-1]
+    for i in starts:  # what leads to a cut ends where the cut now starts
+        if i > 0 and i - 1 not in starts:
+            moved[i - 1] = [MovedPiece(Kind(int(path.kind[i - 1])), starts[i], np.full(3, np.nan), 0.0)]
+    text, origin = rewritten(path, moved)
+    again = load_gcode(text.splitlines(), name=path.name)
+    return Program(text, ".ngc", again, np.array(origin), sum(map(len, moved.values())))
+
+
+def _table(job: Setting, part: Floats) -> Program:
+    """Points of the compensated path with feed, spindle and tool axis."""
+    points, path = job.points, job.path
+    buffer = io.StringIO()
+    out = csv.writer(buffer, lineterminator="\n")
+    spindle = np.where(np.isfinite(points.spindle), points.spindle, job.process.spindle)
+    out.writerow(["x_mm", "y_mm", "z_mm", "feed_mm_min", "spindle_rpm", "i", "j", "k"])
+    columns = np.hstack([1e3 * part, (6e4 * job.feed)[:, None], (spindle * 30 / np.pi)[:, None], points.tool])
+    for row in columns:
+        out.writerow([f"{v:.9g}" if k > 2 else f"{v:.6f}" for k, v in enumerate(row)])
+    again = path_of(np.round(part, 9), feed=job.feed, spindle=spindle, tool=points.tool, name=path.name)
+    return Program(buffer.getvalue(), ".csv", again, points.move[1:], len(again))
