@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from stiffmap.cli.inputs import EffectsOption, ThreadsOption, finish, machine_with, numbers, plain
-from stiffmap.cli.inputs import folder as make_folder
+from stiffmap.cli.inputs import (
+    EffectsOption,
+    FolderOption,
+    ThreadsOption,
+    finish,
+    machine_with,
+    numbers,
+    plain,
+)
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import load_machine
@@ -34,9 +40,7 @@ def mill(
         ),
     ],
     process: Annotated[str, typer.Option(help="Process file, or a shipped name: trimming, slot.")],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for report and program.")
-    ] = None,
+    output: FolderOption = None,
     at: Annotated[
         str | None, typer.Option(help="Origin of the part on the machine, mm. [default: the machine's home]")
     ] = None,
@@ -90,7 +94,6 @@ def mill(
     )  # fmt: skip
     out = summary(found)
     if output is not None:
-        make_folder(output)
         out["files"] = {k: str(output / v) for k, v in write_report(found, output).items()}
     if as_json:
         print_json(plain(out))

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from stiffmap.errors import FileError
+from stiffmap.maps.files import write_dataset
 from stiffmap.milling.job import Milled, beyond, sizes, verdict
 from stiffmap.milling.pictures import error_figure, machine_path_figure, outline_figure
+from stiffmap.outputs import make_folder, write_text
 from stiffmap.process import cutting_force
 from stiffmap.process.force import force_uncertainty
 from stiffmap.report.sheet import Sheet, write_sheet
@@ -67,14 +68,11 @@ def write_report(found: Milled, folder: str | PathLike[str]) -> dict[str, str]:
     """Write report.html, the compensated program and part.nc into a folder; names of the files. Raises FileError."""
     target = Path(folder)
     made = {"report": "report.html", "program": f"compensated{found.program.suffix}", "data": "part.nc"}
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-        (target / made["program"]).write_text(found.program.text, encoding="utf-8")
-        ds = found.dataset.copy()
-        ds.attrs = {k: v if v else "" for k, v in ds.attrs.items()}
-        ds.to_netcdf(target / made["data"])
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(target)) from error
+    make_folder(target)
+    write_text(target / made["program"], found.program.text)
+    ds = found.dataset.copy()
+    ds.attrs = {k: v if v else "" for k, v in ds.attrs.items()}
+    write_dataset(ds, target / made["data"])
     write_sheet(target / made["report"], _sheet(found), _pictures(found), _digests(found))
     return made
 
