@@ -18,11 +18,13 @@ bool read(PyObject* given, std::array<double, N>& out) {
     if (PySequence_Fast_GET_SIZE(given) != static_cast<Py_ssize_t>(N)) return false;
     for (std::size_t i = 0; i < N; ++i) {
       PyObject* item = PySequence_Fast_GET_ITEM(given, static_cast<Py_ssize_t>(i));
-      if (!PyFloat_Check(item) && !PyLong_Check(item)) return false;
+      if ((!PyFloat_Check(item) && !PyLong_Check(item)) || PyBool_Check(item)) return false;
       out[i] = PyFloat_AsDouble(item);
       if (PyErr_Occurred()) return PyErr_Clear(), false;
     }
   } else {
+    // Exactly an array: a subclass may carry a mask or a unit.
+    if (Py_TYPE(given) != py::detail::npy_api::get().PyArray_Type_) return false;
     if (!py::isinstance<py::array_t<double>>(given)) return false;
     const auto a = py::reinterpret_borrow<py::array_t<double>>(given);
     if (a.ndim() != 1 || a.shape(0) != static_cast<py::ssize_t>(N)) return false;

@@ -11,6 +11,8 @@ from stiffmap.version import __version__
 
 if TYPE_CHECKING:
     from stiffmap.budget import DeflectionBudget, deflection_budget
+    from stiffmap.calibration import Calibration
+    from stiffmap.calibration.calibrate import calibrate
     from stiffmap.compensation import Commands, compensate
     from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, Residual, load_experiment
@@ -150,12 +152,14 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'stiffmap' has no attribute {name!r}")
-    value = getattr(import_module(_HOME[name]), name)
-    globals()[name] = value
-    return value
+if not TYPE_CHECKING:  # type checkers then know which names there are
+
+    def __getattr__(name: str) -> Any:
+        if name not in _HOME:
+            raise AttributeError(f"module 'stiffmap' has no attribute {name!r}")
+        value = getattr(import_module(_HOME[name]), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:

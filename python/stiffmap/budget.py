@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.compiled import Role, Status
 from stiffmap.errors import StiffmapError
 from stiffmap.html import table, titled
@@ -104,8 +104,8 @@ def deflection_budget(
     In a statically determinate machine each is the motion of the point if that element alone yielded.
     Raises StiffmapError where the pose has no stable equilibrium.
     """
-    p = machine.description.home.p if position is None else np.asarray(position, dtype=float)
-    load = np.asarray(wrench, dtype=float)
+    p = machine.description.home.p if position is None else real_array(position, "position")
+    load = real_array(wrench, "wrench")
     g = machine.compiled.gravity(gravity)
     options: SolveKeywords = {"rotation": rotation, "point": point, "method": "reference"}
     cases = ((load, g), (np.zeros(6), np.zeros(3)))
@@ -133,7 +133,7 @@ def _unit_reactions(
     size = max(float(np.abs(load).max()), 1.0)
     steps = STEP * size * np.array([1.0, 1.0, 1.0, *[machine.compiled.length] * 3])
     wrenches = np.concatenate([load + np.diag(steps), load - np.diag(steps)])
-    turned = machine.compiled.home_rotation if rotation is None else np.asarray(rotation, dtype=float)
+    turned = machine.compiled.home_rotation if rotation is None else real_array(rotation, "rotation")
     force = machine.compiled.reactions(
         np.tile(p, (12, 1)), np.tile(turned, (12, 1, 1)), wrenches, point=point, gravity=gravity, threads=1
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.broadcasting import Floats, rows, thread_count
+from stiffmap.broadcasting import Floats, real_array, rows, thread_count
 from stiffmap.description.tree import joints
 from stiffmap.machine import Machine, takes_machine
 
@@ -66,10 +66,10 @@ def assembly_stress(
         method="reference",
     )
     shape = s.status.shape
-    load = np.zeros(6) if wrench is None else np.asarray(wrench, dtype=float)
-    turned = machine.compiled.home_rotation if rotation is None else np.asarray(rotation, dtype=float)
+    load = np.zeros(6) if wrench is None else real_array(wrench, "wrench")
+    turned = machine.compiled.home_rotation if rotation is None else real_array(rotation, "rotation")
     force = machine.compiled.reactions(
-        rows(np.asarray(position, dtype=float), shape, (3,)),
+        rows(real_array(position, "position"), shape, (3,)),
         rows(turned, shape, (3, 3)),
         rows(load, shape, (6,)),
         point=point,

@@ -8,7 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.broadcasting import Floats, batch, rows, rows_or_one, thread_count, trailing, wrench_array
+from stiffmap.broadcasting import (
+    Floats,
+    batch,
+    rows,
+    rows_or_one,
+    thread_count,
+    trailing,
+    whole_number,
+    wrench_array,
+)
 from stiffmap.closing import Kinematics, close_actuators, close_poses
 from stiffmap.compiled import CompiledMachine
 from stiffmap.compiled.machine import LOAD_TYPES
@@ -163,6 +172,6 @@ def step_count(load_steps: int | str) -> int:
     """Number of equal load steps; 0: adaptive."""
     if load_steps == "auto":
         return 0
-    if isinstance(load_steps, bool) or not isinstance(load_steps, int) or load_steps < 1:
+    if isinstance(load_steps, str):
         raise StiffmapError(f"load_steps: expected 'auto' or a positive number, got {load_steps!r}")
-    return load_steps
+    return whole_number(load_steps, "load_steps", 1)

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import FileError, StiffmapError
+from stiffmap.number_text import number_in
 from stiffmap.outputs.option import written
 
 if TYPE_CHECKING:
@@ -151,7 +152,7 @@ def _numbers(given: Sequence[str] | None, name: str) -> dict[str, float]:
     out = {}
     for key, text in _pairs(given, name).items():
         try:
-            out[key] = float(text)
+            out[key] = number_in(text)
         except ValueError:
             raise StiffmapError(f"--{name}: expected a number, such as {key}=0; got '{text}'") from None
     return out

@@ -13,6 +13,7 @@ import typer
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
+from stiffmap.number_text import number_in
 from stiffmap.outputs.option import written
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def numbers(text: str, name: str, count: int | None = None) -> Floats:
     """Finite numbers, separated by commas or blanks."""
     expected = "numbers" if count is None else f"{count} numbers"
     try:
-        out = np.array([float(part) for part in text.replace(",", " ").split()])
+        out = np.array([number_in(part) for part in text.replace(",", " ").split()])
     except ValueError:
         raise StiffmapError(
             f"--{name}: expected {expected} without units, such as 100,0,-50; got '{text}'"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from stiffmap.number_text import number_in
+
 VECTORS = frozenset(
     (
         "--at",
@@ -44,6 +46,6 @@ def joined(arguments: Sequence[str]) -> list[str]:
 def _numbers(word: str) -> bool:
     """Whether a word is a number, or several with commas between."""
     try:
-        return bool([float(part) for part in word.strip(" ,").split(",")])
+        return bool([number_in(part) for part in word.strip(" ,").split(",")])
     except ValueError:
         return False

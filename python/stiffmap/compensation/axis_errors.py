@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.compensation.commands import compensate
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
@@ -67,7 +67,7 @@ class AxisErrors:
 
     def corrected(self, command: ArrayLike, *, forward: bool = True) -> Floats:
         """Commanded coordinates (m) that a controller with this table sends: less the interpolated error."""
-        u = np.asarray(command, dtype=float)
+        u = real_array(command, "command")
         error = self.positioning[0 if forward else 1]
         return np.asarray(u - np.interp(u, self.position, error))
 
@@ -94,10 +94,10 @@ def axis_errors(
     if position is None:
         low, high = machine.workspace
         position = np.linspace(low[i], high[i], 21)
-    nodes = np.asarray(position, dtype=float)
+    nodes = real_array(position, "position")
     if nodes.ndim != 1 or nodes.size < 2 or not (np.diff(nodes) > 0).all():
         raise StiffmapError("position: expected two or more rising numbers (m)")
-    point = np.asarray(machine.description.home.p if through is None else through, dtype=float)
+    point = real_array(machine.description.home.p if through is None else through, "through")
     if point.shape != (3,) or not np.isfinite(point).all():
         raise StiffmapError("through: expected a position of three numbers (m)")
     middle = (nodes[:-1] + nodes[1:]) / 2

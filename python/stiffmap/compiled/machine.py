@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap import _core
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.compiled.lowering import build_mechanism, home_gaps
 from stiffmap.compiled.names import Names, names_of
 from stiffmap.description import MachineDescription
@@ -97,7 +97,7 @@ class CompiledMachine:
         """(3,) m/s², base axes; the machine file's where nothing is given. StiffmapError for bad numbers."""
         if given is None:
             return np.array(self.description.gravity or (0.0, 0.0, 0.0))
-        g = np.asarray(given, dtype=float)
+        g = real_array(given, "gravity", "3 finite numbers (m/s², base axes)")
         if g.shape != (3,) or not np.isfinite(g).all():
             raise StiffmapError(f"gravity: expected 3 finite numbers (m/s², base axes), got {given!r}")
         return g

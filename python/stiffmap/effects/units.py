@@ -7,6 +7,7 @@ from collections import Counter
 from fractions import Fraction
 
 from stiffmap.errors import StiffmapError
+from stiffmap.number_text import number_in
 from stiffmap.units import FORCES, LENGTHS, MASSES, PLANE_ANGLES
 
 _MICRO = Fraction(1, 10**6)
@@ -84,10 +85,10 @@ def read_value(text: str, expected: str) -> float:
         if want:
             written = " or ".join(number + unit for unit in _WORKSHOP.get(expected, (expected,)))
             raise StiffmapError(f"the unit is missing: write {written}; got {text!r}")
-        return float(number)
+        return number_in(number)
     factor, dimension = unit_factor(unit)
     if dimension != want:
         raise StiffmapError(f"expected a unit such as {expected}, got {unit!r}")
     if isinstance(factor, Fraction):  # 12um is the double nearest to 12e-6
         return float(Fraction(number) * factor)
-    return float(number) * factor
+    return number_in(number) * factor

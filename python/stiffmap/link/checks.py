@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stiffmap.broadcasting import real_array
 from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Bools, Floats
 
@@ -91,10 +92,7 @@ def identifiable_columns(wrenches: Floats, *, partial: bool) -> Bools:
 
 
 def _finite(name: str, value: ArrayLike, shape: tuple[int | None, ...], words: str) -> Floats:
-    try:
-        a = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise StiffmapError(f"{name}: expected an array of numbers, {words}") from None
+    a = real_array(value, name, f"an array of numbers, {words}")
     fits = a.ndim == len(shape) and all(
         want is None or want == got for want, got in zip(shape, a.shape, strict=True)
     )

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stiffmap.broadcasting import real_array
 from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Bools, Floats
 from stiffmap.link.checks import Field, check_points, checked_field, identifiable_columns
@@ -91,7 +92,7 @@ def known_noise(noise: Known, cases: int) -> Floats | None:
     if noise is None or (isinstance(noise, str) and noise == "independent"):
         return None
     try:
-        sigma = np.asarray(noise, dtype=float)
+        sigma = real_array(noise, "noise")
     except (TypeError, ValueError):
         sigma = np.array([np.nan])
     if sigma.shape not in {(), (1,), (cases,)} or not np.all(np.isfinite(sigma)) or not np.all(sigma > 0):

@@ -14,6 +14,7 @@ from stiffmap.link.arrays import Floats
 from stiffmap.link.gmshmesh import UNITS
 from stiffmap.link.shapes import Bar, Foot, ForkBar, HollowBar
 from stiffmap.link.solve import Material
+from stiffmap.number_text import number_in
 from stiffmap.units import FORCES, MOMENTS, STRESSES, size_of
 from stiffmap.yaml_text import read
 
@@ -127,7 +128,7 @@ def read_cases(path: str | Path) -> Floats:
     for number, line in enumerate(lines[1:], 2):
         cells = line.split(",")
         try:
-            rows.append([float(cells[columns[c][0]]) * columns[c][1] for c in wanted])
+            rows.append([number_in(cells[columns[c][0]]) * columns[c][1] for c in wanted])
         except (ValueError, IndexError):
             raise StiffmapError(f"{path}: row {number} does not hold numbers in all columns") from None
     return np.array(rows).reshape(-1, 6)

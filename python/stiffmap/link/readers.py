@@ -11,6 +11,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.link.arrays import Floats, Ints
 from stiffmap.link.gmshmesh import UNITS
 from stiffmap.link.optional import need
+from stiffmap.number_text import number_in
 
 Rows = tuple[Ints, Floats]
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
@@ -32,7 +33,7 @@ def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
     rows = []
     for number, line in enumerate(lines[1:], 2):
         try:
-            row = [float(cell) for cell in line.split(",")]
+            row = [number_in(cell) for cell in line.split(",")]
         except ValueError:
             raise StiffmapError(
                 f"{path}: row {number} has a cell that is not a number: {line.strip()[:60]}"
@@ -93,7 +94,7 @@ def read_frd(path: str | Path) -> tuple[Floats, Floats]:
                 into = cases[-1]
         elif key.startswith("-1") and into is not None:
             try:
-                into[int(line[3:13])] = [float(line[13 + 12 * i : 25 + 12 * i]) for i in range(3)]
+                into[int(line[3:13])] = [number_in(line[13 + 12 * i : 25 + 12 * i]) for i in range(3)]
             except ValueError:
                 raise StiffmapError(
                     f"{path}: expected fixed columns of twelve characters, got {line.strip()[:60]}"
@@ -190,7 +191,7 @@ def _node_rows(text: str, columns: tuple[int, ...] = (4,)) -> dict[int, list[flo
         head = re.match(r"\s*(\d+)\s(.*)", line)
         cells = re.findall(_NUMBER, head[2]) if head else []
         if head and len(cells) + 1 in columns and not re.search(r"[A-CF-Za-cf-z]", line):
-            rows[int(head[1])] = [float(c.replace("D", "E").replace("d", "e")) for c in cells[:3]]
+            rows[int(head[1])] = [number_in(c.replace("D", "E").replace("d", "e")) for c in cells[:3]]
     return rows
 
 

@@ -13,8 +13,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from stiffmap.broadcasting import whole_number
 from stiffmap.compiled import Status
-from stiffmap.errors import FileError, StiffmapError
+from stiffmap.errors import FileError
 from stiffmap.machine import Machine, hint_metres, takes_machine
 from stiffmap.maps.block import solve_block
 from stiffmap.maps.cluster import on_cluster
@@ -153,9 +154,7 @@ def fill(plan: MapPlan, store: Store, chunk: int | None, progress: bool | None) 
 
 def at_once(chunk: int | None) -> int:
     """Poses solved at once."""
-    if chunk is not None and chunk < 1:
-        raise StiffmapError(f"chunk: expected 1 or more, got {chunk}")
-    return POSES_AT_ONCE if chunk is None else chunk
+    return POSES_AT_ONCE if chunk is None else whole_number(chunk, "chunk", 1)
 
 
 def _fill(plan: MapPlan, store: Store, solver: Solver, progress: bool | None) -> None:

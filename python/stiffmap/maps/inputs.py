@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats, trailing, wrench_array
+from stiffmap.broadcasting import Floats, real_array, real_number, trailing, wrench_array
 from stiffmap.errors import StiffmapError
 
 PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -15,7 +15,7 @@ PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 def axis(values: ArrayLike, name: str) -> Floats:
     """One axis of a grid (m): finite numbers, none twice, at least one."""
-    out = _numbers(np.atleast_1d(np.asarray(values)), name)
+    out = _numbers(values, name)
     if len(np.unique(out)) != out.size:
         raise StiffmapError(f"{name}: expected different numbers, got one of them twice")
     return out
@@ -23,14 +23,11 @@ def axis(values: ArrayLike, name: str) -> Floats:
 
 def force_list(values: ArrayLike) -> Floats:
     """Force magnitudes (N) of a sweep; a negative one acts against the direction."""
-    return _numbers(np.atleast_1d(np.asarray(values)), "forces")
+    return _numbers(values, "forces")
 
 
-def _numbers(values: np.ndarray[tuple[int, ...], np.dtype[np.generic]], name: str) -> Floats:
-    try:
-        out = values.astype(float)
-    except (TypeError, ValueError):
-        raise StiffmapError(f"{name}: expected numbers, got {values.dtype}") from None
+def _numbers(values: ArrayLike, name: str) -> Floats:
+    out = np.atleast_1d(real_array(values, name))
     if out.ndim != 1:
         raise StiffmapError(f"{name}: expected one axis of numbers, got shape {out.shape}")
     if out.size == 0:
@@ -71,7 +68,7 @@ def plane_axes(plane: str) -> tuple[int, int]:
 
 def magnitude(value: float, name: str, unit_name: str) -> float:
     """A positive finite number."""
-    out = float(value)
+    out = real_number(value, name, f"a positive number ({unit_name})")
     if not np.isfinite(out) or out <= 0:
         raise StiffmapError(f"{name}: expected a positive number ({unit_name}), got {value!r}")
     return out

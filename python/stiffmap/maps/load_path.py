@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, whole_number
 from stiffmap.compiled.machine import PATH_CONTROLS as CONTROLS
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import hint_metres
@@ -85,8 +85,7 @@ def check_control(control: str, limit: float | None, steps: int, load_type: obje
         raise StiffmapError(
             f"limit: expected a number other than 0 ({UNITS[control]} for control {control!r}), got {limit!r}"
         )
-    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
-        raise StiffmapError(f"steps: expected a positive number, got {steps!r}")
+    whole_number(steps, "steps", 1)
     if isinstance(cross, bool) or not isinstance(cross, int):
         raise StiffmapError(f"cross: expected the number of a bifurcation, 1, -1, 2 …, got {cross!r}")
     if load_type != "dead":

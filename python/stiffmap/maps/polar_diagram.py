@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, whole_number
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.direction_sweep import DirectionSweep, direction, direction_sweep_of, even_angles
@@ -45,7 +45,7 @@ def polar(
     loading = Loading(machine, options, **given)
     p, axes = place(position), plane_axes(plane)
     force = magnitude(force, "force", "N")
-    if directions < 3:
+    if (directions := whole_number(directions, "directions", 1)) < 3:
         raise StiffmapError(f"directions: expected 3 or more, got {directions}")
     angle = even_angles(directions)
     wrench = np.concatenate([force * direction(angle, axes), np.zeros((directions, 3))], axis=1)

@@ -7,6 +7,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from stiffmap.broadcasting import whole_number
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.maps.inputs import axis, magnitude, plane_axes, plane_force, wrench_cases
@@ -37,7 +38,7 @@ def map_plan(
     """
     loading = Loading(machine, **how)
     wrenches, names = wrench_cases(wrench, None if cases is None else tuple(cases))
-    if directions < 3:
+    if (directions := whole_number(directions, "directions", 1)) < 3:
         raise StiffmapError(f"directions: expected 3 or more, got {directions}")
     return MapPlan(
         loading=loading,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, as_machine
 from stiffmap.maps.cluster import on_cluster
@@ -58,7 +58,7 @@ def map_statistics(
 
     Raises StiffmapError for bad input.
     """
-    wanted = np.asarray(percentiles, dtype=float)
+    wanted = real_array(percentiles, "percentiles")
     if wanted.ndim != 1 or wanted.size == 0 or not ((wanted >= 0) & (wanted <= 100)).all():
         raise StiffmapError(f"percentiles: expected numbers from 0 to 100, got {list(percentiles)}")
     plan = map_plan(as_machine(machine), **call)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.box_search import BoxSearch
@@ -120,12 +120,12 @@ def largest_box(
     that breaks a limit.
     Raises StiffmapError for bad input.
     """
-    shape = np.asarray(proportions, dtype=float)
+    shape = real_array(proportions, "proportions")
     if shape.shape != (3,) or not (np.isfinite(shape).all() and (shape > 0).all()):
         raise StiffmapError(f"proportions: expected 3 positive numbers, got {proportions!r}")
     if not gap > 0:
         raise StiffmapError(f"gap: expected a positive length in m, got {gap!r}")
-    given = None if rotation is None else as_rotations(np.asarray(rotation, dtype=float))
+    given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
     bounds = Bounds(
         machine, given, transmission, factors, length, ranges, joints, clearance, deflection, threads
     )
@@ -135,7 +135,7 @@ def largest_box(
             raise StiffmapError(f"orientation: expected 'search' or (3, 3) axes, got {orientation!r}")
         axes = best_orientation(bounds, shape, space, gap)
     else:
-        axes = np.eye(3) if orientation is None else as_rotations(np.asarray(orientation, dtype=float))
+        axes = np.eye(3) if orientation is None else as_rotations(real_array(orientation, "orientation"))
     space = space if region is not None and not isinstance(orientation, str) else turned(space, axes)
     found = BoxSearch(bounds, shape, axes, space, gap, work).run()
     why = bounds.unproven
@@ -153,7 +153,7 @@ THIN = 1e-9
 def _region(machine: Machine, region: ArrayLike | None, shape: Floats) -> tuple[Floats, Floats]:
     """Where to look, and the box's shape: without thickness where the workspace has none or nothing is commanded."""
     if region is not None:
-        out = np.asarray(region, dtype=float)
+        out = real_array(region, "region")
         if out.shape != (2, 3) or not (np.isfinite(out).all() and (out[1] > out[0]).all()):
             raise StiffmapError(f"region: expected lowest and highest corner (2, 3) in m, got {region!r}")
         return out, shape

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.inputs import plane_axes
@@ -88,7 +88,7 @@ def worst_deflection(
     axes = (0, 1, 2) if plane is None else plane_axes(plane)
     ask = _Ask(machine, force, axes, direction, linear, rotation, gravity, threads, turns)
     if position is not None:
-        p = np.asarray(position, dtype=float).reshape(-1, 3)
+        p = real_array(position, "position").reshape(-1, 3)
         return _result(ask, p, *ask.at(p), plane)
     low, high = read_box(machine, box)
     p = box_nodes(low, high, nodes)
@@ -123,7 +123,7 @@ class _Ask:
         c = start.compliance[:, :3, :3]
         rest = start.displacement[:, :3]
         if self.direction is not None:
-            unit = np.broadcast_to(np.asarray(self.direction, dtype=float), p.shape)
+            unit = np.broadcast_to(real_array(self.direction, "direction"), p.shape)
             unit = unit / np.linalg.norm(unit, axis=1, keepdims=True)
             return self._loaded(p, unit, c, rest, start.status)
         block = np.nan_to_num(c[:, axes][:, :, axes])

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.description.elements import Drive
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
@@ -193,4 +193,4 @@ def fastest(
     highest speed so that the limits hold. `speed`: m/s along the path; `force` (3,) N on the tool.
     """
     need_masses(machine, "a time-optimal trajectory")
-    return quickest(machine, path, rotation, gravity, speed, np.asarray(force, dtype=float), threads)
+    return quickest(machine, path, rotation, gravity, speed, real_array(force, "force"), threads)

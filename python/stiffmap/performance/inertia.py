@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats, thread_count
+from stiffmap.broadcasting import Floats, real_array, thread_count
 from stiffmap.compiled.names import Role
 from stiffmap.description import Body
 from stiffmap.description.tree import all_elements
@@ -117,7 +117,7 @@ def rest_efforts(
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
     twist = np.zeros((len(flat), 6))
     if velocity is not None:
-        twist[:, :3] = np.broadcast_to(np.asarray(velocity, dtype=float), (*shape, 3)).reshape(-1, 3)
+        twist[:, :3] = np.broadcast_to(real_array(velocity, "velocity"), (*shape, 3)).reshape(-1, 3)
     zero = np.zeros_like(twist)
     out = rigid_dynamics(machine, flat, twist, zero, zero, g)
     effort = out["effort"]

@@ -20,6 +20,7 @@ from stiffmap.errors import FileError, StiffmapError
 from stiffmap.files.report import validated
 from stiffmap.files.schema.base import FileModel, Name
 from stiffmap.machine import Machine
+from stiffmap.number_text import number_in
 from stiffmap.performance.quantities import quantity, quantity_in
 from stiffmap.performance.trajectory import Path, Trajectory, circle, line, through, timed
 from stiffmap.units import name_and_unit
@@ -220,7 +221,7 @@ def _columns(place: FilePath) -> tuple[dict[str, Floats], list[int]]:
         for j, (name, scale) in enumerate(heads):
             text = row[j].strip() if j < len(row) else ""
             try:
-                out[i, j] = scale * float(text)
+                out[i, j] = scale * number_in(text)
             except ValueError:
                 raise FileError(
                     f"expected a number, found '{text}'", file=file, line=number, key=name

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array, whole_number
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 
 
 def read_box(machine: Machine, box: ArrayLike | None) -> tuple[Floats, Floats]:
     """Lowest and highest corner, (3,) m each; the machine's workspace where none is given."""
-    given = machine.workspace if box is None else np.asarray(box, dtype=float)
+    given = machine.workspace if box is None else real_array(box, "box")
     if given.shape != (2, 3) or not np.isfinite(given).all() or (given[1] < given[0]).any():
         raise StiffmapError(
             f"box: expected lowest and highest corner (2, 3) in m, base axes, got {np.asarray(box).tolist()}"
@@ -22,7 +22,6 @@ def read_box(machine: Machine, box: ArrayLike | None) -> tuple[Floats, Floats]:
 
 def box_nodes(low: Floats, high: Floats, nodes: int) -> Floats:
     """(nodes³, 3), the last axis fastest; an edge without length has one node."""
-    if nodes < 2:
-        raise StiffmapError(f"nodes: expected 2 or more along each edge, got {nodes}")
+    whole_number(nodes, "nodes", 2)
     axes = [np.linspace(a, b, nodes if b > a else 1) for a, b in zip(low, high, strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

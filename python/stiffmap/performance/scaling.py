@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.description import Drive
 from stiffmap.description.tree import joints
 from stiffmap.errors import StiffmapError
@@ -27,7 +27,7 @@ def drive_values(machine: Machine, field: str, given: ArrayLike | None, unit: st
     """
     n = len(machine.actuators)
     if given is not None:
-        out = np.asarray(given, dtype=float)
+        out = real_array(given, field)
         if out.shape not in ((), (n,)) or not (np.isfinite(out).all() and (out >= 0).all()):
             raise StiffmapError(
                 f"{field}: expected one number or {n} (drives {', '.join(machine.actuators)}), finite and "

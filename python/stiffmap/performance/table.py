@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats, thread_count
+from stiffmap.broadcasting import Floats, real_array, thread_count
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.motion_files import Motion, load_motion
@@ -167,8 +167,8 @@ def measures(
             largest.at_most if largest and largest.at_most is not None else 2.0,
         ),
         proportions=(1.0, float(edges[1] / edges[0]), float(edges[2] / edges[0])), nodes=nodes, coarse=coarse, gap=gap,
-        length=length, gravity=None if gravity is None else np.asarray(gravity, dtype=float),
-        rotation=None if rotation is None else np.asarray(rotation, dtype=float), threads=threads,
+        length=length, gravity=None if gravity is None else real_array(gravity, "gravity"),
+        rotation=None if rotation is None else real_array(rotation, "rotation"), threads=threads,
         toolpath=_motion(toolpath or task.toolpath),
         clearance=_positive("clearance", task.clearance if clearance is None else clearance),
         deflection=_positive("deflection", task.deflection if deflection is None else deflection),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.errors import FileError, StiffmapError
 
 
@@ -55,12 +55,12 @@ class Trajectory:
 
     def with_force(self, force: ArrayLike) -> Trajectory:
         """The same motion with a force (3,) or (n, 3) N on the tool."""
-        return replace(self, force=np.broadcast_to(np.asarray(force, float), self.position.shape).copy())
+        return replace(self, force=np.broadcast_to(real_array(force, "force"), self.position.shape).copy())
 
 
 def line(start: ArrayLike, end: ArrayLike, points: int = 201) -> Path:
     """Straight path from start to end (3,) m."""
-    a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    a, b = real_array(start, "start"), real_array(end, "end")
     if a.shape != (3,) or b.shape != (3,) or not np.linalg.norm(b - a) > 0:
         raise StiffmapError(f"line: expected two different points (3,) in m, got {start!r} and {end!r}")
     s = np.linspace(0, 1, points)
@@ -72,7 +72,7 @@ def circle(centre: ArrayLike, radius: float, plane: str = "xy", points: int = 40
     """One turn about `centre` (3,) m in a plane of the base axes."""
     from stiffmap.maps.inputs import plane_axes
 
-    c = np.asarray(centre, dtype=float)
+    c = real_array(centre, "centre")
     if c.shape != (3,) or not radius > 0:
         raise StiffmapError(f"circle: expected a centre (3,) and a radius in m, got {centre!r}, {radius!r}")
     i, j = plane_axes(plane)
@@ -87,7 +87,7 @@ def circle(centre: ArrayLike, radius: float, plane: str = "xy", points: int = 40
 
 def through(points: ArrayLike, samples: int = 401) -> Path:
     """Smooth path (cubic spline over the chord length) through points (k, 3) m."""
-    p = np.asarray(points, dtype=float)
+    p = real_array(points, "points")
     if p.ndim != 2 or p.shape[1] != 3 or len(p) < 2 or not np.isfinite(p).all():
         raise StiffmapError(f"path: expected two or more finite points (k, 3) in m, got shape {p.shape}")
     steps = np.linalg.norm(np.diff(p, axis=0), axis=1)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.cells import halved
@@ -52,7 +52,7 @@ class Workspace:
 
     def at(self, position: ArrayLike) -> Judged:
         """Poses (n, 3) m judged likewise, each begun at the nearest one drawn."""
-        return self.ask(np.asarray(position, dtype=float).reshape(-1, 3), self.drawn)
+        return self.ask(real_array(position, "position").reshape(-1, 3), self.drawn)
 
 
 @takes_machine
@@ -101,7 +101,7 @@ def workspace_volume(
         raise StiffmapError(f"singularity: expected a distance from 0 to 1, got {singularity!r}")
     if cells is not None and cells < 2:
         raise StiffmapError(f"cells: expected 2 or more along each edge, got {cells!r}")
-    given = None if rotation is None else as_rotations(np.asarray(rotation, dtype=float))
+    given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
     bounds = Bounds(
         machine, given, transmission, factors, length, ranges, joints, clearance, deflection, threads
     )
@@ -147,7 +147,7 @@ class _Drawn:
 def _begun(machine: Machine, region: ArrayLike | None, axes: list[int]) -> tuple[Floats, Floats]:
     low, high = machine.workspace
     if region is not None:
-        out = np.asarray(region, dtype=float)
+        out = real_array(region, "region")
         if out.shape != (2, 3) or not (np.isfinite(out).all() and (out[1] > out[0])[axes].all()):
             raise StiffmapError(f"region: expected lowest and highest corner (2, 3) in m, got {region!r}")
         return out[0], out[1]

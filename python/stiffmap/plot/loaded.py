@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.budget import DeflectionBudget, deflection_budget
 from stiffmap.compiled import Status
 from stiffmap.errors import StiffmapError
@@ -72,8 +72,8 @@ def loaded_shape(
 
     Raises StiffmapError where one of them is no stable equilibrium.
     """
-    p = machine.description.home.p if position is None else np.asarray(position, dtype=float)
-    load = np.asarray(wrench, dtype=float)
+    p = machine.description.home.p if position is None else real_array(position, "position")
+    load = real_array(wrench, "wrench")
     free = machine.solve(p, np.zeros(6), rotation=rotation, gravity=np.zeros(3))
     under = machine.solve(p, load, rotation=rotation, gravity=gravity)
     status = max(int(free.status), int(under.status))

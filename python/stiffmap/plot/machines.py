@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, real_array
 from stiffmap.errors import StiffmapError
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine, takes_machine
@@ -31,7 +31,7 @@ def machine_figure(
     `view`: elevation and azimuth in deg; None: from above where everything lies in a plane of constant z,
     else (22, 35). Raises StiffmapError where the pose cannot be reached.
     """
-    p = machine.description.home.p if position is None else np.asarray(position, dtype=float)
+    p = machine.description.home.p if position is None else real_array(position, "position")
     k = inverse_kinematics(machine, p, rotation)
     if int(k.status) != Status.CONVERGED:
         where = ", ".join(f"{MM * v:g}" for v in p)

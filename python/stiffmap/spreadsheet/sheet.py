@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stiffmap.errors import FileError, MissingPartError
+from stiffmap.number_text import number_in
 
 EXCEL = (".xlsx", ".xlsm")
 NOTHING = {"", "-", "--", "–", "na", "n/a", "n.a.", "nan", "none", "null", "#n/a"}
@@ -61,7 +62,7 @@ def number(cell: str, decimal_comma: bool) -> float | None:
     if decimal_comma and ("," in text or THOUSANDS.fullmatch(text)):
         text = text.replace(".", "").replace(",", ".")
     try:
-        value = float(text)
+        value = number_in(text)
     except ValueError:
         return None
     return value if math.isfinite(value) else None

@@ -11,6 +11,7 @@ import numpy as np
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import FileError
+from stiffmap.number_text import number_in
 from stiffmap.toolpath.gcode.load import lines_of
 from stiffmap.toolpath.path import Toolpath, path_of
 
@@ -92,7 +93,7 @@ def _column(header: str, file: str) -> tuple[str, float]:
 
 def _number(text: str, column: str, file: str, line: int) -> float:
     try:
-        value = float(text)
+        value = number_in(text)
     except ValueError:
         value = nan
     if not isfinite(value) or abs(value) > 1e9:

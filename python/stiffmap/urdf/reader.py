@@ -11,6 +11,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.description import Body, Pose
 from stiffmap.description.pose import vector
 from stiffmap.errors import FileError
+from stiffmap.number_text import number_in
 from stiffmap.rotations import rotation_about
 from stiffmap.urdf.model import UrdfJoint, UrdfModel
 
@@ -126,7 +127,7 @@ def _numbers(e: xml.Element | None, attribute: str, default: Floats, file: str, 
     if text is None:
         return default
     try:
-        values = np.array([float(part) for part in text.split()])
+        values = np.array([number_in(part) for part in text.split()])
     except ValueError:
         values = np.zeros(0)
     if values.shape != (3,) or not np.isfinite(values).all():
@@ -137,7 +138,7 @@ def _numbers(e: xml.Element | None, attribute: str, default: Floats, file: str, 
 def _number(e: xml.Element | None, attribute: str, file: str, key: str) -> float:
     text = None if e is None else e.get(attribute)
     try:
-        value = float(text) if text is not None else 0.0
+        value = number_in(text) if text is not None else 0.0
     except ValueError:
         raise FileError(f"{attribute}: expected a number, found '{text}'", file=file, key=key) from None
     if not np.isfinite(value):

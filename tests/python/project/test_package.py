@@ -33,3 +33,12 @@ def test_local_links_lead_somewhere() -> None:
         for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
             if not target.startswith(("http", "mailto")):
                 assert (page.parent / target).exists(), f"{page.name} -> {target}"
+
+
+def test_licences_of_what_is_compiled_in_go_into_the_wheel() -> None:
+    """Eigen's and pybind11's code is in the module: their licences are in `licenses`, which the wheel takes along."""
+    patterns = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["license-files"]
+    files = {p.name: p.read_text(encoding="utf-8") for pattern in patterns for p in ROOT.glob(pattern)}
+    assert "Mozilla Public License Version 2.0" in files["Eigen-MPL-2.0.txt"]
+    assert "Wenzel Jakob" in files["pybind11-BSD-3-Clause.txt"]
+    assert all(name in files["NOTICE.txt"] for name in files if name not in ("LICENSE", "NOTICE.txt"))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from stiffmap.errors import FileError
 from stiffmap.files.schema.base import suggestion
+from stiffmap.number_text import number_in
 from stiffmap.outputs import unguarded
 
 Floats = NDArray[np.float64]
@@ -51,7 +52,7 @@ class Table:
         if blank and cell.lower() in ("", "nan", "na"):
             return math.nan
         try:
-            value = float(cell)
+            value = number_in(cell)
         except ValueError:
             found = "an empty cell" if not cell else repr(cell)
             raise FileError(
