@@ -77,17 +77,18 @@ def real_number(value: object, name: str, what: str = "a number") -> float:
     return float(out)
 
 
-def whole_number(value: object, name: str, least: int, most: int | None = None) -> int:
-    """An integer between bounds; StiffmapError with the argument's name for anything else, 1.5 and True included."""
-    expected = f"{least} or more" if most is None else f"a whole number from {least} to {most}"
+def whole_number(value: object, name: str, least: int, most: int | None = None, what: str = "") -> int:
+    """An integer between bounds; StiffmapError with the argument's name for anything else, 1.5 and True included; `what` says
+    what is expected in other words."""
     try:
         if isinstance(value, bool | np.bool_):
             raise TypeError
         out = index(value)  # type: ignore[arg-type]
     except TypeError:
-        raise _refused(name, f"a whole number, {least} or more", repr(value)) from None
+        raise _refused(name, what or f"a whole number, {least} or more", repr(value)) from None
     if out < least or (most is not None and out > most):
-        raise _refused(name, expected, str(out))
+        expected = f"{least} or more" if out < least else f"at most {most}"
+        raise _refused(name, what or expected, str(out))
     return out
 
 

@@ -172,6 +172,4 @@ def step_count(load_steps: int | str) -> int:
     """Number of equal load steps; 0: adaptive."""
     if load_steps == "auto":
         return 0
-    if isinstance(load_steps, str):
-        raise StiffmapError(f"load_steps: expected 'auto' or a positive number, got {load_steps!r}")
-    return whole_number(load_steps, "load_steps", 1)
+    return whole_number(load_steps, "load_steps", 1, what="'auto' or a positive number")

@@ -85,7 +85,7 @@ def check_control(control: str, limit: float | None, steps: int, load_type: obje
         raise StiffmapError(
             f"limit: expected a number other than 0 ({UNITS[control]} for control {control!r}), got {limit!r}"
         )
-    whole_number(steps, "steps", 1)
+    whole_number(steps, "steps", 1, what="a positive number")
     if isinstance(cross, bool) or not isinstance(cross, int):
         raise StiffmapError(f"cross: expected the number of a bifurcation, 1, -1, 2 …, got {cross!r}")
     if load_type != "dead":
