@@ -79,12 +79,13 @@ def against(
     status = sm.Status(int(s.status))
     wrong = objection(truth, status, told, gaps, s)
     numbers = status in (sm.Status.CONVERGED, sm.Status.UNSTABLE)
-    if not wrong and numbers and truth.kind != "singular" and (told or not truth.found):
-        off, falling = bodies.judge(s.displacement, task.loads, task.pose, task.drives, task.kind)
-        if np.isnan(off):
+    off = not truth.found or any(not v < LIMIT for v in gaps.values())
+    if not wrong and numbers and truth.kind != "singular" and off:
+        away, falling = bodies.judge(s.displacement, task.loads, task.pose, task.drives, task.kind)
+        if np.isnan(away):
             return Check(how, status.name, told, f"{truth.kind}, undecided", gaps, "")
-        if not off < OFF:
-            wrong = f"not an equilibrium, {off:.0e} off"
+        if not away < OFF:
+            wrong = f"not an equilibrium, {away:.0e} off"
         elif (falling == 0) != (status == sm.Status.CONVERGED):
             wrong = "status against the eigenvalues where it stands"
     return Check(how, status.name, told, truth.kind, gaps, wrong)
@@ -99,13 +100,15 @@ def objection(truth: Answer, status: sm.Status, told: bool, gaps: dict[str, floa
     if not truth.found:  # any equilibrium will do: `against` looks whether it is one
         return ""
     far = truth.crossed or float(np.abs(truth.displacement).max()) > FAR
+    off = {k: v for k, v in gaps.items() if not v < LIMIT}
+    if told and numbers and not off:  # right, and needlessly doubted: counted as flagged
+        return ""
     if told:
         return "" if far else "not found, or not vouched for"
     if not numbers:
         return "no answer"
     if abs(truth.lowest) > CRITICAL and truth.stable != (status == sm.Status.CONVERGED):
         return "status against the eigenvalues"
-    off = {k: v for k, v in gaps.items() if not v < LIMIT}
     if s.flags & sm.Flag.FREE_SPIN or s.flags & sm.Flag.LEG_SINGULAR:
         off.pop("frequency", None)
     return f"another {', '.join(off)}" if off else ""

@@ -52,8 +52,8 @@ def crowd(kind: str, seed: int, count: int) -> Question:
     names, extent = machine.compiled.names, max(0.5, float(np.abs(d.home.p).max()))
     if not names.actuators:
         at = np.tile(np.array(d.home.p), (count, 1))
-        before = sm.inverse_kinematics(machine, at).coordinates
-        return Question(machine, load, at, coordinates(names.coordinates, before), extent)
+        still = sm.inverse_kinematics(machine, at).coordinates
+        return Question(machine, load, at, coordinates(names.coordinates, still), extent)
     home = sm.inverse_kinematics(machine, d.home.p, d.home.r).actuators
     middle = home if drives is None else np.array([drives[named(n, drives)] for n in names.actuators])
     commands = middle + spread * rng.uniform(-1, 1, (min(COMMANDS, count), len(middle)))

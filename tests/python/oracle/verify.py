@@ -38,14 +38,14 @@ class Question:
 
     def of(self, rows: Array) -> Question:
         """Some of the poses."""
-        each = {k: self.load[k][rows] for k in ("wrench", "rotation") if k in self.load}
-        load = {**self.load, **each}
+        each: dict[str, Any] = {k: self.load[k][rows] for k in ("wrench", "rotation") if k in self.load}
+        load: dict[str, Any] = {**self.load, **each}
         return replace(self, load=load, at=self.at[rows], before={n: v[rows] for n, v in self.before.items()})
 
     def solve(self, machine: sm.Machine | None = None, **change: Any) -> sm.Solution:
         """By this machine, or by another."""
         asked = machine or self.machine
-        given = {**self.load, **change}
+        given: dict[str, Any] = {**self.load, **change}
         return (asked.solve_joints if self.joints else asked.solve)(self.at, threads=1, **given)
 
 
@@ -123,7 +123,7 @@ def locks(elements: Sequence[Any]) -> bool:
 def task_error(q: Question, command: dict[str, Array], reached: Array) -> Array:
     """Distance (n,) m of the closed TCP from the command, or of the drives from theirs, in what is commanded."""
     if q.joints:
-        return np.abs(np.column_stack([*command.values()]) - q.at).max(1, initial=0.0)
+        return np.asarray(np.abs(np.column_stack([*command.values()]) - q.at).max(1, initial=0.0))
     use = [c in q.machine.description.task for c in "xyz"]
     return np.asarray(np.abs(reached - q.at)[:, use].max(1, initial=0.0))
 
@@ -155,6 +155,6 @@ def smoothed(item: Any) -> Any:
         item = replace(item, friction=None)
     if isinstance(item, tuple):
         return tuple(smoothed(v) for v in item)
-    if is_dataclass(item):
+    if is_dataclass(item) and not isinstance(item, type):
         return replace(item, **{f.name: smoothed(getattr(item, f.name)) for f in fields(item) if f.init})
     return item
