@@ -20,10 +20,7 @@ from .unseen import UNSEEN
 def objections(task: Task) -> list[str]:
     truth, found = checks(task)
     assert truth.found and len(found) >= 2
-    doubted = task.description.name in FLAGGED
-    return [
-        f"{c.how}: {c.wrong}" for c in found if c.wrong and not (doubted and "drives" in c.how and c.flagged)
-    ]
+    return [f"{c.how}: {c.wrong}" for c in found if c.wrong]
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
