@@ -14,6 +14,7 @@ import argparse
 import csv
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -23,18 +24,15 @@ import stiffmap as sm
 from stiffmap.calibration import Calibration, Tolerances
 from stiffmap.calibration.travel import Profile
 from stiffmap.cli.calibrate import write as write_calibration
-from stiffmap.description import AppliedEffect
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
-from stiffmap.experiment.poses.configuration import coordinates_of
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "measured" / "ipa_ur10_accuracy"
 JOINTS = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
 ELASTIC = ("drive compliance", "link compliance", "masses")
 LENGTH = 1e3 * 3.0**0.5
 """From rms of the coordinates in m to rms of the length in mm."""
-STEP = 1e-4
 OVERLAP, NEAR = 20, 2.0
 """Degrees that two series must share for their profiles to be compared; from a knot."""
 HEAD = """machine: ur10
@@ -119,19 +117,12 @@ def elsewhere(first: str, c: Calibration, series: str, folder: Path, own: Calibr
     aside = np.isin(own.experiment.ids, own.outliers)
     print(f"\nseries {series} predicted by series {first}, rms of the position error's length, mm")
     declared = Predictor(sm.load_machine("ur10"), own.experiment)
-    built = Predictor(c.machine, own.experiment)
-    told = [("as declared", declared()), (f"calibrated on {first}", built())]
+    numbers = replace(c.correction, hats=None).of(np.ones(len(c.experiment), bool)).machine
+    machines = [(f"calibrated on {first}", numbers)]
     if c.travel:
-        q = coordinates_of(c.machine, own.experiment)
-        shown = built()
-        moved = shown.copy()
-        for p in c.travel.profiles:
-            x = q[:, c.machine.compiled.names.joints[p.drive]]
-            x = p.at[0] + np.mod(x - p.at[0], 2 * np.pi)  # a turn further on
-            off = built([AppliedEffect("zero_offset", p.drive.split(".")[1], parameters=(("error", STEP),))])
-            moved += (off - shown) / STEP * np.interp(x, p.at, p.error)[:, None]
-        told.append((f"and the drives' profiles of {first}", moved))
-    for name, prediction in told:
+        machines.append((f"and the drives' profiles of {first}", c.machine))
+    predictions = [(name, Predictor(m, own.experiment)()) for name, m in machines]
+    for name, prediction in [("as declared", declared()), *predictions]:
         problem = Problem.of(own.experiment, declared.experiment.sigma, prediction, ~aside)
         raw = own.experiment.reading - prediction
         left = (raw - nuisance_part(problem, raw))[~aside, :3]

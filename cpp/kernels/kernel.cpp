@@ -6,6 +6,7 @@
 
 #include "answers.hpp"
 #include "closing.hpp"
+#include "command_errors.hpp"
 #include "hanging.hpp"
 #include "last_attempt.hpp"
 #include "load_path.hpp"
@@ -119,10 +120,7 @@ struct Block : Answers {
     }
     for (int i = 0; i < of.error_count; ++i) {
       const CommandErrorProgram& k = of.errors[i];
-      const V u = s.closed[k.of] - k.reference;
-      V wave = splat(0), unused;
-      if (k.amplitude != 0) sincos(u * (2 * 3.14159265358979323846 / k.period) + k.phase, wave, unused);
-      s.a_base[k.coordinate] += k.offset + k.slope * u + k.amplitude * wave;
+      s.a_base[k.coordinate] += command_error(of, k, s.closed[k.of]);
     }
     return set_strokes(of, s);
   }

@@ -59,6 +59,7 @@ inline constexpr int stroke_row = 37;
 /// Error of the commanded coordinate `of`, which moves `coordinate`: the same, or a deviation of its guide.
 struct CommandErrorProgram {
   std::int32_t coordinate, of;
+  std::int32_t first, count;  ///< knots
   double offset, slope, amplitude, period, phase, reference;
 };
 
@@ -167,6 +168,7 @@ struct Program {
   const StrokeProgram* strokes;
   const double* stroke_rows;
   const CommandErrorProgram* errors;
+  const double* error_knots;  ///< (coordinate, error) pairs
   const DriveProgram* drives;
   const CoordinateProgram* coordinates;
   const LegClosure* legs;

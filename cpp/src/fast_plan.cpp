@@ -64,9 +64,11 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
   }
   for (std::size_t i = 0; i < m.drives.size(); ++i) {
     const Drive& k = m.drives[i];
-    for (const auto& [moves, e] : k.errors)
-      d.errors.push_back(
-          {i32(moves), i32(k.coordinate), e.offset, e.slope, e.amplitude, e.period, e.phase, e.reference});
+    for (const auto& [moves, e] : k.errors) {
+      d.errors.push_back({i32(moves), i32(k.coordinate), i32(d.error_knots.size() / 2), i32(e.knots.size()), e.offset,
+                          e.slope, e.amplitude, e.period, e.phase, e.reference});
+      for (const auto& [u, error] : e.knots) d.error_knots.insert(d.error_knots.end(), {u, error});
+    }
     d.drives.push_back({chains.drives[i].coordinate, chains.drives[i].slot, chains.drives[i].prismatic,
                         m.home_coordinates[k.coordinate], k.numbers.compliance_slope, k.numbers.force_limit});
   }
@@ -155,6 +157,7 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.stroke_rows = d.stroke_rows.data();
   p.stroke_count = i32(d.strokes.size());
   p.errors = d.errors.data();
+  p.error_knots = d.error_knots.data();
   p.drives = d.drives.data();
   p.coordinates = d.coordinates.data();
   p.legs = d.legs.data();

@@ -88,7 +88,12 @@ Index Mechanism::add_joint(const Joint& joint, Index node, const std::string& pr
   c.actuator = static_cast<Index>(drives.size());
   c.locked = !joint.law;
   Drive drive{name, size() - 1, joint.numbers, {}};
-  for (const CommandError& e : joint.command_errors) drive.errors.push_back({drive.coordinate, e});
+  for (const CommandError& e : joint.command_errors) {
+    for (std::size_t i = 1; i < e.knots.size(); ++i)
+      require(e.knots[i].first > e.knots[i - 1].first, name + ".command_errors.knots", "rising coordinates",
+              e.knots[i].first);
+    drive.errors.push_back({drive.coordinate, e});
+  }
   drives.push_back(drive);
   return add_guide_errors(joint, node, name);
 }

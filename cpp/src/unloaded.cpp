@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "unloaded.hpp"
 
-#include <cmath>
-#include <numbers>
-
 namespace stiffmap::unloaded {
 bool command(const Mechanism& m, const VecX& x, Problem& p) {
   p.friction_sign.setZero();
@@ -14,9 +11,7 @@ bool command(const Mechanism& m, const VecX& x, Problem& p) {
   for (const Drive& d : m.drives) {
     const double u = x[d.coordinate];
     p.drive_scale[d.coordinate] = 1 + d.numbers.compliance_slope * (u - m.home_coordinates[d.coordinate]);
-    for (const auto& [coordinate, e] : d.errors)
-      p.base[coordinate] += e.offset + e.slope * (u - e.reference) +
-                            e.amplitude * std::sin(2 * std::numbers::pi * (u - e.reference) / e.period + e.phase);
+    for (const auto& [coordinate, error] : d.errors) p.base[coordinate] += error(u);
   }
   bool known = true;
   for (std::size_t i = 0; i < m.groups.size(); ++i) {

@@ -41,10 +41,11 @@ void bind_chain(py::module_& m) {
   py::class_<Law>(m, "Law").def(py::init<double, double, std::vector<std::pair<double, double>>, double>(),
                                 "stiffness"_a, "cubic"_a, "knots"_a, "friction"_a = 0.0);
   py::class_<CommandError>(m, "CommandError")
-      .def(py::init([](double offset, double slope, double amplitude, double period, double phase, double reference) {
-             return CommandError{offset, slope, amplitude, period, phase, reference};
+      .def(py::init([](double offset, double slope, double amplitude, double period, double phase, double reference,
+                       std::vector<std::pair<double, double>> knots) {
+             return CommandError{offset, slope, amplitude, period, phase, reference, std::move(knots)};
            }),
-           "offset"_a, "slope"_a, "amplitude"_a, "period"_a, "phase"_a, "reference"_a);
+           "offset"_a, "slope"_a, "amplitude"_a, "period"_a, "phase"_a, "reference"_a, "knots"_a);
   py::class_<Stroke>(m, "Stroke")
       .def(py::init([](const std::string& joint, int along, double at, double length, double rate,
                        const std::vector<std::pair<double, Array>>& table) {

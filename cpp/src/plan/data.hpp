@@ -23,6 +23,7 @@ struct FastPlanData {
   std::vector<StrokeProgram> strokes;
   std::vector<double> stroke_rows;
   std::vector<CommandErrorProgram> errors;
+  std::vector<double> error_knots;
   std::vector<DriveProgram> drives;
   std::vector<CoordinateProgram> coordinates;
   std::vector<LegClosure> legs;

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from stiffmap.calibration.calibrator import Calibrator
 from stiffmap.calibration.claimed_fit import claimed_fit
-from stiffmap.calibration.edit import edited
-from stiffmap.calibration.facts import Beyond, Row, Wider
+from stiffmap.calibration.corrected import Correction
+from stiffmap.calibration.facts import Beyond, Row, Unseen, Wider
 from stiffmap.calibration.groups import BASE, compare
 from stiffmap.calibration.held_out import Size, held_out
 from stiffmap.calibration.homing import own_part
@@ -25,7 +26,6 @@ from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.folds import folds
 from stiffmap.experiment.noise.level import Noise
 from stiffmap.experiment.poses.configuration import coordinates_of
-from stiffmap.machine import Machine
 
 
 def conclude(ready: Calibrator, seed: int = 0) -> Calibration:
@@ -38,10 +38,6 @@ def conclude(ready: Calibrator, seed: int = 0) -> Calibration:
     freed = ready.blocks(fit=fit).beside(rho).scaled(factor)
     choice = compare(freed, members, [b for b in BASE if b in members])
     built = found.built(fit.values, names, ready.sensitivity.at)
-    moves: dict[tuple[str, str], float] = {}
-    for p, v in zip(names, built, strict=True):
-        for place, weight in p.moves if not p.setup else ():
-            moves[place] = moves.get(place, 0.0) + weight * p.u * float(v)
     e = ready.predictor.experiment
     before, after = ready.left(ready.sensitivity.base), ready.left(fit.prediction)
     keep = ~ready.out[:, None]
@@ -51,6 +47,15 @@ def conclude(ready: Calibrator, seed: int = 0) -> Calibration:
     as_declared = sums.log_evidence <= sums.pick([]).log_evidence and not claimed.any
     misfits = ready.misfits(fit, factor)
     profiles = _travel(ready, fit, rho, factor, seed, size) if misfits else None
+    correction = Correction(ready, claimed, rho, fit.values)
+    unseen = _unseen(correction, seed, size)
+    if profiles is not None:
+        with_profiles = replace(correction, hats=profiles.hats)
+        found_with = _unseen(with_profiles, seed, size)
+        if unseen and found_with and found_with.after < unseen.after:
+            correction, unseen = with_profiles, found_with
+        else:  # in full, not along the slopes, they do not hold
+            profiles = None
     rest = _outweighs(held.before, held.after, noise) if held else _outweighs(b, a, noise)
     unexplained = (rest or bool(claimed.refused)) and not claimed.any and misfits
     seconds = {**ready.seconds, "evidence": time.perf_counter() - start}
@@ -74,13 +79,23 @@ def conclude(ready: Calibrator, seed: int = 0) -> Calibration:
         failed=ready.sensitivity.failed,
         stopped=ready.stopped,
         unit=unit,
-        machine=Machine(edited(ready.predictor.machine.description, moves)),
+        machine=correction.of(np.ones(len(e), bool)).machine,
+        unseen=unseen,
+        correction=correction,
         experiment=e,
         residual=after,
         unknowns=names,
         values=built,
         seconds=seconds,
     )
+
+
+def _unseen(correction: Correction, seed: int, size: Size) -> Unseen | None:
+    """What the corrected machine says of readings that no fit saw."""
+    if correction.ready.stopped:
+        return None
+    found = correction.unseen(seed)
+    return Unseen.of(*found, size) if found else None
 
 
 def _travel(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -28,17 +29,26 @@ from stiffmap.effects import apply_records
 FRAME = ("x", "y", "z", "rx", "ry", "rz")
 END = "end"
 """Name of the frame behind the last element of a leg, and of the tool."""
+Knots = tuple[tuple[float, float], ...]
+"""(coordinate, error) of a drive, m or rad, by rising coordinate."""
 Moves = Mapping[tuple[str, str], float]
 """(full name of the element, what is moved) -> by how much, SI; compliances and masses relative."""
 Elements = tuple[Element, ...]
 
 
-def edited(description: MachineDescription, moves: Moves) -> MachineDescription:
-    """The machine built with these errors; effects that it has already are added again on top."""
+def edited(
+    description: MachineDescription, moves: Moves, travel: Mapping[str, Knots] | None = None
+) -> MachineDescription:
+    """The machine built with these errors; effects that it has already are added again on top.
+
+    ``travel`` holds axis positioning errors of drives, by full name.
+    """
     bare = description.declared or description
-    of: dict[str, dict[str, float]] = {}
+    of: dict[str, dict[str, Any]] = {}
     for (name, what), value in moves.items():
         of.setdefault(name, {})[what] = of.get(name, {}).get(what, 0.0) + value
+    for name, knots in (travel or {}).items():
+        of.setdefault(name, {})["travel"] = knots
     legs = tuple(replace(g, elements=_sequence(g.elements, g.name, of)) for g in bare.legs)
     base = _sequence(bare.base, "base", of, end=False)
     platform = _sequence(bare.platform, "platform", of)
@@ -47,7 +57,7 @@ def edited(description: MachineDescription, moves: Moves) -> MachineDescription:
 
 
 def _sequence(
-    elements: Elements, path: str, of: Mapping[str, Mapping[str, float]], end: bool = True
+    elements: Elements, path: str, of: Mapping[str, Mapping[str, Any]], end: bool = True
 ) -> Elements:
     out: list[Element] = []
     for e in elements:
@@ -72,7 +82,7 @@ def _sequence(
     return tuple(out)
 
 
-def _pose(change: Mapping[str, float]) -> Pose:
+def _pose(change: Mapping[str, Any]) -> Pose:
     t, r = (np.array([change.get(k, 0.0) for k in part]) for part in (FRAME[:3], FRAME[3:]))
     return Pose.of(t, Rotation.from_rotvec(r).as_matrix())
 
@@ -87,7 +97,7 @@ def _pivot(e: Element) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return np.array(e.axes[0]) * e.home[0] if slides and isinstance(e, Joint) else np.zeros(3)
 
 
-def _changed(e: Element, change: Mapping[str, float]) -> Element:
+def _changed(e: Element, change: Mapping[str, Any]) -> Element:
     for what, by in change.items():
         kinds, change_of = CHANGES.get(what, ((), None))
         if change_of is not None and isinstance(e, kinds):  # a body may have its joint's name
@@ -113,6 +123,11 @@ def _gain(e: Element, by: float) -> Element:
     return replace(e, command_errors=(*e.command_errors, error))
 
 
+def _travel(e: Element, knots: Knots) -> Element:
+    assert isinstance(e, Joint)
+    return replace(e, command_errors=(*e.command_errors, CommandError(knots=knots)))
+
+
 def _compliance(e: Element, by: float) -> Element:
     """Times exp(by): a spring stays a spring whatever a fit tries."""
     factor = float(np.exp(by))
@@ -133,10 +148,11 @@ def _mass(e: Element, by: float) -> Element:
     return replace(e, mass=e.mass * factor, inertia=inertia)  # type: ignore[arg-type]
 
 
-CHANGES: dict[str, tuple[tuple[type, ...], Callable[[Element, float], Element]]] = {
+CHANGES: dict[str, tuple[tuple[type, ...], Callable[[Element, Any], Element]]] = {
     "length": ((Offset,), _length),
     "zero": ((Joint,), _zero),
     "gain": ((Joint,), _gain),
+    "travel": ((Joint,), _travel),
     "compliance": ((Joint, Spring), _compliance),
     "mass": ((Body,), _mass),
 }

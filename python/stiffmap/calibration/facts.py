@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from stiffmap.calibration.groups import Choice
 from stiffmap.calibration.travel import Travel
 from stiffmap.calibration.unknowns import Unknown
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.machine import Machine
 from stiffmap.plain import plain
+
+if TYPE_CHECKING:
+    from stiffmap.calibration.corrected import Correction
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,33 @@ class HeldOut:
     """With one group alone beside the base."""
 
 
+@dataclass(frozen=True)
+class Unseen:
+    """What the machine file says of readings that no fit saw: made from all other folds, and predicted in full.
+
+    Unknown frames, tools and zeros are those of the other folds, too, unless only the fold itself has them.
+    """
+
+    by: str
+    """What is left out together: ``poses`` or ``set-ups``."""
+    before: float
+    """rms with the declared machine, m (rad where only angles are read)."""
+    after: float
+    """rms with the corrected machine of the other folds."""
+    u: float
+    """Standard uncertainty of `after`, by the scatter of the folds' mean squares."""
+
+    @staticmethod
+    def of(
+        before: Floats, after: Floats, label: Integers, by: str, size: Callable[[Floats], float]
+    ) -> Unseen:
+        """From residuals (n, c) of rows in folds `label` (n,)."""
+        whole = size(after)
+        squares = np.array([size(after[label == k]) ** 2 for k in np.unique(label)])
+        spread = float(np.nanstd(squares, ddof=1) / np.sqrt(len(squares)))
+        return Unseen(by, size(before), whole, spread / (2.0 * whole) if whole > 0.0 else 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Facts:
     """What a machine's numbers are, given their uncertainties and the readings; SI."""
@@ -112,7 +143,12 @@ class Facts:
     """Whether the time budget ended it early: what follows is the best so far."""
     unit: str
     machine: Machine = field(repr=False)
-    """The machine built as calibrated; its controller keeps the declared numbers."""
+    """The corrected machine: built as calibrated, with the axis positioning errors of its drives where they hold; its
+    controller keeps the declared numbers."""
+    unseen: Unseen | None
+    """What `machine` says of readings that no fit saw; None where there are not two folds, or time was over."""
+    correction: Correction = field(repr=False)
+    """How some of the readings, with effects besides, make such a machine."""
     experiment: Experiment = field(repr=False)
     residual: Floats = field(repr=False)
     """(n, c) reading minus prediction, less fitted frames and zeros."""
@@ -133,9 +169,10 @@ class Facts:
         names = ("verdict", "rank", *measures, "outliers", "stopped", "unit", "seconds")
         out = {n: plain(getattr(self, n)) for n in names}
         out["held_out"] = plain(asdict(self.held_out)) if self.held_out else None
+        out["unseen"] = plain(asdict(self.unseen)) if self.unseen else None
         out["groups"] = plain(asdict(self.groups))
         out["beyond"] = [plain(asdict(b)) for b in self.beyond]
-        out["travel"] = plain(asdict(self.travel)) if self.travel else None
+        out["travel"] = self.travel.as_plain() if self.travel else None
         out["table"] = [plain(asdict(r)) for r in self.rows]
         out["refused"] = list(self.refused)
         out["failed"] = [list(f) for f in self.failed]

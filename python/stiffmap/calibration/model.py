@@ -12,6 +12,7 @@ import numpy as np
 from stiffmap.calibration.certificate import INSTRUMENT, SCALE, frame_columns, scaled
 from stiffmap.calibration.slopes import Slopes, built, moves_of
 from stiffmap.calibration.unknowns import Unknown
+from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
@@ -49,23 +50,25 @@ MOST_KEPT = 4
 _KEPT: OrderedDict[tuple[str, tuple[Unknown, ...]], Sensitivity] = OrderedDict()
 
 
-def predicted(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats) -> Floats:
-    """(n, c) readings of the machine with unknowns at `values` (p,), in standard uncertainties."""
+def predicted(
+    predictor: Predictor, unknowns: Sequence[Unknown], values: Floats, terms: Sequence[AppliedEffect] = ()
+) -> Floats:
+    """(n, c) readings of the machine with unknowns at `values` (p,), in standard uncertainties, and with effects."""
     pairs = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
     frame = _frame_part(predictor, pairs)
     own = list(dict.fromkeys(u.setup for u, _ in pairs if u.setup))
     if not own:
-        return np.asarray(_predicted(predictor, pairs) + frame)
+        return np.asarray(_predicted(predictor, pairs, terms) + frame)
     label = np.array(predictor.experiment.setup)
     others = ~np.isin(label, own)
     out = np.full(predictor.experiment.reading.shape, np.nan)
     if others.any():
-        out[others] = _predicted(predictor.beside(rows=others), [(u, v) for u, v in pairs if not u.setup])
+        shared = [(u, v) for u, v in pairs if not u.setup]
+        out[others] = _predicted(predictor.beside(rows=others), shared, terms)
     for name in own:
         here = label == name
-        out[here] = _predicted(
-            predictor.beside(rows=here), [(u, v) for u, v in pairs if u.setup in ("", name)]
-        )
+        mine = [(u, v) for u, v in pairs if u.setup in ("", name)]
+        out[here] = _predicted(predictor.beside(rows=here), mine, terms)
     return np.asarray(out + frame)
 
 
@@ -79,13 +82,15 @@ def _frame_part(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) ->
     return np.asarray(sum(columns[what] * by for what, by in moved))
 
 
-def _predicted(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> Floats:
+def _predicted(
+    predictor: Predictor, pairs: Sequence[tuple[Unknown, float]], terms: Sequence[AppliedEffect]
+) -> Floats:
     moves = moves_of(pairs)
     scale = moves.pop((INSTRUMENT, SCALE), 0.0)
     beside = predictor
     if any(at != INSTRUMENT for at, _ in moves):
         beside = predictor.beside(machine=built(predictor, moves))
-    return beside([scaled(predictor.machine.description, scale)] if scale else [])
+    return beside([*terms, scaled(predictor.machine.description, scale)] if scale else terms)
 
 
 def sensitivity(

@@ -9,14 +9,16 @@ and judged on poses that neither they nor the calibration have seen.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from stiffmap.calibration.statistics import Sums, gain_of
 from stiffmap.experiment.experiment import Floats, Integers, Mask
 from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.plain import plain
 
 POSES = 10
 """For each knot of a profile."""
@@ -58,6 +60,49 @@ class Travel:
     share: float
     """Of the squares that are left without them."""
     profiles: tuple[Profile, ...]
+    hats: Hats = field(repr=False, compare=False)
+    """What the profiles are made of."""
+
+    def as_plain(self) -> dict[str, Any]:
+        """JSON data."""
+        return {n: plain(getattr(self, n)) for n in ("by", "before", "after", "share")} | {
+            "profiles": [plain(asdict(p)) for p in self.profiles]
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Hats:
+    """Knots of every drive's profile and how large an error at them is expected to be."""
+
+    drives: tuple[Drive, ...]
+    at: tuple[Floats, ...]
+    scales: tuple[Floats, ...]
+    variance: float
+    """Of a whitened reading, beside the profiles."""
+
+    def knots(
+        self, problem: Problem, columns: Floats, linear: Floats, rho: float
+    ) -> dict[str, tuple[tuple[float, float], ...]]:
+        """(coordinate, error) of each drive by the readings of `problem`.
+
+        columns, linear
+            (N, p) and (N,) whitened, of all other unknowns, in the standard uncertainties that hold.
+        rho
+            Model-form floor.
+        """
+        parts = [columns] + [
+            problem.white(d.zero[..., None] * hats(d.coordinate, at)[:, None, :]) * scale
+            for d, at, scale in zip(self.drives, self.at, self.scales, strict=True)
+        ]
+        wide = np.hstack(parts)
+        p = columns.shape[1]
+        values = _beside(Sums.of(wide, linear), p, 1.0 + rho).at(np.arange(p, wide.shape[1]), self.variance)
+        out, done = {}, 0
+        for d, at, scale in zip(self.drives, self.at, self.scales, strict=True):
+            errors = values[done : done + len(at)] * scale
+            out[d.name] = tuple(zip(map(float, at), map(float, errors), strict=True))
+            done += len(at)
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +194,8 @@ def travel(
                 _share(before, left(mine[k], 1.0 + rho)),
             )
         )
-    return Travel(by, size(before), size(after), share, tuple(profiles))
+    made = Hats(tuple(drives), tuple(at), tuple(scales), variance)
+    return Travel(by, size(before), size(after), share, tuple(profiles), made)
 
 
 def hats(x: Floats, knots: Floats) -> Floats:

@@ -34,6 +34,12 @@ def lines(c: Facts) -> list[str]:
             f"held-out {h.by}: rms {in_display_units(h.before, c.unit)} as declared, {in_display_units(h.after, c.unit)} with all "
             f"unknowns, {in_display_units(h.chosen, c.unit)} with the chosen groups"
         )
+    if c.unseen:
+        f = c.unseen
+        out.append(
+            f"machine file on {f.by} that no fit saw: rms {in_display_units(f.before, c.unit)} as declared, "
+            f"{in_display_units(f.after, c.unit)} ± {in_display_units(f.u, c.unit)} corrected"
+        )
     if c.floor > 0.0:
         where = ", ".join(f"{k} {in_display_units(v, _unit(k, c.unit))}" for k, v in c.rest.items())
         out.append(

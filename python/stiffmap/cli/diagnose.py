@@ -85,5 +85,3 @@ def write(result: Diagnosis, folder: Path, date: str | None = None, inputs: Sequ
         write_picture(folder / f"{name}.png", figure, dpi=130)
     result.report(folder / "report.html", date=date, inputs=inputs)
     result.machine.save(folder / "machine.yaml")
-    if result.calibration is not None:
-        result.calibration.machine.save(folder / "calibrated.yaml")

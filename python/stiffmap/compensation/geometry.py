@@ -66,7 +66,7 @@ def corrected_geometry(description: MachineDescription) -> tuple[MachineDescript
 
 def _joint(e: Joint, name: str, left: list[str]) -> list[Element]:
     offset = sum(c.offset for c in e.command_errors)
-    if any(c.slope or c.amplitude for c in e.command_errors) or e.guide_errors:
+    if any(c.slope or c.amplitude or c.knots for c in e.command_errors) or e.guide_errors:
         left.append(f"{name}: errors along its travel")
     if e.law is not None:
         left.append(f"{name}: compliance of the drive")

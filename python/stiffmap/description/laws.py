@@ -48,7 +48,8 @@ class CommandError:
 
     ``offset + slope * (u - reference) + amplitude * sin(2 pi (u - reference) / period + phase)``
 
-    ``reference=None``: the coordinate of the closed home configuration.
+    and what ``knots`` say at u: pairs (coordinate, error) by rising coordinate, straight between them, level
+    beyond the ends. ``reference=None``: the coordinate of the closed home configuration.
     """
 
     offset: float = 0.0
@@ -57,6 +58,7 @@ class CommandError:
     period: float = 1.0
     phase: float = 0.0
     reference: float | None = 0.0
+    knots: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)

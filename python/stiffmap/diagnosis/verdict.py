@@ -33,6 +33,7 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
 from stiffmap.one_thread import on_one_thread
@@ -121,13 +122,17 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
     why = Explanation(finding.model) if s.clock.over else explain(s, search, finding.model)
     model, other = why.model, why.others
     finding = replace(finding, selection=replace(finding.selection, model=model))
-    before = s.free(e.reading - s.plan.base, finding.outliers, calibrated=False)
-    after = s.free(e.reading - s.predictor(model.terms()), finding.outliers)
+    before = s.free(s.reading - s.plan.base, finding.outliers, calibrated=False)
+    made = s.corrected(model, ~finding.outliers)
+    left_over = s.reading - made.prediction
+    exact = Problem.of(e, s.noise.sigma, made.prediction, ~finding.outliers)
+    after = left_over - nuisance_part(exact, left_over)
     if other and verdict == "effects":
         verdict = "ambiguous"
     inflation = max(1.0, float(np.sqrt(model.chi2 / max(search.problem.freedom, 1)))) if left else 1.0
     keep = ~finding.outliers
-    sums = _summaries(held if verdict in ("effects", "ambiguous", "none") else None, before, after, s, keep)
+    as_declared = verdict == "unattributed" and s.layer is None  # what the folds found is not in the machine
+    sums = _summaries(None if as_declared else held, before, after, s, keep)
     return Diagnosis(
         verdict=verdict,
         effects=_effects(s, finding, why, inflation),
@@ -151,7 +156,7 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
             "alpha": search.alpha,
             "needed_minus_ln_p": search.threshold,
         },
-        machine=predicted_machine(s, model),
+        machine=corrected_machine(s, model, made.machine),
         declared=s.predictor.machine,
         experiment=e,
         residual_before=before,
@@ -193,16 +198,17 @@ def _detectable(s: Study, finding: Finding) -> list[Detectability]:
     ]
 
 
-def predicted_machine(s: Study, model: Model) -> Machine:
-    """The corrected machine, whose source says from which experiment each effect comes."""
-    machine = s.predictor.with_terms(model.terms())
+def corrected_machine(s: Study, model: Model, machine: Machine) -> Machine:
+    """The corrected machine, whose source says what it has from which experiment."""
     if machine is s.predictor.machine:
         return machine
     d = machine.description
-    assert d.declared is not None
     added = "; ".join(f"{c}, from experiment {s.experiment.name}" for c in model.candidates)
-    source = f"{d.source} Effects added by a diagnosis: {added}.".strip()
-    return Machine(replace(d, source=source, declared=replace(d.declared, source=source)))
+    source = f"{d.source} Effects added by a diagnosis: {added}." if added else d.source
+    if s.layer is not None:
+        source = f"{source} Numbers calibrated by experiment {s.experiment.name}."
+    declared = None if d.declared is None else replace(d.declared, source=source.strip())
+    return Machine(replace(d, source=source.strip(), declared=declared))
 
 
 def _summaries(

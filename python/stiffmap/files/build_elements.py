@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -222,9 +223,14 @@ def _command_error(model: CommandErrorModel, coordinate: Dimension, context: Con
     given = {
         key: context.si(getattr(model, key), dimensions.get(key, coordinate), f"command_errors.{key}")
         for key in CommandErrorModel.model_fields
-        if getattr(model, key) is not None
+        if key != "knots" and getattr(model, key) is not None
     }
-    return replace(CommandError(), **given)
+    knots = tuple(
+        (context.si(u, coordinate), context.si(error, coordinate)) for u, error in model.knots or []
+    )
+    if any(b <= a for (a, _), (b, _) in pairwise(knots)):
+        context.at("command_errors").at("knots").fail("knots need rising coordinates")
+    return replace(CommandError(), **given, knots=knots)
 
 
 def _body(model: BodyModel, context: Context, place: int, models: Sequence[ElementModel]) -> Body:

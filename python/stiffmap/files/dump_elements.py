@@ -145,7 +145,8 @@ def _numbers(joint: Joint) -> Plain:
 
 
 def _command_error(error: CommandError) -> Plain:
-    return {key: float(value) for key, value in vars(error).items() if value != getattr(CommandError, key)}
+    changed = {key: value for key, value in vars(error).items() if value != getattr(CommandError, key)}
+    return {key: floats(value) if key == "knots" else float(value) for key, value in changed.items()}
 
 
 def _law(law: Law | None) -> Plain:

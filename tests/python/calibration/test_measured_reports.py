@@ -16,6 +16,7 @@ REPORTS = (
     "measured_delta",
     "measured_delta_files",
     "measured_arm",
+    "measured_ur5",
     "measured_actuator",
     "measured_actuator_files",
 )

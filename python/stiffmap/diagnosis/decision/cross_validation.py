@@ -16,6 +16,7 @@ from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.folds import folds
 from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.noise.unseen import left_unseen
 from stiffmap.experiment.noise.whitening import basis
 
 
@@ -26,8 +27,8 @@ class HeldOut:
     before: Summary
     after: Summary
     residual: Floats
-    """(n, 6) reading minus prediction of the model found without the row's group, `Study.free` of
-    frames and zeros."""
+    """(n, c) reading minus what the corrected machine made without the row's group says of it, less unknown frames and
+    zeros as the other groups determine them."""
     chosen: dict[str, int]
     """How many of the folds chose each effect."""
     folds: int
@@ -64,6 +65,7 @@ def held_out(
     if label.max() == 0:
         return None
     after = np.full_like(e.reading, np.nan)
+    files = Unseen.of(study, listed)
     alone_only = np.full_like(e.reading, np.nan)
     chosen: Counter[str] = Counter()
     for fold in range(int(label.max()) + 1):
@@ -78,26 +80,50 @@ def held_out(
         residual = study.free(e.reading - study.predictor(model.terms()), listed, ~test)
         gone = alone(study, np.where(test[:, None], residual, np.nan)) & listed
         after[test & ~gone] = residual[test & ~gone]
+        files.add(model, test, test & ~gone)
         if study.layer is not None:
             bare = study.free(e.reading - study.plan.base, listed, ~test)
             alone_only[test & ~gone] = bare[test & ~gone]
-    declared = study.free(e.reading - study.plan.base, listed, calibrated=False)
-    before = np.where(np.isfinite(after), declared, np.nan)
     sigma = study.noise.sigma
     calibrated = gain = None
     if study.layer is not None:
         calibrated = summary(alone_only, sigma, e.channels)
         gain = _gain(alone_only / sigma, after / sigma, label)
     return HeldOut(
-        summary(before, sigma, e.channels),
-        summary(after, sigma, e.channels),
-        after,
+        summary(files.before, sigma, e.channels),
+        summary(files.after, sigma, e.channels),
+        files.after,
         dict(chosen),
         int(label.max()) + 1,
         by,
         calibrated,
         gain,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """Residuals (n, c) of the declared and of the corrected machine, each group predicted by all others."""
+
+    study: Study
+    listed: Mask
+    before: Floats
+    after: Floats
+
+    @staticmethod
+    def of(study: Study, listed: Mask) -> Unseen:
+        """Nothing predicted yet; rows in `listed` (n,) are no readings to fit."""
+        nothing = np.full_like(study.experiment.reading, np.nan)
+        return Unseen(study, listed, nothing, nothing.copy())
+
+    def add(self, model: Model, test: Mask, rows: Mask) -> None:
+        """The `rows` (n,) of one group `test` (n,), predicted by the machine that all others make with the effects of a
+        model."""
+        s, seen = self.study, ~test & ~self.listed
+        e = s.experiment.with_readings(s.reading)
+        made = s.corrected(model, seen)
+        for out, prediction in ((self.before, s.plan.base), (self.after, made.prediction)):
+            out[rows] = left_unseen(e, s.noise.sigma, prediction, seen, test & ~self.listed)[rows]
 
 
 def _kept(study: Study, known: Finding | None, rows: Mask) -> Model | None:

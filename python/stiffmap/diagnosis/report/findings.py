@@ -102,7 +102,7 @@ class Findings:
     limitations: list[str]
     significance: dict[str, float]
     machine: Machine
-    """The corrected machine."""
+    """The corrected machine: its effects, and what a calibration below them found; `after` is what it does."""
     declared: Machine
     experiment: Experiment
     residual_before: Floats = field(repr=False)
@@ -110,8 +110,8 @@ class Findings:
     set_aside: Mask = field(repr=False)
     empirical: Empirical | None = None
     calibration: Calibration | None = None
-    """Below the effects, where many small errors explain the readings better than exact numbers do;
-    `machine` has its effects on the declared machine, `calibration.machine` is the machine as built."""
+    """Below the effects, where many small errors explain the readings better than exact numbers do; its own
+    machine has no effects."""
     refused: list[str] = field(default_factory=list)
     """Effects that the readings seemed to demand and that are not named, and why."""
     stopped: bool = False

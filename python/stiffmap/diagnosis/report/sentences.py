@@ -95,9 +95,9 @@ def opening(d: Any) -> str:
 def next_step(d: Any) -> str:
     """What to do with the answer."""
     if d.verdict == "none" and d.calibration is not None and d.calibration.beyond:
-        return "Inspect the number that is beyond tolerance; the calibration's machine file has it."
+        return "Inspect the number that is beyond tolerance; machine.yaml has it."
     if d.verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
-        return "Nothing to mend. The calibration's machine file predicts this machine better than the declared one."
+        return "Nothing to mend. machine.yaml holds the calibrated numbers and predicts this machine better than the declared file."
     if d.verdict == "none" and d.stopped:
         return "Let it come to its end."
     if d.verdict == "none":

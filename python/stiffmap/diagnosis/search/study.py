@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from stiffmap.calibration.corrected import Corrected
 from stiffmap.description import MachineDescription
 from stiffmap.diagnosis.candidates.plan import Plan, plan_of
 from stiffmap.diagnosis.clock import Clock
@@ -71,8 +72,22 @@ class Study:
         return Problem.of(self.experiment, self.noise.sigma, self.plan.base, keep, uncertain)
 
     @property
+    def reading(self) -> Floats:
+        """(n, c) as read, without what a calibration below the effects takes out of the readings."""
+        if self.layer is None:
+            return self.experiment.reading
+        return self.layer.calibration.experiment.reading
+
+    def corrected(self, model: Model, keep: Mask) -> Corrected:
+        """The machine with the effects of a model, and the calibration by the rows in `keep` (n,) below them."""
+        terms = model.terms()
+        if self.layer is not None:
+            return self.layer.calibration.correction.of(keep, terms)
+        return Corrected(self.predictor.with_terms(terms), np.zeros(0), self.predictor(terms))
+
+    @property
     def experiment(self) -> Experiment:
-        """The experiment."""
+        """The experiment; above a calibration its readings are less what is not linear in the uncertain numbers."""
         return self.predictor.experiment
 
     @property

@@ -166,7 +166,11 @@ def readings_of(experiment: Experiment, base: Floats) -> tuple[NDArray[np.intp],
 
 def nuisance_part(problem: Problem, values: Floats) -> Floats:
     """(n, c) what the nuisances of best fit say of `values` (n, c); NaN where they are."""
-    columns = nuisance_columns(problem.experiment, problem.base)
+    return best_fit(problem, nuisance_columns(problem.experiment, problem.base), values)
+
+
+def best_fit(problem: Problem, columns: Floats, values: Floats) -> Floats:
+    """(n, c) what columns (n, c, q) of best fit to the kept readings say of `values` (n, c), nothing else fitted."""
     if not columns.shape[-1]:
         return np.zeros_like(values)
     bare = replace(problem.exact, nuisance=np.zeros((len(problem), 0)))

@@ -49,7 +49,9 @@ def _command_error(machine: Machine, channel: Channel, u: Floats) -> Floats:
 def _error(e: CommandError, u: Floats, home: float) -> Floats:
     travel = u - (home if e.reference is None else e.reference)
     wave = np.sin(2 * math.pi * travel / e.period + e.phase)
-    return np.asarray(e.offset + e.slope * travel + e.amplitude * wave)
+    knots = np.array(e.knots or ((0.0, 0.0),))
+    between = np.interp(u, knots[:, 0], knots[:, 1])
+    return np.asarray(e.offset + e.slope * travel + e.amplitude * wave + between)
 
 
 def check_joints(machine: Machine, experiment: Experiment) -> None:

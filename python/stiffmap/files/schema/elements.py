@@ -102,7 +102,8 @@ class JointModel(PassiveNumbers):
 
 
 class CommandErrorModel(FileModel):
-    """Error added to the commanded coordinate u: offset + slope*(u - reference) + amplitude*sin(...)."""
+    """Error added to the commanded coordinate u: offset + slope*(u - reference) + amplitude*sin(...), and the
+    axis positioning error at u by ``knots``: [coordinate, error] by rising coordinate."""
 
     offset: Number | None = None
     slope: Number | None = None
@@ -110,6 +111,7 @@ class CommandErrorModel(FileModel):
     period: Number | None = None
     phase: Number | None = None
     reference: Number | None = None
+    knots: list[Pair] | None = None
 
 
 class ActuatorModel(DriveNumbers):
