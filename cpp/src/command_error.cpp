@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
+#include "stiffmap/command_error.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-
-#include "stiffmap/chain.hpp"
 
 namespace stiffmap {
 namespace {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from stiffmap.calibration.unknowns import Unknown
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.machine import Machine
 from stiffmap.plain import plain
-
-if TYPE_CHECKING:
-    from stiffmap.calibration.corrected import Correction
 
 
 @dataclass(frozen=True)
@@ -147,8 +144,6 @@ class Facts:
     controller keeps the declared numbers."""
     unseen: Unseen | None
     """What `machine` says of readings that no fit saw; None where there are not two folds, or time was over."""
-    correction: Correction = field(repr=False)
-    """How some of the readings, with effects besides, make such a machine."""
     experiment: Experiment = field(repr=False)
     residual: Floats = field(repr=False)
     """(n, c) reading minus prediction, less fitted frames and zeros."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from stiffmap.calibration.corrected import Correction
 from stiffmap.calibration.facts import Facts
 from stiffmap.calibration.wording import lines, table
 
@@ -11,6 +12,9 @@ from stiffmap.calibration.wording import lines, table
 @dataclass(frozen=True, eq=False)
 class Calibration(Facts):
     """What a machine's numbers are, given their uncertainties and the readings; SI."""
+
+    correction: Correction = field(repr=False, kw_only=True)
+    """How some of the readings, with effects besides, make such a machine."""
 
     def lines(self) -> list[str]:
         """The verdict in a few lines."""

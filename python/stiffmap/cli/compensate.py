@@ -33,6 +33,8 @@ from stiffmap.outputs import write_text
 from stiffmap.outputs.option import written
 
 MM = 1e3
+WORSE = "worse: these commands would enlarge the error of these readings; the file does not hold where they were taken"
+BETTER = "better"
 
 
 def compensate(
@@ -80,6 +82,7 @@ def compensate(
 
     The machine is the corrected one: what its controller believes, with the effects that a diagnosis found. Weight,
     load, play and friction on the side of the approach are in the commands; --urdf and --dh hold what geometry can.
+    Exit codes: 1 where --check finds that compensation would make the error larger, 2 bad input.
 
     Examples:
 
@@ -110,6 +113,8 @@ def compensate(
     if check is not None:
         out |= _checked(m, check)
     _say(out, as_json)
+    if out.get("verdict") == WORSE:
+        raise typer.Exit(1)
 
 
 def _checked(m: Machine, folder: Path) -> dict[str, object]:
@@ -121,6 +126,7 @@ def _checked(m: Machine, folder: Path) -> dict[str, object]:
         out[f"rms {name}, m{unit}"] = round(MM * size, 6)
         if unit == "m":
             out[f"largest {name}, mm"] = round(MM * s.max, 6)
+    out["verdict"] = WORSE if after.size[0] > before.size[0] else BETTER
     return out
 
 

@@ -166,6 +166,11 @@ def test_what_compensation_leaves_of_held_out_readings(
     expected = 1e3 * np.sqrt(np.nanmean(hidden[:, :3] ** 2))
     assert said["rms left by compensation, mm"] == pytest.approx(expected, rel=1e-3)
     assert said["rms as measured, mm"] > 4 * expected
+    assert said["verdict"] == "better"
+    assert main([*argument, "--effect", "zero_offset actuator x error=-0.1mm"]) == 1  # the wrong way
+    said = json.loads(capsys.readouterr().out)
+    assert said["verdict"].startswith("worse")
+    assert said["rms left by compensation, mm"] > 1.9 * said["rms as measured, mm"]
     before, after = left_by(both, data)
     assert (before.n, after.rms * 1e3) == (24, pytest.approx(expected, rel=1e-3))
 

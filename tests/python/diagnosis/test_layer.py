@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import stiffmap as sm
 from stiffmap.calibration import unknowns
 from stiffmap.calibration.model import predicted
+from stiffmap.cli.diagnose import write
 from stiffmap.description import AppliedEffect
 from stiffmap.experiment import Experiment, Predictor, random_plan
+from stiffmap.experiment.comparison.prediction_error import left_by
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import Problem
 
 LEAD = AppliedEffect("lead_error", "carriage", ("a",), (("slope", 5e-3),))
 
 
-def twin(seed: int, *effects: AppliedEffect, rough: float = 0.0) -> tuple[sm.Machine, Experiment]:
-    """Readings of a delta that is off everywhere, with effects and a pattern (m) that no model holds."""
+def twin(
+    seed: int, *effects: AppliedEffect, rough: float = 0.0, poses: int | None = None
+) -> tuple[sm.Machine, Experiment]:
+    """Readings of a delta that is off everywhere, with effects and a pattern (m) that no model holds; with `poses` the same
+    delta read at so many others."""
     machine = sm.load_machine("linear-delta")
-    plan = random_plan(machine, "position", poses=40, seed=seed)
+    plan = random_plan(machine, "position", poses=poses or 40, seed=seed + 1000 * bool(poses))
     p = Predictor(machine, plan)
     wanted = unknowns(machine.description, p.experiment)
     rng = np.random.default_rng(seed)
@@ -43,6 +50,24 @@ def test_a_cause_is_named_beside_small_errors_and_a_rest() -> None:
     assert d.verdict == "effects+unattributed"
     assert [(e.kind, e.legs) for e in d.effects] == [("lead_error", ("a",))]
     assert any(line.startswith("explained:") for line in d.lines())
+
+
+@pytest.mark.slow
+def test_the_file_does_on_new_readings_what_the_headline_says(tmp_path: Path) -> None:
+    machine, data = twin(5, LEAD)
+    d = sm.diagnose(machine, data)
+    assert [e.kind for e in d.effects] == ["lead_error"] and d.calibration is not None
+    write(d, tmp_path)
+    file = sm.load_machine(tmp_path / "machine.yaml")
+    assert not (tmp_path / "calibrated.yaml").exists()
+    _, fresh = twin(5, LEAD, poses=200)
+    after = left_by(file, fresh)[1]
+    assert after.rms == pytest.approx(d.after.rms, rel=0.15)
+    # the effect alone, on the declared numbers, is not the machine
+    bare = machine.with_effect(
+        "lead_error", element="carriage", legs=["a"], slope=d.effects[0].parameters["slope"][0]
+    )
+    assert left_by(bare, fresh)[1].rms > 3.0 * after.rms
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ HEADERS = sorted((ROOT / "cpp/include/stiffmap").glob("*.hpp"))
 
 # A header may include headers of earlier ranks only.
 RANKS = (
-    ("types", "check", "parallel", "drive_numbers"),
+    ("types", "check", "parallel", "command_error", "drive_numbers"),
     ("dense", "se3"),
     ("law", "spring", "load"),
     ("chain",),
