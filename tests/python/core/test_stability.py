@@ -79,13 +79,18 @@ def test_a_guided_strut_does_not_buckle(kind: str, method: str, share: float) ->
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("kind", ["spring", "universal", "revolutes"])
-@pytest.mark.parametrize("turn", [0.1, 10.0, 1e3, 1e5])
-@pytest.mark.parametrize("guide", [1e5, 1e8, 1e11])
+@pytest.mark.parametrize(
+    ("guide", "turn"),  # the guide holds what the root does not
+    [
+        (guide, turn)
+        for guide in (1e5, 1e8, 1e11)
+        for turn in (0.1, 10.0, 1e3, 1e5)
+        if guide * LENGTH**2 >= 100 * turn
+    ],
+)
 def test_next_to_the_pole_nothing_is_rigid(guide: float, turn: float, kind: str, method: str) -> None:
     """Stiffness contrasts up to 1e12, loads within 1e-9 of the one at which the strut alone is indifferent."""
     machine = strut(kind, True, guide, turn)
-    if guide * LENGTH**2 < 100 * turn:
-        pytest.skip("the guide holds no longer what the root does not")
     for share in (1 - 1e-3, 1 - 1e-6, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-6, 1 + 1e-3, 3.0):
         force = share * turn / LENGTH
         s = machine.solve((0, 0, LENGTH), (0.01 * force, 0, -force, 0, 0, 0), method=method)

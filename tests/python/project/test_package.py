@@ -42,3 +42,15 @@ def test_licences_of_what_is_compiled_in_go_into_the_wheel() -> None:
     assert "Mozilla Public License Version 2.0" in files["Eigen-MPL-2.0.txt"]
     assert "Wenzel Jakob" in files["pybind11-BSD-3-Clause.txt"]
     assert all(name in files["NOTICE.txt"] for name in files if name not in ("LICENSE", "NOTICE.txt"))
+
+
+def test_every_requirement_has_a_lowest_version_and_no_highest() -> None:
+    """`.ci/lowest` runs the former; with no upper limit every fresh environment is the job with the newest."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    for requirement in [
+        *project["dependencies"],
+        *(r for name, rs in extras.items() if name != "all" for r in rs),
+    ]:
+        assert re.fullmatch(r"[a-z0-9-]+>=[0-9.]+", requirement), requirement
+    assert set(extras) - {"all"} == set(re.fullmatch(r"stiffmap\[(.*)\]", extras["all"][0])[1].split(","))  # type: ignore[index]
