@@ -15,7 +15,7 @@ from .statics import coordinates
 from .verify import Question
 
 FAMILIES = ("random_legs", "hexapod", "heavy_starts", "arm_on_a_rail", "unlike_delta", "four_legs")
-KINDS = (*FAMILIES, *(n for n in CLASSES if n not in ("few",)))
+KINDS = (*FAMILIES, *(n for n in CLASSES if n not in ("few", "hung")))
 TIED = ("random_legs", "heavy_starts", "over-actuated", "gantry", "cables", "four_legs", "springs outside")
 """Kinds whose drives cannot each go their own way: they stay at one command."""
 STROKE = 0.03  # m, rad

@@ -17,6 +17,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -121,6 +122,12 @@ def asked(machine: sm.Machine, rng: np.random.Generator, count: int) -> tuple[np
     }
 
 
+def timed(batch: Batch, count: int) -> dict[str, object]:
+    """`run`, and the CPU time that it took, s."""
+    start = time.process_time()
+    return {**run(batch, count), "cpu": round(time.process_time() - start, 3)}
+
+
 def run(batch: Batch, count: int = BATCH) -> dict[str, object]:
     """Counts, worst numbers and the wrong answers of a batch."""
     key = [batch.seed, *batch.machine.encode(), *batch.effect.encode()]
@@ -200,7 +207,7 @@ def main() -> int:
     todo = [b for b in batches(machines, int(given.count), given.batch, kinds)
             if (b.machine, b.effect, b.seed) not in seen]  # fmt: skip
     with ProcessPoolExecutor(given.jobs) as pool, given.out.open("a") as out:
-        for work in as_completed([pool.submit(run, b, size_of(b.effect, given.batch)) for b in todo]):
+        for work in as_completed([pool.submit(timed, b, size_of(b.effect, given.batch)) for b in todo]):
             result = json.loads(json.dumps(work.result()))
             out.write(json.dumps(result) + "\n")
             out.flush()
@@ -230,7 +237,8 @@ def report(done: list[dict[str, object]]) -> int:
         print("refused:", text)
     for row in bad[:40]:
         print("WRONG", *row)
-    print(f"{sum(int(str(r['solves'])) for r in done)} solves, {len(bad)} wrong")
+    solves, cpu = (sum(float(str(r[n])) for r in done) for n in ("solves", "cpu"))
+    print(f"{solves:.0f} solves, {len(bad)} wrong, {1e3 * cpu / max(1.0, solves):.3f} ms of CPU each")
     return int(bool(bad))
 
 
