@@ -83,6 +83,41 @@ BOOST_AUTO_TEST_CASE(indefinite_matrices_are_refused) {
   BOOST_TEST(contains(message([&] { spring_from_stiffness(K, "bar"); }), "coupling"));
 }
 
+/// Ones on the diagonal, so that scaling changes nothing, and one pair of eigenvalues 1 +- c.
+Mat6 coupled(double c) {
+  Mat6 M = Mat6::Identity();
+  M(1, 4) = M(4, 1) = c;
+  return M;
+}
+
+BOOST_AUTO_TEST_CASE(a_matrix_is_indefinite_from_1e_9_on) {
+  // Round-off of a matrix of less than full rank passes; an eigenvalue that arithmetic cannot explain does not.
+  for (const double size : {1.0, 1e-8, 1e7}) {
+    BOOST_CHECK_NO_THROW(spring_from_stiffness(size * coupled(1 + 5e-10), "bar"));
+    BOOST_CHECK_NO_THROW(spring_from_compliance(size * coupled(1 + 5e-10), "bar"));
+    BOOST_CHECK_THROW(spring_from_stiffness(size * coupled(1 + 2e-9), "bar"), std::invalid_argument);
+    BOOST_CHECK_THROW(spring_from_compliance(size * coupled(1 + 2e-9), "bar"), std::invalid_argument);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_matrix_is_asymmetric_from_1e_9_on) {
+  Mat6 M = coupled(0.5);
+  M(4, 1) += 5e-10;
+  BOOST_CHECK_NO_THROW(spring_from_stiffness(M, "bar"));
+  M(4, 1) += 1e-9;
+  BOOST_CHECK_THROW(spring_from_stiffness(M, "bar"), std::invalid_argument);
+}
+
+BOOST_AUTO_TEST_CASE(a_compliance_loses_rank_below_1e_9) {
+  const SpringMatrix soft = spring_from_compliance(coupled(1 - 3e-9), "bar");
+  BOOST_TEST(!soft.rotated);
+  BOOST_TEST(!soft.rigid.any());
+  BOOST_TEST(std::abs(soft.stiffness(1, 1) * 3e-9 * (2 - 3e-9) - 1) < 1e-6);  // 1 / (1 - c^2)
+  const SpringMatrix rigid = spring_from_compliance(coupled(1 - 3e-10), "bar");
+  BOOST_TEST(rigid.rotated);
+  BOOST_TEST(rigid.rigid.count() == 1);
+}
+
 BOOST_AUTO_TEST_CASE(nan_is_refused) {
   Mat6 K = Mat6::Identity();
   K(4, 4) = std::nan("");
