@@ -24,7 +24,7 @@ from pathlib import Path
 from . import cpp_sites, python_sites, server
 from .cpp_build import build, install
 from .mutant import Mutant, shuffled
-from .table import TESTS, all_folders, folders, test_files
+from .table import all_folders, folders, test_files
 
 ROOT = Path(__file__).parents[3]
 CPU_SECONDS = 400
@@ -143,24 +143,23 @@ def judge_cpp(n: int, mutant: Mutant, package: Path, out: Path, wide: bool) -> s
 def tests_of(
     mutant: Mutant, source: str, package: Path, out: Path, wide: bool, environment: dict[str, str]
 ) -> server.Outcome:
-    """The tests of the mutant's room, or all, up to the first failure."""
+    """The tests of the mutant's room, or all, up to the first failure of one that passes without a mutant."""
     chosen = all_folders(mutant.file) if wide else folders(mutant.file)
     tests = test_files(mutant.file, source, mutant.start, chosen)
-    unfit = [f"--deselect={name}" for folder in chosen for name in failing_anyway(folder, out)]
-    return server.run(package, tests, out / "pytest.log", CPU_SECONDS, environment, "-x", *unfit)
-
-
-def failing_anyway(folder: str, out: Path) -> list[str]:
-    """Tests that fail in a copy of the package without any mutant; they judge none."""
-    known = out / "failing_anyway" / f"{folder}.json"
-    if not known.exists():
-        known.parent.mkdir(exist_ok=True)
-        package, log = copy_of_package(out / "unchanged"), out / "unchanged.log"
-        outcome = server.run(package, [str(TESTS / folder)], log, 10 * CPU_SECONDS, {})
-        found = server.failures(log) if outcome.caught else []
-        known.write_text(json.dumps(found), encoding="utf-8")
-        print(f"{folder}: {outcome.seconds:.0f} s without a mutant, fails anyway: {found}", flush=True)
-    return list(json.loads(known.read_text(encoding="utf-8")))
+    known = out / "without_a_mutant.json"
+    passes: dict[str, bool] = json.loads(known.read_text(encoding="utf-8")) if known.exists() else {}
+    while True:
+        unfit = [f"--deselect={name}" for name, passed in passes.items() if not passed]
+        outcome = server.run(package, tests, out / "pytest.log", CPU_SECONDS, environment, "-x", *unfit)
+        name = outcome.by
+        if not outcome.caught or "::" not in name or passes.get(name):
+            return outcome
+        alone = server.run(copy_of_package(out / "unchanged"), [name], out / "unchanged.log", CPU_SECONDS, {})
+        passes[name] = not alone.caught
+        known.write_text(json.dumps(passes), encoding="utf-8")
+        if passes[name]:
+            return outcome
+        print(f"fails without a mutant: {name}", flush=True)
 
 
 if __name__ == "__main__":
