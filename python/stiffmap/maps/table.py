@@ -74,7 +74,8 @@ def write_map_table(ds: xr.Dataset, path: str | PathLike[str]) -> Path:
     names, rows = map_table(ds)
     if target.suffix == ".csv":
         text = (["" if v is None else f"{v:.9g}" if isinstance(v, float) else v for v in row] for row in rows)
-        return write_rows(target, names, text, encoding="utf-8-sig")
+        write_rows(target, names, text, encoding="utf-8-sig")
+        return target
     if target.suffix == ".xlsx":
         return _write_xlsx(ds, target, names, rows)
     raise StiffmapError(f"{target.name}: expected .csv or .xlsx")

@@ -6,7 +6,6 @@ import csv
 import os
 import re
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import Any
 
 from stiffmap.outputs.writing import writing
@@ -33,10 +32,12 @@ def write_rows(
     header: Sequence[str],
     rows: Iterable[Sequence[Any]],
     encoding: str = "utf-8",
-) -> Path:
-    """Write a CSV file: a header and rows. Raises FileError where it cannot be written."""
+) -> int:
+    """Write a CSV file: a header and rows; returns their number. Raises FileError where it cannot be written."""
+    count = 0
     with writing(path) as fresh, fresh.open("w", newline="", encoding=encoding) as stream:
         out = csv.writer(stream)
         out.writerow([guarded(c) for c in header])
-        out.writerows([guarded(c) for c in row] for row in rows)
-    return Path(path)
+        for count, row in enumerate(rows, 1):  # noqa: B007 - the last one counts
+            out.writerow([guarded(c) if type(c) is str else c for c in row])
+    return count

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.spreadsheet.guess import FORCES, LENGTHS, READINGS, Column, guess, known_unit
@@ -28,7 +30,7 @@ class Imported:
     columns: list[Column]
     units: dict[str, str]
     header: list[str]
-    rows: list[list[str]]
+    rows: Rows
     repeats: int
     constants: dict[str, float]
     notes: list[Column]
@@ -103,32 +105,71 @@ def _unit(c: Column, units: Mapping[str, str]) -> str:
 
 def _rows(
     sheet: Sheet, used: list[Column], constants: Mapping[str, float], repeats: int
-) -> tuple[list[str], list[list[str]]]:
+) -> tuple[list[str], Rows]:
     """Cells of data.csv: repeats side by side become rows one below the other."""
     common = [c for c in used if c.repeat == 0]
     meanings = list(dict.fromkeys(c.meaning for c in used if c.repeat))
     header = [*(c.meaning for c in common), *constants, *meanings, *(["repeat"] if repeats > 1 else [])]
-    values = {c.index: sheet.numbers(c.index) for c in used if c.meaning not in WORDS}
-    out = []
-    for r, cells in enumerate(sheet.rows):
+    return header, Rows(sheet, common, constants, meanings, repeats, used)
+
+
+class Rows:
+    """Rows of data.csv, made block by block whenever they are asked for: text, and numbers as floats."""
+
+    def __init__(
+        self,
+        sheet: Sheet,
+        common: list[Column],
+        constants: Mapping[str, float],
+        meanings: list[str],
+        repeats: int,
+        used: list[Column],
+    ) -> None:
+        self._sheet, self._repeats = sheet, repeats
+        numbers = {c.index: sheet.numbers(c.index) for c in used if c.meaning not in WORDS}
+        at = {(c.meaning, c.repeat): c.index for c in used}
+        wanted: list[list[int | float | None]] = []
         for k in range(1, repeats + 1):
-            row = [_cell(c, cells[c.index], values, r) for c in common]
-            if repeats > 1 and "id" in header:
-                row[header.index("id")] += f".{k}"
-            row += [repr(v) for v in constants.values()]
-            side = {c.meaning: c for c in used if c.repeat == k}
-            row += [_cell(side[m], "", values, r) if m in side else "" for m in meanings]
-            read = [row[header.index(m)] for m in READINGS if m in header]
-            if any(read):
-                out.append([*row, *([str(k)] if repeats > 1 else [])])
-    return header, out
+            side = [at.get((m, k)) for m in meanings]
+            wanted.append([*(c.index for c in common), *map(float, constants.values()), *side])
+        self._numbers, self._wanted = numbers, wanted
+        self._words = [c.index for c in used if c.meaning in WORDS]
+        header = [*(c.meaning for c in common), *constants, *meanings]
+        self._id = header.index("id") if repeats > 1 and "id" in header else None
+        self._readings = [header.index(m) for m in READINGS if m in header]
+
+    def __iter__(self) -> Iterator[Sequence[Any]]:
+        words = {i: self._sheet.columns[i].parts() for i in self._words}
+        start = 0
+        for size in map(len, self._sheet.columns[0].parts()):
+            here = slice(start, start + size)
+            cells = {i: next(parts) for i, parts in words.items()}
+            cells |= {i: _written(values[here]) for i, values in self._numbers.items()}
+            each = [self._block(k, cells, size) for k in range(self._repeats)]
+            for rows in zip(*each, strict=True):
+                yield from (row for row in rows if any(row[i] != "" for i in self._readings))
+            start += size
+
+    def _block(self, k: int, cells: dict[int, list[Any]], size: int) -> Iterator[Sequence[Any]]:
+        """Rows of one of the repeats that stand side by side."""
+        columns = [
+            [""] * size if w is None else [w] * size if isinstance(w, float) else cells[w]
+            for w in self._wanted[k]
+        ]
+        if self._repeats > 1:
+            if self._id is not None:
+                columns[self._id] = [f"{name}.{k + 1}" for name in columns[self._id]]
+            columns.append([k + 1] * size)
+        return zip(*columns, strict=True)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
 
 
-def _cell(c: Column, text: str, values: Mapping[int, Sequence[float]], row: int) -> str:
-    if c.meaning in WORDS:
-        return text
-    v = values[c.index][row]
-    return "" if math.isnan(v) else repr(v)
+def _written(values: Floats) -> list[Any]:
+    """Numbers, and nothing where there are none."""
+    out: list[Any] = values.tolist()
+    return ["" if v != v else v for v in out] if np.isnan(values).any() else out
 
 
 def write_folder(
@@ -149,9 +190,8 @@ def write_folder(
     }
     if noise:
         head["noise"] = dict(noise)
-    head["rows"] = len(found.rows)
     with only_job(make_folder(folder)):
-        write_rows(folder / "data.csv", found.header, found.rows)
+        head["rows"] = write_rows(folder / "data.csv", found.header, found.rows)
         if found.notes:
             kept = ([row[c.index] for c in found.notes] for row in sheet.rows)
             write_rows(folder / "notes.csv", [sheet.header[c.index] for c in found.notes], kept)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from stiffmap.cells import Cells
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.spreadsheet.guess import known_unit, split_unit
 from stiffmap.spreadsheet.sheet import Sheet
@@ -135,8 +136,7 @@ def with_column(sheet: Sheet, name: str, values: list[float]) -> Sheet:
     cell = [("" if math.isnan(v) else repr(v)) for v in values]
     if sheet.decimal_comma:
         cell = [c.replace(".", ",") for c in cell]
-    rows = tuple((*row, c) for row, c in zip(sheet.rows, cell, strict=True))
-    return replace(sheet, header=(*sheet.header, name), rows=rows)
+    return replace(sheet, header=(*sheet.header, name), columns=(*sheet.columns, Cells.of(cell)))
 
 
 def _find(sheet: Sheet, pattern: str) -> int | None:

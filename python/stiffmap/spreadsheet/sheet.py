@@ -7,12 +7,20 @@ import io
 import math
 import re
 from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
+from typing import Any
 
-from stiffmap.errors import FileError, MissingPartError
+from stiffmap.broadcasting import Floats
+from stiffmap.cells import BETWEEN, BLOCK, Cells, packed, row_numbers
+from stiffmap.errors import FileError
 from stiffmap.number_text import number_in
+from stiffmap.spreadsheet.workbook import workbook_lines
 
+Lines = Callable[[], Iterable[tuple[int, list[str]]]]
+"""Number and cells of each line, from the first one whenever it is called."""
 EXCEL = (".xlsx", ".xlsm")
 NOTHING = {"", "-", "--", "–", "na", "n/a", "n.a.", "nan", "none", "null", "#n/a"}
 COMMENTS = ("#", "%", "//")
@@ -20,6 +28,9 @@ LONGEST_HEADER, MOST_COLUMNS = 300, 1000
 SEPARATORS = ";\t|,"
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+")
 """``1.000`` is a thousand in a table with decimal commas."""
+COMMA, POINT = re.compile(r"^[+-]?[\d.]*,\d+$", re.M), re.compile(r"^[+-]?\d*\.\d+$", re.M)
+SAMPLE = 20_000
+"""Lines by which the separator is found."""
 
 
 @dataclass(frozen=True)
@@ -28,19 +39,23 @@ class Sheet:
 
     file: str
     header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    lines: tuple[int, ...]
+    columns: tuple[Cells, ...]
+    lines: Sequence[int]
     """Line of each row in the file, from 1."""
     decimal_comma: bool
 
-    def numbers(self, column: int) -> list[float]:
+    @property
+    def rows(self) -> Iterator[tuple[str, ...]]:
+        """The rows, one by one."""
+        return zip(*self.columns, strict=True)
+
+    def numbers(self, column: int) -> Floats:
         """A column; NaN where nothing was read. FileError names the line of what is no number."""
-        return [
-            self._number(row[column], column, line) for row, line in zip(self.rows, self.lines, strict=True)
-        ]
+        cells = _with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
+        return cells.numbers(lambda cell, row: self._number(cell, column, self.lines[row]))
 
     def _number(self, cell: str, column: int, line: int) -> float:
-        value = number(cell, self.decimal_comma)
+        value = number(cell, False)
         if value is None:
             raise FileError(
                 f"column '{self.header[column]}': expected a number; found {cell!r}",
@@ -51,16 +66,20 @@ class Sheet:
 
     def is_numeric(self, column: int) -> bool:
         """Whether all cells of a column are numbers or say that nothing was read."""
-        return all(number(row[column], self.decimal_comma) is not None for row in self.rows)
+        try:
+            self.numbers(column)
+        except FileError:
+            return False
+        return True
 
 
 def number(cell: str, decimal_comma: bool) -> float | None:
     """The number in a cell; NaN for nothing, None for text."""
-    text = cell.strip().replace("\u00a0", "").replace("−", "-")
+    text = _plain(cell.strip())
     if text.lower() in NOTHING:
         return math.nan
-    if decimal_comma and ("," in text or THOUSANDS.fullmatch(text)):
-        text = text.replace(".", "").replace(",", ".")
+    if decimal_comma:
+        text = _with_point(text)
     try:
         value = number_in(text)
     except ValueError:
@@ -74,28 +93,66 @@ def read_sheet(path: Path, sheet: str | None = None) -> Sheet:
     Text: separators ; tab | , and decimal points or commas are found out, UTF-8, UTF-16 and Latin-1 are read.
     Comment lines are skipped; the header is the line before the first row of mostly numbers. Raises FileError.
     """
-    lines = _excel(path, sheet) if path.suffix.lower() in EXCEL else _text(path)
-    kept = [(n, c) for n, c in lines if any(x.strip() for x in c) and not c[0].strip().startswith(COMMENTS)]
-    comma = _decimal_comma([c for _, c in kept])
-    start = next((i for i, (_, c) in enumerate(kept) if i and _is_data(c, comma)), None)
-    if start is None:
+    lines = workbook_lines(path, sheet) if path.suffix.lower() in EXCEL else _text(path)
+    comma = _decimal_comma(c for _, c in _kept(lines()))
+    before: tuple[int, list[str]] | None = None
+    rows = _kept(lines())
+    for n, c in rows:
+        if before is not None and _is_data(c, comma):
+            first = (n, c)
+            break
+        before = n, c
+    else:
         raise FileError("no header line with rows of numbers below it was found", file=str(path))
-    header = [re.sub(r"\s+", " ", c.strip()) for c in kept[start - 1][1]]
+    assert before is not None
+    header = [re.sub(r"\s+", " ", c.strip()) for c in before[1]]
     endless = next((c for c in header if len(c) > LONGEST_HEADER), None)
     if endless is not None or len(header) > MOST_COLUMNS:
         what = f"{len(header)} columns" if endless is None else f"one of {len(endless)} characters"
         raise FileError(
             f"expected a header of at most {MOST_COLUMNS} columns of {LONGEST_HEADER} characters each; found {what}",
             file=str(path),
-            line=kept[start - 1][0],
+            line=before[0],
         )
     width = max(i for i, c in enumerate(header) if c) + 1
-    rows = [(n, tuple(x.strip() for x in (*c, *[""] * width)[:width])) for n, c in kept[start:]]
     names = [h or f"column {i + 1}" for i, h in enumerate(header[:width])]
     twice = sorted(h for h, n in Counter(names).items() if n > 1)
     if twice:
-        raise FileError(f"column '{twice[0]}' occurs twice", file=str(path), line=kept[start - 1][0])
-    return Sheet(str(path), tuple(names), tuple(r for _, r in rows), tuple(n for n, _ in rows), comma)
+        raise FileError(f"column '{twice[0]}' occurs twice", file=str(path), line=before[0])
+    numbered = row_numbers()
+    columns = packed(_even(chain([first], rows), width, numbered), width)
+    return Sheet(str(path), tuple(names), columns, numbered, comma)
+
+
+def _kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
+    """Lines with something in them that are no comments."""
+    return ((n, c) for n, c in lines if any(x.strip() for x in c) and not c[0].strip().startswith(COMMENTS))
+
+
+def _even(rows: Iterable[tuple[int, list[str]]], width: int, numbers: Any) -> Iterator[list[str]]:
+    """Rows as long as the header; `numbers` gathers those of their lines."""
+    for n, cells in rows:
+        numbers.append(n)
+        yield cells if len(cells) == width else [*cells, *[""] * width][:width]
+
+
+def _with_points(cells: Cells) -> Cells:
+    """Numbers with decimal commas and points for thousands, as numbers with a decimal point."""
+    blocks = []
+    for block in cells.blocks:
+        text = _plain(block)
+        if "." in text:
+            text = BETWEEN.join(_with_point(c) for c in text.split(BETWEEN))
+        blocks.append(text.replace(",", "."))
+    return Cells(blocks, len(cells))
+
+
+def _plain(text: str) -> str:
+    return text.replace("\u00a0", "").replace("−", "-")
+
+
+def _with_point(text: str) -> str:
+    return text.replace(".", "").replace(",", ".") if "," in text or THOUSANDS.fullmatch(text) else text
 
 
 def _is_data(cells: list[str], comma: bool) -> bool:
@@ -105,57 +162,50 @@ def _is_data(cells: list[str], comma: bool) -> bool:
     return len(numeric) >= 2 and 2 * len(numeric) >= len(filled)
 
 
-def _decimal_comma(rows: list[list[str]]) -> bool:
-    cells = [c.strip().replace("−", "-") for row in rows for c in row]
-    commas = any(re.fullmatch(r"[+-]?[\d.]*,\d+", c) for c in cells)
-    points = any(re.fullmatch(r"[+-]?\d*\.\d+", c) and not THOUSANDS.fullmatch(c) for c in cells)
-    return commas and not points
+def _decimal_comma(rows: Iterable[list[str]]) -> bool:
+    """Whether numbers have commas and none has a point."""
+    commas = points = False
+    while block := list(islice(rows, BLOCK)):
+        text = "\n".join(c.strip().replace("\n", " ") for row in block for c in row).replace("−", "-")
+        commas = commas or ("," in text and COMMA.search(text) is not None)
+        points = points or ("." in text and any(not THOUSANDS.fullmatch(m[0]) for m in POINT.finditer(text)))
+        if points:
+            return False
+    return commas
 
 
-def _text(path: Path) -> list[tuple[int, list[str]]]:
+def _text(path: Path) -> Lines:
     try:
         raw = path.read_bytes()
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
-    text = _decoded(raw)
-    sample = [line for line in text.splitlines() if line.strip() and not line.strip().startswith(COMMENTS)]
-    counts = {s: sum(line.count(s) > 0 for line in sample) for s in SEPARATORS}
+    text = _decoded(raw, path).replace("\r\n", "\n").replace("\r", "\n")
+    del raw
+    told = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
+    sample = list(islice(told, SAMPLE))
+    counts = {s: sum(s in line for line in sample) for s in SEPARATORS}
     best = max(SEPARATORS, key=lambda s: (counts[s] > len(sample) / 2, -SEPARATORS.index(s)))
-    reader = csv.reader(io.StringIO(text.replace("\r\n", "\n").replace("\r", "\n")), delimiter=best)
-    try:
-        return [(reader.line_num, row) for row in reader]
-    except csv.Error as error:
-        raise FileError(f"is no table: {error}", file=str(path), line=reader.line_num) from error
 
-
-def _decoded(raw: bytes) -> str:
-    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return raw.decode("utf-16")
-    for encoding in ("utf-8-sig", "latin-1"):
+    def lines() -> Iterator[tuple[int, list[str]]]:
+        reader = csv.reader(io.StringIO(text), delimiter=best)
         try:
-            return raw.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-    return raw.decode("latin-1")  # never fails
+            for row in reader:
+                yield reader.line_num, row
+        except csv.Error as error:
+            raise FileError(f"is no table: {error}", file=str(path), line=reader.line_num) from error
+
+    return lines
 
 
-def _excel(path: Path, sheet: str | None) -> list[tuple[int, list[str]]]:
+def _decoded(raw: bytes, path: Path) -> str:
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        try:
+            return raw.decode("utf-16")
+        except UnicodeDecodeError as error:
+            raise FileError(
+                f"begins as UTF-16 and is none ({error.reason} at byte {error.start})", file=str(path)
+            ) from error
     try:
-        from openpyxl import load_workbook
-    except ModuleNotFoundError:
-        raise MissingPartError(
-            f"{path}: reading Excel files needs openpyxl, which is not installed: pip install 'stiffmap[excel]'"
-        ) from None
-    try:
-        book = load_workbook(path, data_only=True, read_only=True)
-    except FileNotFoundError:
-        raise FileError("there is no such file", file=str(path)) from None
-    except Exception as error:  # openpyxl raises many kinds for what is no workbook
-        raise FileError(f"cannot be read as an Excel workbook ({error})", file=str(path)) from error
-    if sheet is not None and sheet not in book.sheetnames:
-        raise FileError(f"no sheet '{sheet}'; there are: {', '.join(book.sheetnames)}", file=str(path))
-    page = book[sheet] if sheet else book[book.sheetnames[0]]
-    return [
-        (n, ["" if v is None else repr(v) if isinstance(v, float) else str(v) for v in row])
-        for n, row in enumerate(page.iter_rows(values_only=True), 1)
-    ]
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")  # never fails

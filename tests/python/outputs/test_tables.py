@@ -31,7 +31,8 @@ def test_numbers_and_other_text_stay(text: str) -> None:
 
 
 def test_rows(tmp_path: Path) -> None:
-    path = write_rows(tmp_path / "a.csv", ["=x", "y"], [["=1", "-1.5"], [-2.5, None]])
+    path = tmp_path / "a.csv"
+    assert write_rows(path, ["=x", "y"], [["=1", "-1.5"], [-2.5, None]]) == 2
     assert path.read_text() == "'=x,y\n'=1,-1.5\n-2.5,\n"
 
 

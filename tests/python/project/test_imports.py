@@ -19,7 +19,7 @@ PACKAGE = Path(__file__).parents[3] / "python/stiffmap"
 RANKS = (
     ("_core", "version", "errors", "recent", "units", "html", "beams", "number_text"),
     ("description", "broadcasting", "yaml_limits", "python_file", "outputs"),
-    ("rotations", "yaml_text", "home", "fingerprints"),
+    ("rotations", "yaml_text", "home", "fingerprints", "cells"),
     ("compiled", "link"),
     ("status", "branches"),
     ("options", "closing"),

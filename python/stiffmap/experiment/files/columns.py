@@ -42,7 +42,7 @@ def known() -> tuple[str, ...]:
 
 def block(table: Table, names: Sequence[str], *, blank: bool, missing: float = np.nan) -> Floats:
     """(n, names) numbers; a column that is not there is `missing`."""
-    n = len(table.rows)
+    n = len(table)
     return np.column_stack(
         [table.numbers(c, blank=blank) if c in table else np.full(n, missing) for c in names]
     )
@@ -58,7 +58,7 @@ def position(table: Table, scales: Scales, commanded: bool) -> Floats:
                 file=table.file,
                 line=1,
             )
-        return np.full((len(table.rows), 3), np.nan)
+        return np.full((len(table), 3), np.nan)
     if scales.length < 1e-5 and not set(POSE) & set(scales.own):
         raise FileError(
             "units: with length: um the poses x, y, z would be in µm as well; write their unit, as in "
@@ -157,7 +157,7 @@ def other(
                 + ", ".join(f"{c}2" for c in model.command),
                 file=table.file,
             )
-        return np.full((len(table.rows), 3), np.nan)
+        return np.full((len(table), 3), np.nan)
     out = scales.lengths(POSE2) * np.column_stack([table.numbers(c, blank=True) for c in POSE2])
     lost = np.isfinite(reading[:, at]).any(axis=1) & ~np.isfinite(out).all(axis=1)
     same = np.abs(out - scales.lengths(POSE) * block(table, POSE, blank=True)).max(axis=1) < 1e-9
@@ -197,7 +197,7 @@ def sigma(model: ExperimentFile, table: Table, scales: Scales, channels: tuple[C
 def ids(table: Table) -> tuple[str, ...]:
     """Names of the rows, each once."""
     if "id" not in table:
-        return tuple(str(i + 1) for i in range(len(table.rows)))
+        return tuple(str(i + 1) for i in range(len(table)))
     seen: dict[str, int] = {}
     for name, line in zip(table.text("id"), table.lines, strict=True):
         if name in seen:

@@ -47,7 +47,7 @@ def _rename(table: Table, columns: dict[str, str]) -> Table:
     back = {theirs: ours for ours, theirs in columns.items()}
     for theirs in back:
         table.text(theirs)
-    return Table(table.file, tuple(back.get(c, c) for c in table.header), table.rows, table.lines)
+    return Table(table.file, tuple(back.get(c, c) for c in table.header), table.columns, table.lines)
 
 
 def _known_columns(table: Table, own: tuple[str, ...]) -> None:

@@ -35,7 +35,7 @@ def rotations(
     given = model or OrientationModel()
     first, second = (_orientation(table, scales, given, second) for second in (False, True))
     if second is not None and first is None:
-        first = np.tile(np.eye(3), (len(table.rows), 1, 1))
+        first = np.tile(np.eye(3), (len(table), 1, 1))
     return first, first if second is None else second
 
 
@@ -66,7 +66,7 @@ def _orientation(table: Table, scales: Scales, model: OrientationModel, second: 
 
 
 def _vectors(table: Table, scales: Scales, names: list[str], second: bool) -> Floats:
-    n = len(table.rows)
+    n = len(table)
     cells = [table.numbers(c, blank=second) if c in table else np.zeros(n) for c in names]
     vectors = scales.angle(names[0]) * np.nan_to_num(np.column_stack(cells))
     return np.ascontiguousarray(Rotation.from_rotvec(vectors).as_matrix())

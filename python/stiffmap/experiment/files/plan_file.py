@@ -48,7 +48,7 @@ def load_plan(
     units = _units(head | own, table.file)
     model = ExperimentFile(machine=machine.name, quantity=quantity, units=units)  # type: ignore[arg-type]
     scales = Scales.of(model, table.file)
-    n = len(table.rows)
+    n = len(table)
     size = np.where([c.unit == "m" for c in AXIS_CHANNELS], noise or MICRO[quantity], angle_noise)
     sigma = np.tile(np.where([a in axes for a in AXES], size, np.nan), (n, 1))
     wrench = scales.wrench(list(WRENCH)) * columns.block(table, WRENCH, blank=False, missing=0.0)

@@ -6,13 +6,15 @@ import csv
 import math
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap.cells import Cells, packed, row_numbers
 from stiffmap.errors import FileError
 from stiffmap.files.schema.base import suggestion
 from stiffmap.number_text import number_in
@@ -27,26 +29,32 @@ class Table:
 
     file: str
     header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    lines: tuple[int, ...]
+    columns: tuple[Cells, ...]
+    lines: Sequence[int]
+
+    def __len__(self) -> int:
+        return len(self.lines)
 
     def __contains__(self, column: str) -> bool:
         return column in self.header
 
     def text(self, column: str) -> list[str]:
         """Cells of a column; raises `FileError` where there is none."""
+        return [unguarded(cell) for cell in self._cells(column)]
+
+    def _cells(self, column: str) -> Cells:
         if column not in self.header:
             near = suggestion(column, list(self.header))
             raise FileError(
                 f"missing column '{column}'{near}; found {', '.join(self.header)}", file=self.file
             )
-        i = self.header.index(column)
-        return [unguarded(row[i].strip()) for row in self.rows]
+        return self.columns[self.header.index(column)]
 
     def numbers(self, column: str, *, blank: bool = False) -> Floats:
         """A column as floats; with `blank`, empty cells are NaN (a value that was not read)."""
-        cells = self.text(column)
-        return np.array([self._number(c, column, n, blank) for c, n in zip(cells, self.lines, strict=True)])
+        return self._cells(column).numbers(
+            lambda cell, row: self._number(cell, column, self.lines[row], blank)
+        )
 
     def _number(self, cell: str, column: str, line: int, blank: bool) -> float:
         if blank and cell.lower() in ("", "nan", "na"):
@@ -67,23 +75,40 @@ class Table:
 
 def read_table(path: Path, expected: int | None = None) -> Table:
     """Cells of a CSV file with a header line and, where it is known, an expected number of rows; raises `FileError`."""
+    lines = row_numbers()
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             reader = csv.reader(stream)
-            numbered = [(reader.line_num, row) for row in reader if any(c.strip() for c in row)]
+            header = tuple(c.strip() for c in next((row for row in reader if _filled(row)), ()))
+            columns = packed(_rows(reader, header, lines, str(path)), len(header))
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise FileError(f"not a CSV file in UTF-8 ({error})", file=str(path)) from error
-    if len(numbered) < 2:
+    if not lines:
         raise FileError("expected a header line and at least one row", file=str(path))
-    header = tuple(c.strip() for c in numbered[0][1])
-    _check(header, numbered[1:], str(path))
     if expected is not None:
-        _whole(path, expected, len(numbered) - 1)
-    return Table(
-        str(path), header, tuple(tuple(row) for _, row in numbered[1:]), tuple(n for n, _ in numbered[1:])
-    )
+        _whole(path, expected, len(lines))
+    return Table(str(path), header, columns, lines)
+
+
+def _filled(row: list[str]) -> bool:
+    return any(c.strip() for c in row)
+
+
+def _rows(reader: Any, header: Sequence[str], lines: Any, file: str) -> Iterator[list[str]]:
+    """Rows with something in them, as long as the header; `lines` gathers their numbers."""
+    twice = sorted(c for c, times in Counter(header).items() if times > 1)
+    if twice:
+        raise FileError(f"column '{twice[0]}' occurs twice", file=file, line=1)
+    width = len(header)
+    for row in reader:
+        if not _filled(row):
+            continue
+        if len(row) != width:
+            raise FileError(f"expected {width} cells; found {len(row)}", file=file, line=reader.line_num)
+        lines.append(reader.line_num)
+        yield row
 
 
 def _whole(path: Path, expected: int, found: int) -> None:
@@ -98,12 +123,3 @@ def _whole(path: Path, expected: int, found: int) -> None:
             "or changed by hand (then correct or delete 'rows')",
             file=str(path),
         )
-
-
-def _check(header: Sequence[str], rows: Sequence[tuple[int, list[str]]], file: str) -> None:
-    twice = sorted(c for c, times in Counter(header).items() if times > 1)
-    if twice:
-        raise FileError(f"column '{twice[0]}' occurs twice", file=file, line=1)
-    for line, row in rows:
-        if len(row) != len(header):
-            raise FileError(f"expected {len(header)} cells; found {len(row)}", file=file, line=line)

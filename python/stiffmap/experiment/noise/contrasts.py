@@ -13,9 +13,17 @@ from stiffmap.experiment.noise.conditions import Conditions, Contrast
 
 
 def alike(t: Conditions) -> Iterator[Integers]:
-    """Conditions of each pose that differ by their load only."""
-    for key in np.unique(np.column_stack([t.group, t.state]), axis=0):
-        yield np.flatnonzero((t.group == key[0]) & (t.state == key[1]))
+    """Conditions of each pose that differ by their load only; where there is but one nothing can be contrasted."""
+    return (here for here in _grouped(t.group, t.state) if here.size > 1)
+
+
+def _grouped(*keys: Integers) -> Iterator[Integers]:
+    """Rows of each combination of keys, rising."""
+    order = np.lexsort(keys[::-1])
+    ends = np.zeros(order.size, dtype=bool)
+    for key in keys:
+        ends[1:] |= np.diff(key[order]) != 0
+    return iter(np.split(order, np.flatnonzero(ends)) if order.size else ())
 
 
 def _every(t: Conditions, rows: list[int], weights: list[float]) -> Iterator[Contrast]:
@@ -34,11 +42,13 @@ def linearity(t: Conditions) -> Iterator[Contrast]:
 
 def _lines(t: Conditions, here: Integers) -> Iterator[list[int]]:
     size = np.linalg.norm(t.wrench[here], axis=1)
-    loaded = here[size > 0]
-    direction = np.round(t.wrench[loaded] / np.linalg.norm(t.wrench[loaded], axis=1, keepdims=True), 6) + 0.0
-    for d in np.unique(direction, axis=0) if len(loaded) else []:
-        same = loaded[(direction == d).all(axis=1)]
-        yield sorted((int(i) for i in same), key=lambda i: float(np.linalg.norm(t.wrench[i])))
+    loaded, size = here[size > 0], size[size > 0]
+    direction = np.round(t.wrench[loaded] / size[:, None], 6) + 0.0
+    same: dict[tuple[float, ...], list[int]] = {}
+    for k, d in enumerate(direction.tolist()):
+        same.setdefault(tuple(d), []).append(k)
+    for _, ks in sorted(same.items()):
+        yield [int(loaded[k]) for k in sorted(ks, key=lambda k: float(size[k]))]
 
 
 def reversal(t: Conditions) -> Iterator[Contrast]:
@@ -89,10 +99,12 @@ def reciprocity(t: Conditions) -> Iterator[Contrast]:
 
 def hysteresis(t: Conditions) -> Iterator[Contrast]:
     """The same load on both branches."""
-    for g in np.unique(t.group):
-        here = np.flatnonzero((t.group == g) & ~t.unloading)
+    if not t.unloading.any():
+        return
+    for pose in _grouped(t.group):
+        here = pose[~t.unloading[pose]]
         known = {tuple(np.round(t.wrench[i], 6) + 0.0): int(i) for i in here}
-        for j in np.flatnonzero((t.group == g) & t.unloading):
+        for j in pose[t.unloading[pose]]:
             i = known.get(tuple(np.round(t.wrench[j], 6) + 0.0))
             if i is not None:
                 yield from _every(t, [i, int(j)], [1.0, -1.0])
