@@ -1,6 +1,6 @@
 """``experiment new`` and ``residual`` of a million rows: processor time and memory of each command.
 
-    python bench/million_rows.py --rows 1e6
+python bench/million_rows.py --rows 1e6
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ def write(path: Path, rows: int) -> None:
         for i in range(rows):
             p = i // 5
             at = f"{-60 + p % 120},{340 + (p // 120) % 100 + 1e-3 * (p // 12000):.3f}"
-            f.write(f"r{i},{at},0,{80 if p % 2 else -80},0,0,{rng.gauss(10, 1):.3f},{rng.gauss(5, 1):.3f},{i % 5 + 1}\n")
+            f.write(
+                f"r{i},{at},0,{80 if p % 2 else -80},0,0,{rng.gauss(10, 1):.3f},{rng.gauss(5, 1):.3f},{i % 5 + 1}\n"
+            )
 
 
 def run(words: list[str], folder: str) -> None:
@@ -30,10 +32,14 @@ def run(words: list[str], folder: str) -> None:
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     code = "import resource, sys\nfrom stiffmap.cli import main\ncode = main(sys.argv[1:])\n" \
            "print(f'{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6:.2f} GB', file=sys.stderr)\nsys.exit(code)"  # fmt: skip
-    done = subprocess.run([sys.executable, "-c", code, *words], cwd=folder, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words], cwd=folder, capture_output=True, text=True, check=False
+    )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    print(f"{' '.join(words[:2])}: {seconds:.1f} s of processor time, {done.stderr.strip()}, exit code {done.returncode}")
+    print(
+        f"{' '.join(words[:2])}: {seconds:.1f} s of processor time, {done.stderr.strip()}, exit code {done.returncode}"
+    )
 
 
 if __name__ == "__main__":
@@ -42,5 +48,20 @@ if __name__ == "__main__":
     count = int(parser.parse_args().rows)
     with tempfile.TemporaryDirectory() as place:
         write(Path(place) / "a.csv", count)
-        run(["experiment", "new", "a.csv", "--machine", "five-bar", "-o", "e", "--noise", "dx=1", "--noise", "dy=1"], place)
+        run(
+            [
+                "experiment",
+                "new",
+                "a.csv",
+                "--machine",
+                "five-bar",
+                "-o",
+                "e",
+                "--noise",
+                "dx=1",
+                "--noise",
+                "dy=1",
+            ],
+            place,
+        )
         run(["residual", "five-bar", "e"], place)

@@ -92,6 +92,12 @@ def whole_number(value: object, name: str, least: int, most: int | None = None, 
     return out
 
 
+def random_numbers(seed: object, *more: int) -> np.random.Generator:
+    """The generator of a seed, a whole number of 0 or more; StiffmapError for anything else."""
+    number = whole_number(seed, "seed", 0)
+    return np.random.default_rng([number, *more] if more else number)
+
+
 def trailing(values: ArrayLike, shape: tuple[int, ...], name: str, what: str) -> Floats:
     """Float array whose last axes have `shape`; StiffmapError otherwise."""
     out = real_array(values, name, what)

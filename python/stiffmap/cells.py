@@ -53,7 +53,10 @@ class Cells:
         if "_" in block or not block.isascii():
             return np.array([one(c, start + i) for i, c in enumerate(cells)])
         try:
-            out = np.array([float(c) if c else math.nan for c in cells])
+            filled = "" not in cells
+            out = np.array(
+                list(map(float, cells)) if filled else [float(c) if c else math.nan for c in cells]
+            )
         except ValueError:
             return np.array([one(c, start + i) for i, c in enumerate(cells)])
         for i in np.flatnonzero(~np.isfinite(out)):
@@ -73,6 +76,11 @@ def packed(rows: Iterable[Sequence[str]], width: int) -> tuple[Cells, ...]:
             column.blocks.append(text)
             column._count += len(block)
     return out
+
+
+def filled(row: Sequence[str]) -> bool:
+    """Whether anything stands in a row."""
+    return bool(row) and (bool(row[0].strip()) or any(c.strip() for c in row))
 
 
 def row_numbers() -> array[int]:

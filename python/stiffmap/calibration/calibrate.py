@@ -8,6 +8,7 @@ from os import PathLike
 
 import numpy as np
 
+from stiffmap.broadcasting import whole_number
 from stiffmap.calibration.calibrator import Calibrator
 from stiffmap.calibration.certificate import certified
 from stiffmap.calibration.conclude import conclude
@@ -58,6 +59,7 @@ def calibrate(
     Raises StiffmapError for files that cannot be used, poses out of reach, an unknown noise or group.
     docs/calibration.md tells the method.
     """
+    whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
     for name in exclude:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from stiffmap.broadcasting import random_numbers
 from stiffmap.cli.inputs import numbers
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment import load_experiment
@@ -105,7 +106,7 @@ def _loads(text: str, forces: Sequence[float], poses: int, seed: int) -> list[Fl
     every, number = make.load_set("axes", forces), int(text)
     if not 1 <= number <= len(every):
         raise StiffmapError(f"--loads: expected 1 to {len(every)} of these forces, got {number}")
-    rng = np.random.default_rng([seed, 1])
+    rng = random_numbers(seed, 1)
     return [every[rng.permutation(len(every))[:number]] for _ in range(poses)]
 
 

@@ -62,6 +62,10 @@ class CompiledMachine:
     def _plan(self) -> _core.FastPlan:
         box = self.description.workspace
         low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))
+        try:
+            _core.kernel_level()
+        except ValueError as error:  # the environment asks for instructions that there are not
+            raise StiffmapError(str(error)) from None
         return _core.FastPlan(self._mechanism, np.array(low), np.array(high), self._start_nodes)
 
     @cached_property

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, random_numbers
 from stiffmap.description import MachineDescription
 from stiffmap.design.editing import Editor
 from stiffmap.design.judging import values_of, violation
@@ -78,7 +78,7 @@ def robustness(design: Design, x: Floats, *, draws: int = DRAWS, seed: int = 0) 
         up, down = at(values + step), at(values - step)
         for n in names:
             slopes[n][i] = (up[n] - down[n]) / (2 * SHARE)
-    rng, rows, met = np.random.default_rng(seed), [], 0
+    rng, rows, met = random_numbers(seed), [], 0
     for _ in range(draws):
         row = at(values + u * rng.standard_normal(len(u)))
         rows.append([row[n] for n in names])

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffmap.broadcasting import Floats, thread_count
+from stiffmap.broadcasting import Floats, thread_count, whole_number
 from stiffmap.design.judging import IMPOSSIBLE, Judged, judge
 from stiffmap.design.problem import Design, load_design
 from stiffmap.design.store import Evaluations
@@ -109,7 +109,9 @@ def _searched(
     progress: Progress | None,
 ) -> ParetoSet:
     kept = Evaluations(problem, None if place is None else place / "evaluations.jsonl")
-    count = generations or problem.model.search.generations
+    count = problem.model.search.generations
+    if generations is not None:
+        count = whole_number(generations, "generations", 1)
     algorithm = _algorithm(problem, count)
     history: list[tuple[int, int, float]] = []
     seen: list[Floats] = []

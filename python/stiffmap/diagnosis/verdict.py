@@ -10,6 +10,7 @@ from os import PathLike
 import numpy as np
 from scipy.stats import chi2
 
+from stiffmap.broadcasting import whole_number
 from stiffmap.calibration import GROUPS, Tolerances, certified
 from stiffmap.diagnosis.candidates.candidates import check_kinds
 from stiffmap.diagnosis.clock import Clock, Progress
@@ -84,6 +85,7 @@ def diagnose(
     Raises StiffmapError for files that cannot be used, poses out of reach, and noise that is unknown.
     docs/diagnosis.md tells the method.
     """
+    whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
     clock = Clock.of(budget, progress)

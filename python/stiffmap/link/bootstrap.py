@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stiffmap.broadcasting import random_numbers
 from stiffmap.link.arrays import Bools, Floats, Ints
 from stiffmap.link.rigidfit import design_matrix
 
@@ -52,7 +53,7 @@ def block_bootstrap(
     right = np.zeros((count, len(displacements), 6))
     np.add.at(normal, label, np.einsum("kn,nia,nib->nkab", kept.astype(float), A, A))
     np.add.at(right, label, np.einsum("kn,nia,kni->nka", kept.astype(float), A, displacements))
-    rng = np.random.default_rng(seed)
+    rng = random_numbers(seed)
     times = rng.multinomial(count, np.full(count, 1 / count), size=samples).astype(float)
     M, b = np.einsum("sp,pkab->skab", times, normal), np.einsum("sp,pka->ska", times, right)
     solvable = np.linalg.cond(M).max(axis=1) < 1e8

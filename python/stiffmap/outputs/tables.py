@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from stiffmap.outputs.writing import writing
@@ -27,6 +28,10 @@ def unguarded(cell: str) -> str:
     return cell[1:] if cell.startswith("'") and RUN.match(cell) else cell
 
 
+def _counted(rows: Iterable[Sequence[Any]], count: Iterator[int]) -> Iterator[Sequence[Any]]:
+    return (row for row, _ in zip(rows, count, strict=False))
+
+
 def write_rows(
     path: str | os.PathLike[str],
     header: Sequence[str],
@@ -34,10 +39,9 @@ def write_rows(
     encoding: str = "utf-8",
 ) -> int:
     """Write a CSV file: a header and rows; returns their number. Raises FileError where it cannot be written."""
-    count = 0
+    count = itertools.count()
     with writing(path) as fresh, fresh.open("w", newline="", encoding=encoding) as stream:
         out = csv.writer(stream)
         out.writerow([guarded(c) for c in header])
-        for count, row in enumerate(rows, 1):  # noqa: B007 - the last one counts
-            out.writerow([guarded(c) if type(c) is str else c for c in row])
-    return count
+        out.writerows([guarded(c) if type(c) is str else c for c in row] for row in _counted(rows, count))
+    return next(count)

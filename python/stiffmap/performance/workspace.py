@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from stiffmap.broadcasting import Floats, real_array
+from stiffmap.broadcasting import Floats, random_numbers, real_array
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.cells import halved
@@ -106,7 +106,7 @@ def workspace_volume(
         machine, given, transmission, factors, length, ranges, joints, clearance, deflection, threads
     )
     ask = Inside(bounds, singularity)
-    rng = np.random.default_rng(seed)
+    rng = random_numbers(seed)
     axes = [i for i, name in enumerate("xyz") if name in machine.description.task]
     if not axes:
         raise StiffmapError(

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, random_numbers
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment
@@ -106,7 +106,7 @@ def design(
             f"rows: expected at most the {len(free)} candidates that can be reached, got {rows}"
         )
     picked = exchange(information.matrices, start, free, rows, value)
-    rng = np.random.default_rng(seed)
+    rng = random_numbers(seed)
     random = [
         start + information.matrices[rng.choice(free, rows, replace=False)].sum(axis=0) for _ in range(RANDOM)
     ]

@@ -8,13 +8,13 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
 from stiffmap.broadcasting import Floats
-from stiffmap.cells import BETWEEN, BLOCK, Cells, packed, row_numbers
+from stiffmap.cells import BETWEEN, BLOCK, Cells, filled, packed, row_numbers
 from stiffmap.errors import FileError
 from stiffmap.number_text import number_in
 from stiffmap.spreadsheet.workbook import workbook_lines
@@ -28,7 +28,8 @@ LONGEST_HEADER, MOST_COLUMNS = 300, 1000
 SEPARATORS = ";\t|,"
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+")
 """``1.000`` is a thousand in a table with decimal commas."""
-COMMA, POINT = re.compile(r"^[+-]?[\d.]*,\d+$", re.M), re.compile(r"^[+-]?\d*\.\d+$", re.M)
+COMMA = re.compile(r"^[ \t]*[+-]?[\d.]*,\d+[ \t]*$", re.M)
+POINT = re.compile(r"^[ \t]*[+-]?\d*\.\d+[ \t]*$", re.M)
 SAMPLE = 20_000
 """Lines by which the separator is found."""
 
@@ -43,6 +44,7 @@ class Sheet:
     lines: Sequence[int]
     """Line of each row in the file, from 1."""
     decimal_comma: bool
+    _read: dict[int, Floats] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def rows(self) -> Iterator[tuple[str, ...]]:
@@ -51,8 +53,10 @@ class Sheet:
 
     def numbers(self, column: int) -> Floats:
         """A column; NaN where nothing was read. FileError names the line of what is no number."""
-        cells = _with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
-        return cells.numbers(lambda cell, row: self._number(cell, column, self.lines[row]))
+        if column not in self._read:
+            cells = _with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
+            self._read[column] = cells.numbers(lambda cell, row: self._number(cell, column, self.lines[row]))
+        return self._read[column]
 
     def _number(self, cell: str, column: int, line: int) -> float:
         value = number(cell, False)
@@ -126,7 +130,7 @@ def read_sheet(path: Path, sheet: str | None = None) -> Sheet:
 
 def _kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
     """Lines with something in them that are no comments."""
-    return ((n, c) for n, c in lines if any(x.strip() for x in c) and not c[0].strip().startswith(COMMENTS))
+    return ((n, c) for n, c in lines if filled(c) and not c[0].strip().startswith(COMMENTS))
 
 
 def _even(rows: Iterable[tuple[int, list[str]]], width: int, numbers: Any) -> Iterator[list[str]]:
@@ -166,9 +170,14 @@ def _decimal_comma(rows: Iterable[list[str]]) -> bool:
     """Whether numbers have commas and none has a point."""
     commas = points = False
     while block := list(islice(rows, BLOCK)):
-        text = "\n".join(c.strip().replace("\n", " ") for row in block for c in row).replace("−", "-")
+        text = "\n".join(chain.from_iterable(block))
+        if text.count("\n") != sum(map(len, block)) - 1:
+            text = "\n".join(c.replace("\n", " ") for row in block for c in row)
+        text = _plain(text)
         commas = commas or ("," in text and COMMA.search(text) is not None)
-        points = points or ("." in text and any(not THOUSANDS.fullmatch(m[0]) for m in POINT.finditer(text)))
+        points = points or (
+            "." in text and any(not THOUSANDS.fullmatch(m[0].strip()) for m in POINT.finditer(text))
+        )
         if points:
             return False
     return commas

@@ -26,7 +26,11 @@ def read_urdf(path: Path, meshes: bool = True) -> UrdfModel:
         robot = xml.parse(path).getroot()
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=file) from None
-    except xml.ParseError as error:
+    except (
+        xml.ParseError,
+        LookupError,
+        ValueError,
+    ) as error:  # the latter two: an encoding that there is not
         raise FileError(f"not XML: {error}", file=file) from None
     if robot.tag != "robot":
         raise FileError(f"expected a URDF, whose root element is <robot>; found <{robot.tag}>", file=file)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stiffmap.broadcasting import random_numbers
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.study import Study
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -53,7 +54,7 @@ def _trial(study: Study, seed: int) -> Experiment:
         low, high = np.array(study.description.workspace)
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     middle = np.vstack([corners * 0.98 + 0.02 * (low + high) / 2, (low + high) / 2])
-    random = np.random.default_rng(seed).uniform(low, high, (15, 3))
+    random = random_numbers(seed).uniform(low, high, (15, 3))
     return _loaded(e, np.vstack([middle, random]))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stiffmap.broadcasting import random_numbers
 from stiffmap.diagnosis.candidates.stack import Stack
 from stiffmap.diagnosis.search.screen import Screen
 from stiffmap.experiment.experiment import Floats
@@ -27,7 +28,7 @@ def effective_number_of_trials(screen: Screen, seed: int, draws: int = DRAWS) ->
     """
     if not screen.rank.any():
         return 1.0
-    rng = np.random.default_rng(seed)
+    rng = random_numbers(seed)
     best = [
         screen.largest_minus_log_p(rng.standard_normal((screen.readings, 100)))
         for _ in range(max(1, draws // 100))
@@ -42,7 +43,7 @@ def on_enough_rows(problem: Problem, stack: Stack, columns: Floats | None, seed:
     e = problem.experiment
     at, _ = readings_of(e, problem.base)
     count = np.bincount(e.groups[at], minlength=int(e.groups.max()) + 1)
-    order = np.random.default_rng(seed).permutation(len(count))
+    order = random_numbers(seed).permutation(len(count))
     drawn = order[np.cumsum(count[order]) <= ENOUGH]
     rows = np.isin(e.groups, drawn)
     part = e.rows(rows)

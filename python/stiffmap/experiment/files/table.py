@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.cells import Cells, packed, row_numbers
+from stiffmap.cells import Cells, filled, packed, row_numbers
 from stiffmap.errors import FileError
 from stiffmap.files.schema.base import suggestion
 from stiffmap.number_text import number_in
@@ -79,7 +79,7 @@ def read_table(path: Path, expected: int | None = None) -> Table:
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             reader = csv.reader(stream)
-            header = tuple(c.strip() for c in next((row for row in reader if _filled(row)), ()))
+            header = tuple(c.strip() for c in next((row for row in reader if filled(row)), ()))
             columns = packed(_rows(reader, header, lines, str(path)), len(header))
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
@@ -92,10 +92,6 @@ def read_table(path: Path, expected: int | None = None) -> Table:
     return Table(str(path), header, columns, lines)
 
 
-def _filled(row: list[str]) -> bool:
-    return any(c.strip() for c in row)
-
-
 def _rows(reader: Any, header: Sequence[str], lines: Any, file: str) -> Iterator[list[str]]:
     """Rows with something in them, as long as the header; `lines` gathers their numbers."""
     twice = sorted(c for c, times in Counter(header).items() if times > 1)
@@ -103,7 +99,7 @@ def _rows(reader: Any, header: Sequence[str], lines: Any, file: str) -> Iterator
         raise FileError(f"column '{twice[0]}' occurs twice", file=file, line=1)
     width = len(header)
     for row in reader:
-        if not _filled(row):
+        if not filled(row):
             continue
         if len(row) != width:
             raise FileError(f"expected {width} cells; found {len(row)}", file=file, line=reader.line_num)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from stiffmap.broadcasting import random_numbers
 from stiffmap.experiment.experiment import Experiment, Integers
 
 FOLDS = 5
@@ -14,5 +13,5 @@ def folds(experiment: Experiment, seed: int) -> tuple[Integers, str]:
     if experiment.runs.max() > 0:
         return experiment.runs, "set-ups"
     number = int(experiment.groups.max()) + 1
-    label = np.random.default_rng(seed).permutation(number) % min(FOLDS, number)
+    label = random_numbers(seed).permutation(number) % min(FOLDS, number)
     return label[experiment.groups], "poses"

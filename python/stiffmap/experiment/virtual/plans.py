@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from stiffmap.broadcasting import random_numbers
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -23,7 +24,7 @@ MARGIN = 0.02
 def random_poses(machine: Machine, number: int, seed: int) -> Floats:
     """(number, 3) m, evenly distributed over the workspace box."""
     low, high = machine.workspace
-    return np.asarray(np.round(np.random.default_rng(seed).uniform(low, high, (number, 3)), 4))
+    return np.asarray(np.round(random_numbers(seed).uniform(low, high, (number, 3)), 4))
 
 
 def grid_poses(machine: Machine, counts: Sequence[int]) -> Floats:
@@ -127,7 +128,7 @@ def random_plan(
     noise
         One standard deviation of a reading, m; None: 3 µm for deflections, 8 µm for positions.
     """
-    rng = np.random.default_rng(seed)
+    rng = random_numbers(seed)
     low, high = machine.workspace
     where = np.round(rng.uniform(low, high, (poses, 3)), 4)
     every = load_set("axes", [0.25 * force, 0.625 * force, force])
@@ -160,7 +161,7 @@ def with_branches(plan: Experiment) -> Experiment:
 
 def shuffled(plan: Experiment, seed: int) -> Experiment:
     """The plan with its poses visited in random order: what drifts is then no trend in space."""
-    rank = np.random.default_rng(seed).permutation(int(plan.groups.max()) + 1)
+    rank = random_numbers(seed).permutation(int(plan.groups.max()) + 1)
     index = np.argsort(rank[plan.groups], kind="stable")
     moved = plan.rows(index.astype(np.intp))
     ids = tuple(str(i + 1) for i in range(len(plan)))
@@ -181,7 +182,7 @@ def with_setups(plan: Experiment, number: int) -> Experiment:
 
 def with_approach(plan: Experiment, seed: int) -> Experiment:
     """Each pose reached along x, y or z, forwards or backwards."""
-    rng = np.random.default_rng(seed)
+    rng = random_numbers(seed)
     way = np.vstack([np.eye(3), -np.eye(3)])[rng.integers(0, 6, int(plan.groups.max()) + 1)]
     return replace(plan, approach=way[plan.groups])
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from stiffmap.broadcasting import random_numbers
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.comparison.limitations import refuse_unreachable
@@ -43,7 +44,7 @@ def simulate(
     exact = predictor(tuple(effects))
     plan = predictor.experiment
     refuse_unreachable(plan, exact)
-    rng = np.random.default_rng(seed)
+    rng = random_numbers(seed)
     reading = exact + np.nan_to_num(plan.sigma) * rng.standard_normal(exact.shape)
     reading = reading + _zeros(plan, rng) + _unknown(plan, predictor(), rng)
     wild = rng.random(len(plan)) < outliers
