@@ -6,6 +6,7 @@
 #include "approach.hpp"
 #include "arm.hpp"
 #include "frames.hpp"
+#include "nearest.hpp"
 #include "normal_equations.hpp"
 #include "planar.hpp"
 #include "reach.hpp"
@@ -178,6 +179,7 @@ struct Closing {
 
   M close_leg(const LegClosure& leg, int chain, const Frame& start, const Frame& target, M usable) {
     const std::int32_t* unknown = P.unknowns + leg.first_unknown;
+    if (P.nearness) return close_nearest(leg, chain, start, target, usable);
     M done{}, failed = ~usable;
     V previous = splat(1);
     NormalEquations equations;
@@ -201,6 +203,32 @@ struct Closing {
       }
       // What the step leaves: the equations' misfit and terms of its square.
       done |= active & (norm < last_step) & (missing < closed * closed * P.length * P.length);
+      if (all(done | failed)) break;
+      previous = select(active, norm, previous);
+    }
+    return done;
+  }
+
+  /// The same of a leg with more joints than its end commands: the nearest to home (F25).
+  [[gnu::noinline]] M close_nearest(const LegClosure& leg, int chain, const Frame& start, const Frame& target,
+                                    M usable) {
+    M done{}, failed = ~usable;
+    V previous = splat(1);
+    Nearest nearest(P, s, leg);
+    for (int step = 0; step < most_closure_steps; ++step) {
+      V6 errors[most_unknowns];
+      const V error = closure_errors(leg, chain, start, target, errors);
+      failed |= ~done & ~(error < 1e100);
+      if (all(done | failed)) break;
+      nearest.place(errors[0], s.branches[chain].end.p);
+      if (step == 0) failed |= ~done & ~nearest.solve(false);
+      failed |= ~done & ~nearest.solve(true);
+      const V norm = nearest.norm();
+      failed |= ~done & ~(norm < trusted_step);
+      if (step > 0) failed |= ~done & ~((norm <= 0.25 * previous) | (norm < 1e-9));
+      const M active = ~done & ~failed;
+      nearest.move(active);
+      done |= active & (norm < last_step);
       if (all(done | failed)) break;
       previous = select(active, norm, previous);
     }

@@ -183,6 +183,7 @@ struct Program {
   const std::int32_t* serial;  ///< arm of joints alone: its joints that yield and its bodies, from the base
   const std::int32_t* unknowns;
   const std::int32_t* envelope;  ///< per unknown: the first one of its leg that shares an equation with one up to it
+  const double* nearness;        ///< per unknown: weight of its distance from home (F25); null: a pose decides all
   const PlanarLeg* planar;       ///< one per leg, or null: the closure starts from the grid
   const ArmLeg* arm;             ///< of the only leg, or null
   const double* grid;            ///< closure starts: nodes x row of unknowns of all legs, NaN where unreachable

@@ -88,6 +88,7 @@ struct Starts {
       if (!stencil(k, inside, 2, axis[k])) return nullptr;
     }
     const std::int64_t stride[3] = {1, P.grid_n[0], static_cast<std::int64_t>(P.grid_n[0]) * P.grid_n[1]};
+    if (P.grid_row == 0) return nullptr;
     double best = 1e300;
     const double* found = nullptr;
     for (int corner = 0; corner < 8; ++corner) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <random>
 
+#include "stiffmap/redundancy.hpp"
 #include "unloaded.hpp"
 
 namespace stiffmap {
@@ -143,6 +144,7 @@ class Assembly {
     }
     if (known_) found.turned = known_->turned;
     let_go_of_configurations(m_, found.turned);
+    find_redundancy(m_);
     return std::move(m_);
   }
 

@@ -35,8 +35,17 @@ void select_unknowns(const Mechanism& m, bool actuators, ClosureWorkspace& ws);
 /// Residual, angles as lengths; returns its largest entry relative to the length.
 double residual(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws);
 
+/// Fills ws.A: slopes of the residual by the unknowns, both as lengths, at the frames of the last residual.
+void equations(const Mechanism& m, const Target& target, ClosureWorkspace& ws);
+
 /// Gauss-Newton step of least norm over the unknowns, at the frames of the last residual.
 double newton_step(const Mechanism& m, const Target& target, ClosureWorkspace& ws);
+
+/// Of a redundant machine (theory C11), with ws.wanted as what to stay near to: multipliers that fit x best, Newton's
+/// step for the nearest closed configuration, and whether x is nearer than all about it.
+void estimate_multipliers(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws);
+double nearest_step(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws);
+bool is_nearest(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws);
 
 /// Newton to the target, or to the nearest configuration where equations that contradict each other
 /// leave no more than the input tolerance (theory C9).

@@ -17,6 +17,7 @@ constexpr double shortest_leap = 1e-3;  // of the way from home
 }  // namespace
 
 void select_unknowns(const Mechanism& m, bool actuators, ClosureWorkspace& ws) {
+  ws.redundant = actuators && m.redundancy > 0;
   ws.unknown.clear();
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
@@ -40,7 +41,7 @@ double residual(const Mechanism& m, const VecX& x, const Target& target, Closure
   return ws.e.cwiseAbs().maxCoeff() / m.length;
 }
 
-double newton_step(const Mechanism& m, const Target& target, ClosureWorkspace& ws) {
+void equations(const Mechanism& m, const Target& target, ClosureWorkspace& ws) {
   ws.J.setZero();
   if (target.tip) {
     add_jacobian(m, ws.frames, m.tip, ws.frames.at(m.tip).p, 1.0, ws.J.topRows<6>());
@@ -54,13 +55,17 @@ double newton_step(const Mechanism& m, const Target& target, ClosureWorkspace& w
   }
   const Index n = static_cast<Index>(ws.unknown.size());
   ws.A.resize(ws.J.rows(), n);
-  if (n == 0) return 0;  // no joint at all: a structure
   for (Index k = 0; k < n; ++k) {
     const Index j = ws.unknown[at(k)];
     ws.A.col(k) = ws.J.col(j) / m.unit(j);
   }
-  for (Index i = 0; i < ws.A.rows(); ++i)
-    if (i % 6 >= 3) ws.A.row(i) *= m.length;
+  scale_angles(m, ws.A);
+}
+
+double newton_step(const Mechanism& m, const Target& target, ClosureWorkspace& ws) {
+  const Index n = static_cast<Index>(ws.unknown.size());
+  equations(m, target, ws);
+  if (n == 0) return 0;  // no joint at all: a structure
   ws.qr.compute(ws.A, rank_threshold);
   ws.right = -ws.e;
   ws.qr.solve(ws.right, ws.shortest);
@@ -77,10 +82,12 @@ static void apply(ClosureWorkspace& ws, VecX& x, double factor) {
 bool close(const Mechanism& m, const Target& target, Pace pace, ClosureWorkspace& ws, VecX& x, int& iterations) {
   const int most = pace == Pace::contracting ? 12 : 120;
   double previous = 0, error = residual(m, x, target, ws);
+  const bool nearest = ws.redundant && target.tip;
+  if (nearest && std::isfinite(error)) estimate_multipliers(m, x, target, ws);
   for (int k = 0; k < most; ++k) {
     if (!std::isfinite(error)) return false;
     ++iterations;
-    const double norm = newton_step(m, target, ws);
+    const double norm = nearest ? nearest_step(m, x, target, ws) : newton_step(m, target, ws);
     if (pace == Pace::contracting && norm > 0.3) return false;
     if (pace == Pace::contracting && k > 0 && norm > contraction * previous && norm > 1e-9) return false;
     apply(ws, x, norm > 0.1 ? 0.1 / norm : 1.0);
@@ -137,6 +144,7 @@ bool continuation(const Mechanism& m, const Target& target, Set&& set, ClosureWo
 
 void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace& ws, const VecX& x,
             ClosureResult& out) {
+  if (ok && ws.redundant && target.tip && !is_nearest(m, x, target, ws)) out.flags |= flag::branch_unverified;
   const double error = residual(m, x, target, ws);
   out.residual = error * m.length;
   out.exact = error < round_off;
@@ -162,7 +170,8 @@ ClosureWorkspace::ClosureWorkspace(const Mechanism& m)
       step(VecX::Zero(m.size())),
       x(VecX::Zero(m.size())),
       trial(VecX::Zero(m.size())),
-      start(VecX::Zero(m.size())) {}
+      start(VecX::Zero(m.size())),
+      wanted(m.home_coordinates) {}
 
 ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x) {
   return inverse_closure(m, pose, ws, x, m.home_coordinates, m.home);
@@ -173,6 +182,7 @@ ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorks
   ClosureResult out;
   if (!pose.p.allFinite() || !pose.R.allFinite()) return out;
   select_unknowns(m, true, ws);
+  ws.wanted = m.home_coordinates;
   x = from;
   Pose way;
   const Target target{&way, m.task};
@@ -253,6 +263,7 @@ ClosureResult branch_closure(const Mechanism& m, const Pose& pose, ClosureWorksp
   ClosureResult out;
   if (!pose.p.allFinite() || !pose.R.allFinite() || !from.allFinite()) return out;
   const VecX start = joints_only(m, from);
+  ws.wanted = start;
   x = start;
   select_unknowns(m, false, ws);
   Pose way;

@@ -117,7 +117,12 @@ void drive_dynamics(const Mechanism& m, const Inertias& inertias, const VecX& x,
   // Rates of the drives from the tip's twist, then of everything.
   Vec6 v = in.twist;
   mask(m, R, v);
-  solver.solve(v, out.rate);
+  if (in.rate.size() > 0) {
+    out.rate = in.rate;
+  } else {
+    solver.solve(v, out.rate);
+    out.rate = motion.sharing * out.rate;
+  }
   out.misfit = v.norm() > 0 ? (J * out.rate - v).norm() / v.norm() : 0;
   const VecX rate = motion.rates * out.rate;
 
@@ -130,12 +135,22 @@ void drive_dynamics(const Mechanism& m, const Inertias& inertias, const VecX& x,
   Vec6 a;
   a << in.twist_rate.head<3>() - moved[at(m.tip)].a, in.twist_rate.tail<3>() - moved[at(m.tip)].b;
   mask(m, R, a);
-  solver.solve(a, out.acceleration);
+  VecX drives_follow(out.rate.size());
+  for (std::size_t d = 0; d < m.drives.size(); ++d)
+    drives_follow[static_cast<Index>(d)] = follow(m.drives[d].coordinate, 0);
+  VecX own;  // acceleration of the drives beyond what closes the loops
+  if (in.rate.size() > 0) {
+    own = in.acceleration - drives_follow;
+  } else {
+    solver.solve(a, own);
+    own = motion.sharing * own;
+  }
+  out.acceleration = drives_follow + own;
   Vec6 wanted = in.twist_rate;
   mask(m, R, wanted);
   const double size = wanted.norm() + v.squaredNorm() / m.length;
-  if (size > 0) out.misfit = std::max(out.misfit, (J * out.acceleration - a).norm() / size);
-  moved = move(m, frames, rate, follow.col(0) + motion.rates * out.acceleration);
+  if (size > 0) out.misfit = std::max(out.misfit, (J * own - a).norm() / size);
+  moved = move(m, frames, rate, follow.col(0) + motion.rates * own);
 
   VecX force = VecX::Zero(m.size());
   out.kinetic = 0;

@@ -29,6 +29,7 @@ bool left_inverse(const MatX& A, MatX& C) {
 }  // namespace
 
 std::string Encloser::missing(const Mechanism& m) {
+  if (m.redundancy > 0) return "a pose leaves some drives open";
   int turned = 0;
   for (std::size_t i = 3; i < 6; ++i) turned += m.task[i];
   return turned == 0 || turned == 3 ? "" : "some rotations of the task are open";

@@ -197,6 +197,18 @@ void link(const Mechanism& m, FastPlanData& d) {
   for (const Op& op : d.ops) p.parallel |= op.kind == OpKind::block && op.count > 1;
 }
 
+/// What a redundant machine's closure stays near to; false where the kernels close it in no lane: a leg with loops, or
+/// with many joints.
+bool link_nearness(const Mechanism& m, FastPlanData& d) {
+  constexpr int most_joints = 16;  // as nearest.hpp of the kernels
+  if (d.program.closes != 1) return false;
+  for (const LegClosure& leg : d.legs)
+    if (leg.equations != 1 || leg.unknowns > most_joints) return false;
+  for (const std::int32_t j : d.unknowns) d.nearness.push_back(m.nearness[j]);
+  d.program.nearness = d.nearness.data();
+  return true;
+}
+
 /// The program of what hangs: all numbers are those of `d.program`, which is complete.
 void link_hanging(FastPlanData& d) {
   Program& p = d.program;
@@ -248,6 +260,8 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   for (int i = 0; i < 9; ++i) p.home_R[i] = m.home.R(i % 3, i / 3);
   p.open_task = m.task != full_task;
   p.closes = leg_by_leg && (box || p.planar) ? 1 : whole ? 2 : 0;
+  if (p.unknown_count == 0) p.closes = 0;  // a structure stands at home alone
+  if (m.redundancy > 0 && !link_nearness(m, *data_)) p.closes = 0;
   if (p.closes && !p.planar) place_grid(m, low, high, grid_nodes, *data_);
   if (heavy_spins_ && !p.deficient && let_spins_hang(m, spins, *data_)) link_hanging(*data_);
 }

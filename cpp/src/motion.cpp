@@ -8,6 +8,7 @@ namespace stiffmap {
 namespace {
 
 constexpr double sound_pivot = 1e-8;  // of the normal matrix: below it, the rank is revealed
+constexpr double apart = 1e-7;        // loop velocity per rate of the drives, below which they go together
 
 }  // namespace
 
@@ -110,31 +111,84 @@ MatX LoopRates::solve_scaled(const MatX& e) const {
 
 void LoopRates::solve(const Mechanism& m, const MatX& e, Eigen::Ref<MatX> out) const {
   out.setZero();
-  if (passive_.empty()) return;
   MatX scaled = e;
   scale_angles(m, scaled);
-  const MatX x = solve_scaled(scaled);
+  MatX x = MatX::Zero(A_.cols(), e.cols()), left = scaled;
+  if (!passive_.empty()) {
+    x = solve_scaled(scaled);
+    left -= product(x);
+  }
+  if (!m.drives.empty() && left.norm() > apart * scaled.norm()) {  // drives that go together move along
+    const MatX B = driven(m);
+    MatX open = B, y;
+    if (!passive_.empty()) open += product(solve_scaled(-B));
+    Orthogonal rates;
+    rates.compute(open, apart);
+    rates.solve(left, y);
+    if (!passive_.empty()) x = solve_scaled(scaled - B * y);
+    for (std::size_t d = 0; d < m.drives.size(); ++d) {
+      const Index j = m.drives[d].coordinate;
+      out.row(j) = y.row(static_cast<Index>(d)) / m.unit(j);
+    }
+  }
   for (std::size_t k = 0; k < passive_.size(); ++k)
     out.row(passive_[k]) = x.row(static_cast<Index>(k)) / m.unit(passive_[k]);
 }
 
-void LoopRates::motion(const Mechanism& m, const Frames& frames, Motion& out) const {
+/// Rates y of the drives (angles as lengths) go together where open y = 0, so that y = V v. By the weights W the
+/// nearest to any are V (V'WV)^-1 V'W (theory D10).
+void LoopRates::share(const Mechanism& m, const MatX& open, const VecX& weights, Motion& out) const {
+  const Index drives = open.cols();
+  out.together = drives;
+  out.sharing.setIdentity(drives, drives);
+  if (drives == 0 || open.rows() == 0 || open.cwiseAbs().maxCoeff() < apart) return;
+  const Singular parts = singular_vectors(open);
+  out.together = drives - (parts.values.array() > apart).count();
+  out.sharing.setZero();
+  if (out.together == 0) return;
+  VecX W(drives);
+  for (Index d = 0; d < drives; ++d) {
+    const double unit = m.unit(m.drives[at(d)].coordinate);
+    W[d] = weights.size() ? weights[d] / (unit * unit) : 1.0;
+  }
+  const MatX V = parts.V.rightCols(out.together), VW = V.transpose() * W.asDiagonal();
+  MatX inner;
+  Lu lu(out.together);
+  lu.compute(VW * V);
+  lu.solve(VW, inner);
+  out.sharing.noalias() = V * inner;
+  for (Index d = 0; d < drives; ++d) {
+    const double unit = m.unit(m.drives[at(d)].coordinate);
+    out.sharing.row(d) /= unit;
+    out.sharing.col(d) *= unit;
+  }
+}
+
+/// The loops' columns of the drives, angles as lengths.
+MatX LoopRates::driven(const Mechanism& m) const {
   const Index drives = static_cast<Index>(m.drives.size());
-  out.rates.setZero(m.size(), drives);
-  MatX B(m.closures(), drives);
+  MatX B(J_.rows(), drives);
   for (Index d = 0; d < drives; ++d) {
     const Index j = m.drives[at(d)].coordinate;
-    B.col(d) = J_.col(j);
-    out.rates(j, d) = 1;
+    B.col(d) = J_.col(j) / m.unit(j);
   }
-  out.misfit = 0;
-  if (!passive_.empty()) {
-    const MatX x = solve_scaled(-B);
-    const double size = std::max(B.cwiseAbs().maxCoeff(), 1e-300);
-    out.misfit = (product(x) + B).cwiseAbs().maxCoeff() / size;
+  return B;
+}
+
+void LoopRates::motion(const Mechanism& m, const Frames& frames, Motion& out, const VecX& weights) const {
+  const Index drives = static_cast<Index>(m.drives.size());
+  out.rates.setZero(m.size(), drives);
+  const MatX B = driven(m);
+  if (passive_.empty()) {
+    share(m, B, weights, out);
+  } else {
+    MatX x = solve_scaled(-B);
+    share(m, B + product(x), weights, out);
+    for (Index d = 0; d < drives; ++d) x.col(d) *= m.unit(m.drives[at(d)].coordinate);
     for (std::size_t k = 0; k < passive_.size(); ++k)
-      out.rates.row(passive_[k]) = x.row(static_cast<Index>(k)) / m.unit(passive_[k]);
+      out.rates.row(passive_[k]) = x.row(static_cast<Index>(k)) / m.unit(passive_[k]) * out.sharing;
   }
+  for (Index d = 0; d < drives; ++d) out.rates.row(m.drives[at(d)].coordinate) = out.sharing.row(d);
   out.J.setZero(6, drives);
   for (Index j : tree_.tip()) out.J.noalias() += column(m, frames, j, frames.at(m.tip).p) * out.rates.row(j);
   out.pivot = pivot_;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "closing.hpp"
+
 namespace stiffmap {
 namespace {
 
@@ -93,10 +95,12 @@ void PoseCloser::normal(const Mechanism& m, const Pose& pose) {
 
 /// Undamped and trusted only while its steps shrink fast, so that the answer continues the start.
 bool PoseCloser::newton(const Mechanism& m, const Pose& pose, VecX& x) {
+  if (m.redundancy > 0) return close_nearest(m, pose, x);
   double error = residual(m, pose, x), previous = 0;
   for (int k = 0; k < 8; ++k) {
     if (!std::isfinite(error)) return false;
     if (error < closed) return true;
+    if (unit_.size() == 0) return false;
     normal(m, pose);
     if (!cholesky_.compute(N_)) return false;
     VecX step;
@@ -112,9 +116,17 @@ bool PoseCloser::newton(const Mechanism& m, const Pose& pose, VecX& x) {
   return error < closed;
 }
 
+bool PoseCloser::close_nearest(const Mechanism& m, const Pose& pose, VecX& x) {
+  closing::select_unknowns(m, true, ws_);
+  const closing::Target target{&pose, m.task};
+  int iterations = 0;
+  const bool ok = closing::close(m, target, closing::Pace::contracting, ws_, x, iterations);
+  return ok && residual(m, pose, x) < closed;
+}
+
 double PoseCloser::pivot(const Mechanism& m, const Pose& pose) {
   normal(m, pose);
-  if (!cholesky_.compute(N_)) return 0;
+  if (unit_.size() == 0 || !cholesky_.compute(N_)) return 0;
   const auto pivots = cholesky_.pivots();
   return pivots.minCoeff() / pivots.maxCoeff();
 }

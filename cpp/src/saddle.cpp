@@ -122,6 +122,11 @@ void SaddleSystem::assemble(const Mechanism& m, const Linearization& lin) {
 
 void SaddleSystem::factorize() {
   lu_.compute(A_);
+  if (A_.size() == 0) {  // a rigid machine without coordinates
+    sign_ = 1;
+    regular_ = well_conditioned_ = true;
+    return;
+  }
   const auto pivots = lu_.pivots();
   double lowest = std::abs(pivots[0]), highest = lowest;
   sign_ = lu_.exchanges();

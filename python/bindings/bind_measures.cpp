@@ -32,21 +32,32 @@ Inertias inertias_of(const Mechanism& m, const Array& values) {
   return out;
 }
 
+/// Weights of the drives: one each, or none.
+VecX drive_weights(const Mechanism& m, const Array& values) {
+  const py::ssize_t drives = static_cast<py::ssize_t>(m.drives.size());
+  if (count_of(values) == 0) return {};
+  return Eigen::Map<const VecX>(data(values, {drives}, "weights"), drives);
+}
+
 /// Coordinates, drive Jacobian and, where wanted, the rates of all coordinates. `start`: coordinates near
 /// the answer (NaN: none known), or no rows. `only`: poses are continued from their starts and nowhere else.
-py::dict kinematics(const Mechanism& m, const Array& position, const Array& rotation, const Array& start, bool rates,
-                    bool patient, bool only, int threads) {
+py::dict kinematics(const Mechanism& m, const Array& position, const Array& rotation, const Array& start,
+                    const Array& weights, bool rates, bool patient, bool only, int threads) {
   const py::ssize_t n = count_of(position), size = m.size(), drives = static_cast<py::ssize_t>(m.drives.size());
   const double *p = data(position, {n, 3}, "position"), *R = data(rotation, {n, 3, 3}, "rotation");
   const double* x0 = count_of(start) ? data(start, {n, size}, "start") : nullptr;
   auto x_out = unknown({n, size}), J_out = unknown({n, 6, drives}), free_out = unknown({n, 6}), pivot = unknown({n});
   auto tip_out = unknown({n, 3}), turned = unknown({n, 3, 3}), rates_out = unknown({rates ? n : 0, size, drives});
-  auto misfit = unknown({n});
+  auto sharing = unknown({n, drives, drives});
+  const VecX shares = drive_weights(m, weights);
+  py::array_t<std::int32_t> together(n);
+  std::fill_n(together.mutable_data(), n, static_cast<std::int32_t>(drives));
+  std::int32_t* const tos = together.mutable_data();
   py::array_t<std::uint8_t> status(n);
   py::array_t<std::uint32_t> flags(n);
   double *xs = x_out.mutable_data(), *Js = J_out.mutable_data(), *fs = free_out.mutable_data(),
          *ps = pivot.mutable_data(), *ts = tip_out.mutable_data(), *Rs = turned.mutable_data(),
-         *gs = rates_out.mutable_data(), *ms = misfit.mutable_data();
+         *gs = rates_out.mutable_data(), *ms = sharing.mutable_data();
   std::uint8_t* states = status.mutable_data();
   std::uint32_t* bits = flags.mutable_data();
   {
@@ -65,12 +76,13 @@ py::dict kinematics(const Mechanism& m, const Array& position, const Array& rota
         bits[i] = r.flags;
         if (r.status != Status::converged) continue;
         loops.factorise(m, closer.frames());
-        loops.motion(m, closer.frames(), motion);
+        loops.motion(m, closer.frames(), motion, shares);
         Eigen::Map<VecX>(xs + size * i, size) = x;
         Eigen::Map<Vec3>(ts + 3 * i) = r.tip.p;
         Eigen::Map<Row3>(Rs + 9 * i) = r.tip.R;
         ps[i] = motion.pivot;
-        ms[i] = motion.misfit;
+        Eigen::Map<RowX>(ms + drives * drives * i, drives, drives) = motion.sharing;
+        tos[i] = static_cast<std::int32_t>(motion.together);
         Eigen::Map<Vec6>(fs + 6 * i) = motion.free_twist;
         if (!motion.free_twist.hasNaN()) {
           states[i] = static_cast<std::uint8_t>(Status::singular);
@@ -90,7 +102,8 @@ py::dict kinematics(const Mechanism& m, const Array& position, const Array& rota
   out["rates"] = rates_out;
   out["free_twist"] = free_out;
   out["pivot"] = pivot;
-  out["misfit"] = misfit;
+  out["sharing"] = sharing;
+  out["together"] = together;
   out["status"] = status;
   out["flags"] = flags;
   return out;
@@ -156,13 +169,17 @@ py::dict enclose(const Mechanism& m, const Array& centre, const Array& half, con
   return out;
 }
 
-/// Drive efforts at closed coordinates and tip motions.
+/// Drive efforts at closed coordinates and tip motions; rates and accelerations of the drives: as many rows, or none.
 py::dict dynamics(const Mechanism& m, const Array& inertias, const Array& coordinates, const Array& twist,
-                  const Array& twist_rate, const Array& wrench, const Array& gravity, int threads) {
+                  const Array& twist_rate, const Array& wrench, const Array& gravity, const Array& rates,
+                  const Array& accelerations, const Array& weights, int threads) {
   const py::ssize_t n = count_of(coordinates), size = m.size(), drives = static_cast<py::ssize_t>(m.drives.size());
   const double *x = data(coordinates, {n, size}, "coordinates"), *v = data(twist, {n, 6}, "twist"),
                *a = data(twist_rate, {n, 6}, "twist_rate"), *w = data(wrench, {n, 6}, "wrench");
   const Vec3 g = Eigen::Map<const Vec3>(data(gravity, {3}, "gravity"));
+  const double *given = count_of(rates) ? data(rates, {n, drives}, "rates") : nullptr,
+               *given_too = given ? data(accelerations, {n, drives}, "accelerations") : nullptr;
+  const VecX shares = drive_weights(m, weights);
   const Inertias I = inertias_of(m, inertias);
   auto effort = unknown({n, drives}), rate = unknown({n, drives}), acceleration = unknown({n, drives}),
        mass = unknown({n, drives, drives}), kinetic = unknown({n}), potential = unknown({n}), misfit = unknown({n});
@@ -181,10 +198,16 @@ py::dict dynamics(const Mechanism& m, const Array& inertias, const Array& coordi
         if (!at.allFinite()) continue;
         forward(m, Geometry::nominal, at, frames);
         loops.factorise(m, frames);
-        loops.motion(m, frames, motion);
+        loops.motion(m, frames, motion, shares);
         if (!motion.free_twist.hasNaN()) continue;
-        const DynamicsInput in{Eigen::Map<const Vec6>(v + 6 * i), Eigen::Map<const Vec6>(a + 6 * i),
-                               Eigen::Map<const Vec6>(w + 6 * i), g};
+        DynamicsInput in{Eigen::Map<const Vec6>(v + 6 * i),
+                         Eigen::Map<const Vec6>(a + 6 * i),
+                         Eigen::Map<const Vec6>(w + 6 * i),
+                         g,
+                         {},
+                         {}};
+        if (given) in.rate = Eigen::Map<const VecX>(given + drives * i, drives);
+        if (given) in.acceleration = Eigen::Map<const VecX>(given_too + drives * i, drives);
         drive_dynamics(m, I, at, frames, loops, motion, in, r);
         Eigen::Map<VecX>(es + drives * i, drives) = r.effort;
         Eigen::Map<VecX>(rs + drives * i, drives) = r.rate;
@@ -268,13 +291,14 @@ void bind_measures(py::module_& m) {
                                for (const Coordinate& c : k.coordinates) out.emplace_back(c.lower, c.upper);
                                return out;
                              })
-      .def("kinematics", &kinematics, "position"_a, "rotation"_a, "start"_a, "rates"_a, "patient"_a, "only"_a,
-           "threads"_a)
+      .def("kinematics", &kinematics, "position"_a, "rotation"_a, "start"_a, "weights"_a, "rates"_a, "patient"_a,
+           "only"_a, "threads"_a)
+      .def_readonly("redundancy", &Mechanism::redundancy)
       .def_property_readonly("not_enclosed", &Encloser::missing)
       .def("enclose", &enclose, "centre"_a, "half"_a, "axes"_a, "rotation"_a, "start"_a, "slopes"_a, "watched"_a,
            "threads"_a)
       .def("dynamics", &dynamics, "inertias"_a, "coordinates"_a, "twist"_a, "twist_rate"_a, "wrench"_a, "gravity"_a,
-           "threads"_a)
+           "rates"_a, "accelerations"_a, "weights"_a, "threads"_a)
       .def("modes", &modes, "inertias"_a, "position"_a, "rotation"_a, "wrench"_a, "gravity"_a, "count"_a, "threads"_a);
 }
 

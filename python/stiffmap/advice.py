@@ -34,7 +34,7 @@ def advice(machine: Machine, path: str | PathLike[str]) -> list[str]:
         *_freedoms(machine),
         *_reach(machine),
         *_limits(machine),
-        *(_rigid(machine) or tried(machine).findings),
+        *_trial(machine),
         *_numbers(machine, path),
         *_rams(machine, path),
     ]
@@ -102,10 +102,14 @@ def _limits(machine: Machine) -> Iterator[str]:
             yield f"{name}: home lies {'outside' if not 0 <= share <= 1 else 'at the end'} of its range"
 
 
-def _rigid(machine: Machine) -> list[str]:
-    elements = [e for _, e in all_elements(machine.description)]
+def _trial(machine: Machine) -> list[str]:
+    trial = tried(machine)
+    description = machine.description
+    elements = [e for _, e in all_elements(description)]
     elastic = any(isinstance(e, Spring) or (isinstance(e, Joint) and e.law is not None) for e in elements)
-    return [] if elastic else ["the machine is rigid: no spring and no drive yields, so nothing deflects"]
+    if trial.stiffness is not None or elastic or description.external_springs:
+        return trial.findings
+    return ["the machine is rigid: no spring and no drive yields, so nothing deflects"]
 
 
 def _numbers(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:

@@ -6,6 +6,7 @@ truth values, dates, text, None.
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
 from decimal import Decimal
@@ -137,7 +138,7 @@ def batch(*shapes: tuple[int, ...]) -> tuple[int, ...]:
 
 def rows(values: Floats, shape: tuple[int, ...], tail: tuple[int, ...]) -> Floats:
     """C-contiguous copy of shape (batch size, *tail)."""
-    return np.ascontiguousarray(np.broadcast_to(values, shape + tail)).reshape((-1,) + tail)
+    return np.ascontiguousarray(np.broadcast_to(values, shape + tail)).reshape((math.prod(shape),) + tail)
 
 
 def rows_or_one(values: Floats, shape: tuple[int, ...], tail: tuple[int, ...]) -> Floats:

@@ -16,6 +16,10 @@ struct ClosureWorkspace {
   VecX e, step, right, shortest, x, trial, start;
   std::vector<Index> unknown;
   Orthogonal qr;
+  bool redundant = false;  ///< the unknowns have motions that a commanded tip leaves open (theory C11)
+  VecX wanted;             ///< coordinates to stay near to
+  VecX multipliers;
+  MatX H, bordered;
 };
 
 struct ClosureResult {

@@ -11,6 +11,7 @@ struct DynamicsInput {
   Vec6 twist = Vec6::Zero(), twist_rate = Vec6::Zero();  ///< TCP velocity, angular velocity; their derivatives
   Vec6 wrench = Vec6::Zero();                            ///< on the machine at the TCP
   Vec3 gravity = Vec3::Zero();
+  VecX rate, acceleration;  ///< of the drives, where the tip's motion leaves some open; empty: it decides them
 };
 
 struct DynamicsResult {

@@ -146,6 +146,8 @@ class Mechanism {
   Pose home;                             ///< tip pose of the home configuration
   VecX home_coordinates;                 ///< as declared; once assembled: closed at home
   VecX beside_home;                      ///< closed, where hinges that lock at home do not; empty: none do
+  Index redundancy = 0;                  ///< motions of the drives that a commanded pose leaves open (theory C11)
+  VecX nearness;                         ///< weights of the coordinates' distance, where some are
   VecX rest;                             ///< where laws about a fixed coordinate are free of force
   double length = 1;                     ///< characteristic length: turns angles into lengths in every norm
   double stiffness = 1;                  ///< characteristic stiffness, N/m: turns forces into lengths

@@ -28,6 +28,7 @@ class GridKey {
     add(m.home.R);
     add(m.task);
     add(d.program.closes);
+    for (const double w : m.nearness) add(w);
   }
 
   std::string text;
@@ -73,9 +74,9 @@ class GridKey {
 };
 
 /// At a folded or stretched leg Newton starts badly: such a node is no start for its neighbours.
-bool nearly_singular(ClosureWorkspace& ws) {
+bool nearly_singular(const Mechanism& m, ClosureWorkspace& ws) {
   ws.qr.compute(ws.A, 0.02);
-  return ws.qr.rank() < static_cast<Index>(ws.unknown.size());
+  return ws.qr.rank() < static_cast<Index>(ws.unknown.size()) - m.redundancy;
 }
 
 std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const FastPlanData& d) {
@@ -112,7 +113,8 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
           for (std::size_t u = 0; u < d.unknowns.size(); ++u) unknowns[u] = found[d.unknowns[u]];
         };
         VecX found = from ? *from : VecX::Constant(m.size(), std::nan(""));
-        if (quick.close(m, pose, found, false).status == Status::converged && quick.pivot(m, pose) > sound) {
+        if (m.redundancy == 0 && quick.close(m, pose, found, false).status == Status::converged &&
+            quick.pivot(m, pose) > sound) {
           x[node] = found;
           keep(found);
           continue;
@@ -129,7 +131,7 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
         }
         if (lost()) continue;
         x[node] = found;
-        if (!nearly_singular(ws)) keep(found);
+        if (!nearly_singular(m, ws)) keep(found);
       }
   return grid;
 }

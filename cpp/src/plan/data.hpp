@@ -30,6 +30,7 @@ struct FastPlanData {
   std::vector<ClosureEquation> equations;
   std::vector<ClosureTerm> terms;
   std::vector<std::int32_t> unknowns, envelope, serial;
+  std::vector<double> nearness;  ///< of a redundant machine, per unknown
   std::vector<PlanarLeg> planar;
   std::vector<ArmLeg> arm;  ///< one or none
   std::vector<ReachProgram> reach;

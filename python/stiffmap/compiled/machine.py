@@ -231,17 +231,20 @@ class CompiledMachine:
         rotation: Floats,
         start: Floats | None,
         *,
+        weights: Floats,
         patient: bool,
         only: bool,
         threads: int,
     ) -> dict[str, Any]:
         """Arrays by name: closed coordinates and the drives' Jacobian of (n, 3) positions.
 
+        weights: (drives,) of what drives that outnumber the freedoms share (theory D10); (0,): their own.
+
         start: (n, coordinates) near the answer, NaN where none is known. Not patient: a pose that straight
         continuation from home does not reach is out of reach. Only: so is one that its start does not lead to.
         """
         begin = np.zeros((0, len(self.names.coordinates))) if start is None else start
-        return self._mechanism.kinematics(position, rotation, begin, False, patient, only, threads)
+        return self._mechanism.kinematics(position, rotation, begin, weights, False, patient, only, threads)
 
     @property
     def not_enclosed(self) -> str:
@@ -278,10 +281,24 @@ class CompiledMachine:
         twist_rate: Floats,
         wrench: Floats,
         gravity: Floats,
+        *,
+        rates: Floats,
+        accelerations: Floats,
+        weights: Floats,
         threads: int,
     ) -> dict[str, Any]:
-        """Arrays by name: inverse dynamics at (n, coordinates) that are closed, motions of the tcp (n, 6)."""
-        return self._mechanism.dynamics(inertias, coordinates, twist, twist_rate, wrench, gravity, threads)
+        """Arrays by name: inverse dynamics at (n, coordinates) that are closed, motions of the tcp (n, 6).
+
+        rates, accelerations: (n, drives) where the tcp's motion leaves some open; (0, drives): it decides them.
+        """
+        return self._mechanism.dynamics(
+            inertias, coordinates, twist, twist_rate, wrench, gravity, rates, accelerations, weights, threads
+        )
+
+    @property
+    def redundancy(self) -> int:
+        """Motions of the drives that a commanded pose leaves open."""
+        return int(self._mechanism.redundancy)
 
     def modes(
         self,

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from stiffmap.broadcasting import Floats
+from stiffmap.derivatives.by_wrench import along_wrench
 from stiffmap.derivatives.inputs import along_input
 from stiffmap.derivatives.prepared import Prepared
 from stiffmap.derivatives.requests import Requests
@@ -20,12 +21,16 @@ Table = dict[str, dict[str, Floats]]  # quantity -> name of the variable -> deri
 
 def differentiate(ready: Prepared, call: Call, requests: Requests) -> Solution:
     """Answer of the machine with all the effects of `requests`, with its derivatives; NaN where a pose failed."""
-    if requests.whole:
+    if requests.whole or "wrench" in requests.inputs:
         call = replace(call, options=replace(call.options, stiffness=True))
     table: Table = {q: {} for q in requests.of}
     solution = (_whole if requests.whole else _displacement)(ready, call, table)
     for name in requests.inputs:
-        for variable, values in along_input(ready.base, call, solution, name, requests.of):
+        if name == "wrench":
+            slopes = along_wrench(ready.base, call, solution, requests.of)
+        else:
+            slopes = along_input(ready.base, call, solution, name, requests.of)
+        for variable, values in slopes:
             for q in requests.of:
                 table[q][variable] = values[q]
     return solution._with_derivatives(table)

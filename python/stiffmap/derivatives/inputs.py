@@ -1,4 +1,4 @@
-"""Derivatives with respect to the commanded pose and to the wrench."""
+"""Derivatives with respect to the commanded pose."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from stiffmap.solution import Solution
 from stiffmap.solving import Call, solve_call
 
 POSE_STEP = 1e-4  # of the machine's length, rad
-LOAD_STEP = 1e-5  # N, as the machine's characteristic stiffness times this share of its length
 
 
 def along_input(
@@ -24,11 +23,11 @@ def along_input(
 ) -> Iterator[tuple[str, dict[str, Floats]]]:
     """For each component of an input: its name, and the derivative of each quantity.
 
-    ``position x`` per m; ``rotation rx`` per rad, the command turned about base axes; ``wrench fx`` per N (the
-    wrench at `point`, other wrenches as they are). Central differences of the whole solution, of second order.
+    ``position x`` per m; ``rotation rx`` per rad, the command turned about base axes. Central differences of the
+    whole solution, of second order.
     """
     for i, component in enumerate(INPUTS[name]):
-        step = _step(machine, name, i)
+        step = _step(machine, name)
         stencil = central(step)
         ends = [solve_call(machine, _moved(machine, call, name, i, h))[0] for h in stencil.offsets]
         yield (
@@ -37,19 +36,13 @@ def along_input(
         )
 
 
-def _step(machine: CompiledMachine, name: str, i: int) -> float:
-    length, stiffness = machine.length, machine.stiffness
-    if name == "wrench":
-        return float(LOAD_STEP * stiffness * length * (length if i > 2 else 1.0))
-    return float(POSE_STEP * (length if name == "position" else 1.0))
+def _step(machine: CompiledMachine, name: str) -> float:
+    return float(POSE_STEP * (machine.length if name == "position" else 1.0))
 
 
 def _moved(machine: CompiledMachine, call: Call, name: str, i: int, h: float) -> Call:
     if name == "position":
         return replace(call, position=np.asarray(call.position, dtype=float) + h * np.eye(3)[i])
-    if name == "wrench":
-        given = np.zeros(6) if call.wrench is None else np.asarray(call.wrench, dtype=float)
-        return replace(call, wrench=given + h * np.eye(6)[i])
     now = call.options.rotation
     given = machine.home_rotation if now is None else np.asarray(now, dtype=float)
     turn = np.array(rotation_about(np.eye(3)[i], h))

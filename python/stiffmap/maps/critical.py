@@ -17,7 +17,7 @@ def critical_variables(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Variables and coordinates over the dimensions ``critical`` and ``coordinate``."""
     names = list(machine.compiled.names.coordinates)
-    modes = np.array([c["mode"] for c in critical]).reshape(-1, len(names))
+    modes = np.array([c["mode"] for c in critical]).reshape(len(critical), len(names))
     sizes = np.abs(modes) * _units(machine)
     over = {
         "critical_force": _floats(critical, "load", "N", "force at the critical point"),
@@ -38,7 +38,7 @@ def critical_variables(
         ),
         "critical_coordinates": (
             ("critical", "coordinate"),
-            np.array([c["coordinates"] for c in critical]).reshape(-1, len(names)),
+            np.array([c["coordinates"] for c in critical]).reshape(len(critical), len(names)),
             meaning("m or rad", "coordinates at the critical point"),
         ),
     }

@@ -46,6 +46,7 @@ def accuracy_transmission(
     errors: ArrayLike | None = None,
     plane: str = "xy",
     nonlinear: bool = False,
+    sharing: str = "least_norm",
     threads: int | None = None,
 ) -> AccuracyTransmission:
     """Worst tool error when every encoder may be wrong by up to ± its error, at poses (..., 3) m.
@@ -53,9 +54,10 @@ def accuracy_transmission(
     The norm being convex, its largest value over the box of errors lies at a corner, so all corners
     are the exact worst case of the first-order model. `errors`: one or one each, m or rad; None: the
     machine file's ``encoder_error``. `nonlinear` also closes the machine at every corner, without
-    linearising. Raises StiffmapError for bad input, never for a pose.
+    linearising. `sharing`: what errors of drives that outnumber the freedoms do to the tool, ``least_norm`` or
+    ``stiffness`` (docs/measures.md). Raises StiffmapError for bad input, never for a pose.
     """
-    k = drive_kinematics(machine, position, rotation, threads=threads)
+    k = drive_kinematics(machine, position, rotation, sharing=sharing, threads=threads)
     out = accuracy_of(machine, k, errors=errors, plane=plane)
     if not nonlinear:
         return out
@@ -85,6 +87,7 @@ def _by_closing(machine: Machine, k: DriveKinematics, errors: Floats, threads: i
     worst = np.zeros(k.status.shape)
     signs = corners(len(errors))
     for s in (*signs, *-signs):
-        there = forward_kinematics(machine, k.actuators + s * errors, threads=threads)
+        moved = (k.sharing @ (s * errors)[:, None])[..., 0]  # drives that go together move together
+        there = forward_kinematics(machine, k.actuators + moved, threads=threads)
         worst = np.maximum(worst, np.linalg.norm(there.position - k.position, axis=-1))
     return worst

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
+from stiffmap.performance.sharing import drive_weights
 from stiffmap.rotations import as_rotations
 
 CHUNK = 16_384
@@ -32,6 +33,11 @@ class DriveKinematics:
     """(..., 3, 3)."""
     free_twist: Floats
     """(..., 6) with all drives held, the motion of the platform at a SINGULAR pose; else NaN."""
+    sharing: Floats
+    """(..., drives, drives) takes any rates to the nearest that go together, transposed the efforts that a motion needs
+    to the drives' shares; the identity unless drives outnumber the freedoms."""
+    together: NDArray[np.int32]
+    """(...) dimension of the rates of drives that go together."""
     pivot: Floats
     """(...) smallest relative pivot of the loops' elimination: 0 at a pose where passive joints lose rank."""
     status: NDArray[np.uint8]
@@ -46,6 +52,7 @@ def drive_kinematics(
     start: ArrayLike | None = None,
     patient: bool = True,
     only_start: bool = False,
+    sharing: str = "least_norm",
     threads: int | None = None,
 ) -> DriveKinematics:
     """Jacobian from the drives to the TCP at commanded poses (..., 3) m, rotation (..., 3, 3).
@@ -54,7 +61,7 @@ def drive_kinematics(
     (..., coordinates): coordinates near the answer; None: continued from the pose before. `patient`: False
     takes a pose that straight continuation from home does not reach as UNREACHABLE, without the slow
     second attempt. `only_start`: coordinates of a neighbouring pose, which each pose continues; one that
-    they do not lead to is UNREACHABLE. Raises StiffmapError for bad input, never for a pose.
+    they do not lead to is UNREACHABLE. `sharing`: see `drive_weights`. Raises StiffmapError for bad input, never for a pose.
     """
     p = trailing(position, (3,), "position", "positions (m)")
     r = trailing(
@@ -76,10 +83,11 @@ def drive_kinematics(
     if only_start and begin is None:
         raise StiffmapError("only_start: needs start, coordinates of neighbouring poses")
     out = compiled.rates(
-        flat_p, flat_r, begin, patient=patient, only=only_start, threads=thread_count(threads)
-    )
+        flat_p, flat_r, begin, weights=drive_weights(machine, sharing), patient=patient, only=only_start,
+        threads=thread_count(threads),
+    )  # fmt: skip
     drives = list(compiled.drives)
-    shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items() if k not in ("rates", "misfit")}
+    shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items() if k != "rates"}
     return DriveKinematics(actuators=shaped["coordinates"][..., drives], **shaped)
 
 

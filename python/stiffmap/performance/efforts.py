@@ -33,13 +33,15 @@ def drive_efforts(
     rotation: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     friction: bool = True,
+    sharing: str = "least_norm",
     threads: int | None = None,
 ) -> xr.Dataset:
     """What each drive exerts along a motion of the tool: effort, power, speed, their peaks and rms.
 
     Newton and Euler for every body of the closed machine, projected on the drives; Coulomb and viscous
     friction of the drives, springs of passive joints and external springs, `Trajectory.force` on the
-    tool. gravity (3,) m/s²; None: what the machine file says.
+    tool. gravity (3,) m/s²; None: what the machine file says. sharing: of drives that outnumber the freedoms,
+    ``least_norm`` or ``stiffness`` (docs/measures.md). The joints of a redundant machine are those nearest to home.
 
     Returns a Dataset over (time, drive): effort, rate, acceleration, coordinate, power, friction; over
     time: kinetic, potential (J); over drive: peak_effort, rms_effort, peak_speed, peak_power,
@@ -51,12 +53,12 @@ def drive_efforts(
     """
     need_masses(machine, "inverse dynamics")
     t = trajectory
-    k = drive_kinematics(machine, t.position, rotation, threads=threads)
+    k = drive_kinematics(machine, t.position, rotation, sharing=sharing, threads=threads)
     refuse_failed(machine, k, t.time, t.position)
     zero = np.zeros_like(t.position)
     out = rigid_dynamics(
         machine, k.coordinates, np.hstack([t.velocity, zero]), np.hstack([t.acceleration, zero]),
-        np.hstack([t.force, zero]), gravity, threads,
+        np.hstack([t.force, zero]), gravity, threads, sharing=sharing,
     )  # fmt: skip
     bad = ~(out["misfit"] < IMPOSSIBLE)
     if bad.any():

@@ -14,7 +14,7 @@ from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.inertia import rest_efforts
 from stiffmap.performance.polygons import Polygon, section_polygon
 from stiffmap.performance.scaling import characteristic_length, drive_values, weighted
-from stiffmap.performance.velocity import singular_values
+from stiffmap.performance.velocity import of_motions, singular_values
 
 NOTHING = 1e-12
 """Effort of a drive per unit force below which the drive does not feel the force."""
@@ -50,6 +50,7 @@ def force_transmission(
     gravity: ArrayLike | None = None,
     velocity: ArrayLike | None = None,
     length: float | None = None,
+    sharing: str = "least_norm",
     threads: int | None = None,
 ) -> ForceTransmission:
     """Smallest and largest force that the drives hold, at rest or at speed, at poses (..., 3) m.
@@ -62,11 +63,22 @@ def force_transmission(
     velocity
         (..., 3) m/s of the TCP, no acceleration, no rotation: inertia and friction at that speed count
         against the limits too; None: at rest, without friction.
+    sharing
+        Of drives that outnumber the freedoms: ``least_norm`` or ``stiffness`` (docs/measures.md).
 
     Raises StiffmapError for bad input, never for a pose.
     """
-    k = drive_kinematics(machine, position, rotation, threads=threads)
-    return force_of(machine, k, plane=plane, limits=limits, gravity=gravity, velocity=velocity, length=length)
+    k = drive_kinematics(machine, position, rotation, sharing=sharing, threads=threads)
+    return force_of(
+        machine,
+        k,
+        plane=plane,
+        limits=limits,
+        gravity=gravity,
+        velocity=velocity,
+        length=length,
+        sharing=sharing,
+    )
 
 
 def force_of(
@@ -78,19 +90,21 @@ def force_of(
     gravity: ArrayLike | None = None,
     velocity: ArrayLike | None = None,
     length: float | None = None,
+    sharing: str = "least_norm",
 ) -> ForceTransmission:
     """The same from kinematics that are at hand."""
     text = limits if isinstance(limits, str) else ""
     given = np.ones(()) if text == "unit" else None if text == "declared" else limits
     most = drive_values(machine, "force", given, "N or N·m")
-    bias = rest_efforts(machine, k, gravity=gravity, velocity=velocity)
+    bias = rest_efforts(machine, k, gravity=gravity, velocity=velocity, sharing=sharing)
     needed = -np.swapaxes(k.jacobian[..., :3, :], -1, -2)  # effort of the drives per force on the tool
     free = most - np.abs(bias)
     norms = np.linalg.norm(needed, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         room = np.where(norms > NOTHING, free / norms, np.where(free >= 0, np.inf, 0.0))
-        s = singular_values(weighted(machine, k.jacobian, characteristic_length(machine, length), "all"))
-        least, largest = 1 / s[..., 0], 1 / s[..., -1]
+        j = weighted(machine, k.jacobian, characteristic_length(machine, length), "all")
+        s, last = of_motions(machine, k, singular_values(j))
+        least, largest = 1 / s[..., 0], 1 / last
     bad = ~np.isfinite(needed).all(axis=(-2, -1))
     return ForceTransmission(
         sphere_min=least,

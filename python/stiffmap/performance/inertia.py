@@ -15,6 +15,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.performance.closing import DriveKinematics
 from stiffmap.performance.scaling import drive_table
+from stiffmap.performance.sharing import drive_weights, followed
 
 
 @dataclass(frozen=True)
@@ -94,18 +95,29 @@ def rigid_dynamics(
     wrench: Floats,
     gravity: ArrayLike | None,
     threads: int | None = None,
+    *,
+    sharing: str = "least_norm",
 ) -> dict[str, Floats]:
-    """The core's inverse dynamics at closed coordinates (n, coordinates) and tip motions (n, 6)."""
+    """The core's inverse dynamics at closed coordinates (n, coordinates) and tip motions (n, 6); see `drive_weights`."""
+    rates = accelerations = np.zeros((0, len(machine.actuators)))
+    if machine.compiled.redundancy and (np.any(twist) or np.any(twist_rate)):
+        rates, accelerations = followed(machine, coordinates, twist, twist_rate, threads)
     out: dict[str, Floats] = machine.compiled.dynamics(
         inertias(machine), np.ascontiguousarray(coordinates), np.ascontiguousarray(twist),
         np.ascontiguousarray(twist_rate), np.ascontiguousarray(wrench), machine.compiled.gravity(gravity),
-        thread_count(threads),
+        rates=rates, accelerations=accelerations, weights=drive_weights(machine, sharing),
+        threads=thread_count(threads),
     )  # fmt: skip
     return out
 
 
 def rest_efforts(
-    machine: Machine, k: DriveKinematics, *, gravity: ArrayLike | None, velocity: ArrayLike | None
+    machine: Machine,
+    k: DriveKinematics,
+    *,
+    gravity: ArrayLike | None,
+    velocity: ArrayLike | None,
+    sharing: str = "least_norm",
 ) -> Floats:
     """(..., drives) efforts at rest under gravity, or at a constant velocity with friction."""
     shape, drives = k.status.shape, k.actuators.shape[-1]
@@ -119,7 +131,7 @@ def rest_efforts(
     if velocity is not None:
         twist[:, :3] = np.broadcast_to(real_array(velocity, "velocity"), (*shape, 3)).reshape(-1, 3)
     zero = np.zeros_like(twist)
-    out = rigid_dynamics(machine, flat, twist, zero, zero, g)
+    out = rigid_dynamics(machine, flat, twist, zero, zero, g, sharing=sharing)
     effort = out["effort"]
     if velocity is not None:
         effort = effort + friction_efforts(machine, out["rate"])

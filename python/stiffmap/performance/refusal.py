@@ -9,6 +9,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
+from stiffmap.performance.sharing import FLAT, motions
 from stiffmap.status import Status
 
 STEPS = 24
@@ -18,7 +19,7 @@ STEPS = 24
 def refuse_failed(machine: Machine, k: DriveKinematics, time: Floats | None, position: Floats) -> None:
     """StiffmapError with place and time of the first pose of a motion that cannot be; between two samples it is
     sought by halving."""
-    failed = (k.status != Status.CONVERGED) | _crossed(k.jacobian)
+    failed = (k.status != Status.CONVERGED) | _crossed(machine, k)
     if not failed.any():
         return
     i = int(np.argmax(failed))
@@ -38,22 +39,39 @@ def _between(machine: Machine, k: DriveKinematics, position: Floats, i: int) -> 
     for _ in range(STEPS):
         middle = (low + high) / 2
         there = drive_kinematics(machine, a + middle * (b - a), k.rotation[i - 1], start=start)
-        pair = np.stack([k.jacobian[i - 1], there.jacobian])
-        if there.status != Status.CONVERGED or _crossed(pair)[1]:
+        if there.status != Status.CONVERGED or _crossed_between(machine, k, i - 1, there):
             high = middle
         else:
             low, start = middle, there.coordinates
     return 1 - high, a + high * (b - a)
 
 
-def _crossed(jacobian: Floats) -> NDArray[np.bool_]:
-    """(n,) where the drive Jacobian (n, 6, drives) of a machine with as many drives as motions changes its
-    orientation; False where it is NaN."""
+def _crossed(machine: Machine, k: DriveKinematics) -> NDArray[np.bool_]:
+    """(n,) where the drive Jacobian loses rank, or changes its orientation since the pose before; False where it is
+    NaN."""
+    return _lost(k.jacobian, k.together, machine.compiled.redundancy)
+
+
+def _crossed_between(machine: Machine, k: DriveKinematics, i: int, there: DriveKinematics) -> bool:
+    """The same between pose `i` and another one."""
+    pair, together = (
+        np.stack([getattr(k, name)[i], getattr(there, name)]) for name in ("jacobian", "together")
+    )
+    return bool(_lost(pair, together, machine.compiled.redundancy)[1])
+
+
+def _lost(jacobian: Floats, together: NDArray[np.int32], redundancy: int) -> NDArray[np.bool_]:
     ok = np.isfinite(jacobian).all(axis=(1, 2))
     out = np.zeros(len(jacobian), dtype=bool)
     if not ok.any():
         return out
     j = jacobian[ok]
+    if redundancy or (together[ok] < j.shape[-1]).any():
+        values = np.asarray(np.linalg.svd(j, compute_uv=False), dtype=float)
+        last = motions(together[ok], values, redundancy) - 1
+        least = np.take_along_axis(values, np.maximum(last, 0)[:, None], axis=-1)[:, 0]
+        out[ok] = least < FLAT * values[:, 0]
+        return out
     # a smooth change of sign is a drive that stops moving the tool; a jump is one that runs away
     turn = np.linalg.det(np.swapaxes(j[:-1], 1, 2) @ j[1:])
     flipped = np.concatenate([[False], turn <= 0])

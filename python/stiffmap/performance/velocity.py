@@ -13,6 +13,7 @@ from stiffmap.maps.inputs import plane_axes
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.polygons import Polygon, section_polygon
 from stiffmap.performance.scaling import characteristic_length, drive_values, mixes_units, weighted
+from stiffmap.performance.sharing import facets, motions
 from stiffmap.performance.zonotopes import farthest_vertex, inscribed_sphere, inverse_rows, rows_limit
 
 
@@ -93,9 +94,12 @@ def transmission_of(
     size = characteristic_length(machine, length)
     j = weighted(machine, k.jacobian, size, part)
     driven = j * (speeds if not unit else 1.0)
-    s = singular_values(j)
-    low, high = s[..., -1], s[..., 0]
-    if part == "all":
+    s, low = of_motions(machine, k, singular_values(j))
+    high = s[..., 0]
+    if part == "all" and machine.compiled.redundancy:
+        rank = int((np.isfinite(s) & (s > 0)).sum(axis=-1).max(initial=1))
+        slowest = facets(driven, rank)[1].min(axis=-1)
+    elif part == "all":
         same = inverse is not None and not mixes_units(machine) and _translates(k.jacobian)
         slowest = rows_limit(inverse if same and inverse is not None else inverse_rows(j), speeds)
     else:
@@ -103,9 +107,22 @@ def transmission_of(
     with np.errstate(invalid="ignore", divide="ignore"):
         return VelocityTransmission(
             sphere_min=low, sphere_max=high, cube_min=slowest, cube_max=farthest_vertex(driven),
-            condition=high / low, dexterity=low / high, manipulability=np.prod(s, axis=-1),
+            condition=high / low, dexterity=low / high, manipulability=np.nanprod(s, axis=-1) + 0 * high,
             jacobian=k.jacobian, length=size, limits=speeds, status=k.status, flags=k.flags,
         )  # fmt: skip
+
+
+def of_motions(machine: Machine, k: DriveKinematics, values: Floats) -> tuple[Floats, Floats]:
+    """Singular values (..., n), those beyond the tool's motions NaN, and the last one that counts.
+
+    Drives that go together, or that leave the tool where it is, have none of their own.
+    """
+    redundancy, drives = machine.compiled.redundancy, k.jacobian.shape[-1]
+    if not redundancy and not (k.together < drives).any():
+        return values, values[..., -1]
+    count = motions(k.together, values, redundancy)
+    last = np.take_along_axis(values, np.maximum(count - 1, 0)[..., None], axis=-1)[..., 0]
+    return np.where(np.arange(values.shape[-1]) < count[..., None], values, np.nan), last
 
 
 def _translates(jacobian: Floats) -> bool:
@@ -156,6 +173,13 @@ def velocity_polygon(
     unit = isinstance(limits, str) and limits == "unit"
     given = np.ones(()) if unit else None if isinstance(limits, str) and limits == "declared" else limits
     speeds = drive_values(machine, "speed", given, "m/s or rad/s")
-    inverse = inverse_rows(weighted(machine, k.jacobian, 1.0, "all"))
+    j = weighted(machine, k.jacobian, 1.0, "all")
     axes = list(plane_axes(plane))
-    return section_polygon(inverse[..., axes], speeds, k.status)
+    if machine.compiled.redundancy:
+        s = of_motions(machine, k, singular_values(j))[0]
+        rank = int((np.isfinite(s) & (s > 0)).sum(axis=-1).max(initial=1))
+        normals, distance = facets(k.jacobian * speeds, rank)
+        bounded = np.isfinite(distance)
+        rows = np.where(bounded[..., None], normals, 0.0)
+        return section_polygon(rows[..., axes], np.where(bounded, distance, 1.0), k.status)
+    return section_polygon(inverse_rows(j)[..., axes], speeds, k.status)

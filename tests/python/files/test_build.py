@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from machine_text import BASE, changed, description, with_element
 
+from stiffmap.beams import rectangle_section
 from stiffmap.description import Element, Joint, Law, Offset, Spring
 from stiffmap.units import Dimension, UnitSystem
 
@@ -127,6 +128,20 @@ def test_torsion_of_a_square_and_of_a_strip() -> None:
     assert square[1] == pytest.approx(0.140577 * 0.01**4, rel=1e-5)
     strip = section_products({"rectangle": {"width": 1, "height": 100}})
     assert strip[1] == pytest.approx(0.1 * 0.001**3 * (1 / 3 - 0.21 * 0.01), rel=1e-4)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.07, 2.5, 40.0, 3000.0])
+def test_torsion_of_a_rectangle_is_the_whole_series(ratio: float) -> None:
+    """Saint-Venant's series, 10^4 terms of it, along either side: both are exact."""
+
+    def series(a: float, b: float) -> float:
+        terms = math.fsum(math.tanh(n * math.pi * a / (2 * b)) / n**5 for n in range(1, 20001, 2))
+        return a * b**3 / 3 * (1 - 192 / math.pi**5 * b / a * terms)
+
+    found = rectangle_section(0.01, 0.01 * ratio).torsion
+    assert found == pytest.approx(series(0.01 * ratio, 0.01), rel=1e-15)
+    if ratio < 3:  # the series along the short side loses digits in a strip
+        assert found == pytest.approx(series(0.01, 0.01 * ratio), rel=2e-14)
 
 
 def test_turns_follow_each_other() -> None:

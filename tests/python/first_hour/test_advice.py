@@ -10,6 +10,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.advice import advice
 from stiffmap.cli import main
+from stiffmap.description import ExternalSpring, Joint, Leg, MachineDescription
 from stiffmap.files.shipped import machine_folder
 from stiffmap.files.starter import starter_text
 from stiffmap.free_motions import twist_words
@@ -131,3 +132,15 @@ def test_what_is_free_is_said_in_words(tmp_path: Path) -> None:
         a for a in found if "the platform can turn about x" in a
     ]  # of home, once and not for each position
     assert "although all drives stand still" in said
+
+
+def test_what_springs_outside_hold_is_not_called_rigid(tmp_path: Path) -> None:
+    """A slide that no spring of its own holds, and a cord: it has a stiffness, so that it is not rigid."""
+    cord = ExternalSpring("cord", "tcp", (0.0, 0.0, 1.0), 1e4, 0.5)
+    slide = Joint("slide", "prismatic", ((0.0, 0.0, 1.0),))
+    machine = MachineDescription("hung", (Leg("arm", (slide,)),), external_springs=(cord,), task=("z",))
+    path = tmp_path / "hung.yaml"
+    sm.Machine(machine).save(path)
+    hung = sm.load_machine(path)
+    assert tried(hung).stiffness is not None
+    assert not [line for line in advice(hung, path) if "rigid" in line]

@@ -20,7 +20,7 @@ RANKS = (
     ("mechanism",),
     ("kinematics",),
     ("closure", "linearization", "rigid_tree"),
-    ("saddle", "home", "free_spins", "motion", "pose_closer"),
+    ("saddle", "home", "free_spins", "motion", "pose_closer", "redundancy"),
     ("stability", "home_record"),
     ("equilibrium", "stiffness", "dynamics", "enclosure"),
     ("spins",),
