@@ -21,10 +21,13 @@ from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import load_machine
 from stiffmap.milling import mill_job
-from stiffmap.milling.report import summary, write_report
+from stiffmap.milling.placement import placements
+from stiffmap.milling.redundancy import redundancy as choose_turns
+from stiffmap.milling.report import placement_summary, summary, write_report
+from stiffmap.milling.setting import setting
 from stiffmap.process import Process, load_process
 from stiffmap.status import Status
-from stiffmap.toolpath import load_path
+from stiffmap.toolpath import load_path, sampled
 
 MM = 1e-3
 
@@ -63,6 +66,16 @@ def mill(
     tolerance: Annotated[float | None, typer.Option(help="Tolerance, mm; default: the process's.")] = None,
     passes: Annotated[int, typer.Option(help="Passes along the same program.")] = 1,
     band: Annotated[bool, typer.Option(help="Also under 80 and 120 % of the force.")] = False,
+    place: Annotated[
+        int | None,
+        typer.Option(
+            help="Try so many placements first and take the best, refined; instead of --at and --turn."
+        ),
+    ] = None,
+    redundancy: Annotated[
+        int | None,
+        typer.Option(help="Arms: choose the turn about the tool from so many over a full turn, e.g. 72."),
+    ] = None,
     threads: ThreadsOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -86,13 +99,31 @@ def mill(
         offsets=_offsets(offset),
     )
     cut = _process(process, tolerance)
+    where = None if at is None else MM * numbers(at, "at", 3)
+    angle = float(np.radians(turn))
+    out: dict[str, object] = {}
+    if place is not None:
+        best = placements(m, p, cut, count=place, threads=threads)
+        where, angle = best.best.at, best.best.turn
+        out["placement"] = placement_summary(best)
+    turns = None
+    if redundancy is not None:
+        arm = setting(
+            m, p, cut, sampled(p, MM * step), p.placed(m.description.home.p if where is None else where, angle),
+            thickness=None if thickness is None else MM * thickness,
+        )  # fmt: skip
+        chosen = choose_turns(arm, redundancy, threads=threads)
+        turns = chosen.angle
+        out["redundancy"] = {
+            "largest_mm": float(1e3 * np.abs(chosen.error).max()), "best_fixed_turn_mm": float(1e3 * chosen.fixed.min()),
+            "as_at_home_mm": float(1e3 * np.interp(0.0, chosen.turns, chosen.fixed)),
+        }  # fmt: skip
     found = mill_job(
-        m, p, cut,
-        at=None if at is None else MM * numbers(at, "at", 3), turn=float(np.radians(turn)), step=MM * step, within=MM * within,
+        m, p, cut, at=where, turn=angle, step=MM * step, within=MM * within, angle=turns,
         true_machine=None if true_machine is None else load_machine(true_machine),
         thickness=None if thickness is None else MM * thickness, passes=passes, band=band, threads=threads,
     )  # fmt: skip
-    out = summary(found)
+    out = {**summary(found), **out}
     if output is not None:
         out["files"] = {k: str(output / v) for k, v in write_report(found, output).items()}
     if as_json:

@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from stiffmap.kinematics import inverse_kinematics
 from stiffmap.maps.files import write_dataset
 from stiffmap.milling.job import Milled, beyond, sizes, verdict
 from stiffmap.milling.pictures import error_figure, machine_path_figure, outline_figure
-from stiffmap.outputs import make_folder, write_text
+from stiffmap.milling.placement import Placements
+from stiffmap.outputs import make_folder, write_rows, write_text
 from stiffmap.process import cutting_force
 from stiffmap.process.force import force_uncertainty
 from stiffmap.report.sheet import Sheet, write_sheet
@@ -64,6 +66,23 @@ def summary(found: Milled) -> dict[str, object]:
     return out
 
 
+def placement_summary(found: Placements) -> dict[str, object]:
+    """Numbers of a search for the placement; mm, deg."""
+    fits = found.largest[np.isfinite(found.largest)]
+    return {
+        "at_mm": [float(1e3 * v) for v in found.best.at],
+        "turn_deg": float(np.degrees(found.best.turn)),
+        "largest_error_mm": 1e3 * found.best_error,
+        "naive_at_mm": [float(1e3 * v) for v in found.naive.at],
+        "naive_error_mm": 1e3 * found.naive_error,
+        "naive_over_best": found.gain,
+        "worst_error_mm": float(1e3 * fits.max()),
+        "tried": len(found.largest),
+        "in_reach": found.reachable,
+        "limited_by": found.limits,
+    }
+
+
 def write_report(found: Milled, folder: str | PathLike[str]) -> dict[str, str]:
     """Write report.html, the compensated program and part.nc into a folder; names of the files. Raises FileError."""
     target = Path(folder)
@@ -73,8 +92,24 @@ def write_report(found: Milled, folder: str | PathLike[str]) -> dict[str, str]:
     ds = found.dataset.copy()
     ds.attrs = {k: v if v else "" for k, v in ds.attrs.items()}
     write_dataset(ds, target / made["data"])
+    if found.job.angle is not None:
+        made["drives"] = "drives.csv"
+        write_rows(target / made["drives"], *_drives(found))
     write_sheet(target / made["report"], _sheet(found), _pictures(found), _digests(found))
     return made
+
+
+def _drives(found: Milled) -> tuple[list[str], list[list[str]]]:
+    """Names and rows: what an arm's drives stand at along the compensated path, and the turn about the tool."""
+    job, machine = found.job, found.job.machine
+    at = inverse_kinematics(machine, found.command, job.rotation).actuators
+    prismatic = [machine.compiled.names.is_prismatic(a) for a in machine.actuators]
+    scale = np.where(prismatic, 1e3, 180 / np.pi)
+    units = ["mm" if p else "deg" for p in prismatic]
+    names = ["way_mm", "turn_deg", *(f"{a}_{u}" for a, u in zip(machine.actuators, units, strict=True))]
+    assert job.angle is not None
+    columns = np.hstack([1e3 * job.points.way[:, None], np.degrees(job.angle)[:, None], at * scale])
+    return names, [[f"{v:.9g}" for v in row] for row in columns]
 
 
 def _pictures(found: Milled) -> dict[str, Figure | bytes]:

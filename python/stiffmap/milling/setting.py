@@ -42,6 +42,8 @@ class Setting:
     """(m,) m/s."""
     faster: Floats
     """(m,) feed per revolution as a multiple of the process's own."""
+    angle: Floats | None = None
+    """(m,) rad, turn of an arm's tool about its axis; None: as at home."""
     scale: float = 1.0
     """Of the force: 0.8 to 1.2 for a band of 20 %."""
 
@@ -106,6 +108,8 @@ def setting(
     scale: float = 1.0,
 ) -> Setting:
     """A job; `angle` (m,) rad turns the tool of an arm about its axis. Raises StiffmapError for what does not go together."""
+    if angle is not None and np.shape(angle) != (len(points),):
+        raise StiffmapError(f"angle: expected {len(points)} turns of the tool (rad), one for each point")
     _check(path, process, points)
     tool = place.vectors(points.tool)
     return Setting(
@@ -122,6 +126,7 @@ def setting(
         orientations(machine, tool, place, angle),
         np.where(np.isfinite(points.feed), points.feed, process.feed),
         _faster(points, process),
+        angle,
         scale,
     )
 

@@ -66,9 +66,10 @@ def run(
 
 def _job(job: Setting, points: Points) -> Setting:
     """The job at other points; width and depth as at the nearest of its own."""
-    made = setting(job.machine, job.path, job.process, points, job.place, scale=job.scale)
     order = np.argsort(job.points.way, kind="stable")
     way = job.points.way[order]
+    angle = None if job.angle is None else np.interp(points.way, way, np.unwrap(job.angle)[order])
+    made = setting(job.machine, job.path, job.process, points, job.place, scale=job.scale, angle=angle)
     k = np.clip(np.searchsorted(way, points.way), 1, len(way) - 1)
     k -= np.abs(points.way - way[k - 1]) < np.abs(points.way - way[k])
     old = order[k]
@@ -80,10 +81,7 @@ def _job(job: Setting, points: Points) -> Setting:
     engaged = replace(
         made.engaged, radial=e.radial[old], axial=e.axial[old], corner=e.corner[old], curvature=bent
     )
-    turned = job.rotation if job.rotation.strides[0] == 0 else job.rotation[old]
-    if job.rotation.strides[0] == 0:
-        turned = np.broadcast_to(job.rotation[0], (len(points), 3, 3))
-    return replace(made, engaged=engaged, rotation=turned)
+    return replace(made, engaged=engaged)
 
 
 def nearest(path: Toolpath, move: NDArray[np.int64], p: Floats) -> Floats:

@@ -1,0 +1,115 @@
+"""Feed and sense of the cut: the least time within the tolerance; climb or conventional."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stiffmap.broadcasting import Floats
+from stiffmap.errors import StiffmapError
+from stiffmap.milling.equilibrium import equilibrium
+from stiffmap.milling.job import drive_speeds
+from stiffmap.milling.plant import Plant
+from stiffmap.milling.setting import Setting
+from stiffmap.performance.scaling import drive_table
+from stiffmap.process.description import Process
+from stiffmap.toolpath import Kind, Toolpath
+
+ROUNDS = 20
+SLOWEST, FASTEST = 0.02, 4.0
+"""Of the feed as it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Feeds:
+    """Feed of each move."""
+
+    feed: Floats
+    """(moves,) m/s; that of the path where a move does not cut."""
+    time: float
+    """s of all cuts."""
+    before: float
+    """s with the feed as it is."""
+    held: Floats
+    """(moves,) bool: the error stays within the tolerance."""
+    limited_by: tuple[str, ...]
+    """(moves,) tolerance, drive speed, or fastest feed asked for."""
+
+
+def best_feeds(job: Setting, tolerance: float | None = None, threads: int | None = None) -> Feeds:
+    """Largest feed of each move at which no point of it is off by more than the tolerance (m), before compensation.
+
+    Within the drives' speeds and FASTEST times the feed as it is; by bisection at all points at once, the force re-evaluated.
+    """
+    t = job.process.tolerance if tolerance is None else tolerance
+    if t is None or not t > 0:
+        raise StiffmapError("tolerance: expected a length above zero (m), from the process or given")
+    most = np.array([d.speed if d.speed else np.inf for d in drive_table(job.machine)])
+    with np.errstate(divide="ignore"):
+        room = (most / np.maximum(np.abs(drive_speeds(job)), 1e-12)).min(axis=1)
+    top = np.minimum(room, FASTEST)
+
+    def error(share: Floats) -> Floats:
+        faster = replace(job, feed=job.feed * share, faster=job.faster * share)
+        e = equilibrium(Plant(faster, threads=threads), job.position)
+        return np.asarray(np.abs(np.nan_to_num((e.error * job.off).sum(axis=1), nan=np.inf)))
+
+    low, high = np.full(len(job), SLOWEST), top.copy()
+    holds_low, holds_high = error(low) <= t, error(high) <= t
+    for _ in range(ROUNDS):
+        middle = np.where(holds_high, high, (low + high) / 2)
+        good = error(middle) <= t
+        low, high = np.where(good, middle, low), np.where(good, high, middle)
+    share = np.where(holds_high, top, low)
+    feed = job.path.feed.copy()
+    held = np.ones(len(job.path), bool)
+    why = ["does not cut"] * len(job.path)
+    total = before = 0.0
+    for i in np.unique(job.points.move):
+        rows = np.flatnonzero(job.points.move == i)
+        at = rows[int(np.argmin(share[rows]))]
+        feed[i] = job.feed[rows].min() * share[at]
+        held[i] = bool(holds_low[rows].all())
+        why[i] = (
+            "tolerance"
+            if not holds_high[at]
+            else "drive speed"
+            if top[at] < FASTEST
+            else "fastest feed asked for"
+        )
+        total += job.path.length[i] / feed[i]
+        before += job.path.length[i] / job.feed[rows].min()
+    return Feeds(feed, float(total), float(before), held, tuple(why))
+
+
+def turned_round(path: Toolpath) -> Toolpath:
+    """The same path run the other way; what was a climb cut is a conventional one."""
+    back = slice(None, None, -1)
+    kind = path.kind[back].copy()
+    return replace(
+        path,
+        kind=kind,
+        start=path.end[back].copy(),
+        end=path.start[back].copy(),
+        centre=np.where((kind == Kind.ARC)[:, None], _centres(path)[back], np.nan),
+        normal=path.normal[back].copy(),
+        sweep=-path.sweep[back],
+        feed=path.feed[back].copy(),
+        spindle=path.spindle[back].copy(),
+        line=path.line[back].copy(),
+        tool=path.tool[back].copy(),
+        text=(),
+    )
+
+
+def _centres(path: Toolpath) -> Floats:
+    """(n, 3) m, at the height of the end, where the reversed arc starts."""
+    axis = np.eye(3)[path.normal]
+    return np.asarray(path.centre * (1 - axis) + path.end * axis)
+
+
+def other_side(process: Process) -> Process:
+    """Conventional for climb and the other way round; a slot stays what it is."""
+    side = {"climb": "conventional", "conventional": "climb", "slot": "slot"}[process.cut.side]
+    return replace(process, cut=replace(process.cut, side=side))
