@@ -52,6 +52,11 @@ COMMANDS |= {
     f"design/{name}.png": ("optimize redesign -o {out}", "")
     for name in ("fronts", "parallel", "beside", "toolpath")
 }
+COMMANDS |= {
+    f"milling/{name}.png": ("mill orthoglide-revised washbasin --process trimming --at 50,50,0 --band -o {out}", "")
+    for name in ("outline", "error")
+} | {"milling/arm.png": (f"mill {HERE.parent / 'examples/ur10-spindle.yaml'} washbasin --process trimming --at=-750,-100,300 "
+                         "--redundancy 72 --step 4 -o {out}", "error.png")}  # fmt: skip
 PAPER = ("figure5", "figure6", "figure7-worst", "figure7-best", "figure7-Fx", "figure7-Fy")
 COMMANDS |= {f"{name}.png": ("paper -o {out}", "") for name in PAPER}
 

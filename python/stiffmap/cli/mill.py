@@ -82,7 +82,7 @@ def mill(
     """The part as a machine will cut it, and a program that makes it right.
 
     The cutting force and the deflection are found together; the compensated program is read back and simulated.
-    Exit code 1: a point without an equilibrium, a broken limit, or an error beyond the tolerance after compensation.
+    Exit code 1: a point without an equilibrium, or an error beyond the tolerance after compensation.
 
     Examples:
 

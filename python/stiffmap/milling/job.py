@@ -221,14 +221,12 @@ def drive_speeds(job: Setting) -> Floats:
     return np.asarray((ends[1] - ends[0]) / 2e-5 * job.feed[:, None])
 
 
+BROKEN = {"joint range": Flag.JOINT_LIMIT, "drive range": Flag.DRIVE_RANGE, "drive effort": Flag.DRIVE_FORCE}
+
+
 def beyond(ds: xr.Dataset, machine: Machine) -> dict[str, int]:
     """Number of points that break each limit."""
-    flags = ds.flags.values
-    out = {
-        "joint range": int((flags & Flag.JOINT_LIMIT > 0).sum()),
-        "drive range": int((flags & Flag.DRIVE_RANGE > 0).sum()),
-        "drive effort": int((flags & Flag.DRIVE_FORCE > 0).sum()),
-    }
+    out = {name: int((ds.flags.values & flag > 0).sum()) for name, flag in BROKEN.items()}
     if machine.description.workspace is not None:
         low, high = (
             np.array(c) - 1e-9 * s for c, s in zip(machine.description.workspace, (1, -1), strict=True)
@@ -258,8 +256,10 @@ def verdict(ds: xr.Dataset) -> str:
         return f"{bad} of {ds.sizes['point']} points have no equilibrium."
     b, a = sizes(ds.error_normal), sizes(ds.error_normal_after)
     text = f"The part is off by {b['largest']:.3f} mm at most; with the compensated program by {a['largest']:.4f} mm."
+    over = [name for name, flag in BROKEN.items() if (ds.flags.values & flag).any()]
+    end = f" Limits are broken: {', '.join(over)}." if over else ""
     if "tolerance" not in ds.attrs:
-        return text
+        return text + end
     t = 1e3 * ds.attrs["tolerance"]
     words = [("within" if v["largest"] <= t else "beyond") for v in (b, a)]
-    return f"{text} The tolerance is {t:g} mm: {words[0]} it as it is, {words[1]} it compensated."
+    return f"{text} The tolerance is {t:g} mm: {words[0]} it as it is, {words[1]} it compensated.{end}"

@@ -106,14 +106,11 @@ def error_figure(ds: xr.Dataset) -> Figure:
                 top.axhline(scale * sign * tolerance, color=TOLERANCE, lw=0.8, label="tolerance")
         top.axhline(0, color="0.7", lw=0.6, zorder=0)
         top.set_ylabel(f"error across the wall, {unit}\n(positive: material stays)")
-        fine, small = length_unit(float(np.nanmax(np.abs(ds.error_normal_after.values), initial=0.0)))
+        band = "error_normal_after_low" in ds
+        shown = ds.error_normal_after_high if band else ds.error_normal_after
+        fine, small = length_unit(float(np.nanmax(np.abs(shown.values), initial=0.0)))
         bottom.plot(way, small * ds.error_normal_after, color=GREEN, ls="--")
-        if "error_normal_after_low" in ds:
-            fine, small = length_unit(
-                float(np.nanmax(np.abs(ds.error_normal_after_high.values), initial=0.0))
-            )
-            bottom.clear()
-            bottom.plot(way, small * ds.error_normal_after, color=GREEN, ls="--")
+        if band:
             bottom.fill_between(
                 way, small * ds.error_normal_after_low, small * ds.error_normal_after_high, color=GREEN, alpha=0.25,
                 label="force 80 to 120 %",

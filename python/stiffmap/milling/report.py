@@ -15,10 +15,13 @@ from stiffmap.milling.job import Milled, beyond, sizes, verdict
 from stiffmap.milling.pictures import error_figure, machine_path_figure, outline_figure
 from stiffmap.milling.placement import Placements
 from stiffmap.outputs import make_folder, write_rows, write_text
+from stiffmap.plot.style import save
 from stiffmap.process import cutting_force
 from stiffmap.process.force import force_uncertainty
 from stiffmap.report.sheet import Sheet, write_sheet
 from stiffmap.status import Status
+
+PICTURES = ("outline", "error", "machine")
 
 
 def summary(found: Milled) -> dict[str, object]:
@@ -84,7 +87,7 @@ def placement_summary(found: Placements) -> dict[str, object]:
 
 
 def write_report(found: Milled, folder: str | PathLike[str]) -> dict[str, str]:
-    """Write report.html, the compensated program and part.nc into a folder; names of the files. Raises FileError."""
+    """Write report.html, its pictures, the compensated program and part.nc into a folder; names of the files. Raises FileError."""
     target = Path(folder)
     made = {"report": "report.html", "program": f"compensated{found.program.suffix}", "data": "part.nc"}
     make_folder(target)
@@ -95,7 +98,11 @@ def write_report(found: Milled, folder: str | PathLike[str]) -> dict[str, str]:
     if found.job.angle is not None:
         made["drives"] = "drives.csv"
         write_rows(target / made["drives"], *_drives(found))
-    write_sheet(target / made["report"], _sheet(found), _pictures(found), _digests(found))
+    pictures = _pictures(found)
+    for name, figure in zip(PICTURES, pictures.values(), strict=True):
+        made[name] = f"{name}.png"
+        save(figure, target / made[name])
+    write_sheet(target / made["report"], _sheet(found), pictures, _digests(found))
     return made
 
 
@@ -112,7 +119,7 @@ def _drives(found: Milled) -> tuple[list[str], list[list[str]]]:
     return names, [[f"{v:.9g}" for v in row] for row in columns]
 
 
-def _pictures(found: Milled) -> dict[str, Figure | bytes]:
+def _pictures(found: Milled) -> dict[str, Figure]:
     return {
         "The wall of the part, wanted and cut.": outline_figure(found),
         "Error across the wall along the path.": error_figure(found.dataset),
