@@ -95,6 +95,9 @@ class Mechanism:
     def prismatic(self) -> list[bool]:
         ...
     @property
+    def redundancy(self) -> int:
+        ...
+    @property
     def roles(self) -> list[int]:
         ...
     @property
