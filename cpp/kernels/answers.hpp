@@ -19,7 +19,8 @@ struct Answers {
   M never = {};  ///< lanes out of reach
   M closed = {};
   M unstable = {}, ended = {}, unverified = {}, nowhere = {};
-  M stuck = {};  ///< in equilibrium, but not where spins come to rest
+  M unfinished = {};  ///< on a load path that takes more steps than those of most lanes
+  M stuck = {};       ///< in equilibrium, but not where spins come to rest
 
   std::int64_t place(int lane) const { return first + (lane < count ? lane : count - 1); }
   std::int64_t pose(int lane) const { return in.index ? in.index[place(lane)] : place(lane); }
@@ -55,7 +56,8 @@ struct Answers {
     if (nowhere[lane]) return pose_nowhere;
     if (ended[lane]) return pose_ended;
     if (stuck[lane]) return pose_left;
-    if (in.patience == Patience::path) return pose_left;
+    if (unfinished[lane] && in.patience == Patience::path) return pose_heavy;
+    if (in.patience >= Patience::path) return pose_left;
     if (closed[lane]) return pose_heavy;
     return in.patience == Patience::leaps ? pose_left : pose_slow;
   }

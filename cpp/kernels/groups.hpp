@@ -11,11 +11,31 @@ namespace stiffmap::kernel {
 /// The eliminated joints of a chain up to its `first_stiff`, from the base.
 struct Group {
   const Op* joint[6] = {};
+  bool ball = true;  ///< the last three turn about one point
   Group(const Program& P, const ChainProgram& chain) {
-    for (int i = chain.first, k = 0; i <= chain.first_stiff && k < 6; ++i)
-      if (P.ops[i].kind <= OpKind::prismatic && P.ops[i].eliminated) joint[k++] = P.ops + i;
+    int k = 0;
+    for (int i = chain.first; i <= chain.first_stiff && k < 6; ++i) {
+      const Op& op = P.ops[i];
+      if (k > 3 && op.actual.has_translation) ball = false;
+      if (op.kind > OpKind::prismatic || !op.eliminated) continue;
+      if (k > 2 && op.kind == OpKind::prismatic) ball = false;
+      joint[k++] = &op;
+    }
   }
 };
+
+/// Rows of the inverse of three columns, and their determinant.
+inline V invert_columns(const V3 (&c)[3], V (&rows)[3][3]) {
+  const V3 first = cross(c[1], c[2]), second = cross(c[2], c[0]), third = cross(c[0], c[1]);
+  const V size = dot(c[0], first), over = 1.0 / size;
+  const V3* const r[3] = {&first, &second, &third};
+  for (int a = 0; a < 3; ++a) {
+    rows[a][0] = over * r[a]->x;
+    rows[a][1] = over * r[a]->y;
+    rows[a][2] = over * r[a]->z;
+  }
+  return size;
+}
 
 /// Inverse of a 6x6 by Gauss-Jordan, each lane with its own order of rows; returns the smallest pivot.
 inline V invert_by_rows(V (&m)[6][6], V (&x)[6][6]) {
@@ -109,6 +129,61 @@ inline V6 group_residual(Elimination& el, const ChainProgram& chain, const V (&p
   return get(c);
 }
 
+/// J^-1 where the last three joints turn about the end, so that the others alone move it: blocks in place of rows.
+/// Returns what stands for the smallest pivot: determinants over the longest columns.
+inline V invert_ball(const Elimination& el, const Group& group, GroupSlot& k, V (&U)[3][3], V (&S)[3][3],
+                     V (&T)[3][3]) {
+  V3 moves[3], turns[3];
+  V longest = splat(0);
+  for (int a = 0; a < 3; ++a) {
+    const JointSlot& j = el.s.joints[group.joint[a]->slot];
+    const bool slides = group.joint[a]->kind == OpKind::prismatic;
+    moves[a] = slides ? j.w : cross(j.w, k.p - j.o);
+    longest = larger(longest, dot(moves[a], moves[a]));
+    turns[a] = el.s.joints[group.joint[3 + a]->slot].w;
+  }
+  const V moving = invert_columns(moves, U), turning = invert_columns(turns, T);
+  for (int i = 0; i < 3; ++i) {
+    V3 turned{};  // by the first three joints while the end moves along i
+    for (int a = 0; a < 3; ++a)
+      if (group.joint[a]->kind == OpKind::revolute) turned = turned + U[a][i] * el.s.joints[group.joint[a]->slot].w;
+    for (int a = 0; a < 3; ++a) S[a][i] = -(T[a][0] * turned.x + T[a][1] * turned.y + T[a][2] * turned.z);
+  }
+  for (int a = 0; a < 3; ++a)
+    for (int i = 0; i < 3; ++i) {
+      k.inverse[a][i] = U[a][i];
+      k.inverse[a][3 + i] = splat(0);
+      k.inverse[3 + a][i] = S[a][i];
+      k.inverse[3 + a][3 + i] = T[a][i];
+    }
+  const V linear = absolute(moving) / (longest * el.P.length), angular = absolute(turning);
+  return linear < angular ? linear : angular;
+}
+
+/// J^-T A J^-1 of such a group.
+inline void ball_tangent(const V (&A)[6][6], const V (&U)[3][3], const V (&S)[3][3], const V (&T)[3][3], Sym6& K) {
+  V X[6][3], Z[3][3];  // A times the columns of J^-1: translations, and rotations of the last three joints
+  for (int a = 0; a < 6; ++a)
+    for (int i = 0; i < 3; ++i) {
+      X[a][i] = A[a][0] * U[0][i] + A[a][3] * S[0][i];
+      for (int b = 1; b < 3; ++b) X[a][i] += A[a][b] * U[b][i] + A[a][3 + b] * S[b][i];
+      if (a < 3) Z[a][i] = A[3 + a][3] * T[0][i] + A[3 + a][4] * T[1][i] + A[3 + a][5] * T[2][i];
+    }
+  const auto sum = [](const V(&l)[3][3], int i, const V(*r)[3], int q) {
+    return l[0][i] * r[0][q] + l[1][i] * r[1][q] + l[2][i] * r[2][q];
+  };
+  const auto force = [&](int i, int q) { return sum(U, i, X, q) + sum(S, i, X + 3, q); };
+  K.A = {force(0, 0), force(1, 1), force(2, 2), force(0, 1), force(0, 2), force(1, 2)};
+  for (int q = 0; q < 3; ++q) K.B.c[q] = {sum(T, q, X + 3, 0), sum(T, q, X + 3, 1), sum(T, q, X + 3, 2)};
+  K.E = {sum(T, 0, Z, 0), sum(T, 1, Z, 1), sum(T, 2, Z, 2), sum(T, 0, Z, 1), sum(T, 0, Z, 2), sum(T, 1, Z, 2)};
+}
+
+/// Next to a singular configuration: left to the reference; a load path takes negative pivots, but none next to zero.
+inline void judge_group(Elimination& el, V pivot) {
+  el.lowest = select(pivot > 1e-4, el.lowest, splat(-1));
+  if (el.counts) el.closest = select(pivot > 1e-3, el.closest, splat(0));
+}
+
 /// Tangent K = J^-T A J^-1 and c at the last joint of the group.
 inline void group_tangent(Elimination& el, const ChainProgram& chain, Sym6& K, V6& c) {
   const Group group(el.P, chain);
@@ -117,16 +192,20 @@ inline void group_tangent(Elimination& el, const ChainProgram& chain, Sym6& K, V
   k.p = last.o;
   V A[6][6], pull[6], J[6][6], Y[6][6];
   group_stiffness(el, chain, last.F, k.p, A, pull);
+  if (group.ball) {
+    V U[3][3], S[3][3], T[3][3];
+    judge_group(el, invert_ball(el, group, k, U, S, T));
+    ball_tangent(A, U, S, T, K);
+    c = group_residual(el, chain, pull);
+    return;
+  }
   for (int a = 0; a < 6; ++a) {
     const JointSlot& j = el.s.joints[group.joint[a]->slot];
     V column[6];
     put(group.joint[a]->kind == OpKind::prismatic ? V6{j.w, V3{}} : V6{cross(j.w, k.p - j.o), j.w}, column);
     for (int i = 0; i < 6; ++i) J[i][a] = column[i] * (i < 3 ? 1 / el.P.length : 1.0);
   }
-  const V pivot = invert_by_rows(J, k.inverse);
-  // Next to a singular configuration: left to the reference; a load path takes negative pivots, but none next to zero.
-  el.lowest = select(pivot > 1e-4, el.lowest, splat(-1));
-  if (el.counts) el.closest = select(pivot > 1e-3, el.closest, splat(0));
+  judge_group(el, invert_by_rows(J, k.inverse));
   for (int a = 0; a < 6; ++a)
     for (int i = 0; i < 3; ++i) k.inverse[a][i] *= 1 / el.P.length;
   for (int a = 0; a < 6; ++a)

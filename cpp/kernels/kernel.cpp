@@ -210,10 +210,11 @@ struct Block : Answers {
     e.heavy = in.gravity[0] != 0 || in.gravity[1] != 0 || in.gravity[2] != 0;
     Newton newton{P, in, s, e, load, e.gravity};
     newton.turning.read(P, in, command.R, [&](int lane) { return pose(lane); });
-    V iterations = splat(0), steps;
-    M done = newton.solve(usable, P.starts_linear, iterations, steps);
-    if (in.patience == Patience::path && !P.starts_linear && !P.deficient && any(usable & ~done))
-      done |= follow(usable & ~done, newton, iterations, steps);
+    V iterations = splat(0), steps = splat(0);
+    const bool path = in.patience >= Patience::path && !P.starts_linear && !P.deficient;
+    // Poses of the passes for paths are those that Newton's first steps do not settle.
+    M done =
+        path ? follow(usable, newton, iterations, steps) : newton.solve(usable, P.starts_linear, iterations, steps);
     if (P.hanging && e.heavy) return hang(done, newton, iterations, steps);
     V K[6][6];
     newton.dense(newton.answer.K, K);
@@ -240,9 +241,11 @@ struct Block : Answers {
   M follow(M lanes, Newton& newton, V& iterations, V& steps) {
     stand_at_start(lanes);
     LoadPath path{newton};
-    M done = path.follow(lanes, iterations, [&](M anew) { stand_at_start(anew); });
+    const int most = in.patience == Patience::path ? LoadPath::most_of_most : LoadPath::most_iterations;
+    M done = path.follow(lanes, most, iterations, [&](M anew) { stand_at_start(anew); });
     unstable = path.unstable;
     ended = path.ended;
+    unfinished = path.unfinished;
     if (any(ended) && LastAttempt::possible(newton)) done |= attempt(newton, iterations);
     steps = select(lanes, splat(1), steps);
     newton.settle();

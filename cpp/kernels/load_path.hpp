@@ -12,19 +12,22 @@ namespace stiffmap::kernel {
 
 struct LoadPath {
   Newton& n;
-  M unstable = {};  ///< of the lanes that arrived: the energy falls in some direction
-  M ended = {};     ///< lanes whose path of equilibria ends before the whole load
+  M unstable = {};    ///< of the lanes that arrived: the energy falls in some direction
+  M ended = {};       ///< lanes whose path of equilibria ends before the whole load
+  M unfinished = {};  ///< lanes that are still on their way after `most` linearisations
+
+  static constexpr int most_iterations = 4000, most_of_most = 96;
 
   explicit LoadPath(Newton& newton) : n(newton) {}
 
-  /// Follows the path of `lanes`, which stand at their start; returns those that arrive at the whole load. `restart`
-  /// puts lanes back to their start.
+  /// Follows the path of `lanes`, which stand at their start, for at most `most` linearisations; returns those that
+  /// arrive at the whole load. `restart` puts lanes back to their start.
   template <class Restart>
-  M follow(M lanes, V& iterations, const Restart& restart) {
+  M follow(M lanes, int most, V& iterations, const Restart& restart) {
     Elimination& e = n.e;
     M active = lanes, done{};
     e.counts = true;
-    for (int k = 0; k < most_iterations && any(active); ++k) {
+    for (int k = 0; k < most && any(active); ++k) {
       n.put_load(factor, select(looking, factor + ahead, factor));
       e.count_anew();
       n.laws.evaluate(false);
@@ -126,13 +129,13 @@ struct LoadPath {
         active &= ~ended;
       }
     }
+    unfinished = active;
     e.counts = false;
     unstable = done & (stable > 0.0);
     return done;
   }
 
  private:
-  static constexpr int most_iterations = 4000;
   static constexpr double contraction = 0.2, most_tries = 40;
   static constexpr double shortest = 1.0 / 16384, crossing_step = 1.0 / 1024, most_steps = 400;
   static constexpr double most_aims = 32;  // at one change: where they do not come true, halves do

@@ -177,7 +177,7 @@ struct Newton {
   M solve(M usable, bool corners, V& iterations, V& steps) {
     M done = ~usable & usable, failed = ~usable;
     LoadSteps way{P, s};
-    const bool patient = in.patience == Patience::path;
+    const bool patient = in.patience >= Patience::path;
     const bool searches = corners && P.bends && !patient && P.serial_joints == 0;
     const double most_tries = in.max_iterations * (!corners ? 1.0 : patient ? 3.0 : 0.5);
     way.begin(unloaded_lanes());

@@ -209,7 +209,7 @@ struct Program {
 
 /// How long a block of poses may take: a lane that needs more is left to a later pass, so that it holds up only its
 /// like.
-enum class Patience : std::int32_t { quick, leaps, path };
+enum class Patience : std::int32_t { quick, leaps, path, long_path };
 
 /// Whether a load keeps its direction as the tip turns, turns with it, or has the conservative moment (theory E6).
 enum class LoadTurns : std::int32_t { dead, follower, semitangential };

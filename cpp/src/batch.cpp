@@ -237,6 +237,7 @@ class FastBatch {
     };
     again(pose_slow, Patience::leaps);
     again(pose_heavy, Patience::path);
+    again(pose_heavy, Patience::long_path);
     left.clear();
     collect([](std::uint8_t how) { return how == pose_left || how == pose_ended; });
     parallel_chunks(static_cast<long>(left.size()), 1, threads_, [&](int thread, long begin, long end) {
