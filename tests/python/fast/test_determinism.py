@@ -71,3 +71,18 @@ def test_an_answer_keeps_its_memory() -> None:
     others = [machine.solve(position, k * wrench).stiffness for k in (0.0, 2.0, 3.0)]
     assert kept.tobytes() == before.tobytes()
     assert not any(np.shares_memory(a, b) for a, b in zip(others, [kept, *others], strict=False))
+
+
+@pytest.mark.parametrize("name", ["orthoglide-revised", "ur10", "hexapod"])
+def test_bits_of_the_levels(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What docs/big_maps.md promises of clusters: AVX2 and AVX-512 give the same bits, the base level nearly so."""
+    machine = sm.load_machine(name)
+    position = np.random.default_rng(6).uniform(*machine.workspace, (100, 3))
+    answers = {}
+    for level in _core.kernel_levels():
+        monkeypatch.setenv("STIFFMAP_ISA", level)
+        answers[level] = machine.solve(position, [100, 50, -200, 0, 0, 0])
+    if "v3" in answers and "v4" in answers:
+        assert same_bits(answers["v3"], answers["v4"])
+    for other in answers.values():
+        np.testing.assert_allclose(other.displacement, answers["base"].displacement, rtol=0, atol=1e-12)
