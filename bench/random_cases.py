@@ -34,11 +34,11 @@ class Case:
 
 
 def machines(count: int) -> Iterator[Case]:
-    """All hand-made machines, then the oracle's by seed: families of its generator and further classes in turn."""
-    for name, make in UNSEEN.items():
-        yield Case(name, name, sm.Machine(make()))
+    """The oracle's by seed, families of its generator and further classes in turn; then all hand-made machines."""
     for seed in range(count):
         yield of_seed(seed)
+    for name, make in UNSEEN.items():
+        yield Case(name, name, sm.Machine(make()))
 
 
 def of_seed(seed: int) -> Case:
@@ -81,7 +81,7 @@ def columns(case: Case) -> Iterator[tuple[str, Solve, np.ndarray]]:
     w[:, :3] /= np.linalg.norm(w[:, :3], axis=1)[:, None]
     arm = len(machine.legs) == 1 and not machine.free_spins and not any_blocks(machine)
     by_joints = case.drives is not None
-    if by_joints:
+    if case.drives is not None:
         width = 0.3 if arm else 0.0
         p = case.drives + rng.uniform(-width, width, (POSES, len(machine.actuators)))
     else:
@@ -91,7 +91,7 @@ def columns(case: Case) -> Iterator[tuple[str, Solve, np.ndarray]]:
     def at(size: float, **options: object) -> Solve:
         return lambda rows: solve(rows[:, :n], size * rows[:, n:], threads=1, **options)  # type: ignore[arg-type]
 
-    rows, few = np.hstack([p, w]), np.hstack([p, w])[:64]
+    rows, few = np.hstack([p, w]), np.hstack([p, w])[:24]
     name = "joints, {}" if by_joints else "{}"
     borne = level(lambda size: at(size)(few), FORCE, machine.compiled.length)
     yield name.format("unloaded"), lambda rows: solve(rows[:, :n], threads=1), rows
@@ -116,7 +116,8 @@ def any_blocks(machine: sm.Machine) -> bool:
 
 
 def level(solve: Callable[[float], sm.Solution], start: float, length: float, most: float = 1e7) -> float:
-    """A force (N) that nearly all poses bear, no tip moving further than three times `length` (m), of which the double they do not; at most `most`."""
+    """A force (N) that nearly all poses bear, no tip moving further than three times `length` (m), of which the double
+    they do not; at most `most`."""
 
     def bears(size: float) -> bool:
         s = solve(size)
@@ -124,8 +125,8 @@ def level(solve: Callable[[float], sm.Solution], start: float, length: float, mo
         return bool((s.status == sm.Status.CONVERGED).mean() > 1 - MOST_FAILED and np.all(moved < 3 * length))
 
     size = start
-    while size > 1e-3 * start and not bears(size):
-        size /= 2
+    while size > 1e-2 * start and not bears(size):
+        size /= 4
     while size < most and bears(2 * size):
         size *= 2
     return min(size, most)

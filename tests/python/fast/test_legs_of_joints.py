@@ -12,22 +12,31 @@ from tests.python.oracle.unseen import cable_suspension
 
 import stiffmap as sm
 from stiffmap import _core
-from stiffmap.description import Joint, Law, MachineDescription
+from stiffmap.description import Element, Joint, Law, Leg, MachineDescription
 
 
-def struts() -> MachineDescription:
-    """The suspension's cables as struts that push as well, their drives on both sides of the balls' order."""
+def struts(ball: Law | None = None) -> MachineDescription:
+    """The suspension's cables as struts that push as well, their balls free or elastic."""
     d = cable_suspension()
 
-    def pushes(leg_elements: tuple) -> tuple:
-        return tuple(
-            replace(e, law=Law(9e5)) if isinstance(e, Joint) and e.actuated else e for e in leg_elements
-        )
+    def changed(e: Element) -> Element:
+        if not isinstance(e, Joint):
+            return e
+        if e.actuated:
+            return replace(e, law=Law(9e5))
+        return replace(e, law=ball) if e.kind == "spherical" else e
 
-    return replace(d, legs=tuple(replace(leg, elements=pushes(leg.elements)) for leg in d.legs))
+    def leg(of: Leg) -> Leg:
+        return replace(of, elements=tuple(changed(e) for e in of.elements))
+
+    return replace(d, legs=tuple(leg(of) for of in d.legs))
 
 
-MACHINES = {"struts": struts(), "locked balls": Classes(5).task("locked balls").description}
+MACHINES = {
+    "struts": struts(),
+    "elastic balls": struts(Law(2e3)),
+    "locked balls": Classes(5).task("locked balls").description,
+}
 
 
 @pytest.mark.parametrize("level", _core.kernel_levels())
@@ -48,3 +57,4 @@ def test_both_paths_agree(name: str, level: str, monkeypatch: pytest.MonkeyPatch
         assert gap.statuses == 0
         assert gap.poses > 20
         assert gap.worst() < TOLERANCE
+        assert np.median(fast.iterations) < 5
