@@ -82,7 +82,13 @@ def against(
     wrong = "" if elsewhere else objection(truth, status, told, gaps, s)
     numbers = status in (sm.Status.CONVERGED, sm.Status.UNSTABLE)
     off = not truth.found or any(not v < LIMIT for v in gaps.values())
-    if not wrong and numbers and truth.kind != "singular" and off and not elsewhere:
+    if (
+        not wrong
+        and numbers
+        and truth.kind not in ("singular", "unreachable", "locked")
+        and off
+        and not elsewhere
+    ):
         away, falling = bodies.judge(s.displacement, task.loads, task.pose, task.drives, task.kind)
         if np.isnan(away):
             return Check(how, status.name, told, f"{truth.kind}, undecided", gaps, "")
@@ -97,8 +103,8 @@ def objection(truth: Answer, status: sm.Status, told: bool, gaps: dict[str, floa
     numbers = status in (sm.Status.CONVERGED, sm.Status.UNSTABLE)
     if truth.kind == "singular":
         return "" if status == sm.Status.SINGULAR else "singular, not said"
-    if truth.kind == "unreachable":
-        return "" if status == sm.Status.UNREACHABLE else "out of reach, not said"
+    if truth.kind == "unreachable":  # the oracle's steps of closing are no proof
+        return ""
     if not truth.found:  # any equilibrium will do: `against` looks whether it is one
         return ""
     far = truth.crossed or float(np.abs(truth.displacement).max()) > FAR

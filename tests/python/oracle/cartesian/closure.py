@@ -15,6 +15,10 @@ from .structure import Structure
 SLACK = 1e-11  # of what constraints that depend on each other may share
 
 
+SHORTEST = 1 / 4096  # of the way
+LONG = 0.15  # m, rad: of a step of Newton after the first; longer ones may lead to another branch
+
+
 class Unreachable(Exception):
     """Nothing closes there."""
 
@@ -56,16 +60,23 @@ class Closure:
     ) -> tuple[State, Array]:
         p0, r0 = at.p[self.s.tip], at.r[self.s.tip]
         values0 = near.copy()
-        for k in range(1, steps + 1):
-            share = k / steps
+        done, step = 0.0, 1.0 / steps
+        while done < 1:
+            share = min(1.0, done + step)
             to_p = None if p is None else p0 + share * (p - p0)
             to_r = None
             if r is not None:
-                to_r = (
-                    Rotation.from_rotvec(share * Rotation.from_matrix(r @ r0.T).as_rotvec()).as_matrix() @ r0
-                )
+                turn = Rotation.from_matrix(r @ r0.T).as_rotvec()
+                to_r = Rotation.from_rotvec(share * turn).as_matrix() @ r0
             to = {i: values0[i] + share * (v - values0[i]) for i, v in drives.items()}
-            at, near = self.newton(at, near, to_p, to_r, to, last=k == steps)
+            try:
+                at, near = self.newton(at, near, to_p, to_r, to, last=share == 1)
+            except Unreachable:
+                step /= 2
+                if step < SHORTEST:
+                    raise
+                continue
+            done, step = share, 2 * step
         return at, near
 
     def newton(
@@ -74,7 +85,7 @@ class Closure:
         rows = [*self.rigid, *drives]
         goal = np.r_[np.zeros(len(self.rigid)), list(drives.values())]
         tip, size = 6 * self.s.tip, np.inf
-        for _ in range(25):
+        for k in range(25):
             value, slope = self.measured(at, near)
             c, a = value[rows] - goal, slope[rows]
             if p is not None and r is not None:
@@ -92,7 +103,7 @@ class Closure:
                 return at, value
             step = least(a, -c)
             size = float(np.abs(step).max(initial=0.0))
-            if not size < 2:
+            if not size < (2 * LONG if k == 0 else LONG):
                 raise Unreachable("far off")
             at, near = at.moved(step), value
         raise Unreachable("no end of steps")

@@ -17,6 +17,7 @@ ITERATIONS = 60
 SHORTEST = 1 / 4096
 CROSSING = 1 / 512
 MOST = 120
+LOCK = 0.05  # cosine of a spring's middle angle
 FREE = 1e-12  # eigenvalue over the largest of a motion without stiffness
 
 
@@ -127,7 +128,7 @@ class Path:
         return Point(at, multipliers, near, t, slope, self.falling(t))
 
     def follow(self) -> tuple[Point | None, str]:
-        """The equilibrium under the whole load, and how the path ended: found, ends, given up, singular."""
+        """The equilibrium under the whole load, and how the path ended: found, ends, locked, given up, singular."""
         multipliers = np.zeros(self.system.closures)
         t = self.system.at_state(self.start, multipliers, self.near, 0.0)
         if not self.hold(t):
@@ -146,7 +147,7 @@ class Path:
             if to is None:
                 share /= 2
                 if share < SHORTEST:
-                    return None, "ends"
+                    return None, "locked" if self.locked(at) else "ends"
             else:
                 self.crossed |= to.falling != at.falling
                 at, done, share = to, min(1.0, done + share), 2 * share
@@ -162,6 +163,10 @@ class Path:
         i = 6 * self.system.s.tip
         self.pull = found[3].slope[i : i + 6].copy()
         return self.newton(found[0], found[1], found[2], 0.0, 3)
+
+    def locked(self, at: Point) -> bool:
+        """A spring is turned by a right angle about y: its three angles are no function of its frames there."""
+        return bool((np.abs(np.cos(at.near[self.system.s.measures.sines])) < LOCK).any())
 
     def tip(self) -> Array:
         out = np.zeros((6, 6 * self.system.s.size))
