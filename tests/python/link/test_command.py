@@ -276,5 +276,5 @@ def test_plan_picture_is_written(tmp_path):
 
     draw_plan(noisy_field(n=40)[0], WRENCHES, REFERENCE, 2e-8, tmp_path / "plan.png")
     assert (tmp_path / "plan.png").stat().st_size > 20_000
-    with pytest.raises(StiffmapError, match="cannot write the picture"):
+    with pytest.raises(StiffmapError, match="cannot be written"):
         draw_plan(noisy_field(n=40)[0], WRENCHES, REFERENCE, 2e-8, tmp_path / "no" / "plan.png")
