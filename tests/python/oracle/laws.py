@@ -15,7 +15,7 @@ def command_error(c: Any, u: Array, e: Joint) -> Array:
     """Added to the command u."""
     v = u - (e.home[0] if c.reference is None else c.reference)
     out: Array = c.offset + c.slope * v + c.amplitude * np.sin(2 * np.pi * v / c.period + c.phase)
-    return out
+    return out + np.interp(u, *np.transpose(c.knots)) if c.knots else out
 
 
 def law_force(law: Any, a: Array, soft: Array, rubs: Array) -> tuple[Array, tuple[Array, Array] | None]:

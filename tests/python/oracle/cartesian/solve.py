@@ -137,7 +137,8 @@ class Machine:
 def error(c: object, u: float, home: float) -> float:
     v = u - (home if c.reference is None else c.reference)  # type: ignore[attr-defined]
     wave = c.amplitude * np.sin(2 * np.pi * v / c.period + c.phase)  # type: ignore[attr-defined]
-    return float(c.offset + c.slope * v + wave)  # type: ignore[attr-defined]
+    table = np.interp(u, *np.transpose(c.knots)) if c.knots else 0.0  # type: ignore[attr-defined]
+    return float(c.offset + c.slope * v + wave + table)  # type: ignore[attr-defined]
 
 
 def answered(path: Path, at: Point, pose: Pose, command: dict[str, float], modes: int) -> Answer:
