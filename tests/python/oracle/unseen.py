@@ -6,10 +6,9 @@ All dimensions, stiffnesses and masses are invented.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from stiffmap.description import (
     Block,
@@ -24,18 +23,10 @@ from stiffmap.description import (
     Offset,
     Point,
     Pose,
-    Spring,
 )
 
 from .parts import end_of
-
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-SLACK = -2.0  # m: a one-sided law bears nothing from here to zero
-
-
-def turn(axis: str, degrees: float) -> np.ndarray:
-    """(3, 3) rotation about a coordinate axis."""
-    return np.asarray(Rotation.from_euler(axis, degrees, degrees=True).as_matrix())
+from .pieces import X, Y, Z, beam, box_of, closed, leaf, matrix, pulls, strut, triple, turn
 
 
 def over_actuated_3rr() -> MachineDescription:
@@ -54,15 +45,15 @@ def over_actuated_3rr() -> MachineDescription:
             Joint("motor", "revolute", (Z,), (float(shoulder),), actuated=True, law=Law(4e4)),
             Offset("arm_length", Pose.of((upper, 0, 0))),
             Body("arm", 1.2, (-0.15, 0.0, 0.0)),
-            _beam("arm", upper, 0.04),
+            beam("arm", upper, 0.04),
             Joint("elbow", "revolute", (Z,), (float(elbow),)),
             Offset("forearm_length", Pose.of((fore, 0, 0))),
             Body("forearm", 1.0, (-0.18, 0.0, 0.0)),
-            _beam("forearm", fore, 0.03),
+            beam("forearm", fore, 0.03),
         ]
         if i > 0:  # the first leg carries the tool
             out.append(Joint("pin", "revolute", (Z,), (float(-shoulder - elbow),)))
-        legs.append(_closed(f"leg{i}", out, Pose.of((*at, 0.0))))
+        legs.append(closed(f"leg{i}", out, Pose.of((*at, 0.0))))
     box = ((-0.1, -0.1, 0.0), (0.1, 0.1, 0.0))
     tool = (Body("tool", 0.8),)
     return MachineDescription(
@@ -95,7 +86,7 @@ def seven_axis_arm() -> MachineDescription:
         (Leg("arm", tuple(out)),),
         platform=(Body("tool", 2.0, (0.0, 0.0, 0.05)),),
         home=home_pose,
-        workspace=_box(low, high),
+        workspace=box_of(low, high),
     )
 
 
@@ -108,7 +99,7 @@ def tricept_with_wrist() -> MachineDescription:
         Joint("cardan", "universal", (X, Y), lay),
         Joint("slide", "prismatic", (Z,), (-float(np.linalg.norm(at)),)),
         Body("tube", 20.0, (0.0, 0.0, 0.3)),
-        _beam("tube", 1.0, 0.12, along="z"),
+        beam("tube", 1.0, 0.12, along="z"),
     ]
     end = end_of(central)
     legs = [Leg("central", tuple(central))]
@@ -116,20 +107,20 @@ def tricept_with_wrist() -> MachineDescription:
         angle = 2 * np.pi * i / 3 + 0.3
         foot = 0.5 * np.array([np.cos(angle), np.sin(angle), 0.1])
         head = end.p + end.r @ (0.18 * np.array([np.cos(angle), np.sin(angle), 0.0]))
-        legs.append(_strut(f"strut{i}", foot, head, end, Law(8e7), beam=True))
+        legs.append(strut(f"strut{i}", foot, head, end, Law(8e7), elastic=True))
     wrist: tuple[Element, ...] = (
         Body("platform", 15.0, (0.0, 0.0, -0.05)),
         Offset("down", Pose.of((0, 0, -0.15))),
         Joint("fork", "revolute", (Z,), (0.3,), actuated=True, law=Law(3e5)),
         Offset("side", Pose.of((0, 0, -0.12))),
-        _beam("fork", 0.2, 0.1, along="z"),
+        beam("fork", 0.2, 0.1, along="z"),
         Body("fork", 8.0, (0.0, 0.05, 0.0)),
         Joint("swivel", "revolute", (Y,), (0.5,), actuated=True, law=Law(2e5)),
         Body("spindle", 12.0, (0.0, 0.0, -0.1)),
         Offset("tool", Pose.of((0, 0, -0.2))),
     )
     home = end @ end_of(list(wrist))
-    box = _box(home.p - [0.2, 0.2, 0.15], home.p + [0.2, 0.2, 0.15])
+    box = box_of(home.p - [0.2, 0.2, 0.15], home.p + [0.2, 0.2, 0.15])
     return MachineDescription(
         "tricept with wrist",
         tuple(legs),
@@ -152,10 +143,10 @@ def leaf_spring_stage(count: int = 2, segments: int = 6) -> MachineDescription:
             step = Offset(f"half{k}", Pose.of((0, 0, long / segments / 2)))
             out += [
                 step,
-                _leaf(f"leaf{k}", long / segments, wide, thick),
+                leaf(f"leaf{k}", long / segments, wide, thick),
                 Offset(f"other{k}", step.nominal),
             ]
-        legs.append(_closed(f"leaf{i}", out, home))
+        legs.append(closed(f"leaf{i}", out, home))
     stage = (Body("stage", 0.05, (0.0, 0.0, 0.005)),)
     box = (home.translation, home.translation)
     return MachineDescription("leaf-spring stage", tuple(legs), platform=stage, home=home, workspace=box)
@@ -175,9 +166,9 @@ def twin_drive_gantry() -> MachineDescription:
             Offset("rail", Pose.of((x, 0, 0.6))),
             Joint("y", "prismatic", (Y,), (0.2,), actuated=True, law=Law(3e7 + 5e6 * i)),
             Body("carriage", 15.0, (0.0, 0.0, 0.05)),
-            _matrix("wagon", [4e8, 3e8, 5e8, 4e6, 5e6, 3e6]),
+            matrix("wagon", [4e8, 3e8, 5e8, 4e6, 5e6, 3e6]),
             Offset("half", Pose.of((-x, 0, 0))),
-            _beam("beam_half", 0.6, 0.15),
+            beam("beam_half", 0.6, 0.15),
         ]
         sides.append(Branch(f"side{i}", tuple(out)))
     gantry: list[Element] = [
@@ -185,10 +176,10 @@ def twin_drive_gantry() -> MachineDescription:
         Body("beam", 60.0),
         Joint("x", "prismatic", (X,), (0.1,), actuated=True, law=Law(2.5e7)),
         Body("slide", 20.0),
-        _matrix("slide_wagon", [4e8, 3e8, 5e8, 4e6, 5e6, 3e6]),
+        matrix("slide_wagon", [4e8, 3e8, 5e8, 4e6, 5e6, 3e6]),
         Joint("z", "prismatic", (Z,), (-0.1,), actuated=True, law=Law(2e7)),
         Offset("ram", Pose.of((0, 0, -0.2))),
-        _beam("ram", 0.3, 0.12, along="z"),
+        beam("ram", 0.3, 0.12, along="z"),
         Body("spindle", 12.0, (0.0, 0.0, 0.1)),
     ]
     home = end_of(gantry)
@@ -209,12 +200,12 @@ def planar_cable_suspension() -> MachineDescription:
     corners = ((-0.8, -0.5), (0.8, -0.5), (0.8, 0.6), (-0.8, 0.6))
     legs: list[Leg] = []
     guide: list[Element] = [
-        _matrix("floor", [1e8, 1e8, 1e8, 1e6, 1e6, 1e6]),
+        matrix("floor", [1e8, 1e8, 1e8, 1e6, 1e6, 1e6]),
         Joint("gx", "prismatic", (X,), (0.05,)),
         Joint("gy", "prismatic", (Y,), (0.0,)),
         Joint("gz", "revolute", (Z,), (float(np.radians(4.0)),)),
     ]
-    legs.append(_closed("plane", guide, home))
+    legs.append(closed("plane", guide, home))
     for i, corner in enumerate(corners):
         foot = np.array([*corner, 0.0])
         local = np.array([0.1 if corner[0] > 0 else -0.1, 0.06 if corner[1] > 0 else -0.06, 0.0])
@@ -231,10 +222,10 @@ def planar_cable_suspension() -> MachineDescription:
                 actuated=True,
                 law=pulls(2e5, 1e-3),
             ),
-            _matrix("root", [1e9, 1e8, 1e8, 1e6, 1e6, 1e6]),
+            matrix("root", [1e9, 1e8, 1e8, 1e6, 1e6, 1e6]),
             Joint("pin", "revolute", (Z,), (0.0,)),
         ]
-        legs.append(_closed(f"cable{i}", out, home))
+        legs.append(closed(f"cable{i}", out, home))
     box = ((-0.2, -0.15, home.p[2]), (0.2, 0.15, home.p[2]))
     plate = (Body("plate", 5.0, (0.0, 0.01, 0.0)),)
     return MachineDescription(
@@ -257,7 +248,7 @@ def cable_suspension(preload: float = 9e-4) -> MachineDescription:
         foot = np.array([0.9 * a, 0.7 * b, 1.9]) if not low else np.array([0.7 * a, 0.9 * b, 0.05])
         local = np.array([0.15 * a, 0.1 * b, 0.1]) if not low else np.array([0.1 * a, -0.15 * b, -0.1])
         head = home.p + home.r @ local
-        legs.append(_strut(f"cable{i}", foot, head, home, pulls(9e5, preload)))
+        legs.append(strut(f"cable{i}", foot, head, home, pulls(9e5, preload)))
     box = ((-0.2, -0.2, 0.7), (0.2, 0.2, 1.1))
     return MachineDescription(
         "cable suspension",
@@ -275,17 +266,17 @@ def hung_on_springs() -> MachineDescription:
     column: list[Element] = [
         Joint("turn", "revolute", (Z,), (0.0,), actuated=True, law=Law(2e4)),
         Joint("lift", "prismatic", (Z,), (0.6,), actuated=True, law=Law(5e6)),
-        _matrix("column", [2e5, 3e5, 5e7, 2e4, 3e4, 1e4]),
+        matrix("column", [2e5, 3e5, 5e7, 2e4, 3e4, 1e4]),
     ]
     points, springs = [], []
     for i in range(6):
         angle = np.pi / 3 * i + 0.2
         local = 0.2 * np.array([np.cos(angle), np.sin(angle), 0.1 * (-1) ** i])
         anchor = np.array([np.cos(angle + 0.3), np.sin(angle + 0.3), 0.6 + 0.5 * (-1) ** i])
-        points.append(Point(f"eye{i}", _triple(local)))
+        points.append(Point(f"eye{i}", triple(local)))
         length = 0.98 * float(np.linalg.norm(anchor - home.p - local))
         springs.append(
-            ExternalSpring(f"spring{i}", f"platform.eye{i}", _triple(anchor), 3e4, length, i % 2 == 0)
+            ExternalSpring(f"spring{i}", f"platform.eye{i}", triple(anchor), 3e4, length, i % 2 == 0)
         )
     return MachineDescription(
         "hung on springs",
@@ -296,77 +287,6 @@ def hung_on_springs() -> MachineDescription:
         external_springs=tuple(springs),
         task=("z", "rz"),
     )
-
-
-def pulls(stiffness: float, preload: float = 0.0) -> Law:
-    """A drive that only pulls: nothing where it would push. `preload`: m that are wound up beyond the command."""
-    return Law(stiffness, knots=((SLACK, -1e-6 * stiffness * -SLACK), (-preload, 0.0)))
-
-
-def _strut(name: str, foot: np.ndarray, head: np.ndarray, home: Pose, law: Law, *, beam: bool = False) -> Leg:
-    """Universal joint, drive along the line to the head, ball."""
-    line = head - foot
-    z = line / np.linalg.norm(line)
-    x = np.cross((0.3, 0.8, 0.1), z)
-    x /= np.linalg.norm(x)
-    rod: list[Element] = []
-    if beam:
-        rod = [Body("rod", 5.0, (0.0, 0.0, -0.3)), _beam("rod", 0.7, 0.06, along="z")]
-    out: list[Element] = [
-        Offset("foot", Pose.of(foot, np.column_stack([x, np.cross(z, x), z]))),
-        Joint("cardan", "universal", (X, Y), (0.0, 0.0)),
-        Joint("drive", "prismatic", (Z,), (float(np.linalg.norm(line)),), actuated=True, law=law),
-        *rod,
-        Joint("ball", "spherical", (X, Y, Z), (0.0, 0.0, 0.0)),
-    ]
-    return _closed(name, out, home)
-
-
-def _closed(name: str, out: Sequence[Element], home: Pose) -> Leg:
-    return Leg(name, (*out, Offset("attach", end_of(list(out)).inverse() @ home)))
-
-
-def _matrix(name: str, diagonal: Sequence[float]) -> Spring:
-    return Spring(name, stiffness=tuple(map(tuple, np.diag(diagonal).tolist())))
-
-
-def _beam(name: str, length: float, side: float, along: str = "x", young: float = 7e10) -> Spring:
-    """A square bar, at its end."""
-    return _bar(name, length, side, side, young, along)
-
-
-def _leaf(name: str, length: float, wide: float, thick: float) -> Spring:
-    """A piece of steel strip along z that bends about y, in its middle."""
-    area, iy, ix = wide * thick, wide * thick**3 / 12, thick * wide**3 / 12
-    young, shear = 2.1e11, 8.1e10
-    k = [12 * young * iy / length**3, 12 * young * ix / length**3, young * area / length]
-    k += [young * ix / length, young * iy / length, shear * 4 * iy / length]
-    return _matrix(name, k)
-
-
-def _bar(name: str, length: float, width: float, height: float, young: float, along: str) -> Spring:
-    area, second = width * height, width * height**3 / 12
-    bend, turning, both = length**3 / 3, length, length**2 / 2
-    ei = young * second
-    c = np.zeros((6, 6))
-    c[0, 0], c[3, 3] = length / (young * area), length / (0.76 * ei)
-    c[1, 1] = c[2, 2] = bend / ei
-    c[4, 4] = c[5, 5] = turning / ei
-    c[1, 5] = c[5, 1] = both / ei
-    c[2, 4] = c[4, 2] = -both / ei
-    if along == "z":
-        q = np.kron(np.eye(2), turn("y", -90.0))  # x to z
-        c = q @ c @ q.T
-    return Spring(name, compliance=tuple(map(tuple, ((c + c.T) / 2).tolist())))
-
-
-def _triple(v: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(u) for u in v)
-    return (x, y, z)
-
-
-def _box(low: np.ndarray, high: np.ndarray) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    return _triple(low), _triple(high)
 
 
 UNSEEN: dict[str, Callable[[], MachineDescription]] = {
