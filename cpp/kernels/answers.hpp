@@ -25,14 +25,27 @@ struct Answers {
   std::int64_t place(int lane) const { return first + (lane < count ? lane : count - 1); }
   std::int64_t pose(int lane) const { return in.index ? in.index[place(lane)] : place(lane); }
 
-  /// Lanes in which a ball joint's axes are less than `least` from coinciding.
+  /// Lanes in which a ball joint's axes that are meant are less than `least` from coinciding, at the command.
   M locked(double least) const {
     M hit{};
     for (int q = 0; q < P.coordinate_count; ++q) {
-      if (!P.coordinates[q].ball) continue;
+      if (P.coordinates[q].ball != 1) continue;
       V sn, cs;
       sincos(s.closed[q] - P.coordinates[q].middle, sn, cs);
       hit |= absolute(cs) < least;
+    }
+    return hit;
+  }
+
+  /// Lanes in which a free ball joint is near the lock of its axes: there the balance of moments says little about one
+  /// direction, and the reference path counts by other axes (theory C8).
+  [[gnu::noinline]] M near_lock(const V* x) const {
+    M hit{};
+    for (int q = 0; q < P.coordinate_count; ++q) {
+      if (P.coordinates[q].ball != 2) continue;
+      V sn, cs;
+      sincos(x[q] - P.coordinates[q].middle, sn, cs);
+      hit |= ~(absolute(cs) > P.narrow);
     }
     return hit;
   }
@@ -123,6 +136,11 @@ struct Answers {
     V* const efforts = s.dz;  // no step is taken any more
     for (int d = 0; d < P.drive_count; ++d) {
       const DriveProgram& k = P.drives[d];
+      if (k.slot < 0) {  // a winch
+        efforts[d] = -s.tau[k.coordinate];
+        high |= absolute(efforts[d]) > k.force_limit;
+        continue;
+      }
       const JointSlot& j = s.joints[k.slot];
       efforts[d] = P.coordinates[k.coordinate].locked ? -dot(j.w, k.prismatic ? j.F.a : j.F.b) : -s.tau[k.coordinate];
       high |= absolute(efforts[d]) > k.force_limit;
@@ -139,10 +157,13 @@ struct Answers {
       if (k.role == 0) range |= off;
       if (k.role == 1) limit |= off;
     }
+    M slack{};
+    for (int i = 0; i < P.spring_count; ++i)
+      if (P.springs[i].coordinate >= 0) slack |= ~(s.tau[P.springs[i].coordinate] > 0.0);
     const M lock = locked(P.near_lock), stepped = steps > 0.0;
     const M flags = bits(always) | (lock & bits(P.flag_lock)) | (high & bits(P.flag_force)) |
                     (range & bits(P.flag_range)) | (limit & bits(P.flag_limit)) | (stepped & bits(P.flag_stepped)) |
-                    (unverified & bits(P.flag_unverified));
+                    (unverified & bits(P.flag_unverified)) | (slack & bits(P.flag_slack));
     each_lane(wanted, [&](int i) { out.flags[pose(i)] = static_cast<std::uint32_t>(flags[i]); });
   }
 

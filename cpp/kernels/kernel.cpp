@@ -7,6 +7,7 @@
 #include "answers.hpp"
 #include "closing.hpp"
 #include "command_errors.hpp"
+#include "floating.hpp"
 #include "hanging.hpp"
 #include "last_attempt.hpp"
 #include "load_path.hpp"
@@ -88,6 +89,10 @@ struct Block : Answers {
   }
 
   M close() {
+    if (P.floating) {
+      Floating::close(P, command, s);
+      return ~M{};
+    }
     const double* at[W];
     for (int i = 0; i < W; ++i) at[i] = in.position + 3 * pose(i);
     Closing closing{P, s};
@@ -97,6 +102,7 @@ struct Block : Answers {
       command = Closing::base_frame();
       walk<Build::nominal>(P, P.chains[P.root], s.x, command, s);
     }
+    wind(P, command, s);
     return ok;
   }
 
@@ -203,7 +209,7 @@ struct Block : Answers {
     }
     usable &= declared;
     closed = usable;
-    usable &= ~locked(P.locked);
+    if (P.free_balls) usable &= ~near_lock(s.closed);
     const double f = __builtin_sqrt(P.stiffness), g = f * P.length;
     Elimination e{
         P, s, {splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])}, splat(0), {f, f, f, g, g, g}};
@@ -211,10 +217,12 @@ struct Block : Answers {
     Newton newton{P, in, s, e, load, e.gravity};
     newton.turning.read(P, in, command.R, [&](int lane) { return pose(lane); });
     V iterations = splat(0), steps = splat(0);
+    if (P.floating) return float_down(usable, newton, iterations);
     const bool path = in.patience >= Patience::path && !P.starts_linear && !P.deficient;
     // Poses of the passes for paths are those that Newton's first steps do not settle.
     M done =
         path ? follow(usable, newton, iterations, steps) : newton.solve(usable, P.starts_linear, iterations, steps);
+    if (P.free_balls) done &= ~drop_locked();
     if (P.hanging && e.heavy) return hang(done, newton, iterations, steps);
     V K[6][6];
     newton.dense(newton.answer.K, K);
@@ -224,6 +232,24 @@ struct Block : Answers {
     vary(done & ~unstable & ~newton.serial.play.lanes, newton, newton.answer.compliance);
   }
 
+  [[gnu::noinline]] void float_down(M usable, Newton& newton, V iterations) {
+    Floating floating{P, in, s, newton};
+    const M done = floating.run(usable, iterations);
+    unverified = floating.far;
+    V K[6][6];
+    newton.dense(newton.answer.K, K);
+    write(done, newton, K, newton.answer.compliance, iterations, splat(0));
+  }
+
+  /// Lanes whose answer, or whose end, is near the lock of a free ball: nothing is said of them here.
+  M drop_locked() {
+    const M lost = near_lock(s.x);
+    unstable &= ~lost;
+    ended &= ~lost;
+    nowhere &= ~lost;
+    return lost;
+  }
+
   /// What weights turn is let go.
   [[gnu::noinline]] void hang(M held, Newton& newton, V iterations, V steps) {
     Elimination e = {*P.hanging, s, newton.whole_gravity, splat(0), {}};
@@ -231,7 +257,8 @@ struct Block : Answers {
     e.heavy = true;
     Newton loose{*P.hanging, in, s, e, load, newton.whole_gravity};
     loose.turning = newton.turning;
-    const M done = Hanging{loose, newton}.settle(held & ~unstable, iterations);
+    M done = Hanging{loose, newton}.settle(held & ~unstable, iterations);
+    if (P.free_balls) done &= ~near_lock(s.x);
     stuck = held & ~done;
     V K[6][6];
     loose.dense(loose.answer.K, K);

@@ -7,12 +7,12 @@
 #include "laws.hpp"
 #include "load_steps.hpp"
 #include "platform.hpp"
+#include "pulls.hpp"
 #include "residual.hpp"
 #include "serial.hpp"
 #include "steps.hpp"
 #include "tangents.hpp"
 #include "tip_loads.hpp"
-#include "tip_springs.hpp"
 #include "wrenches.hpp"
 
 namespace stiffmap::kernel {
@@ -77,7 +77,7 @@ struct Newton {
   [[gnu::noinline]] void pull() {
     turn_load();
     load = dead_load;
-    if (P.spring_count > 0) tip_springs(P, tip, point, load, nullptr);
+    if (P.spring_count > 0) pull_at_tip(P, s, tip, point, load, nullptr);
   }
   void turn_load() {
     if (!turning.turns()) return;
@@ -87,7 +87,7 @@ struct Newton {
   }
   [[gnu::noinline]] void springs_too() {
     V6 again{};
-    tip_springs(P, tip, point, again, &K);
+    pull_at_tip(P, s, tip, point, again, &K);
   }
 
   [[gnu::noinline]] void linearize() {
@@ -159,7 +159,7 @@ struct Newton {
   [[gnu::noinline]] const Sym6& pull_arm() {
     load = dead_load;
     K = Sym6{};
-    tip_springs(P, tip, point, load, &K);
+    pull_at_tip(P, s, tip, point, load, &K);
     return K;
   }
 

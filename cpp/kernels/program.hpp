@@ -73,7 +73,7 @@ struct CoordinateProgram {
   double stiffness, rest;  ///< of a link spring's direction that is a joint of its own; rest: of a joint's law too
   double friction;         ///< of a free passive joint
   double middle;           ///< of a ball joint's second coordinate: its axes are perpendicular there
-  std::int32_t ball;       ///< it is one
+  std::int32_t ball;       ///< it is one: 1 of axes that are meant, 2 of a free ball
   std::int32_t role, locked, law, from_home;
   std::int32_t by_force;  ///< a hardening law of a joint: its parameter is the deflection that its force has without it
 };
@@ -137,10 +137,16 @@ struct ReachProgram {
   double length;  ///< of all that is between the two centres
 };
 
-/// An external spring at the tip (theory S2): straight, from a point of the tip's body to an anchor in the base.
+/// An external spring at the tip (theory S2): straight, from a point of the tip's body to an anchor in the base. A
+/// cable has a winch (theory B1-B4).
 struct TipSpringProgram {
   double offset[3], anchor[3], stiffness, length;
   std::int32_t tension_only;
+  std::int32_t coordinate;                      ///< of the winch: the free length; -1: none
+  double axis[3], radius;                       ///< pulley
+  double fixed, per_length;                     ///< compliance: fixed + per_length * free length
+  double nominal_offset[3], nominal_anchor[3];  ///< as the controller believes
+  double stretch, slope;                        ///< its command: (length - stretch) * slope
 };
 
 /// A named point. Of the tip's body: its frame in the tip's. Of another: the steps that lead to its body from the base
@@ -202,7 +208,13 @@ struct Program {
   std::uint32_t flag_force, flag_range, flag_limit, flag_lock, flag_always, flag_stepped, flag_unverified;
   std::int32_t grid_n[3], grid_row;  ///< nodes along each axis; numbers per node, a multiple of 8
   double grid_low[3], grid_step[3];
-  double length, stiffness, near_lock, locked;
+  std::int32_t free_balls;                      ///< there are some
+  double length, stiffness, near_lock, narrow;  ///< spreads of a ball's axes: a flag, another chart
+  std::int32_t floating;                        ///< no leg, no spring: cables alone carry the tip
+  std::int32_t free[6];                         ///< of such a platform: its free joints, along and about the base axes
+  double guide[3], tip_from_body[3];            ///< where these joints start; the tip from their end at home, base axes
+  double weight, weight_at[3];                  ///< mass of the platform, its centre in the tip's frame
+  std::uint32_t flag_slack;
   double softest;               ///< lowest stiffness of a spring or drive, in multiples of `stiffness`; at most 1
   double home_p[3], home_R[9];  ///< tip pose at home, R by columns
 };

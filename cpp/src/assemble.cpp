@@ -45,6 +45,7 @@ Mechanism with_any_springs(const Mechanism& m) {
     if (const Index law = out.coordinates[at(j)].law; law >= 0)
       out.laws[at(law)] = Law(m.stiffness * m.unit(j) * m.unit(j) * (1.5 + share(random)));
   out.external_springs.clear();
+  out.cables.clear();
   return out;
 }
 

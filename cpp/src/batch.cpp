@@ -303,7 +303,8 @@ class FastBatch {
       input.patience = patience;
       input.perturbed = variants_.data();
       input.perturbed_leg = moved_.data();
-      input.perturbed_count = out_.variants && !program_.deficient ? static_cast<std::int32_t>(variants_.size()) : 0;
+      input.perturbed_count =
+          out_.variants && !program_.deficient && !program_.floating ? static_cast<std::int32_t>(variants_.size()) : 0;
       if (in_.closed || !program_.closes) s.closed.put(m_, in_, begin, end, pose_at, s.reference, input);
       table.run(&program_, &input, &answer, begin, end, kernel_scratch(table.scratch_size(&program_)));
       for (long place = begin; place < end; ++place) {
@@ -314,7 +315,7 @@ class FastBatch {
         else if (how == pose_unreachable || how == pose_nowhere)
           s.reference.refuse(m_, in_, i, how == pose_nowhere ? Status::not_converged : Status::unreachable,
                              flags_[at(i)], out_);
-        if (how != pose_solved || program_.deficient) forget_variants(i);
+        if (how != pose_solved || program_.deficient || program_.floating) forget_variants(i);
       }
     });
   }

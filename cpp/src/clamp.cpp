@@ -141,6 +141,7 @@ void Clamp::solve(PoseInput in, const Vec6& displacement, ClampResult& out) {
   out.pose.indeterminate.assign(at(machine_.size()), false);
   if (closure.status != Status::converged || !displacement.allFinite()) return fail(Status::unreachable);
   state_.z = ws_.state.z;
+  state_.charts = ws_.state.charts;
   state_.lambda.setZero();
   if (!follow(displacement, ws_.problem)) return fail(Status::not_converged);
 
@@ -152,6 +153,7 @@ void Clamp::solve(PoseInput in, const Vec6& displacement, ClampResult& out) {
   ws_.problem.wrenches = in.wrenches;
   ws_.problem.load_frames.push_back(ws_.nominal.at(point_.node).R);
   ws_.state.z = state_.z;
+  ws_.state.charts = state_.charts;
   ws_.state.lambda = state_.lambda.head(machine_.closures());
   factorize_at(machine_, ws_.problem, ws_.state, ws_.equilibrium);
   EquilibriumResult free;

@@ -32,6 +32,11 @@ enum class Pace { contracting, damped };
 /// Joints that may move, locked spins and (unless wanted) actuators left out.
 void select_unknowns(const Mechanism& m, bool actuators, ClosureWorkspace& ws);
 
+/// Equations besides the loops: where the tip is not given, the winches say how long each cable's way is.
+inline Index winches(const Mechanism& m, const Target& target) {
+  return target.tip ? 0 : static_cast<Index>(m.cables.size());
+}
+
 /// Residual, angles as lengths; returns its largest entry relative to the length.
 double residual(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws);
 

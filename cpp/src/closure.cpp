@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "closing.hpp"
+#include "stiffmap/pull.hpp"
 
 namespace stiffmap {
 namespace closing {
@@ -21,13 +22,13 @@ void select_unknowns(const Mechanism& m, bool actuators, ClosureWorkspace& ws) {
   ws.unknown.clear();
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
-    if (c.role == Role::spring) continue;
+    if (c.role == Role::spring || c.cable >= 0) continue;
     if (c.role == Role::actuator ? actuators : !c.locked) ws.unknown.push_back(j);
   }
 }
 
 double residual(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws) {
-  forward(m, Geometry::nominal, x, ws.frames);
+  forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
   ws.e.setZero();
   if (target.tip) {
     ws.e.head<6>() = -frame_error(ws.frames.at(m.tip), *target.tip);
@@ -36,8 +37,15 @@ double residual(const Mechanism& m, const VecX& x, const Target& target, Closure
   for (std::size_t i = 0; i < m.loops.size(); ++i)
     ws.e.segment<6>(6 + 6 * static_cast<Index>(i)) =
         frame_error(ws.frames.at(m.loops[i].primary), ws.frames.at(m.loops[i].end));
-  for (Index i = 0; i < ws.e.size(); ++i)
+  const Index loops = 6 + m.closures();
+  for (Index i = 0; i < loops; ++i)
     if (i % 6 >= 3) ws.e[i] *= m.length;
+  for (Index i = 0; i < winches(m, target); ++i) {
+    const NodeSpring& s = m.external_springs[at(m.cables[at(i)])];
+    const Vec3 p = ws.frames.point(s.node, s.offset);
+    const double length = cable_line(s.anchor, s.winch->axis, s.winch->radius, p).length;
+    ws.e[loops + i] = commanded_length(s, length) - x[s.coordinate];
+  }
   return ws.e.cwiseAbs().maxCoeff() / m.length;
 }
 
@@ -53,13 +61,21 @@ void equations(const Mechanism& m, const Target& target, ClosureWorkspace& ws) {
     add_jacobian(m, ws.frames, loop.end, ws.frames.at(loop.end).p, 1.0, ws.J.middleRows<6>(row));
     add_jacobian(m, ws.frames, loop.primary, ws.frames.at(loop.primary).p, -1.0, ws.J.middleRows<6>(row));
   }
+  const Index loops = 6 + m.closures();
+  for (Index i = 0; i < winches(m, target); ++i) {
+    const NodeSpring& s = m.external_springs[at(m.cables[at(i)])];
+    const Vec3 p = ws.frames.point(s.node, s.offset);
+    const Vec3 along = commanded_slope(s) * cable_line(s.anchor, s.winch->axis, s.winch->radius, p).along;
+    for (Index j : m.path[at(s.node)]) ws.J(loops + i, j) += along.dot(column(m, ws.frames, j, p).head<3>());
+  }
   const Index n = static_cast<Index>(ws.unknown.size());
   ws.A.resize(ws.J.rows(), n);
   for (Index k = 0; k < n; ++k) {
     const Index j = ws.unknown[at(k)];
     ws.A.col(k) = ws.J.col(j) / m.unit(j);
   }
-  scale_angles(m, ws.A);
+  for (Index i = 0; i < loops; ++i)
+    if (i % 6 >= 3) ws.A.row(i) *= m.length;
 }
 
 double newton_step(const Mechanism& m, const Target& target, ClosureWorkspace& ws) {
@@ -91,6 +107,7 @@ bool close(const Mechanism& m, const Target& target, Pace pace, ClosureWorkspace
     if (pace == Pace::contracting && norm > 0.3) return false;
     if (pace == Pace::contracting && k > 0 && norm > contraction * previous && norm > 1e-9) return false;
     apply(ws, x, norm > 0.1 ? 0.1 / norm : 1.0);
+    if (ws.renumber && pace == Pace::damped) keep_off_locks(m, x, ws.charts);
     previous = norm;
     const double before = error;
     error = residual(m, x, target, ws);
@@ -123,6 +140,7 @@ bool continuation(const Mechanism& m, const Target& target, Set&& set, ClosureWo
     set(s, ws.trial);
     if (close(m, target, Pace::contracting, ws, ws.trial, out.iterations)) {
       x = ws.trial;
+      keep_off_locks(m, x, ws.charts);
       done = s;
       leap *= 2;
       continue;
@@ -142,10 +160,24 @@ bool continuation(const Mechanism& m, const Target& target, Set&& set, ClosureWo
   return true;
 }
 
-void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace& ws, const VecX& x,
-            ClosureResult& out) {
+/// A search starts at `x`, by its own axes.
+void start(const Mechanism& m, ClosureWorkspace& ws, VecX& x) {
+  ws.charts = {};
+  ws.renumber = true;
+  keep_off_locks(m, x, ws.charts);
+}
+
+/// It ends there.
+void stop(const Mechanism& m, ClosureWorkspace& ws, VecX& x) {
+  if (!ws.charts.plain()) x = by_own_axes(m, ws.charts, x, m.home_coordinates);
+  ws.charts = {};
+  ws.renumber = false;
+}
+
+void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace& ws, VecX& x, ClosureResult& out) {
   if (ok && ws.redundant && target.tip && !is_nearest(m, x, target, ws)) out.flags |= flag::branch_unverified;
   const double error = residual(m, x, target, ws);
+  stop(m, ws, x);
   out.residual = error * m.length;
   out.exact = error < round_off;
   out.tip = ws.frames.at(m.tip);
@@ -157,21 +189,28 @@ void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace&
     out.flags |= c.role == Role::actuator ? flag::drive_range : flag::joint_limit;
   }
   for (const Ball& b : m.balls)
-    if (b.spread(x[b.first + 1]) < near_lock) out.flags |= flag::gimbal_lock;
+    if (!b.free && b.spread(x[b.first + 1]) < near_lock) out.flags |= flag::gimbal_lock;
 }
 
 }  // namespace
 
 ClosureWorkspace::ClosureWorkspace(const Mechanism& m)
     : frames(m),
-      J(MatX::Zero(6 + m.closures(), m.size())),
-      A(MatX::Zero(6 + m.closures(), m.size())),
-      e(VecX::Zero(6 + m.closures())),
+      J(MatX::Zero(6 + m.closures() + static_cast<Index>(m.cables.size()), m.size())),
+      A(J),
+      e(VecX::Zero(J.rows())),
       step(VecX::Zero(m.size())),
       x(VecX::Zero(m.size())),
       trial(VecX::Zero(m.size())),
       start(VecX::Zero(m.size())),
       wanted(m.home_coordinates) {}
+
+/// Where all else is closed.
+static void wind_up(const Mechanism& m, ClosureWorkspace& ws, VecX& x) {
+  if (m.cables.empty()) return;
+  forward(m, Geometry::nominal, x, ws.frames);
+  wind(m, ws.frames, x);
+}
 
 ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x) {
   return inverse_closure(m, pose, ws, x, m.home_coordinates, m.home);
@@ -184,24 +223,28 @@ ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorks
   select_unknowns(m, true, ws);
   ws.wanted = m.home_coordinates;
   x = from;
+  start(m, ws, x);
   Pose way;
   const Target target{&way, m.task};
   const auto set = [&](double s, VecX&) { way = on_the_way(at_pose, pose, s); };
   bool ok = continuation(m, target, set, ws, x, out);
   if (!ok && m.beside_home.size() > 0) {  // from home no way leads where a locked hinge has to turn by a right angle
     x = m.beside_home;
-    forward(m, Geometry::nominal, x, ws.frames);
+    start(m, ws, x);
+    forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
     const Pose beside = ws.frames.at(m.tip);
     ok = continuation(m, target, [&](double s, VecX&) { way = on_the_way(beside, pose, s); }, ws, x, out);
     if (ok) out.flags |= flag::branch_unverified;
   }
   if (!ok) {  // the straight way may leave the workspace although its end lies inside
     x = m.home_coordinates;
+    start(m, ws, x);
     way = pose;
     ok = close(m, target, Pace::damped, ws, x, out.iterations);
     if (ok) out.flags |= flag::branch_unverified;
   }
   way = pose;
+  wind_up(m, ws, x);
   finish(m, target, ok, ws, x, out);
   return out;
 }
@@ -222,6 +265,7 @@ VecX joints_only(const Mechanism& m, const VecX& given) {
 ClosureResult follow_actuators(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x) {
   ClosureResult out;
   select_unknowns(m, false, ws);
+  start(m, ws, x);
   const VecX from = x;
   const auto set = [&](double s, VecX& trial) {
     for (std::size_t i = 0; i < m.drives.size(); ++i) {
@@ -254,17 +298,21 @@ ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, Closure
   if (!actuators.allFinite() || !from.allFinite()) return {};
   x = joints_only(m, from);
   select_unknowns(m, false, ws);
+  start(m, ws, x);
   int iterations = 0;
-  if (!close(m, Target{}, Pace::damped, ws, x, iterations)) return {};
+  const bool ok = close(m, Target{}, Pace::damped, ws, x, iterations);
+  stop(m, ws, x);
+  if (!ok) return {};
   return follow_actuators(m, actuators, ws, x);
 }
 
 ClosureResult branch_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x, const VecX& from) {
   ClosureResult out;
   if (!pose.p.allFinite() || !pose.R.allFinite() || !from.allFinite()) return out;
-  const VecX start = joints_only(m, from);
-  ws.wanted = start;
-  x = start;
+  const VecX given = joints_only(m, from);
+  ws.wanted = given;
+  x = given;
+  start(m, ws, x);
   select_unknowns(m, false, ws);
   Pose way;
   const Target target{&way, m.task};
@@ -276,7 +324,8 @@ ClosureResult branch_closure(const Mechanism& m, const Pose& pose, ClosureWorksp
   }
   way = pose;
   if (!ok) {  // actuators and the others may belong to different configurations: all move at once
-    x = start;
+    x = given;
+    start(m, ws, x);
     ok = close(m, target, Pace::damped, ws, x, out.iterations);
     if (ok) out.flags |= flag::branch_unverified;
   }
@@ -287,7 +336,8 @@ ClosureResult branch_closure(const Mechanism& m, const Pose& pose, ClosureWorksp
 ClosureResult given_closure(const Mechanism& m, ClosureWorkspace& ws, const VecX& x) {
   ClosureResult out;
   if (!x.allFinite()) return out;
-  finish(m, Target{}, true, ws, x, out);
+  VecX same = x;
+  finish(m, Target{}, true, ws, same, out);
   return out;
 }
 
@@ -295,8 +345,11 @@ double close_passive(const Mechanism& m, const Pose& tip, ClosureWorkspace& ws, 
   select_unknowns(m, false, ws);
   const Target target{&tip};
   int iterations = 0;
+  start(m, ws, x);
   close(m, target, Pace::damped, ws, x, iterations);
-  return residual(m, x, target, ws);
+  const double error = residual(m, x, target, ws);
+  stop(m, ws, x);
+  return error;
 }
 
 }  // namespace stiffmap

@@ -5,64 +5,22 @@
 #include <cmath>
 #include <limits>
 
+#include "downhill.hpp"
+#include "newton.hpp"
+#include "stiffmap/floating.hpp"
+
 namespace stiffmap {
 namespace {
 
-constexpr double trusted_contraction = 0.2;  // of a Newton step against the last one
-constexpr double steady_contraction = 0.1;   // of the second against the first: no further proof is needed
+constexpr double steady_contraction = 0.1;  // of the second against the first: no further proof is needed
 constexpr double shortest_load_step = 1.0 / 16384;
 constexpr double crossing_step = 1.0 / 1024;  // a change of stability is looked at this closely
 constexpr double trusted_bend = 0.1;          // of a load step: its chord against the tangents at its ends
 constexpr double crossing_bend = 1e-3, bend_noise = 1e-9;
-constexpr double nothing = 1e-15;  // a step that changes no force
-constexpr double balanced = 1e-9;  // merit of an equilibrium, in unit deflections of the machine's stiffness and length
+constexpr double short_of_way = 1e-2;  // a correction of so little of the step's way leads to no other branch
 constexpr int most_load_steps = 400;
 constexpr int patient_steps = 8;
-constexpr int most_idle = 10;  // Newton steps in which the merit is not halved once: at a singular point each one does
-
-/// A linear deflection below this share of the length is closure noise: the coordinate bears nothing.
-constexpr double unloaded = 1e-11;
-/// The same for the force that a gap would have to bear at an equilibrium: certainly noise, and certainly a force.
-constexpr double gap_noise = 1e-15, gap_force = 1e-14;
-
-/// After an iteration with all laws linear: put each law where it carries the force just found. One
-/// that bears nothing stays at its centre, friction opposes the deflection just found: at any share of the load as at
-/// the whole of it.
-void start_laws(const Mechanism& m, Problem& p, State& state) {
-  for (Index j = 0; j < m.size(); ++j) {
-    const Coordinate& c = m.coordinates[at(j)];
-    const bool bears = std::abs(state.z[j]) * m.unit(j) > unloaded * m.length * p.factor;
-    if (c.friction != 0) p.friction_sign[j] = !bears ? 0 : state.z[j] > 0 ? 1 : -1;
-    if (c.law < 0 || c.locked) continue;
-    const Law& law = m.laws[at(c.law)];
-    const double tau = bears ? law.stiffness() / p.drive_scale[j] * state.z[j] : 0.0;
-    p.friction_sign[j] = tau > 0 ? 1 : tau < 0 ? -1 : 0;
-    const double in_spring = tau - law.friction() * p.friction_sign[j];
-    state.z[j] = bears ? law.from_force(in_spring, p.drive_scale[j]) : 0.0;
-  }
-}
-
-/// A coordinate inside a gap that has to bear force after all, of more than `noise` of its own stiffness times the
-/// length, goes to the end of the gap.
-bool leave_gaps(const Mechanism& m, const Problem& p, const Linearization& lin, double noise, State& state) {
-  bool left = false;
-  for (Index j = 0; j < m.size(); ++j) {
-    const Coordinate& c = m.coordinates[at(j)];
-    if (c.law < 0 || c.locked || lin.kind[at(j)] != Kind::free) continue;
-    const Law& law = m.laws[at(c.law)];
-    if (std::abs(lin.r[j]) * m.unit(j) <= noise * m.length * law.stiffness()) continue;
-    state.z[j] = law.from_force(lin.tau[j] - law.friction() * p.friction_sign[j] - lin.r[j], p.drive_scale[j]);
-    left = true;
-  }
-  return left;
-}
-
-/// Forces balance and loops are closed: a vanishing step alone says nothing where the tangent is singular.
-bool in_balance(const Mechanism& m, const EquilibriumWorkspace& ws) {
-  return ws.saddle.merit(ws.lin) < balanced * std::sqrt(m.stiffness) * m.length;
-}
-
-enum class Outcome { converged, failed, distrusted };
+constexpr int few_iterations = 12;  // of whole steps across corners: they end soon or go to and fro
 
 /// Counts where the determinant changed sign since the last converged load step.
 void count_sign(const SaddleSystem& saddle, double& sign, EquilibriumResult& out) {
@@ -77,98 +35,6 @@ double unloaded_sign(const Mechanism& m, Problem& p, EquilibriumWorkspace& ws, c
   p.factor = 0;
   factorize_at(m, p, state, ws);
   return ws.saddle.regular() ? ws.saddle.determinant_sign() : 0;
-}
-
-/// Halves the step until the merit falls; keeps the shortest if it never does.
-void line_search(const Mechanism& m, const Problem& p, EquilibriumWorkspace& ws, State& state, double merit) {
-  ws.before = state;
-  double share = 1;
-  for (int k = 0; k < 8; ++k, share *= 0.5) {
-    state.z = ws.before.z + share * ws.dz;
-    state.lambda = ws.before.lambda + share * ws.dlambda;
-    linearize(m, p, state, ws.lin);
-    if (ws.saddle.merit(ws.lin) < (1 - 0.1 * share) * merit) return;
-  }
-}
-
-/// Newton's steps at one load. `trusting`: leave as soon as the first steps do not shrink fast, so that the
-/// result is the continuation of the start and no other root (theory E9). A gap bears what is more than `noise`.
-Outcome iterate(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bool cold, bool trusting, double noise,
-                EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
-  const bool knots = has_knots(m);
-  double first = 0, previous = 0, least = std::numeric_limits<double>::infinity();
-  int idle = 0;
-  out.contraction = 0;
-  p.secant_laws = p.first_order = cold && knots;
-  if (p.secant_laws) p.friction_sign.setZero();  // not those of an attempt at more of the load
-  linearize(m, p, state, ws.lin);
-  for (int k = 0; k < opt.max_iterations; ++k) {
-    ws.saddle.assemble(m, ws.lin);
-    ws.saddle.factorize();
-    force_balance(m, ws.lin, ws.saddle, ws.force);
-    ws.saddle.solve(ws.force, ws.lin.e, ws.dz, ws.dlambda);
-    ++out.iterations;
-    const double norm = ws.saddle.step_norm(m, ws.dz);
-    if (!std::isfinite(norm)) return Outcome::failed;
-    if (p.secant_laws) {
-      state.z += ws.dz;
-      state.lambda += ws.dlambda;
-      start_laws(m, p, state);
-      p.secant_laws = p.first_order = false;
-      linearize(m, p, state, ws.lin);
-      continue;
-    }
-    if (first > 0 && out.contraction == 0) out.contraction = norm / first;
-    // A short step may still cross a corner, after which the force is another: two in a row do not.
-    const bool settled =
-        norm < opt.tolerance && (!knots || norm < nothing || (previous > 0 && previous < opt.tolerance));
-    if (settled) {
-      if (knots && !ws.saddle.regular() && leave_gaps(m, p, ws.lin, noise, state)) {
-        linearize(m, p, state, ws.lin);
-        continue;
-      }
-      if (!ws.saddle.regular() && !in_balance(m, ws)) return trusting ? Outcome::distrusted : Outcome::failed;
-      state.z += ws.dz;
-      state.lambda += ws.dlambda;
-      return Outcome::converged;
-    }
-    if (trusting && !knots) {
-      if (first == 0) first = norm;
-      if (norm > largest_step) return Outcome::distrusted;
-      if (previous > 0 && norm > trusted_contraction * previous && norm > 1e-7) return Outcome::distrusted;
-    }
-    previous = norm;
-    const double merit = ws.saddle.merit(ws.lin);
-    idle = merit < 0.5 * least ? 0 : idle + 1;
-    if (merit < 0.5 * least) least = merit;
-    const bool last_attempt = !trusting && !knots && opt.load_steps == 0;
-    if (last_attempt && idle > most_idle && !in_balance(m, ws)) return Outcome::failed;  // it wanders
-    ws.before = state;
-    state.z += ws.dz;
-    state.lambda += ws.dlambda;
-    linearize(m, p, state, ws.lin);
-    // The merit mixes closure and force: far steps may raise it harmlessly once, so only guard
-    // against growth when the steps have stopped shrinking.
-    if ((knots || !trusting) && k > 2 && !(ws.saddle.merit(ws.lin) < 2 * merit)) {
-      state = ws.before;
-      line_search(m, p, ws, state, merit);
-    }
-  }
-  return Outcome::failed;
-}
-
-/// Newton at one load. Whether a gap bears a force next to round-off is found by trying: where Newton does not settle
-/// with it, it was noise.
-Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bool cold, bool trusting,
-               EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
-  const Outcome outcome = iterate(m, p, opt, cold, trusting, gap_force, ws, state, out);
-  if (outcome != Outcome::converged || !has_knots(m) || ws.saddle.regular()) return outcome;
-  ws.settled = state;
-  if (!leave_gaps(m, p, ws.lin, gap_noise, state)) return outcome;
-  if (iterate(m, p, opt, false, trusting, gap_noise, ws, state, out) == Outcome::converged) return outcome;
-  state = ws.settled;
-  factorize_at(m, p, state, ws);
-  return outcome;
 }
 
 Outcome equal_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, int steps, EquilibriumWorkspace& ws,
@@ -220,13 +86,14 @@ class LoadPath {
     out_.flags |= flag::load_stepped;
     p_.factor = 0;
     if (newton(m_, p_, opt_, true, false, ws_, state_, out_) != Outcome::converged) return Outcome::failed;
-    note(stable_, ws_.slope_before);
+    note(stable_, ws_.slope_before, wrench_slope_before_);
     double done = 0, step = 0.5;
     for (int k = 0; k < most_load_steps; ++k) {
       p_.factor = std::min(1.0, done + step);
       if (advance(p_.factor - done)) {
         if (done = p_.factor; done == 1) return Outcome::converged;
         step *= 2;
+        renumber();
         continue;
       }
       state_ = ws_.step_start;
@@ -245,19 +112,36 @@ class LoadPath {
   EquilibriumResult& out_;
   bool by_sign_;       ///< stability by the determinant's sign
   double stable_ = 0;  ///< at the start of the step: falling directions, or the determinant's sign
+  VecX wrench_slope_, wrench_slope_before_;  ///< of the loops
 
-  void note(double& stable, VecX& slope) {
+  void note(double& stable, VecX& slope, VecX& wrench_slope) {
     load_slope(m_, p_, ws_, slope);
+    wrench_slope = ws_.dlambda;
     out_.falling = ws_.stability.falling(ws_.saddle);
     if (!by_sign_) stable = static_cast<double>(out_.falling);
     else stable = ws_.saddle.regular() ? ws_.saddle.determinant_sign() : stable_;
   }
 
+  /// Before a step: within it, its chord and the tangents at its ends count by the same axes.
+  void renumber() {
+    if (!off_locks(m_, p_, state_)) return;
+    factorize_at(m_, p_, state_, ws_);
+    note(stable_, ws_.slope_before, wrench_slope_before_);
+  }
+
   bool advance(double step) {
     ws_.step_start = state_;
-    if (newton(m_, p_, opt_, false, true, ws_, state_, out_) != Outcome::converged) return false;
+    // From the end of the tangent: where stiff springs turn far, Newton's steps from its start shrink only if they are
+    // tiny.
+    ws_.dz = step * ws_.slope_before;
+    const double way = ws_.saddle.step_norm(m_, ws_.dz);
+    if (!(way < largest_step)) return false;
+    state_.z += ws_.dz;
+    state_.lambda += step * wrench_slope_before_;
+    if (newton(m_, p_, opt_, false, true, ws_, state_, out_, std::max(1e-7, short_of_way * way)) != Outcome::converged)
+      return false;
     double stable = 0;
-    note(stable, ws_.slope);
+    note(stable, ws_.slope, wrench_slope_);
     // The chord against the mean of the tangents at both ends: on another branch they disagree.
     ws_.dz = state_.z - ws_.step_start.z;
     const double chord = ws_.saddle.step_norm(m_, ws_.dz);
@@ -269,6 +153,7 @@ class LoadPath {
     out_.sign_changes += by_sign_ && crossed;
     stable_ = stable;
     ws_.slope_before = ws_.slope;
+    wrench_slope_before_ = wrench_slope_;
     return true;
   }
 };
@@ -301,38 +186,52 @@ Outcome steps_with_corners(const Mechanism& m, Problem& p, const EquilibriumOpti
   return Outcome::converged;
 }
 
+/// Laws with corners of which none sticks: the whole load at once, where that needs it by way of least energy. Not
+/// taken where the tip leaps.
+bool at_once_with_corners(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
+                          State& state, EquilibriumResult& out) {
+  p.factor = 1;
+  EquilibriumOptions few = opt;
+  few.max_iterations = std::min(opt.max_iterations, few_iterations);
+  linearize(m, p, state, ws.lin);
+  const Vec3 tip = ws.lin.frames.at(m.tip).p;
+  const auto found = [&] {
+    out.falling = ws.stability.falling(ws.saddle);
+    return out.falling == 0 && !leaps(m, ws.lin.frames.at(m.tip).p - tip);
+  };
+  if (newton(m, p, few, true, true, ws, state, out) == Outcome::converged && found()) return true;
+  state = ws.start;
+  if (!settle_downhill(m, p, opt.tolerance, ws, state, out)) return false;
+  factorize_at(m, p, state, ws);
+  return found();
+}
+
 Outcome adaptive_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
                        State& state, EquilibriumResult& out) {
-  if (has_knots(m)) return steps_with_corners(m, p, opt, ws, state, out);
+  if (has_knots(m)) {
+    if (!rubs_or_sticks(m) && at_once_with_corners(m, p, opt, ws, state, out)) return Outcome::converged;
+    state = ws.start;
+    return steps_with_corners(m, p, opt, ws, state, out);
+  }
   LoadPath path(m, p, opt, ws, state, out);
   if (path.at_once()) return Outcome::converged;
   state = ws.start;
   return path.follow();
 }
 
+/// A platform in cables alone: the minimum of the energy that lies downhill, then Newton's last steps.
+Outcome float_down(const Mechanism& m, Problem& p, EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
+  p.factor = 1;
+  const FloatingResult found = find_floating(m, p, ws.slope);
+  out.iterations = found.iterations;
+  if (found.leapt) out.flags |= flag::branch_unverified;
+  if (!found.found) return Outcome::failed;
+  for (const Index j : m.path[at(m.tip)]) state.z[j] = ws.slope[j] - p.base[j];
+  out.falling = -1;
+  return Outcome::converged;
+}
+
 }  // namespace
-
-bool has_knots(const Mechanism& m) {
-  const auto has_friction = [](const Coordinate& c) { return c.friction != 0; };
-  if (std::any_of(m.coordinates.begin(), m.coordinates.end(), has_friction)) return true;
-  return std::any_of(m.laws.begin(), m.laws.end(),
-                     [](const Law& law) { return law.has_knots() || law.friction() != 0; });
-}
-
-void factorize_at(const Mechanism& m, const Problem& p, const State& state, EquilibriumWorkspace& ws) {
-  linearize(m, p, state, ws.lin);
-  ws.saddle.assemble(m, ws.lin);
-  ws.saddle.factorize();
-}
-
-void force_balance(const Mechanism& m, const Linearization& lin, const SaddleSystem& saddle, VecX& force) {
-  for (Index j = 0; j < m.size(); ++j) {
-    force[j] = -lin.da[j] * lin.r[j];
-    if (lin.kind[at(j)] != Kind::fixed) continue;
-    const bool stuck = lin.dtau[j] > 0 && !m.coordinates[at(j)].locked;
-    force[j] = stuck ? -lin.r[j] / (lin.dtau[j] * saddle.scale()[j] * saddle.scale()[j]) : 0.0;
-  }
-}
 
 EquilibriumWorkspace::EquilibriumWorkspace(const Mechanism& m)
     : lin(m),
@@ -352,7 +251,9 @@ EquilibriumResult solve_equilibrium(const Mechanism& m, Problem& problem, const 
                                     EquilibriumWorkspace& ws, State& state) {
   EquilibriumResult out;
   Outcome how;
-  if (options.load_steps > 0) {
+  if (m.floating) {
+    how = float_down(m, problem, ws, state, out);
+  } else if (options.load_steps > 0) {
     how = equal_steps(m, problem, options, options.load_steps, ws, state, out);
     out.falling = -1;
   } else {
@@ -369,6 +270,7 @@ EquilibriumResult solve_equilibrium(const Mechanism& m, Problem& problem, const 
   }
   problem.factor = 1;
   if (how != Outcome::converged) return out;
+  off_locks(m, problem, state);
   factorize_at(m, problem, state, ws);
   if (!in_balance(m, ws)) return out;
   if (out.falling < 0) out.falling = ws.stability.falling(ws.saddle);

@@ -9,10 +9,14 @@
 #include "plan/closure.hpp"
 #include "plan/places.hpp"
 #include "plan/spins.hpp"
+#include "stiffmap/pull.hpp"
 #include "stiffmap/spins.hpp"
 
 namespace stiffmap {
 namespace {
+
+constexpr double narrow_in_lanes =
+    0.1;  // spread of a free ball's axes below which a lane is left to the reference path
 
 /// Strokes in the order of their operations' numbers.
 void add_strokes(const Mechanism& m, FastPlanData& d) {
@@ -42,6 +46,60 @@ void add_strokes(const Mechanism& m, FastPlanData& d) {
   }
 }
 
+void put(const Vec3& v, double (&out)[3]) {
+  for (int i = 0; i < 3; ++i) out[i] = v[i];
+}
+
+TipSpringProgram tip_spring(const NodeSpring& s, const FromTip& tip) {
+  TipSpringProgram k{};
+  put(tip.actual * s.offset, k.offset);
+  put(s.anchor, k.anchor);
+  k.stiffness = s.stiffness;
+  k.length = s.length;
+  k.tension_only = s.tension_only;
+  k.coordinate = -1;
+  if (!s.winch) return k;
+  const Winch& w = *s.winch;
+  put(tip.actual * Vec3(s.offset + w.point_error), k.offset);
+  put(s.anchor + w.anchor_error, k.anchor);
+  put(tip.nominal * s.offset, k.nominal_offset);
+  put(s.anchor, k.nominal_anchor);
+  put(w.axis, k.axis);
+  k.tension_only = 1;
+  k.coordinate = i32(s.coordinate);
+  k.radius = w.radius;
+  k.fixed = pull_of(s, 0, 0, true).stiffness;
+  k.fixed = 1 / k.fixed;
+  k.per_length = w.elasticity > 0 ? 1 / (w.elasticity * w.factor) : 0;
+  k.slope = commanded_slope(s);
+  k.stretch = -commanded_length(s, 0) / k.slope;
+  return k;
+}
+
+/// The platform that floats: its free joints, and its bodies as one.
+std::string fill_floating(const Mechanism& m, FastPlanData& d) {
+  Program& p = d.program;
+  const auto& free = m.path[static_cast<std::size_t>(m.tip)];
+  if (free.size() != 6) return "a platform in cables that guides hold";
+  Frames f(m);
+  forward(m, Geometry::nominal, m.home_coordinates, f);
+  const Node& first = m.nodes[static_cast<std::size_t>(m.coordinates[static_cast<std::size_t>(free[0])].node)];
+  const Vec3 body = f.at(m.coordinates[static_cast<std::size_t>(free[5])].node).p;
+  put(f.at(first.parent).p, p.guide);
+  put(m.home.p - body, p.tip_from_body);
+  for (std::size_t i = 0; i < 6; ++i) p.free[i] = i32(free[i]);
+  Vec3 moment = Vec3::Zero();
+  for (const NodeBody& b : m.bodies) {
+    const FromTip tip = from_tip(m, b.node);
+    if (!tip.rigid) continue;  // of the base
+    p.weight += b.mass;
+    moment += b.mass * (tip.actual * b.com);
+  }
+  if (p.weight > 0) put(moment / p.weight, p.weight_at);
+  p.floating = 1;
+  return "";
+}
+
 void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData& d) {
   for (const Law& law : m.laws) {
     d.laws.push_back({law.stiffness(), law.cubic(), law.friction(), i32(d.knots.size() / 3), i32(law.knots().size())});
@@ -60,7 +118,8 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
   for (const Ball& b : m.balls) {
     CoordinateProgram& c = d.coordinates[static_cast<std::size_t>(b.first + 1)];
     c.middle = b.middle;
-    c.ball = 1;
+    c.ball = b.free ? 2 : 1;
+    d.program.free_balls |= b.free;
   }
   for (std::size_t i = 0; i < m.drives.size(); ++i) {
     const Drive& k = m.drives[i];
@@ -69,8 +128,10 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
                           e.slope, e.amplitude, e.period, e.phase, e.reference});
       for (const auto& [u, error] : e.knots) d.error_knots.insert(d.error_knots.end(), {u, error});
     }
-    d.drives.push_back({chains.drives[i].coordinate, chains.drives[i].slot, chains.drives[i].prismatic,
-                        m.home_coordinates[k.coordinate], k.numbers.compliance_slope, k.numbers.force_limit});
+    const bool cable = m.coordinates[static_cast<std::size_t>(k.coordinate)].cable >= 0;
+    const auto joint = cable ? DriveSlot{i32(k.coordinate), -1, 1} : chains.drives[i];
+    d.drives.push_back({joint.coordinate, joint.slot, joint.prismatic, m.home_coordinates[k.coordinate],
+                        k.numbers.compliance_slope, k.numbers.force_limit});
   }
   add_strokes(m, d);
   for (const ElasticJoint& e : chains.elastic) {
@@ -185,8 +246,9 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.flag_lock = flag::gimbal_lock;
   p.flag_stepped = flag::load_stepped;
   p.flag_unverified = flag::branch_unverified;
+  p.flag_slack = flag::slack;
   p.near_lock = near_lock;
-  p.locked = locked;
+  p.narrow = narrow_in_lanes;
   p.length = m.length;
   p.stiffness = m.stiffness;
   p.softest = softest(m);
@@ -227,20 +289,18 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
     : data_(std::make_unique<FastPlanData>()) {
   for (const NodeSpring& s : m.external_springs) {
     const FromTip tip = from_tip(m, s.node);
-    const Vec3 at = tip.actual * s.offset;
     if (!tip.rigid) missing_ = "external springs that are not at the tip";
-    else
-      data_->springs.push_back(
-          {{at[0], at[1], at[2]}, {s.anchor[0], s.anchor[1], s.anchor[2]}, s.stiffness, s.length, s.tension_only});
+    else data_->springs.push_back(tip_spring(s, tip));
   }
   const CompiledChains chains = compile_chains(m, *data_);
   if (missing_.empty()) missing_ = chains.missing;
-  find_serial(*data_);
+  if (!m.floating) find_serial(*data_);
   data_->program.deficient = is_deficient(m, *data_);
   if (data_->program.deficient) data_->program.flag_always |= flag::rigid_direction;
+  else if (missing_.empty() && m.floating) missing_ = fill_floating(m, *data_);
   else if (missing_.empty() && chains.deficient)
     missing_ = "a chain with neither a full link spring nor six joints that yield";
-  if (data_->program.legs_op < 0) missing_ = "no legs";
+  if (data_->program.legs_op < 0 && !m.floating) missing_ = "no legs";
   if (missing_.empty() && m.beside_home.size() > 0) missing_ = "hinges that do not lock at home";
   if (!missing_.empty()) return;
   const Spins spins(m);
@@ -248,21 +308,22 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   fill_tables(m, chains, *data_);
   compile_places(m, chains, *data_);
   const bool box = (high - low).minCoeff() >= 0 && high.allFinite();
-  const bool leg_by_leg = m.task == full_task && only_legs_have_joints(m, *data_) && compile_closure(m, *data_);
+  const bool leg_by_leg =
+      !m.floating && m.task == full_task && only_legs_have_joints(m, *data_) && compile_closure(m, *data_);
   if (leg_by_leg) recognise_planar_legs(m, *data_);
   if (leg_by_leg) recognise_arm(m, *data_);
   if (leg_by_leg) bound_reach(m, *data_);
-  const bool whole = !leg_by_leg && box && compile_whole_closure(m, *data_);
+  const bool whole = !m.floating && !leg_by_leg && box && compile_whole_closure(m, *data_);
   link(m, *data_);
   Program& p = data_->program;
   for (std::size_t i = 0; i < 6; ++i) p.task[i] = m.task[i];
   for (int i = 0; i < 3; ++i) p.home_p[i] = m.home.p[i];
   for (int i = 0; i < 9; ++i) p.home_R[i] = m.home.R(i % 3, i / 3);
   p.open_task = m.task != full_task;
-  p.closes = leg_by_leg && (box || p.planar) ? 1 : whole ? 2 : 0;
-  if (p.unknown_count == 0) p.closes = 0;  // a structure stands at home alone
+  p.closes = m.floating ? (m.task == full_task ? 1 : 0) : leg_by_leg && (box || p.planar) ? 1 : whole ? 2 : 0;
+  if (p.unknown_count == 0 && !m.floating) p.closes = 0;  // a structure stands at home alone
   if (m.redundancy > 0 && !link_nearness(m, *data_)) p.closes = 0;
-  if (p.closes && !p.planar) place_grid(m, low, high, grid_nodes, *data_);
+  if (p.closes && !p.planar && !m.floating) place_grid(m, low, high, grid_nodes, *data_);
   if (heavy_spins_ && !p.deficient && let_spins_hang(m, spins, *data_)) link_hanging(*data_);
 }
 

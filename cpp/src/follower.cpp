@@ -161,7 +161,7 @@ PathPoint Follower::report(const LoadedState& y) const {
   out.along = y.along;
   const Pose& T = lin.frames.at(point_.node);
   out.displacement << T * point_.offset - nominal_.p, log_so3(T.R * nominal_.R.transpose());
-  out.x = lin.x;
+  out.x = by_own_axes(m_, y.state.charts, lin.x, ws_.x);
   out.unstable = y.unstable;
   return out;
 }
@@ -178,7 +178,7 @@ Crossing Follower::critical(const LoadedState& y) const {
   CriticalPoint& p = out.point;
   p.load = y.load;
   p.along = y.along;
-  p.x = ws_.equilibrium.lin.x;
+  p.x = by_own_axes(m_, y.state.charts, ws_.equilibrium.lin.x, ws_.x);
   VecX v = critical_mode(saddle, m_);
   const double gradient = std::max(gradient_.norm(), noise * J_.topRows<3>().norm());
   p.limit = std::abs(gradient_.dot(v.head(n))) > limit_share * gradient * v.head(n).norm();

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "closing.hpp"
+#include "stiffmap/pull.hpp"
 
 namespace stiffmap {
 namespace {
@@ -124,6 +125,7 @@ HomeFit close_home(Mechanism& m, HomeSearch search) {
   else out.closed = residual(m, x, target, ws) < near_enough && close(m, target, Pace::damped, ws, closed, iterations);
   out.closest = gaps(m, closed, target, ws);
   if (!out.closed) return out;
+  wind(m, ws.frames, closed);
   x = closed;
   if (m.task != full_task) m.home = ws.frames.at(m.tip);
   return out;

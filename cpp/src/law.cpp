@@ -75,4 +75,15 @@ double Law::from_force(double tau, double scale) const {
   return 0.5 * (lo + hi);
 }
 
+double Law::from_deflection(double a, double scale) const {
+  const std::size_t n = knots_.size();
+  if (a <= knots_.front().first || a >= knots_.back().first) {
+    const std::size_t end = a <= knots_.front().first ? 0 : n - 1;
+    return z_[end] + (a - knots_[end].first) * (1 + scale) / scale;
+  }
+  std::size_t i = 1;
+  while (knots_[i].first <= a) ++i;
+  return z_[i - 1] + (a - knots_[i - 1].first) / (knots_[i].first - knots_[i - 1].first) * (z_[i] - z_[i - 1]);
+}
+
 }  // namespace stiffmap

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/linearization.hpp"
 
+#include "stiffmap/pull.hpp"
+
 namespace stiffmap {
 namespace {
 
@@ -66,14 +68,15 @@ void add_loads(const Mechanism& m, const Problem& p, Linearization& out) {
       add_wrench(m, {b.node, out.frames.point(b.node, b.com), p.factor * b.mass * p.gravity, Vec3::Zero()}, out);
 }
 
-void add_external_spring(const Mechanism& m, const NodeSpring& s, Linearization& out) {
-  const Vec3 p = out.frames.point(s.node, s.offset), d = p - s.anchor;
-  const double length = d.norm();
-  if (length < 1e-12 || (s.tension_only && length <= s.length)) return;
-  const Vec3 u = d / length;
-  const double force = s.stiffness * (length - s.length);
-  add_wrench(m, {s.node, p, -force * u, Vec3::Zero()}, out);
-  const Mat3 k = s.stiffness * u * u.transpose() + force / length * (Mat3::Identity() - u * u.transpose());
+/// Theory (B4): its stiffness along the line, and what the force does that turns with it. `linear`: also if slack.
+void add_external_spring(const Mechanism& m, const NodeSpring& s, bool linear, Linearization& out) {
+  const Vec3 p = pulled_point(s, out.frames);
+  const CableLine line = line_of(s, p);
+  const Pull pull = pull_of(s, line.length, free_length(s, out.x), linear && s.winch);
+  if (pull.stiffness == 0 || line.along.isZero(0)) return;
+  if (s.winch) out.r[s.coordinate] -= pull.force;  // what the winch has to hold
+  add_wrench(m, {s.node, p, -pull.force * line.along, Vec3::Zero()}, out);
+  const Mat3 k = pull.stiffness * line.along * line.along.transpose() + pull.force * line.bend;
   const auto& path = m.path[at(s.node)];
   for (Index i : path)
     for (Index j : path)
@@ -180,7 +183,7 @@ void Linearization::point_jacobian(const Mechanism& m, Index node, const Vec3& o
 
 void linearize(const Mechanism& m, const Problem& problem, const State& state, Linearization& out) {
   evaluate_laws(m, problem, state, out);
-  forward(m, Geometry::actual, out.x, out.frames);
+  forward(m, Geometry::actual, out.x, out.frames, &state.charts);
   out.K.setZero();
   out.H.setZero();
   out.J.setZero();
@@ -189,7 +192,7 @@ void linearize(const Mechanism& m, const Problem& problem, const State& state, L
   add_loads(m, problem, out);
   if (problem.first_order) out.H.setZero();
   for (const NodeSpring& s : m.external_springs)
-    if (!problem.unpulled || s.node != m.tip) add_external_spring(m, s, out);
+    if (!problem.unpulled || s.node != m.tip) add_external_spring(m, s, problem.secant_laws, out);
   add_loops(m, problem, state, out);
   out.r += out.tau;
 }

@@ -141,7 +141,7 @@ Index Mechanism::add_block(const Block& block, Index start, const std::string& p
   const bool is_legs = outermost && block.name == "legs" && legs.empty();
   if (is_legs) outside.clear();
   const std::string name = join(prefix, block.name);
-  require(!block.branches.empty(), name, "one branch or more", 0);
+  require(is_legs || !block.branches.empty(), name, "one branch or more", 0);
   Index primary = -1;
   for (const auto& [branch, chain] : block.branches) {
     // A leg's elements are named after the leg alone: "x.foot", not "legs.x.foot".
@@ -151,7 +151,7 @@ Index Mechanism::add_block(const Block& block, Index start, const std::string& p
     else loops.push_back({name, branch, primary, end, is_legs, join(is_legs ? "" : prefix, branch)});
   }
   if (is_legs) {
-    primary = add_node(primary, {}, {});  // the platform: what follows belongs to no leg
+    primary = add_node(primary < 0 ? start : primary, {}, {});  // the platform: what follows belongs to no leg
     beyond_legs[static_cast<std::size_t>(primary)] = true;
     outside = "platform";
   }
@@ -203,14 +203,44 @@ void Mechanism::find_strokes() {
   }
 }
 
+/// Its free length is a coordinate behind which nothing stands, held where it is commanded.
+void Mechanism::add_cable(const ExternalSpring& spring) {
+  const Winch& w = *spring.winch;
+  require(std::abs(w.axis.norm() - 1) < 1e-9, spring.name + ".axis", "a unit vector", w.axis.norm());
+  require(w.elasticity > 0 || spring.stiffness > 0, spring.name, "an elasticity or a stiffness", 0);
+  add_coordinate(0, spring.name, Role::actuator, JointType::prismatic, Vec3::UnitZ(), spring.length);
+  Coordinate& c = coordinates.back();
+  c.lower = w.lower;
+  c.upper = w.upper;
+  c.locked = true;
+  c.cable = static_cast<Index>(external_springs.size()) - 1;
+  c.actuator = static_cast<Index>(drives.size());
+  Drive drive{spring.name, size() - 1, w.numbers, {}};
+  for (const CommandError& e : w.errors) drive.errors.push_back({drive.coordinate, e});
+  drives.push_back(drive);
+  external_springs.back().coordinate = size() - 1;
+  cables.push_back(c.cable);
+}
+
+bool Mechanism::floats() const {
+  if (cables.empty() || !loops.empty() || !legs.empty() || !groups.empty()) return false;
+  const auto& free = path[static_cast<std::size_t>(tip)];
+  return free.size() + cables.size() == coordinates.size() && std::all_of(free.begin(), free.end(), [&](Index j) {
+           const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
+           return c.role == Role::passive && c.law < 0 && c.friction == 0;
+         });
+}
+
 void Mechanism::finish(const std::vector<ExternalSpring>& springs) {
+  for (const ExternalSpring& s : springs) {
+    const NodePoint& p = points[static_cast<std::size_t>(point(s.point))];
+    external_springs.push_back({s.name, p.node, p.offset, s.anchor, s.stiffness, s.length, s.tension_only, s.winch});
+    if (s.winch) add_cable(s);
+  }
+  floating = floats();
   std::set<std::string> names;
   for (const Coordinate& c : coordinates)
     require(names.insert(c.name).second, "element names", "different names within a sequence", c.name);
-  for (const ExternalSpring& s : springs) {
-    const NodePoint& p = points[static_cast<std::size_t>(point(s.point))];
-    external_springs.push_back({s.name, p.node, p.offset, s.anchor, s.stiffness, s.length, s.tension_only});
-  }
   home_coordinates = VecX::Zero(size());
   for (Index j = 0; j < size(); ++j) home_coordinates[j] = coordinates[static_cast<std::size_t>(j)].home;
   set_rest();
@@ -233,27 +263,33 @@ void Mechanism::find_balls() {
     const Vec3 &a = axis(0), &b = axis(1), &c = axis(2);
     if (std::abs(a.dot(b)) > 1e-9 || std::abs(b.dot(c)) > 1e-9) continue;  // axes of its own kind: never quite locked
     const double from_first = std::atan2(b.dot(a.cross(c)), a.dot(c));
+    for (Index k = 0; k < 3; ++k)
+      coordinates[static_cast<std::size_t>(first + k)].ball = static_cast<Index>(balls.size());
     balls.push_back({first, std::numbers::pi / 2 - from_first, chart == BallChart::free});
   }
 }
 
 void Mechanism::set_scales() {
-  // Length: the farthest frame from the base's centre of all, at home.
+  // Length: the farthest frame or anchor of a cable from the centre of all, at home.
   std::vector<Pose> at(nodes.size());
+  std::vector<Vec3> places;
   Vec3 mean = Vec3::Zero();
   for (std::size_t i = 1; i < nodes.size(); ++i) {
     const Node& n = nodes[i];
     at[i] = at[static_cast<std::size_t>(n.parent)] * n.nominal;
+    if (n.coordinate >= 0 && coordinates[static_cast<std::size_t>(n.coordinate)].cable >= 0) continue;
     if (n.coordinate >= 0) {
       const double x = coordinates[static_cast<std::size_t>(n.coordinate)].home;
       if (n.type == JointType::revolute) at[i].R = (at[i].R * rotation_about(n.axis, x)).eval();
       else at[i].p += at[i].R * n.axis * x;
     }
-    mean += at[i].p;
+    places.push_back(at[i].p);
   }
-  mean /= static_cast<double>(std::max<std::size_t>(1, nodes.size() - 1));
+  for (const Index i : cables) places.push_back(external_springs[static_cast<std::size_t>(i)].anchor);
+  for (const Vec3& p : places) mean += p;
+  mean /= static_cast<double>(std::max<std::size_t>(1, places.size()));
   double radius = 0;
-  for (std::size_t i = 1; i < nodes.size(); ++i) radius = std::max(radius, (at[i].p - mean).norm());
+  for (const Vec3& p : places) radius = std::max(radius, (p - mean).norm());
   // A single link has all its frames in one place: then the reach from the base counts.
   if (radius > 1e-9 * mean.norm()) length = radius;
   else if (mean.norm() > 0) length = mean.norm();
@@ -275,6 +311,10 @@ void Mechanism::set_scales() {
   for (Index j = 0; j < size(); ++j) {
     const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
     if (c.law >= 0) add(laws[static_cast<std::size_t>(c.law)].stiffness() / (unit(j) * unit(j)));
+  }
+  for (const Index i : cables) {
+    const NodeSpring& s = external_springs[static_cast<std::size_t>(i)];
+    add(s.winch->elasticity > 0 ? s.winch->elasticity / length : s.stiffness);
   }
   if (count) stiffness = std::exp(sum / count);
 }

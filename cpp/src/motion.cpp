@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+
+#include "stiffmap/pull.hpp"
 
 namespace stiffmap {
 namespace {
@@ -10,9 +13,12 @@ namespace {
 constexpr double sound_pivot = 1e-8;  // of the normal matrix: below it, the rank is revealed
 constexpr double apart = 1e-7;        // loop velocity per rate of the drives, below which they go together
 
+/// Equations between rates: those of the loops, then one per cable; in blocks of six.
+Index equations(const Mechanism& m) { return m.closures() + 6 * ((static_cast<Index>(m.cables.size()) + 5) / 6); }
+
 }  // namespace
 
-LoopRates::LoopRates(const Mechanism& m) : tree_(m), J_(MatX::Zero(m.closures(), m.size())) {
+LoopRates::LoopRates(const Mechanism& m) : tree_(m), J_(MatX::Zero(equations(m), m.size())) {
   std::vector<Index> place(at(m.size()), -1);
   for (Index j : tree_.moving()) {
     if (m.coordinates[at(j)].role != Role::passive) continue;
@@ -28,8 +34,11 @@ LoopRates::LoopRates(const Mechanism& m) : tree_(m), J_(MatX::Zero(m.closures(),
     used.erase(std::unique(used.begin(), used.end()), used.end());
     columns_.push_back(used);
   }
+  std::vector<Index> all(passive_.size());
+  std::iota(all.begin(), all.end(), Index{0});
+  for (Index row = m.closures(); row < J_.rows(); row += 6) columns_.push_back(all);
   const Index n = static_cast<Index>(passive_.size());
-  A_ = MatX::Zero(m.closures(), n);
+  A_ = MatX::Zero(J_.rows(), n);
   N_.resize(n, n);
 }
 
@@ -48,6 +57,17 @@ void LoopRates::factorise(const Mechanism& m, const Frames& frames) {
     }
     for (Index k : columns_[i])
       A_.col(k).segment<6>(row) = J_.col(passive_[at(k)]).segment<6>(row) / m.unit(passive_[at(k)]);
+  }
+  for (std::size_t i = 0; i < m.cables.size(); ++i) {
+    const NodeSpring& s = m.external_springs[at(m.cables[i])];
+    const Index row = m.closures() + static_cast<Index>(i);
+    const Vec3 p = frames.point(s.node, s.offset);
+    const Vec3 along = commanded_slope(s) * cable_line(s.anchor, s.winch->axis, s.winch->radius, p).along;
+    J_.row(row).setZero();
+    for (Index j : m.path[at(s.node)]) J_(row, j) = along.dot(column(m, frames, j, p).head<3>());
+    J_(row, s.coordinate) = -1;
+    for (std::size_t k = 0; k < passive_.size(); ++k)
+      A_(row, static_cast<Index>(k)) = J_(row, passive_[k]) / m.unit(passive_[k]);
   }
   pivot_ = passive_.empty() ? 1.0 : fill_normal();
   regular_ = pivot_ > sound_pivot;
@@ -111,8 +131,9 @@ MatX LoopRates::solve_scaled(const MatX& e) const {
 
 void LoopRates::solve(const Mechanism& m, const MatX& e, Eigen::Ref<MatX> out) const {
   out.setZero();
-  MatX scaled = e;
-  scale_angles(m, scaled);
+  MatX scaled = MatX::Zero(A_.rows(), e.cols());
+  scaled.topRows(e.rows()) = e;
+  scale_angles(m, scaled.topRows(e.rows()));
   MatX x = MatX::Zero(A_.cols(), e.cols()), left = scaled;
   if (!passive_.empty()) {
     x = solve_scaled(scaled);

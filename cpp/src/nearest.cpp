@@ -20,7 +20,7 @@ Mat3 turn_of_logarithm(const Vec3& phi) {
 
 /// Slopes at x exactly as the residual has them: where the task leaves rotations open, its error is a large angle.
 void slopes(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws) {
-  forward(m, Geometry::nominal, x, ws.frames);
+  forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
   equations(m, target, ws);
   if (target.task == full_task) return;
   const Mat3 &R = ws.frames.at(m.tip).R, &goal = target.tip->R;

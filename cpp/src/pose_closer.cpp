@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "closing.hpp"
+#include "stiffmap/pull.hpp"
 
 namespace stiffmap {
 namespace {
@@ -221,7 +222,7 @@ ClosureResult PoseCloser::continue_from(const Mechanism& m, const Pose& pose, Ve
   return answer(m, pose, x, ok, {});
 }
 
-ClosureResult PoseCloser::answer(const Mechanism& m, const Pose& pose, const VecX& x, bool ok, ClosureResult out) {
+ClosureResult PoseCloser::answer(const Mechanism& m, const Pose& pose, VecX& x, bool ok, ClosureResult out) {
   if (!ok) {
     has_last_ = false;
     even_ = 0;
@@ -230,6 +231,10 @@ ClosureResult PoseCloser::answer(const Mechanism& m, const Pose& pose, const Vec
   }
   out.status = Status::converged;
   out.tip = ws_.frames.at(m.tip);
+  if (!m.cables.empty()) {
+    forward(m, Geometry::nominal, x, ws_.frames);
+    wind(m, ws_.frames, x);
+  }
   out.flags &= flag::branch_unverified;
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];

@@ -7,6 +7,7 @@ RigidTree::RigidTree(const Mechanism& m) {
   std::vector<bool> moves(at(m.size()), false), kept(m.nodes.size(), false);
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
+    if (c.cable >= 0) continue;
     if (c.role != Role::actuator && (c.role != Role::passive || c.locked)) continue;
     moves[at(j)] = true;
     moving_.push_back(j);

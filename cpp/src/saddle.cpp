@@ -120,6 +120,11 @@ void SaddleSystem::assemble(const Mechanism& m, const Linearization& lin) {
     if (kind_[at(j)] == Kind::fixed) fix(j);
 }
 
+void SaddleSystem::stiffen(double by) {
+  for (Index j = 0; j < n_; ++j)
+    if (kind_[at(j)] != Kind::fixed) A_(j, j) += by;
+}
+
 void SaddleSystem::factorize() {
   lu_.compute(A_);
   if (A_.size() == 0) {  // a rigid machine without coordinates

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "stiffmap/pull.hpp"
 #include "unloaded.hpp"
 
 namespace stiffmap {
@@ -31,10 +32,9 @@ void leg_wrenches(const Mechanism& m, const PoseInput& in, const SolveWorkspace&
     if (m.beyond_legs[at(b.node)]) add(left, b.mass * in.gravity, Vec3::Zero(), f.point(b.node, b.com), -1);
   for (const NodeSpring& s : m.external_springs) {
     if (!m.beyond_legs[at(s.node)]) continue;
-    const Vec3 q = f.point(s.node, s.offset), d = q - s.anchor;
-    const double length = d.norm();
-    if (length < 1e-12 || (s.tension_only && length <= s.length)) continue;
-    add(left, -s.stiffness * (length - s.length) / length * d, Vec3::Zero(), q, -1);
+    Vec3 q;
+    const Vec3 force = force_of(s, f, ws.equilibrium.lin.x, q);
+    add(left, force, Vec3::Zero(), q, -1);
   }
   Index leg = 1;
   for (std::size_t i = 0; i < m.loops.size(); ++i) {
@@ -59,6 +59,8 @@ void reset(const Mechanism& m, std::uint32_t flags, PoseResult& out) {
 bool configuration_undetermined(const Mechanism& m, const PoseInput& in, const VecX& motion, SolveWorkspace& ws,
                                 const Mat6& stiffness) {
   VecX x = ws.x;
+  Charts charts;
+  keep_off_locks(m, x, charts);
   double size = 0;
   for (Index j = 0; j < m.size(); ++j)
     if (m.coordinates[at(j)].role == Role::passive) size = std::max(size, std::abs(motion[j]) * m.unit(j) / m.length);
@@ -66,6 +68,7 @@ bool configuration_undetermined(const Mechanism& m, const PoseInput& in, const V
   constexpr double stride = 0.05;
   for (Index j = 0; j < m.size(); ++j)
     if (m.coordinates[at(j)].role == Role::passive) x[j] += stride / size * motion[j];
+  x = by_own_axes(m, charts, x, ws.x);
   const VecX moved = x;
   if (close_passive(m, ws.reached, ws.closure, x) > 1e-9) return false;
   double kept = 0;
@@ -151,9 +154,11 @@ void report(const Mechanism& m, const PoseInput& in, const SolveWorkspace& ws, P
     out.effort[static_cast<Index>(i)] = m.coordinates[at(j)].locked ? lin.r[j] : -lin.tau[j];
     if (std::abs(out.effort[static_cast<Index>(i)]) > m.drives[i].numbers.force_limit) out.flags |= flag::drive_force;
   }
+  for (const Index i : m.cables)
+    if (!(out.effort[m.coordinates[at(m.external_springs[at(i)].coordinate)].actuator] < 0)) out.flags |= flag::slack;
   const NodePoint& first = m.points[at(in.read_points.front())];
   leg_wrenches(m, in, ws, lin.frames.point(first.node, first.offset), out);
-  out.x = lin.x;
+  out.x = by_own_axes(m, ws.state.charts, lin.x, ws.x);
   for (Index j = 0; j < m.size(); ++j)
     if (m.coordinates[at(j)].locked && m.coordinates[at(j)].role == Role::passive && !ws.spins.decided(j)) {
       out.flags |= flag::free_spin;
@@ -177,6 +182,24 @@ void hide_undetermined(const Mechanism& m, const SolveWorkspace& ws, PoseResult&
       }
       ++leg;
     }
+  }
+}
+
+/// Cables that leave a motion of the platform free: no compliance, also where guides hold other directions.
+void let_float(const Mechanism& m, const NodePoint& p, SolveWorkspace& ws, PoseResult& out) {
+  out.flags |= flag::platform_singular;
+  if (out.status == Status::converged) out.status = Status::singular;
+  out.point.compliance.setConstant(nan);
+  out.point.free_twists.setConstant(nan);
+  const MatX null = ws.equilibrium.saddle.null_space();
+  MatX J(6, m.size());
+  ws.equilibrium.lin.point_jacobian(m, p.node, p.offset, J);
+  out.point.free = 0;
+  for (Index c = 0; c < null.cols() && out.point.free < 6; ++c) {
+    VecX v = null.col(c);
+    ws.equilibrium.saddle.to_coordinates(v);
+    const Vec6 twist = J * v.head(m.size());
+    out.point.free_twists.col(out.point.free++) = twist / twist.norm();
   }
 }
 
@@ -217,9 +240,7 @@ void solve_pose(const Mechanism& m, const PoseInput& in, const SolveOptions& opt
   const ClosureResult closure = prepare_pose(m, in, ws);
   reset(m, closure.flags, out);
   if (closure.status != Status::converged) return fail_pose(m, in, Status::unreachable, out);
-  for (const Ball& b : m.balls)  // a direction is lost that the joint has: no stiffness of this chart is the joint's
-    if (b.free && b.spread(ws.x[b.first + 1]) < locked) return fail_pose(m, in, Status::singular, out);
-  if (!examine_unloaded(m, in, ws, out)) return;
+  if (!m.floating && !examine_unloaded(m, in, ws, out)) return;  // what floats is carried by what acts on it
 
   EquilibriumResult eq = solve_equilibrium(m, ws.problem, options.equilibrium, ws.equilibrium, ws.state);
   if (eq.status == Status::converged && ws.spins.loaded(ws.problem) &&
@@ -265,6 +286,7 @@ void conclude_pose(const Mechanism& m, const PoseInput& in, const EquilibriumRes
       gap = gap || (m.coordinates[at(j)].law >= 0 && done.lin.kind[at(j)] == Kind::free);
     out.flags |= gap ? flag::free_play | flag::platform_singular : flag::platform_singular;
   }
+  if (m.floating && !done.saddle.regular()) let_float(m, p, ws, out);
   hide_undetermined(m, ws, out);
 }
 

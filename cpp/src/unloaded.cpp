@@ -24,10 +24,14 @@ bool command(const Mechanism& m, const VecX& x, Problem& p) {
 void start_state(const Mechanism& m, const VecX& x, State& state) {
   state.z.setZero();
   state.lambda.setZero();
+  state.charts = {};
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
     if (c.from_home()) state.z[j] = x[j] - m.rest[j];
   }
+  VecX charted = x;
+  if (!keep_off_locks(m, charted, state.charts)) return;
+  for (const Ball& b : m.balls) state.z.segment<3>(b.first) += charted.segment<3>(b.first) - x.segment<3>(b.first);
 }
 
 Mat6 Unloaded::stiffness(const VecX& x, const NodePoint& point) {

@@ -108,12 +108,32 @@ void bind_chain(py::module_& m) {
             c.elements.emplace_back(Block{name, branches});
           },
           "name"_a, "branches"_a);
+  py::class_<Winch>(m, "Winch")
+      .def(py::init([](double elasticity, double lead, double pretension, double factor, double lead_factor,
+                       double radius, const Array& axis, const Array& anchor_error, const Array& point_error,
+                       double lower, double upper, const py::dict& numbers, const std::vector<CommandError>& errors) {
+             return Winch{elasticity,
+                          lead,
+                          pretension,
+                          factor,
+                          lead_factor,
+                          radius,
+                          vec3(axis, "axis"),
+                          vec3(anchor_error, "anchor_error"),
+                          vec3(point_error, "point_error"),
+                          lower,
+                          upper,
+                          drive_numbers_of(numbers),
+                          errors};
+           }),
+           "elasticity"_a, "lead"_a, "pretension"_a, "factor"_a, "lead_factor"_a, "radius"_a, "axis"_a,
+           "anchor_error"_a, "point_error"_a, "lower"_a, "upper"_a, "numbers"_a, "errors"_a);
   py::class_<ExternalSpring>(m, "ExternalSpring")
       .def(py::init([](const std::string& name, const std::string& point, const Array& anchor, double stiffness,
-                       double length, bool tension_only) {
-             return ExternalSpring{name, point, vec3(anchor, "anchor"), stiffness, length, tension_only};
+                       double length, bool tension_only, const std::optional<Winch>& winch) {
+             return ExternalSpring{name, point, vec3(anchor, "anchor"), stiffness, length, tension_only, winch};
            }),
-           "name"_a, "point"_a, "anchor"_a, "stiffness"_a, "length"_a, "tension_only"_a);
+           "name"_a, "point"_a, "anchor"_a, "stiffness"_a, "length"_a, "tension_only"_a, "winch"_a = std::nullopt);
 }
 
 }  // namespace stiffmap::bindings

@@ -126,6 +126,12 @@ void bind_mechanism(py::module_& m) {
                              })
       .def_property_readonly(
           "points", [](const Mechanism& k) { return names(k.points, [](const NodePoint& p) { return p.name; }); })
+      .def_property_readonly("cables",
+                             [](const Mechanism& k) {
+                               std::vector<std::string> out;
+                               for (const Index i : k.cables) out.push_back(k.external_springs[at(i)].name);
+                               return out;
+                             })
       .def_property_readonly("legs", [](const Mechanism& k) { return k.legs; })
       .def_readonly("length", &Mechanism::length)
       .def_readonly("stiffness", &Mechanism::stiffness)

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Answer', 'Chain', 'CommandError', 'DRIVE_NUMBERS', 'ExternalSpring', 'FastPlan', 'HomeMisfit', 'Law', 'Mechanism', 'OneAnswer', 'OneCall', 'Pose', 'Stroke', 'clamp', 'home_gaps', 'kernel_level', 'kernel_levels', 'path', 'reactions']
+__all__: list[str] = ['Answer', 'Chain', 'CommandError', 'DRIVE_NUMBERS', 'ExternalSpring', 'FastPlan', 'HomeMisfit', 'Law', 'Mechanism', 'OneAnswer', 'OneCall', 'Pose', 'Stroke', 'Winch', 'clamp', 'home_gaps', 'kernel_level', 'kernel_levels', 'path', 'reactions']
 class Pose:
     def __init__(self, translation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         ...
@@ -34,8 +34,11 @@ class Chain:
         ...
     def spring(self, name: str, matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], compliance: bool, rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], laws: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, Law]], stroke: Stroke | None = None) -> None:
         ...
+class Winch:
+    def __init__(self, elasticity: typing.SupportsFloat | typing.SupportsIndex, lead: typing.SupportsFloat | typing.SupportsIndex, pretension: typing.SupportsFloat | typing.SupportsIndex, factor: typing.SupportsFloat | typing.SupportsIndex, lead_factor: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], anchor_error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point_error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, numbers: dict, errors: collections.abc.Sequence[CommandError]) -> None:
+        ...
 class ExternalSpring:
-    def __init__(self, name: str, point: str, anchor: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], stiffness: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex, tension_only: bool) -> None:
+    def __init__(self, name: str, point: str, anchor: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], stiffness: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex, tension_only: bool, winch: Winch | None = None) -> None:
         ...
 class Mechanism:
     def __init__(self, root: Chain, home: Pose, springs: collections.abc.Sequence[ExternalSpring], task: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(6)"] = [True, True, True, True, True, True], search: bool = False, like: Mechanism = None) -> None:
@@ -63,6 +66,9 @@ class Mechanism:
         ...
     @property
     def bodies(self) -> list[tuple[str, int, float]]:
+        ...
+    @property
+    def cables(self) -> list[str]:
         ...
     @property
     def coordinates(self) -> list[str]:

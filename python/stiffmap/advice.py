@@ -11,7 +11,7 @@ import numpy as np
 
 from stiffmap.broadcasting import Floats
 from stiffmap.compiled import Status
-from stiffmap.description import Body, Joint, Spring
+from stiffmap.description import Body, Cable, Joint, Spring
 from stiffmap.description.tree import all_elements
 from stiffmap.files.shipped import find
 from stiffmap.free_motions import direction, free_motions
@@ -106,7 +106,9 @@ def _trial(machine: Machine) -> list[str]:
     trial = tried(machine)
     description = machine.description
     elements = [e for _, e in all_elements(description)]
-    elastic = any(isinstance(e, Spring) or (isinstance(e, Joint) and e.law is not None) for e in elements)
+    elastic = any(
+        isinstance(e, (Spring, Cable)) or (isinstance(e, Joint) and e.law is not None) for e in elements
+    )
     if trial.stiffness is not None or elastic or description.external_springs:
         return trial.findings
     return ["the machine is rigid: no spring and no drive yields, so nothing deflects"]

@@ -133,6 +133,12 @@ class Solution:
         return self._array("actuator_effort")  # type: ignore[no-any-return]
 
     @property
+    def tension(self) -> Floats:
+        """(..., cables) N: of each cable, 0 where it is slack, in the order of `cables`."""
+        columns = [self._names.actuators.index(n) for n in self._names.cables]
+        return -self.actuator_effort[..., columns] + 0.0
+
+    @property
     def leg_wrench(self) -> Floats:
         """(..., legs, 6) N, N·m: leg on platform at `point`."""
         return self._array("leg_wrench")  # type: ignore[no-any-return]
@@ -151,6 +157,11 @@ class Solution:
     def actuators(self) -> tuple[str, ...]:
         """Names along the last axis of `actuator_effort`."""
         return self._names.actuators
+
+    @property
+    def cables(self) -> tuple[str, ...]:
+        """Names along the last axis of `tension`."""
+        return self._names.cables
 
     @property
     def legs(self) -> tuple[str, ...]:

@@ -90,12 +90,29 @@ struct Chain {
   std::vector<std::variant<Offset, Joint, Spring, Body, Point, Block>> elements;
 };
 
-/// A straight spring from a point of the machine to a fixed anchor (cable, hose, counterbalance).
+/// What makes a straight spring a cable: its free length is the command of a winch (theory B1-B4).
+struct Winch {
+  double elasticity = 0;   ///< axial stiffness EA, N; 0: the spring's own stiffness alone
+  double lead = 0;         ///< cable between winch and anchor, m: it yields, and counts in no length
+  double pretension = 0;   ///< that the controller believes in: lengths are commanded shorter by its elongation
+  double factor = 1;       ///< of the real cable's stiffness on the one that is believed in
+  double lead_factor = 1;  ///< tension of the lead by that of the free length (friction of the guide)
+  double radius = 0;       ///< of the pulley that turns about `axis` through the anchor; 0: an eye
+  Vec3 axis = Vec3::UnitZ();
+  Vec3 anchor_error = Vec3::Zero();  ///< real anchor minus the one that is believed in
+  Vec3 point_error = Vec3::Zero();   ///< the same of the point, in the axes of its body
+  double lower = -1e300, upper = 1e300;
+  DriveNumbers numbers;
+  std::vector<CommandError> errors;
+};
+
+/// A straight spring from a point of the machine to a fixed anchor (hose, counterbalance); with a winch: a cable.
 struct ExternalSpring {
   std::string name, point;
   Vec3 anchor = Vec3::Zero();
   double stiffness = 0, length = 0;
   bool tension_only = false;
+  std::optional<Winch> winch = std::nullopt;
 };
 
 }  // namespace stiffmap

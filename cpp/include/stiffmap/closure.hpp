@@ -12,6 +12,8 @@ namespace stiffmap {
 struct ClosureWorkspace {
   explicit ClosureWorkspace(const Mechanism& m);
   Frames frames;
+  Charts charts;          ///< by which the unknowns of free balls count, within one search
+  bool renumber = false;  ///< free balls are numbered anew on the way
   MatX J, A;
   VecX e, step, right, shortest, x, trial, start;
   std::vector<Index> unknown;

@@ -32,6 +32,10 @@ struct EquilibriumWorkspace {
   VecX dz, dlambda, force, slope, slope_before, no_closure;
 };
 
+/// Free balls whose axes have come near their lock are numbered anew, the configuration stays: near a lock the balance
+/// of moments says nothing about one direction. True where one has changed.
+bool off_locks(const Mechanism& m, const Problem& p, State& state);
+
 /// The linearisation at `state` in `ws`, factorised.
 void factorize_at(const Mechanism& m, const Problem& p, const State& state, EquilibriumWorkspace& ws);
 
@@ -43,6 +47,9 @@ inline constexpr double largest_step = 0.2;
 
 /// Whether the tip went that far at once: with corners of laws the load is then taken in steps.
 inline bool leaps(const Mechanism& m, const Vec3& motion) { return !(motion.norm() < largest_step * m.length); }
+
+/// Laws of which the deflection does not say the force.
+bool rubs_or_sticks(const Mechanism& m);
 
 /// Laws with corners or with dry friction: Newton starts from the solution with all laws linear.
 bool has_knots(const Mechanism& m);

@@ -2,7 +2,7 @@
 // Frames and Jacobian columns of a mechanism at given coordinates (theory C1, C4).
 #pragma once
 
-#include "stiffmap/mechanism.hpp"
+#include "stiffmap/charts.hpp"
 
 namespace stiffmap {
 
@@ -18,7 +18,8 @@ struct Frames {
   Vec3 point(Index node, const Vec3& offset) const { return at(node) * offset; }
 };
 
-void forward(const Mechanism& m, Geometry geometry, const VecX& x, Frames& out);
+/// `charts`: free balls numbered anew; null: all by their own axes.
+void forward(const Mechanism& m, Geometry geometry, const VecX& x, Frames& out, const Charts* charts = nullptr);
 
 /// Twist of a body point p per unit of coordinate j, seen from beyond the joint (theory C4).
 inline Vec6 column(const Mechanism& m, const Frames& f, Index j, const Vec3& p) {

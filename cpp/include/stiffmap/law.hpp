@@ -26,6 +26,9 @@ class Law {
   /// Parameter of the point that carries force tau: the start of a Newton iteration.
   double from_force(double tau, double scale = 1.0) const;
 
+  /// Parameter at deflection a, of a law that has corners and does not stick.
+  double from_deflection(double a, double scale = 1.0) const;
+
   bool linear() const { return cubic_ == 0.0 && knots_.empty() && friction_ == 0.0; }
   bool has_knots() const { return !knots_.empty(); }
   /// Holds a range of forces at one deflection.

@@ -43,6 +43,7 @@ struct Problem {
 struct State {
   explicit State(const Mechanism& m) : z(VecX::Zero(m.size())), lambda(VecX::Zero(m.closures())) {}
   VecX z, lambda;
+  Charts charts;  ///< by which the coordinates of free balls count
 };
 
 /// What a coordinate is at this state.

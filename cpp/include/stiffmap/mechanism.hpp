@@ -34,10 +34,12 @@ struct Coordinate {
   double lower = -1e300, upper = 1e300;
   Index actuator = -1;  ///< index among the actuators
   Index law = -1;       ///< index into laws, -1: none
+  Index ball = -1;      ///< index into balls of the joint that it is an axis of, -1: none
   bool locked = false;  ///< rigid drive, deviation of a guide, or a spin that changes nothing (held at home)
   double friction = 0;  ///< of a free passive joint
   bool about_command = false;
   std::optional<double> rest;  ///< as declared; none: as at home
+  Index cable = -1;            ///< free length of this external spring: no frame moves with it
 
   /// The law of a passive joint acts about its home coordinate unless it says otherwise.
   bool from_home() const { return role == Role::passive && law >= 0 && !about_command; }
@@ -114,6 +116,8 @@ struct NodeSpring {
   Vec3 offset = Vec3::Zero(), anchor = Vec3::Zero();
   double stiffness = 0, length = 0;
   bool tension_only = false;
+  std::optional<Winch> winch = std::nullopt;
+  Index coordinate = -1;  ///< of the winch: the free length
 };
 
 /// Which of the six pose components are commanded: translations along base axes, rotations about the
@@ -139,6 +143,7 @@ class Mechanism {
   std::vector<NodePoint> points;  ///< the first is "tcp"
   std::vector<NodeBody> bodies;
   std::vector<NodeSpring> external_springs;
+  std::vector<Index> cables;             ///< those of them that have a winch
   std::vector<std::string> legs;         ///< names of the branches of the legs' block
   std::vector<bool> beyond_legs;         ///< per node: on the platform's side of the legs' block
   std::vector<std::vector<Index>> path;  ///< per node: its coordinates from the base outwards
@@ -146,6 +151,7 @@ class Mechanism {
   Pose home;                             ///< tip pose of the home configuration
   VecX home_coordinates;                 ///< as declared; once assembled: closed at home
   VecX beside_home;                      ///< closed, where hinges that lock at home do not; empty: none do
+  bool floating = false;                 ///< no leg and no spring: what carries the platform are external springs
   Index redundancy = 0;                  ///< motions of the drives that a commanded pose leaves open (theory C11)
   VecX nearness;                         ///< weights of the coordinates' distance, where some are
   VecX rest;                             ///< where laws about a fixed coordinate are free of force
@@ -177,6 +183,8 @@ class Mechanism {
   Index add_spring(const Spring& spring, Index node, const std::string& prefix);
   void find_strokes();
   void finish(const std::vector<ExternalSpring>& springs);
+  void add_cable(const ExternalSpring& spring);
+  bool floats() const;
   void set_scales();
   void find_balls();
 };

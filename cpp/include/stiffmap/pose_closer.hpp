@@ -32,7 +32,7 @@ class PoseCloser {
   bool continued(const Mechanism& m, const Pose& from, const Pose& pose, double shortest, VecX& x);
   bool from_home(const Mechanism& m, const Pose& pose, VecX& x);
   void at_rest(const Mechanism& m, VecX& x) const;
-  ClosureResult answer(const Mechanism& m, const Pose& pose, const VecX& x, bool ok, ClosureResult out);
+  ClosureResult answer(const Mechanism& m, const Pose& pose, VecX& x, bool ok, ClosureResult out);
   void remember(const Pose& pose, const VecX& x);
   bool extrapolated(const Pose& pose, VecX& x) const;
   double residual(const Mechanism& m, const Pose& pose, const VecX& x);

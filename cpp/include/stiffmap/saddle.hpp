@@ -23,6 +23,8 @@ class SaddleSystem {
   explicit SaddleSystem(const Mechanism& m);
 
   void assemble(const Mechanism& m, const Linearization& lin);
+  /// Adds stiffness to every coordinate that is not fixed, in multiples of the machine's or of its own.
+  void stiffen(double by);
   /// Factorises; falls back to a rank-revealing factorisation where pivots are small.
   void factorize();
   /// Solves T [dz; dlambda] = [force; closure]; the least-squares solution of least norm where T is

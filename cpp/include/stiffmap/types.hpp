@@ -45,6 +45,7 @@ inline constexpr std::uint32_t branch_unverified = 1u << 10;  ///< reached witho
 inline constexpr std::uint32_t free_play = 1u << 11;          ///< a gap is open: no stiffness inside it
 inline constexpr std::uint32_t load_stepped = 1u << 12;       ///< full load was not reached in one step
 inline constexpr std::uint32_t gimbal_lock = 1u << 14;        ///< axes of a ball joint (nearly) coincide
+inline constexpr std::uint32_t slack = 1u << 15;              ///< a cable carries nothing
 }  // namespace flag
 
 /// Dimensionless threshold of every rank decision, on matrices scaled to length and stiffness.

@@ -178,6 +178,7 @@ class Compiler {
   }
 
   void block(const Block& b, Way& way, std::vector<Op>& ops, bool outermost, bool still) {
+    if (b.branches.empty()) return;  // no leg
     const std::size_t first = out_.chains.size();
     out_.chains.resize(first + b.branches.size());
     const bool is_legs = outermost && b.name == "legs" && out_.program.legs_op < 0;

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import math
+
 from stiffmap.calibration.facts import Beyond, Facts, Wider
 
-DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm"), "ln": (1e2, "%")}
+DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm")}
+FACTOR = 0.5
+"""Logarithm of a factor from which it is written as one: ×1.65."""
 
 NAMED = 12
 """Outliers that a line names."""
 
 
 def in_display_units(value: float, unit: str) -> str:
-    """A number in the units of the screen."""
+    """A number in the units of the screen; the logarithm of a factor as the per cent that it adds, or as the factor."""
+    if unit == "ln":
+        return f"{100.0 * math.expm1(value):.4g} %" if abs(value) < FACTOR else f"×{math.exp(value):.4g}"
     factor, name = DISPLAY_UNITS[unit]
     return f"{value * factor:.4g} {name}"
 

@@ -41,6 +41,11 @@ def _parallel(axes: tuple[tuple[float, ...], ...]) -> int:
     return -1
 
 
+def _perpendicular(axes: tuple[tuple[float, ...], ...]) -> bool:
+    """Whether neighbouring axes are: the core then numbers the joint anew wherever it comes near its lock."""
+    return all(abs(np.dot(axes[i], axes[i + 1])) <= 1e-9 for i in range(len(axes) - 1))
+
+
 def charted(e: Joint) -> tuple[Joint, _core.Pose | None]:
     """The joint with axes that do not lock at home, and the constant rotation before it (None: none).
 
@@ -57,7 +62,7 @@ def charted(e: Joint) -> tuple[Joint, _core.Pose | None]:
     if e.kind != "spherical":
         return e, None
     turn, spread = _at_home(e.axes, e.home)
-    if any_axes_do(e) and spread < WIDE:
+    if any_axes_do(e) and (spread < WIDE or not _perpendicular(e.axes)):
         flat = replace(e, axes=IDENTITY, home=(0.0, 0.0, 0.0))
         return flat, _core.Pose(np.zeros(3), np.array(turn).reshape(3, 3))
     if spread < PARALLEL:

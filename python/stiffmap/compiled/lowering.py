@@ -14,6 +14,7 @@ from stiffmap.description import (
     BeamStroke,
     Block,
     Body,
+    Cable,
     CommandError,
     Element,
     Joint,
@@ -27,7 +28,7 @@ from stiffmap.description import (
 )
 from stiffmap.description.numbers import numbers_of
 from stiffmap.description.strokes import present_rows
-from stiffmap.description.tree import ENDS
+from stiffmap.description.tree import ENDS, all_elements, core_name
 from stiffmap.errors import StiffmapError
 from stiffmap.home import Gap, misfit_text
 
@@ -50,7 +51,7 @@ def build_mechanism(machine: MachineDescription, like: _core.Mechanism | None = 
         springs = [
             _core.ExternalSpring(s.name, s.point, np.array(s.anchor), s.stiffness, s.length, s.tension_only)
             for s in machine.external_springs
-        ]
+        ] + [cable(full, e) for full, e in all_elements(machine) if isinstance(e, Cable)]
         known = () if like is None else (like,)
         return _core.Mechanism(root, pose(machine.home), springs, task(machine), machine.search_home, *known)
     except _core.HomeMisfit as problem:
@@ -69,9 +70,66 @@ def root_chain(machine: MachineDescription) -> _core.Chain:
     """Compiled chain from the base through the legs to the TCP."""
     root = _core.Chain()
     add_elements(root, machine.base)
+    if not machine.legs:
+        add_free_platform(root, machine)
     root.block("legs", [(leg.name, chain(leg.elements)) for leg in machine.legs])
     add_elements(root, machine.platform)
     return root
+
+
+def add_free_platform(out: _core.Chain, machine: MachineDescription) -> None:
+    """Free joints of a platform that no leg carries: along and about the base axes, at zero turned as at home."""
+    tip = Pose()
+    for e in machine.platform:
+        if isinstance(e, Offset):
+            tip = tip @ e.nominal
+    body = machine.home @ tip.inverse()
+    x, y, z = (0.0 if n in machine.freedoms else v for n, v in zip("xyz", body.translation, strict=True))
+    guide = pose(Pose((x, y, z)))
+    out.offset("platform.guide", guide, guide)
+    for i, name in enumerate(TASK):
+        if name not in machine.freedoms:
+            continue
+        out.joint(
+            name=f"platform.{name}",
+            prismatic=i < 3,
+            axis=np.eye(3)[i % 3],
+            actuated=False,
+            home=body.translation[i] if i < 3 else 0.0,
+            law=None,
+            numbers={},
+            errors=[],
+            lower=-UNLIMITED,
+            upper=UNLIMITED,
+            guide_errors=[],
+            friction=0.0,
+            about_command=False,
+        )
+    turn = pose(Pose((0.0, 0.0, 0.0), body.rotation))
+    out.offset("platform.home", turn, turn)
+
+
+def cable(full: str, e: Cable) -> _core.ExternalSpring:
+    """A cable as the core's straight spring with a winch, at a point of the same name."""
+    lower, upper = limits_with_slack(e)
+    winch = _core.Winch(
+        e.elasticity or 0.0,
+        e.lead,
+        e.pretension,
+        1.0 / e.stretch,
+        e.lead_tension,
+        e.radius,
+        np.array(e.guide),
+        np.array(e.anchor_error),
+        np.array(e.at_error),
+        lower,
+        upper,
+        drive_numbers(e),
+        [command_error(c) for c in e.command_errors],
+    )
+    return _core.ExternalSpring(
+        core_name(full), full, np.array(e.anchor), e.stiffness or 0.0, 0.0, True, winch
+    )
 
 
 def task(machine: MachineDescription) -> list[bool]:
@@ -104,6 +162,8 @@ def add_elements(out: _core.Chain, elements: Sequence[Element]) -> None:
         match e:
             case Offset():
                 out.offset(e.name, pose(e.nominal), pose(e.actual or e.nominal))
+            case Cable():
+                out.point(e.name, np.array(e.at))
             case Joint():
                 add_joint(out, e)
             case Spring():

@@ -25,6 +25,8 @@ class Names:
     """In the order of the core; springs and joints with the index of their (first) coordinate."""
 
     actuators: tuple[str, ...]
+    cables: tuple[str, ...]
+    """Those of the actuators that are winches of cables."""
     legs: tuple[str, ...]
     points: tuple[str, ...]
     coordinates: tuple[str, ...]
@@ -46,6 +48,7 @@ def names_of(core: Mechanism) -> Names:
     coordinates, roles = tuple(core.coordinates), tuple(map(ROLES.__getitem__, core.roles))
     return Names(
         actuators=tuple(n for n, _ in core.actuators),
+        cables=tuple(core.cables),
         legs=tuple(core.legs),
         points=tuple(core.points),
         coordinates=coordinates,

@@ -36,6 +36,7 @@ class Flag(IntFlag):
     LOAD_STEPPED = 1 << 12
     REFERENCE_PATH = 1 << 13
     GIMBAL_LOCK = 1 << 14
+    SLACK = 1 << 15
 
 
 def counted(status: NDArray[np.uint8]) -> dict[str, int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.description.elements import Block, Body, Element, Joint, Offset, Point, Spring
+from stiffmap.description.elements import Block, Body, Cable, Element, Joint, Offset, Point, Spring
 from stiffmap.description.laws import Law
 from stiffmap.description.machine import MachineDescription
 
@@ -30,7 +30,7 @@ def alike(one: MachineDescription, other: MachineDescription, *, heavy: bool) ->
 
 
 def _whole(d: MachineDescription) -> tuple[object, ...]:
-    return d.home, d.search_home, d.task, d.gravity, d.external_springs
+    return d.home, d.search_home, d.task, d.freedoms, d.gravity, d.external_springs
 
 
 def _sequence(one: Elements, other: Elements, heavy: bool) -> bool:
@@ -76,6 +76,8 @@ def _element(one: Element, other: Element, heavy: bool) -> bool:
 
 
 def _joint(one: Joint, other: Joint) -> bool:
+    if isinstance(one, Cable) or isinstance(other, Cable):
+        return one == other
     if (one.kind, one.axes, one.home, one.actuated, one.friction, len(one.guide_errors)) != (
         other.kind,
         other.axes,

@@ -97,6 +97,49 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class Cable(Joint):
+    """Cable (or belt) from a point of the body of the current frame to an anchor in the base; it only pulls.
+
+    Its coordinate is the free (unstretched) length between the two, which a winch commands: an actuated joint
+    behind which no frame moves. ``anchor`` (m, base axes) is where it enters the guide: an eye, or a pulley of
+    ``radius`` that turns about ``guide`` (unit vector, base axes, the way the cable comes from the winch).
+    ``at`` (m, current frame) is where it is fixed to the body. docs/cables.md.
+    """
+
+    kind: str = "prismatic"
+    axes: tuple[Vector, ...] = ((0.0, 0.0, 1.0),)
+    actuated: bool = True
+    anchor: Vector = (0.0, 0.0, 0.0)
+    at: Vector = (0.0, 0.0, 0.0)
+    guide: Vector = (0.0, 0.0, 1.0)
+    elasticity: float | None = number("elasticity", "Axial stiffness EA.", effort=1, lower=0.0)
+    stiffness: float | None = number(
+        "stiffness",
+        "Stiffness that does not depend on the length, in series.",
+        coordinate=-1,
+        effort=1,
+        lower=0.0,
+    )
+    lead: float = number(
+        "lead", "Length between winch and anchor, which yields too.", default=0.0, coordinate=1, lower=0.0
+    )
+    pretension: float = number(
+        "pretension", "Tension that the controller commands lengths for.", default=0.0, effort=1, lower=0.0
+    )
+    radius: float = number(
+        "radius", "Of the guide's pulley; 0: an eye.", default=0.0, coordinate=1, lower=0.0
+    )
+    stretch: float = 1.0
+    """Factor of the real cable's compliance on the one that is believed in."""
+    lead_tension: float = 1.0
+    """Tension of the lead, of that of the free length: friction of the guide."""
+    anchor_error: Vector = (0.0, 0.0, 0.0)
+    """Real anchor minus the one that is believed in (m, base axes)."""
+    at_error: Vector = (0.0, 0.0, 0.0)
+    """The same of ``at`` (m, current frame)."""
+
+
+@dataclass(frozen=True)
 class Spring:
     """Virtual spring of a link: translations t then rotations phi, the frame behind it being
     ``p + R t``, ``R Rx(phi1) Ry(phi2) Rz(phi3)``.
@@ -152,7 +195,7 @@ class Block:
     branches: tuple[Branch, ...] = field(default=())
 
 
-Element = Offset | Joint | Spring | Body | Point | Block
+Element = Offset | Joint | Cable | Spring | Body | Point | Block
 
 __all__ = [
     "IDENTITY",
@@ -160,6 +203,7 @@ __all__ = [
     "Block",
     "Body",
     "Branch",
+    "Cable",
     "Drive",
     "Element",
     "Joint",

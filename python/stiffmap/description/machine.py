@@ -59,6 +59,8 @@ class MachineDescription:
     ``task`` names the pose components that are commanded, translations along base axes, rotations about
     the axes of the commanded TCP frame; the machine's closure decides the others.
     ``gravity`` (m/s², base axes) applies unless a call says otherwise; ``None`` is none.
+    A machine without legs hangs in its cables; ``freedoms`` names the components in which its platform can move
+    (translations along base axes, rotations about those of the base at home), guides hold the others.
     ``uncertainty`` holds a standard uncertainty (SI) beside any number, keyed by
     ``full.element.name/field``; ``notes`` says where numbers come from, by the same keys.
     ``declared`` is the machine before its effects were added (``None``: no effect has been);
@@ -77,6 +79,7 @@ class MachineDescription:
     external_springs: tuple[ExternalSpring, ...] = ()
     effects: tuple[AppliedEffect, ...] = ()
     task: tuple[str, ...] = TASK
+    freedoms: tuple[str, ...] = TASK
     title: str = ""
     source: str = ""
     uncertainty: tuple[tuple[str, float], ...] = ()

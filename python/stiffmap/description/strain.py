@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stiffmap.description.elements import Element, Joint, Offset, Spring
+from stiffmap.description.elements import Cable, Element, Joint, Offset, Spring
 from stiffmap.description.machine import MachineDescription
 from stiffmap.description.tree import all_elements
 
@@ -17,6 +17,8 @@ def _strains(e: Element) -> bool:
     match e:
         case Offset():
             return e.actual is not None and e.actual != e.nominal
+        case Cable():
+            return True  # gravity or pretension may stretch it differently from what its controller believes
         case Joint():
             sprung = not e.actuated and any(e.laws)  # away from home
             return bool(e.command_errors or e.guide_errors or sprung)

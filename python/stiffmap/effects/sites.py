@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from stiffmap.description import Block, Body, Element, Joint, MachineDescription, Offset, Point, Spring
+from stiffmap.description import Block, Body, Cable, Element, Joint, MachineDescription, Offset, Point, Spring
 from stiffmap.description.tree import Elements, sequences
 from stiffmap.effects.edit import Sites
 from stiffmap.effects.types import Place
@@ -50,7 +50,20 @@ def _alone(e: Element, i: int) -> bool:
 
 def guides(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Actuated sliders."""
-    return _by_name(elements, lambda e: isinstance(e, Joint) and e.actuated and e.kind == "prismatic")
+    return _by_name(
+        elements,
+        lambda e: isinstance(e, Joint) and e.actuated and e.kind == "prismatic" and not isinstance(e, Cable),
+    )
+
+
+def cables(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Cables and belts."""
+    return _by_name(elements, lambda e: isinstance(e, Cable))
+
+
+def led_cables(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Cables with a lead between winch and guide."""
+    return _by_name(elements, lambda e: isinstance(e, Cable) and e.lead > 0.0)
 
 
 def free_joints(elements: Elements) -> dict[str, tuple[int, ...]]:
@@ -64,8 +77,8 @@ def passive_joints(elements: Elements) -> dict[str, tuple[int, ...]]:
 
 
 def joints(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """All joints."""
-    return _by_name(elements, lambda e: isinstance(e, Joint))
+    """All joints; a cable is none."""
+    return _by_name(elements, lambda e: isinstance(e, Joint) and not isinstance(e, Cable))
 
 
 def springs(elements: Elements) -> dict[str, tuple[int, ...]]:

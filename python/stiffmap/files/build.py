@@ -46,6 +46,7 @@ def build(
     ]
     description = MachineDescription(
         task=tuple(c for c in TASK if c in model.task),
+        freedoms=tuple(c for c in TASK if c in model.freedoms),
         name=model.name,
         legs=tuple(leg for leg in legs if leg is not None),
         base=build_elements(model.base, context.at("base").inside("base")),

@@ -15,6 +15,7 @@ from stiffmap.description import (
     Block,
     Body,
     Branch,
+    Cable,
     CommandError,
     Drive,
     Element,
@@ -33,6 +34,7 @@ from stiffmap.files.schema.elements import (
     ActuatorModel,
     BlockModel,
     BodyModel,
+    CableModel,
     CommandErrorModel,
     ElementModel,
     JointModel,
@@ -81,6 +83,8 @@ def build_element(
             return _joint(model, _named(model.joint, model.note, context))
         case ActuatorModel():
             return _actuator(model, _named(model.actuator, model.note, context))
+        case CableModel():
+            return _cable(model, _named(model.cable, model.note, context))
         case SpringModel():
             return build_spring(model, _named(model.spring, model.note, context))
         case BodyModel():
@@ -174,7 +178,7 @@ def build_range(pair: list[Number], dimension: Dimension, context: Context, name
 
 
 def build_numbers(
-    model: JointModel | ActuatorModel, holder: type, angular: bool, context: Context
+    model: JointModel | ActuatorModel | CableModel, holder: type, angular: bool, context: Context
 ) -> dict[str, Any]:
     """Values of the numbers that `holder` declares and the file gives, SI; raises `FileError` out of bounds."""
     out: dict[str, Any] = {}
@@ -215,6 +219,22 @@ def _actuator(model: ActuatorModel, context: Context) -> Joint:
         command_errors=tuple(_command_error(e, coordinate, context) for e in model.command_errors or []),
         **build_numbers(model, Joint, angular, context),
         drive=None if drive == Drive() else drive,
+    )
+
+
+def _cable(model: CableModel, context: Context) -> Cable:
+    drive = Drive(**build_numbers(model, Drive, False, context))
+    numbers = build_numbers(model, Cable, False, context)
+    if not (numbers.get("elasticity") or numbers.get("stiffness")):
+        context.fail("a cable without elasticity and stiffness; at least one must be positive")
+    return Cable(
+        model.cable,
+        anchor=build_vector(model.anchor, LENGTH, context, "anchor"),
+        at=build_vector(model.at, LENGTH, context, "at") if model.at else (0.0, 0.0, 0.0),
+        guide=model.guide or (0.0, 0.0, 1.0),
+        command_errors=tuple(_command_error(e, LENGTH, context) for e in model.command_errors or []),
+        drive=None if drive == Drive() else drive,
+        **numbers,
     )
 
 

@@ -44,6 +44,7 @@ def dump(description: MachineDescription) -> Plain:
         "gravity": None if declared.gravity is None else floats(declared.gravity),
         "home": {**dump_pose(declared.home), **({"solve": True} if declared.search_home else {})},
         "task": None if declared.task == TASK else list(declared.task),
+        "freedoms": None if declared.freedoms == TASK else list(declared.freedoms),
         "workspace": None if declared.workspace is None else _box(declared.workspace),
         **_legs(declared.legs),
         "base": dump_elements(declared.base),
@@ -84,6 +85,8 @@ def _effect(effect: AppliedEffect) -> Plain:
 
 def _legs(legs: tuple[Leg, ...]) -> Plain:
     """Legs that differ by their frames and home coordinates only share a template."""
+    if not legs:
+        return {}
     placed = [_placed(leg) for leg in legs]
     middles = [middle for _, middle, _ in placed]
     template = middles[0]

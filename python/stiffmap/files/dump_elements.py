@@ -10,6 +10,7 @@ from stiffmap.description import (
     BeamStroke,
     Block,
     Body,
+    Cable,
     CommandError,
     Element,
     Joint,
@@ -48,6 +49,8 @@ def dump_element(element: Element) -> Plain:
         case Offset():
             actual = {} if element.actual is None else {"actual": dump_pose(element.actual)}
             return {"offset": element.name, **dump_pose(element.nominal), **actual}
+        case Cable():
+            return _cable(element)
         case Joint():
             return _actuator(element) if element.actuated else _joint(element)
         case Spring():
@@ -124,6 +127,17 @@ def _actuator(joint: Joint) -> Plain:
     plain.update(_numbers(joint))
     if joint.command_errors:
         plain["command_errors"] = [_command_error(error) for error in joint.command_errors]
+    return plain
+
+
+def _cable(cable: Cable) -> Plain:
+    _refuse_unsaved(cable)
+    plain: Plain = {"cable": cable.name, "anchor": floats(cable.anchor), "at": floats(cable.at)}
+    if cable.guide != Cable.guide:
+        plain["guide"] = _axis(cable.guide)
+    plain.update(_numbers(cable))
+    if cable.command_errors:
+        plain["command_errors"] = [_command_error(error) for error in cable.command_errors]
     return plain
 
 

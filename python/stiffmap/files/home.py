@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from stiffmap.compiled import CompiledMachine
 from stiffmap.compiled.ball import charted
-from stiffmap.description import Joint, MachineDescription
+from stiffmap.description import Cable, Joint, MachineDescription
 from stiffmap.description.tree import all_elements, core_name
 from stiffmap.units import ANGLE, LENGTH
 
@@ -37,7 +37,12 @@ def home_changes(machine: CompiledMachine) -> list[HomeChange]:
     changes = []
     for full_name, e in all_elements(machine.description):
         name = core_name(full_name)
-        if not isinstance(e, Joint) or charted(e)[1] is not None or name in machine.spun_balls:
+        if (
+            not isinstance(e, Joint)
+            or isinstance(e, Cable)
+            or charted(e)[1] is not None
+            or name in machine.spun_balls
+        ):
             continue  # a free ball joint in axes of our own
         for i, declared in enumerate(e.home):
             full = name if len(e.home) == 1 else f"{name}.{i + 1}"

@@ -11,6 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.calibration import Calibration, calibrate
 from stiffmap.calibration.corrected import at_every_turn
+from stiffmap.calibration.wording import in_display_units
 from stiffmap.description.tree import joints
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.experiment import Floats
@@ -95,3 +96,10 @@ def test_errors_of_a_turning_drive_return_with_its_turns() -> None:
         assert np.interp(u + 2 * np.pi * turns, *np.array(made).T) == pytest.approx(error)
     sliding = next(iter(joints(sm.load_machine("linear-delta").description).values()))
     assert at_every_turn(sliding, knots) == knots
+
+
+def test_per_cent_are_per_cent() -> None:
+    assert in_display_units(float(np.log(1.25)), "ln") == "25 %"
+    assert in_display_units(float(np.log(0.8)), "ln") == "-20 %"
+    assert in_display_units(3.5, "ln") == "×33.12"  # not 350 %
+    assert in_display_units(2e-3, "m") == "2 mm"

@@ -30,5 +30,6 @@ CLASSES: dict[str, Callable[[Classes], Task]] = {
     "cables": Classes.cables,
     "locked balls": Classes.locked_balls,
     "springs outside": Classes.outside,
+    "hung": Classes.hung,
     "few": Classes.few,
 }

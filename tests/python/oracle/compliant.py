@@ -10,6 +10,7 @@ from scipy.optimize import lsq_linear
 
 from stiffmap.description import (
     Body,
+    Cable,
     CommandError,
     Element,
     ExternalSpring,
@@ -82,6 +83,44 @@ class Compliant(Asking):
         shift, turn = self.rng.uniform(-0.1, 0.1, 3), self._turn(0.05)
         pose = Pose.of(np.array(home.p) + shift, turn @ np.array(home.r))
         return self._asked(d, pose, float(10 ** self.rng.uniform(1, 3.7)), by_pose=True)
+
+    def hung(self) -> Task:
+        """Six to ten cables as elements, through eyes or over pulleys, no legs: pretensioned from above and below, or
+        hanging by its weight."""
+        count = int(self.rng.integers(6, 11))
+        home = Pose.of(self.rng.uniform(-0.1, 0.1, 3) + [0, 0, 0.9], self._turn(0.1))
+        ends = self._cable_ends(count)
+        pretension, left = balance(home, ends)
+        above = left > 1.0  # nothing balances: all of them from above, by the weight
+        cables: list[Element] = []
+        for i, ((anchor, head), tension) in enumerate(zip(ends, pretension, strict=True)):
+            x, y, z = (anchor + [0.0, 0.0, 1.9 - anchor[2] + 0.1 * i] if above else anchor).tolist()
+            radius = float(self.rng.choice([0.0, 0.0, 0.03]))
+            error = (
+                (CommandError(offset=float(self.rng.normal(scale=2e-4))),) if self.rng.random() < 0.3 else ()
+            )
+            cables.append(
+                Cable(
+                    f"c{i}",
+                    anchor=(x, y, z),
+                    at=(float(head[0]), float(head[1]), float(head[2])),
+                    guide=(0.0, 0.0, -1.0 if z > home.p[2] else 1.0),
+                    elasticity=float(10 ** self.rng.uniform(4.5, 6)) if self.rng.random() < 0.8 else None,
+                    stiffness=float(10 ** self.rng.uniform(5, 6))
+                    if not cables or self.rng.random() < 0.5
+                    else 1e6,
+                    lead=float(self.rng.uniform(0, 1)),
+                    pretension=0.0 if above else float(tension),
+                    radius=radius,
+                    command_errors=error,
+                )
+            )
+        body = Body("platform", float(self.rng.uniform(5, 60)), self._vector(0.05), self._inertia(2.0))
+        d = MachineDescription("hung", (), platform=(*cables, body), home=home)
+        shift, turn = self.rng.uniform(-0.1, 0.1, 3), self._turn(0.05)
+        pose = Pose.of(np.array(home.p) + shift, turn @ np.array(home.r))
+        size = 20.0 if above else float(10 ** self.rng.uniform(1, 3.5))
+        return self._asked(d, pose, size, by_pose=True, heavy=1.0 if above else 0.5)
 
     def _cable_ends(self, count: int) -> list[tuple[np.ndarray, np.ndarray]]:
         """Anchors (base axes) above and below in turn, heads (the platform's axes)."""

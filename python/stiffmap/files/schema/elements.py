@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
-from stiffmap.description import Drive, Joint
+from stiffmap.description import Cable, Drive, Joint
 from stiffmap.description.numbers import JointNumber, numbers_of
 from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Pair, Vector3
 from stiffmap.files.schema.geometry import Axis, Frame
 from stiffmap.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix, Stroke
 
-SORTS = ("offset", "joint", "actuator", "spring", "body", "point", "block")
+SORTS = ("offset", "joint", "actuator", "spring", "body", "point", "block", "cable")
 AXES_OF = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 3}
 
 
@@ -31,9 +31,9 @@ def _model(name: str, numbers: dict[str, JointNumber]) -> type[FileModel]:
     return create_model(name, __base__=FileModel, **keys)
 
 
-def _numbers(name: str, *, passive: bool) -> type[FileModel]:
+def _numbers(name: str, *, passive: bool, of: type = Joint) -> type[FileModel]:
     """Keys of all declared numbers of a joint with a drive, or of a passive one."""
-    found = (*numbers_of(Joint), *(() if passive else numbers_of(Drive)))
+    found = (*numbers_of(of), *(() if passive else numbers_of(Drive)))
     return _model(name, {n.key: n for n in found if n.passive or not passive})
 
 
@@ -45,10 +45,14 @@ if TYPE_CHECKING:  # the keys are made from the numbers that Joint and Drive dec
     class DriveNumbers(FileModel):
         """Keys of the numbers of a joint with a drive."""
 
+    class CableNumbers(FileModel):
+        """Keys of the numbers of a cable and its winch."""
+
 else:
-    PassiveNumbers, DriveNumbers = (
+    PassiveNumbers, DriveNumbers, CableNumbers = (
         _numbers("PassiveNumbers", passive=True),
         _numbers("DriveNumbers", passive=False),
+        _numbers("CableNumbers", passive=False, of=Cable),
     )
 
 
@@ -131,6 +135,24 @@ class ActuatorModel(DriveNumbers):
     @model_validator(mode="after")
     def _one_law(self) -> ActuatorModel:
         one_of(self, ("stiffness", "compliance", "law", "rigid"), required=True)
+        return self
+
+
+class CableModel(CableNumbers):
+    """Cable or belt from the current frame to an anchor in the base; its winch commands its free length. Give its
+    elasticity (EA), a stiffness, or both. ``force`` is the largest tension."""
+
+    cable: Name
+    anchor: Annotated[Vector3, Field(description="Where it enters its guide, base axes.")]
+    at: Annotated[Vector3 | None, Field(description="Where it is fixed, in the current frame.")] = None
+    guide: Annotated[Axis | None, Field(description="Axis about which the pulley turns, base axes.")] = None
+    command_errors: list[CommandErrorModel] | None = None
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _yields(self) -> CableModel:
+        if getattr(self, "elasticity", None) is None and getattr(self, "stiffness", None) is None:
+            raise PydanticCustomError("cable", "a cable needs an elasticity (EA) or a stiffness")
         return self
 
 
@@ -229,7 +251,8 @@ ElementModel = Annotated[
     | Annotated[SpringModel, Tag("spring")]
     | Annotated[BodyModel, Tag("body")]
     | Annotated[PointModel, Tag("point")]
-    | Annotated[BlockModel, Tag("block")],
+    | Annotated[BlockModel, Tag("block")]
+    | Annotated[CableModel, Tag("cable")],
     Discriminator(
         _sort,
         custom_error_type="element",

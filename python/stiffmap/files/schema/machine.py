@@ -8,7 +8,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Vector3
-from stiffmap.files.schema.elements import ElementModel
+from stiffmap.files.schema.elements import BodyModel, CableModel, ElementModel, OffsetModel, PointModel
 from stiffmap.files.schema.geometry import Box, Frame, HomeModel
 from stiffmap.files.schema.springs import Material
 
@@ -109,7 +109,15 @@ class MachineFile(FileModel):
     materials: dict[Name, Material] = Field(default_factory=dict)
     templates: dict[Name, AnyTemplate] = Field(default_factory=dict)
     base: list[ElementModel] = Field(default_factory=list)
-    legs: Annotated[dict[Name, LegModel], Field(min_length=1)]
+    legs: dict[Name, LegModel] = Field(default_factory=dict)
+    freedoms: Annotated[
+        list[Component],
+        Field(
+            min_length=1,
+            description="Components in which the platform of a machine without legs can move; left out: all. "
+            "Guides hold the others.",
+        ),
+    ] = Field(default_factory=lambda: list(get_args(Component)))
     platform: list[ElementModel] = Field(default_factory=list)
     external_springs: dict[Name, ExternalSpringModel] = Field(default_factory=dict)
     effects: list[EffectModel] = Field(default_factory=list)
@@ -118,3 +126,24 @@ class MachineFile(FileModel):
     )
     notes: dict[str, str] = Field(default_factory=dict)
     extra: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _carried(self) -> MachineFile:
+        if self.legs:
+            return self
+        if not any(isinstance(e, CableModel) for e in self.platform):
+            raise PydanticCustomError("legs", "expected legs, or cables in the platform; found neither")
+        rigid = (OffsetModel, BodyModel, PointModel, CableModel)
+        for sequence, kinds in (("base", rigid[1:3]), ("platform", rigid)):
+            for e in getattr(self, sequence):
+                if not isinstance(e, kinds):
+                    raise PydanticCustomError(
+                        "legs",
+                        "without legs, {sequence} has {kinds} only; found {found}",
+                        {
+                            "sequence": sequence,
+                            "kinds": ", ".join(k.__name__.removesuffix("Model").lower() for k in kinds),
+                            "found": type(e).__name__.removesuffix("Model").lower(),
+                        },
+                    )
+        return self

@@ -132,7 +132,9 @@ class Path:
         multipliers = np.zeros(self.system.closures)
         t = self.system.at_state(self.start, multipliers, self.near, 0.0)
         if not self.hold(t):
-            return None, "singular"
+            if not self.system.winches or not self.system.loads.gravity.any():
+                return None, "singular"
+            self.system.weighs = True  # hangs by its weight
         start = self.newton(self.start, multipliers, self.near, 0.0, ITERATIONS)
         if start is None and not len(self.holds):
             start = self.held()

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.description import Joint, MachineDescription, Pose, Spring
 
 from ..energy import Loads
+from .cables import Winch, winches
 from .closure import Closure, Unreachable
 from .path import Path, Point, closed
 from .relative import Array, State
@@ -89,6 +90,7 @@ class Machine:
         pose = Pose.of(at[0].p[tip], at[0].r[tip])
         command = {n: self.value(at, n) for n in self.drives}
         path = self.path(at, loads, kind)
+        command |= {c.name: c.free for c in path.system.winches}
         point, how = path.follow()
         if point is None:
             return nothing(how, pose, command)
@@ -99,7 +101,12 @@ class Machine:
         state, measured = at
         beside, target, soft = self.targets(measured)
         real = Builder(self.d, beside).build()
-        return Path(System(real, target, soft, loads, kind, state.r[self.drawn.tip]), state, measured)
+        system = System(real, target, soft, loads, kind, state.r[self.drawn.tip])
+        drawn = {c.name: c.free for c in winches(self.drawn, state)}
+        system.winches = [
+            Winch(e, at, leg, name, drawn[name]) for name, leg, at, e in real.cables if name in drawn
+        ]
+        return Path(system, state, measured)
 
     def judge(
         self, displacement: Array, loads: Loads, pose: Pose | None, drives: dict[str, float] | None, kind: str
@@ -149,7 +156,8 @@ def answered(path: Path, at: Point, pose: Pose, command: dict[str, float], modes
     compliance = path.solve(t, unit, np.zeros((len(t.gap), 6)))[0][i : i + 6]
     p, r = at.state.p[s.tip], at.state.r[s.tip]
     turn = Rotation.from_matrix(r @ np.array(pose.r).T).as_rotvec()
-    effort = {n: -float(t.force[s.names.index(n)]) for n in command}
+    effort = {n: -float(t.force[s.names.index(n)]) for n in command if n in s.names}
+    effort |= {n: -v for n, v in t.tensions.items()}
     z = closed(np.vstack([t.rows, path.holds]) if len(path.holds) else t.rows)
     h = z.T @ t.curve @ z
     values = np.linalg.eigvalsh(h + h.T)
@@ -175,6 +183,9 @@ def leg_wrenches(path: Path, at: Point) -> dict[str, Array]:
         if leg and where.body == body:
             arm = at.state.r[body] @ where.p
             out[leg] += np.r_[force, np.cross(arm, force)]
+    for c in path.system.winches:
+        if c.leg and c.at.body == body:
+            out[c.leg] -= c.pull(at.state)[1]
     shift = at.state.p[body] - at.state.p[s.tip]
     for w in out.values():
         w[3:] += np.cross(shift, w[:3])

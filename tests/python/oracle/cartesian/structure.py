@@ -4,13 +4,13 @@ and the start of the platform, the ends of all branches of a block."""
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.description import Block, Body, Joint, Law, MachineDescription, Offset, Point, Spring
+from stiffmap.description import Block, Body, Cable, Joint, Law, MachineDescription, Offset, Point, Spring
 
 from . import measures as made
 from .measures import Measure, Measures
@@ -65,6 +65,8 @@ class Structure:
     pairs: list[Pair]
     masses: list[Mass]
     points: dict[str, tuple[str, At]]
+    cables: list[tuple[str, str, At, Cable]]
+    """Full name, leg, frame that it starts from."""
     tip: int
     platform: int
     """The body in which the legs end."""
@@ -96,6 +98,7 @@ class Builder:
         self.pairs: list[Pair] = []
         self.masses: list[Mass] = []
         self.points: dict[str, tuple[str, At]] = {}
+        self.cables: list[tuple[str, str, At, Cable]] = []
         self.poses: list[tuple[Array, Array]] = []
         self.same: dict[int, At] = {}  # body -> where it stands on the body that it is part of
         self.leg = ""
@@ -109,7 +112,7 @@ class Builder:
             self.leg = leg.name
             ends.append(self.leg_or_branch(leg.elements, start, f"{leg.name}.", ends[0] if ends else None))
         self.leg = ""
-        self.end = ends[0] if ends else start
+        self.end = ends[0] if ends else self.hung() if self.d.freedoms and not self.d.legs else start
         tip = self.along(self.d.platform, self.end, "")
         tip = self.now(tip)
         if tip.body == BASE:  # held by nothing but itself
@@ -119,6 +122,28 @@ class Builder:
             )
             tip = self.end = At(len(self.poses) - 1)
         return self.finished(tip)
+
+    def hung(self) -> At:
+        """The platform of a machine without legs, where the TCP is at home; guides hold what is no freedom."""
+        own = Builder(replace(self.d, legs=()), None)
+        own.poses.append((np.eye(3), np.zeros(3)))
+        end = own.along(self.d.platform, At(0), "")
+        r = np.array(self.d.home.r) @ own.pose(end)[0].T
+        p = np.array(self.d.home.p) - r @ own.pose(end)[1]
+        self.poses.append((r, p))
+        turning = [i for i, n in enumerate(("rx", "ry", "rz")) if n in self.d.freedoms]
+        kept = [made.linear(shift=np.eye(3)[i]) for i, n in enumerate("xyz") if n not in self.d.freedoms]
+        if len(turning) == 2:
+            raise Unsupported("a platform that turns about two axes")
+        if not turning:
+            kept += made.weld()[:3]
+        if len(turning) == 1:
+            axis = np.eye(3)[turning[0]]
+            kept += [made.linear(np.outer(v, axis)) for v in made.across(axis)]
+        if kept:
+            body = At(len(self.poses) - 1, r.T, np.zeros(3))
+            self.pair(Pair("guides", "", At(BASE, np.eye(3), p), body, kept, ["keep"] * len(kept)))
+        return At(len(self.poses) - 1)
 
     def leg_or_branch(self, elements: Iterable[Any], start: At, prefix: str, end: At | None) -> At:
         """Its end; where others have ended already, that is made one with their end."""
@@ -150,6 +175,8 @@ class Builder:
             if isinstance(e, Offset):
                 t = e.actual if e.actual is not None and self.as_built else e.nominal
                 f = f.behind(np.array(t.r), np.array(t.p))
+            elif isinstance(e, Cable):
+                self.cables.append((name, self.leg, f, e))
             elif isinstance(e, Joint):
                 f = self.joint(e, f, name)
             elif isinstance(e, Spring):
@@ -221,6 +248,7 @@ class Builder:
             p.a, p.b = final(p.a), final(p.b)
         masses = [Mass(m.leg, final(m.at), m.body) for m in self.masses]
         points = {n: (leg, final(at)) for n, (leg, at) in self.points.items()}
+        cables = [(n, leg, final(at), e) for n, leg, at, e in self.cables]
         names: list[str] = []
         home: list[float] = []
         of: list[int] = []
@@ -238,7 +266,7 @@ class Builder:
         start = State(np.array([p for _, p in poses]), np.array([r for r, _ in poses]))
         all_measures = Measures([m for p in self.pairs for m in p.measures], of, sine_of)
         return Structure(
-            self.d, self.pairs, masses, points, number[len(self.poses) - 1], final(self.end).body, start,
+            self.d, self.pairs, masses, points, cables, number[len(self.poses) - 1], final(self.end).body, start,
             (frames([p.a for p in self.pairs]), frames([p.b for p in self.pairs])),
             all_measures, names, np.array(home, dtype=float),
         )  # fmt: skip

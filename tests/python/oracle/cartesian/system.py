@@ -10,6 +10,7 @@ import numpy as np
 from stiffmap.description import ExternalSpring, Joint, Spring
 
 from ..energy import Loads
+from .cables import Winch
 from .closure import spread
 from .relative import BOTH, CROSS, Array, Relative, State, crossed
 from .structure import At, Structure, Unsupported, law_at
@@ -35,6 +36,8 @@ class Tangent:
     """Of all measures: of laws, springs, constraints."""
     pieces: tuple[int, ...]
     """Which pieces of laws are at work."""
+    tensions: dict[str, float]
+    """Of cables."""
 
 
 class System:
@@ -45,6 +48,8 @@ class System:
     ) -> None:
         self.s, self.target, self.soft, self.loads, self.kind = s, target, soft, loads, kind
         self.turned = turned  # commanded rotation of the TCP
+        self.winches: list[Winch] = []
+        self.weighs = False  # its weight is there from the start
         self.laws: list[tuple[int, Any]] = []
         groups: list[tuple[int, Array]] = []
         kept = s.where("keep")
@@ -119,13 +124,23 @@ class System:
         pushes = np.einsum("mi,mij->mj", w, rel.slope)
         blocks = np.swapaxes(rel.slope, 1, 2) @ b @ rel.slope + rel.curve(w)
         wide = n6 + 6
-        curve = np.bincount(self.flat, blocks.ravel(), wide * wide).reshape(wide, wide)[:n6, :n6]
-        gradient = np.bincount(self.dofs.ravel(), pushes.ravel(), wide)[:n6]
+        curve = np.bincount(self.flat, blocks.ravel(), wide * wide).astype(float)
+        curve = curve.reshape(wide, wide)[:n6, :n6]
+        gradient = np.bincount(self.dofs.ravel(), pushes.ravel(), wide)[:n6].astype(float)
         load = np.zeros(n6)
         self._pull(at, gradient, curve, pieces)
-        self._load(at, load, curve, share)
+        tensions = {}
+        for c in self.winches:
+            tensions[c.name], own, k, _ = c.pull(at)
+            pieces.append(int(k.any()))
+            i = slice(6 * c.at.body, 6 * c.at.body + 6)
+            gradient[i] += own
+            curve[i, i] += k
+        self._load(at, load, gradient, curve, share)
         rows = spread(np.einsum("ij,ijk->ik", slope[self.kept], rel.slope[m.pair[self.kept]]), s, self.kept)
-        return Tangent(gradient, load, curve, off[self.kept], rows, value, pushes, force, tuple(pieces))
+        return Tangent(
+            gradient, load, curve, off[self.kept], rows, value, pushes, force, tuple(pieces), tensions
+        )
 
     def _pull(self, at: State, gradient: Array, curve: Array, pieces: list[int]) -> None:
         """Straight springs between a point and an anchor."""
@@ -149,14 +164,15 @@ class System:
             turn = slice(6 * point.body + 3, 6 * point.body + 6)
             curve[turn, turn] += np.einsum("klim,i,m->kl", BOTH, pull * u, arm)
 
-    def _load(self, at: State, load: Array, curve: Array, share: float) -> None:
+    def _load(self, at: State, load: Array, gradient: Array, curve: Array, share: float) -> None:
         """The whole load's gradient, and its share of the Hessian."""
-        for where, force, weights, _ in self.lifts:
+        for number, (where, force, weights, _) in enumerate(self.lifts):
             if where.body == self.s.size:
                 continue
-            i = 6 * where.body
-            load[i : i + 3] -= force
-            turned(load, curve, i + 3, -(weights @ at.r[where.body].T), share)
+            i, steady = 6 * where.body, self.weighs and number < len(self.s.masses)
+            to = gradient if steady else load
+            to[i : i + 3] -= force
+            turned(to, curve, i + 3, -(weights @ at.r[where.body].T), 1.0 if steady else share)
         i, turn = 6 * self.s.tip, at.r[self.s.tip] @ self.turned.T
         force, moment = self.loads.force, self.loads.moment
         if self.kind == "follower":
