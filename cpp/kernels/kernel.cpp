@@ -271,7 +271,7 @@ struct Block : Answers {
     const int most = in.patience == Patience::path ? LoadPath::most_of_most : LoadPath::most_iterations;
     M done = path.follow(lanes, most, iterations, [&](M anew) { stand_at_start(anew); });
     unstable = path.unstable;
-    ended = path.ended;
+    if (P.spring_count == 0) ended = path.ended;  // what such springs hold, the reference may follow farther
     unfinished = path.unfinished;
     if (any(ended) && LastAttempt::possible(newton)) done |= attempt(newton, iterations);
     steps = select(lanes, splat(1), steps);

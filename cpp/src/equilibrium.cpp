@@ -85,7 +85,12 @@ class LoadPath {
   Outcome follow() {
     out_.flags |= flag::load_stepped;
     p_.factor = 0;
-    if (newton(m_, p_, opt_, true, false, ws_, state_, out_) != Outcome::converged) return Outcome::failed;
+    if (newton(m_, p_, opt_, true, false, ws_, state_, out_) !=
+        Outcome::converged) {  // springs that pull without a load
+      state_ = ws_.start;
+      if (!settle_downhill(m_, p_, opt_.tolerance, ws_, state_, out_)) return Outcome::failed;
+      factorize_at(m_, p_, state_, ws_);
+    }
     note(stable_, ws_.slope_before, wrench_slope_before_);
     double done = 0, step = 0.5;
     for (int k = 0; k < most_load_steps; ++k) {
@@ -216,7 +221,13 @@ Outcome adaptive_steps(const Mechanism& m, Problem& p, const EquilibriumOptions&
   LoadPath path(m, p, opt, ws, state, out);
   if (path.at_once()) return Outcome::converged;
   state = ws.start;
-  return path.follow();
+  const Outcome followed = path.follow();
+  const auto slackens = [](const NodeSpring& s) { return s.tension_only; };
+  if (followed == Outcome::converged || std::none_of(m.external_springs.begin(), m.external_springs.end(), slackens))
+    return followed;
+  state = ws.start;  // the path has a corner where one of them goes slack
+  out.sign_changes = 0;
+  return at_once_with_corners(m, p, opt, ws, state, out) ? Outcome::converged : Outcome::failed;
 }
 
 /// A platform in cables alone: the minimum of the energy that lies downhill, then Newton's last steps.
