@@ -46,7 +46,7 @@ class Line:
 
     def value(self, bodies: list[tuple[Array, Array]]) -> complex:
         d = self.end.now(bodies)[0] - self.start.now(bodies)[0]
-        return self.energy(np.sqrt(d @ d))
+        return complex(self.energy(np.sqrt(d @ d)))
 
 
 def arc(y: complex, x: complex) -> complex:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,7 +86,7 @@ class Suspension:
             parts.append(Force(At(0, np.array(self.com)), self.mass * gravity))
         return Bodies([(p, r)], parts)
 
-    def spring(self, free: float):  # type: ignore[no-untyped-def]
+    def spring(self, free: float) -> Callable[[complex], complex]:
         def energy(length: complex) -> complex:
             d = length - free
             pushes = self.slack if self.slack and d.real < 0 else self.stiffness

@@ -31,7 +31,8 @@ def leaf(width: float, height: float) -> np.ndarray:
 def stage(legs: int, seed: int) -> tuple[MachineDescription, list[Part]]:
     """A platform on leaves that stand up from the base."""
     rng = np.random.default_rng(seed)
-    made, parts = [], []
+    made: list[Leg] = []
+    parts: list[Part] = []
     for i in range(legs):
         turn = 2 * np.pi * i / legs + rng.uniform(-0.1, 0.1)
         r = Rotation.from_euler("ZY", [turn, rng.uniform(-0.2, 0.2) - np.pi / 2]).as_matrix()
