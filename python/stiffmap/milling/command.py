@@ -1,4 +1,4 @@
-"""Commands at which the loaded machine is on the path, and the mirrored ones beside them (theory.md, M10)."""
+"""Commands at which the loaded machine is on the path, and the mirrored ones (theory.md, M10)."""
 
 from __future__ import annotations
 

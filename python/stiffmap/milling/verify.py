@@ -25,7 +25,7 @@ class Run:
     """k points of a program, base axes."""
 
     job: Setting
-    """Points of the wanted path beside those of the program."""
+    """Points of the wanted path that belong to those of the program."""
     state: Equilibrium
     normal: Floats
     """(k,) m: error across the wall, positive where material stays."""

@@ -49,6 +49,18 @@ def test_measured_set() -> None:
     assert sm.cutting_force(at).mean == pytest.approx(law.best.predict(at))
 
 
+def test_other_names_of_columns() -> None:
+    names = {
+        "feed_per_tooth_mm": "feed per tooth [mm]",
+        "Fx_N": "fx [N]",
+        "Fy_N": "FY_N",
+        "teeth": "n_teeth",
+        "axial_mm": "ap [mm]",
+    }
+    law = sm.identify_process({names.get(k, k): v for k, v in MEASURED.items()})
+    assert law.coefficients == sm.identify_process(MEASURED).coefficients
+
+
 def made(noise: float = 0.0, signals: bool = False, runout: float = 0.0) -> dict[str, Any]:
     """Readings of the shipped slot at four feeds."""
     rng = np.random.default_rng(3)

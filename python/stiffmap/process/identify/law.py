@@ -99,7 +99,7 @@ class IdentifiedLaw:
             out.append(
                 f"The forces bend: a straight law would by chance with probability {self.bend:.2g} only. Likeliest: {best.model.name}{named}, "
                 f"{best.model.words}; it leaves {', '.join(f'{v:.1f}' for v in np.sqrt((best.residual**2).mean(axis=0)))} N."
-                + (f" These readings do not tell it from: {', '.join(close)}." if close else "")
+                + (f" These readings cannot separate it from: {', '.join(close)}." if close else "")
             )
         else:
             out.append(f"No bend is shown (probability {self.bend:.2g} by chance).")

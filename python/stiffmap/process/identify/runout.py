@@ -1,4 +1,4 @@
-"""Run-out from signals: the line at the spindle's frequency beside that of the tooth passing."""
+"""Run-out from signals: the line at the spindle's frequency against that of the tooth passing."""
 
 from __future__ import annotations
 

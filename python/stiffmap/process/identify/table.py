@@ -15,11 +15,18 @@ import numpy as np
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.process.description import SIDES, Cut, EndMill, Process, Tool
+from stiffmap.units import name_and_unit
 
 MM = 1e-3
 FORCES = ("Fx_N", "Fy_N", "Fz_N")
 NEEDED = ("feed_per_tooth_mm", *FORCES, "teeth", "axial_mm")
 OTHERS = ("radial_mm", "diameter_mm", "spindle_rpm", "side", "helix_deg", "time_s")
+ALIASES = {
+    "feed_mm_per_tooth": "feed_per_tooth_mm", "feed_mm_tooth": "feed_per_tooth_mm", "c_mm": "feed_per_tooth_mm",
+    "chip_mm": "feed_per_tooth_mm", "fx_n": "Fx_N", "fy_n": "Fy_N", "fz_n": "Fz_N", "depth_mm": "axial_mm", "ap_mm": "axial_mm",
+    "ae_mm": "radial_mm", "width_mm": "radial_mm", "rpm": "spindle_rpm", "z": "teeth", "n_teeth": "teeth", "t_s": "time_s",
+}  # fmt: skip
+"""Other names of columns, in small letters; ``Fx [N]`` is Fx_N."""
 SLOT_SIGNS = (-1.0, 1.0, 1.0)
 """Of the mean forces of a slot with positive coefficients."""
 
@@ -64,7 +71,7 @@ def read_table(table: str | PathLike[str] | Mapping[str, Any], process: Process 
     columns = (
         _read_csv(Path(table)) if isinstance(table, str | PathLike) else {str(k): table[k] for k in table}
     )
-    columns = _with_defaults(columns, process)
+    columns = _with_defaults({_known(n): v for n, v in columns.items()}, process)
     missing = [n for n in NEEDED if n not in columns]
     if missing:
         raise FileError(f"missing column '{missing[0]}'; needed: {', '.join(NEEDED)}", file=file)
@@ -92,6 +99,13 @@ def read_table(table: str | PathLike[str] | Mapping[str, Any], process: Process 
         means.append(one.force.mean(axis=0))
         signals.append(one)
     return _slot_signs(ForceTable(tuple(cuts_of), np.array(means), tuple(signals)))
+
+
+def _known(name: str) -> str:
+    """The name of a column as `NEEDED` and `OTHERS` have it; itself where it is none of theirs."""
+    plain, unit = name_and_unit(name)
+    text = "_".join(p for p in (plain.replace(" ", "_"), unit) if p)
+    return next((n for n in NEEDED + OTHERS if n.lower() == text.lower()), ALIASES.get(text.lower(), name))
 
 
 def _whole_turns(s: Signals, turn: float, file: str, feed: float) -> Signals:
