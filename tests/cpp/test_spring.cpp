@@ -118,6 +118,52 @@ BOOST_AUTO_TEST_CASE(a_compliance_loses_rank_below_1e_9) {
   BOOST_TEST(rigid.rigid.count() == 1);
 }
 
+BOOST_AUTO_TEST_CASE(a_table_is_linear_between_its_rows) {
+  // Rows of different shape, so that each interval and each share of it gives a compliance of its own.
+  const Mat6 A = random_spd(7), B = random_spd(8), C = random_spd(9);
+  Stroke stroke;
+  stroke.joint = "slide";
+  stroke.table = {{-0.5, A}, {0.25, B}, {1.5, C}};
+  const SpringMatrix matrix = spring_from_compliance(A, "link");
+  BOOST_CHECK_NO_THROW(check_stroke(stroke, matrix, "link"));
+  const auto compliance = [&](double u) {
+    Mat6 K;
+    BOOST_TEST(stiffness_at(stroke, matrix, u, K));
+    BOOST_TEST((K - K.transpose()).norm() == 0);
+    return Mat6(K.inverse());
+  };
+  const auto near = [](const Mat6& got, const Mat6& wanted) { return (got - wanted).norm() < 1e-8 * wanted.norm(); };
+  BOOST_TEST(near(compliance(-0.5), A));
+  BOOST_TEST(near(compliance(-0.2), 0.6 * A + 0.4 * B));
+  BOOST_TEST(near(compliance(0.25), B));
+  BOOST_TEST(near(compliance(0.5), 0.8 * B + 0.2 * C));
+  BOOST_TEST(near(compliance(1.5), C));
+  Mat6 K;
+  const double slack = 2e-9;  // 1e-9 of the width of 2
+  BOOST_TEST(stiffness_at(stroke, matrix, -0.5 - 0.9 * slack, K));
+  BOOST_TEST(stiffness_at(stroke, matrix, 1.5 + 0.9 * slack, K));
+  BOOST_TEST(!stiffness_at(stroke, matrix, -0.5 - 1.1 * slack, K));
+  BOOST_TEST(!stiffness_at(stroke, matrix, 1.5 + 1.1 * slack, K));
+}
+
+BOOST_AUTO_TEST_CASE(a_beam_that_grows_has_the_compliance_of_its_length) {
+  const test::BeamSection section{2e8, 3e4, 3e4, 2e4};
+  Stroke stroke;
+  stroke.joint = "slide";
+  stroke.at = 0.1;
+  stroke.length = 0.8;
+  stroke.rate = -2;
+  const SpringMatrix matrix = spring_from_compliance(test::beam_compliance(0.8, section), "beam");
+  for (const double u : {0.1, 0.3, -0.4}) {
+    Mat6 K;
+    BOOST_TEST(stiffness_at(stroke, matrix, u, K));
+    const Mat6 wanted = test::beam_compliance(0.8 - 2 * (u - 0.1), section).inverse();
+    BOOST_TEST((K - wanted).norm() < 1e-9 * wanted.norm());
+  }
+  Mat6 K;
+  BOOST_TEST(!stiffness_at(stroke, matrix, 0.5, K));  // no length
+}
+
 BOOST_AUTO_TEST_CASE(nan_is_refused) {
   Mat6 K = Mat6::Identity();
   K(4, 4) = std::nan("");
