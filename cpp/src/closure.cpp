@@ -283,7 +283,7 @@ ClosureResult follow_actuators(const Mechanism& m, const VecX& actuators, Closur
 ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x) {
   if (!actuators.allFinite()) return {};
   x = m.home_coordinates;
-  if (!m.loops.empty()) return follow_actuators(m, actuators, ws, x);
+  if (!m.loops.empty() || !m.cables.empty()) return follow_actuators(m, actuators, ws, x);
   ClosureResult out;  // nothing to close: the joints are where the actuators put them
   for (std::size_t i = 0; i < m.drives.size(); ++i) {
     const Index j = m.drives[i].coordinate;

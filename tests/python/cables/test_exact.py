@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.python.cables.made import hanging
 
-from stiffmap import Flag, Status, inverse_kinematics
+from stiffmap import Flag, Status, forward_kinematics, inverse_kinematics
 
 EA, T = 2.0e5, 300.0
 METHODS = ("fast", "reference")
@@ -139,3 +139,21 @@ def test_stiffness_is_the_slope_of_the_force(radius: float) -> None:
             errors.append(np.abs(slope - s.compliance[:3, :3]).max() / np.abs(s.compliance[:3, :3]).max())
         assert errors[1] < 1e-5
         assert 3.5 < errors[0] / errors[1] < 4.5
+
+
+def test_forward_kinematics_of_more_winches_than_freedoms() -> None:
+    """Eight free lengths lead back to the pose; eight that do not go together lead nowhere."""
+    anchors = [(sx * 2.0, sy * 1.5, z) for z in (0.0, 2.0) for sx in (-1, 1) for sy in (-1, 1)]
+    at = [(0.3 * np.sign(a[0]), 0.1 * np.sign(a[1]), 0.15 - 0.15 * a[2]) for a in anchors]
+    m = hanging(
+        anchors,
+        at=[tuple(map(float, p)) for p in at],
+        freedoms=("x", "y", "z", "rx", "ry", "rz"),
+        home=(0.0, 0.0, 1.0),
+        elasticity=EA,
+        pretension=T,
+    )
+    p = np.array([0.2, -0.1, 1.1])
+    lengths = inverse_kinematics(m, p).actuators
+    np.testing.assert_allclose(forward_kinematics(m, lengths).position, p, atol=1e-12)
+    assert forward_kinematics(m, lengths + 0.05 * np.eye(8)[0]).status == Status.UNREACHABLE
