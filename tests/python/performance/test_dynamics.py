@@ -108,7 +108,10 @@ def with_links(name):
     return sm.Machine(replace(d, legs=legs, platform=(*d.platform, tool)))
 
 
-@pytest.mark.parametrize("name", sm.machine_names())
+CABLES = ("belt-router", "cogiro", "ipanema-1")  # which that engine's tree of joints does not have
+
+
+@pytest.mark.parametrize("name", [n for n in sm.machine_names() if n not in CABLES])
 def test_frequencies_against_mujoco(name):
     machine = with_links(name)
     low, high = machine.workspace
