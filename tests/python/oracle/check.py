@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 import stiffmap as sm
+from stiffmap.description import Cable
 
 from .cartesian.solve import Answer, Machine
 from .tasks import Task
@@ -59,7 +60,8 @@ def asked(machine: sm.Machine, task: Task, truth: Answer) -> Iterator[tuple[str,
     }
     wrench = [*task.loads.force, *task.loads.moment]
     drives = {n.removeprefix("platform."): v for n, v in truth.drives.items()}
-    by_drives = drives and (task.drives is not None or truth.kind != "unreachable")
+    hung = any(isinstance(e, Cable) for e in task.description.platform)
+    by_drives = drives and not hung and (task.drives is not None or truth.kind != "unreachable")
     for method in ("fast", "reference"):
         if task.by_pose or not by_drives:
             pose = task.pose or truth.pose

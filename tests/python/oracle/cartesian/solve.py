@@ -23,7 +23,7 @@ class Answer:
     """SI, base axes, about the TCP; NaN where there is none."""
 
     kind: str
-    """found, ends, given up, no start, singular, unreachable."""
+    """found, ends, locked, given up, no start, singular, unreachable."""
     pose: Pose
     """Where the closed machine stands without load."""
     displacement: Array
