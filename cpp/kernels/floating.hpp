@@ -138,6 +138,8 @@ struct Floating {
       const M settled =
           active & sound & ((norm < arrived) | ((norm < close_by) & (previous < close_by) & (share == 1.0)));
       if (any(settled)) {
+        newton.tip = now.tip;  // a load that turns is turned as it is here
+        newton.dead_load = before_load;
         newton.K = now.K;
         V full[6][6];
         newton.dense(now.K, full);
