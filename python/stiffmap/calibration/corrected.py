@@ -16,7 +16,7 @@ from stiffmap.calibration.calibrator import Calibrator, pose_labels
 from stiffmap.calibration.certificate import INSTRUMENT
 from stiffmap.calibration.claims import Claims
 from stiffmap.calibration.edit import Knots, edited
-from stiffmap.calibration.floor import Blocks
+from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.model import predicted
 from stiffmap.calibration.slopes import moves_of
 from stiffmap.calibration.travel import Hats
@@ -66,13 +66,15 @@ class Correction:
         names, p = ready.sensitivity.unknowns, ready.predictor
         problem = Problem.of(p.experiment, ready.noise.sigma, ready.problem.base, keep & ~ready.out)
         columns, label = problem.white(ready.sensitivity.columns), pose_labels(problem)
-        values, prediction = self.start, self._predicted(self.start, terms)
+        values, prediction, rho = self.start, self._predicted(self.start, terms), self.rho
         for _ in range(STEPS):
             linear = problem.residual(prediction) + columns @ values
-            better = Blocks.of(columns, linear, label).scaled(factor).beside(self.rho).estimate * factor
+            blocks = Blocks.of(columns, linear, label, problem.nuisance.shape[1]).scaled(factor)
+            rho = model_form(blocks) if terms else rho  # what the effects explain is no floor
+            better = blocks.beside(rho).estimate * factor
             if float(np.linalg.norm(columns @ (better - values))) < NEAR:
                 break
-            moved = self._moved(problem, values, better - values, prediction, terms)
+            moved = self._moved(problem, values, better - values, prediction, terms, rho)
             if moved is None:
                 break
             values, prediction = moved
@@ -83,7 +85,7 @@ class Correction:
         if self.hats is not None:
             linear = problem.residual(prediction) + columns @ values
             declared = p.machine.description
-            found = self.hats.knots(problem, columns * factor, linear, self.rho)
+            found = self.hats.knots(problem, columns * factor, linear, rho)
             knots = {name: at_every_turn(joints(declared)[name], k) for name, k in found.items()}
             beside = p.beside(machine=Machine(edited(declared, {}, knots), like=p.machine))
             prediction = predicted(beside, names, built, terms)
@@ -97,13 +99,14 @@ class Correction:
         step: Floats,
         prediction: Floats,
         terms: Sequence[AppliedEffect],
+        rho: float,
     ) -> tuple[Floats, Floats] | None:
         """Values and prediction a step further, halved while misfit and prior grow or the machine is not there; None: no
         step is better."""
 
         def cost(at: Floats, shown: Floats) -> float:
             left = problem.residual(shown)
-            return float(left @ left) / (1.0 + self.rho) + float(np.sum((at / self.claims.factor) ** 2))
+            return float(left @ left) / (1.0 + rho) + float(np.sum((at / self.claims.factor) ** 2))
 
         before = cost(values, prediction)
         for _ in range(HALVINGS):

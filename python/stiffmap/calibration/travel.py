@@ -24,6 +24,8 @@ POSES = 10
 """For each knot of a profile."""
 FEWEST, MOST = 4, 60
 """Knots."""
+SAME = 1e-9
+"""Of a coordinate, within which two knots are one."""
 BYTES = 2**28
 """That all columns may take; with more readings there are fewer knots."""
 TOLD = 0.1
@@ -144,7 +146,7 @@ def travel(
         return None
     parts, at, scales = [columns], [], []
     for d in drives:
-        places = np.unique(np.quantile(d.coordinate[problem.keep], np.linspace(0.0, 1.0, knots)))
+        places = apart(np.quantile(d.coordinate[problem.keep], np.linspace(0.0, 1.0, knots)))
         white = problem.white(d.zero[..., None] * hats(d.coordinate, places)[:, None, :])
         # a knot of typical effect moves the readings about it by as much as is left of them
         scale = np.sqrt(rho / np.maximum(np.mean(white**2, axis=0) * len(places), 1e-300))
@@ -196,6 +198,12 @@ def travel(
         )
     made = Hats(tuple(drives), tuple(at), tuple(scales), variance)
     return Travel(by, size(before), size(after), share, tuple(profiles), made)
+
+
+def apart(places: Floats) -> Floats:
+    """Rising places without those that are the next one but for round-off."""
+    rising = np.unique(places)
+    return np.asarray(rising[np.append(True, np.diff(rising) > SAME * (1.0 + np.abs(rising[1:])))])
 
 
 def hats(x: Floats, knots: Floats) -> Floats:

@@ -11,7 +11,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.calibration import Calibration, calibrate
-from stiffmap.calibration.travel import hats
+from stiffmap.calibration.travel import apart, hats
 from stiffmap.cli.calibrate import write
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.experiment import Floats
@@ -81,6 +81,10 @@ def test_errors_that_follow_no_drive_make_no_profile() -> None:
     machine, plan, _ = arm()
     assert calibrate(machine, read(plan, Predictor(machine, plan)(), more=1e-4)).travel is None
     assert calibrate(machine, read(plan, Predictor(machine, plan)())).travel is None
+
+
+def test_knots_that_round_off_alone_keeps_apart_are_one() -> None:
+    assert apart(np.array([0.5, 0.1, 0.1 + 1e-16, 0.1 + 1e-13, 0.5])) == pytest.approx([0.1, 0.5])
 
 
 def test_hats_are_straight_between_knots() -> None:
