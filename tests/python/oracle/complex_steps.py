@@ -53,7 +53,7 @@ def arc(y: complex, x: complex) -> complex:
     """atan2 that a complex step goes through."""
     near = np.arctan2(np.real(y), np.real(x))
     c, s = np.cos(near), np.sin(near)
-    return near + np.arctan((c * y - s * x) / (c * x + s * y))
+    return complex(near + np.arctan((c * y - s * x) / (c * x + s * y)))
 
 
 @dataclass(frozen=True)
