@@ -140,7 +140,7 @@ bool continuation(const Mechanism& m, const Target& target, Set&& set, ClosureWo
     set(s, ws.trial);
     if (close(m, target, Pace::contracting, ws, ws.trial, out.iterations)) {
       x = ws.trial;
-      keep_off_locks(m, x, ws.charts);
+      if (ws.renumber) keep_off_locks(m, x, ws.charts);
       done = s;
       leap *= 2;
       continue;
@@ -160,11 +160,11 @@ bool continuation(const Mechanism& m, const Target& target, Set&& set, ClosureWo
   return true;
 }
 
-/// A search starts at `x`, by its own axes.
+/// A search starts at `x`, by its own axes; for good where the nearest configuration is sought, which counts by them.
 void start(const Mechanism& m, ClosureWorkspace& ws, VecX& x) {
   ws.charts = {};
-  ws.renumber = true;
-  keep_off_locks(m, x, ws.charts);
+  ws.renumber = m.redundancy == 0;
+  if (ws.renumber) keep_off_locks(m, x, ws.charts);
 }
 
 /// It ends there.
@@ -208,7 +208,7 @@ ClosureWorkspace::ClosureWorkspace(const Mechanism& m)
 /// Where all else is closed.
 static void wind_up(const Mechanism& m, ClosureWorkspace& ws, VecX& x) {
   if (m.cables.empty()) return;
-  forward(m, Geometry::nominal, x, ws.frames);
+  forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
   wind(m, ws.frames, x);
 }
 
