@@ -133,7 +133,7 @@ def _of_circle(
 
 def with_column(sheet: Sheet, name: str, values: list[float]) -> Sheet:
     """The sheet and one column more."""
-    cell = [("" if math.isnan(v) else repr(v)) for v in values]
+    cell = [("" if math.isnan(v) else repr(float(v))) for v in values]
     if sheet.decimal_comma:
         cell = [c.replace(".", ",") for c in cell]
     return replace(sheet, header=(*sheet.header, name), columns=(*sheet.columns, Cells.of(cell)))

@@ -29,6 +29,7 @@ MADE_SMALLER = {
     "link bar": ("--quick", "--size", "6"),
     "link bracket": ("--quick",),
 }
+OUTLINE = "G21 G90 G17 S18000 M3\nG0 X0 Y0 Z0\nG1 X60 F2000\nG3 X70 Y10 I0 J10\nG1 Y40\nM5\nM2\n"
 TRACKER = """Point ID;X Nominal;Y Nominal;Z Nominal;X [mm];Y [mm];Z [mm];Temp
 A1;0,0;0,0;700,0;0,012;-0,020;700,004;20,1
 A2;50,0;20,0;700,0;50,031;19,991;699,998;20,2
@@ -82,6 +83,9 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     clocks = "x [mm];y [mm];Fx [N];Uhr 1 [µm];Uhr 2 [µm]\n0;416;100;351,5;352,1\n50;416;-100;-350,2;-349,9\n"
     (at / "clocks.csv").write_text(clocks, encoding="utf-8")
+    shutil.copy(SHIPPED / "process/library/trimming.yaml", at)
+    (at / "outline.ngc").write_text(OUTLINE, encoding="utf-8")
+    machine.save(at / "measured.yaml")
     (at / "points.csv").write_text(TRACKER, encoding="utf-8")
     _workbook(at / "readings.xlsx")
     (at / "arm.urdf").write_text(ROBOT, encoding="utf-8")

@@ -10,7 +10,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.advice import advice
 from stiffmap.cli import main
-from stiffmap.description import ExternalSpring, Joint, Leg, MachineDescription
+from stiffmap.description import ExternalSpring, Joint, Leg, MachineDescription, Point
 from stiffmap.files.shipped import machine_folder
 from stiffmap.files.starter import starter_text
 from stiffmap.free_motions import twist_words
@@ -136,9 +136,11 @@ def test_what_is_free_is_said_in_words(tmp_path: Path) -> None:
 
 def test_what_springs_outside_hold_is_not_called_rigid(tmp_path: Path) -> None:
     """A slide that no spring of its own holds, and a cord: it has a stiffness, so that it is not rigid."""
-    cord = ExternalSpring("cord", "tcp", (0.0, 0.0, 1.0), 1e4, 0.5)
+    cord = ExternalSpring("cord", "arm.eye", (0.0, 0.0, 1.0), 1e4, 0.5)
     slide = Joint("slide", "prismatic", ((0.0, 0.0, 1.0),))
-    machine = MachineDescription("hung", (Leg("arm", (slide,)),), external_springs=(cord,), task=("z",))
+    machine = MachineDescription(
+        "hung", (Leg("arm", (slide, Point("eye"))),), external_springs=(cord,), task=("z",)
+    )
     path = tmp_path / "hung.yaml"
     sm.Machine(machine).save(path)
     hung = sm.load_machine(path)

@@ -254,5 +254,5 @@ def test_missing_and_unwritable_link_file(tmp_path):
     with pytest.raises(StiffmapError, match="no such link file"):
         load_link(tmp_path / "absent.yaml")
     file = LinkFile(bar_compliance(), np.zeros((36, 36)), np.zeros(3), {})
-    with pytest.raises(StiffmapError, match="cannot write"):
+    with pytest.raises(StiffmapError, match="cannot be written"):
         save_link(file, tmp_path / "no" / "link.yaml")
