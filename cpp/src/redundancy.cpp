@@ -12,7 +12,8 @@ namespace {
 using namespace closing;
 
 constexpr int trials = 4;
-constexpr double stray = 0.2;  // rad, or the same share of the length: how far from home they are made
+constexpr double apart = 1e-6;  // share of the drives in a motion, below which they stand still
+constexpr double stray = 0.2;   // rad, or the same share of the length: how far from home they are made
 
 struct Open {
   Index all = 0, driven = 0;  ///< motions that the commanded pose leaves open; how many of them drives tell apart
@@ -28,8 +29,9 @@ Open open_motions(const Mechanism& m, const VecX& x, ClosureWorkspace& ws) {
   Index rows = 0;
   for (std::size_t k = 0; k < ws.unknown.size(); ++k)
     if (m.coordinates[at(ws.unknown[k])].role == Role::actuator) drives.row(rows++) = Z.row(static_cast<Index>(k));
-  const Index rank = rows == 0 || Z.cols() == 0 ? 0 : rank_of(drives.topRows(rows), 1e-6);
-  return {Z.cols(), rank};
+  if (rows == 0 || Z.cols() == 0) return {Z.cols(), 0};
+  // The motions are of length 1: drives that go along by round-off alone stand still.
+  return {Z.cols(), (singular_vectors(MatX(drives.topRows(rows))).values.array() > apart).count()};
 }
 
 }  // namespace

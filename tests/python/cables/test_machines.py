@@ -1,6 +1,8 @@
-"""The shipped cable machines over their boxes, against energy minimisation."""
+"""The example machines in cables over their boxes, against energy minimisation."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,11 +10,13 @@ from tests.python.cables.energy import hung
 
 from stiffmap import Flag, Status, load_machine
 
+EXAMPLES = Path(__file__).parents[3] / "examples/cables"
+
 
 @pytest.mark.parametrize("name", ["cogiro", "ipanema-1"])
 def test_box(name: str) -> None:
     """Converged under its own weight by both paths; IPAnema's lower cables go slack in some corners, CoGiRo's nowhere."""
-    machine = load_machine(name)
+    machine = load_machine(EXAMPLES / f"{name}.yaml")
     assert machine.compiled.not_fast == ""
     low, high = machine.workspace
     axes = [np.linspace(a, b, 4) for a, b in zip(low, high, strict=True)]
@@ -30,7 +34,7 @@ def test_box(name: str) -> None:
 
 def test_belt_router() -> None:
     """Two freedoms: what the sheet holds does not move, and belts below go slack where the sled hangs low."""
-    machine = load_machine("belt-router")
+    machine = load_machine(EXAMPLES / "belt-router.yaml")
     p = np.array([(x, y, 0.0) for x in (-1.2, 0.0, 1.2) for y in (-0.6, 0.0, 0.6)])
     s = machine.solve(p, [0, 20, 0, 0, 0, 0])
     assert (s.status == Status.CONVERGED).all()

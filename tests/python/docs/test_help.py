@@ -85,7 +85,6 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (at / "clocks.csv").write_text(clocks, encoding="utf-8")
     shutil.copy(SHIPPED / "process/library/trimming.yaml", at)
     (at / "outline.ngc").write_text(OUTLINE, encoding="utf-8")
-    machine.save(at / "measured.yaml")
     (at / "points.csv").write_text(TRACKER, encoding="utf-8")
     _workbook(at / "readings.xlsx")
     (at / "arm.urdf").write_text(ROBOT, encoding="utf-8")

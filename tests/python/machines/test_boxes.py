@@ -9,12 +9,11 @@ import pytest
 import stiffmap as sm
 from stiffmap.files import shipped_machines
 
-CABLES = ("belt-router", "cogiro", "ipanema-1")  # tests/python/cables
 LIGHT = {"linear-delta": 5.0, "rotary-delta": 20.0, "ur10": 50.0, "five-bar": 50.0, "swing-table": 50.0}
 
 
 def test_every_shipped_machine_is_a_case() -> None:
-    assert {m.name for m in shipped_machines()} == {*cases.FLAGS, "tripteron", *CABLES}
+    assert {m.name for m in shipped_machines()} == {*cases.FLAGS, "tripteron"}
 
 
 @pytest.mark.parametrize("name", cases.FLAGS)

@@ -108,10 +108,7 @@ def with_links(name):
     return sm.Machine(replace(d, legs=legs, platform=(*d.platform, tool)))
 
 
-CABLES = ("belt-router", "cogiro", "ipanema-1")  # which that engine's tree of joints does not have
-
-
-@pytest.mark.parametrize("name", [n for n in sm.machine_names() if n not in CABLES])
+@pytest.mark.parametrize("name", sm.machine_names())
 def test_frequencies_against_mujoco(name):
     machine = with_links(name)
     low, high = machine.workspace
