@@ -90,7 +90,7 @@ def mill(
 
       [cyan]stiffmap mill linear-delta rectangle --size 120,80,15 --process trimming.yaml --at 0,0,300 -o result[/cyan]
 
-      [cyan]stiffmap mill result/machine.yaml outline.ngc --process trimming --true corrected.yaml --band -o result[/cyan]
+      [cyan]stiffmap mill corrected.yaml outline.ngc --process trimming --true my.yaml --band -o cut[/cyan]
     """
     m = machine_with(machine, effect)
     p = load_path(
