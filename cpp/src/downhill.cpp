@@ -7,11 +7,11 @@
 namespace stiffmap {
 namespace {
 
-constexpr int most_steps = 150, trials = 6;
+constexpr int most_down = 150, trials = 6;
 constexpr double longest = 0.1;               // of a step, in multiples of the length
 constexpr double first_shift = 1e-4;          // added stiffness, in multiples of the machine's
 constexpr double more = 4, most_shift = 100;  // its growth, and where it ends
-constexpr double flat = 0.1;                  // slope of the energy at the end of a step, of that at its start
+constexpr double flattened = 0.1;             // slope of the energy at the end of a step, of that at its start
 constexpr double nothing = 1e-15;             // a step that changes no force
 
 class Downhill {
@@ -21,7 +21,7 @@ class Downhill {
 
   bool run(double tolerance, int& iterations) {
     double previous = std::numeric_limits<double>::infinity();
-    for (int k = 0; k < most_steps; ++k, ++iterations) {
+    for (int k = 0; k < most_down; ++k, ++iterations) {
       off_locks(m_, p_, state_);
       linearize(m_, p_, state_, ws_.lin);
       if (!rising_tangent()) return false;
@@ -98,9 +98,9 @@ class Downhill {
     way_ = ws_.lin.da.cwiseProduct(ws_.dz);
     const double start = slope(0);
     double share = most, end = slope(most);
-    if (start < 0 && end > -flat * start) {  // Illinois: a false position that does not stay on one side
+    if (start < 0 && end > -flattened * start) {  // Illinois: a false position that does not stay on one side
       double low = 0, high = most, at_low = start, at_high = end;
-      for (int k = 0; k < trials && std::abs(end) > -flat * start; ++k) {
+      for (int k = 0; k < trials && std::abs(end) > -flattened * start; ++k) {
         share = low - at_low * (high - low) / (at_high - at_low);
         end = slope(share);
         if (end > 0) {

@@ -10,11 +10,11 @@
 namespace stiffmap {
 namespace {
 
-constexpr int most_steps = 400;
+constexpr int most_descents = 400;
 constexpr double longest_step = 0.1;    // of the length
 constexpr double far_away = 0.2;        // of the length, from the command
 constexpr double arrived = 1e-13;       // last step, of the length
-constexpr double flat = 1e-9;           // curvature of no stiffness, of the largest
+constexpr double no_curvature = 1e-9;   // curvature of no stiffness, of the largest
 constexpr double push_off = 1e-4;       // from a saddle, of the length
 constexpr double sufficient = 1e-4;     // share of the slope's promise that a step has to keep
 constexpr double energy_noise = 1e-14;  // of the energies that are summed up
@@ -179,13 +179,13 @@ FloatingResult find_floating(const Mechanism& m, const Problem& problem, VecX& x
   const auto S = body.directions();
   double turned = 0;
   Lu lu;
-  for (out.iterations = 1; out.iterations <= most_steps; ++out.iterations) {
+  for (out.iterations = 1; out.iterations <= most_descents; ++out.iterations) {
     body.linearize();
     const VecX g = S.transpose() * body.gradient;
     const MatX A = S.transpose() * body.tangent * S;
     const EigenX e = symmetric_eigen(MatX(0.5 * (A + A.transpose())));
     const double most = std::max(e.values.cwiseAbs().maxCoeff(), 1e-12 * m.stiffness);
-    const bool definite = e.values[0] > flat * most;
+    const bool definite = e.values[0] > no_curvature * most;
     VecX step;
     if (definite) {
       lu.compute(A);
@@ -195,9 +195,9 @@ FloatingResult find_floating(const Mechanism& m, const Problem& problem, VecX& x
       step = VecX::Zero(n);
       for (Index k = 0; k < n; ++k) {
         const double slope = e.vectors.col(k).dot(g);
-        step -= slope / std::max(std::abs(e.values[k]), flat * most) * e.vectors.col(k);
+        step -= slope / std::max(std::abs(e.values[k]), no_curvature * most) * e.vectors.col(k);
       }
-      if (step.norm() < 1e-7 * m.length && e.values[0] < -flat * most)  // a saddle: off it, downhill
+      if (step.norm() < 1e-7 * m.length && e.values[0] < -no_curvature * most)  // a saddle: off it, downhill
         step += (e.vectors.col(0).dot(g) > 0 ? -1 : 1) * push_off * m.length * e.vectors.col(0);
     }
     const double norm = step.norm();
