@@ -10,10 +10,12 @@ from stiffmap.status import Flag, Status
 from stiffmap.version import __version__
 
 if TYPE_CHECKING:
+    from stiffmap import plot
     from stiffmap.budget import DeflectionBudget, deflection_budget
     from stiffmap.calibration import Calibration
     from stiffmap.calibration.calibrate import calibrate
     from stiffmap.compensation import Commands, compensate
+    from stiffmap.design.search import optimize
     from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, Residual, load_experiment
     from stiffmap.experiment.comparison.residual import residual
@@ -23,7 +25,15 @@ if TYPE_CHECKING:
     from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
     from stiffmap.link import identify_link
     from stiffmap.machine import Machine, load_machine
-    from stiffmap.maps import error_map, map_estimate, map_statistics, polar, sweep, uncertainty_ranking
+    from stiffmap.maps import (
+        design_sweep,
+        error_map,
+        map_estimate,
+        map_statistics,
+        polar,
+        sweep,
+        uncertainty_ranking,
+    )
     from stiffmap.milling import mill
     from stiffmap.performance import (
         accuracy_transmission,
@@ -38,6 +48,7 @@ if TYPE_CHECKING:
         workspace_volume,
         worst_deflection,
     )
+    from stiffmap.planning.calls import monitor, plan
     from stiffmap.process import (
         CuttingForce,
         IdentifiedLaw,
@@ -47,6 +58,7 @@ if TYPE_CHECKING:
         load_process,
     )
     from stiffmap.solution import Solution
+    from stiffmap.urdf.to_machine import import_urdf
 
 # Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
 _HOME = {
@@ -86,7 +98,13 @@ _HOME = {
     "DeflectionBudget": "stiffmap.budget",
     "deflection_budget": "stiffmap.budget",
     "assembly_stress": "stiffmap.internal_wrenches",
+    "design_sweep": "stiffmap.maps",
     "error_map": "stiffmap.maps",
+    "import_urdf": "stiffmap.urdf.to_machine",
+    "monitor": "stiffmap.planning.calls",
+    "optimize": "stiffmap.design.search",
+    "plan": "stiffmap.planning.calls",
+    "plot": "stiffmap.plot",
     "forward_kinematics": "stiffmap.kinematics",
     "identify_link": "stiffmap.link",
     "inverse_kinematics": "stiffmap.kinematics",
@@ -121,6 +139,7 @@ __all__ = [
     "compensate",
     "cutting_force",
     "deflection_budget",
+    "design_sweep",
     "diagnose",
     "drive_efforts",
     "error_map",
@@ -128,6 +147,7 @@ __all__ = [
     "forward_kinematics",
     "identify_link",
     "identify_process",
+    "import_urdf",
     "inverse_kinematics",
     "largest_box",
     "load_experiment",
@@ -139,7 +159,11 @@ __all__ = [
     "map_statistics",
     "measures",
     "mill",
+    "monitor",
     "natural_frequencies",
+    "optimize",
+    "plan",
+    "plot",
     "polar",
     "residual",
     "simulate",
@@ -157,7 +181,8 @@ if not TYPE_CHECKING:  # type checkers then know which names there are
     def __getattr__(name: str) -> Any:
         if name not in _HOME:
             raise AttributeError(f"module 'stiffmap' has no attribute {name!r}")
-        value = getattr(import_module(_HOME[name]), name)
+        home = import_module(_HOME[name])
+        value = home if _HOME[name] == f"{__name__}.{name}" else getattr(home, name)
         globals()[name] = value
         return value
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from stiffmap.cli.inputs import numbers, placed, plain
+from stiffmap.cli.inputs import numbers, plain
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
@@ -19,6 +19,7 @@ from stiffmap.machine import Machine, load_machine
 from stiffmap.outputs import write_rows
 from stiffmap.outputs.option import written
 from stiffmap.planning import Design, design, follow
+from stiffmap.planning.calls import placed
 from stiffmap.planning.estimate import fitted
 
 MM = 1e-3

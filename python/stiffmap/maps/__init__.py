@@ -1,5 +1,6 @@
 """Labelled results over a workspace: error maps, polar diagrams, force sweeps (xarray, SI)."""
 
+from stiffmap.maps.design_sweep import design_sweep
 from stiffmap.maps.estimate import MapEstimate, map_estimate
 from stiffmap.maps.grid_map import error_map
 from stiffmap.maps.polar_diagram import polar
@@ -9,6 +10,7 @@ from stiffmap.maps.sweep_line import sweep
 
 __all__ = [
     "MapEstimate",
+    "design_sweep",
     "error_map",
     "map_estimate",
     "map_statistics",

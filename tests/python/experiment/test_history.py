@@ -9,7 +9,6 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import stiffmap as sm
-from stiffmap.cli.inputs import placed
 from stiffmap.description.tree import joints
 from stiffmap.diagnosis.decision.patterns import features
 from stiffmap.effects.library.hysteresis import deflection, spring_force
@@ -19,6 +18,7 @@ from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.history import drives_of
 from stiffmap.experiment.ramps import directions
 from stiffmap.planning import estimate
+from stiffmap.planning.calls import placed
 
 ONE_JOINT = """
 name: gear
