@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from stiffmap.design.search import optimize
     from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, Residual, load_experiment
-    from stiffmap.experiment.comparison.residual import residual
-    from stiffmap.experiment.virtual.simulate import simulate
+    from stiffmap.experiment.calls import residual, simulate
     from stiffmap.files.shipped import machine_names
     from stiffmap.internal_wrenches import assembly_stress
     from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics

@@ -12,10 +12,10 @@ from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.experiment import load_experiment
+from stiffmap.experiment.calls import placed
 from stiffmap.json_text import parse_json
 from stiffmap.machine import Machine, load_machine
 from stiffmap.planning.budget import budgets
-from stiffmap.planning.calls import placed
 from stiffmap.planning.monitor import compare
 
 

@@ -14,12 +14,12 @@ from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment import simulate
+from stiffmap.experiment.calls import placed
 from stiffmap.experiment.files.save import plan_columns
 from stiffmap.machine import Machine, load_machine
 from stiffmap.outputs import write_rows
 from stiffmap.outputs.option import written
 from stiffmap.planning import Design, design, follow
-from stiffmap.planning.calls import placed
 from stiffmap.planning.estimate import fitted
 
 MM = 1e-3

@@ -13,10 +13,10 @@ from stiffmap.cli.inputs import EffectsOption, FolderOption, ThreadsOption, plai
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.experiment import Experiment, Residual, load_experiment
 from stiffmap.experiment import residual as compute
+from stiffmap.experiment.calls import placed
 from stiffmap.experiment.channels import Channel
 from stiffmap.machine import load_machine
 from stiffmap.outputs import make_folder, write_picture, write_text
-from stiffmap.planning.calls import placed
 
 
 def residual(

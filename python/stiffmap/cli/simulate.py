@@ -12,10 +12,10 @@ from stiffmap.cli import plan_options as plans
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment import Loop, save_experiment
 from stiffmap.experiment import simulate as run
+from stiffmap.experiment.calls import placed
 from stiffmap.experiment.virtual import plans as make
 from stiffmap.machine import load_machine
 from stiffmap.outputs.option import written
-from stiffmap.planning.calls import placed
 
 Effects = Annotated[
     list[str] | None,

@@ -24,6 +24,7 @@ from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.outputs import write_rows
+from stiffmap.short import short_repr
 
 STEPS = 25
 DONE = 1e-10
@@ -31,6 +32,7 @@ DONE = 1e-10
 MM = 1e3
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Commands:
     """Compensated commands of n poses, SI, base axes; NaN where the machine has no answer."""

@@ -24,6 +24,7 @@ from stiffmap.milling.reach import must_reach
 from stiffmap.milling.ripple import ripple
 from stiffmap.milling.setting import Setting, scaled, setting
 from stiffmap.milling.verify import Run, run
+from stiffmap.options import keywords_of
 from stiffmap.performance.scaling import drive_table
 from stiffmap.process import Process, load_process
 from stiffmap.status import Flag, Status
@@ -47,52 +48,6 @@ class Milled:
     dataset: xr.Dataset
     true_before: Equilibrium | None = None
     true_after: Run | None = None
-
-
-def mill(
-    machine: Machine | str | PathLike[str],
-    path: Toolpath | str | PathLike[str],
-    process: Process | str | PathLike[str] | Mapping[str, Any],
-    **options: Any,
-) -> xr.Dataset:
-    """The part as a machine will cut it, and compensated commands.
-
-    Parameters
-    ----------
-    machine
-        What is known of the machine: as declared, with the effects that a diagnosis or calibration found.
-    path
-        A built-in outline, a file (G-code, CL, CSV), or a `Toolpath` in the axes of the part, m.
-    process
-        Tool, law of the force, speeds and cut: a name, a file, a mapping.
-    at, turn
-        Where the part's origin lies (3,) m, base axes, and its turn about z, rad. None: the machine's home.
-    true_machine
-        Machine that the commands are also simulated on, as an experiment would find it.
-    step, within
-        m: distance of the points along the path; chord error of the written program.
-    stock, thickness
-        Box of stock (`stiffmap.toolpath.box`), or width to trim, m; None: the process's own cut.
-    passes
-        Number of passes along the same commands; each further one cuts what the last left (spring-back).
-    band
-        True: also under 80 and 120 % of the force.
-    angle
-        (points,) rad: turn of an arm's tool about its axis, from `redundancy`.
-    threads
-        None: all cores that this process may use.
-
-    Returns
-    -------
-    Dataset
-        Dimension point (along the path, each cut with both ends): `way` m, `wanted`, `command` (…, 3) m in base axes;
-        `error` (…, 3) m before, its parts `error_normal` (positive: material stays on the part), `error_along`, `error_axial`;
-        `error_normal_after` of the written program as simulated, at the same way; `mirror_left` what one mirror step leaves;
-        `force` (…, 3) N, `gain` kp/k, `effort` N, N·m, `margin` m, `status`, `flags`, `ripple` m.
-
-    Raises StiffmapError for bad input: paths that leave the workspace, cuts with the spindle off …
-    """
-    return mill_job(as_machine(machine), path, process, **options).dataset
 
 
 def mill_job(
@@ -149,6 +104,53 @@ def mill_job(
     ds["true_error_normal"] = ("point", (real.error * job.off).sum(axis=1))
     ds["true_error_normal_after"] = _along(job, real_after)
     return replace(out, true_before=real, true_after=real_after)
+
+
+@keywords_of(mill_job)
+def mill(
+    machine: Machine | str | PathLike[str],
+    path: Toolpath | str | PathLike[str],
+    process: Process | str | PathLike[str] | Mapping[str, Any],
+    **options: Any,
+) -> xr.Dataset:
+    """The part as a machine will cut it, and compensated commands.
+
+    Parameters
+    ----------
+    machine
+        What is known of the machine: as declared, with the effects that a diagnosis or calibration found.
+    path
+        A built-in outline, a file (G-code, CL, CSV), or a `Toolpath` in the axes of the part, m.
+    process
+        Tool, law of the force, speeds and cut: a name, a file, a mapping.
+    at, turn
+        Where the part's origin lies (3,) m, base axes, and its turn about z, rad. None: the machine's home.
+    true_machine
+        Machine that the commands are also simulated on, as an experiment would find it.
+    step, within
+        m: distance of the points along the path; chord error of the written program.
+    stock, thickness
+        Box of stock (`stiffmap.toolpath.box`), or width to trim, m; None: the process's own cut.
+    passes
+        Number of passes along the same commands; each further one cuts what the last left (spring-back).
+    band
+        True: also under 80 and 120 % of the force.
+    angle
+        (points,) rad: turn of an arm's tool about its axis, from `redundancy`.
+    threads
+        None: all cores that this process may use.
+
+    Returns
+    -------
+    Dataset
+        Dimension point (along the path, each cut with both ends): `way` m, `wanted`, `command` (…, 3) m in base axes;
+        `error` (…, 3) m before, its parts `error_normal` (positive: material stays on the part), `error_along`, `error_axial`;
+        `error_normal_after` of the written program as simulated, at the same way; `mirror_left` what one mirror step leaves;
+        `force` (…, 3) N, `gain` kp/k, `effort` N, N·m, `margin` m, `status`, `flags`, `ripple` m.
+
+    Raises StiffmapError for bad input: paths that leave the workspace, cuts with the spindle off …
+    """
+    return mill_job(as_machine(machine), path, process, **options).dataset
 
 
 def _along(job: Setting, made: Run) -> xr.Variable:

@@ -14,11 +14,13 @@ from stiffmap.performance.box_search import BoxSearch
 from stiffmap.performance.limits import Bounds
 from stiffmap.performance.turning import best_orientation, turned
 from stiffmap.rotations import as_rotations
+from stiffmap.short import short_repr
 
 WORK = 100_000
 """Cells and poses at most; when they are used up, the bounds stay as far apart as they are."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class LargestBox:
     """Bounds on the largest similar box, and where it is."""

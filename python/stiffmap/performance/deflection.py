@@ -12,12 +12,14 @@ from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.inputs import plane_axes
 from stiffmap.performance.poses import box_nodes, read_box
+from stiffmap.short import short_repr
 from stiffmap.status import Status
 
 TURNS = 12
 REFINEMENTS = 4
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class WorstDeflection:
     """The largest deflection that was found, and the one at each pose asked for."""

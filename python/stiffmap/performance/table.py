@@ -18,6 +18,7 @@ from stiffmap.performance.motion_files import Motion, load_motion
 from stiffmap.performance.poses import box_nodes, read_box
 from stiffmap.performance.registry import Case, Found, Measure, all_measures, get_measure
 from stiffmap.performance.requirements import Bound, Requirements, load_requirements
+from stiffmap.short import short_repr
 from stiffmap.status import Status
 
 
@@ -48,6 +49,7 @@ class Row:
         return "pass" if self.margin >= 0 else "fail"
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class MeasuresTable:
     """All measures of a machine over a box."""

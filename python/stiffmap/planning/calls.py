@@ -8,19 +8,13 @@ from os import PathLike
 from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import real_array
-from stiffmap.description import AppliedEffect
-from stiffmap.effects import parse_effect
-from stiffmap.effects.check import place_of
-from stiffmap.effects.registry import get
 from stiffmap.errors import StiffmapError
-from stiffmap.experiment import Experiment, load_experiment
+from stiffmap.experiment import Experiment
+from stiffmap.experiment.calls import Effects, as_experiment, effects_of
 from stiffmap.files.load import Source
 from stiffmap.machine import Machine, as_machine
 from stiffmap.planning.design import Design, design
 from stiffmap.planning.monitor import Comparison, compare
-
-Effects = str | AppliedEffect | Sequence[str | AppliedEffect]
-"""One effect or several, each as text (``compliance actuator x scale=1.2``) or as a record."""
 
 
 def plan(
@@ -68,7 +62,7 @@ def plan(
     Raises StiffmapError for bad input.
     """
     m = as_machine(machine)
-    terms, others = _effects(m, identify), _effects(m, rival)
+    terms, others = effects_of(m, identify), effects_of(m, rival)
     if not terms:
         raise StiffmapError("identify: expected at least one effect, got none")
     return design(
@@ -80,7 +74,7 @@ def plan(
         quantity=quantity,
         poses=poses,
         force=force,
-        candidates=None if candidates is None else _experiment(candidates),
+        candidates=None if candidates is None else as_experiment(candidates),
         at=None if at is None else real_array(at, "at").reshape(-1, 3),
         load=None if load is None else real_array(load, "load"),
         frame=frame,
@@ -88,7 +82,7 @@ def plan(
         axes=axes,
         noise=noise,
         seed=seed,
-        done=None if done is None else _experiment(done),
+        done=None if done is None else as_experiment(done),
     )
 
 
@@ -109,30 +103,7 @@ def monitor(
     Raises StiffmapError for bad input.
     """
     m = as_machine(machine)
-    terms = _effects(m, effects)
+    terms = effects_of(m, effects)
     if not terms:
         raise StiffmapError("effects: expected at least one effect to follow, got none")
-    return compare(m, _experiment(before), _experiment(after), terms)
-
-
-def _experiment(given: Experiment | str | PathLike[str]) -> Experiment:
-    return given if isinstance(given, Experiment) else load_experiment(given)
-
-
-def _effects(machine: Machine, given: Effects) -> list[AppliedEffect]:
-    """Records with the machine's own names of element and legs filled in."""
-    several = [given] if isinstance(given, str | AppliedEffect) else list(given)
-    return [placed(machine, one) for one in several]
-
-
-def placed(machine: Machine, given: str | AppliedEffect) -> AppliedEffect:
-    """One effect, text or record, with the machine's own names of element and legs filled in; one of the measurement too."""
-    d = machine.description
-    term = parse_effect(given, d) if isinstance(given, str) else given
-    effect = get(term.kind)
-    if effect.measurement:
-        element, legs = place_of(effect, d, term.element or None, term.legs or None)
-        return AppliedEffect(term.kind, element, legs, term.parameters, term.options)
-    more = {**dict(term.parameters), **dict(term.options)}
-    added = machine.with_effect(term.kind, element=term.element or None, legs=term.legs or None, **more)
-    return added.description.effects[-1]
+    return compare(m, as_experiment(before), as_experiment(after), terms)

@@ -12,6 +12,7 @@ from stiffmap.description import AppliedEffect
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.machine import Machine
 from stiffmap.planning.estimate import Estimate, estimate
+from stiffmap.short import short_repr
 
 ALPHA = 0.01
 """Probability of naming a change in any number where there is none."""
@@ -46,6 +47,7 @@ class Change:
         )
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """Two experiments with the same effects fitted to each."""

@@ -10,9 +10,9 @@ from scipy.stats import kstest
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, simulate
+from stiffmap.experiment.calls import placed
 from stiffmap.experiment.noise.checks import Check, checks
 from stiffmap.experiment.virtual.plans import load_set, plan_of_poses, random_poses, with_branches
-from stiffmap.planning.calls import placed
 
 ALL = ("linearity", "sign reversal", "superposition", "return to zero", "reciprocity")
 

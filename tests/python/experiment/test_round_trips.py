@@ -9,7 +9,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, residual
-from stiffmap.planning.calls import placed
+from stiffmap.experiment.calls import placed
 
 from .conftest import Twin
 

@@ -12,8 +12,8 @@ import stiffmap as sm
 from stiffmap.cli.app import main
 from stiffmap.compensation import compensate
 from stiffmap.experiment import Predictor, simulate
+from stiffmap.experiment.calls import placed
 from stiffmap.planning import design, estimate, follow
-from stiffmap.planning.calls import placed
 from stiffmap.planning.monitor import compare
 
 
