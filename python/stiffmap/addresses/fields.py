@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stiffmap.addresses import beam as beams
 from stiffmap.addresses import units
 from stiffmap.description import Body, Cable, Element, Joint, Law, Offset, Point, Pose, Spring
 from stiffmap.description.elements import Matrix6
@@ -186,13 +187,13 @@ def _positive(value: float) -> float:
 def _spring(e: Spring) -> Iterator[tuple[str, Field]]:
     word = "compliance" if e.compliance is not None else "stiffness"
     matrix: Matrix6 = getattr(e, word)
-    beam = e.beam if e.beam is not None and e.beam.compliance() == matrix else None
+    beam = e.beam if e.beam is not None and beams.compliance(e.beam) == matrix else None
     if beam is not None:
         for key, value in beam.numbers:
 
             def put(x: float, key: str = key) -> Spring:
-                new = beam.changed(key, x)
-                return replace(e, compliance=new.compliance(), beam=new)
+                new = beams.changed(beam, key, x)
+                return replace(e, compliance=beams.compliance(new), beam=new)
 
             yield f"beam.{key}", Field(value, units.of_beam(key), put)
     for i in range(6):

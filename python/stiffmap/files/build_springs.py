@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap import beams
+from stiffmap.addresses.beam import SECTIONS
 from stiffmap.description import BeamNumbers, Law, Spring
-from stiffmap.description.beam import SECTIONS
 from stiffmap.description.elements import Matrix6
 from stiffmap.files.context import Context, LinkUse, StrokeUse
 from stiffmap.files.matrix_checks import asymmetry, lowest_eigenvalue
