@@ -22,7 +22,7 @@ def short_repr(cls: type[T]) -> type[T]:
         more = ", …" if len(fields(self)) > MOST_FIELDS else ""
         return f"<{type(self).__name__} {', '.join(shown)}{more}>"
 
-    cls.__repr__ = line  # type: ignore[method-assign,assignment]
+    cls.__repr__ = line  # type: ignore[method-assign]
     return cls
 
 

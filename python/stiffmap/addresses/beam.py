@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from stiffmap import beams
@@ -9,7 +11,8 @@ from stiffmap.description import BeamNumbers
 from stiffmap.description.elements import Matrix6
 from stiffmap.errors import StiffmapError
 
-SECTIONS = {
+Shape = Callable[..., beams.Section]
+SECTIONS: dict[str, tuple[tuple[str, ...], Shape]] = {
     "round": (("diameter",), beams.round_section),
     "tube": (("outer", "inner"), beams.tube_section),
     "rectangle": (("width", "height"), beams.rectangle_section),

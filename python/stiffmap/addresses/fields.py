@@ -143,13 +143,13 @@ def _listed_numbers(holder: Any, name: str, key: str, unit: str) -> Iterator[tup
 
 
 def _laws(e: Joint, angular: bool) -> Iterator[tuple[str, Field]]:
-    for i, law in enumerate(e.axis_laws):
+    for i, own in enumerate(e.axis_laws):
         yield (
             f"stiffness.{i + 1}",
             Field(
-                law.stiffness,
+                own.stiffness,
                 units.STIFFNESS[2 * angular],
-                lambda x, i=i, law=law: replace(  # type: ignore[misc]
+                lambda x, i=i, law=own: replace(  # type: ignore[misc]
                     e,
                     axis_laws=(
                         *e.axis_laws[:i],

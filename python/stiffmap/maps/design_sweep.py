@@ -97,7 +97,11 @@ def design_sweep(
             continue
         here = made.description.home.p if position is None else given
         s = made.solve(here, wrench, **options)  # type: ignore[arg-type]
-        answer = {"displacement": s.displacement, "compliance": s.compliance, "status": s.status}
+        answer: dict[str, Any] = {
+            "displacement": s.displacement,
+            "compliance": s.compliance,
+            "status": s.status,
+        }
         answer["deflection"] = np.linalg.norm(answer["displacement"][..., :3], axis=-1)
         cells[index] = {**answer, **_evaluated(evaluate, made)}
     if not cells:
@@ -152,13 +156,13 @@ def _dataset(
         words.astype(str),
         meaning("", "why there is no such machine; empty where there is"),
     )
-    table = {row.Index: row.unit for row in machine.numbers().itertuples()}
+    table = {str(a): str(u) for a, u in machine.numbers()["unit"].items()}
     coords = {dims[a]: (dims[a], v, {"address": a, "units": _unit(table, a)}) for a, v in axes.items()}
     labels = {"component": list(COMPONENTS), "wrench_component": list(WRENCH)}
     return xr.Dataset(data, coords={**coords, **labels}, attrs={"machine": machine.name})
 
 
-def _unit(units: Mapping[Any, str], address: str) -> str:
+def _unit(units: Mapping[str, str], address: str) -> str:
     """Unit of an address that is listed, or of the listed ones that end alike; empty where none is."""
     if address.endswith("/length"):
         return "m"
