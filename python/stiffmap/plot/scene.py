@@ -9,12 +9,13 @@ from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats
-from stiffmap.plot.skeleton import Skeleton
+from stiffmap.plot.skeleton import Skeleton, plate
 from stiffmap.plot.style import BLACK, MM
 
 FLAT = 1e-6  # m
-ZOOM = 1.12
+ZOOM = 1.03
 MARGIN = 0.06
+THINNEST = 0.3  # of the widest axis
 
 
 def is_flat(shape: Skeleton) -> bool:
@@ -47,7 +48,8 @@ def flat_marks(ax: Any) -> dict[str, Any]:
 
 def draw_body(ax: Any, points: Floats) -> None:
     """A platform: the plate between the joints (n, 3) m that hold it."""
-    corners = on(ax, points).T
+    ordered = plate(points)
+    corners = on(ax, ordered if len(ordered) else points).T
     if dimensions(ax) == 2:
         ax.add_patch(
             Polygon(corners, facecolor="0.55", edgecolor="0.25", alpha=0.5, zorder=1, label="platform")
@@ -81,6 +83,14 @@ def finish(ax: Any, shape: Skeleton, view: tuple[float, float] | None = None) ->
         return
     ax.set_zlabel("z, mm")
     ax.set_aspect("equal")
+    for limits, to in (
+        (ax.get_xlim(), ax.set_xlim),
+        (ax.get_ylim(), ax.set_ylim),
+        (ax.get_zlim(), ax.set_zlim),
+    ):
+        widest = max(float(np.ptp(other())) for other in (ax.get_xlim, ax.get_ylim, ax.get_zlim))
+        if float(np.ptp(limits)) < THINNEST * widest:  # room for the numbers of the axis
+            to(np.mean(limits) - THINNEST * widest / 2, np.mean(limits) + THINNEST * widest / 2)
     spans = [float(np.ptp(limits)) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())]
     ax.set_box_aspect(spans, zoom=ZOOM)
     ax.view_init(*(view or (22.0, 35.0)))

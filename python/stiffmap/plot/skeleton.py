@@ -30,7 +30,7 @@ class Skeleton:
     tcp: Floats
     """(3,)."""
     platform: Floats
-    """(n, 3) corners of the platform in order; none where its legs do not hold it at three points of a plate."""
+    """(n, 3) where its legs hold the platform (`plate` puts them in order); none where these are not corners of a plate."""
 
     @property
     def points(self) -> Floats:
@@ -47,8 +47,10 @@ def skeleton(machine: Machine, coordinates: Floats, *, shortest: float = COINCID
     owner = owners(core)
     named = joints(machine.description)
     held = held_by(core)
-    corners = plate(position[sorted(held)])
-    body = beyond(core, held) if len(corners) else set()
+    corners = position[sorted(held)]
+    if not len(plate(corners)):
+        corners, held = np.zeros((0, 3)), set()
+    body = beyond(core, held)
     links, guides, marks = [], [], {Role.ACTUATOR: [], Role.PASSIVE: []}  # type: ignore[var-annotated]
     for i, (parent, c) in enumerate(core.nodes):
         role = core.names.roles[c] if c >= 0 else None
