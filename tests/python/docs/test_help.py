@@ -46,7 +46,11 @@ def examples(function: object) -> list[str]:
 @pytest.fixture(scope="module")
 def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files of the examples."""
-    at = tmp_path_factory.mktemp("workshop")
+    return make_workshop(tmp_path_factory.mktemp("workshop"))
+
+
+def make_workshop(at: Path) -> Path:
+    """The files, in this folder."""
 
     def simulate(machine: str, name: str, *more: str) -> None:
         assert main(["simulate", machine, "--poses", "6", *more, "-o", str(at / name)]) == 0
@@ -76,6 +80,10 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     p = np.array(sm.load_machine("ur10").description.home.p) * 1e3
     path = [p, p + [20, 30, -10], p + [40, 0, 0]]
     rows = "\n".join(",".join(f"{v:.3f}" for v in q) for q in path)
+    (at / "path_small.csv").write_text("x [mm],y [mm],z [mm]\n0,0,0\n50,0,0\n", encoding="utf-8")
+    (at / "path_flat.csv").write_text(
+        "x [mm],y [mm],z [mm],fx [N]\n0,400,0,0\n50,420,0,90\n", encoding="utf-8"
+    )
     (at / "path.csv").write_text(f"x [mm],y [mm],z [mm]\n{rows}\n", encoding="utf-8")
     (at / "cut.yaml").write_text(
         "name: cut\nline: {start: [-100 mm, 0 mm, 0 mm], end: [150 mm, 100 mm, -100 mm]}\nduration: 2 s\n",
