@@ -14,8 +14,7 @@ import time
 
 import numpy as np
 
-STEPS = 12
-RANK = 1e-9
+STEPS, STEP, RANK = 12, 1e-5, 1e-7
 
 
 def rotations(vector):
@@ -46,15 +45,12 @@ def fitted(q, seen, axes, points, target):
     """The numbers that explain places seen (n, 3)."""
     x = np.zeros(9 + 6 * q.shape[1])
     for _ in range(STEPS):
-        base = places(x, q, axes, points, target)
-        slopes = np.stack(
-            [
-                (places(x + step, q, axes, points, target) - base).ravel() / 1e-7
-                for step in 1e-7 * np.eye(len(x))
-            ],
-            axis=-1,
-        )
-        step = np.linalg.lstsq(slopes, (seen - base).ravel(), rcond=RANK)[0]
+        slopes = []
+        for h in STEP * np.eye(len(x)):
+            there, back = (places(x + s * h, q, axes, points, target) for s in (1, -1))
+            slopes.append((there - back).ravel() / (2 * STEP))
+        left = (seen - places(x, q, axes, points, target)).ravel()
+        step = np.linalg.lstsq(np.stack(slopes, axis=-1), left, rcond=RANK)[0]
         x = x + step
         if np.abs(step).max() < 1e-10:
             break

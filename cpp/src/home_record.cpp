@@ -3,11 +3,10 @@
 
 #include <type_traits>
 
+#include "stiffmap/whole_branches.hpp"
+
 namespace stiffmap {
 namespace {
-
-/// Never called: Clang 14 does not find a Block's branches complete unless their vector is destroyed before it is read.
-[[maybe_unused]] void destroy_branches(std::vector<std::pair<std::string, Chain>>& branches) { branches.~vector(); }
 
 /// Bytes of what closure sees, one after the other. Springs rest there, bodies and points are no part of the geometry,
 /// and names are none.
