@@ -17,7 +17,7 @@ from board.peers import beside_arm, plain_places
 from board.row import Row
 
 import stiffmap as sm
-from stiffmap.calibration import Tolerances
+from stiffmap.calibration import Calibration, Tolerances
 from stiffmap.cli.calibrate import write as write_calibration
 from stiffmap.experiment.files.load import load_experiment
 
@@ -101,10 +101,16 @@ def ur5(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
             "after": after,
             "unseen_rows": int(new.sum()),
             "unseen_by": "random poses of the authors, never fitted",
-            "cause": c.verdict,
+            "cause": _cause(c),
             "seconds": used,
             "peers": (plain_places(declared, q, place, new),),
         }
+
+
+def _cause(c: Calibration) -> str:
+    """The verdict, and groups of numbers that are beyond their tolerances as a whole."""
+    whole = "; ".join(" or ".join((w.group, *w.rivals)) for w in c.wider)
+    return c.verdict if not whole or "beyond" in c.verdict else f"{c.verdict}; beyond tolerance as a whole: {whole}"
 
 
 def _mean(left: Any) -> float:
@@ -134,7 +140,7 @@ def ur10(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
                 "after": LENGTH * c.unseen.after,
                 "unseen_rows": len(c.experiment),
                 "unseen_by": f"five folds of poses, every {every}th row",
-                "cause": c.verdict,
+                "cause": _cause(c),
                 "seconds": used,
                 "peers": beside_arm(folder, asked.peers) if series == "C" else (),
             }
@@ -165,7 +171,7 @@ def delta(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
             "after": 1e3 * h.after,
             "unseen_rows": len(c.experiment),
             "unseen_by": f"left out: {h.by}, one after the other",
-            "cause": c.verdict,
+            "cause": _cause(c),
             "seconds": used,
         }
 
