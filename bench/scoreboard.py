@@ -37,8 +37,16 @@ def main() -> int:
     )
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="page: .md or .html")
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the sets [../shared/measured]")
-    parser.add_argument("--peer", action="append", default=[], metavar="NAME=PYTHON", help="robotkinecal, figaroh")
+    parser.add_argument(
+        "--peer", action="append", default=[], metavar="NAME=PYTHON", help="robotkinecal, figaroh"
+    )
     parser.add_argument("--quick", action="store_true", help="some rows of each set")
+    parser.add_argument(
+        "--only",
+        action="append",
+        metavar="FOLDER",
+        help="measure this set, keep the others' rows of FILE.json",
+    )
     parser.add_argument("--page-of", type=Path, metavar="JSON", help="only write the page of these rows")
     a = parser.parse_args()
     if bad := [p for p in a.peer if "=" not in p]:
@@ -51,7 +59,9 @@ def main() -> int:
         except (OSError, ValueError) as error:
             parser.error(f"--page-of {a.page_of}: {error}")
     else:
-        data = measured(a.data, a.quick, dict(p.split("=", 1) for p in a.peer))
+        data = measured(
+            a.data, a.quick, dict(p.split("=", 1) for p in a.peer), a.only, a.out.with_suffix(".json")
+        )
     a.out.parent.mkdir(parents=True, exist_ok=True)
     a.out.with_suffix(".json").write_text(
         json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
@@ -61,21 +71,37 @@ def main() -> int:
     return 0
 
 
-def measured(folder: Path, quick: bool, peers: dict[str, str]) -> dict[str, Any]:
+def measured(
+    folder: Path, quick: bool, peers: dict[str, str], only: list[str] | None, before: Path
+) -> dict[str, Any]:
     """Rows of all sets, and with what they were measured."""
-    from board.sets import Asked, all_rows
+    from board.sets import SETS, Asked, all_rows
 
     import stiffmap
 
+    known = {s.folder: s for s in SETS}
+    for name in only or ():
+        if name not in known:
+            raise SystemExit(f"--only: expected one of {', '.join(known)}, got {name!r}")
     if not folder.is_dir():
         print(f"no folder {folder}: every set is absent", file=sys.stderr)
 
     def say(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
-    rows = [r.to_json() for r in all_rows(folder, Asked(quick, peers), say)]
+    rows = [r.to_json() for r in all_rows(folder, Asked(quick, peers), say, only)]
+    if only:
+        fresh = {known[name].source: [r for r in rows if r["source"] == known[name].source] for name in only}
+        kept, rows = json.loads(before.read_text(encoding="utf-8"))["rows"], []
+        for r in kept:
+            rows += fresh.pop(r["source"], []) if r["source"] in fresh else []
+            rows += [] if r["source"] in {known[name].source for name in only} else [r]
+        rows += [r for some in fresh.values() for r in some]
     release = stiffmap.__version__
-    about = {"stiffmap": release if release != "0" else "from its sources", "Python": platform.python_version()}
+    about = {
+        "stiffmap": release if release != "0" else "from its sources",
+        "Python": platform.python_version(),
+    }
     return {"about": about, "command": COMMAND + (" --quick" if quick else ""), "rows": rows}
 
 

@@ -39,15 +39,13 @@ def tables(rows: Sequence[Row]) -> list[tuple[str, tuple[str, ...], list[list[st
         before, after = (f"{number(x)} {unit}".strip() for x in (r.before, r.after))
         seconds = number(r.seconds)
         main.append([r.set, r.authors, before, after, counted, cause, seconds])
-    peers = [
-        [r.set, p.name, number(p.after), number(p.seconds), p.note]
-        for r in rows
-        for p in (*r.peers,)
-    ]
+    peers = [[r.set, p.name, number(p.after), number(p.seconds), p.note] for r in rows for p in (*r.peers,)]
     for r in rows:
         if r.peers:
             at = next(i for i, p in enumerate(peers) if p[0] == r.set)
-            peers.insert(at, [r.set, "**stiffmap**", number(r.after), number(r.seconds), "all folds and the verdict"])
+            peers.insert(
+                at, [r.set, "**stiffmap**", number(r.after), number(r.seconds), "all folds and the verdict"]
+            )
     sources = [list(x) for x in dict.fromkeys((r.source, r.quantity) for r in rows)]
     out = [("Before and after", HEAD, main)]
     if peers:

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from board.row import Peer
 
 import stiffmap as sm
+from board.row import Peer
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "peers"
 sys.path.insert(0, str(SCRIPTS))
@@ -55,9 +55,7 @@ def screws(machine: sm.Machine, joints: int) -> tuple[Any, Any, Any]:
 
     axes, points = [], []
     for k in range(joints):
-        there, back = (
-            sm.forward_kinematics(machine, s * 0.5 * np.eye(joints)[k : k + 1]) for s in (1, -1)
-        )
+        there, back = (sm.forward_kinematics(machine, s * 0.5 * np.eye(joints)[k : k + 1]) for s in (1, -1))
         r = there.rotation[0] @ back.rotation[0].T
         axes.append(Rotation.from_matrix(r).as_rotvec())
         p = there.position[0] - r @ back.position[0]

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from board.peers import beside_arm, plain_places
-from board.row import Row
 
 import stiffmap as sm
+from board.peers import beside_arm, plain_places
+from board.row import Row
 from stiffmap.calibration import Calibration, Tolerances
 from stiffmap.cli.calibrate import write as write_calibration
 from stiffmap.experiment.files.load import load_experiment
@@ -48,9 +48,11 @@ class MeasuredSet:
     """Fields of its rows, one after the other."""
 
 
-def all_rows(data: Path, asked: Asked, say: Callable[[str], None]) -> Iterator[Row]:
-    """Every row: sets that are read, sets that are absent, folders that nothing here reads."""
-    for one in SETS:
+def all_rows(
+    data: Path, asked: Asked, say: Callable[[str], None], only: list[str] | None = None
+) -> Iterator[Row]:
+    """Every row: sets that are read, sets that are absent, folders that nothing here reads; or `only` some folders."""
+    for one in (s for s in SETS if only is None or s.folder in only):
         known = {"source": one.source, "authors": one.authors}
         if not (data / one.folder).is_dir():
             yield Row(one.name, **known, status="absent", note=f"no folder {one.folder} among the data")
@@ -64,7 +66,7 @@ def all_rows(data: Path, asked: Asked, say: Callable[[str], None]) -> Iterator[R
             say(f"{one.name}: {error}")
             yield Row(one.name, **known, status="failed", note=f"{type(error).__name__}: {error}")
     known_folders = {one.folder for one in SETS}
-    for folder in sorted(data.iterdir()) if data.is_dir() else ():
+    for folder in sorted(data.iterdir()) if data.is_dir() and only is None else ():
         if folder.is_dir() and folder.name not in known_folders:
             yield Row(
                 folder.name, "see the folder", "unknown", status="absent", note="no reader for this set yet"
@@ -108,9 +110,16 @@ def ur5(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
 
 
 def _cause(c: Calibration) -> str:
-    """The verdict, and groups of numbers that are beyond their tolerances as a whole."""
+    """The verdict, groups of numbers beyond their tolerances as a whole, and where errors along the travel are."""
+    parts = [c.verdict]
     whole = "; ".join(" or ".join((w.group, *w.rivals)) for w in c.wider)
-    return c.verdict if not whole or "beyond" in c.verdict else f"{c.verdict}; beyond tolerance as a whole: {whole}"
+    if whole and "beyond" not in c.verdict:
+        parts.append(f"beyond tolerance as a whole: {whole}")
+    if c.travel:
+        most = sorted(c.travel.profiles, key=lambda p: -p.share)[:2]
+        shares = ", ".join(f"{p.drive} {100 * p.share:.0f} %" for p in most)
+        parts.append(f"errors along the drives' travel, alone {shares}")
+    return "; ".join(parts)
 
 
 def _mean(left: Any) -> float:
@@ -121,7 +130,7 @@ def ur10(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
     """Each series by itself: five folds of its poses."""
     import measured_arm as example
 
-    every = 8 if asked.quick else 2
+    every = 8 if asked.quick else 1
     for series, kind in (
         ("C", "random poses"),
         ("B", "a grid in other configurations"),
@@ -139,7 +148,7 @@ def ur10(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
                 "before": LENGTH * c.unseen.before,
                 "after": LENGTH * c.unseen.after,
                 "unseen_rows": len(c.experiment),
-                "unseen_by": f"five folds of poses, every {every}th row",
+                "unseen_by": "five folds of poses" + (f", one row of {every}" if every > 1 else ""),
                 "cause": _cause(c),
                 "seconds": used,
                 "peers": beside_arm(folder, asked.peers) if series == "C" else (),
@@ -185,7 +194,7 @@ def gearbox(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
         first: dict[tuple[str, str], str] = {}
         for test, kind in sorted(tests.items()):
             first.setdefault(kind, test)
-        for (variant, state), test in list(sorted(first.items()))[: 2 if asked.quick else None]:
+        for (variant, state), test in sorted(first.items())[: 2 if asked.quick else None]:
             begun = time.process_time()
             d = sm.diagnose(folder / "gear.yaml", folder / test, seed=0)
             effects = " + ".join(e.kind for e in d.effects)
@@ -231,5 +240,3 @@ SETS = (
         gearbox,
     ),
 )
-
-

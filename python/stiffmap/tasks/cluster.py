@@ -34,9 +34,7 @@ class OnCluster:
         given: dict[Any, tuple[int, Any, int]] = {}  # of each future: number, item, how often it was lost
 
         def submit(index: int, item: Any, lost: int = 0) -> Any:
-            future = self._client.submit(
-                _do, self._function, self._there, item, pure=False, retries=RETRIES
-            )
+            future = self._client.submit(_do, self._function, self._there, item, pure=False, retries=RETRIES)
             given[future] = index, item, lost
             return future
 

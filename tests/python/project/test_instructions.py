@@ -31,7 +31,9 @@ def libraries() -> dict[str, Path]:
 
 def newer_instructions(library: Path) -> list[str]:
     """Lines of the disassembly that a processor of 2009 can't run."""
-    run = subprocess.run(["objdump", "-d", "--no-show-raw-insn", library], capture_output=True, text=True, check=True)
+    run = subprocess.run(
+        ["objdump", "-d", "--no-show-raw-insn", library], capture_output=True, text=True, check=True
+    )
     return [line for line in run.stdout.splitlines() if NEWER.search(line)]
 
 
@@ -65,7 +67,9 @@ def test_an_old_processor_makes_the_map(monkeypatch: pytest.MonkeyPatch) -> None
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(places), "OPENBLAS_NUM_THREADS": "1"}
     python = Path(sys.executable).resolve()
     said = [
-        subprocess.run([*before, python, "-c", text], capture_output=True, text=True, env=environment | more, check=True).stdout
+        subprocess.run(
+            [*before, python, "-c", text], capture_output=True, text=True, env=environment | more, check=True
+        ).stdout
         for before, text, more in (
             (["qemu-x86_64", "-cpu", "Nehalem"], MAP, {}),
             ([], re.sub(r"assert.*\n", "\n", MAP), {"STIFFMAP_ISA": "base"}),

@@ -52,7 +52,9 @@ def test_the_version_comes_from_the_tag(tmp_path: Path, done: list[str], expecte
 
 def fallback() -> str:
     """The version where nothing tells one."""
-    return str(tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools_scm"]["fallback_version"])
+    return str(
+        tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools_scm"]["fallback_version"]
+    )
 
 
 def test_every_public_name_is_there() -> None:
