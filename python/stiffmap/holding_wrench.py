@@ -78,8 +78,15 @@ def holding_wrench(
     gravity
         (3,) m/s², base axes; None: what the machine file says.
 
+    Notes
+    -----
     Loaded equilibrium, not stiffness times displacement. A displacement that rigid parts forbid is
-    NOT_CONVERGED. Raises StiffmapError for bad input.
+    NOT_CONVERGED.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     p = trailing(position, (3,), "position", "positions (m)")
     d = trailing(displacement, (6,), "displacement", "displacements [dx dy dz rx ry rz] (m, rad)")

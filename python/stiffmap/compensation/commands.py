@@ -129,7 +129,14 @@ def compensate(
         Pose components to correct, of x y z rx ry rz; None: those that the machine commands, positions first
         where it has fewer drives than components.
 
-    Rows out of reach hold NaN. Raises StiffmapError for bad input.
+    Notes
+    -----
+    Rows out of reach hold NaN.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     plan = _plan(machine, position, rotation, joints, wrench, approach, gravity, point)
     wanted_p, wanted_r = plan.position, _turns(machine, plan)

@@ -82,8 +82,11 @@ def diagnose(
     progress
         Called with a text on what is tried.
 
-    Raises StiffmapError for files that cannot be used, poses out of reach, and noise that is unknown.
-    docs/diagnosis.md tells the method.
+    Raises
+    ------
+    StiffmapError
+        For files that cannot be used, poses out of reach, and noise that is unknown. docs/diagnosis.md
+        tells the method.
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)

@@ -111,7 +111,12 @@ def error_map(
     highest status among the directions. SI units; unreachable, unstable and not converged poses hold
     NaN and their status. Attributes say what was computed, of what machine and how.
 
-    Raises StiffmapError for bad input, FileError where `out` cannot be written.
+    Raises
+    ------
+    StiffmapError
+        For bad input.
+    FileError
+        Where `out` cannot be written.
     """
     plan = map_plan(
         machine, x=x, y=y, z=z, wrench=wrench, cases=cases, plane=plane, force=force, directions=directions,

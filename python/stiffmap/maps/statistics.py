@@ -59,7 +59,10 @@ def map_statistics(
     (percentile[, case]), NAME_column_max (y, x[, case], the worst of all z); status_count (z[, case], status).
     Maxima, shares and counts are exact; a percentile is at most 0.2 % above the exact one, never below it.
 
-    Raises StiffmapError for bad input.
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     wanted = real_array(percentiles, "percentiles")
     if wanted.ndim != 1 or wanted.size == 0 or not ((wanted >= 0) & (wanted <= 100)).all():

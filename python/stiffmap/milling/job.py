@@ -148,7 +148,10 @@ def mill(
         `error_normal_after` of the written program as simulated, at the same way; `mirror_left` what one mirror step leaves;
         `force` (…, 3) N, `gain` kp/k, `effort` N, N·m, `margin` m, `status`, `flags`, `ripple` m.
 
-    Raises StiffmapError for bad input: paths that leave the workspace, cuts with the spindle off …
+    Raises
+    ------
+    StiffmapError
+        For bad input: paths that leave the workspace, cuts with the spindle off ….
     """
     return mill_job(as_machine(machine), path, process, **options).dataset
 

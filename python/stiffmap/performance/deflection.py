@@ -83,7 +83,10 @@ def worst_deflection(
     linear
         Unloaded compliance times force, by superposition. Otherwise the equilibrium under each force.
 
-    Raises StiffmapError for bad input, never for a pose.
+    Raises
+    ------
+    StiffmapError
+        For bad input, never for a pose.
     """
     if not (np.isfinite(force) and force > 0):
         raise StiffmapError(f"force: expected a positive size in N, got {force!r}")

@@ -148,7 +148,14 @@ def measures(
         m, what poses of the workspace and of the largest box keep: least distance between members of different
         legs, largest deflection under `force` in `plane`; None: the requirement's, else not asked for.
 
-    Raises StiffmapError for bad input. A measure that the machine lacks the data for says so in its row.
+    Raises
+    ------
+    StiffmapError
+        For bad input.
+
+    Notes
+    -----
+    A measure that the machine lacks the data for says so in its row.
     """
     task = (
         requirements

@@ -74,7 +74,10 @@ def velocity_transmission(
     part
         ``all`` components of the twist, or its ``translation`` or ``rotation`` alone.
 
-    Raises StiffmapError for bad input, never for a pose.
+    Raises
+    ------
+    StiffmapError
+        For bad input, never for a pose.
     """
     k = drive_kinematics(machine, position, rotation, threads=threads)
     return transmission_of(machine, k, length=length, limits=limits, part=part)

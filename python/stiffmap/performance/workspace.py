@@ -97,7 +97,10 @@ def workspace_volume(
     seed
         Of the random poses.
 
-    Raises StiffmapError for bad input.
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     if singularity is not None and not 0 <= singularity < 1:
         raise StiffmapError(f"singularity: expected a distance from 0 to 1, got {singularity!r}")

@@ -89,7 +89,10 @@ def design(
     done
         Rows that have been measured already: their information counts.
 
-    Raises StiffmapError for bad input.
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     _check(aim, rival, rows)
     if candidates is None:
