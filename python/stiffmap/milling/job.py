@@ -4,29 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from os import PathLike
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
-from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine, as_machine
 from stiffmap.milling.command import commanded
 from stiffmap.milling.equilibrium import Equilibrium, equilibrium
+from stiffmap.milling.limits import BROKEN, drive_speeds
 from stiffmap.milling.passes import after_passes
 from stiffmap.milling.plant import Plant
 from stiffmap.milling.program import WITHIN, Program, program
 from stiffmap.milling.reach import must_reach
 from stiffmap.milling.ripple import ripple
 from stiffmap.milling.setting import Setting, scaled, setting
+from stiffmap.milling.speed import Feeds, best_feeds
+from stiffmap.milling.taper import taper
 from stiffmap.milling.verify import Run, run
-from stiffmap.performance.scaling import drive_table
+from stiffmap.milling.warnings import Warned, mark, warned
 from stiffmap.process import Process, load_process
-from stiffmap.status import Flag, Status
+from stiffmap.status import Status
 from stiffmap.toolpath import Box, Toolpath, load_path, sampled
 
 BAND = 0.2
@@ -47,6 +50,12 @@ class Milled:
     dataset: xr.Dataset
     true_before: Equilibrium | None = None
     true_after: Run | None = None
+    feeds: Feeds | None = None
+
+    @cached_property
+    def warnings(self) -> list[Warned]:
+        """What is to be watched, and at which points."""
+        return warned(self)
 
 
 def mill(
@@ -78,7 +87,9 @@ def mill(
     band
         True: also under 80 and 120 % of the force.
     angle
-        (points,) rad: turn of an arm's tool about its axis, from `redundancy`.
+        (points,) rad: turn of an arm's tool about its axis, from `redundancy`; None: that of the path (C), else as at home.
+    feeds
+        True: the largest feed of each move at which the error stays within the tolerance; the program has them.
     threads
         None: all cores that this process may use.
 
@@ -88,7 +99,8 @@ def mill(
         Dimension point (along the path, each cut with both ends): `way` m, `wanted`, `command` (…, 3) m in base axes;
         `error` (…, 3) m before, its parts `error_normal` (positive: material stays on the part), `error_along`, `error_axial`;
         `error_normal_after` of the written program as simulated, at the same way; `mirror_left` what one mirror step leaves;
-        `force` (…, 3) N, `gain` kp/k, `effort` N, N·m, `margin` m, `status`, `flags`, `ripple` m.
+        `force` (…, 3) N, `gain` kp/k, `effort` N, N·m, `margin` m, `status`, `flags`, `ripple` m; `taper` m, how much
+        further out the wall is at the top of the cut than at the tip; `warnings`, a bit for each of its attribute `names`.
 
     Raises StiffmapError for bad input: paths that leave the workspace, cuts with the spindle off …
     """
@@ -110,6 +122,7 @@ def mill_job(
     passes: int = 1,
     band: bool = False,
     angle: Floats | None = None,
+    feeds: bool = False,
     threads: int | None = None,
 ) -> Milled:
     """The same with the program and all states, for reports."""
@@ -118,13 +131,19 @@ def mill_job(
     if passes < 1:
         raise StiffmapError(f"passes: expected 1 or more, got {passes}")
     place = p.placed(machine.description.home.p if at is None else at, turn)
+    if angle is not None:
+        p = replace(p, turn=None)
     job = setting(machine, p, cut, sampled(p, step), place, stock=stock, thickness=thickness, angle=angle)
     must_reach(job, threads)
+    chosen = best_feeds(job, threads=threads) if feeds else None
+    if chosen is not None:
+        p = replace(p, feed=chosen.feed)
+        job = setting(machine, p, cut, sampled(p, step), place, stock=stock, thickness=thickness, angle=angle)
     plant = Plant(job, threads=threads)
     before = equilibrium(plant, job.position)
     found = commanded(plant, before)
     command = np.where(np.isfinite(found.position), found.position, job.position)
-    made = program(job, command, within)
+    made = program(job, command, within, None if chosen is None else chosen.feed)
     after = run(job, made, step=step, threads=threads)
     mirrored = equilibrium(plant, np.where(np.isfinite(found.mirror), found.mirror, job.position))
     ds = _dataset(job, before, found.position, found.left, after, mirrored)
@@ -136,7 +155,8 @@ def mill_job(
             ds[f"error_normal_after_{name}"] = _along(
                 job, run(scaled(job, share), made, step=step, threads=threads)
             )
-    out = Milled(job, before, found.position, made, after, ds)
+    out = Milled(job, before, found.position, made, after, ds, feeds=chosen)
+    mark(out)
     if true_machine is None:
         return out
     if true_machine.actuators != machine.actuators:
@@ -164,6 +184,14 @@ def _along(job: Setting, made: Run) -> xr.Variable:
     return xr.Variable("point", out)
 
 
+def _flags_along(job: Setting, made: Run) -> NDArray[np.uint32]:
+    """Flags of a run at the points of the job: all that its points between them have."""
+    edges = (job.points.way[1:] + job.points.way[:-1]) / 2
+    out = np.zeros(len(job), np.uint32)
+    np.bitwise_or.at(out, np.searchsorted(edges, made.way), made.state.flags)
+    return out
+
+
 def _dataset(
     job: Setting, before: Equilibrium, command: Floats, left: Floats, after: Run, mirrored: Equilibrium
 ) -> xr.Dataset:
@@ -181,12 +209,14 @@ def _dataset(
             "command_left": ("point", left),
             "error_normal_after": _along(job, after),
             "mirror_left": ("point", (mirrored.error * job.off).sum(axis=1)),
+            "taper": ("point", taper(job, before)),
             "force": (xyz, before.force),
             "gain": ("point", before.gain),
             "effort": (("point", "actuator"), before.effort),
             "speed": (("point", "actuator"), drive_speeds(job)),
             "status": ("point", before.status),
             "flags": ("point", before.flags),
+            "flags_after": ("point", _flags_along(job, after)),
             "width": ("point", job.width(np.zeros(len(job)))),
             "feed": ("point", job.feed),
         },
@@ -212,32 +242,6 @@ def _dataset(
     return ds
 
 
-def drive_speeds(job: Setting) -> Floats:
-    """(m, actuators) m/s, rad/s at the feed; NaN out of reach."""
-    ends = [
-        inverse_kinematics(job.machine, job.position + s * 1e-5 * job.tangent, job.rotation).actuators
-        for s in (-1, 1)
-    ]
-    return np.asarray((ends[1] - ends[0]) / 2e-5 * job.feed[:, None])
-
-
-BROKEN = {"joint range": Flag.JOINT_LIMIT, "drive range": Flag.DRIVE_RANGE, "drive effort": Flag.DRIVE_FORCE}
-
-
-def beyond(ds: xr.Dataset, machine: Machine) -> dict[str, int]:
-    """Number of points that break each limit."""
-    out = {name: int((ds.flags.values & flag > 0).sum()) for name, flag in BROKEN.items()}
-    if machine.description.workspace is not None:
-        low, high = (
-            np.array(c) - 1e-9 * s for c, s in zip(machine.description.workspace, (1, -1), strict=True)
-        )
-        outside = ((ds.wanted.values < low) | (ds.wanted.values > high)).any(axis=1)
-        out["declared workspace"] = int(outside.sum())
-    most = np.array([d.speed if d.speed else np.inf for d in drive_table(machine)])
-    out["drive speed"] = int((np.abs(ds.speed.values) > most).any(axis=1).sum())
-    return out
-
-
 def sizes(values: ArrayLike) -> dict[str, float]:
     """rms and largest size of errors (m), in mm; points without an answer do not count."""
     v = np.asarray(values, dtype=float)
@@ -256,7 +260,8 @@ def verdict(ds: xr.Dataset) -> str:
         return f"{bad} of {ds.sizes['point']} points have no equilibrium."
     b, a = sizes(ds.error_normal), sizes(ds.error_normal_after)
     text = f"The part is off by {b['largest']:.3f} mm at most; with the compensated program by {a['largest']:.4f} mm."
-    over = [name for name, flag in BROKEN.items() if (ds.flags.values & flag).any()]
+    flags = ds.flags.values | ds.flags_after.values
+    over = [name for name, flag in BROKEN.items() if (flags & flag).any()]
     end = f" Limits are broken: {', '.join(over)}." if over else ""
     if "tolerance" not in ds.attrs:
         return text + end

@@ -53,6 +53,23 @@ class Placements:
         """How many times the naive placement's error is the best one's."""
         return self.naive_error / self.best_error
 
+    def words(self, tolerance: float | None = None) -> str:
+        """One sentence; `tolerance` m: also whether a placement reaches it before compensation."""
+        at = ", ".join(f"{1e3 * v:.1f}" for v in self.best.at)
+        best = f"{1e3 * self.best_error:.3f} mm at ({at}) mm, turned by {np.degrees(self.best.turn):.1f} deg"
+        if tolerance is None or self.best_error <= tolerance:
+            return f"Of {len(self.at)} placements the best leaves {best}; the middle of the workspace {1e3 * self.naive_error:.3f} mm."
+        return (
+            f"No placement of {len(self.at)} reaches the tolerance of {1e3 * tolerance:g} mm without compensation: the best leaves {best}; "
+            f"what limits it: {self.limits}."
+        )
+
+    @property
+    def three_times(self) -> float:
+        """Share of the placements in reach whose error is more than three times the best one's."""
+        fits = self.largest[np.isfinite(self.largest)]
+        return float((fits > 3 * self.best_error).mean())
+
     @property
     def reachable(self) -> float:
         """Share of the placements in which all of the path was in reach."""

@@ -19,8 +19,9 @@ from stiffmap.milling.placement import Search, placements
 from stiffmap.milling.plant import Plant
 from stiffmap.milling.redundancy import Steps, best_sequence, redundancy
 from stiffmap.milling.setting import Setting, setting
-from stiffmap.milling.speed import best_feeds, other_side, turned_round
+from stiffmap.milling.speed import best_feeds, other_side
 from stiffmap.toolpath import outline, path_of, sampled
+from stiffmap.toolpath.entry import turned_round
 
 ARM = Path(__file__).parents[3] / "examples/ur10-spindle.yaml"
 PROCESS = sm.load_process("trimming")
