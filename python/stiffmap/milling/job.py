@@ -259,6 +259,12 @@ def verdict(ds: xr.Dataset) -> str:
     if bad:
         return f"{bad} of {ds.sizes['point']} points have no equilibrium."
     b, a = sizes(ds.error_normal), sizes(ds.error_normal_after)
+    lost = int((~np.isfinite(ds.error_normal_after.values)).sum())
+    if lost:
+        return (
+            f"The part is off by {b['largest']:.3f} mm at most. With the compensated program {lost} of {ds.sizes['point']} points have "
+            "no equilibrium."
+        )
     text = f"The part is off by {b['largest']:.3f} mm at most; with the compensated program by {a['largest']:.4f} mm."
     flags = ds.flags.values | ds.flags_after.values
     over = [name for name, flag in BROKEN.items() if (flags & flag).any()]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,9 +71,30 @@ def program(job: Setting, command: Floats, within: float = WITHIN, feeds: Floats
         if i > 0 and i - 1 not in starts:
             end, angle = starts[i]
             moved[i - 1] = [MovedPiece(Kind(int(path.kind[i - 1])), end, np.full(3, np.nan), 0.0, angle)]
-    text, origin = rewritten(path, moved, feeds)
+    text, origin = rewritten(_turning(path, points.move[first], turn, first, last), moved, feeds)
     again = load_gcode(text.splitlines(), name=path.name, offsets=path.offsets or None)
     return Program(text, ".ngc", again, np.array(origin), sum(map(len, moved.values())))
+
+
+def _turning(
+    path: Toolpath,
+    cuts: NDArray[np.int64],
+    turn: Floats | None,
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
+) -> Toolpath:
+    """The path with the tool's turn on the moves between cuts: a retreat keeps it, what follows turns to where the next cut begins."""
+    if turn is None:
+        return path
+    now = np.full(len(path), turn[first[0]])
+    for k, i in enumerate(cuts):
+        later = cuts[k + 1] if k + 1 < len(cuts) else len(path)
+        next_turn = turn[first[k + 1]] if k + 1 < len(cuts) else turn[last[k] - 1]
+        now[i] = turn[last[k] - 1]
+        now[i + 1 : later] = next_turn
+        if later > i + 2:
+            now[i + 1] = now[i]
+    return replace(path, turn=now)
 
 
 def _first(turn: Floats | None) -> float:

@@ -78,6 +78,8 @@ def summary(found: Milled) -> dict[str, object]:
 def placement_summary(found: Placements) -> dict[str, object]:
     """Numbers of a search for the placement; mm, deg."""
     fits = found.largest[np.isfinite(found.largest)]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.abs(found.naive_along) / np.abs(found.best_along)
     return {
         "at_mm": [float(1e3 * v) for v in found.best.at],
         "turn_deg": float(np.degrees(found.best.turn)),
@@ -85,6 +87,10 @@ def placement_summary(found: Placements) -> dict[str, object]:
         "naive_at_mm": [float(1e3 * v) for v in found.naive.at],
         "naive_error_mm": 1e3 * found.naive_error,
         "naive_over_best": found.gain,
+        "naive_over_best_along": {
+            "median": float(np.median(ratio)),
+            "share_over_3": float((ratio > 3).mean()),
+        },
         "worst_over_best": float(fits.max() / found.best_error),
         "more_than_3_times_the_best": found.three_times,
         "worst_error_mm": float(1e3 * fits.max()),
@@ -153,7 +159,7 @@ def _sheet(found: Milled) -> Sheet:
         f"({', '.join(f'{v:.1f}' for v in s['at_mm'])}) mm, turned by {s['turn_deg']:.1f} deg.",  # type: ignore[attr-defined]
         f"Process {p.name}: {p.cut.side} cut, {1e3 * p.cut.axial:g} mm deep, {60 * p.feed:.3g} m/min; mean force {mean} N along the "
         f"feed, to its left, along the tool; {force.power:.0f} W at the spindle.",
-        f"Error across the wall: positive where material stays on the part. Loop gain kp/k up to {s['loop_gain']['largest']:.3g}: "  # type: ignore[index]
+        f"Error across the wall: positive where material stays on the part. Loop gain kp/k up to {abs(s['loop_gain']['largest']) if abs(s['loop_gain']['largest']) < 1e-9 else s['loop_gain']['largest']:.3g}: "  # type: ignore[index]
         f"one mirrored program would leave {s['mirror_leaves_mm']['largest']:.4f} mm.",  # type: ignore[index]
         f"The compensated program has {found.program.pieces} cutting moves; it was read back and simulated with the force "
         "evaluated anew at the true distance from the wall.",

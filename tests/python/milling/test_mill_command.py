@@ -54,8 +54,10 @@ def test_findings_and_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     small = ["linear-delta", "circle", "--size", "60", "--process", "trimming", "--at", "0,0,300"]
     assert main(["mill", *small, "--tolerance", "0.000001", "--step", "5"]) == 1
     assert "beyond it compensated" in capsys.readouterr().out
-    assert main(["mill", *small[:-2]]) == 0  # at the machine's home
-    capsys.readouterr()
+    assert main(["mill", *small]) == 0
+    assert "warnings" not in capsys.readouterr().out
+    assert main(["mill", *small[:-2]]) == 1  # at the machine's home its drives are too weak
+    assert "The drive effort is broken at 12 of" in capsys.readouterr().out
     for wrong, message in (
         (["--tolerance", "0"], "--tolerance"),
         (["--offset", "G60=1"], "--offset"),

@@ -135,10 +135,9 @@ def _line(text: str, words: str, feed: bool) -> str:
         if part.startswith(("(", ";")):
             parts.append(part)
             continue
-        bare = _MOTION.sub("\0", part)
+        bare = _MOTION.sub("\0", _FEED.sub("", part) if feed else part)
         if "\0" in bare:
             bare = _TURNS.sub("", bare)
-            bare = _FEED.sub("", bare) if feed else bare
             head, _, tail = bare.partition("\0")
             bare = f"{head}{'' if placed else words}{tail.replace(chr(0), '')}"
             placed = True
