@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from os import PathLike
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, as_machine
 from stiffmap.milling.command import commanded
+from stiffmap.milling.dataset import along, dataset_of
 from stiffmap.milling.equilibrium import Equilibrium, equilibrium
-from stiffmap.milling.limits import BROKEN, drive_speeds
 from stiffmap.milling.passes import after_passes
 from stiffmap.milling.plant import Plant
 from stiffmap.milling.program import WITHIN, Program, program
@@ -25,11 +24,9 @@ from stiffmap.milling.reach import must_reach
 from stiffmap.milling.ripple import ripple
 from stiffmap.milling.setting import Setting, scaled, setting
 from stiffmap.milling.speed import Feeds, best_feeds
-from stiffmap.milling.taper import taper
 from stiffmap.milling.verify import Run, run
-from stiffmap.milling.warnings import Warned, mark, warned
+from stiffmap.milling.warnings import Warned, warned
 from stiffmap.process import Process, load_process
-from stiffmap.status import Status
 from stiffmap.toolpath import Box, Toolpath, load_path, sampled
 
 BAND = 0.2
@@ -51,11 +48,8 @@ class Milled:
     true_before: Equilibrium | None = None
     true_after: Run | None = None
     feeds: Feeds | None = None
-
-    @cached_property
-    def warnings(self) -> list[Warned]:
-        """What is to be watched, and at which points."""
-        return warned(self)
+    warnings: tuple[Warned, ...] = ()
+    """What is to be watched, and at which points."""
 
 
 def mill(
@@ -146,17 +140,16 @@ def mill_job(
     made = program(job, command, within, None if chosen is None else chosen.feed)
     after = run(job, made, step=step, threads=threads)
     mirrored = equilibrium(plant, np.where(np.isfinite(found.mirror), found.mirror, job.position))
-    ds = _dataset(job, before, found.position, found.left, after, mirrored)
+    ds = dataset_of(job, before, found.position, found.left, after, mirrored)
     ds["ripple"] = ("point", ripple(job, before))
     if passes > 1:
         ds["error_normal_passes"] = (("passes", "point"), after_passes(job, before, passes, threads))
     if band:
         for name, share in (("low", 1 - BAND), ("high", 1 + BAND)):
-            ds[f"error_normal_after_{name}"] = _along(
+            ds[f"error_normal_after_{name}"] = along(
                 job, run(scaled(job, share), made, step=step, threads=threads)
             )
-    out = Milled(job, before, found.position, made, after, ds, feeds=chosen)
-    mark(out)
+    out = Milled(job, before, found.position, made, after, ds, feeds=chosen, warnings=warned(job, ds))
     if true_machine is None:
         return out
     if true_machine.actuators != machine.actuators:
@@ -167,110 +160,5 @@ def mill_job(
     real = equilibrium(Plant(job, true_machine, threads), job.position)
     real_after = run(job, made, true_machine, step=step, threads=threads)
     ds["true_error_normal"] = ("point", (real.error * job.off).sum(axis=1))
-    ds["true_error_normal_after"] = _along(job, real_after)
+    ds["true_error_normal_after"] = along(job, real_after)
     return replace(out, true_before=real, true_after=real_after)
-
-
-def _along(job: Setting, made: Run) -> xr.Variable:
-    """The error of a run at the points of the job: of the run's points nearest in way, the largest in size."""
-    order = np.argsort(made.way, kind="stable")
-    way, value = made.way[order], made.normal[order]
-    edges = (job.points.way[1:] + job.points.way[:-1]) / 2
-    bins = np.searchsorted(edges, way)
-    out = np.interp(job.points.way, way, value)
-    best = np.lexsort((np.abs(value), bins))
-    last = np.r_[np.flatnonzero(np.diff(bins[best])), len(best) - 1]
-    out[bins[best][last]] = value[best][last]
-    return xr.Variable("point", out)
-
-
-def _flags_along(job: Setting, made: Run) -> NDArray[np.uint32]:
-    """Flags of a run at the points of the job: all that its points between them have."""
-    edges = (job.points.way[1:] + job.points.way[:-1]) / 2
-    out = np.zeros(len(job), np.uint32)
-    np.bitwise_or.at(out, np.searchsorted(edges, made.way), made.state.flags)
-    return out
-
-
-def _dataset(
-    job: Setting, before: Equilibrium, command: Floats, left: Floats, after: Run, mirrored: Equilibrium
-) -> xr.Dataset:
-    normal = (before.error * job.off).sum(axis=1)
-    tolerance = job.process.tolerance
-    xyz = ("point", "axis")
-    ds = xr.Dataset(
-        {
-            "wanted": (xyz, job.position),
-            "error": (xyz, before.error),
-            "error_normal": ("point", normal),
-            "error_along": ("point", (before.error * job.tangent).sum(axis=1)),
-            "error_axial": ("point", (before.error * job.tool).sum(axis=1)),
-            "command": (xyz, command),
-            "command_left": ("point", left),
-            "error_normal_after": _along(job, after),
-            "mirror_left": ("point", (mirrored.error * job.off).sum(axis=1)),
-            "taper": ("point", taper(job, before)),
-            "force": (xyz, before.force),
-            "gain": ("point", before.gain),
-            "effort": (("point", "actuator"), before.effort),
-            "speed": (("point", "actuator"), drive_speeds(job)),
-            "status": ("point", before.status),
-            "flags": ("point", before.flags),
-            "flags_after": ("point", _flags_along(job, after)),
-            "width": ("point", job.width(np.zeros(len(job)))),
-            "feed": ("point", job.feed),
-        },
-        coords={
-            "way": ("point", job.points.way),
-            "line": ("point", job.path.line[job.points.move]),
-            "axis": ["x", "y", "z"],
-            "actuator": list(job.machine.actuators),
-        },
-        attrs={
-            "machine": job.machine.name,
-            "process": job.process.name,
-            "path": job.path.name,
-            "at": job.place.at.tolist(),
-            "turn": job.place.turn,
-            "notes": list(job.path.notes),
-        },
-    )
-    if tolerance is not None:
-        ds["margin"] = ("point", tolerance - np.abs(normal))
-        ds["margin_after"] = tolerance - np.abs(ds.error_normal_after)
-        ds.attrs["tolerance"] = tolerance
-    return ds
-
-
-def sizes(values: ArrayLike) -> dict[str, float]:
-    """rms and largest size of errors (m), in mm; points without an answer do not count."""
-    v = np.asarray(values, dtype=float)
-    v = v[np.isfinite(v)]
-    if not v.size:
-        return {"rms": float("nan"), "largest": float("nan")}
-    return {"rms": float(1e3 * np.sqrt((v**2).mean())), "largest": float(1e3 * np.abs(v).max())}
-
-
-def verdict(ds: xr.Dataset) -> str:
-    """One sentence."""
-    bad = int((ds.status.values != Status.CONVERGED).sum())
-    if (ds.status.values == Status.UNSTABLE).any():
-        return f"The cut runs away at {int((ds.status.values == Status.UNSTABLE).sum())} points: the force grows faster than the machine resists."
-    if bad:
-        return f"{bad} of {ds.sizes['point']} points have no equilibrium."
-    b, a = sizes(ds.error_normal), sizes(ds.error_normal_after)
-    lost = int((~np.isfinite(ds.error_normal_after.values)).sum())
-    if lost:
-        return (
-            f"The part is off by {b['largest']:.3f} mm at most. With the compensated program {lost} of {ds.sizes['point']} points have "
-            "no equilibrium."
-        )
-    text = f"The part is off by {b['largest']:.3f} mm at most; with the compensated program by {a['largest']:.4f} mm."
-    flags = ds.flags.values | ds.flags_after.values
-    over = [name for name, flag in BROKEN.items() if (flags & flag).any()]
-    end = f" Limits are broken: {', '.join(over)}." if over else ""
-    if "tolerance" not in ds.attrs:
-        return text + end
-    t = 1e3 * ds.attrs["tolerance"]
-    words = [("within" if v["largest"] <= t else "beyond") for v in (b, a)]
-    return f"{text} The tolerance is {t:g} mm: {words[0]} it as it is, {words[1]} it compensated.{end}"

@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.maps.files import write_dataset
-from stiffmap.milling.job import Milled, sizes, verdict
+from stiffmap.milling.job import Milled
 from stiffmap.milling.limits import outside
 from stiffmap.milling.pictures import error_figure, machine_path_figure, outline_figure
 from stiffmap.milling.placement import Placements
+from stiffmap.milling.verdict import sizes, verdict
 from stiffmap.outputs import make_folder, write_rows, write_text
 from stiffmap.plot.style import save
 from stiffmap.process import cutting_force
