@@ -35,6 +35,8 @@ class Equilibrium:
     """(m, actuators)."""
     compliance: Floats
     """(m, 3, 3) m/N."""
+    turned: Floats
+    """(m, 3) rad, rotation vector of the tool's holder from the commanded orientation."""
     steps: int
 
 
@@ -71,7 +73,7 @@ def equilibrium(plant: Plant, command: Floats, rows: NDArray[np.int64] | None = 
     blank = np.where(lost[:, None], np.nan, 1.0)
     return Equilibrium(
         error * blank, force * blank, np.where(np.isfinite(error).all(axis=1), gain, np.nan), status, s.flags,
-        s.effort * blank, s.compliance, steps,
+        s.effort * blank, s.compliance, s.turned * blank, steps,
     )  # fmt: skip
 
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.milling.equilibrium import equilibrium
-from stiffmap.milling.job import drive_speeds
+from stiffmap.milling.limits import drive_speeds, fastest
 from stiffmap.milling.plant import Plant
 from stiffmap.milling.setting import Setting
-from stiffmap.performance.scaling import drive_table
 from stiffmap.process.description import Process
-from stiffmap.toolpath import Kind, Toolpath
 
 ROUNDS = 20
 SLOWEST, FASTEST = 0.02, 4.0
@@ -31,7 +30,7 @@ class Feeds:
     """s of all cuts."""
     before: float
     """s with the feed as it is."""
-    held: Floats
+    held: NDArray[np.bool_]
     """(moves,) bool: the error stays within the tolerance."""
     limited_by: tuple[str, ...]
     """(moves,) tolerance, drive speed, or fastest feed asked for."""
@@ -45,7 +44,7 @@ def best_feeds(job: Setting, tolerance: float | None = None, threads: int | None
     t = job.process.tolerance if tolerance is None else tolerance
     if t is None or not t > 0:
         raise StiffmapError("tolerance: expected a length above zero (m), from the process or given")
-    most = np.array([d.speed if d.speed else np.inf for d in drive_table(job.machine)])
+    most = fastest(job.machine)
     with np.errstate(divide="ignore"):
         room = (most / np.maximum(np.abs(drive_speeds(job)), 1e-12)).min(axis=1)
     top = np.minimum(room, FASTEST)
@@ -81,32 +80,6 @@ def best_feeds(job: Setting, tolerance: float | None = None, threads: int | None
         total += job.path.length[i] / feed[i]
         before += job.path.length[i] / job.feed[rows].min()
     return Feeds(feed, float(total), float(before), held, tuple(why))
-
-
-def turned_round(path: Toolpath) -> Toolpath:
-    """The same path run the other way; what was a climb cut is a conventional one."""
-    back = slice(None, None, -1)
-    kind = path.kind[back].copy()
-    return replace(
-        path,
-        kind=kind,
-        start=path.end[back].copy(),
-        end=path.start[back].copy(),
-        centre=np.where((kind == Kind.ARC)[:, None], _centres(path)[back], np.nan),
-        normal=path.normal[back].copy(),
-        sweep=-path.sweep[back],
-        feed=path.feed[back].copy(),
-        spindle=path.spindle[back].copy(),
-        line=path.line[back].copy(),
-        tool=path.tool[back].copy(),
-        text=(),
-    )
-
-
-def _centres(path: Toolpath) -> Floats:
-    """(n, 3) m, at the height of the end, where the reversed arc starts."""
-    axis = np.eye(3)[path.normal]
-    return np.asarray(path.centre * (1 - axis) + path.end * axis)
 
 
 def other_side(process: Process) -> Process:

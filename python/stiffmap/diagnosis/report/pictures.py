@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from stiffmap.diagnosis.report.findings import Findings
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment.comparison.pictures import vector_cases
 from stiffmap.experiment.experiment import WRENCH, Experiment, Floats
 from stiffmap.machine import Machine
@@ -36,10 +37,18 @@ def figures(d: Findings) -> dict[str, Figure]:
     if d.effects and d.declared.description.workspace is not None:
         made["maps"] = maps(d)
         worst = worst_pose(d)
-        made |= {"loaded": loaded_figure(d.machine, *worst)} if worst else {}
+        made |= _loaded(d.machine, worst) if worst else {}
     if d.unexplained and d.empirical and d.experiment.groups.max() > 0:
         made["unexplained"] = left(d)
     return made
+
+
+def _loaded(machine: Machine, worst: tuple[Floats, Floats]) -> dict[str, Figure]:
+    """The picture where there is one: a machine with play has no state of its own without load."""
+    try:
+        return {"loaded": loaded_figure(machine, *worst)}
+    except StiffmapError:
+        return {}
 
 
 def loops(d: Findings) -> Figure:
