@@ -1,6 +1,6 @@
 """Labelled results over a workspace: error maps, polar diagrams, force sweeps (xarray, SI)."""
 
-from stiffmap.maps.design_sweep import design_sweep
+from stiffmap.maps.sweep_of_numbers import design_sweep
 from stiffmap.maps.estimate import MapEstimate, map_estimate
 from stiffmap.maps.grid_map import error_map
 from stiffmap.maps.polar_diagram import polar

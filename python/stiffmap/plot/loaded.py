@@ -116,7 +116,8 @@ def loaded_figure(
     budget = deflection_budget(machine, position, wrench, rotation=rotation, gravity=gravity)
     with paper_style():
         figure = new_figure(10.4, 5.0)
-        left, right = figure.add_gridspec(1, 2, width_ratios=(1.3, 1.0))
+        grid = figure.add_gridspec(1, 2, width_ratios=(1.3, 1.0))
+        left, right = grid[0, 0], grid[0, 1]
         ax: Any = scene_axes(figure, shape.rest, view, left)
         draw_loaded(ax, shape, machine.legs, view)
         draw_budget(figure.add_subplot(right), budget)
