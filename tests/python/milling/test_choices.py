@@ -136,6 +136,19 @@ def test_feed_up_to_the_tolerance() -> None:
         best_feeds(job, 0.0)
 
 
+def test_feed_up_to_the_drives_efforts() -> None:
+    machine, path = sm.load_machine("linear-delta"), outline("circle", (0.06,))
+    job = setting(machine, path, PROCESS, sampled(path, 4e-3), path.placed((0.05, 0.05, 0.3)))
+    found = best_feeds(job, 1e-3)
+    assert set(found.limited_by) - {"does not cut"} == {"drive effort"}
+    share = found.feed[job.points.move] / job.feed
+    for more, broken in ((1.0, False), (1.01, True)):
+        faster = replace(job, faster=job.faster * share * more)
+        force = faster.force(np.zeros((len(job), 2)))
+        effort = Plant(faster).stand(job.position, force, full=True).effort
+        assert (np.abs(effort).max() > 150.0) is np.bool_(broken)  # N, from the machine's file
+
+
 def test_the_other_way_round() -> None:
     path = outline("washbasin")
     back = turned_round(path)

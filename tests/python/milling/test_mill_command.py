@@ -51,7 +51,7 @@ def test_outline_to_report_and_program(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 def test_findings_and_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    small = ["linear-delta", "circle", "--size", "60", "--process", "trimming", "--at", "0,0,300"]
+    small = ["linear-delta", "circle", "--size", "60", "--process", "trimming", "--at", "50,50,300"]
     assert main(["mill", *small, "--tolerance", "0.000001", "--step", "5"]) == 1
     assert "beyond it compensated" in capsys.readouterr().out
     assert main(["mill", *small]) == 0
