@@ -18,7 +18,7 @@ def header_of(above: Sequence[Line], first: Sequence[str]) -> tuple[int, list[st
     """Line number and names of the columns, from the lines above the first row of data; None where none is a header."""
     width = _width(first)
     lines = [(n, [_plain(c) for c in cells]) for n, cells in above]
-    lines = [(n, cells) for n, cells in lines if any(cells)][-MOST_LINES:]
+    lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)][-MOST_LINES:]
     units: list[str] = []
     while lines and not _fits(lines[-1][1], width):
         if _units(lines[-1][1]):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ugly import UGLY, Ugly
+from .ugly import UGLY, Ugly
 
 import stiffmap as sm
 from stiffmap.cli import main
