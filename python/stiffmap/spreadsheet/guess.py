@@ -54,7 +54,7 @@ def split_unit(header: str) -> tuple[str, str]:
         return part[1].strip(), part[2].strip()
     said = re.match(r"^(.*?)(?:\s*[/,;]\s*|\s+in\s+)(\S+)\s*$", header)
     bare = re.match(r"^(.*\S)[\s_](\S{2,})\s*$", header)
-    newton = re.match(r"^(.*\S)\s(k?N)\s*$", header)
+    newton = re.match(r"^(.*?[^\s,;/])(?:\s+in)?\s(k?N)\s*$", header)
     if newton:
         return newton[1].strip(), newton[2]
     if said and said[1] and known_unit(said[2]) and not known_unit(header):

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from .ugly import UGLY, Ugly
 
 import stiffmap as sm
 from stiffmap.cli import main
 from stiffmap.spreadsheet.units import unit_of
+
+from .ugly import LATER, STILL, UGLY, Ugly
 
 CLEAN = "Nr;x [mm];y [mm];fx [N];dx [µm]\n1;0;400;100;12.5\n2;50;400;100;14.0\n"
 
@@ -42,6 +43,16 @@ def test_twenty_ugly_sheets(name: str, tmp_path: Path, capsys: pytest.CaptureFix
     assert code == 0, capsys.readouterr().err
     assert e is not None
     matches(e, UGLY[name])
+
+
+@pytest.mark.parametrize("name", LATER)
+def test_ten_more(name: str, tmp_path: Path) -> None:
+    code, e = imported(LATER[name], tmp_path)
+    if name in STILL:
+        assert code == 2 and sorted(p.name for p in tmp_path.iterdir()) in (["sheet.csv"], ["sheet.xlsx"])
+        return
+    assert e is not None
+    matches(e, LATER[name])
 
 
 def test_what_is_left_out_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
