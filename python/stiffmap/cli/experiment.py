@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from stiffmap.spreadsheet.sheet import Sheet
 
 
+RECORDED = {"operator", "instrument", "certificate", "date", "temperature", "notes", "source", "sha256"}
+
+
 def experiment(
     action: Annotated[str, typer.Argument(help="new: make a folder from a spreadsheet.")],
     file: Annotated[
@@ -62,6 +65,12 @@ def experiment(
     sheet: Annotated[
         str | None, typer.Option(help="Sheet of the workbook. [default: the first that fits]")
     ] = None,
+    record: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="For the report: operator, instrument, certificate, date, temperature or notes, e.g. operator=Miller."
+        ),
+    ] = None,
     dialogue: Annotated[
         bool, typer.Option("--dialogue", help="Ask what cannot be guessed, and remember the answers.")
     ] = False,
@@ -83,6 +92,7 @@ def experiment(
 
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
+    from stiffmap.fingerprints import file_digest
     from stiffmap.machine import load_machine
     from stiffmap.spreadsheet.dialogue import Answers
     from stiffmap.spreadsheet.folder import make_experiment
@@ -106,7 +116,11 @@ def experiment(
     ask = _prompt if dialogue else None
     table, found, answers, told = read_and_ask(file, sheet, wrote, given, ask)
     title = f"from {table.file.replace(str(file), file.name)}"
-    made = make_experiment(found, table, output, machine, quantity, answers.noise, title)
+    kept = {"source": file.name, "sha256": file_digest(file), **_pairs(record, "record")}
+    wrong = sorted(set(kept) - RECORDED)
+    if wrong:
+        raise StiffmapError(f"--record: expected one of {', '.join(sorted(RECORDED))}; got '{wrong[0]}'")
+    made = make_experiment(found, table, output, machine, quantity, answers.noise, title, kept)
     if as_json:
         print_json({"folder": str(output), "rows": len(made), "repeats": found.repeats,
                     "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units})  # fmt: skip

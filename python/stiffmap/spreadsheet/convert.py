@@ -249,6 +249,7 @@ def write_folder(
     quantity: str,
     noise: Mapping[str, float],
     title: str,
+    record: Mapping[str, str] | None = None,
 ) -> None:
     """Write the folder; raises FileError where it cannot be written."""
     head: dict[str, Any] = {
@@ -259,6 +260,11 @@ def write_folder(
     }
     if noise:
         head["noise"] = {n: v * found.factors.get(n, 1.0) for n, v in noise.items()}
+    told = {**dict(sheet.record), **(record or {})}
+    if "notes" in told:
+        head["notes"] = told.pop("notes")
+    if told:
+        head["record"] = told
     with only_job(make_folder(folder)):
         head["rows"] = write_rows(folder / "data.csv", found.header, found.rows)
         if found.notes:

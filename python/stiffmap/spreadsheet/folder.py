@@ -25,6 +25,7 @@ def make_experiment(
     quantity: str,
     noise: Mapping[str, float],
     title: str,
+    record: Mapping[str, str] | None = None,
 ) -> Experiment:
     """Write the folder and load it. Where it does not load nothing is left behind, and the error names row and column of
     the sheet. Raises FileError."""
@@ -34,7 +35,7 @@ def make_experiment(
     except OSError as error:
         raise FileError(f"cannot be written: {error.strerror}", file=str(folder)) from error
     try:
-        write_folder(found, sheet, fresh, machine, quantity, noise, title)
+        write_folder(found, sheet, fresh, machine, quantity, noise, title, record)
         try:
             made = load_experiment(fresh)
         except FileError as error:

@@ -39,6 +39,29 @@ def header_of(above: Sequence[Line], first: Sequence[str]) -> tuple[int, list[st
     return number, names
 
 
+RECORD = {
+    "operator": r"operator|bediener|prüfer|measured by|gemessen von|name",
+    "instrument": r"instrument|messmittel|messgerät|messuhr|gauge",
+    "certificate": r"certificate|zertifikat|kalibrierschein|calibration",
+    "date": r"date|datum",
+    "temperature": r"temperature|temperatur|temp\.?|raumtemperatur",
+    "notes": r"notes?|bemerkung(en)?|remarks?",
+}
+
+
+def record_of(above: Sequence[Line]) -> tuple[tuple[str, str], ...]:
+    """``Operator;Miller`` or ``Operator: Miller`` in the lines above a table."""
+    out: dict[str, str] = {}
+    for _, cells in above:
+        filled = [_plain(c) for c in cells if c.strip()]
+        pairs = [tuple(filled)] if len(filled) == 2 else [tuple(c.split(":", 1)) for c in filled if ":" in c]
+        for name, value in (p for p in pairs if len(p) == 2):
+            for key, pattern in RECORD.items():
+                if re.fullmatch(pattern, name.strip().rstrip(":"), re.IGNORECASE) and value.strip():
+                    out.setdefault(key, value.strip())
+    return tuple(out.items())
+
+
 def _plain(cell: str) -> str:
     text = re.sub(r"\s+", " ", cell.strip())
     bare = text.lstrip("#%").strip() if text.startswith(("#", "%")) else text

@@ -17,7 +17,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.cells import BETWEEN, BLOCK, Cells, filled, packed, row_numbers
 from stiffmap.errors import FileError
 from stiffmap.number_text import number_in
-from stiffmap.spreadsheet.header import header_of
+from stiffmap.spreadsheet.header import header_of, record_of
 from stiffmap.spreadsheet.workbook import workbook_lines
 
 Lines = Callable[[], Iterable[tuple[int, list[str]]]]
@@ -86,6 +86,8 @@ class Sheet:
     lines: Sequence[int]
     """Line of each row in the file, from 1."""
     decimal_comma: bool
+    record: tuple[tuple[str, str], ...] = ()
+    """Operator, instrument and the like, from the lines above the table."""
     aside: tuple[str, ...] = ()
     """What was left out: rows of means, remarks below the table."""
     _read: dict[int, Floats] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -172,7 +174,7 @@ def read_sheet(path: Path, sheet: str | None = None) -> Sheet:
     data = _data(chain([first], _kept(rows)), header, comma, aside)
     columns = packed(_even(data, width, numbered), width)
     file = f"{path}, sheet '{page}'" if page else str(path)
-    return Sheet(file, tuple(names), columns, numbered, comma, tuple(aside))
+    return Sheet(file, tuple(names), columns, numbered, comma, record_of(above), tuple(aside))
 
 
 def _kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:

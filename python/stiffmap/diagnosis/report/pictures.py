@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.stats import f as f_distribution
 
 from stiffmap.diagnosis.report.findings import Findings
+from stiffmap.diagnosis.report.place import place_figure
+from stiffmap.diagnosis.report.wording import noise_size
 from stiffmap.experiment.comparison.pictures import vector_cases
 from stiffmap.experiment.experiment import WRENCH, Experiment, Floats
 from stiffmap.machine import Machine
@@ -15,7 +18,10 @@ UM, MM = 1e6, 1e3
 CAPTIONS = {
     "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the machine of your file and "
     "with the corrected one; both enlarged alike.",
-    "residual_trends": "Residual of every reading against what may drive it. What depends on nothing here is noise.",
+    "place": "The machine at home. Red: what is named; where nothing of the machine is, the tool is marked.",
+    "before_after": "Readings that no fit saw: what the machine of your file and the corrected one leave of them, rms.",
+    "residual_trends": "Residual of every reading against what drives it.",
+    "residual_others": "Residual of every reading against what drives nothing here.",
     "residual_histogram": "Residuals over the noise floor. With the right machine they follow the dashed line.",
     "loops": "Reading over load in the order of time, each set-up from its own zero: what was measured, and what the machine of your file "
     "and the corrected one show.",
@@ -25,12 +31,18 @@ CAPTIONS = {
     "unexplained": "What no effect explains, over the workspace, and the empirical field that would remove it.",
 }
 BEFORE, AFTER = "#c1432e", "#2a6f97"
+Driver = tuple[str, Floats]
+"""Label and value of each row."""
 
 
 def figures(d: Findings) -> dict[str, Figure]:
     """All figures by the names of their files."""
-    made = {"residual_vectors": vectors(d)} if d.experiment.axis_read[:3].any() else {}
-    made |= {"residual_trends": trends(d), "residual_histogram": histogram(d)}
+    made = {"place": place_figure(d), "before_after": before_after(d)}
+    made |= {"residual_vectors": vectors(d)} if d.experiment.axis_read[:3].any() else {}
+    told, others = trending(d)
+    made |= {"residual_trends": trends(d, told)} if told else {}
+    made |= {"residual_others": trends(d, others)} if others else {}
+    made |= {"residual_histogram": histogram(d)}
     if d.experiment.load_direction is not None:
         made["loops"] = loops(d)
     if d.effects and d.declared.description.workspace is not None:
@@ -111,7 +123,13 @@ def vectors(d: Findings) -> Figure:
     case, before, after = max(both, key=lambda b: float(np.nansum(b[1][:, :3] ** 2)))
     at = _pose_means(d.experiment, d.experiment.position) * MM
     longest = max(float(np.linalg.norm(np.nan_to_num(before[:, :3]), axis=1).max()), 1e-12)
-    scale = 0.25 * max(float(np.ptp(at)), 1.0) / longest
+    extent = float(np.ptp(at, axis=0).max())
+    scale = 0.25 * max(extent, 1.0) / longest
+    spread = [a for a in range(3) if np.ptp(at[:, a]) > 1e-6 * max(extent, 1.0)]
+    if len(spread) < 3:
+        _flat_vectors(figure, at, ((("before", before, BEFORE)), ("after", after, AFTER)), scale, spread)
+        figure.text(0.5, 0.02, _longest(longest, case), ha="center", fontsize=9)
+        return figure
     for i, (name, r, colour) in enumerate((("before", before, BEFORE), ("after", after, AFTER))):
         axes = figure.add_subplot(1, 2, i + 1, projection="3d")
         v = np.nan_to_num(r[:, :3]) * scale
@@ -122,14 +140,97 @@ def vectors(d: Findings) -> Figure:
         axes.locator_params(nbins=5)
         axes.set_box_aspect(None, zoom=0.85)  # room for the label of z
     figure.subplots_adjust(left=0.02, right=0.95, bottom=0.1, top=0.93, wspace=0.12)
-    told = f"longest arrow before: {longest * UM:.1f} µm{'; ' + case if case else ''}"
-    figure.text(0.5, 0.025, told, ha="center", fontsize=9)
+    figure.text(0.5, 0.025, _longest(longest, case), ha="center", fontsize=9)
     return figure
 
 
-def trends(d: Findings) -> Figure:
+def _longest(longest: float, case: str) -> str:
+    return f"longest arrow before: {longest * UM:.1f} µm{'; ' + case if case else ''}"
+
+
+def _flat_vectors(
+    figure: Figure, at: Floats, pairs: tuple[tuple[str, Floats, str], ...], scale: float, spread: list[int]
+) -> None:
+    """Arrows in the plane in which poses lie (a line or a point of them: with the axis of the largest residual)."""
+    sizes = np.nansum(pairs[0][1][:, :3] ** 2, axis=0)
+    more = [int(a) for a in np.argsort(-sizes, kind="stable") if a not in spread]
+    a, b = sorted([*spread, *more][:2])
+    axes = figure.subplots(1, 2, sharex=True, sharey=True)
+    ends = [at[:, [a, b]]] + [at[:, [a, b]] + np.nan_to_num(r[:, [a, b]]) * scale for _, r, _ in pairs]
+    low, high = np.vstack(ends).min(axis=0), np.vstack(ends).max(axis=0)
+    room = 0.08 * max(float((high - low).max()), 1.0)
+    for ax, (name, r, colour) in zip(axes, pairs, strict=True):
+        v = np.nan_to_num(r[:, [a, b]]) * scale
+        ax.quiver(*at[:, [a, b]].T, *v.T, angles="xy", scale_units="xy", scale=1, color=colour, width=0.005)
+        ax.plot(at[:, a], at[:, b], ".", ms=4, color="0.4")
+        ax.set(
+            xlabel=f"{'xyz'[a]}, mm", ylabel=f"{'xyz'[b]}, mm", title=f"{name}: mean residual of each pose"
+        )
+        ax.set_xlim(low[0] - room, high[0] + room)
+        ax.set_ylim(low[1] - room, high[1] + room)
+        ax.set_aspect("equal", adjustable="box")
+    figure.subplots_adjust(left=0.09, right=0.97, bottom=0.17, top=0.92, wspace=0.2)
+
+
+TREND = 1e-3
+"""p-value below which residuals follow a driver, over all drivers and channels."""
+
+
+def trending(d: Findings) -> tuple[list[Driver], list[Driver]]:
+    """Drivers that residuals follow, before or after, and the others."""
+    drivers = _drivers(d.experiment)
+    read = np.flatnonzero(d.experiment.axis_read)
+    level = TREND / max(2 * len(drivers) * len(read), 1)
+    told = [
+        any(
+            _follows(x, _kept(d, r)[:, i]) < level
+            for r in (d.residual_before, d.residual_after)
+            for i in read
+        )
+        for _, x in drivers
+    ]
+    return [v for v, t in zip(drivers, told, strict=True) if t], [
+        v for v, t in zip(drivers, told, strict=True) if not t
+    ]
+
+
+def _follows(x: Floats, y: Floats) -> float:
+    """p-value of a parabola through residuals over a driver."""
+    good = np.isfinite(x) & np.isfinite(y)
+    columns = min(3, len(np.unique(x[good])))
+    n = int(good.sum())
+    if columns < 2 or n < columns + 3:
+        return 1.0
+    u = (x[good] - x[good].mean()) / np.ptp(x[good])
+    a = np.vander(u, columns)
+    left = y[good] - a @ np.linalg.lstsq(a, y[good], rcond=None)[0]
+    rest, whole = float(left @ left), float(np.sum((y[good] - y[good].mean()) ** 2))
+    if rest <= 0:
+        return 1.0 if whole <= 0 else 0.0
+    ratio = ((whole - rest) / (columns - 1)) / (rest / (n - columns))
+    return float(f_distribution.sf(ratio, columns - 1, n - columns))
+
+
+def before_after(d: Findings) -> Figure:
+    """Rms of what both machines leave of readings that no fit saw, and the noise."""
+    unit = d.before.size[1]
+    values = [UM * d.before.size[0], UM * d.after.size[0], UM * noise_size(d)]
+    figure = Figure(figsize=(4.6, 2.4), layout="constrained")
+    ax = figure.subplots()
+    bars = ax.barh(["your file", "corrected", "noise"], values, color=[BEFORE, AFTER, "0.7"])
+    ax.bar_label(bars, [f"{v:.3g} µ{unit}" for v in values], padding=3)
+    ax.invert_yaxis()
+    ax.set_xlim(0, 1.3 * max(values))
+    ax.set(xlabel=f"left of {d.after.n} readings, rms, µ{unit}")
+    if d.held_out is None:
+        ax.set_title("not held out: the fit saw these readings", fontsize=9)
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    return figure
+
+
+def trends(d: Findings, against: list[Driver]) -> Figure:
     """Residual of each channel against what may drive it."""
-    against = _drivers(d.experiment)
     axes_read = [int(i) for i in np.flatnonzero(d.experiment.axis_read)]
     channels = d.experiment.channels
     # a row per driver fits an upright page; its columns are the channels
@@ -154,7 +255,7 @@ def trends(d: Findings) -> Figure:
     return figure
 
 
-def _drivers(e: Experiment) -> list[tuple[str, Floats]]:
+def _drivers(e: Experiment) -> list[Driver]:
     out = [(f"{c}, mm", e.position[:, i] * MM) for i, c in enumerate("xyz")]
     out += [(f"f{c}, N", e.wrench[:, i]) for i, c in enumerate("xyz") if e.wrench[:, i].any()]
     out += [("order", e.order)] if e.order is not None else []

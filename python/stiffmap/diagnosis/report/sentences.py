@@ -26,7 +26,7 @@ ALIASES = 2
 
 
 def measured(value: float, low: float, high: float, unit: str) -> str:
-    """``0.301 ± 0.002 µm/N`` (one standard uncertainty), to two digits of the uncertainty."""
+    """``0.301 ± 0.002 µm/N`` (one standard uncertainty), to the digits that it carries."""
     factor, name = UNITS.get(unit, (1.0, unit))
     half = factor * abs(high - low) / 2 / 1.96
     if not (half > 0 and isfinite(half)):
@@ -35,18 +35,17 @@ def measured(value: float, low: float, high: float, unit: str) -> str:
 
 
 def rounded(size: float) -> str:
-    """An uncertainty to two digits; never 0."""
+    """An uncertainty to its first digit, to two where that is a 1; never 0."""
     return within(size, size)
 
 
 def within(value: float, u: float) -> str:
-    """A value to the digits that its uncertainty carries, two of them; very small and very large ones as powers of ten."""
+    """A value to the digits that its uncertainty carries; of very small and very large ones as a power of ten."""
     exponent = _exponent(u)
-    if exponent < -6 or exponent > 6:
-        digits = max(0, _exponent(value) - exponent + 1) if value else 1
-        return f"{value:.{min(digits, 12)}e}"
-    digits = max(0, 1 - exponent)
-    return f"{round(value, 1 - exponent):.{digits}f}"
+    last = exponent - (u < 1.95 * 10.0**exponent)
+    if not -6 <= exponent <= 6:
+        return f"{value:.{max(0, min(_exponent(value) - last, 12)) if value else 0}e}"
+    return f"{round(value, -last):.{max(0, -last)}f}"
 
 
 def interval(value: float, low: float, high: float, unit: str) -> tuple[str, str, str]:
@@ -189,7 +188,7 @@ def next_step(d: Any) -> str:
         return "Nothing to correct. Keep the readings as the record of this state."
     if d.verdict == "ambiguous" and not d.effects:
         tilt = "" if d.experiment.axis_read[3:6].any() else ", the tilt of the tool as well (rx, ry, rz)"
-        return f"Read what tells these groups apart{tilt}; `stiffmap plan` proposes poses."
+        return f"Read what tells these groups apart{tilt}; the command stiffmap plan proposes poses."
     if d.verdict == "unattributed":
         return (
             "Look at where the difference is largest (What is left), check the instrument's frame and the tool "
