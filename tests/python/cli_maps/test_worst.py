@@ -30,7 +30,7 @@ def test_the_report_names_the_worst_of_the_map(tmp_path: Path, capsys: pytest.Ca
 
 def test_worst_is_that_of_the_table() -> None:
     m = sm.load_machine("orthoglide-revised")
-    ds = sm.error_map(m, AXIS, AXIS, [-0.2], wrench={"Fx": [300.0, 0, 0, 0, 0, 0]}, progress=False)
+    ds = sm.error_map(m, x=AXIS, y=AXIS, z=[-0.2], wrench={"Fx": [300.0, 0, 0, 0, 0, 0]}, progress=False)
     worst = worst_pose(m, ds, None)
     assert worst is not None
     assert worst["deflection"] == pytest.approx(float(np.nanmax(ds.worst_deflection)))
@@ -42,7 +42,7 @@ def test_worst_is_that_of_the_table() -> None:
 @pytest.fixture(scope="module")
 def two() -> object:
     loads = {"Fx": [300.0, 0, 0, 0, 0, 0], "thrust": [0, 0, -300.0, 0, 0, 0]}
-    return sm.error_map("orthoglide-revised", AXIS, AXIS, [0.0], wrench=loads, progress=False)
+    return sm.error_map("orthoglide-revised", x=AXIS, y=AXIS, z=[0.0], wrench=loads, progress=False)
 
 
 def test_a_force_out_of_the_plane_is_judged_in_space(two) -> None:  # type: ignore[no-untyped-def]

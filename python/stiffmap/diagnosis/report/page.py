@@ -57,7 +57,7 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
         axes=", ".join(d.experiment.axes),
         opening=opening(d),
         next=next_step(d),
-        lines=five_lines(d),
+        lines=[in_shop_words(line) for line in five_lines(d)],
         effects=[_effect(e) for e in d.effects],
         rivals=[
             ("; ".join(map(effect_text, other)), separation_text(s))
@@ -91,7 +91,7 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
         seen=_seen(d),
         shown=SHOWN,
         unseen=[spoken(u) for u in d.unobservable],
-        limits=d.limitations,
+        limits=[in_shop_words(v) for v in d.limitations],
         provenance=provenance(date, d.seed, inputs, _digests(d)),
     )
 
@@ -126,12 +126,17 @@ def _slip(s: Slip) -> dict[str, Any]:
     return {"check": s.check, "seen": s.seen, "also": s.also, "evidence": s.evidence, "undone": s.undone}
 
 
+def in_shop_words(text: str) -> str:
+    """A line of the screen with drives called so, and no marks of code."""
+    return text.replace("actuator", "drive").replace("`", "")
+
+
 def spoken(text: str) -> str:
     """``bilinear of actuator, leg x (why)`` with the effect's title and drives called so."""
     kind, of, rest = text.partition(" of ")
     if not of or kind not in registry.kinds():
-        return text
-    return f"{registry.get(kind).title}: {rest.replace('actuator', 'drive')}"
+        return in_shop_words(text)
+    return f"{registry.get(kind).title}: {in_shop_words(rest)}"
 
 
 def in_axis_units(axis: str, value: float) -> str:
@@ -153,10 +158,10 @@ def p_text(p: float) -> str:
 def _effect(e: Effect) -> dict[str, Any]:
     legs = f", leg {', '.join(e.legs)}" if e.legs else ""
     return {
-        "name": f"{registry.get(e.kind).title}: {e.element}{legs}",
+        "name": f"{registry.get(e.kind).title}: {in_shop_words(e.element)}{legs}",
         "rows": [(n.replace("_", " "), *interval(*v)) for n, v in e.parameters.items()],
         "same": "; ".join(alias_words(a) for a in e.aliases),
-        "definition": e.definition,
+        "definition": in_shop_words(e.definition),
         "evidence": f"Chi-square falls by {e.evidence['delta_chi2']:.0f}; p-value over the whole search "
         f"{p_text(e.evidence['p_global'])}.",
     }
@@ -176,7 +181,7 @@ def _budget(d: Findings) -> dict[str, Any] | None:
         "at": ", ".join(f"{1e3 * v:.0f}" for v in p),
         "force": ", ".join(f"{v:.0f}" for v in force[:3]),
         "size": whole,
-        "rows": [(n, whole * s, 100 * s) for n, _, s in found.ranked()[:PARTS]],
+        "rows": [(in_shop_words(n), whole * s, 100 * s) for n, _, s in found.ranked()[:PARTS]],
     }
 
 
@@ -232,7 +237,7 @@ def _one_seen(x: Detectability, turning: set[str]) -> tuple[float, tuple[str, st
         )
         ease = min(ease, abs(value) / p.scale)
     legs = f" of {', '.join(x.legs)}" if x.legs else ""
-    return ease, (registry.get(x.kind).title, f"{x.element}{legs}", ", ".join(sizes))
+    return ease, (registry.get(x.kind).title, f"{in_shop_words(x.element)}{legs}", ", ".join(sizes))
 
 
 def _digests(d: Findings) -> dict[str, str]:

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.stats import f as f_distribution
 
+from stiffmap.diagnosis.report.drawn import AFTER, BEFORE, MM, UM, kept, pose_means
 from stiffmap.diagnosis.report.findings import Findings
 from stiffmap.diagnosis.report.place import place_figure
+from stiffmap.diagnosis.report.trends import trending, trends
+from stiffmap.diagnosis.report.vectors import vectors
 from stiffmap.diagnosis.report.wording import noise_size
-from stiffmap.experiment.comparison.pictures import vector_cases
-from stiffmap.experiment.experiment import WRENCH, Experiment, Floats
+from stiffmap.experiment.experiment import WRENCH, Floats
 from stiffmap.machine import Machine
 from stiffmap.plot.loaded import loaded_figure
 
-UM, MM = 1e6, 1e3
 CAPTIONS = {
     "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the machine of your file and "
     "with the corrected one; both enlarged alike.",
     "place": "The machine at home. Red: what is named; where nothing of the machine is, the tool is marked.",
-    "before_after": "Readings that no fit saw: what the machine of your file and the corrected one leave of them, rms.",
+    "before_after": "What the machine of your file and the corrected one leave of the readings, rms: of those that no fit saw, unless "
+    "the title says otherwise.",
     "residual_trends": "Residual of every reading against what drives it.",
     "residual_others": "Residual of every reading against what drives nothing here.",
     "residual_histogram": "Residuals over the noise floor. With the right machine they follow the dashed line.",
@@ -30,9 +31,6 @@ CAPTIONS = {
     "of each spring and drive.",
     "unexplained": "What no effect explains, over the workspace, and the empirical field that would remove it.",
 }
-BEFORE, AFTER = "#c1432e", "#2a6f97"
-Driver = tuple[str, Floats]
-"""Label and value of each row."""
 
 
 def figures(d: Findings) -> dict[str, Figure]:
@@ -92,9 +90,9 @@ def left(d: Findings) -> Figure:
     named = [p.axis for p in d.unexplained if p.axis in seen]
     axis = names.index(named[0] if named else seen[0])
     figure = Figure(figsize=(11, 6.4), layout="constrained")
-    at = _pose_means(d.experiment, d.experiment.position) * MM
+    at = pose_means(d.experiment, d.experiment.position) * MM
     shown = [
-        _pose_means(d.experiment, _kept(d, v))[:, axis] * UM for v in (d.residual_after, d.empirical.field)
+        pose_means(d.experiment, kept(d, v))[:, axis] * UM for v in (d.residual_after, d.empirical.field)
     ]
     top = max(float(np.nanmax(np.abs(v))) for v in shown)
     titles = (f"left in {names[axis]}, mean of each pose", "empirical field, from the other poses")
@@ -106,109 +104,6 @@ def left(d: Findings) -> Figure:
             ax.set(xlabel=f"{'xyz'[a]}, mm", ylabel=f"{'xyz'[b]}, mm", title=title if column == 1 else "")
         figure.colorbar(dots, ax=list(grid[row]), label=f"{names[axis]}, µm")
     return figure
-
-
-def vectors(d: Findings) -> Figure:
-    """Mean residual vector of each pose, before and after, on one scale."""
-    figure = Figure(figsize=(10, 5.0))
-
-    # of loads along x, y or z, turned to one sign (else + and - would cancel), those that leave most
-    def seen(values: Floats, weight: Floats) -> Floats:
-        return _pose_means(d.experiment, _kept(d, values) * weight[:, None])
-
-    both = [
-        (name, seen(d.residual_before, w), seen(d.residual_after, w))
-        for name, w in vector_cases(d.experiment)
-    ]
-    case, before, after = max(both, key=lambda b: float(np.nansum(b[1][:, :3] ** 2)))
-    at = _pose_means(d.experiment, d.experiment.position) * MM
-    longest = max(float(np.linalg.norm(np.nan_to_num(before[:, :3]), axis=1).max()), 1e-12)
-    extent = float(np.ptp(at, axis=0).max())
-    scale = 0.25 * max(extent, 1.0) / longest
-    spread = [a for a in range(3) if np.ptp(at[:, a]) > 1e-6 * max(extent, 1.0)]
-    if len(spread) < 3:
-        _flat_vectors(figure, at, ((("before", before, BEFORE)), ("after", after, AFTER)), scale, spread)
-        figure.text(0.5, 0.02, _longest(longest, case), ha="center", fontsize=9)
-        return figure
-    for i, (name, r, colour) in enumerate((("before", before, BEFORE), ("after", after, AFTER))):
-        axes = figure.add_subplot(1, 2, i + 1, projection="3d")
-        v = np.nan_to_num(r[:, :3]) * scale
-        axes.quiver(*at.T, *v.T, color=colour, linewidth=1.2)
-        axes.scatter(*at.T, s=6, color="0.4")
-        axes.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm", title=f"{name}: mean residual of each pose")
-        axes.tick_params(labelsize=8)
-        axes.locator_params(nbins=5)
-        axes.set_box_aspect(None, zoom=0.85)  # room for the label of z
-    figure.subplots_adjust(left=0.02, right=0.95, bottom=0.1, top=0.93, wspace=0.12)
-    figure.text(0.5, 0.025, _longest(longest, case), ha="center", fontsize=9)
-    return figure
-
-
-def _longest(longest: float, case: str) -> str:
-    return f"longest arrow before: {longest * UM:.1f} µm{'; ' + case if case else ''}"
-
-
-def _flat_vectors(
-    figure: Figure, at: Floats, pairs: tuple[tuple[str, Floats, str], ...], scale: float, spread: list[int]
-) -> None:
-    """Arrows in the plane in which poses lie (a line or a point of them: with the axis of the largest residual)."""
-    sizes = np.nansum(pairs[0][1][:, :3] ** 2, axis=0)
-    more = [int(a) for a in np.argsort(-sizes, kind="stable") if a not in spread]
-    a, b = sorted([*spread, *more][:2])
-    axes = figure.subplots(1, 2, sharex=True, sharey=True)
-    ends = [at[:, [a, b]]] + [at[:, [a, b]] + np.nan_to_num(r[:, [a, b]]) * scale for _, r, _ in pairs]
-    low, high = np.vstack(ends).min(axis=0), np.vstack(ends).max(axis=0)
-    room = 0.08 * max(float((high - low).max()), 1.0)
-    for ax, (name, r, colour) in zip(axes, pairs, strict=True):
-        v = np.nan_to_num(r[:, [a, b]]) * scale
-        ax.quiver(*at[:, [a, b]].T, *v.T, angles="xy", scale_units="xy", scale=1, color=colour, width=0.005)
-        ax.plot(at[:, a], at[:, b], ".", ms=4, color="0.4")
-        ax.set(
-            xlabel=f"{'xyz'[a]}, mm", ylabel=f"{'xyz'[b]}, mm", title=f"{name}: mean residual of each pose"
-        )
-        ax.set_xlim(low[0] - room, high[0] + room)
-        ax.set_ylim(low[1] - room, high[1] + room)
-        ax.set_aspect("equal", adjustable="box")
-    figure.subplots_adjust(left=0.09, right=0.97, bottom=0.17, top=0.92, wspace=0.2)
-
-
-TREND = 1e-3
-"""p-value below which residuals follow a driver, over all drivers and channels."""
-
-
-def trending(d: Findings) -> tuple[list[Driver], list[Driver]]:
-    """Drivers that residuals follow, before or after, and the others."""
-    drivers = _drivers(d.experiment)
-    read = np.flatnonzero(d.experiment.axis_read)
-    level = TREND / max(2 * len(drivers) * len(read), 1)
-    told = [
-        any(
-            _follows(x, _kept(d, r)[:, i]) < level
-            for r in (d.residual_before, d.residual_after)
-            for i in read
-        )
-        for _, x in drivers
-    ]
-    return [v for v, t in zip(drivers, told, strict=True) if t], [
-        v for v, t in zip(drivers, told, strict=True) if not t
-    ]
-
-
-def _follows(x: Floats, y: Floats) -> float:
-    """p-value of a parabola through residuals over a driver."""
-    good = np.isfinite(x) & np.isfinite(y)
-    columns = min(3, len(np.unique(x[good])))
-    n = int(good.sum())
-    if columns < 2 or n < columns + 3:
-        return 1.0
-    u = (x[good] - x[good].mean()) / np.ptp(x[good])
-    a = np.vander(u, columns)
-    left = y[good] - a @ np.linalg.lstsq(a, y[good], rcond=None)[0]
-    rest, whole = float(left @ left), float(np.sum((y[good] - y[good].mean()) ** 2))
-    if rest <= 0:
-        return 1.0 if whole <= 0 else 0.0
-    ratio = ((whole - rest) / (columns - 1)) / (rest / (n - columns))
-    return float(f_distribution.sf(ratio, columns - 1, n - columns))
 
 
 def before_after(d: Findings) -> Figure:
@@ -229,51 +124,12 @@ def before_after(d: Findings) -> Figure:
     return figure
 
 
-def trends(d: Findings, against: list[Driver]) -> Figure:
-    """Residual of each channel against what may drive it."""
-    axes_read = [int(i) for i in np.flatnonzero(d.experiment.axis_read)]
-    channels = d.experiment.channels
-    # a row per driver fits an upright page; its columns are the channels
-    figure = Figure(figsize=(max(6.0, 3.0 * len(axes_read)), 1.9 * len(against) + 0.6), layout="constrained")
-    grid = figure.subplots(len(against), len(axes_read), squeeze=False, sharex="row", sharey="col")
-    for row, (name, x) in enumerate(against):
-        for column, axis in enumerate(axes_read):
-            ax = grid[row][column]
-            for values, colour, label in (
-                (d.residual_before, BEFORE, "before"),
-                (d.residual_after, AFTER, "after"),
-            ):
-                ax.plot(x, _kept(d, values)[:, axis] * UM, ".", ms=3, color=colour, alpha=0.6, label=label)
-            ax.axhline(0, color="0.5", lw=0.6)
-            ax.set_xlabel(name, fontsize=9)
-            ax.tick_params(labelsize=8)
-            ax.set_ylabel(
-                f"{channels[axis].name}, {'µm' if channels[axis].unit == 'm' else 'µrad'}", fontsize=9
-            )
-    grid[0][0].legend(fontsize=8)
-    figure.suptitle("Residual: reading minus prediction")
-    return figure
-
-
-def _drivers(e: Experiment) -> list[Driver]:
-    out = [(f"{c}, mm", e.position[:, i] * MM) for i, c in enumerate("xyz")]
-    out += [(f"f{c}, N", e.wrench[:, i]) for i, c in enumerate("xyz") if e.wrench[:, i].any()]
-    out += [("order", e.order)] if e.order is not None else []
-    out += [("temperature", e.temperature)] if e.temperature is not None else []
-    out += (
-        [("branch: 0 loading, 1 unloading", np.array([b == "unloading" for b in e.branch], float))]
-        if e.branch
-        else []
-    )
-    return out
-
-
 def histogram(d: Findings) -> Figure:
     """Residuals over the noise floor, beside the normal distribution that noise alone would give."""
     figure = Figure(figsize=(6, 3.4), layout="constrained")
     ax = figure.subplots()
     floor = np.array([d.noise.floor.get(c.name, np.nan) for c in d.experiment.channels])
-    both = [(_kept(d, r) / floor) for r in (d.residual_before, d.residual_after)]
+    both = [(kept(d, r) / floor) for r in (d.residual_before, d.residual_after)]
     width = min(12.0, max(4.0, float(np.nanpercentile(np.abs(both[0]), 99))))
     bins = np.linspace(-width, width, 61)
     for z, colour, label in zip(both, (BEFORE, AFTER), ("before", "after"), strict=True):
@@ -350,17 +206,3 @@ def _errors(machine: Machine, position: Floats, wrench: Floats) -> Floats:
 
 def _middle(machine: Machine) -> Floats:
     return np.asarray(machine.workspace.mean(axis=0))
-
-
-def _kept(d: Findings, values: Floats) -> Floats:
-    return np.where(d.set_aside[:, None], np.nan, values)
-
-
-def _pose_means(e: Experiment, values: Floats) -> Floats:
-    number = int(e.groups.max()) + 1
-    good = np.isfinite(values)
-    sums = np.stack(
-        [np.bincount(e.groups, np.where(good, values, 0.0)[:, i], number) for i in range(values.shape[1])]
-    )
-    counts = np.stack([np.bincount(e.groups, good[:, i], number) for i in range(values.shape[1])])
-    return np.asarray(np.where(counts > 0, sums / np.maximum(counts, 1), np.nan).T)

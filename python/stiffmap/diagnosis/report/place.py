@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from stiffmap.compiled import Status
+from stiffmap.compiled import Role, Status
 from stiffmap.diagnosis.report.findings import Effect, Findings
 from stiffmap.experiment.experiment import Floats
 from stiffmap.kinematics import inverse_kinematics
@@ -72,7 +72,8 @@ def lit(machine: Machine, coordinates: Floats, e: Effect) -> tuple[Floats, list[
         ):
             continue
         points.append(position[i])
-        if parent > 0 and owner[i] and np.linalg.norm(position[i] - position[parent]) > 1e-9:
+        spring = core.names.roles[c] == Role.SPRING
+        if spring and parent > 0 and owner[i] and np.linalg.norm(position[i] - position[parent]) > 1e-9:
             pieces.append(position[[parent, i]])
     unique = np.unique(np.round(np.array(points).reshape(-1, 3), 9), axis=0)
     return unique, pieces

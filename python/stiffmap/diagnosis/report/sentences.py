@@ -43,7 +43,7 @@ def within(value: float, u: float) -> str:
     """A value to the digits that its uncertainty carries; of very small and very large ones as a power of ten."""
     exponent = _exponent(u)
     last = exponent - (u < 1.95 * 10.0**exponent)
-    if not -6 <= exponent <= 6:
+    if not -8 <= exponent <= 6:
         return f"{value:.{max(0, min(_exponent(value) - last, 12)) if value else 0}e}"
     return f"{round(value, -last):.{max(0, -last)}f}"
 
@@ -175,8 +175,8 @@ def next_step(d: Any) -> str:
     """What to do with the answer."""
     if d.slips:
         return (
-            f"{_upper(d.slips[0].check)} at the machine and in the sheet, correct the readings and diagnose again; "
-            "look for no cause in the machine before."
+            "Check this at the machine and in the sheet, correct the readings and diagnose again; look for no cause in the "
+            "machine before."
         )
     if d.verdict == "none" and d.calibration is not None and d.calibration.beyond:
         return "Inspect the number that is beyond tolerance; machine.yaml has it."

@@ -14,6 +14,8 @@ from stiffmap.experiment.experiment import Experiment, Floats
 UM, MM = 1e6, 1e3
 COLOUR, NOISE, ASIDE = "#2a6f97", "#d9d9d9", "#c1432e"
 MOST_LABELS = 12
+FLAT = 0.05
+"""Share of the largest extent below which poses lie in a plane."""
 
 Driver = tuple[str, Floats, list[str]]
 """Label, value of each row, and names of the values where they are classes."""
@@ -74,7 +76,7 @@ def vector_cases(e: Experiment) -> list[tuple[str, Floats]]:
 def views(at: Floats) -> tuple[tuple[int, int], ...]:
     """Planes in which poses (n, 3) spread; of poses in a plane that plane, of those on a line or at a point the first two."""
     extent = np.ptp(at, axis=0)
-    flat = [a for a in range(3) if extent[a] <= 1e-6 * max(float(extent.max()), 1.0)]
+    flat = [a for a in range(3) if extent[a] <= FLAT * max(float(extent.max()), 1.0)]
     all_ = ((0, 1), (0, 2), (1, 2))
     if len(flat) != 1:
         return all_ if not flat else tuple(v for v in all_ if any(a not in flat for a in v)) or all_[:1]
