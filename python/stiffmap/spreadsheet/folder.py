@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import tempfile
@@ -12,7 +11,7 @@ from pathlib import Path
 
 from stiffmap.errors import FileError
 from stiffmap.experiment import Experiment, load_experiment
-from stiffmap.outputs import make_folder
+from stiffmap.outputs import make_folder, only_job, put_files
 from stiffmap.spreadsheet.convert import Imported, write_folder
 from stiffmap.spreadsheet.sheet import Sheet, column_letter
 
@@ -40,9 +39,8 @@ def make_experiment(
             made = load_experiment(fresh)
         except FileError as error:
             raise of_sheet(error, found, sheet, fresh) from None
-        make_folder(folder)
-        for file in sorted(fresh.iterdir()):
-            os.replace(file, folder / file.name)
+        with only_job(make_folder(folder)):
+            put_files(fresh, folder)
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
     return replace(made, name=folder.name)
