@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 from stiffmap.errors import FileError
 from stiffmap.experiment import Experiment, load_experiment
 from stiffmap.outputs import make_folder, only_job, put_files
+from stiffmap.outputs.alone import short
 from stiffmap.spreadsheet.convert import Imported, write_folder
 from stiffmap.spreadsheet.sheet import Sheet, column_letter
 
@@ -29,20 +29,18 @@ def make_experiment(
     """Write the folder and load it. Where it does not load nothing is left behind, and the error names row and column of
     the sheet. Raises FileError."""
     there = next(p for p in (folder, *folder.absolute().parents) if p.is_dir())
-    try:
-        fresh = Path(tempfile.mkdtemp(prefix=".stiffmap-", dir=there))
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(folder)) from error
-    try:
-        write_folder(found, sheet, fresh, machine, quantity, noise, title, record)
+    fresh = there / f".{short(folder.name)}.new"
+    with only_job(folder):
+        shutil.rmtree(fresh, ignore_errors=True)  # of a job that was killed
         try:
-            made = load_experiment(fresh)
-        except FileError as error:
-            raise of_sheet(error, found, sheet, fresh) from None
-        with only_job(make_folder(folder)):
+            write_folder(found, sheet, make_folder(fresh), machine, quantity, noise, title, record)
+            try:
+                made = load_experiment(fresh)
+            except FileError as error:
+                raise of_sheet(error, found, sheet, fresh) from None
             put_files(fresh, folder)
-    finally:
-        shutil.rmtree(fresh, ignore_errors=True)
+        finally:
+            shutil.rmtree(fresh, ignore_errors=True)
     return replace(made, name=folder.name)
 
 
