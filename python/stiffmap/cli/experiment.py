@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +21,12 @@ from stiffmap.outputs.option import written
 if TYPE_CHECKING:
     from stiffmap.experiment import Experiment
     from stiffmap.spreadsheet.convert import Imported
+    from stiffmap.spreadsheet.dialogue import Answers, Ask
+    from stiffmap.spreadsheet.instrument import Instrument
+    from stiffmap.spreadsheet.sheet import Sheet
+
+
+RECORDED = {"operator", "instrument", "certificate", "date", "temperature", "notes", "source", "sha256"}
 
 
 def experiment(
@@ -55,7 +62,18 @@ def experiment(
     noise: Annotated[
         list[str] | None, typer.Option(help="One standard deviation of a reading in its unit, e.g. dx=2.")
     ] = None,
-    sheet: Annotated[str | None, typer.Option(help="Sheet of the workbook. [default: the first]")] = None,
+    sheet: Annotated[
+        str | None, typer.Option(help="Sheet of the workbook. [default: the first that fits]")
+    ] = None,
+    record: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="For the report: operator, instrument, certificate, date, temperature or notes, e.g. operator=Miller."
+        ),
+    ] = None,
+    dialogue: Annotated[
+        bool, typer.Option("--dialogue", help="Ask what cannot be guessed, and remember the answers.")
+    ] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing experiment.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -70,13 +88,15 @@ def experiment(
 
       [cyan]stiffmap experiment new points.csv --instrument tracker --machine hexapod --noise dx=0.01 -o points[/cyan]
 
+      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue -o readings[/cyan]
+
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
-    from stiffmap.experiment import load_experiment
+    from stiffmap.fingerprints import file_digest
     from stiffmap.machine import load_machine
-    from stiffmap.spreadsheet.convert import understand, write_folder
-    from stiffmap.spreadsheet.instrument import as_readings, load_instrument
-    from stiffmap.spreadsheet.sheet import read_sheet
+    from stiffmap.spreadsheet.dialogue import Answers
+    from stiffmap.spreadsheet.folder import make_experiment
+    from stiffmap.spreadsheet.instrument import load_instrument
 
     if action != "new":
         raise StiffmapError(f"experiment: expected 'new', got '{action}'")
@@ -87,20 +107,77 @@ def experiment(
     load_machine(machine)
     if (output / "experiment.yaml").exists() and not overwrite:
         raise FileError("exists already; use --overwrite to replace it", file=str(output / "experiment.yaml"))
-    table = read_sheet(file, sheet)
-    chosen = {k: v.split("|") for k, v in _pairs(mapped, "map").items()}
-    units, constants = _pairs(unit, "unit"), _numbers(constant, "set")
-    if wrote is not None:
-        table, meant, assumed, constants = as_readings(table, wrote, constants)
-        chosen, units = meant | chosen, assumed | units
-    found = understand(table, chosen, units, constants)
-    write_folder(found, table, output, machine, quantity, _numbers(noise, "noise"), f"from {file.name}")
-    made = load_experiment(output)
+    given = Answers(
+        {k: v.split("|") for k, v in _pairs(mapped, "map").items()},
+        _pairs(unit, "unit"),
+        _numbers(constant, "set"),
+        _numbers(noise, "noise"),
+    )
+    ask = _prompt if dialogue else None
+    table, found, answers, told = read_and_ask(file, sheet, wrote, given, ask)
+    title = f"from {table.file.replace(str(file), file.name)}"
+    kept = {"source": file.name, "sha256": file_digest(file), **_pairs(record, "record")}
+    wrong = sorted(set(kept) - RECORDED)
+    if wrong:
+        raise StiffmapError(f"--record: expected one of {', '.join(sorted(RECORDED))}; got '{wrong[0]}'")
+    made = make_experiment(found, table, output, machine, quantity, answers.noise, title, kept)
     if as_json:
         print_json({"folder": str(output), "rows": len(made), "repeats": found.repeats,
                     "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units})  # fmt: skip
         return
+    for line in (*told, *(f"left out: {text}" for text in table.aside)):
+        Console(highlight=False, soft_wrap=True).print(escape(line))
     tell(found, table.header, made, machine, output)
+
+
+def read_and_ask(
+    file: Path, sheet: str | None, wrote: Instrument | None, given: Answers, ask: Ask | None
+) -> tuple[Sheet, Imported, Answers, list[str]]:
+    """The sheet that fits, what was understood of it, the answers in use, and what the user should know of them."""
+    from stiffmap.spreadsheet.dialogue import ask_all, profile_file, remember, remembered
+    from stiffmap.spreadsheet.instrument import as_readings
+    from stiffmap.spreadsheet.sheet import EXCEL, read_sheet
+    from stiffmap.spreadsheet.workbook import sheet_names
+
+    def one(name: str | None, ask: Ask | None) -> tuple[Sheet, Imported, Answers, list[str]]:
+        table, answers, told = read_sheet(file, name), given, list[str]()
+        form = table
+        if (kept := remembered(form)) is not None:
+            answers = kept.below(given)
+            told.append(f"answers of an earlier sheet of this form are used: {profile_file(form)}")
+        if wrote is not None:
+            table, meant, assumed, constants = as_readings(table, wrote, answers.constants)
+            answers = replace(
+                answers, chosen=meant | answers.chosen, units=assumed | answers.units, constants=constants
+            )
+        found, final = ask_all(table, answers, ask)
+        if ask is not None and final != answers:
+            told.append(f"the answers are remembered for sheets of this form: {remember(form, final)}")
+        return table, found, final, told
+
+    names = sheet_names(file) if sheet is None and file.suffix.lower() in EXCEL else [sheet]
+    if len(names) == 1:
+        return one(sheet, ask)
+    reasons = {}
+    for name in names:
+        try:
+            return one(name, None)
+        except StiffmapError as problem:
+            reasons[str(name)] = problem
+    tables = [n for n, p in reasons.items() if type(p).__name__ == "Question"]
+    if ask is not None and tables:
+        return one(tables[0], ask)
+    lines = "; ".join(f"'{n}': {str(p).removeprefix(str(file)).lstrip(':, ')}" for n, p in reasons.items())
+    raise StiffmapError(f"{file}: none of its {len(names)} sheets fits (--sheet NAME reads one). {lines}")
+
+
+def _prompt(text: str) -> str:
+    try:
+        return input(f"{text} ")
+    except EOFError:
+        raise StiffmapError(
+            "--dialogue: a question is left and nobody answers; say it by --map, --unit or --set"
+        ) from None
 
 
 def tell(found: Imported, header: Sequence[str], made: Experiment, machine: str, output: Path) -> None:
@@ -109,7 +186,10 @@ def tell(found: Imported, header: Sequence[str], made: Experiment, machine: str,
     for c in found.columns:
         told = f"repeat {c.repeat} of {c.meaning}" if c.repeat else c.meaning
         where = (
-            "kept in notes.csv" if c.meaning == "note" else f"{told}, {found.units.get(c.meaning, 'no unit')}"
+            "kept in notes.csv"
+            if c.meaning == "note"
+            else f"{told}, {found.units.get(c.meaning, 'no unit')}"
+            + (f" (one in the sheet is {found.factors[c.meaning]:.9g})" if c.meaning in found.factors else "")
         )
         console.print(f"'{escape(header[c.index])}': {where}")
     for name, value in found.constants.items():

@@ -147,6 +147,8 @@ class Experiment:
     ``frame_direction`` (rad)."""
     loop: Loop = Loop()
     title: str = ""
+    record: tuple[tuple[str, str], ...] = ()
+    """Operator, instrument, certificate, date, temperature, source (of a sheet) with its sha256, notes: in words, of a report."""
     source: str = ""
 
     def _repr_html_(self) -> str:

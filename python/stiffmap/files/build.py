@@ -73,6 +73,7 @@ def build(
         uncertainty=tuple({**gathered.uncertainty, **model.uncertainty}.items()),
         extra=with_links(description.extra, gathered.links, context),
         notes=tuple({**gathered.notes, **model.notes}.items()),
+        sources=tuple({**gathered.sources, **model.sources}.items()),
     )
 
 
@@ -126,6 +127,7 @@ def _gravity(numbers: list[Number] | None, context: Context) -> Vector | None:
 
 def _external_spring(name: str, model: ExternalSpringModel, context: Context) -> ExternalSpring:
     context.note(model.note)
+    context.mark(model.source)
     for key in ("stiffness", "length"):
         if getattr(model, key).value < 0.0:
             context.at(key).fail(f"must not be negative; found {getattr(model, key).value}")

@@ -31,7 +31,15 @@ RANKS = (
 )
 # Rooms inside a room, each may import earlier ones only.
 INNER = {
-    "diagnosis": ("clock", "candidates", "fitting", "search", ("rivals", "decision"), "report", "verdict"),
+    "diagnosis": (
+        "clock",
+        "candidates",
+        "fitting",
+        "search",
+        ("rivals", "decision", "slips"),
+        "report",
+        "verdict",
+    ),
     "experiment": (
         ("experiment", "channels", "notebook", "ramps", "setups"),
         "readings",
