@@ -115,7 +115,7 @@ def test_a_number_farther_off_than_any_tolerance_is_not_claimed() -> None:
     zero = Unknown("zero of drive", "zeros", "m", 2e-4)
     for size, claimed in ((60.0, True), (150.0, False)):
         sums = Sums.of(column, size * column[:, 0] + rng.standard_normal(400))
-        found = claims(sums, [zero], {"zeros": [0]}, (), None, lambda before, after: "")
+        found = claims(sums, [zero], {"zeros": [0]}, (), None, lambda before, after, which: "")
         assert found.any is claimed
         assert bool(found.refused) is not claimed
     assert "150 standard uncertainties" in found.refused[0]
