@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -129,7 +130,7 @@ def test_groups_that_do_not_suffice_are_withdrawn() -> None:
     names = [Unknown(f"n{i}", "first" if i < 3 else "second", "m", 1e-4) for i in range(6)]
     asked: list[float] = []
 
-    def first_only(before: Floats, after: Floats) -> str:
+    def first_only(before: Floats, after: Floats, which: Sequence[int]) -> str:
         asked.append(float(before.max()))
         return "" if before.max() == 1.0 else "no"
 

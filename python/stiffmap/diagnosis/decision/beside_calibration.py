@@ -41,6 +41,8 @@ COVERED, FAINT = 0.95, 0.1
 """Share of an effect's signature that uncertain numbers imitate; those that ten standard uncertainties of show at all."""
 SELDOM = 1e-3
 """Odds of what tolerances may be by chance."""
+NEAR = 2.0
+"""Standard uncertainties by which numbers that are within tolerance may be off along one direction."""
 WORTH_A_FLOOR = 0.3
 """Noise variances per pose that no linear explanation takes: effects are then looked for at that floor at once."""
 LEAD = 3.0
@@ -180,12 +182,21 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
     model, smooth = standing(s, named) if left else (model, ())
     # what stands is held out as it was found; where nothing does, no fold is searched
     held = held_out(again, finding.outliers, seed, finding, search=bool(model.candidates))
+    beside = _tolerated(again, with_model(finding, model)) if held and model.candidates else None
+    if beside is not None and held is not None and not held.pays:
+        held = replace(held, gain=_gain_beside(beside, finding, seed))
     model, more = _shared(model, finding, held)
     named = with_model(finding, model)
     if smooth or more:
         left = unexplained(s, _on(s, named))
     refused = (*refused, *same, *smooth, *more)
     return Answer(again, named, _word(s, named, left), left, s.layer.calibration, held, refused)
+
+
+def _gain_beside(s: Study, finding: Finding, seed: int) -> tuple[float, float] | None:
+    """What effects gain on held-out readings in another study."""
+    held = held_out(s, finding.outliers, seed, finding)
+    return None if held is None else held.gain
 
 
 def _found_at(s: Study, found: Calibrator, rho: float, seed: int) -> tuple[Study, Finding]:
@@ -314,14 +325,37 @@ def _beyond_calibration(s: Study, model: Model, finding: Finding) -> tuple[Model
 def imitated(columns: Floats, signature: Floats) -> bool:
     """Whether numbers with columns (N, p) per standard uncertainty show `COVERED` of a signature (N,), none of it by being
     off more than all of them together are once in `SELDOM`."""
-    u, size, _ = np.linalg.svd(columns, full_matrices=False)
+    needed, told = imitation(columns, signature)
+    return needed is not None and float(needed @ needed) <= float(chi2.isf(SELDOM, max(told, 1)))
+
+
+def imitation(columns: Floats, signature: Floats) -> tuple[Floats | None, int]:
+    """(p,) the most likely values with which numbers show `COVERED` of a signature (N,), None where they do not, and how
+    many directions of them the readings tell."""
+    u, size, v = np.linalg.svd(columns, full_matrices=False)
     felt = size > FAINT
     along = u[:, felt].T @ signature
+    told = int((size[felt] > 1.0).sum())
     if float(along @ along) <= COVERED * float(signature @ signature):
-        return False
-    needed = along * size[felt] / (1.0 + size[felt] ** 2)  # their most likely values
-    told = size[felt] > 1.0
-    return float(needed @ needed) <= float(chi2.isf(SELDOM, max(int(told.sum()), 1)))
+        return None, told
+    return np.asarray(v[felt].T @ (along * size[felt] / (1.0 + size[felt] ** 2))), told
+
+
+def _tolerated(s: Study, finding: Finding) -> Study | None:
+    """The study where the numbers that imitate an effect of a finding stay as near as tolerances allow; None: none does.
+
+    Many readings overrun a prior: beside numbers that are as far off as they like no such effect gains anything.
+    """
+    assert s.layer is not None
+    problem, predictor, model = finding.search.problem.exact, finding.search.predictor, finding.model
+    layer = s.layer
+    for i in range(len(model.candidates)):
+        alone = problem.white(predictor(model.terms()) - predictor(model.without(i).terms()))
+        needed, told = imitation(problem.white(layer.columns), alone)
+        far = 0.0 if needed is None else float(np.linalg.norm(needed))
+        if needed is not None and far > NEAR:
+            layer = layer.narrowed(needed, NEAR / far)
+    return None if layer is s.layer else replace(s, layer=layer)
 
 
 def _shared(model: Model, finding: Finding, held: HeldOut | None) -> tuple[Model, tuple[str, ...]]:
