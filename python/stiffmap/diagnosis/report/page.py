@@ -14,6 +14,7 @@ from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.report.findings import Detectability, Effect, Findings
 from stiffmap.diagnosis.report.sentences import UNITS, next_step, opening
 from stiffmap.diagnosis.report.wording import effect_text, five_lines, separation_text
+from stiffmap.errors import StiffmapError
 from stiffmap.effects import registry
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.fingerprints import digest
@@ -126,7 +127,10 @@ def _budget(d: Findings) -> dict[str, Any] | None:
     if worst is None:
         return None
     p, force = worst
-    found = deflection_budget(d.machine, p, force)
+    try:
+        found = deflection_budget(d.machine, p, force)
+    except StiffmapError:  # a machine in play has no stiffness to share out
+        return None
     whole = 1e6 * float(np.linalg.norm(found.displacement[:3]))
     return {
         "at": ", ".join(f"{1e3 * v:.0f}" for v in p),
