@@ -24,19 +24,14 @@ from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
 from stiffmap.diagnosis.decision.few import MEETING, not_few, screened
 from stiffmap.diagnosis.decision.judge import judge, unexplained, with_model
 from stiffmap.diagnosis.decision.patterns import Pattern
+from stiffmap.diagnosis.decision.refusals import EVERYWHERE, RULES, Rule, why_not
 from stiffmap.diagnosis.fitting.fit import evaluate, fit_without
-from stiffmap.diagnosis.fitting.interval import unseen
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.calibrated import Layer
 from stiffmap.diagnosis.search.study import Finding, Study, find, search_on, study
-from stiffmap.effects import Parameter, get
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 
-BEYOND = 100.0
-"""Standard uncertainties of its certificate that an instrument is never taken to be off by."""
-AT_BOUND, AT_SCALE = 1e-6, 1e-3
-"""Share of a parameter's range, and of its typical size, within which it is at its bound."""
 COVERED, FAINT = 0.95, 0.1
 """Share of an effect's signature that uncertain numbers imitate; those that ten standard uncertainties of show at all."""
 SELDOM = 1e-3
@@ -45,8 +40,8 @@ NEAR = 2.0
 """Standard uncertainties by which numbers that are within tolerance may be off along one direction."""
 WORTH_A_FLOOR = 0.3
 """Noise variances per pose that no linear explanation takes: effects are then looked for at that floor at once."""
-LEAD = 3.0
-"""Nats by which effects on an exact machine must lead: odds of 20, strong evidence (Kass and Raftery 1995)."""
+LEAD = 6.0
+"""Nats by which effects on an exact machine must lead: odds of 400, very strong evidence (Kass and Raftery 1995)."""
 REJECTED = 5.41
 """Nats by which the readings must reject the floor that a search was done at, before it is done again at the lower
 one: half the chi-square of one degree of freedom that chance exceeds once in a thousand."""
@@ -76,8 +71,13 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
         if found is not None and not_few(s, screened(s), spread_evidence(s.whole[0], found)):
             return _layered(s, found, seed, tolerances)
     finding, verdict, left = judge(s, find(s))
-    first = Answer(s, finding, verdict, left)
-    if s.clock.over or not (left or finding.model.candidates):
+    model, refused = admissible(finding.model, finding, tolerances, EVERYWHERE)
+    if refused:
+        finding = with_model(finding, model)
+        left = unexplained(s, finding)
+        verdict = _without(finding, left)
+    first = Answer(s, finding, verdict, left, refused=refused)
+    if s.clock.over or not (left or finding.model.candidates or refused):
         return first
     found = found or calibrator(s, tolerances, exclude)
     if found is None:
@@ -238,6 +238,14 @@ def _left_by(s: Study, finding: Finding) -> Blocks:
     return Blocks.of(columns, residual, pose_labels(problem))
 
 
+def _without(finding: Finding, left: list[Pattern]) -> str:
+    """The verdict on an exact machine where effects were refused: what they explained is still there."""
+    named = bool(finding.model.candidates)
+    if left or not named:
+        return "effects+unattributed" if named else "unattributed"
+    return "effects"
+
+
 def _word(s: Study, finding: Finding, left: list[Pattern]) -> str:
     named = bool(finding.model.candidates)
     calibration = None if s.layer is None else s.layer.calibration
@@ -250,13 +258,15 @@ def _word(s: Study, finding: Finding, left: list[Pattern]) -> str:
     return "effects" if named else "none"
 
 
-def admissible(model: Model, finding: Finding, tolerances: Tolerances) -> tuple[Model, tuple[str, ...]]:
+def admissible(
+    model: Model, finding: Finding, tolerances: Tolerances, rules: tuple[Rule, ...] = RULES
+) -> tuple[Model, tuple[str, ...]]:
     """The model without effects that are never named, and why they are not."""
     refused: list[str] = []
     while model.candidates:
         why = [
             (i, w)
-            for i, w in ((i, _why_not(model, i, tolerances)) for i in range(len(model.candidates)))
+            for i, w in ((i, why_not(model, i, tolerances, rules)) for i in range(len(model.candidates)))
             if w
         ]
         if not why:
@@ -265,43 +275,6 @@ def admissible(model: Model, finding: Finding, tolerances: Tolerances) -> tuple[
         refused.append(f"{model.candidates[i]}: {word}")
         model = fit_without(model, i, finding.search.predictor, finding.search.problem)
     return model, tuple(refused)
-
-
-def _why_not(model: Model, i: int, tolerances: Tolerances) -> str:
-    """Why an effect is never named beside a calibration; empty: it may be."""
-    part, candidate = model.parts()[i], model.candidates[i]
-    low, high = (b[part] for b in model.bounds())
-    x = model.values[part]
-    held = {k - part.start for k in model.held}
-    near = np.minimum(AT_BOUND * (high - low), AT_SCALE)
-    at = [
-        p.name
-        for k, p in enumerate(candidate.parameters)
-        if k not in held
-        and not _as_left_out(p, x[k] * p.scale)
-        and (
-            (x[k] - low[k] < near[k] and p.lower != p.null)
-            or (high[k] - x[k] < near[k] and p.upper != p.null)
-        )
-    ]
-    if at:
-        return f"{at[0]} is at its bound"
-    blind = [
-        p.name for k, p in enumerate(candidate.parameters) if k not in held and unseen(model, part.start + k)
-    ]
-    if len(blind) == len(candidate.parameters) - len(held):
-        return f"the readings do not determine {blind[0]}" if blind else ""
-    if get(candidate.kind).certified:
-        exact = np.array([p.null or 0.0 for p in candidate.parameters])
-        off = np.abs(model.si[part] - exact).max()
-        if off > BEYOND * tolerances.instrument:
-            return f"{off:.2g} is beyond the instrument's certificate ({tolerances.instrument:.2g}) a hundred times"
-    return ""
-
-
-def _as_left_out(p: Parameter, value: float) -> bool:
-    """Whether a shape is within what it is when nobody gives it, as a gap that is crossed at once: no bound of a search."""
-    return p.null is None and p.default is not None and value <= p.default
 
 
 def _beyond_calibration(s: Study, model: Model, finding: Finding) -> tuple[Model, tuple[str, ...]]:
