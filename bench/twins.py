@@ -54,7 +54,7 @@ def one(number: int, null: bool) -> dict[str, Any]:
     word, given = case(number, null)
     position = (number // 12) % 2
     few = given.pop("few", False)
-    poses = (12 if position else 2) if few else (30 if position else 8)
+    poses = (12 if position else 4) if few else (30 if position else 10)
     start = time.perf_counter()
     t = twin(number + (1000 if null else 0), poses=poses, **given)
     made = time.perf_counter()

@@ -32,6 +32,7 @@ from stiffmap.experiment.comparison.limitations import limitations, refuse
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.files.load import load_experiment
+from stiffmap.experiment.noise.as_left import AsLeft, as_left
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Mask
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
@@ -131,7 +132,8 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
     after = left_over - nuisance_part(exact, left_over)
     if other and verdict == "effects":
         verdict = "ambiguous"
-    inflation = max(1.0, float(np.sqrt(model.chi2 / max(search.problem.freedom, 1)))) if left else 1.0
+    noise = _noise_left(search.problem, model)
+    inflation = max(1.0, noise.widening) if left else noise.widening
     keep = ~finding.outliers
     as_declared = verdict == "unattributed" and s.layer is None  # what the folds found is not in the machine
     sums = _summaries(None if as_declared else held, before, after, s, keep)
@@ -152,7 +154,11 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
         unexplained=[
             located(p, e, np.where(keep[:, None], after, np.nan), s.noise.sigma) for p in left[:LISTED]
         ],
-        limitations=limitations(e, s.noise, s.predictor.machine),
+        limitations=[
+            *found.notes,
+            *limitations(e, s.noise, s.predictor.machine),
+            *([] if left else noise.sentences()),
+        ],
         significance={
             "effective_trials": s.effective_trials,
             "alpha": search.alpha,
@@ -174,6 +180,12 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
         if model.candidates
         else 0.0,
     )
+
+
+def _noise_left(problem: Problem, model: Model) -> AsLeft:
+    """What a model leaves, as noise."""
+    assert model.residual is not None
+    return as_left(problem, model.residual, model.freedom)
 
 
 def _effects(s: Study, finding: Finding, why: Explanation, inflation: float) -> list[Effect]:

@@ -40,8 +40,9 @@ NEAR = 2.0
 """Standard uncertainties by which numbers that are within tolerance may be off along one direction."""
 WORTH_A_FLOOR = 0.3
 """Noise variances per pose that no linear explanation takes: effects are then looked for at that floor at once."""
-LEAD = 6.0
-"""Nats by which effects on an exact machine must lead: odds of 400, very strong evidence (Kass and Raftery 1995)."""
+LEAD, CLEAR = 3.0, 6.0
+"""Nats by which effects on an exact machine must lead to be considered, odds of 20, and to be the only answer, odds of 400:
+strong and very strong evidence (Kass and Raftery 1995). Between the two numbers that are a little off remain a rival."""
 REJECTED = 5.41
 """Nats by which the readings must reject the floor that a search was done at, before it is done again at the lower
 one: half the chi-square of one degree of freedom that chance exceeds once in a thousand."""
@@ -60,6 +61,8 @@ class Answer:
     held: HeldOut | None = None
     refused: tuple[str, ...] = ()
     """Effects that the readings seemed to demand and that are not named, and why."""
+    notes: tuple[str, ...] = ()
+    """What else the reader must know of the answer."""
 
 
 def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str, ...] = ()) -> Answer:
@@ -82,9 +85,16 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
     found = found or calibrator(s, tolerances, exclude)
     if found is None:
         return first
-    if not left and sparse_evidence(first) >= spread_evidence(finding.search.problem, found) + LEAD:
-        return first
+    lead = sparse_evidence(first) - spread_evidence(finding.search.problem, found)
+    if not left and lead >= LEAD:
+        return first if lead >= CLEAR or not model.candidates else _beside_numbers(first, lead)
     return _layered(s, found, seed, tolerances)
+
+
+def _beside_numbers(first: Answer, lead: float) -> Answer:
+    """Effects that numbers which are a little off explain nearly as well."""
+    note = f"every number a little off, within its tolerance, explains the readings nearly as well (odds of {np.exp(lead):.0f} for the effect)"
+    return replace(first, verdict="ambiguous", notes=(note,))
 
 
 def _layered(s: Study, found: Calibrator, seed: int, tolerances: Tolerances) -> Answer:
