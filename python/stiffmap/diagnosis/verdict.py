@@ -14,6 +14,7 @@ from stiffmap.broadcasting import whole_number
 from stiffmap.calibration import GROUPS, Tolerances, certified
 from stiffmap.diagnosis.candidates.candidates import check_kinds
 from stiffmap.diagnosis.clock import Clock, Progress
+from stiffmap.diagnosis.decision.beside_noise import noise_left
 from stiffmap.diagnosis.decision.beside_calibration import Answer, find_effects
 from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
 from stiffmap.diagnosis.decision.empirical import empirical
@@ -32,7 +33,6 @@ from stiffmap.experiment.comparison.limitations import limitations, refuse
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.files.load import load_experiment
-from stiffmap.experiment.noise.as_left import AsLeft, as_left
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Mask
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
@@ -132,7 +132,7 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
     after = left_over - nuisance_part(exact, left_over)
     if other and verdict == "effects":
         verdict = "ambiguous"
-    noise = _noise_left(search.problem, model)
+    noise = noise_left(finding, model)
     inflation = max(1.0, noise.widening) if left else noise.widening
     keep = ~finding.outliers
     as_declared = verdict == "unattributed" and s.layer is None  # what the folds found is not in the machine
@@ -180,12 +180,6 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
         if model.candidates
         else 0.0,
     )
-
-
-def _noise_left(problem: Problem, model: Model) -> AsLeft:
-    """What a model leaves, as noise."""
-    assert model.residual is not None
-    return as_left(problem, model.residual, model.freedom)
 
 
 def _effects(s: Study, finding: Finding, why: Explanation, inflation: float) -> list[Effect]:

@@ -20,6 +20,7 @@ from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.statistics import Sums
 from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.decision.beside_field import standing
+from stiffmap.diagnosis.decision.beside_noise import above_noise
 from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
 from stiffmap.diagnosis.decision.few import MEETING, not_few, screened
 from stiffmap.diagnosis.decision.judge import judge, unexplained, with_model
@@ -74,11 +75,13 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
         if found is not None and not_few(s, screened(s), spread_evidence(s.whole[0], found)):
             return _layered(s, found, seed, tolerances)
     finding, verdict, left = judge(s, find(s))
-    model, refused = admissible(finding.model, finding, tolerances, EVERYWHERE)
+    model, never = admissible(finding.model, finding, tolerances, EVERYWHERE)
+    model, noisy = above_noise(finding, model)
+    refused = never + noisy
     if refused:
         finding = with_model(finding, model)
         left = unexplained(s, finding)
-        verdict = _without(finding, left)
+        verdict = _without(finding, bool(left or never))
     first = Answer(s, finding, verdict, left, refused=refused)
     if s.clock.over or not (left or finding.model.candidates or refused):
         return first
@@ -169,7 +172,8 @@ def _searched(s: Study, tolerances: Tolerances) -> Answer:
     finding, verdict, left = judge(s, find(s))
     model, refused = admissible(finding.model, finding, tolerances)
     model, more = _beyond_calibration(s, model, finding)
-    refused += more
+    model, noisy = above_noise(finding, model)
+    refused += more + noisy
     if refused:
         finding = with_model(finding, model)
         left = unexplained(s, finding)
@@ -248,12 +252,12 @@ def _left_by(s: Study, finding: Finding) -> Blocks:
     return Blocks.of(columns, residual, pose_labels(problem))
 
 
-def _without(finding: Finding, left: list[Pattern]) -> str:
-    """The verdict on an exact machine where effects were refused: what they explained is still there."""
+def _without(finding: Finding, rest: bool) -> str:
+    """The verdict on an exact machine where effects were refused; `rest`: something is left, or what they explained is."""
     named = bool(finding.model.candidates)
-    if left or not named:
+    if rest:
         return "effects+unattributed" if named else "unattributed"
-    return "effects"
+    return "effects" if named else "none"
 
 
 def _word(s: Study, finding: Finding, left: list[Pattern]) -> str:
