@@ -34,9 +34,7 @@ def telling(names: tuple[Unknown, ...], found: Calibrator) -> list[int]:
     return [i for i, u in enumerate(names) if u.group in plain and spread[i] < 1.0 / TOLD]
 
 
-def twin(
-    machine: sm.Machine, poses: int, seed: int, fault: bool
-) -> tuple[Experiment, str]:
+def twin(machine: sm.Machine, poses: int, seed: int, fault: bool) -> tuple[Experiment, str]:
     """Readings and the name of what is far off; empty: nothing is."""
     plan = replace(random_plan(machine, "position", poses=poses, repeats=1, seed=seed), frame="unknown")
     p = Predictor(machine, plan)

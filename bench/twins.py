@@ -18,11 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-import stiffmap as sm
 from tests.python.twins.generator import twin
 from tests.python.twins.judge import judged
 from tests.python.twins.noise import KINDS
+
+import stiffmap as sm
 
 CASES: tuple[tuple[str, dict[str, Any]], ...] = (
     ("single", {"kind": "gaussian", "faults": 1}),
@@ -104,7 +104,9 @@ def main() -> int:
             known.append(one(number, null))
             stream.write(json.dumps(known[-1]) + "\n")
             stream.flush()
-            print(known[-1]["name"], known[-1]["word"], known[-1]["truth"], known[-1]["said"][:200], flush=True)
+            print(
+                known[-1]["name"], known[-1]["word"], known[-1]["truth"], known[-1]["said"][:200], flush=True
+            )
     print(table(known))
     return int(any(r["word"] in ("false", "error") for r in known))
 

@@ -21,6 +21,7 @@ from stiffmap.calibration.result import Calibration
 from stiffmap.calibration.statistics import Sums, independent
 from stiffmap.calibration.travel import Drive, Travel, travel
 from stiffmap.calibration.unknowns import Unknown
+from stiffmap.calibration.validity import covered
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.summary import rms
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
@@ -61,6 +62,9 @@ def conclude(ready: Calibrator, seed: int = 0) -> Calibration:
     unexplained = (rest or bool(claimed.refused)) and not claimed.any and misfits
     seconds = {**ready.seconds, "evidence": time.perf_counter() - start}
     rows = _rows(names, freed, factor, built)
+    valid = covered(ready.predictor.machine, e, ~ready.out)
+    if unseen:
+        valid = replace(valid, error=unseen.after, error_u=unseen.u, unit=unit)
     far = pulls(
         freed,
         [u.name for u in names],
@@ -88,7 +92,8 @@ def conclude(ready: Calibrator, seed: int = 0) -> Calibration:
         failed=ready.sensitivity.failed,
         stopped=ready.stopped,
         unit=unit,
-        machine=correction.of(np.ones(len(e), bool)).machine,
+        machine=valid.kept_by(correction.of(np.ones(len(e), bool)).machine),
+        validity=valid,
         unseen=unseen,
         correction=correction,
         experiment=e,

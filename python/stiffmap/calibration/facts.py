@@ -16,6 +16,7 @@ from stiffmap.calibration.unknowns import Unknown
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.machine import Machine
 from stiffmap.plain import plain
+from stiffmap.validity import Validity
 
 
 @dataclass(frozen=True)
@@ -153,6 +154,8 @@ class Facts:
     values: Floats = field(repr=False, default_factory=lambda: np.zeros(0))
     """(p,) in standard uncertainties."""
     seconds: dict[str, float] = field(default_factory=dict)
+    validity: Validity = field(kw_only=True)
+    """What the readings covered; beyond it nothing vouches for `machine`."""
     pulls: Pulls = field(kw_only=True)
     """How far the numbers are beyond their standard uncertainties, those that are let go set aside."""
     refused: tuple[str, ...] = ()
@@ -169,6 +172,10 @@ class Facts:
         out = {n: plain(getattr(self, n)) for n in names}
         out["held_out"] = plain(asdict(self.held_out)) if self.held_out else None
         out["unseen"] = plain(asdict(self.unseen)) if self.unseen else None
+        v = self.validity
+        out["validity"] = plain(
+            {"poses": v.poses, "drives": dict(v.drives), "loads": dict(v.loads), "temperature": v.temperature}
+        )
         out["pulls"] = plain(asdict(self.pulls)) | {"within": self.pulls.within}
         out["groups"] = plain(asdict(self.groups))
         out["beyond"] = [plain(asdict(b)) for b in self.beyond]

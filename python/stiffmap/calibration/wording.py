@@ -49,6 +49,7 @@ def lines(c: Facts) -> list[str]:
             f"machine file on {f.by} that no fit saw: rms {in_display_units(f.before, c.unit)} as declared, "
             f"{in_display_units(f.after, c.unit)} ± {in_display_units(f.u, c.unit)} corrected"
         )
+    out.append(f"holds where it was read: {c.validity}")
     if c.floor > 0.0:
         where = ", ".join(f"{k} {in_display_units(v, _unit(k, c.unit))}" for k, v in c.rest.items())
         out.append(

@@ -12,6 +12,7 @@ from stiffmap.status import Flag, Status
 COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 TWIST_UNITS = "m (dx, dy, dz), rad (rx, ry, rz)"
+BEYOND = "beyond_calibration"
 COMPLIANCE_UNITS = "m/N, m/(N m), rad/N, rad/(N m): component per wrench_component"
 
 
@@ -65,6 +66,12 @@ def load_variables(case: tuple[str, ...], plane: str, compliance: bool) -> list[
         dims = (*case, "component", "wrench_component")
         out.append(Variable("compliance", dims, meaning(COMPLIANCE_UNITS, "loaded compliance")))
     return out
+
+
+def beyond_variable(case: tuple[str, ...], covered: str) -> Variable:
+    """Where nothing vouches for the numbers of a calibrated machine."""
+    text = "1: joints or load are beyond the readings that the machine was calibrated by"
+    return Variable(BEYOND, case, meaning("1", text, calibrated_by=covered), "u1")
 
 
 def deviation_variables(case: tuple[str, ...], plane: str, turning: bool) -> list[Variable]:

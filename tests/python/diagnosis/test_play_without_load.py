@@ -58,6 +58,8 @@ def test_an_answer_does_not_depend_on_its_pictures(tmp_path: Path, monkeypatch: 
 
     monkeypatch.setattr(pictures, "loaded", fails)
     write(d, tmp_path)
-    assert {"machine.yaml", "report.html", "diagnosis.json", "loaded.png"} <= {p.name for p in tmp_path.iterdir()}
+    assert {"machine.yaml", "report.html", "diagnosis.json", "loaded.png"} <= {
+        p.name for p in tmp_path.iterdir()
+    }
     said = pictures.drawn(fails, d).texts[0].get_text()
     assert said == "not drawn: singular"

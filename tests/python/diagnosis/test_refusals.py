@@ -69,7 +69,9 @@ def test_no_kind_is_named_with_its_whole_range_as_interval(kind: str) -> None:
     half = model(c, *middle)
     assert half.jacobian is not None
     shape_only = np.where(size, 1e-6, 1.0) * half.jacobian[: len(size)]
-    seen = Model((c,), half.values, 1.0, np.vstack([shape_only, np.zeros((3, len(size)))]), np.zeros(len(size) + 3))
+    seen = Model(
+        (c,), half.values, 1.0, np.vstack([shape_only, np.zeros((3, len(size)))]), np.zeros(len(size) + 3)
+    )
     if any(size):
         assert "the readings do not determine" in why_not(seen, 0, Tolerances())
 

@@ -70,7 +70,9 @@ def twin(number: int, *, kind: str, faults: int, poses: int, strength: float, sp
             break
         f = may[i]
         size = f.typical
-        if rms(shown(declared, f.of(real, size), plan.rows(few)) - whole[few]) < 1e-9:  # the plan does not feel it
+        if (
+            rms(shown(declared, f.of(real, size), plan.rows(few)) - whole[few]) < 1e-9
+        ):  # the plan does not feel it
             continue
         change = shown(declared, f.of(real, size), plan) - whole
         for _ in range(2):
@@ -90,7 +92,9 @@ def twin(number: int, *, kind: str, faults: int, poses: int, strength: float, sp
     reading[:, :3] = np.where(plan.axis_read[:3], whole + noise, np.nan)
     size_of = np.where(np.isfinite(reading), sigma, np.nan)
     data = replace(plan.with_readings(reading), sigma=size_of, order=np.arange(len(plan)))
-    return Twin(f"{number} {name} {quantity} {kind}", machine, data, tuple(chosen), tuple(sizes), whole - none)
+    return Twin(
+        f"{number} {name} {quantity} {kind}", machine, data, tuple(chosen), tuple(sizes), whole - none
+    )
 
 
 def rms(values: np.ndarray) -> float:

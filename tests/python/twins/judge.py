@@ -29,13 +29,17 @@ class Judgement:
 def judged(twin: Twin, d: Diagnosis) -> Judgement:
     """The worst word of all that is named; silent where nothing is."""
     named = [(e.kind, e.element, e.legs) for e in d.effects]
-    groups = [[n, *places(e.aliases), *rivals(d, k)] for k, (n, e) in enumerate(zip(named, d.effects, strict=True))]
+    groups = [
+        [n, *places(e.aliases), *rivals(d, k)] for k, (n, e) in enumerate(zip(named, d.effects, strict=True))
+    ]
     c = d.calibration
     numbers = [[b.name, *b.rivals] for b in c.beyond] if c else []
     said = f"{d.verdict}: {'; '.join(map(str, d.effects))} | {c.verdict if c else '-'}"
     if not named and not numbers:
         wide = bool(c and c.wider)
-        return Judgement(("silent" if twin.faults else "quiet") if not wide or twin.faults else "false", said, ())
+        return Judgement(
+            ("silent" if twin.faults else "quiet") if not wide or twin.faults else "false", said, ()
+        )
     if not twin.faults:
         return Judgement("false", said, ())
     truths = [f.at for f in twin.faults]
@@ -64,7 +68,11 @@ def at(place: tuple[str, str, tuple[str, ...]], truth: str) -> bool:
 
 def within(number: str, truth: str) -> bool:
     """Whether the name of an uncertain number speaks of the element of a fault."""
-    return any(truth == w or truth.endswith(f".{w}") or w in truth for w in number.split() if "." in w or w in truth.split("."))
+    return any(
+        truth == w or truth.endswith(f".{w}") or w in truth
+        for w in number.split()
+        if "." in w or w in truth.split(".")
+    )
 
 
 def alike(twin: Twin, d: Diagnosis) -> bool:
@@ -77,7 +85,11 @@ def alike(twin: Twin, d: Diagnosis) -> bool:
 
 def covered(twin: Twin, d: Diagnosis) -> Iterator[bool]:
     """Intervals of faults that are named by their own kind at their own place and leg."""
-    own = {"soft": ("compliance", "scale", 1.0), "zero": ("zero_offset", "error", 0.0), "gain": ("lead_error", "slope", 0.0)}
+    own = {
+        "soft": ("compliance", "scale", 1.0),
+        "zero": ("zero_offset", "error", 0.0),
+        "gain": ("lead_error", "slope", 0.0),
+    }
     for f, size in zip(twin.faults, twin.sizes, strict=True):
         kind, parameter, null = own[f.kind]
         for e in d.effects:

@@ -338,7 +338,7 @@ def _tolerated(s: Study, finding: Finding) -> Study | None:
     layer = s.layer
     for i in range(len(model.candidates)):
         alone = problem.white(predictor(model.terms()) - predictor(model.without(i).terms()))
-        needed, told = imitation(problem.white(layer.columns), alone)
+        needed, _ = imitation(problem.white(layer.columns), alone)
         far = 0.0 if needed is None else float(np.linalg.norm(needed))
         if needed is not None and far > NEAR:
             layer = layer.narrowed(needed, NEAR / far)

@@ -82,7 +82,13 @@ def not_determined(c: Claimed) -> str:
 def no_such_turn(c: Claimed) -> str:
     """An angle of a part that nobody would have assembled so."""
     for _, p, v in c.values:
-        if p.unit == "rad" and p.null == 0.0 and p.name.startswith("angle") and abs(v) > TURNED and not _free(c):
+        if (
+            p.unit == "rad"
+            and p.null == 0.0
+            and p.name.startswith("angle")
+            and abs(v) > TURNED
+            and not _free(c)
+        ):
             return f"no assembled part is turned by {1e3 * v:.3g} mrad"
     return ""
 

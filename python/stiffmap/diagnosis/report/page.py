@@ -14,8 +14,8 @@ from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.report.findings import Detectability, Effect, Findings
 from stiffmap.diagnosis.report.sentences import UNITS, next_step, opening
 from stiffmap.diagnosis.report.wording import effect_text, five_lines, separation_text
-from stiffmap.errors import StiffmapError
 from stiffmap.effects import registry
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.fingerprints import digest
 from stiffmap.outputs import write_text

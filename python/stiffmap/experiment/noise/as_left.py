@@ -42,15 +42,21 @@ class AsLeft:
         """What a reader must know."""
         out = []
         if self.other and self.ratio < 1.0:
-            out.append(f"the declared noise is {1.0 / self.ratio:.2g} times what the fit leaves; intervals are by what it leaves")
+            out.append(
+                f"the declared noise is {1.0 / self.ratio:.2g} times what the fit leaves; intervals are by what it leaves"
+            )
         if self.other and self.ratio > 1.0:
-            out.append(f"the fit leaves {self.ratio:.2g} times the declared noise; intervals are by what it leaves")
+            out.append(
+                f"the fit leaves {self.ratio:.2g} times the declared noise; intervals are by what it leaves"
+            )
         if self.along_time:
             out.append(
                 f"noise is correlated along time ({self.along_time:.2g} from one row to the next); intervals are wider for it"
             )
         if self.tails:
-            out.append("noise has heavier tails than a normal law: single rows say less than their noise promises")
+            out.append(
+                "noise has heavier tails than a normal law: single rows say less than their noise promises"
+            )
         return out
 
 

@@ -22,7 +22,6 @@ from stiffmap.options import SolveOptions
 from stiffmap.solution import Solution
 from stiffmap.status import Flag, Status
 
-
 ACROSS = 1e-3
 """Share of the work that a load does along a free motion of play below which it does not press the gap."""
 
