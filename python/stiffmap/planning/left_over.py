@@ -28,7 +28,7 @@ def difference(a: Estimate, b: Estimate) -> tuple[Floats, Floats]:
     tell."""
     k = len(a.values)
     told = np.flatnonzero(np.isfinite(a.sigma) & np.isfinite(b.sigma))
-    shift, covariance = b.values - a.values, np.full((k, k), np.inf) * np.eye(k)
+    shift, covariance = b.values - a.values, np.diag(np.full(k, np.inf))
     if not told.size:
         return shift, covariance
     scale = np.concatenate([WIDE * e.misfit * e.sigma[told] for e in (a, b)])
