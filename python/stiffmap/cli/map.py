@@ -45,7 +45,7 @@ from stiffmap.cli.map_options import (
     ZarrOption,
     ZOption,
 )
-from stiffmap.cli.map_summary import as_table, failures, summary
+from stiffmap.cli.map_summary import as_table, beyond, failures, summary
 from stiffmap.cli.map_uncertainty import print_uncertainty, uncertainty_data
 from stiffmap.cli.map_worst import in_words, worst_pose
 from stiffmap.cli.output import JsonOption, print_json
@@ -163,9 +163,11 @@ def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wa
     table = as_table(ds, rows, wanted.plane, wanted.tolerance)
     files = [how["out"], *write_files(machine, ds, wanted, table, worst, failed, call["gravity"])]
     band = uncertainty_data(ds, wanted.plane) if wanted.uncertainty else None
+    far = beyond(ds)
     if as_json:
         data: dict[str, Any] = {"machine": machine.name, "rows": rows, "failed": failed}
         data |= {"files": list(map(str, files)), "worst_pose": worst}
+        data |= {} if far is None else {"beyond_calibration": far}
         print_json(plain(data if band is None else data | {"uncertainty": band}))
     else:
         console = Console(highlight=False)
@@ -174,6 +176,9 @@ def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wa
             print_uncertainty(console, band, wanted.plane)
         if worst is not None:
             console.print(in_words(worst), soft_wrap=True)
+        if far is not None:
+            told = f"{100 * far['share']:.3g} % of it beyond what the machine was calibrated by ({far['calibrated_by']})"
+            console.print(f"[yellow]{told}[/yellow]" if far["share"] else told, soft_wrap=True)
         for line in failed_in_words(failed):
             console.print(f"[yellow]{line}[/yellow]", soft_wrap=True)
         console.print(f"wrote {', '.join(map(str, files))}", soft_wrap=True)

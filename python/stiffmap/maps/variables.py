@@ -13,6 +13,8 @@ from stiffmap.labels import (
     status_attrs,
 )
 
+BEYOND = "beyond_calibration"
+
 
 @dataclass(frozen=True)
 class Variable:
@@ -39,6 +41,12 @@ def load_variables(case: tuple[str, ...], plane: str, compliance: bool) -> list[
         dims = (*case, "component", "wrench_component")
         out.append(Variable("compliance", dims, meaning(COMPLIANCE_UNITS, "loaded compliance")))
     return out
+
+
+def beyond_variable(case: tuple[str, ...], covered: str) -> Variable:
+    """Where nothing vouches for the numbers of a calibrated machine."""
+    text = "1: joints or load are beyond the readings that the machine was calibrated by"
+    return Variable(BEYOND, case, meaning("1", text, calibrated_by=covered), "u1")
 
 
 def deviation_variables(case: tuple[str, ...], plane: str, turning: bool) -> list[Variable]:

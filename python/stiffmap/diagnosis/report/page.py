@@ -178,7 +178,7 @@ def _budget(d: Findings) -> dict[str, Any] | None:
     p, force = worst
     try:
         found = deflection_budget(d.machine, p, force)
-    except StiffmapError:
+    except StiffmapError:  # a machine in play has no stiffness to share out
         return None
     whole = 1e6 * float(np.linalg.norm(found.displacement[:3]))
     return {
