@@ -213,5 +213,5 @@ def look_at_machine(server: Any, rest: Drawing, extent: float) -> None:
     is_flat = float(np.ptp(points[:, 2])) < 1e-3
     direction = np.array([0.02, -0.05, 1.0] if is_flat else [0.75, -0.9, 0.6])
     server.initial_camera.look_at = tuple(middle)
-    server.initial_camera.position = tuple(middle + 1.15 * extent * direction / np.linalg.norm(direction))
+    server.initial_camera.position = tuple(middle + 0.8 * extent * direction / np.linalg.norm(direction))
     server.initial_camera.up = (0.0, 0.0, 1.0)

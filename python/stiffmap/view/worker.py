@@ -7,6 +7,8 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+YIELD = 0.002
+"""s after the first stage, in which the server's thread sends what it drew before dearer stages compute."""
 Stage = Callable[[], None]
 
 
@@ -66,6 +68,7 @@ class Worker:
                 self._failed(problem)
             if i == 0 and since is not None:
                 self.latencies.append(time.perf_counter() - since)
+                time.sleep(YIELD)
 
     def stop(self) -> None:
         """End the thread after what it is doing."""
