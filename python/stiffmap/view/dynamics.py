@@ -10,7 +10,8 @@ from stiffmap.performance.frequencies import NaturalFrequencies, natural_frequen
 from stiffmap.view.place import orientation
 from stiffmap.view.state import State
 
-MODES = 12
+MODES = 40
+"""As parallel machines have dozens of modes of their bars below those that move the tool."""
 DAMPING = 0.02
 """Modal damping ratio of every mode."""
 STEP = 1e-7

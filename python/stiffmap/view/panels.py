@@ -38,7 +38,7 @@ def status_line(moment: Moment, solution: Solution, message: str, error: str) ->
     lines += [f'<span style="color:{ORANGE}">{escape(message)}</span>'] if message else []
     for line in error.splitlines():
         lines.append(f'<span role="alert" style="color:{RED}">{escape(line)}</span>')
-    return f'<div role="status" aria-live="polite" style="padding:.3em .6em">{"<br>".join(lines)}</div>'
+    return f'<div role="status" aria-live="polite" style="padding:.3em .6em">{"<br/>".join(lines)}</div>'
 
 
 def colour_bar(found: PlaneMap, limits: tuple[float, float], tolerance: float) -> str:
