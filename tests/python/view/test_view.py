@@ -166,17 +166,6 @@ def test_every_quantity_is_drawn(view: View, quantity: str) -> None:
     assert viewer.scene.lit
 
 
-def test_the_page_holds_everything_and_asks_for_nothing(machine: sm.Machine, tmp_path: Path) -> None:
-    page = tmp_path / "out.html"
-    assert main(["view", "orthoglide-revised", "--at", "100,0,50", "--html", str(page)]) == 0
-    text = page.read_text(encoding="utf-8")
-    assert "__VISER_EMBED_DATA__" in text and "orthoglide-revised at (100.0, 0.0, 50.0) mm" in text
-    for tag in ('<script src="http', '<link rel="stylesheet" href="http', "@import url(http"):
-        assert tag not in text
-    d = 1e6 * np.linalg.norm(machine.solve((0.1, 0, 0.05), (0, 0, -300.0, 0, 0, 0)).displacement[:3])
-    assert f"{d:.2f} µm" in text
-
-
 @pytest.mark.parametrize(
     ("options", "words"),
     [
