@@ -17,6 +17,8 @@ SMALL_TURN = 0.03
 """rad, with which it is tried whether a machine turns."""
 DEFAULT_BOX = 0.25
 """Of the machine's length, half edge of the box of a machine that declares none."""
+WIDE = 0.5
+"""Of the longest commanded edge of the box, edge of the plane along what is not commanded."""
 
 
 def box_of(machine: Machine) -> tuple[Floats, Floats]:
@@ -27,6 +29,18 @@ def box_of(machine: Machine) -> tuple[Floats, Floats]:
     home = machine.description.home.p
     half = DEFAULT_BOX * machine.compiled.length
     return home - half, home + half
+
+
+def drawn_box(machine: Machine) -> tuple[Floats, Floats]:
+    """The box of the plane: where an axis is not commanded, wide enough to see the colours, which it does not change."""
+    low, high = (v.copy() for v in box_of(machine))
+    free = np.array(moves(machine))
+    if free.any():
+        least = WIDE * float((high - low)[free].max())
+        for i in np.flatnonzero(~free & (high - low < least)):
+            middle = machine.description.home.p[i]
+            low[i], high[i] = middle - least / 2, middle + least / 2
+    return low, high
 
 
 def orientation(state: State) -> Floats | None:

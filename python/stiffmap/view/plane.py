@@ -13,7 +13,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.compiled import Status
 from stiffmap.machine import Machine
 from stiffmap.view.dynamics import dynamic_stiffness, lowest_frequency
-from stiffmap.view.place import box_of, orientation
+from stiffmap.view.place import drawn_box, orientation
 from stiffmap.view.quantities import QUANTITIES, Load, Mask
 from stiffmap.view.state import State
 
@@ -51,7 +51,7 @@ class Frame:
 
 def plane_frame(machine: Machine, state: State) -> Frame:
     """The rectangle across the workspace box that holds the tool."""
-    low, high = box_of(machine)
+    low, high = drawn_box(machine)
     p = np.array(state.position)
     if state.plane == "free":
         n = np.array(state.normal) / np.linalg.norm(state.normal)
@@ -131,7 +131,7 @@ def plane_map(machine: Machine, state: State, count: int = FINE, *, threads: int
     if quantity.of is None:
         count = min(count, DEAR)
     p = frame.poses(count)
-    low, high = box_of(machine)
+    low, high = drawn_box(machine)
     slack = INSIDE * (high - low)
     outside = np.asarray(((p < low - slack) | (p > high + slack)).any(axis=-1))
     if quantity.of is None:
