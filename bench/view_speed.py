@@ -22,7 +22,6 @@ import zstandard
 import stiffmap as sm
 from stiffmap.view.open import View, model_of
 
-
 QUIET = 1.0
 """s without a message."""
 
@@ -46,7 +45,9 @@ class Listener:
                 now = self.last = time.perf_counter()
                 self.ready.set()
                 words = unpacked(message)
-                if b"/map" in words or b'id="scale"' in words:  # equal pixels under another scale are not sent again
+                if (
+                    b"/map" in words or b'id="scale"' in words
+                ):  # equal pixels under another scale are not sent again
                     self.at = now
                     self.arrived.set()
 
@@ -100,7 +101,9 @@ def main() -> None:
     parser.add_argument("--drags", type=int, default=60)
     parser.add_argument("--force", action="store_true")
     given = parser.parse_args()
-    print("| machine | least, ms | median, ms | 95 %, ms | processor (median), ms | poses | 101 x 101, least, ms |")
+    print(
+        "| machine | least, ms | median, ms | 95 %, ms | processor (median), ms | poses | 101 x 101, least, ms |"
+    )
     print("|---|---|---|---|---|---|---|")
     for name in given.machines or sm.machine_names():
         first, processor, fine, counts = measure(name, given.drags, given.force)

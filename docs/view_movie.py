@@ -1,4 +1,4 @@
-"""Moving pictures and screenshots of docs/view.md: `python docs/view_movie.py [movie | panel | machines FOLDER]`.
+"""Moving pictures and screenshots of docs/view.md: `python docs/view_movie.py FILE`, or `machines FOLDER`: every shipped machine.
 
 Needs the extra [view], Playwright's wheel and a Chromium of the system. The tool of the revised Orthoglide goes from home to
 the corner in which it is weak; every picture is a screenshot of the page.
@@ -22,7 +22,6 @@ from playwright.sync_api import sync_playwright
 import stiffmap as sm
 from stiffmap.view.open import View, model_of
 
-HERE = Path(__file__).parent / "img"
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
          "--disable-component-update", "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader",
          "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]  # fmt: skip
@@ -37,7 +36,11 @@ def page_of(view: View, width: int = 1000, height: int = 620) -> Iterator[Any]:
     command = shutil.which("chromium") or shutil.which("google-chrome")
     with sync_playwright() as p, tempfile.TemporaryDirectory() as folder:
         browser = p.chromium.launch_persistent_context(
-            folder, executable_path=command, headless=True, args=FLAGS, viewport={"width": width, "height": height}
+            folder,
+            executable_path=command,
+            headless=True,
+            args=FLAGS,
+            viewport={"width": width, "height": height},
         )
         browser.set_default_timeout(120_000)
         page = browser.new_page()
@@ -58,9 +61,17 @@ def shot(view: View, page: Any, wait: int = 900) -> Image.Image:
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
 
-def movie() -> None:
+def look(view: View) -> None:
+    """From above, so that the plane is seen."""
+    for client in view._server.get_clients().values():
+        client.camera.position = (0.35, -0.95, 1.35)  # this moves what is looked at as well
+        client.camera.look_at = (-0.12, -0.15, -0.05)
+
+
+def movie(target: Path) -> None:
     """From home to the weak corner, with the shares beside it."""
     with View(model_of(sm.load_machine("orthoglide-revised"), START, **LOAD)) as view, page_of(view) as page:
+        look(view)
         page.get_by_role("tab", name="Why").click()
         frames = []
         for t in (1 - np.cos(np.linspace(0, np.pi, FRAMES))) / 2:
@@ -68,18 +79,21 @@ def movie() -> None:
             frames.append(shot(view, page))
     small = [f.resize((800, 496), Image.Resampling.LANCZOS).quantize(COLOURS) for f in frames]
     hold = [1200, *[160] * (FRAMES - 2), 2500]
-    small[0].save(HERE / "view-corner.gif", save_all=True, append_images=small[1:], duration=hold, loop=0, optimize=True)
-    frames[-1].quantize(128).save(HERE / "view-why.png", optimize=True)
+    small[0].save(target, save_all=True, append_images=small[1:], duration=hold, loop=0, optimize=True)
 
 
-def panel() -> None:
-    """The first look, and the map in its worst direction with the ellipsoid."""
-    with View(model_of(sm.load_machine("orthoglide-revised"), START, **LOAD)) as view, page_of(view) as page:
-        shot(view, page).quantize(128).save(HERE / "view-first.png", optimize=True)
-        view._viewer.controls.surface = "ellipsoid"
-        view.set(position=tuple(CORNER), quantity="worst", plane="free", normal=(1.0, -1.0, 0.0))
-        page.get_by_role("tab", name="Map").click()
-        shot(view, page, 3000).quantize(128).save(HERE / "view-worst.png", optimize=True)
+def still(target: Path) -> None:
+    """The first look, the shares at the corner, or the worst direction there with the ellipsoid, by the file's name."""
+    place = START if target.stem == "first" else CORNER
+    with View(model_of(sm.load_machine("orthoglide-revised"), place, **LOAD)) as view, page_of(view) as page:
+        look(view)
+        if target.stem == "why":
+            page.get_by_role("tab", name="Why").click()
+        if target.stem == "worst":
+            view._viewer.controls.surface = "ellipsoid"
+            view.set(quantity="worst", plane="free", normal=(1.0, -1.0, 0.0))
+            page.get_by_role("tab", name="Map").click()
+        shot(view, page, 2500).quantize(128).save(target, optimize=True)
 
 
 def machines(folder: Path) -> None:
@@ -91,11 +105,11 @@ def machines(folder: Path) -> None:
 
 
 def main(wanted: list[str]) -> None:
-    if wanted[:1] == ["machines"]:
+    if wanted[0] == "machines":
         machines(Path(wanted[1]))
         return
-    for what in wanted or ["movie", "panel"]:
-        {"movie": movie, "panel": panel}[what]()
+    target = Path(wanted[0])
+    (movie if target.suffix == ".gif" else still)(target)
 
 
 if __name__ == "__main__":

@@ -228,7 +228,14 @@ class Machine:
             add_effect(self._description, kind, element=element, legs=legs, **parameters), like=self
         )
 
-    def view(self, position: ArrayLike | None = None, *, port: int | None = None, browser: bool = True, **state: Any) -> Any:
+    def view(
+        self,
+        position: ArrayLike | None = None,
+        *,
+        port: int | None = None,
+        browser: bool = True,
+        **state: Any,
+    ) -> Any:
         """Look at the machine and its map live in a browser; the view that is open is returned (``close()`` ends it).
 
         position (3,) m, None: home. port: of 127.0.0.1; None: a free one from 8080 on. browser: whether to open one.
@@ -239,7 +246,9 @@ class Machine:
         """
         from importlib import import_module
 
-        return import_module(f"{__package__}.view").open_view(self, position, port=port, browser=browser, **state)
+        return import_module(f"{__package__}.view").open_view(
+            self, position, port=port, browser=browser, **state
+        )
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a machine file that loads back equal."""

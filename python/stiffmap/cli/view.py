@@ -25,16 +25,20 @@ def view(
     machine: MachineArgument,
     at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
     rotation: Annotated[
-        str | None, typer.Option(help="Commanded orientation, rotation vector in deg, base axes, e.g. 0,0,30.")
+        str | None,
+        typer.Option(help="Commanded orientation, rotation vector in deg, base axes, e.g. 0,0,30."),
     ] = None,
     force: Annotated[str, typer.Option(help="Force on the tool in N.")] = "0,0,-300",
     moment: Annotated[str, typer.Option(help="Moment on the tool in N·m.")] = "0,0,0",
     gravity: GravityOption = None,
     effect: EffectsOption = None,
     plane: Annotated[
-        str | None, typer.Option(help="Axis across which the plane lies (x, y, z), or the normal of a free one.")
+        str | None,
+        typer.Option(help="Axis across which the plane lies (x, y, z), or the normal of a free one."),
     ] = None,
-    quantity: Annotated[str, typer.Option(help=f"What the colours show: {', '.join(QUANTITIES)}.")] = "deflection",
+    quantity: Annotated[
+        str, typer.Option(help=f"What the colours show: {', '.join(QUANTITIES)}.")
+    ] = "deflection",
     tolerance: Annotated[float, typer.Option(help="Tolerated deflection, mm.")] = 0.25,
     frequency: Annotated[float, typer.Option(help="Of the dynamic stiffness, Hz.")] = 0.0,
     magnify: Annotated[
@@ -42,20 +46,32 @@ def view(
     ] = None,
     changes: Annotated[
         list[str] | None,
-        typer.Option("--set", help="A number of the machine, ADDRESS=VALUE in SI, e.g. x.foot/compliance.c33=2e-8; repeatable."),
+        typer.Option(
+            "--set",
+            help="A number of the machine, ADDRESS=VALUE in SI, e.g. x.foot/compliance.c33=2e-8; repeatable.",
+        ),
     ] = None,
     start: Annotated[
-        str | None, typer.Option(help="All coordinates (m, rad) that name an assembly mode, as the view writes them.")
+        str | None,
+        typer.Option(help="All coordinates (m, rad) that name an assembly mode, as the view writes them."),
     ] = None,
-    link: Annotated[str | None, typer.Option(help="State of a link that the view gave; goes before the options.")] = None,
-    experiment: Annotated[Path | None, typer.Option(help="Folder of an experiment: its rows and residuals.")] = None,
+    link: Annotated[
+        str | None, typer.Option(help="State of a link that the view gave; goes before the options.")
+    ] = None,
+    experiment: Annotated[
+        Path | None, typer.Option(help="Folder of an experiment: its rows and residuals.")
+    ] = None,
     path: Annotated[
         str | None, typer.Option(help="Toolpath (G-code, CL, CSV, or an outline): wanted, cut, compensated.")
     ] = None,
     html: Annotated[Path | None, written("--html", help="Write the scene as one page and end.")] = None,
-    picture: Annotated[Path | None, written("--picture", help="Write a picture (PNG, SVG, PDF) and end.")] = None,
+    picture: Annotated[
+        Path | None, written("--picture", help="Write a picture (PNG, SVG, PDF) and end.")
+    ] = None,
     port: Annotated[int | None, typer.Option(help="Port. [default: a free one from 8080 on]")] = None,
-    host: Annotated[str, typer.Option(help="Address to listen on; beyond this computer a token is asked for.")] = LOCAL,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; beyond this computer a token is asked for.")
+    ] = LOCAL,
     browser: Annotated[bool, typer.Option(help="Open the browser.")] = True,
     as_json: JsonOption = False,
 ) -> None:

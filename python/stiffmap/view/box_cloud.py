@@ -26,6 +26,11 @@ def box_cloud(moment: Moment) -> tuple[Floats, Floats]:
     ]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     solution = m.solve(
-        points, s.wrench, rotation=orientation(s), gravity=s.gravity, start=s.start_array, stiffness=quantity.stiffness
+        points,
+        s.wrench,
+        rotation=orientation(s),
+        gravity=s.gravity,
+        start=s.start_array,
+        stiffness=quantity.stiffness,
     )
     return points, quantity.of(solution, Load(np.array(s.force), s.tolerance)) * quantity.factor

@@ -81,7 +81,9 @@ def _set_effect(records: list[AppliedEffect], address: str, rest: str, value: fl
     index, _, name = rest.partition("/")
     known = dict(_of_effects(tuple(records)))
     if address not in known:
-        raise StiffmapError(f"{address}: expected {', '.join(known) or 'no address of effects: there are none'}")
+        raise StiffmapError(
+            f"{address}: expected {', '.join(known) or 'no address of effects: there are none'}"
+        )
     r = records[int(index)]
     records[int(index)] = replace(
         r, parameters=tuple((n, value if n == name else v) for n, v in r.parameters)

@@ -30,7 +30,9 @@ class Controls:
 
     def __init__(self, viewer: Viewer) -> None:
         self.viewer, gui = viewer, viewer.server.gui
-        gui.configure_theme(control_layout="collapsible", control_width="large", show_logo=False, show_share_button=False)
+        gui.configure_theme(
+            control_layout="collapsible", control_width="large", show_logo=False, show_share_button=False
+        )
         self._modes: dict[str, tuple[float, ...] | None] = {HOME: None}
         moment = viewer.model.moment
         self._status = gui.add_html("")
@@ -54,7 +56,9 @@ class Controls:
     # -- building -----------------------------------------------------------------------------------------------
 
     def _tool(self, gui: Any, moment: Moment) -> None:
-        self._position = gui.add_vector3("Tool, mm", (0, 0, 0), step=1.0, hint="commanded position in base axes")
+        self._position = gui.add_vector3(
+            "Tool, mm", (0, 0, 0), step=1.0, hint="commanded position in base axes"
+        )
         self._typed(self._position, lambda m, v: m.put(position=tuple(1e-3 * np.array(v))))
         self._turn = gui.add_vector3(
             "Rotation, deg", (0, 0, 0), step=1.0, hint="rotation vector of the commanded orientation",
@@ -71,21 +75,29 @@ class Controls:
         self._typed(self._moment, lambda m, v: m.put(moment=tuple(v)))
         self._gravity = gui.add_slider("Gravity downwards, m/s²", 0.0, MOST_GRAVITY, 0.01, 0.0)
         self._typed(self._gravity, lambda m, v: m.put(gravity=(0.0, 0.0, -float(v)), keep=False), keep=False)
-        self._factor = gui.add_number("Magnification", 1.0, min=0.0, hint="of the deflected machine; 0 hides it")
+        self._factor = gui.add_number(
+            "Magnification", 1.0, min=0.0, hint="of the deflected machine; 0 hides it"
+        )
         self._typed(self._factor, lambda m, v: m.put(magnification=float(v)))
         self._pressed(gui.add_button("Round magnification"), lambda m: m.put(magnification=None))
-        self._mode = gui.add_dropdown("Assembly mode", (HOME,), hint="ways in which the machine takes this pose")
+        self._mode = gui.add_dropdown(
+            "Assembly mode", (HOME,), hint="ways in which the machine takes this pose"
+        )
         self._typed(self._mode, lambda m, v: m.put(start=self._modes.get(v)))
         gui.add_button("Search assembly modes").on_click(lambda _: self._search())
         self._pressed(gui.add_button("Undo"), lambda m: m.undo())
         self._pressed(gui.add_button("Reset"), lambda m: m.reset())
-        gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl").on_trigger(lambda _: self.viewer.act(lambda m: m.undo()))
+        gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl").on_trigger(
+            lambda _: self.viewer.act(lambda m: m.undo())
+        )
         gui.add_command("Reset the view").on_trigger(lambda _: self.viewer.act(lambda m: m.reset()))
 
     def _map(self, gui: Any, moment: Moment) -> None:
         box = gui.add_checkbox("Map", True)
         box.on_update(lambda e: self._set("map_on", e))
-        self._quantity = gui.add_dropdown("Colour", tuple(TITLES), initial_value=QUANTITIES["deflection"].title)
+        self._quantity = gui.add_dropdown(
+            "Colour", tuple(TITLES), initial_value=QUANTITIES["deflection"].title
+        )
         self._typed(self._quantity, lambda m, v: m.put(quantity=TITLES[v]))
         self._plane = gui.add_dropdown("Plane across", PLANES, initial_value=first_plane(moment.machine))
         self._typed(self._plane, lambda m, v: m.put(plane=v))
@@ -122,7 +134,9 @@ class Controls:
             self.viewer.swing.mode = int(event.target.value) - 1
             self.viewer.worker.ask()
 
-        gui.add_checkbox("Mode moves", False).on_update(lambda e: self.viewer.swing.play(bool(e.target.value)))
+        gui.add_checkbox("Mode moves", False).on_update(
+            lambda e: self.viewer.swing.play(bool(e.target.value))
+        )
 
     def _numbers(self, gui: Any, moment: Moment) -> None:
         self._all = addresses(moment.machine.description)
@@ -134,7 +148,9 @@ class Controls:
         self._typed(self._value, lambda m, v: m.change(self._address.value, float(v)))
         self._typed(
             self._scale,
-            lambda m, v: m.change(self._address.value, self._all[self._address.value] * 10 ** float(v), keep=False),
+            lambda m, v: m.change(
+                self._address.value, self._all[self._address.value] * 10 ** float(v), keep=False
+            ),
             keep=False,
         )
         self._pressed(gui.add_button("As in the file"), lambda m: m.change(self._address.value, None))
@@ -218,7 +234,9 @@ class Controls:
         self._write(self._around, "value", round(float(np.rad2deg(np.arctan2(s.force[1], s.force[0]))), 3))
         self._write(self._gravity, "value", min(max(-float(gravity[2]), 0.0), MOST_GRAVITY))
         if self.viewer._solution is not None:
-            self._write(self._factor, "value", moment.magnification(self.viewer.scene.rest, self.viewer._solution))
+            self._write(
+                self._factor, "value", moment.magnification(self.viewer.scene.rest, self.viewer._solution)
+            )
         self._write(self._quantity, "value", QUANTITIES[s.quantity].title)
         self._write(self._plane, "value", s.plane)
         self._write(self._normal, "value", _round(s.normal))
@@ -233,7 +251,10 @@ class Controls:
         self._write(self._value, "value", now)
         power = float(np.log10(now / plain)) if plain and now / plain > 0 else 0.0
         self._write(self._scale, "value", round(float(np.clip(power, -DECADE, DECADE)), 2))
-        lines = [f"{a} = {v:.6g} {unit_of(a)}, file: {self._all.get(a, float('nan')):.6g}" for a, v in given.items()]
+        lines = [
+            f"{a} = {v:.6g} {unit_of(a)}, file: {self._all.get(a, float('nan')):.6g}"
+            for a, v in given.items()
+        ]
         self._write(self._changed, "value", "\n".join(lines) or "nothing")
         self.outputs.show(moment)
 

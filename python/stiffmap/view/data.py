@@ -56,7 +56,11 @@ class Data:
 
     def _ribbon(self, scene: Scene, moment: Moment, path: Floats) -> None:
         wanted, cut, corrected, factor = path_errors(moment, path, DRAWN * scene.extent)
-        for name, colour, line in (("wanted", GREEN, wanted), ("cut", VERMILLION, cut), ("compensated", BLUE, corrected)):
+        for name, colour, line in (
+            ("wanted", GREEN, wanted),
+            ("cut", VERMILLION, cut),
+            ("compensated", BLUE, corrected),
+        ):
             pieces = np.stack([line[:-1], line[1:]], axis=1)
             good = np.isfinite(pieces).all(axis=(1, 2))
             scene.lines(f"/path/{name}", pieces[good], colour, 0.003 * scene.extent)

@@ -123,7 +123,8 @@ def element_links(machine: Machine, element: str) -> list[int]:
     """Which links of a drawing lie just before an element: they are lit when its share is chosen."""
     core = machine.compiled
     first = next(
-        (i for i, (_, c) in enumerate(core.nodes) if c >= 0 and _is_of(core.names.coordinates[c], element)), None
+        (i for i, (_, c) in enumerate(core.nodes) if c >= 0 and _is_of(core.names.coordinates[c], element)),
+        None,
     )
     if first is None:
         return []

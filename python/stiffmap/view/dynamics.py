@@ -77,4 +77,3 @@ def _compliance(
         phi = (machine.compiled.frames(at + step * shape)[0][-1] - rest) / step
         total = total + np.outer(phi, phi) * (1 / (w**2 - big**2 + 2j * DAMPING * w * big) - 1 / w**2)
     return float(np.linalg.svd(total, compute_uv=False)[0])
-

@@ -13,7 +13,13 @@ from stiffmap.view.state import State, as_plain
 def command_line(machine: str, moment: Moment) -> str:
     """For a shell; files and units as there: mm, deg, µm as mm."""
     s = moment.state
-    words = ["stiffmap", "view", machine, f"--at={_numbers(1e3 * np.array(s.position))}", f"--force={_numbers(s.force)}"]
+    words = [
+        "stiffmap",
+        "view",
+        machine,
+        f"--at={_numbers(1e3 * np.array(s.position))}",
+        f"--force={_numbers(s.force)}",
+    ]
     default = State(s.position)
     if s.rotation is not None:
         words.append(f"--rotation={_numbers(np.rad2deg(s.rotation))}")
@@ -44,7 +50,9 @@ def python_lines(machine: str, moment: Moment) -> str:
     lines.append(f"machine.view({p!r}{', ' if given else ''}{given})")
     if not s.changes and s.rotation is None and s.start is None:
         gravity = "" if s.gravity is None else f", gravity={list(s.gravity)!r}"
-        lines.append(f"print(machine.solve({list(p)!r}, {[float(v) for v in s.wrench]!r}{gravity}).displacement)")
+        lines.append(
+            f"print(machine.solve({list(p)!r}, {[float(v) for v in s.wrench]!r}{gravity}).displacement)"
+        )
     return "\n".join(lines)
 
 

@@ -27,7 +27,9 @@ KEPT_MACHINES = 16
 class Model:
     """State, history and what they mean; every method that changes anything says what went wrong by StiffmapError."""
 
-    def __init__(self, machine: Machine, state: State | None = None, *, file: str | Path | None = None) -> None:
+    def __init__(
+        self, machine: Machine, state: State | None = None, *, file: str | Path | None = None
+    ) -> None:
         """`file`: where the machine was read from, for commands that make the same picture and for reloading."""
         self.file = None if file is None else Path(file)
         self.declared = machine

@@ -21,7 +21,9 @@ from stiffmap.view.watch import Watch
 class View:
     """A view that is open; `close` ends it, as the end of a ``with`` block and of the program do."""
 
-    def __init__(self, model: Model, host: str = HERE, port: int | None = None, data: Data | None = None) -> None:
+    def __init__(
+        self, model: Model, host: str = HERE, port: int | None = None, data: Data | None = None
+    ) -> None:
         need_viser()
         self._guard = Guard(host, self._go)
         self._server = start_server(host, port, self._guard, model.declared.name)
@@ -63,7 +65,9 @@ class View:
         def deed(model: Model) -> None:
             machine, state = from_permalink(word)
             if machine not in (model.declared.name, str(model.file)):
-                raise StiffmapError(f"the link is of the machine {machine}; this view shows {model.declared.name}")
+                raise StiffmapError(
+                    f"the link is of the machine {machine}; this view shows {model.declared.name}"
+                )
             model.put(**{k: getattr(state, k) for k in state.__dataclass_fields__})
 
         self._viewer.act(deed)
@@ -100,7 +104,9 @@ class View:
         return f'<iframe src="{self.url}" width="100%" height="560" style="border:0" title="stiffmap view"></iframe>'
 
     def __repr__(self) -> str:
-        return f"View of {self._viewer.model.declared.name!r} at {self.url}" if self._viewer else "View, closed"
+        return (
+            f"View of {self._viewer.model.declared.name!r} at {self.url}" if self._viewer else "View, closed"
+        )
 
 
 def open_view(
@@ -119,7 +125,9 @@ def open_view(
     return view
 
 
-def model_of(machine: Machine, position: Any = None, file: str | PathLike[str] | None = None, **state: Any) -> Model:
+def model_of(
+    machine: Machine, position: Any = None, file: str | PathLike[str] | None = None, **state: Any
+) -> Model:
     """A model in a state given by keywords; StiffmapError for bad ones."""
     from stiffmap.view.state import as_plain, from_plain
 

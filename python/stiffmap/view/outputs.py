@@ -58,4 +58,3 @@ def _picture(moment: Moment, kind: str) -> bytes:
         file = Path(folder) / f"view.{kind}"
         write_view_picture(moment, file)
         return file.read_bytes()
-

@@ -70,7 +70,9 @@ def draw(server: object, moment: Moment, data: Callable[[Scene, Moment], None] |
     except StiffmapError:
         shares = ""
     force = np.array(moment.state.force)
-    words = f"force ({', '.join(f'{v:g}' for v in force)}) N; deflected machine (orange) magnified × {factor:g}"
+    words = (
+        f"force ({', '.join(f'{v:g}' for v in force)}) N; deflected machine (orange) magnified × {factor:g}"
+    )
     return (
         f"{status_line(moment, solution, '', '')}<div>{escape(words)}</div>"
         f"{colour_bar(found, found.range, moment.state.tolerance)}"

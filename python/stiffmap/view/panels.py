@@ -8,9 +8,9 @@ from html import escape
 import numpy as np
 
 from stiffmap.budget import DeflectionBudget
-from stiffmap.status import Status
 from stiffmap.performance.scaling import drive_table
 from stiffmap.solution import Solution
+from stiffmap.status import Status
 from stiffmap.view.colours import STATUS_COLOURS, table
 from stiffmap.view.isolines import levels, tolerance_level
 from stiffmap.view.moment import Moment
@@ -67,9 +67,7 @@ def colour_bar(found: PlaneMap, limits: tuple[float, float], tolerance: float) -
     )
     level = tolerance_level(found.quantity, tolerance)
     if level is not None and low < level < high:
-        ticks += (
-            f'<line x1="{at(level):.1f}" x2="{at(level):.1f}" y1="14" y2="40" stroke="#D55E00" stroke-width="2.5"/>'
-        )
+        ticks += f'<line x1="{at(level):.1f}" x2="{at(level):.1f}" y1="14" y2="40" stroke="#D55E00" stroke-width="2.5"/>'
     words = f"{q.title}, {q.unit}"
     note = f"; hatched: {int(found.failed.sum())} poses without an equilibrium" if found.failed.any() else ""
     text = f"{low:.4g} to {high:.4g} {q.unit}"
@@ -122,7 +120,12 @@ def compliance_panel(solution: Solution) -> str:
         return bars("compliance of the tool: none, there is no equilibrium", [])
     values, directions = principal(c)
     rows: list[Row] = [
-        (f"({', '.join(f'{x:z.2f}' for x in d)})", v / values[0] if values[0] else 0.0, BLUE, f"{1e6 * v:.4g} µm/N")
+        (
+            f"({', '.join(f'{x:z.2f}' for x in d)})",
+            v / values[0] if values[0] else 0.0,
+            BLUE,
+            f"{1e6 * v:.4g} µm/N",
+        )
         for v, d in zip(values, directions, strict=True)
     ]
     return bars("principal directions of the tool's compliance", rows)

@@ -15,7 +15,17 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from stiffmap.errors import StiffmapError
 from stiffmap.plot import save
 from stiffmap.plot.loaded import FORCE, draw_budget
-from stiffmap.plot.style import BLACK, COLOURS, CYCLE, MM, ORANGE, TOLERANCE, headline, new_figure, paper_style
+from stiffmap.plot.style import (
+    BLACK,
+    COLOURS,
+    CYCLE,
+    MM,
+    ORANGE,
+    TOLERANCE,
+    headline,
+    new_figure,
+    paper_style,
+)
 from stiffmap.view.colours import plane_image
 from stiffmap.view.isolines import isolines, tolerance_lines
 from stiffmap.view.moment import Moment

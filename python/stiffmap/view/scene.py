@@ -94,8 +94,12 @@ class Scene:
         self.rest = rest
         for name, colour, thick, chosen in self._groups:
             self.lines(name, rest.links[chosen], colour, thick)
-        self._points.points = np.asarray(rest.passive, np.float32) if len(rest.passive) else np.zeros((1, 3), np.float32)
-        self._drives.points = np.asarray(rest.actuators, np.float32) if len(rest.actuators) else np.zeros((1, 3), np.float32)
+        self._points.points = (
+            np.asarray(rest.passive, np.float32) if len(rest.passive) else np.zeros((1, 3), np.float32)
+        )
+        self._drives.points = (
+            np.asarray(rest.actuators, np.float32) if len(rest.actuators) else np.zeros((1, 3), np.float32)
+        )
         moved = NOTHING[:0] if loaded is None or factor == 0 else rest.enlarged(loaded, factor)
         self.lines("/ghost", moved, GHOST, 0.004 * self.extent)
         self.lines("/lit", rest.links[self.lit] if self.lit else NOTHING[:0], LIT, 0.03 * self.extent)
@@ -115,7 +119,12 @@ class Scene:
         if self._arrow is None:
             e = self.extent
             self._arrow = self.api.add_arrows(
-                "/force", points, rgb(FORCE), shaft_radius=0.005 * e, head_radius=0.013 * e, head_length=0.035 * e
+                "/force",
+                points,
+                rgb(FORCE),
+                shaft_radius=0.005 * e,
+                head_radius=0.013 * e,
+                head_length=0.035 * e,
             )
         self._arrow.points = points
         self._arrow.visible = size > 0
@@ -161,7 +170,13 @@ class Scene:
         points = np.asarray(around + np.array(moment.state.position), np.float32)
         if self._surface is None:
             self._surface = self.api.add_mesh_simple(
-                "/surface", points, sphere()[1], color=rgb("#56B4E9"), opacity=0.45, side="double", cast_shadow=False
+                "/surface",
+                points,
+                sphere()[1],
+                color=rgb("#56B4E9"),
+                opacity=0.45,
+                side="double",
+                cast_shadow=False,
             )
         self._surface.vertices = points
         self._surface.visible = True

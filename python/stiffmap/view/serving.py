@@ -15,6 +15,7 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from stiffmap.errors import StiffmapError
+from stiffmap.view.names import named
 from stiffmap.view.optional import need_viser
 
 HERE = "127.0.0.1"
@@ -65,6 +66,10 @@ class Guard:
             if link and self.on_link is not None and request.headers.get("Upgrade") != "websocket":
                 self.on_link(link)
             out = process(connection, request)
+            if out is not None and out.headers.get("Content-Type", "").startswith("text/html"):
+                out.body = named(out.body, out.headers.get("Content-Encoding") == "gzip")
+                del out.headers["Content-Length"]
+                out.headers["Content-Length"] = str(len(out.body))
             if out is not None and self.token:
                 out.headers["Set-Cookie"] = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
             return out

@@ -42,7 +42,9 @@ COUNTS = (FINE, COARSE, 35, 25, 17, 11)
 class Viewer:
     """Everything behind one address; all browsers that open it see the same."""
 
-    def __init__(self, model: Model, server: Any, data: Callable[[Scene, Moment], None] | None = None) -> None:
+    def __init__(
+        self, model: Model, server: Any, data: Callable[[Scene, Moment], None] | None = None
+    ) -> None:
         self.model, self.server, self._data = model, server, data
         self.lock = threading.RLock()
         self.error = ""
@@ -53,6 +55,7 @@ class Viewer:
         self._solution: Solution | None = None
         self._probe: np.ndarray[Any, Any] | None = None
         self._cloud_key: object = None
+        self._renewed = False
         self.dragging = False
         self.scene = Scene(server.scene, model.moment)
         self.controls = Controls(self)
@@ -100,7 +103,6 @@ class Viewer:
                 self.dragging = False
                 self.worker.ask()
 
-
     def drag(self, position: Any, wxyz: Any) -> None:
         """The gizmo was moved (m, quaternion)."""
         from scipy.spatial.transform import Rotation
@@ -139,6 +141,9 @@ class Viewer:
 
     def quick(self) -> None:
         """The machine and a plane with as many poses as the time allows."""
+        if self._renewed:
+            self._renewed = False
+            self._new_scene()
         moment = self.now()
         s = moment.solve()
         rest = moment.rest()
@@ -224,7 +229,9 @@ class Viewer:
         self.scene.lit = element_links(moment.machine, lit) if lit else []
         self.controls.why("".join(parts), self.scene.surface(moment, s, self.controls.surface))
         if self._solution is s:
-            self.scene.machine(moment, self.scene.rest, moment.loaded(s), moment.magnification(self.scene.rest, s))
+            self.scene.machine(
+                moment, self.scene.rest, moment.loaded(s), moment.magnification(self.scene.rest, s)
+            )
         if self._data is not None:
             self._data(self.scene, moment)
 
@@ -240,21 +247,25 @@ class Viewer:
         self.scene.cloud(points, colours_of(values, *limits))
 
     def _fail(self, problem: Exception) -> None:
-        self.error = str(problem) if isinstance(problem, StiffmapError) else f"{type(problem).__name__}: {problem}"
+        self.error = (
+            str(problem) if isinstance(problem, StiffmapError) else f"{type(problem).__name__}: {problem}"
+        )
         s = self._solution
         if s is not None:
             self.controls.say(status_line(self.now(), s, "", self.error))
 
     def renew(self) -> None:
-        """The machine's file has changed: its own scene and addresses."""
-        with self.lock:
-            moment = self.model.moment
+        """The machine's file has changed: its own scene and addresses, made by the thread that draws."""
+        self._renewed = True
+        self.redraw()
+
+    def _new_scene(self) -> None:
+        moment = self.now()
         self.server.scene.reset()
         self.scene = Scene(self.server.scene, moment)
         self._hands()
         self.controls.renew(moment)
-        self._cloud_key = None
-        self.redraw()
+        self._plane_key = self._cloud_key = None
 
     def close(self) -> None:
         """End the threads and the server."""

@@ -20,7 +20,9 @@ FLAGS = (
 def browser(tmp_path: Path) -> Iterator[Any]:
     """A browser with a fresh profile and no network but this computer; skips where there is none."""
     pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (pip install --group test)")
+    api = pytest.importorskip(
+        "playwright.sync_api", reason="playwright is not installed (pip install --group test)"
+    )
     command = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if command is None:
         pytest.skip("no Chromium is installed (Debian: apt-get install chromium)")

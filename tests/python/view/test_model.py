@@ -109,13 +109,17 @@ def test_effects_have_addresses_too(machine: sm.Machine) -> None:
     want = machine.with_effect("dead_zone", element="actuator", legs=["x"], half_width=5e-5)
     load = (300.0, 0, 0, 0, 0, 0)
     np.testing.assert_allclose(
-        model.machine.solve((0, 0, 0), load).displacement, want.solve((0, 0, 0), load).displacement, rtol=1e-12
+        model.machine.solve((0, 0, 0), load).displacement,
+        want.solve((0, 0, 0), load).displacement,
+        rtol=1e-12,
     )
     with pytest.raises(StiffmapError, match="effects/3/size: expected effects/0/half_width"):
         model.change("effects/3/size", 1.0)
 
 
-@pytest.mark.parametrize("address", ["x.foot/compliance.c99x", "nothing/at.x", "x.foot", "", "x.frame/translation.q"])
+@pytest.mark.parametrize(
+    "address", ["x.foot/compliance.c99x", "nothing/at.x", "x.foot", "", "x.frame/translation.q"]
+)
 def test_an_unknown_address_is_refused_and_nothing_changes(machine: sm.Machine, address: str) -> None:
     model = Model(machine)
     before = model.state

@@ -67,7 +67,9 @@ def test_panels_hold_the_numbers(model: Model) -> None:
     efforts = efforts_panel(moment, s)
     assert f"{s.actuator_effort[0]:.1f} of 2000 N" in efforts
     assert "▶ mode 2" in frequencies_panel([10.0, 20.0, np.nan], 1)
-    assert probe_text(moment, model.state.position).endswith(f"{1e6 * np.linalg.norm(s.displacement[:3]):.5g} µm")
+    assert probe_text(moment, model.state.position).endswith(
+        f"{1e6 * np.linalg.norm(s.displacement[:3]):.5g} µm"
+    )
 
 
 def test_the_colour_bar_shows_scale_and_tolerance(model: Model) -> None:
@@ -100,15 +102,23 @@ def test_the_command_makes_the_same_state(model: Model) -> None:
         if name == "set":
             given["changes"].append(value)  # type: ignore[union-attr]
         else:
-            given[names.get(name, name)] = float(value) if name in ("tolerance", "frequency", "magnify") else value
+            given[names.get(name, name)] = (
+                float(value) if name in ("tolerance", "frequency", "magnify") else value
+            )
     fields = _state(given)
     fields["changes"] = tuple(fields["changes"].items())
     for name, value in fields.items():
         want = getattr(full, name)
-        assert value == want if isinstance(want, str) or name == "changes" else np.allclose(value, want, rtol=1e-10)
+        assert (
+            value == want
+            if isinstance(want, str) or name == "changes"
+            else np.allclose(value, want, rtol=1e-10)
+        )
 
 
-def test_python_lines_run(model: Model, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_python_lines_run(
+    model: Model, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     seen = {}
     monkeypatch.setattr(sm.Machine, "view", lambda self, p, **state: seen.update(position=p, **state))
     exec(python_lines("orthoglide-revised", model.moment), {})

@@ -146,12 +146,16 @@ def test_dynamic_stiffness_is_the_sum_over_all_modes(machine: sm.Machine) -> Non
     ends = [[machine.compiled.frames(x + t * u)[0][-1] for t in (h, -h)] for u in w.shape[: len(k)]]
     motion = np.array([(a - b) / (2 * h) for a, b in ends])
     static = machine.solve(p, s.wrench).compliance[:3, :3]
-    np.testing.assert_allclose(np.einsum("mi,mj,m->ij", motion, motion, k**-2), static, atol=1e-6 * np.abs(static).max())
+    np.testing.assert_allclose(
+        np.einsum("mi,mj,m->ij", motion, motion, k**-2), static, atol=1e-6 * np.abs(static).max()
+    )
     for f in (5.0, 61.0, 100.0, 900.0):
         at = 2 * np.pi * f
         c = np.einsum("mi,mj,m->ij", motion, motion, 1 / (k**2 - at**2 + 2j * 0.02 * k * at))
         want = 1 / np.linalg.svd(c, compute_uv=False)[0]
-        assert float(dynamic_stiffness(machine, replace(s, frequency=f), p)[0]) == pytest.approx(want, rel=1e-4)
+        assert float(dynamic_stiffness(machine, replace(s, frequency=f), p)[0]) == pytest.approx(
+            want, rel=1e-4
+        )
 
 
 def test_quantities_of_modes_are_mapped_coarsely(machine: sm.Machine) -> None:

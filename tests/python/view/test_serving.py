@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gzip
 import socket
 
 import pytest
 
 from stiffmap.errors import StiffmapError
+from stiffmap.view.names import SCRIPT, named
 from stiffmap.view.serving import COOKIE, FIRST_PORT, Guard, free_port
 
 HERE = {"Host": "127.0.0.1:8080"}
@@ -46,6 +48,15 @@ def test_beyond_this_computer_a_token_is_asked_for() -> None:
     assert guard.refusal("/", far | {"Cookie": f"a=b; {COOKIE}={guard.token}"}) == ""
     assert guard.refusal("/", far | {"Cookie": f"{COOKIE}=ü"})
     assert guard.refusal(f"/?token={guard.token}", far | {"Origin": "http://evil.example"})
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_the_page_names_its_fields(packed: bool) -> None:
+    page = b"<html><head><title>t</title></head><body></body></html>"
+    out = named(gzip.compress(page) if packed else page, packed)
+    text = gzip.decompress(out) if packed else out
+    assert text.replace(SCRIPT.encode(), b"") == page and SCRIPT.encode() in text
+    assert named(b"no page", False) == b"no page"
 
 
 def test_a_taken_port_is_named_and_another_is_found() -> None:

@@ -100,7 +100,9 @@ def test_what_is_refused_is_shown_and_changes_nothing(view: View) -> None:
     assert not viewer.act(lambda m: m.put(position=(9.0, 0.0, 0.0)))
     assert viewer.worker.idle()
     assert view.state == before
-    assert 'role="alert"' in viewer.controls._status.content and "cannot reach (9000, 0, 0) mm" in viewer.error
+    assert (
+        'role="alert"' in viewer.controls._status.content and "cannot reach (9000, 0, 0) mm" in viewer.error
+    )
     assert viewer.act(lambda m: m.put(force=(1.0, 0.0, 0.0)))
     assert viewer.worker.idle()
     assert "alert" not in viewer.controls._status.content
@@ -179,7 +181,9 @@ def test_every_quantity_is_drawn(view: View, quantity: str) -> None:
         (["--start", "1,2"], "start"),
     ],
 )
-def test_bad_options_end_in_one_message(options: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_options_end_in_one_message(
+    options: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["view", "orthoglide-revised", "--html", "unused.html", *options]) == 2
     assert words in " ".join(capsys.readouterr().err.split())
     assert not Path("unused.html").exists()
