@@ -269,6 +269,28 @@ class Machine:
         """
         return Machine(redesigned(self._description, values), like=self)
 
+    def view(
+        self,
+        position: ArrayLike | None = None,
+        *,
+        port: int | None = None,
+        browser: bool = True,
+        **state: Any,
+    ) -> Any:
+        """Look at the machine and its map live in a browser; the view that is open is returned (``close()`` ends it).
+
+        position (3,) m, None: home. port: of 127.0.0.1; None: a free one from 8080 on. browser: whether to open one.
+        state: fields of `stiffmap.view.State`, such as ``force=(0, 0, -300)`` N, ``plane="x"``, ``quantity="worst"``,
+        ``changes={"x.foot/compliance.c33": 2e-8}``; SI, base axes. In a notebook the view is shown where it is the
+        last value of a cell. docs/view.md. Raises MissingPartError without the extra ``[view]`` (viser),
+        StiffmapError for bad input and for a pose that the machine cannot take.
+        """
+        from importlib import import_module
+
+        return import_module(f"{__package__}.view").open_view(
+            self, position, port=port, browser=browser, **state
+        )
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write a machine file that loads back equal."""
         save_description(self._description, path)

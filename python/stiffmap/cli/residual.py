@@ -10,7 +10,7 @@ import typer
 from scipy.spatial.transform import Rotation
 
 from stiffmap.calibration.validity import beyond
-from stiffmap.cli.inputs import EffectsOption, FolderOption, ThreadsOption, placed, plain
+from stiffmap.cli.inputs import EffectsOption, FolderOption, ThreadsOption, plain
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.experiment import Experiment, Residual, load_experiment
 from stiffmap.experiment import residual as compute
