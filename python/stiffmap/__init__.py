@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from stiffmap.budget import DeflectionBudget, deflection_budget
     from stiffmap.calibration import Calibration
     from stiffmap.calibration.calibrate import calibrate
+    from stiffmap.chatter import floquet_multiplier, limiting_depth, stability_lobes
     from stiffmap.compensation import Commands, compensate
     from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, Residual, load_experiment
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
         load_process,
     )
     from stiffmap.solution import Solution
+    from stiffmap.vibration import frequency_response
 
 # Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
 _HOME = {
@@ -88,6 +90,10 @@ _HOME = {
     "assembly_stress": "stiffmap.internal_wrenches",
     "error_map": "stiffmap.maps",
     "forward_kinematics": "stiffmap.kinematics",
+    "floquet_multiplier": "stiffmap.chatter",
+    "frequency_response": "stiffmap.vibration",
+    "limiting_depth": "stiffmap.chatter",
+    "stability_lobes": "stiffmap.chatter",
     "identify_link": "stiffmap.link",
     "inverse_kinematics": "stiffmap.kinematics",
     "load_machine": "stiffmap.machine",
@@ -130,6 +136,7 @@ __all__ = [
     "identify_process",
     "inverse_kinematics",
     "largest_box",
+    "limiting_depth",
     "load_experiment",
     "load_machine",
     "load_process",
@@ -143,6 +150,7 @@ __all__ = [
     "polar",
     "residual",
     "simulate",
+    "stability_lobes",
     "sweep",
     "uncertainty_ranking",
     "velocity_section",
