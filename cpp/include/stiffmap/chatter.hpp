@@ -2,6 +2,7 @@
 // Stability of milling: the largest multiplier of one tooth period by semi-discretization (theory V5).
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "stiffmap/types.hpp"
@@ -19,11 +20,13 @@ struct ToolModes {
 
 /// Scratch of `largest_multiplier`.
 struct ChatterWorkspace {
-  std::vector<MatX> step, push;  ///< per interval: state by state, state by what the last pass left
+  std::vector<double> step;  ///< per interval, by rows: state by state and by what the last pass left
+  std::vector<double> state, term, next;
   std::vector<Chip> gain;
-  MatX basis, hessenberg, work;
-  VecX start;
-  std::vector<Eigen::Vector2d> passed;
+  MatX basis, hessenberg;
+  VecX start;                  ///< where the next search begins: near what the last one found
+  std::vector<double> passed;  ///< displacements of two periods, the oldest first
+  double settled = 1e-10;      ///< residual of the largest multiplier, relative
 };
 
 /// |mu| of the largest multiplier; `chips`: means over the equal intervals of a tooth period (s), depth in m.
