@@ -17,10 +17,11 @@ using Row6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 
 py::dict tip_modes_of(const Mechanism& m, const Array& inertias, const Array& viscous, const Array& loss,
                       const Array& position, const Array& rotation, const Array& wrench, const Array& gravity,
-                      const std::string& point, int count, int threads) {
+                      const Array& closed, const std::string& point, int count, int threads) {
   const py::ssize_t n = position.shape(0), bodies = static_cast<py::ssize_t>(m.bodies.size()), size = m.size();
   const double *p = data(position, {n, 3}, "position"), *R = data(rotation, {n, 3, 3}, "rotation"),
                *w = data(wrench, {n, 6}, "wrench"), *about = data(inertias, {bodies, 3, 3}, "inertias");
+  const double* x0 = closed.ndim() && closed.shape(0) ? data(closed, {n, size}, "closed") : nullptr;
   const Vec3 g = Eigen::Map<const Vec3>(data(gravity, {3}, "gravity"));
   Inertias I;
   for (py::ssize_t k = 0; k < bodies; ++k) I.emplace_back(Eigen::Map<const Row3>(about + 9 * k));
@@ -49,6 +50,7 @@ py::dict tip_modes_of(const Mechanism& m, const Array& inertias, const Array& vi
       for (long i = begin; i < end; ++i) {
         in.commanded = {Eigen::Map<const Vec3>(p + 3 * i), Mat3(Eigen::Map<const Row3>(R + 9 * i))};
         in.wrenches = {Vec6(Eigen::Map<const Vec6>(w + 6 * i))};
+        in.closed = x0 && std::isfinite(x0[size * i]) ? x0 + size * i : nullptr;
         tip_modes(m, I, damping, in, count, ws, r);
         states[i] = static_cast<std::uint8_t>(r.status);
         bits[i] = r.flags;
@@ -111,7 +113,7 @@ void bind_vibration(py::module_& m) {
   using namespace py::literals;
   py::class_<Mechanism>(m.attr("Mechanism"))
       .def("tip_modes", &tip_modes_of, "inertias"_a, "viscous"_a, "loss"_a, "position"_a, "rotation"_a, "wrench"_a,
-           "gravity"_a, "point"_a, "count"_a, "threads"_a);
+           "gravity"_a, "closed"_a, "point"_a, "count"_a, "threads"_a);
   m.def("multipliers", &multipliers, "frequency"_a, "ratio"_a, "mass"_a, "way"_a, "rest"_a, "chips"_a, "period"_a,
         "depth"_a, "threads"_a);
 }

@@ -323,13 +323,14 @@ class CompiledMachine:
         wrench: Floats,
         *,
         gravity: Floats,
+        closed: Floats,
         point: str,
         count: int,
         threads: int,
     ) -> dict[str, Any]:
         """Arrays by name: the lowest modes at a point, damping between them, the flexibility of all others."""
         return self._mechanism.tip_modes(
-            inertias, viscous, loss, position, rotation, wrench, gravity, point, count, threads
+            inertias, viscous, loss, position, rotation, wrench, gravity, closed, point, count, threads
         )
 
     def frames(self, coordinates: Floats) -> tuple[Floats, Floats]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -94,12 +95,16 @@ def tip_modes(
     if rotation is not None:
         r = as_rotations(trailing(rotation, (3, 3), "rotation", "rotation matrices"))
     shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2])
+    poses, turns, loads = rows(p, shape, (3,)), rows(r, shape, (3, 3)), rows(w, shape, (6,))
+    cores = thread_count(threads)
     out = compiled.tip_modes(
-        inertias(machine), declared.viscous, declared.loss, rows(p, shape, (3,)), rows(r, shape, (3, 3)),
-        rows(w, shape, (6,)), gravity=compiled.gravity(gravity), point=point,
-        count=_count(machine, declared, modes), threads=thread_count(threads),
+        inertias(machine), declared.viscous, declared.loss, poses, turns, loads,
+        gravity=compiled.gravity(gravity), closed=compiled.close_poses(poses, turns, cores)[0], point=point,
+        count=_count(machine, declared, modes), threads=cores,
     )  # fmt: skip
     _symmetric(machine, out["unsymmetric"], symmetrise)
+    static = machine.solve(poses, loads, rotation=turns, point=point, gravity=gravity, threads=threads)
+    _statically(out, np.where(static.ok[:, None, None], static.compliance, np.nan))
     most = int(np.isfinite(out["square"]).sum(axis=1).max(initial=0))
     square = out["square"][:, :most]
     viscous = out["viscous"][:, :most, :most].copy()
@@ -129,6 +134,14 @@ def _symmetric(machine: Machine, unsymmetric: Floats, symmetrise: bool) -> None:
             "frequency response by modes needs a symmetric one; give symmetrise=True to take its symmetric part, "
             "or leave the moment out"
         )
+
+
+def _statically(out: dict[str, Any], compliance: Floats) -> None:
+    """What is not in the modes is the loaded compliance without theirs: the same number at 0 Hz as in statics."""
+    b = np.nan_to_num(out["tip"])
+    rest = compliance - b @ b.transpose(0, 2, 1)
+    take = np.isfinite(rest).all(axis=(1, 2)) & (out["unsymmetric"] <= SYMMETRIC)
+    out["rest"][take] = rest[take]
 
 
 def _padded(found: TipModes) -> TipModes:
