@@ -147,12 +147,12 @@ def _check(one: MeasuredResponse, file: str) -> None:
     if fall.size:
         k = int(fall[0])
         raise FileError(
-            f"{where}: expected rising frequencies; row {k + 2} has {f[k + 1]:g} Hz after {f[k]:g} Hz", file=file
+            f"{where}: expected rising frequencies; point {k + 2} has {f[k + 1]:g} Hz after {f[k]:g} Hz", file=file
         )
     bad = np.flatnonzero(np.isfinite(c) & ((c < 0) | (c > 1 + 1e-9)))
     if bad.size:
         k = int(bad[0])
-        raise FileError(f"{where}: expected a coherence from 0 to 1; row {k + 1} has {c[k]:g}", file=file)
+        raise FileError(f"{where}: expected a coherence from 0 to 1; point {k + 1} has {c[k]:g}", file=file)
     known = c[np.isfinite(c)]
     if known.size > 2 and (known >= 1).all():
         raise FileError(

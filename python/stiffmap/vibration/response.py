@@ -96,7 +96,7 @@ def frequency_axis(frequencies: ArrayLike) -> Floats:
     if fall.size:
         k = int(fall[0])
         raise StiffmapError(
-            f"frequencies: expected rising frequencies (Hz); entry {k + 1} is {f[k + 1]:g} after {f[k]:g}"
+            f"frequencies: expected rising frequencies (Hz); entry {k + 2} is {f[k + 1]:g} after {f[k]:g}"
         )
     return f
 
