@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from stiffmap.budget import DeflectionBudget, deflection_budget
     from stiffmap.calibration import Calibration
     from stiffmap.calibration.calibrate import calibrate
-    from stiffmap.chatter import floquet_multiplier, limiting_depth, stability_lobes
+    from stiffmap.chatter import floquet_multiplier, limiting_depth, stability_lobes, vibration_map
     from stiffmap.compensation import Commands, compensate
     from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, Residual, load_experiment
@@ -94,6 +94,7 @@ _HOME = {
     "frequency_response": "stiffmap.vibration",
     "limiting_depth": "stiffmap.chatter",
     "stability_lobes": "stiffmap.chatter",
+    "vibration_map": "stiffmap.chatter",
     "identify_link": "stiffmap.link",
     "inverse_kinematics": "stiffmap.kinematics",
     "load_machine": "stiffmap.machine",
@@ -155,6 +156,7 @@ __all__ = [
     "uncertainty_ranking",
     "velocity_section",
     "velocity_transmission",
+    "vibration_map",
     "workspace_volume",
     "worst_deflection",
 ]

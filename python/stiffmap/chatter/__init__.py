@@ -2,6 +2,7 @@
 
 from stiffmap.chatter.floquet import floquet_multiplier
 from stiffmap.chatter.lobes import stability_lobes
+from stiffmap.chatter.workspace import vibration_map
 from stiffmap.chatter.zero_order import limiting_depth
 
-__all__ = ["floquet_multiplier", "limiting_depth", "stability_lobes"]
+__all__ = ["floquet_multiplier", "limiting_depth", "stability_lobes", "vibration_map"]

@@ -133,13 +133,17 @@ def _axis(given: ArrayLike, name: str, unit: str) -> Floats:
     return out
 
 
+def interval_counts(modes: ToolModes, p: Process, speed: Floats) -> Any:
+    """(speeds,) parts of a tooth period that the fastest mode needs, one of 40, 80, 160 and 320."""
+    waves = modes.frequency.max() * 2 * pi / (p.tool.teeth * speed)
+    return (2 ** np.ceil(np.log2(np.clip(PER_WAVE * waves, LEAST, MOST) / LEAST)) * LEAST).astype(int)
+
+
 def _multipliers(
     modes: ToolModes, p: Process, speed: Floats, depth: Floats, intervals: int | None, threads: int | None
 ) -> Floats:
     """Speeds with the same number of intervals together."""
-    waves = modes.frequency.max() * 2 * pi / (p.tool.teeth * speed)
-    wanted = 2 ** np.ceil(np.log2(np.clip(PER_WAVE * waves, LEAST, MOST) / LEAST)) * LEAST
-    k = np.full(len(speed), intervals) if intervals is not None else wanted.astype(int)
+    k = np.full(len(speed), intervals) if intervals is not None else interval_counts(modes, p, speed)
     out = np.empty((len(speed), len(depth)))
     for count in np.unique(k):
         rows = k == count

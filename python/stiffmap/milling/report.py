@@ -14,6 +14,7 @@ from stiffmap.maps.files import write_dataset
 from stiffmap.milling.job import Milled, beyond, sizes, verdict
 from stiffmap.milling.pictures import error_figure, machine_path_figure, outline_figure
 from stiffmap.milling.placement import Placements
+from stiffmap.milling.stability import PathStability
 from stiffmap.outputs import make_folder, write_rows, write_text
 from stiffmap.plot.style import save
 from stiffmap.process import cutting_force
@@ -38,6 +39,7 @@ def summary(found: Milled) -> dict[str, object]:
         "length_mm": float(1e3 * job.points.way[-1]),
         "time_s": float(np.sum(np.diff(job.points.way) / job.feed[1:])),
         "verdict": verdict(ds),
+        "stability": _stability(found),
         "statuses": {
             s.name: int((ds.status.values == s).sum()) for s in Status if (ds.status.values == s).any()
         },
@@ -84,6 +86,18 @@ def placement_summary(found: Placements) -> dict[str, object]:
         "in_reach": found.reachable,
         "limited_by": found.limits,
     }
+
+
+def _stability(found: Milled) -> dict[str, object]:
+    """What is said of chatter; rpm."""
+    s, spindle = found.stability, found.job.process.spindle
+    if not isinstance(s, PathStability):
+        return {"said": s}
+    return {
+        "said": s.sentence(spindle), "largest_multiplier": float(s.multiplier.max()), "unstable_places": s.unstable,
+        "places": len(s.way), "stable_speeds_rpm": [float(60 * v / (2 * np.pi)) for v in s.offered],
+        "damping": s.damping,
+    }  # fmt: skip
 
 
 def write_report(found: Milled, folder: str | PathLike[str]) -> dict[str, str]:
@@ -150,6 +164,7 @@ def _sheet(found: Milled) -> Sheet:
         f"The compensated program has {found.program.pieces} cutting moves; it was read back and simulated with the force "
         "evaluated anew at the true distance from the wall.",
     ]
+    lines.append(str(s["stability"]["said"]))  # type: ignore[index]
     over = {k: v for k, v in s["beyond_limits"].items() if v}  # type: ignore[attr-defined]
     if over:
         lines.append("Limits broken: " + ", ".join(f"{k} at {v} points" for k, v in over.items()) + ".")
