@@ -73,7 +73,8 @@ def stability_lobes(
     -------
     Dataset
         `limit` (speed) m: least unstable depth, infinite where none on the diagram; `limit_zero_order` (speed) m;
-        `multiplier` (speed, depth); attributes: `least` m and `frequency` Hz of zero order, `coupling` m where modes couple
+        `multiplier` (speed, depth); attributes: `least` m and `frequency` Hz of zero order, `at_process` the
+        multiplier at the speed and depth of the process, `coupling` m where modes couple
         without regeneration, `damping`, `stable_speeds` [rad/s, m]: where the limit has its largest values.
 
     Raises StiffmapError for bad input. Source: docs/theory.md, V4 to V6.
@@ -100,6 +101,7 @@ def stability_lobes(
             "process": p.name, "method": method, "least": least, "damping": said, "modes": len(modes),
             "frequency": float(frequency[int(np.argmin(depth0.min(axis=-1)))]),
             "coupling": coupling_depth(modes, p),
+            "at_process": float(_multipliers(modes, p, np.array([p.spindle]), np.array([p.cut.axial]), intervals, 1)[0, 0]),
             "helix": "left out: the tooth is straight" if p.tool.helix else "none",
         },
     )  # fmt: skip

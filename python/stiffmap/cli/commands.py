@@ -55,5 +55,6 @@ COMMANDS = (
         "compensate", "stiffmap.cli.compensate", "compensate", "Commands that cancel what a machine lacks."
     ),
     Command("mill", "stiffmap.cli.mill", "mill", "The part as it is cut, and a program that makes it right."),
+    Command("lobes", "stiffmap.cli.lobes", "lobes", "Which depth of cut chatters at which speed."),
     Command("bench", "stiffmap.cli.bench", "bench", "Speed of this installation on this computer."),
 )
