@@ -50,8 +50,8 @@ def pose_of(machine):
     return (low + high) / 2 + np.where(high - low > 0.01, np.array([0.01, -0.02, 0.015]), 0.0)
 
 
-def expected(machine, p):
-    """(frequencies, 6, 6) m/N and the like."""
+def linearised(machine, p):
+    """Tip Jacobian (6, k), stiffness, losses, mass and dampers (k, k) of the motions that keep the loops closed."""
     k = drive_kinematics(machine, p)
     x = dict(zip(machine.compiled.names.coordinates, k.coordinates, strict=True))
     tree = Tree(machine, springs=True, x=x)
@@ -71,11 +71,12 @@ def expected(machine, p):
         index = [i for i, _ in rows]
         block = np.array([row for _, row in rows])
         stiffness[np.ix_(index, index)] = block
-        lossy[np.ix_(index, index)] = (elements.get(name) or elements[core_name(name)]).loss_factor * block
+        loss = (elements.get(name) or elements[core_name(name)]).loss_factor
+        lossy[np.ix_(index, index)] = (loss or 0.0) * block
     for name, e in elements.items():
         if isinstance(e, Joint):
             for full in [name] if len(e.axes) == 1 else [f"{name}.{i + 1}" for i in range(len(e.axes))]:
-                dampers[tree.index(full)] = e.damping
+                dampers[tree.index(full)] = e.damping or 0.0
     held = [tree.index(s) for s in machine.free_spins]
     held += [tree.index(a) for a in machine.actuators if elements[core_name(a)].law is None]
     free = [i for i in range(n) if i not in held]
@@ -85,8 +86,25 @@ def expected(machine, p):
     take = np.ix_(free, free)
     K, E, M = (Z.T @ a[take] @ Z for a in (stiffness, lossy, tree.mass()))
     C = Z.T @ np.diag(dampers[free]) @ Z
+    return tip, K, E, M, C
+
+
+def expected(machine, p):
+    """(frequencies, 6, 6) m/N and the like."""
+    tip, K, E, M, C = linearised(machine, p)
     w = 2 * np.pi * FREQUENCIES
     return np.array([tip @ np.linalg.solve(K + 1j * np.sign(v) * E + 1j * v * C - v**2 * M, tip.T) for v in w])
+
+
+def modes(machine, p, count):
+    """(count,) Hz and (count, 3) directions of the tool, lowest first, of those that move it."""
+    tip, K, _, M, _ = linearised(machine, p)
+    mu, X = scipy.linalg.eigh(M, K.real)
+    order = np.argsort(-mu)
+    b = (tip @ X[:, order])[:3]
+    size = np.linalg.norm(b, axis=0)
+    keep = np.flatnonzero((mu[order] > 1e-12 * mu.max()) & (size > 1e-3 * size[: 4 * count].max()))[:count]
+    return 1 / (2 * np.pi * np.sqrt(mu[order][keep])), (b[:, keep] / size[keep]).T
 
 
 def difference(name):
