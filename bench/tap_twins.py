@@ -12,13 +12,13 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
+from tests.python.vibration.mujoco_frf import machine_of, modes
 
 import stiffmap as sm
 from stiffmap.effects import apply_records
 from stiffmap.taps import TapTest, explain_taps
 from stiffmap.taps.explain import _candidates
 from stiffmap.taps.problem import shifted, uncertain_numbers
-from tests.python.vibration.mujoco_frf import machine_of, modes
 
 MACHINES = ("ur10", "orthoglide-revised", "five-bar", "linear-delta", "travelling-column")
 POSES, MODES, NOISE, TURN, DEFAULT = 3, 4, 0.005, 0.05, 0.05
@@ -52,14 +52,24 @@ def main() -> None:
     for k in range(given.twins):
         name = MACHINES[k % len(MACHINES)]
         machine = machine_of(name)
-        drives = [c for c in _candidates(machine.description) if c.kind == "compliance" and "." not in c.element]
+        drives = [
+            c for c in _candidates(machine.description) if c.kind == "compliance" and "." not in c.element
+        ]
         own = {a.rpartition(".")[2] for a in machine.actuators}
         drives = [c for c in drives if c.element in own and len(c.legs) == 1] or drives
         c = drives[rng.integers(len(drives))]
         scale = float(rng.uniform(2.5, 5.0))
         found = explain_taps(machine, twin(machine, rng, c.term([scale])), default_u=DEFAULT)
         names = [e.candidate for e in found.alike]
-        how = "named" if names[:1] == [str(c)] else "listed" if str(c) in names else "missed" if not names else "wrong"
+        how = (
+            "named"
+            if names[:1] == [str(c)]
+            else "listed"
+            if str(c) in names
+            else "missed"
+            if not names
+            else "wrong"
+        )
         tally.setdefault(name, []).append(how)
         if how == "named":
             off.append((found.alike[0].parameters["scale"] - scale) / found.alike[0].u["scale"])

@@ -82,7 +82,9 @@ def stability_lobes(
     if method not in METHODS:
         raise StiffmapError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
     p = milling_process(process)
-    modes, said = _modes(machine, position, cut_axes(real_array(feed, "feed"), real_array(tool, "tool")), pose)
+    modes, said = _modes(
+        machine, position, cut_axes(real_array(feed, "feed"), real_array(tool, "tool")), pose
+    )
     extra = list(also)
     if extra:
         modes = modes.and_also(mode_rows(extra))
@@ -120,7 +122,9 @@ def _modes(
 ) -> tuple[ToolModes, str]:
     if not isinstance(machine, Machine | str | PathLike):
         if pose or position is not None:
-            raise StiffmapError("modes: a list of modes has no pose; position and its options are for a machine")
+            raise StiffmapError(
+                "modes: a list of modes has no pose; position and its options are for a machine"
+            )
         return mode_rows(machine), "of the modes as given"
     m = as_machine(machine)
     at = m.description.home.p if position is None else position
@@ -130,7 +134,11 @@ def _modes(
 
 def _axis(given: ArrayLike, name: str, unit: str) -> Floats:
     out = np.atleast_1d(real_array(given, name, f"rising numbers above zero ({unit})"))
-    if out.ndim != 1 or not out.size or not (np.isfinite(out).all() and out[0] > 0 and (np.diff(out) > 0).all()):
+    if (
+        out.ndim != 1
+        or not out.size
+        or not (np.isfinite(out).all() and out[0] > 0 and (np.diff(out) > 0).all())
+    ):
         raise StiffmapError(f"{name}: expected rising numbers above zero ({unit})")
     return out
 

@@ -44,9 +44,7 @@ class ToolModes:
 
     def turned(self, axes: Floats) -> ToolModes:
         """The same along the rows of `axes` (3, 3)."""
-        return ToolModes(
-            self.frequency, self.ratio, self.mass, self.way @ axes.T, axes @ self.rest @ axes.T
-        )
+        return ToolModes(self.frequency, self.ratio, self.mass, self.way @ axes.T, axes @ self.rest @ axes.T)
 
     def receptance(self, frequency: Floats) -> np.ndarray:
         """(frequencies, 3, 3) m/N at Hz."""
@@ -78,7 +76,9 @@ def mode_rows(modes: ToolModes | Iterable[Any]) -> ToolModes:
         return modes
     rows = list(modes)
     if not rows:
-        raise StiffmapError("modes: expected rows (frequency Hz, damping ratio, mass kg, direction), got none")
+        raise StiffmapError(
+            "modes: expected rows (frequency Hz, damping ratio, mass kg, direction), got none"
+        )
     found = [_row(i, row) for i, row in enumerate(rows)]
     f, ratio, mass, way = zip(*found, strict=True)
     return ToolModes(np.array(f), np.array(ratio), np.array(mass), np.array(way), np.zeros((3, 3)))

@@ -77,14 +77,20 @@ def vibration_map(
         peak = np.argmax(largest, axis=1)
         here = np.arange(len(rows))
         stiffness[rows], at[rows] = 1 / np.sqrt(largest[here, peak]), f[peak]
-        way[rows] = _real(np.linalg.eigh(H[here, peak].conj().transpose(0, 2, 1) @ H[here, peak])[1][:, :, -1])
+        way[rows] = _real(
+            np.linalg.eigh(H[here, peak].conj().transpose(0, 2, 1) @ H[here, peak])[1][:, :, -1]
+        )
         if cut is not None:
             use = f > 0
             depth[rows] = limits(axes @ H[:, use] @ axes.T, cut)[0].min(axis=(-1, -2))
     shape = p.shape[:-1]
     dims = ("pose",) if len(shape) == 1 else tuple(f"pose_{i}" for i in range(len(shape)))
     lowest = np.where(np.isfinite(found.rest[:, 0, 0]), found.frequency[:, 0], np.nan)
-    values = {"lowest_frequency": (lowest, "Hz"), "dynamic_stiffness": (stiffness, "N/m"), "at_frequency": (at, "Hz")}
+    values = {
+        "lowest_frequency": (lowest, "Hz"),
+        "dynamic_stiffness": (stiffness, "N/m"),
+        "at_frequency": (at, "Hz"),
+    }
     if cut is not None:
         values["limiting_depth"] = (depth, "m")
     ds = xr.Dataset(

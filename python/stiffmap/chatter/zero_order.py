@@ -97,9 +97,7 @@ def limits(G: np.ndarray, process: Any) -> tuple[Floats, Floats]:
     eigen = np.stack([trace / 2 + root, trace / 2 - root], axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = 1 / eigen
-        depth = np.where(
-            inverse.real > 0, (inverse.real**2 + inverse.imag**2) / (2 * inverse.real), np.inf
-        )
+        depth = np.where(inverse.real > 0, (inverse.real**2 + inverse.imag**2) / (2 * inverse.real), np.inf)
         angle = 2 * np.arctan2(inverse.real, inverse.imag)
     return np.where(np.isfinite(depth), depth, np.inf), angle
 

@@ -4,4 +4,14 @@ from stiffmap.compiled.machine import Answer, CompiledMachine, kernel_levels, mu
 from stiffmap.compiled.names import Names, Role
 from stiffmap.compiled.status import Flag, Status, counted
 
-__all__ = ["Answer", "CompiledMachine", "Flag", "Names", "Role", "Status", "counted", "kernel_levels", "multipliers"]
+__all__ = [
+    "Answer",
+    "CompiledMachine",
+    "Flag",
+    "Names",
+    "Role",
+    "Status",
+    "counted",
+    "kernel_levels",
+    "multipliers",
+]

@@ -366,6 +366,4 @@ def multipliers(
     (modes,) rad/s, ratio, kg and (modes, 3) unit vectors; (3, 3) m/N that follows at once; (intervals, 3, 2) N/m² means of the
     chip's force; (periods,) s; (depths,) m.
     """
-    return np.asarray(
-        _core.multipliers(frequency, ratio, mass, way, rest, chips, period, depth, threads)
-    )
+    return np.asarray(_core.multipliers(frequency, ratio, mass, way, rest, chips, period, depth, threads))

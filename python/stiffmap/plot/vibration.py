@@ -36,7 +36,9 @@ def lobes_figure(
         s, d = RPM * lobes.speed.values, MM * lobes.depth.values
         if "multiplier" in lobes:
             mu = np.clip(lobes.multiplier.values.T, 0, 2)
-            filled = ax.pcolormesh(s, d, mu, cmap=COLOURS + "_r", vmin=0.5, vmax=1.5, shading="nearest", rasterized=True)
+            filled = ax.pcolormesh(
+                s, d, mu, cmap=COLOURS + "_r", vmin=0.5, vmax=1.5, shading="nearest", rasterized=True
+            )
             bar = figure.colorbar(filled, ax=ax, extend="both")
             bar.set_label("largest multiplier of a tooth period")
             if mu.min() < 1 < mu.max():
@@ -65,7 +67,11 @@ def response_figure(responses: Mapping[str, xr.DataArray], axes: str = "xyz") ->
             for i, (label, H) in enumerate(responses.items()):
                 own = np.abs(H.sel(response=axis, force=f"f{axis}"))
                 ax.semilogy(
-                    H.frequency, MICRO * own, color=CYCLE[i % len(CYCLE)], ls=DASHES[i % len(DASHES)], label=label
+                    H.frequency,
+                    MICRO * own,
+                    color=CYCLE[i % len(CYCLE)],
+                    ls=DASHES[i % len(DASHES)],
+                    label=label,
                 )
             ax.set_title(f"along {axis}")
             ax.set_xlabel("frequency, Hz")

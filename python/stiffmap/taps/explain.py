@@ -164,7 +164,11 @@ def _term(c: Candidate, value: float) -> Term:
 def _scaled(p: Parameter) -> tuple[Callable[[float], float], float, float]:
     """From a free number to the parameter (factors by their logarithm), and its bounds."""
     if p.null == 1.0:
-        return (lambda t: float(np.clip(np.exp(t), p.lower, p.upper))), float(np.log(p.lower)), float(np.log(p.upper))
+        return (
+            (lambda t: float(np.clip(np.exp(t), p.lower, p.upper))),
+            float(np.log(p.lower)),
+            float(np.log(p.upper)),
+        )
     return (lambda t: float(np.clip(t * p.scale, p.lower, p.upper))), p.lower / p.scale, p.upper / p.scale
 
 
@@ -196,7 +200,12 @@ def _fitted(problem: Problem, c: Candidate, part: str = "") -> Explained | None:
     starts = STARTS if p.null == 1.0 else (0.05, 1.0)
     grid = [(float((residual(np.array([t])) ** 2).sum()), t) for t in starts]
     fit = least_squares(
-        residual, [min(max(min(grid)[1], low), high)], bounds=([low], [high]), diff_step=1e-4, x_scale=0.3, max_nfev=25
+        residual,
+        [min(max(min(grid)[1], low), high)],
+        bounds=([low], [high]),
+        diff_step=1e-4,
+        x_scale=0.3,
+        max_nfev=25,
     )
     curvature = float((fit.jac**2).sum())
     if not curvature > 0:
@@ -244,5 +253,9 @@ def _both(problem: Problem, best: Explained) -> Explained:
         return best
     name = best.place.parameters[0].name
     return replace(
-        best, statics=one.parameters[name], u_statics=one.u[name], taps=two.parameters[name], u_taps=two.u[name]
+        best,
+        statics=one.parameters[name],
+        u_statics=one.u[name],
+        taps=two.parameters[name],
+        u_taps=two.u[name],
     )

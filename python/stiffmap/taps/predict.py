@@ -59,5 +59,7 @@ def predict_taps(
         f[rows[mine]], ratio[rows[mine]] = hertz[theirs], found.ratio[k, seen[theirs]]
         mac[rows[mine]] = cosine[mine, theirs]
     if np.isnan(f).all():
-        raise StiffmapError(f"{machine.name}: no pose of the tap test can be reached, or none has a mode at the tool")
+        raise StiffmapError(
+            f"{machine.name}: no pose of the tap test can be reached, or none has a mode at the tool"
+        )
     return Predicted(f, ratio, mac)

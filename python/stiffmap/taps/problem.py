@@ -108,12 +108,18 @@ class Problem:
 def uncertain_numbers(d: MachineDescription, default_u: float) -> list[tuple[str, float, float]]:
     """Names, values and standard uncertainties (SI): those that the machine file declares, and masses by `default_u`."""
     declared = dict(d.uncertainty)
-    masses = {f"{full}/mass": default_u * e.mass for full, e in all_elements(d) if isinstance(e, Body) and e.mass > 0}
+    masses = {
+        f"{full}/mass": default_u * e.mass
+        for full, e in all_elements(d)
+        if isinstance(e, Body) and e.mass > 0
+    }
     both = {**masses, **declared}
     return [(k, v, u) for k, u in both.items() if u > 0 and (v := number(d, k)) is not None]
 
 
-def shifted(d: MachineDescription, numbers: list[tuple[str, float, float]], off: Floats) -> MachineDescription:
+def shifted(
+    d: MachineDescription, numbers: list[tuple[str, float, float]], off: Floats
+) -> MachineDescription:
     """Numbers off by so many standard uncertainties; stiffness, compliance and mass by factors, so that they stay positive."""
     for (key, value, u), t in zip(numbers, off, strict=True):
         field_ = key.partition("/")[2]

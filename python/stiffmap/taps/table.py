@@ -45,7 +45,9 @@ class TapTest:
 
     def rows(self, keep: NDArray[np.bool_]) -> TapTest:
         """Some of the rows."""
-        return TapTest(*(getattr(self, n)[keep] for n in ("position", "frequency", "u", "ratio", "direction")))
+        return TapTest(
+            *(getattr(self, n)[keep] for n in ("position", "frequency", "u", "ratio", "direction"))
+        )
 
 
 def load_taps(path: str | PathLike[str]) -> TapTest:
@@ -58,12 +60,22 @@ def load_taps(path: str | PathLike[str]) -> TapTest:
     if not p.is_file():
         raise FileError("no such table of tap tests", file=str(path))
     with p.open(newline="", encoding="utf-8-sig") as file:
-        rows = [r for r in csv.reader(file) if any(c.strip() for c in r) and not r[0].lstrip().startswith("#")]
+        rows = [
+            r for r in csv.reader(file) if any(c.strip() for c in r) and not r[0].lstrip().startswith("#")
+        ]
     head = [h.strip() for h in rows[0]] if rows else []
     missing, unknown = [c for c in NEEDED if c not in head], [c for c in head if c not in KNOWN]
     if missing or unknown or len(rows) < 2:
-        what = f"missing {', '.join(missing)}" if missing else f"unknown {', '.join(unknown)}" if unknown else "no rows"
-        raise FileError(f"expected the columns {', '.join(KNOWN)} (from u_Hz on where known); {what}", file=str(path))
+        what = (
+            f"missing {', '.join(missing)}"
+            if missing
+            else f"unknown {', '.join(unknown)}"
+            if unknown
+            else "no rows"
+        )
+        raise FileError(
+            f"expected the columns {', '.join(KNOWN)} (from u_Hz on where known); {what}", file=str(path)
+        )
     data = {c: np.full(len(rows) - 1, np.nan) for c in KNOWN}
     for i, row in enumerate(rows[1:]):
         if len(row) != len(head):

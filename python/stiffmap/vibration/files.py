@@ -63,7 +63,8 @@ def _csv(path: Path) -> MeasuredResponse:
     unit = head[1].partition("_")[2] if len(head) > 1 else ""
     if head[0] != "frequency_Hz" or len(head) not in (3, 4) or unit not in KINDS:
         raise FileError(
-            f"expected the columns {HEAD}, UNIT one of {', '.join(KINDS)}; found {', '.join(head)}", file=str(path)
+            f"expected the columns {HEAD}, UNIT one of {', '.join(KINDS)}; found {', '.join(head)}",
+            file=str(path),
         )
     if not (head[1].startswith("real_") and head[2] == f"imag_{unit}" and head[3:] in ([], ["coherence"])):
         raise FileError(f"expected the columns {HEAD}; found {', '.join(head)}", file=str(path), line=1)
@@ -147,7 +148,8 @@ def _check(one: MeasuredResponse, file: str) -> None:
     if fall.size:
         k = int(fall[0])
         raise FileError(
-            f"{where}: expected rising frequencies; point {k + 2} has {f[k + 1]:g} Hz after {f[k]:g} Hz", file=file
+            f"{where}: expected rising frequencies; point {k + 2} has {f[k + 1]:g} Hz after {f[k]:g} Hz",
+            file=file,
         )
     bad = np.flatnonzero(np.isfinite(c) & ((c < 0) | (c > 1 + 1e-9)))
     if bad.size:

@@ -87,7 +87,9 @@ def tip_modes(
     need_masses(machine, "a frequency response")
     compiled = machine.compiled
     if point not in machine.points:
-        raise StiffmapError(f"point: no point '{point}' on {machine.name}; there are: {', '.join(machine.points)}")
+        raise StiffmapError(
+            f"point: no point '{point}' on {machine.name}; there are: {', '.join(machine.points)}"
+        )
     declared = damping_of(machine, damping)
     p = trailing(position, (3,), "position", "positions (m)")
     w = wrench_array(wrench)

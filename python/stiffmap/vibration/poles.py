@@ -2,36 +2,46 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.broadcasting import Floats
+from stiffmap.broadcasting import Floats, thread_count
 from stiffmap.vibration.modes import TipModes
 
 Complex = NDArray[np.complex128]
 WORST_BASIS = 1e8
 """Condition of the eigenvectors from which on (critically damped pairs) each frequency is solved by itself."""
+BLOCK = 64
+"""Poses of one call of a thread."""
 
 
-def receptance(modes: TipModes, frequency: Floats) -> Complex:
+def receptance(modes: TipModes, frequency: Floats, threads: int | None = None) -> Complex:
     """(n, frequencies, 6, 6) m/N and the like at (frequencies,) Hz; NaN where the pose failed.
 
     At 0 Hz structural damping does not count: the compliance there is real.
     """
     n, f = len(modes.square), len(frequency)
-    out = np.full((n, f, 6, 6), np.nan + 0j)
-    ok = np.isfinite(modes.rest[:, 0, 0])
-    if ok.any():
-        solve = _real_modes if modes.proportional else _poles
-        out[ok] = solve(_rows(modes, ok), 2j * np.pi * frequency)
+    out = np.empty((n, f, 6, 6), complex)
+    solve = _real_modes if modes.proportional else _poles
+    s = 2j * np.pi * frequency
+
+    def block(first: int) -> None:
+        rows = np.arange(first, min(n, first + BLOCK))
+        ok = np.isfinite(modes.rest[rows, 0, 0])
+        out[rows[~ok]] = np.nan
+        if ok.any():
+            out[rows[ok]] = solve(_rows(modes, rows[ok]), s)
+
+    with ThreadPoolExecutor(thread_count(threads)) as pool:
+        list(pool.map(block, range(0, n, BLOCK)))
     return out
 
 
-def _rows(m: TipModes, ok: NDArray[np.bool_]) -> dict[str, Any]:
-    names = ("square", "tip", "viscous", "loss", "rest")
-    return {k: getattr(m, k) if ok.all() else getattr(m, k)[ok] for k in names}
+def _rows(m: TipModes, rows: NDArray[np.intp]) -> dict[str, Any]:
+    return {k: getattr(m, k)[rows] for k in ("square", "tip", "viscous", "loss", "rest")}
 
 
 def _real_modes(m: dict[str, Floats], s: Complex) -> Complex:

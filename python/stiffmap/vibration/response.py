@@ -79,7 +79,7 @@ def frequency_response(
         machine, position, wrench, rotation=rotation, gravity=gravity, point=point, damping=damping, modes=modes,
         symmetrise=symmetrise, threads=threads,
     )  # fmt: skip
-    values = receptance(found, f)
+    values = receptance(found, f, threads)
     if KINDS[kind]:
         values *= ((2j * np.pi * f) ** KINDS[kind])[:, None, None]
     return response_array(values, f, found, machine.name, point, kind)

@@ -68,7 +68,9 @@ def _stretching(stiff: Complex, load: Floats, length: float) -> Complex:
     y = np.where(np.abs(x) < 1e-4, 1.0, x)
     own = np.where(np.abs(x) < 1e-4, 1 - x**2 / 3, y / np.tan(y))
     other = np.where(np.abs(x) < 1e-4, -1 - x**2 / 6, -y / np.sin(y))
-    return np.asarray(np.array([[own, other], [other, own]]).transpose(2, 0, 1) * (stiff / length)[:, None, None])
+    return np.asarray(
+        np.array([[own, other], [other, own]]).transpose(2, 0, 1) * (stiff / length)[:, None, None]
+    )
 
 
 def couple_tool(machine: xr.DataArray, tool: Complex, axes: Floats | None = None) -> xr.DataArray:

@@ -38,7 +38,8 @@ def test_one_mode_tends_to_the_published_multiplier_with_order_two(depth, limit)
 
 
 @pytest.mark.parametrize(
-    ("share", "rpm", "depth", "mu"), [(0.05, 15e3, 1e-3, 0.956), (0.1, 10e3, 1e-3, 1.0038), (0.5, 5e3, 0.5e-3, 1.991)]
+    ("share", "rpm", "depth", "mu"),
+    [(0.05, 15e3, 1e-3, 0.956), (0.1, 10e3, 1e-3, 1.0038), (0.5, 5e3, 0.5e-3, 1.991)],
 )
 def test_two_modes_at_low_immersion(share, rpm, depth, mu):
     found = sm.floquet_multiplier(TWO, process(10 * share), rpm * np.pi / 30, depth, intervals=80)
@@ -56,7 +57,11 @@ def test_borders_of_the_delay_oscillator_are_exact():
     def size(d, b):
         one = np.ones(1)
         w = np.sqrt(d - b) * one
-        return float(multipliers(w, 0 * one, one, np.eye(3)[:1], np.zeros((3, 3)), chip, 2 * np.pi * one, b * one, 1)[0, 0])
+        return float(
+            multipliers(w, 0 * one, one, np.eye(3)[:1], np.zeros((3, 3)), chip, 2 * np.pi * one, b * one, 1)[
+                0, 0
+            ]
+        )
 
     for n, d in ((0, 0.1), (1, 0.6), (2, 1.15), (3, 2.0), (4, 4.1)):
         b = (-1) ** n * (d - n**2 / 4)
@@ -87,7 +92,8 @@ def published_receptance():
 
 
 @pytest.mark.parametrize(
-    ("side", "radial", "limit"), [("climb", 15.875, 1.015), ("conventional", 15.875, 1.564), ("slot", 31.75, 0.504)]
+    ("side", "radial", "limit"),
+    [("climb", 15.875, 1.015), ("conventional", 15.875, 1.564), ("slot", 31.75, 0.504)],
 )
 def test_zero_order_of_two_modes_per_axis(side, radial, limit):
     cut = process(radial, side, 31.75, 1319.4, 788.8)
@@ -102,7 +108,7 @@ def test_skewed_modes_have_the_limit_of_tlusty():
     found = oriented_limit(G, 1000e6)
     # near the dip of one mode alone: -cos² / (4 k z (1 + z)), the other mode adds its flexibility there
     n, z, k, a = rows[0]
-    dip = -np.cos(a) ** 2 / (4 * k * z * (1 + z))
+    dip = -(np.cos(a) ** 2) / (4 * k * z * (1 + z))
     other = np.cos(rows[1][3]) ** 2 / rows[1][2] / (1 - (n * np.sqrt(1 + 2 * z) / rows[1][0]) ** 2)
     assert found == pytest.approx(-1 / (2 * 1000e6 * (dip + other)), rel=2e-3)
 
@@ -127,7 +133,9 @@ def test_chips_are_the_means_of_their_integrand():
     for tooth in range(2):
         at = phi + tooth * np.pi
         on = (at >= first) & (at <= last)
-        force = np.stack([-6e8 * np.cos(at) - 2e8 * np.sin(at), 6e8 * np.sin(at) - 2e8 * np.cos(at), 0 * at], -1)
+        force = np.stack(
+            [-6e8 * np.cos(at) - 2e8 * np.sin(at), 6e8 * np.sin(at) - 2e8 * np.cos(at), 0 * at], -1
+        )
         value += on[:, None, None] * force[:, :, None] * np.stack([np.sin(at), np.cos(at)], -1)[:, None, :]
     np.testing.assert_allclose(found, value.reshape(k, 4000, 3, 2).mean(axis=1), atol=2e-4 * 6e8)
 

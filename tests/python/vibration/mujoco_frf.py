@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.linalg
+from tests.python.performance.mujoco_tree import Tree
 
 import stiffmap as sm
 from stiffmap.description import Body, Joint, Offset, Spring
 from stiffmap.description.tree import all_elements, core_name, edit_sequences
 from stiffmap.performance.closing import drive_kinematics
-from tests.python.performance.mujoco_tree import Tree
 
 FREQUENCIES = np.array([0.0, 3.0, 8.0, 17.0, 31.0, 60.0, 140.0])
 
@@ -65,7 +65,9 @@ def linearised(machine, p):
             stiffness[i, i] = row
         else:
             group.setdefault(joint.rsplit(".", 1)[0], []).append((i, row))
-    elements = {core_name(full): e for full, e in all_elements(machine.description) if isinstance(e, Joint | Spring)}
+    elements = {
+        core_name(full): e for full, e in all_elements(machine.description) if isinstance(e, Joint | Spring)
+    }
     lossy = np.zeros((n, n))
     for name, rows in group.items():
         index = [i for i, _ in rows]
@@ -93,7 +95,9 @@ def expected(machine, p):
     """(frequencies, 6, 6) m/N and the like."""
     tip, K, E, M, C = linearised(machine, p)
     w = 2 * np.pi * FREQUENCIES
-    return np.array([tip @ np.linalg.solve(K + 1j * np.sign(v) * E + 1j * v * C - v**2 * M, tip.T) for v in w])
+    return np.array(
+        [tip @ np.linalg.solve(K + 1j * np.sign(v) * E + 1j * v * C - v**2 * M, tip.T) for v in w]
+    )
 
 
 def modes(machine, p, count):
@@ -117,7 +121,9 @@ def difference(name):
     for rows in (slice(0, 3), slice(3, 6)):
         for columns in (slice(0, 3), slice(3, 6)):
             a, b = found.values[:, rows, columns], by_hand[:, rows, columns]
-            size = np.abs(by_hand[:, rows, rows]).max(axis=(1, 2)) * np.abs(by_hand[:, columns, columns]).max(axis=(1, 2))
+            size = np.abs(by_hand[:, rows, rows]).max(axis=(1, 2)) * np.abs(by_hand[:, columns, columns]).max(
+                axis=(1, 2)
+            )
             off = max(off, float((np.abs(a - b).max(axis=(1, 2)) / np.sqrt(size)).max()))
     return off
 

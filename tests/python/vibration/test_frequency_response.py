@@ -14,7 +14,7 @@ from stiffmap.description.tree import edit_sequences
 from stiffmap.vibration import tip_modes
 from stiffmap.vibration.poles import direct, receptance
 
-ARM = Path(__file__).with_name("kr210.yaml")
+ARM = Path(__file__).parents[3] / "examples/taps/kr210.yaml"
 MASSIVE = [n for n in sm.machine_names() if n != "tripteron"]
 
 OSCILLATOR = """
@@ -78,9 +78,7 @@ def test_published_arm_of_six_joints():
     expected = [10.07, 11.31, 21.33, 71.92, 110.70, 293.76]
     np.testing.assert_allclose(modes.frequency[0], expected, atol=0.012)
     c = sm.frequency_response(machine, p, [0.0]).values[0, :3, :3].real * 1e6
-    np.testing.assert_allclose(
-        [c[0, 0], c[1, 1], c[2, 2], c[0, 1]], [0.241, 1.809, 1.651, 0.213], atol=6e-4
-    )
+    np.testing.assert_allclose([c[0, 0], c[1, 1], c[2, 2], c[0, 1]], [0.241, 1.809, 1.651, 0.213], atol=6e-4)
     np.testing.assert_allclose(np.sort(1 / np.linalg.eigvalsh(c)), [0.544, 0.606, 4.719], atol=1.2e-3)
 
 

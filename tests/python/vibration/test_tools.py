@@ -56,18 +56,28 @@ def test_short_and_waving_forms_of_a_beam_meet():
 
 def test_a_csv_file_is_read_in_its_units(tmp_path):
     path = tmp_path / "tap.csv"
-    path.write_text("frequency_Hz,real_m/s2/N,imag_m/s2/N,coherence\n10,-0.5,0.1,0.98\n20,-1.5,0.4,0.97\n30,2,1,0.9\n")
+    path.write_text(
+        "frequency_Hz,real_m/s2/N,imag_m/s2/N,coherence\n10,-0.5,0.1,0.98\n20,-1.5,0.4,0.97\n30,2,1,0.9\n"
+    )
     (one,) = read_responses(path)
     w = 2 * np.pi * np.array([10, 20, 30])
-    np.testing.assert_allclose(one.receptance, np.array([-0.5 + 0.1j, -1.5 + 0.4j, 2 + 1j]) / -(w**2), rtol=1e-12)
+    np.testing.assert_allclose(
+        one.receptance, np.array([-0.5 + 0.1j, -1.5 + 0.4j, 2 + 1j]) / -(w**2), rtol=1e-12
+    )
     assert one.variance(5)[2] == pytest.approx(0.1 / (2 * 5 * 0.9))
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("frequency_Hz,real_m/N,imag_m/N\n10,1,0\n5,1,0\n", "rising frequencies; point 2 has 5 Hz after 10 Hz"),
-        ("frequency_Hz,real_m/N,imag_m/N,coherence\n1,1,0,0.9\n2,1,0,1.4\n", "coherence from 0 to 1; point 2 has 1.4"),
+        (
+            "frequency_Hz,real_m/N,imag_m/N\n10,1,0\n5,1,0\n",
+            "rising frequencies; point 2 has 5 Hz after 10 Hz",
+        ),
+        (
+            "frequency_Hz,real_m/N,imag_m/N,coherence\n1,1,0,0.9\n2,1,0,1.4\n",
+            "coherence from 0 to 1; point 2 has 1.4",
+        ),
         ("frequency_Hz,real_m/N,imag_m/N,coherence\n1,1,0,1\n2,1,0,1\n3,1,0,1\n", "coherence is 1 at every"),
         ("frequency_Hz,real_furlong,imag_furlong\n1,1,0\n2,1,0\n", "UNIT one of m/N"),
         ("frequency_Hz,real_m/N,imag_m/N\n1,1,0\n2,high,0\n", "expected 3 numbers; found 2, high"),
