@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from stiffmap.budget import DeflectionBudget, deflection_budget
     from stiffmap.calibration import Calibration
     from stiffmap.calibration.calibrate import calibrate
+    from stiffmap.chatter import floquet_multiplier, limiting_depth, stability_lobes, vibration_map
     from stiffmap.compensation import Commands, compensate
     from stiffmap.design.search import optimize
     from stiffmap.diagnosis import Diagnosis, diagnose
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     )
     from stiffmap.solution import Solution
     from stiffmap.urdf.to_machine import import_urdf
+    from stiffmap.vibration import frequency_response
 
 # Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
 _HOME = {
@@ -105,6 +107,11 @@ _HOME = {
     "plan": "stiffmap.planning.calls",
     "plot": "stiffmap.plot",
     "forward_kinematics": "stiffmap.kinematics",
+    "floquet_multiplier": "stiffmap.chatter",
+    "frequency_response": "stiffmap.vibration",
+    "limiting_depth": "stiffmap.chatter",
+    "stability_lobes": "stiffmap.chatter",
+    "vibration_map": "stiffmap.chatter",
     "identify_link": "stiffmap.link",
     "inverse_kinematics": "stiffmap.kinematics",
     "load_machine": "stiffmap.machine",
@@ -142,13 +149,16 @@ __all__ = [
     "diagnose",
     "drive_efforts",
     "error_map",
+    "floquet_multiplier",
     "force_transmission",
     "forward_kinematics",
+    "frequency_response",
     "identify_link",
     "identify_process",
     "import_urdf",
     "inverse_kinematics",
     "largest_box",
+    "limiting_depth",
     "load_experiment",
     "load_machine",
     "load_process",
@@ -166,10 +176,12 @@ __all__ = [
     "polar",
     "residual",
     "simulate",
+    "stability_lobes",
     "sweep",
     "uncertainty_ranking",
     "velocity_section",
     "velocity_transmission",
+    "vibration_map",
     "workspace_volume",
     "worst_deflection",
 ]

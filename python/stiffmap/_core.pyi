@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Answer', 'Chain', 'CommandError', 'DRIVE_NUMBERS', 'ExternalSpring', 'FastPlan', 'HomeMisfit', 'Law', 'Mechanism', 'OneAnswer', 'OneCall', 'Pose', 'Stroke', 'Winch', 'clamp', 'home_gaps', 'kernel_level', 'kernel_levels', 'path', 'reactions']
+__all__: list[str] = ['Answer', 'Chain', 'CommandError', 'DRIVE_NUMBERS', 'ExternalSpring', 'FastPlan', 'HomeMisfit', 'Law', 'Mechanism', 'OneAnswer', 'OneCall', 'Pose', 'Stroke', 'Winch', 'clamp', 'home_gaps', 'kernel_level', 'kernel_levels', 'multipliers', 'path', 'reactions']
 class Answer:
     @property
     def actuator_effort(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -99,6 +99,8 @@ class Mechanism:
     def point_positions(self, point: str, coordinates: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         ...
     def solve(self, plan: FastPlan, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], load_points: collections.abc.Sequence[str], load_types: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], read_points: collections.abc.Sequence[str], gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], load_steps: typing.SupportsInt | typing.SupportsIndex, threads: typing.SupportsInt | typing.SupportsIndex, full: bool, variants: collections.abc.Sequence[FastPlan] = [], closed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> Answer:
+        ...
+    def tip_modes(self, inertias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], viscous: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], loss: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], closed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: str, count: typing.SupportsInt | typing.SupportsIndex, threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
         ...
     @property
     def actuators(self) -> list[tuple[str, int]]:
@@ -209,6 +211,8 @@ def home_gaps(root: Chain, home: Pose, task: typing.Annotated[collections.abc.Se
 def kernel_level() -> str:
     ...
 def kernel_levels() -> list[str]:
+    ...
+def multipliers(frequency: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], way: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], chips: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], depth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], threads: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
     ...
 def path(mechanism: Mechanism, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: str, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], control: typing.SupportsInt | typing.SupportsIndex, limit: typing.SupportsFloat | typing.SupportsIndex, steps: typing.SupportsInt | typing.SupportsIndex, cross: typing.SupportsInt | typing.SupportsIndex) -> tuple:
     ...

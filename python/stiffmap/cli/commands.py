@@ -56,5 +56,7 @@ COMMANDS = (
         "compensate", "stiffmap.cli.compensate", "compensate", "Commands that cancel what a machine lacks."
     ),
     Command("mill", "stiffmap.cli.mill", "mill", "The part as it is cut, and a program that makes it right."),
+    Command("lobes", "stiffmap.cli.lobes", "lobes", "Which depth of cut chatters at which speed."),
+    Command("taps", "stiffmap.cli.taps", "taps", "Which effect explains frequencies of tap tests."),
     Command("bench", "stiffmap.cli.bench", "bench", "Speed of this installation on this computer."),
 )

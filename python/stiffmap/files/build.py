@@ -58,6 +58,7 @@ def build(
         workspace=tried(partial(_workspace, model.workspace, context.at("workspace"), model.task, home)),
         gravity=tried(partial(_gravity, model.gravity, context.at("gravity"))),
         external_springs=tuple(s for s in springs if s is not None),
+        modal_damping=tried(partial(_ratios, model.modal_damping, context.at("modal_damping"))) or (),
         title=model.title,
         source=model.source,
         extra=tuple((key, _tuples(value)) for key, value in model.extra.items()),
@@ -123,6 +124,17 @@ def _gravity(numbers: list[Number] | None, context: Context) -> Vector | None:
     if max(abs(g) for g in gravity) > GRAVITY_LIMIT:
         context.fail(f"gravity is in m/s^2 whatever the length unit; found {list(gravity)}")
     return gravity
+
+
+def _ratios(given: Number | list[Number] | None, context: Context) -> tuple[float, ...]:
+    numbers = given if isinstance(given, list) else [] if given is None else [given]
+    ratios = tuple(context.si(n, NONE, f"modal_damping.{i + 1}") for i, n in enumerate(numbers))
+    if isinstance(given, list) and not ratios:
+        context.fail("expected at least one damping ratio; found an empty list")
+    for r in ratios:
+        if not 0.0 <= r < 1.0:
+            context.fail(f"expected damping ratios from 0 to below 1 (0.02 is 2 %); found {r:g}")
+    return ratios
 
 
 def _external_spring(name: str, model: ExternalSpringModel, context: Context) -> ExternalSpring:

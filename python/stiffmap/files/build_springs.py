@@ -44,7 +44,10 @@ def build_spring(model: SpringModel, context: Context) -> Spring:
     if model.stroke is not None:
         context.gathered.strokes.append(StrokeUse(context.full, model, context.at("stroke")))
     beam = None if model.beam is None else _beam_numbers(model.beam, context.at("beam"))
-    return Spring(model.spring, compliance, stiffness, laws, rest or (0.0,) * 6, beam=beam)
+    loss = None if model.loss_factor is None else context.si(model.loss_factor, NONE, "loss_factor")
+    if loss is not None and loss < 0.0:
+        context.at("loss_factor").fail(f"must not be negative; found {loss:g}")
+    return Spring(model.spring, compliance, stiffness, laws, rest or (0.0,) * 6, beam=beam, loss_factor=loss)
 
 
 def _spring_matrix(model: SpringModel, context: Context) -> Matrix6:

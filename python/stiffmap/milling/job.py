@@ -24,6 +24,7 @@ from stiffmap.milling.reach import must_reach
 from stiffmap.milling.ripple import ripple
 from stiffmap.milling.setting import Setting, scaled, setting
 from stiffmap.milling.speed import Feeds, best_feeds
+from stiffmap.milling.stability import PathStability, path_stability
 from stiffmap.milling.verify import Run, run
 from stiffmap.milling.warnings import Warned, warned
 from stiffmap.options import keywords_of
@@ -46,6 +47,8 @@ class Milled:
     after: Run
     """The written program on the machine that it was made for."""
     dataset: xr.Dataset
+    stability: PathStability | str
+    """Whether the cut chatters along the path; a sentence where that cannot be judged."""
     true_before: Equilibrium | None = None
     true_after: Run | None = None
     feeds: Feeds | None = None
@@ -101,7 +104,12 @@ def mill_job(
             ds[f"error_normal_after_{name}"] = along(
                 job, run(scaled(job, share), made, step=step, threads=threads)
             )
-    out = Milled(job, before, found.position, made, after, ds, feeds=chosen, warnings=warned(job, ds))
+    stability = path_stability(job, threads)
+    if isinstance(stability, PathStability):
+        ds["multiplier"] = ("point", np.interp(job.points.way, stability.way, stability.multiplier))
+    out = Milled(
+        job, before, found.position, made, after, ds, stability, feeds=chosen, warnings=warned(job, ds)
+    )
     if true_machine is None:
         return out
     if true_machine.actuators != machine.actuators:

@@ -15,6 +15,7 @@ from stiffmap.milling.job import Milled
 from stiffmap.milling.limits import outside
 from stiffmap.milling.pictures import error_figure, machine_path_figure, outline_figure
 from stiffmap.milling.placement import Placements
+from stiffmap.milling.stability import PathStability
 from stiffmap.milling.verdict import sizes, verdict
 from stiffmap.outputs import make_folder, write_rows, write_text
 from stiffmap.plot.style import save
@@ -40,6 +41,7 @@ def summary(found: Milled) -> dict[str, object]:
         "length_mm": float(1e3 * job.points.way[-1]),
         "time_s": float(np.sum(np.diff(job.points.way) / job.feed[1:])),
         "verdict": verdict(ds),
+        "stability": _stability(found),
         "statuses": {
             s.name: int((ds.status.values == s).sum()) for s in Status if (ds.status.values == s).any()
         },
@@ -99,6 +101,18 @@ def placement_summary(found: Placements) -> dict[str, object]:
         "in_reach": found.reachable,
         "limited_by": found.limits,
     }
+
+
+def _stability(found: Milled) -> dict[str, object]:
+    """What is said of chatter; rpm."""
+    s, spindle = found.stability, found.job.process.spindle
+    if not isinstance(s, PathStability):
+        return {"said": s}
+    return {
+        "said": s.sentence(spindle), "largest_multiplier": float(s.multiplier.max()), "unstable_places": s.unstable,
+        "places": len(s.way), "stable_speeds_rpm": [float(60 * v / (2 * np.pi)) for v in s.offered],
+        "damping": s.damping,
+    }  # fmt: skip
 
 
 def write_report(found: Milled, folder: str | PathLike[str]) -> dict[str, str]:
@@ -175,6 +189,7 @@ def _sheet(found: Milled) -> Sheet:
                 else f"{int((~found.feeds.held).sum())} moves are beyond the tolerance at any feed."
             )
         )
+    lines.append(str(s["stability"]["said"]))  # type: ignore[index]
     lines += [f"Note: {n}" for n in s["notes"]]  # type: ignore[attr-defined]
     rows = [
         [label, f"{s[key]['rms']:.5f}", f"{s[key]['largest']:.5f}"]  # type: ignore[index]

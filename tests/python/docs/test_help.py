@@ -43,6 +43,9 @@ def examples(function: object) -> list[str]:
     )
 
 
+TAPS = Path(__file__).parents[3] / "examples/taps"
+
+
 @pytest.fixture(scope="module")
 def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files of the examples."""
@@ -92,6 +95,7 @@ def make_workshop(at: Path) -> Path:
     clocks = "x [mm];y [mm];Fx [N];Uhr 1 [µm];Uhr 2 [µm]\n0;416;100;351,5;352,1\n50;416;-100;-350,2;-349,9\n"
     (at / "clocks.csv").write_text(clocks, encoding="utf-8")
     shutil.copy(SHIPPED / "process/library/trimming.yaml", at)
+    shutil.copytree(TAPS, at / "examples/taps")
     (at / "outline.ngc").write_text(OUTLINE, encoding="utf-8")
     (at / "points.csv").write_text(TRACKER, encoding="utf-8")
     _workbook(at / "readings.xlsx")
