@@ -97,7 +97,8 @@ def spelled_out(keywords: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
             Parameter(n, Parameter.KEYWORD_ONLY, default=_default(defaults, n), annotation=hints[n])
             for n in names
         )
-        function.__signature__ = own.replace(parameters=[*shown, *more])  # type: ignore[attr-defined]
+        named = [p for p in more if p.name not in own.parameters]
+        function.__signature__ = own.replace(parameters=[*shown, *named])  # type: ignore[attr-defined]
         return function
 
     return show
@@ -110,7 +111,8 @@ def keywords_of(other: Callable[..., Any]) -> Callable[[Callable[P, R]], Callabl
     def show(function: Callable[P, R]) -> Callable[P, R]:
         own = signature(function)
         shown = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
-        function.__signature__ = own.replace(parameters=[*shown, *more])  # type: ignore[attr-defined]
+        named = [p for p in more if p.name not in own.parameters]
+        function.__signature__ = own.replace(parameters=[*shown, *named])  # type: ignore[attr-defined]
         return function
 
     return show

@@ -12,6 +12,7 @@ from stiffmap.broadcasting import Floats, real_array, trailing
 from stiffmap.chatter.cut import GivenProcess, cut_axes, milling_process
 from stiffmap.chatter.zero_order import FEED, TOOL, limits
 from stiffmap.machine import Machine, takes_machine
+from stiffmap.options import keywords_of
 from stiffmap.vibration.modes import TipModes, tip_modes
 from stiffmap.vibration.poles import receptance
 from stiffmap.vibration.response import frequency_axis
@@ -22,6 +23,7 @@ LOW, HIGH, LOOKED = 0.3, 2.0, 6
 
 
 @takes_machine
+@keywords_of(tip_modes)
 def vibration_map(
     machine: Machine,
     position: ArrayLike,

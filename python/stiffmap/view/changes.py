@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
+from stiffmap.addresses import moved, number
 from stiffmap.description import AppliedEffect, Joint, MachineDescription
 from stiffmap.description.numbers import numbers_of
 from stiffmap.description.tree import all_elements
 from stiffmap.effects import apply_records
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
-from stiffmap.maps.uncertainty_edit import moved, number
 
 DIAGONAL = tuple(f"{i}{i}" for i in range(1, 7))
 SHOWN = 8
