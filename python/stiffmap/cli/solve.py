@@ -30,8 +30,10 @@ from stiffmap.cli.inputs import (
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.cli.solve_table import force_vector, is_file_name, solve_table
+from stiffmap.cli.statuses import MEANINGS
 from stiffmap.errors import StiffmapError
 from stiffmap.free_motions import free_motions
+from stiffmap.machine import Machine
 from stiffmap.outputs.option import written
 from stiffmap.solution import Solution
 from stiffmap.status import Flag, Status
@@ -100,13 +102,15 @@ def solve(
     load = np.r_[acting, MM * numbers(moment, "moment", 3)]
     s = m.solve(position(at, m), load, **how)
     if as_json:
-        print_json(as_plain(m.name, s, load))
+        print_json(as_plain(m.name, s, load) | {"reason": reason(m, s, position(at, m), how["rotation"])})
     else:
         console = Console(highlight=False)
         if vector is None:
             told = ", ".join(f"{v:.1f}" for v in acting)
             console.print(f"{size:g} N in the direction that pushes furthest: force ({told}) N")
         show(console, s)
+        if why := reason(m, s, position(at, m), how["rotation"]):
+            console.print(f"reason: {why}", soft_wrap=True)
         if int(s.status) == Status.SINGULAR and (ways := free_motions(m, s.free_twists)):
             console.print(f"free: the platform can {'; '.join(ways)}", soft_wrap=True)
     finish(int(s.status) != Status.CONVERGED)
@@ -138,14 +142,27 @@ def show(console: Console, s: Solution) -> None:
     flags = ", ".join(str(f.name) for f in Flag(int(s.flags)))
     console.print(f"status {Status(int(s.status)).name.lower()}" + (f"; flags {flags}" if flags else ""))
     d = s.displacement
-    shift = ", ".join(f"{v:.6f}" for v in 1e3 * d[:3])
-    console.print(f"displacement of {s.point}: ({shift}) mm, norm {1e3 * np.linalg.norm(d[:3]):.6f} mm")
-    console.print(f"rotation: ({', '.join(f'{v:.6f}' for v in np.rad2deg(d[3:]))}) deg")
+    if np.isfinite(d).all():
+        shift = ", ".join(f"{v:.6f}" for v in 1e3 * d[:3])
+        console.print(f"displacement of {s.point}: ({shift}) mm, norm {1e3 * np.linalg.norm(d[:3]):.6f} mm")
+        console.print(f"rotation: ({', '.join(f'{v:.6f}' for v in np.rad2deg(d[3:]))}) deg")
     for name, effort in zip(s.actuators, s.actuator_effort, strict=True):
-        console.print(f"drive {name}: {effort:.4f} (N, or N m for a revolute one)")
-    console.print(
-        _matrix("loaded compliance: mm and rad per N and N mm", s.compliance * np.outer(SCALE, SCALE) / 1e3)
-    )
+        if np.isfinite(effort):
+            console.print(f"drive {name}: {effort:.4f} (N, or N m for a revolute one)")
+    if np.isfinite(s.compliance).any():
+        scaled = s.compliance * np.outer(SCALE, SCALE) / 1e3
+        console.print(_matrix("loaded compliance: mm and rad per N and N mm", scaled))
+
+
+def reason(m: Machine, s: Solution, at: Any, turned: Any) -> str | None:
+    """Why a pose has no answer, in words; None where it has one."""
+    if int(s.status) == Status.CONVERGED:
+        return None
+    if int(s.status) != Status.UNREACHABLE:
+        return MEANINGS[Status(int(s.status)).name]
+    from stiffmap.unreachable import why_unreachable
+
+    return why_unreachable(m, m.description.home.p if at is None else at, turned)
 
 
 def _matrix(title: str, values: Any) -> Table:
