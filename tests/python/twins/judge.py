@@ -6,13 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from tests.python.twins.faults import Fault
+from tests.python.twins.generator import Twin
 
 from stiffmap.calibration import Tolerances
 from stiffmap.description.tree import joints
 from stiffmap.diagnosis import Diagnosis
-
-from .faults import Fault
-from .generator import Twin
 
 ALIKE = 0.98
 """Cosine of two changes of the readings from which the noise of the twin cannot tell them apart."""
