@@ -72,7 +72,7 @@ def one(number: int, null: bool) -> dict[str, Any]:
 
 def table(records: list[dict[str, Any]]) -> str:
     """Words by case."""
-    words = ("right", "same", "silent", "quiet", "false", "error")
+    words = ("right", "same", "within", "unattributed", "silent", "quiet", "false", "error")
     out = ["| case | twins | " + " | ".join(words) + " |", "|---" * (len(words) + 2) + "|"]
     for name in [*dict.fromkeys(r["case"] for r in records), "all"]:
         mine = [r for r in records if name in (r["case"], "all")]

@@ -115,11 +115,9 @@ class Validity:
         parts = []
         for name, (low, high) in self.drives.items():
             factor, unit = (180.0 / math.pi, "deg") if name in self.turning else (1e3, "mm")
-            parts.append(f"{name} {factor * low:.4g} to {factor * high:.4g} {unit}")
-        parts += [
-            f"{n} {a + 0.0:.4g} to {b + 0.0:.4g} {'N' if n[0] == 'f' else 'N·m'}"
-            for n, (a, b) in self.loads.items()
-        ]
+            parts.append(f"{name} {_span(factor * low, factor * high)} {unit}")
+        for name, (low, high) in self.loads.items():
+            parts.append(f"{name} {_span(low, high)} {'N' if name[0] == 'f' else 'N·m'}")
         if not self.loads:
             parts.append("no load")
         if self.temperature is not None:
@@ -143,6 +141,11 @@ def range_of(values: Floats) -> Range:
     """Least and largest finite value."""
     good = values[np.isfinite(values)]
     return (float(good.min()), float(good.max())) if good.size else (0.0, 0.0)
+
+
+def _span(low: float, high: float) -> str:
+    low, high = round(low, 9) + 0.0, round(high, 9) + 0.0
+    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
 
 
 def _pair(values: Any) -> Range:

@@ -20,7 +20,7 @@ from stiffmap.calibration.pulls import Pulls, pulls
 from stiffmap.calibration.result import Calibration
 from stiffmap.calibration.statistics import Sums, independent
 from stiffmap.calibration.travel import Drive, Travel, travel
-from stiffmap.calibration.unknowns import Unknown
+from stiffmap.calibration.unknowns import Unknown, joint_name
 from stiffmap.calibration.validity import covered
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.summary import rms
@@ -124,7 +124,7 @@ def _travel(
     machine = ready.predictor.machine
     at = coordinates_of(machine, e)
     drives = [
-        Drive(name, u.unit, s.columns[..., i] / u.u, at[:, machine.compiled.names.joints[name]])
+        Drive(name, u.unit, s.columns[..., i] / u.u, at[:, machine.compiled.names.joints[joint_name(name)]])
         for i, u, name in ((i, s.unknowns[i], s.unknowns[i].moves[0][0][0]) for i in zeros)
     ]
 

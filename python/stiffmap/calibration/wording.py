@@ -49,6 +49,10 @@ def lines(c: Facts) -> list[str]:
             f"machine file on {f.by} that no fit saw: rms {in_display_units(f.before, c.unit)} as declared, "
             f"{in_display_units(f.after, c.unit)} ± {in_display_units(f.u, c.unit)} corrected"
         )
+        if f.after > f.before:
+            out.append(
+                "the file is worse than the declared machine on readings that no fit saw: do not use it; more poses are needed"
+            )
     out.append(f"holds where it was read: {c.validity}")
     if c.floor > 0.0:
         where = ", ".join(f"{k} {in_display_units(v, _unit(k, c.unit))}" for k, v in c.rest.items())

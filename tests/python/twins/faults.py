@@ -72,13 +72,15 @@ def softer(size: float) -> Edit:
 
 
 def driven(**error: float) -> Callable[[float], Edit]:
-    """A drive that stands beside its command: by an offset, a slope, or a wave."""
+    """A drive that stands beside its command: by an offset, or by a slope about where it was homed."""
 
     def build(size: float) -> Edit:
         def edit(e: Element) -> Element:
             if not isinstance(e, Joint):
                 return e
             numbers = {k: size if v == 0.0 else v for k, v in error.items()}
+            if "slope" in numbers:
+                numbers["offset"] = numbers.get("offset", 0.0) - numbers["slope"] * e.home[0]
             return replace(e, command_errors=(*e.command_errors, CommandError(**numbers)))
 
         return edit

@@ -9,16 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from tests.python.oracle.cartesian.solve import Machine
+from tests.python.oracle.energy import Loads
+from tests.python.twins.faults import Fault, elastic, geometric, jitter, plain
+from tests.python.twins.noise import KINDS
 
 import stiffmap as sm
 from stiffmap.description import MachineDescription, Pose
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.virtual.plans import plan_of_poses, random_poses
-
-from ..oracle.cartesian.solve import Machine
-from ..oracle.energy import Loads
-from .faults import Fault, elastic, geometric, jitter, plain
-from .noise import KINDS
 
 MACHINES = (
     "3-rps", "five-bar", "hexapod", "hybrid", "linear-delta", "orthoglide-original", "orthoglide-revised",

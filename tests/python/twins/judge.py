@@ -6,10 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from tests.python.twins.faults import Fault
+from tests.python.twins.generator import Twin
 
+from stiffmap.calibration import Tolerances
+from stiffmap.description.tree import joints
 from stiffmap.diagnosis import Diagnosis
-
-from .generator import Twin
 
 ALIKE = 0.98
 """Cosine of two changes of the readings from which the noise of the twin cannot tell them apart."""
@@ -20,7 +22,8 @@ class Judgement:
     """Of one twin."""
 
     word: str
-    """right, same (another name with the same readings), silent, false; of a machine without a fault quiet or false."""
+    """right, same (another name with the same readings), within (silent, of faults that usual tolerances allow), unattributed
+    (no cause, but said that one is missing), silent, false; of a machine without a fault quiet or false."""
     said: str
     covered: tuple[bool, ...]
     """Whether the 95 % interval of a fault that is named at its place holds its size."""
@@ -37,9 +40,10 @@ def judged(twin: Twin, d: Diagnosis) -> Judgement:
     said = f"{d.verdict}: {'; '.join(map(str, d.effects))} | {c.verdict if c else '-'}"
     if not named and not numbers:
         wide = bool(c and c.wider)
-        return Judgement(
-            ("silent" if twin.faults else "quiet") if not wide or twin.faults else "false", said, ()
-        )
+        if not twin.faults:
+            return Judgement("false" if wide else "quiet", said, ())
+        missing = d.verdict == "unattributed" or bool(c and c.verdict == "unattributed")
+        return Judgement("within" if tolerable(twin) else "unattributed" if missing else "silent", said, ())
     if not twin.faults:
         return Judgement("false", said, ())
     truths = [f.at for f in twin.faults]
@@ -47,6 +51,21 @@ def judged(twin: Twin, d: Diagnosis) -> Judgement:
     words += [any(within(n, t) for n in names for t in truths) for names in numbers]
     word = "right" if all(words) else "same" if alike(twin, d) else "false"
     return Judgement(word, said, tuple(covered(twin, d)))
+
+
+def tolerable(twin: Twin) -> bool:
+    """Whether each fault is within three usual standard uncertainties of what it is."""
+    t = Tolerances()
+    u = {"gain": t.gain, "soft": t.compliance}
+    turning = {name for name, j in joints(twin.machine.description).items() if j.kind == "revolute"}
+
+    def one(f: Fault, size: float) -> bool:
+        if f.kind == "soft":
+            return abs(np.log1p(size)) < 3.0 * u["soft"]
+        zero = t.turning_zero if f.at.removeprefix("platform.") in turning else t.zero
+        return abs(size) < 3.0 * (zero if f.kind == "zero" else u["gain"])
+
+    return all(one(f, s) for f, s in zip(twin.faults, twin.sizes, strict=True))
 
 
 def places(aliases: list[dict[str, object]]) -> list[tuple[str, str, tuple[str, ...]]]:
