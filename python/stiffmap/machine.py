@@ -281,7 +281,7 @@ class Machine:
 
         position (3,) m, None: home. port: of 127.0.0.1; None: a free one from 8080 on. browser: whether to open one.
         state: fields of `stiffmap.view.State`, such as ``force=(0, 0, -300)`` N, ``plane="x"``, ``quantity="worst"``,
-        ``changes={"x.foot/compliance.c33": 2e-8}``; SI, base axes. In a notebook the view is shown where it is the
+        ``changes={"x.foot/beam.EIz": 1e4}``; SI, base axes. In a notebook the view is shown where it is the
         last value of a cell. docs/view.md. Raises MissingPartError without the extra ``[view]`` (viser),
         StiffmapError for bad input and for a pose that the machine cannot take.
         """

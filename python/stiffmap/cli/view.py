@@ -48,7 +48,7 @@ def view(
         list[str] | None,
         typer.Option(
             "--set",
-            help="A number of the machine, ADDRESS=VALUE in SI, e.g. x.foot/compliance.c33=2e-8; repeatable.",
+            help="A number of the machine, ADDRESS=VALUE in SI, e.g. x.foot/beam.EIz=1e4; repeatable.",
         ),
     ] = None,
     start: Annotated[
@@ -90,7 +90,7 @@ def view(
 
       [cyan]stiffmap view hexapod --plane x --html hexapod.html[/cyan]
 
-      [cyan]stiffmap view my_machine.yaml --set x.foot/compliance.c33=2e-8 --no-browser --port 8090[/cyan]
+      [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIz=1e4 --no-browser --port 8090[/cyan]
     """
     from stiffmap.view.optional import need_viser
 
@@ -155,7 +155,7 @@ def _change(text: str) -> tuple[str, float]:
             return address, number_in(value)
     except ValueError:
         pass
-    raise StiffmapError(f"--set: expected ADDRESS=VALUE, such as x.foot/compliance.c33=2e-8; got '{text}'")
+    raise StiffmapError(f"--set: expected ADDRESS=VALUE, such as x.foot/beam.EIz=1e4; got '{text}'")
 
 
 def _data(experiment: Path | None, path: str | None) -> Any:
