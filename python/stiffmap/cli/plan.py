@@ -16,6 +16,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.experiment import simulate
 from stiffmap.experiment.files.save import plan_columns
 from stiffmap.machine import Machine, load_machine
+from stiffmap.number_text import with_uncertainty
 from stiffmap.outputs import write_rows
 from stiffmap.outputs.option import written
 from stiffmap.planning import Design, design, follow
@@ -118,7 +119,7 @@ def _sequential(
     )
     for count, e in steps:
         each = zip(e.names, e.values, e.sigma * e.misfit, e.units, strict=True)
-        print(f"{count} rows: " + ", ".join(f"{n} {v:.5g} ± {u:.2g} {s}" for n, v, u, s in each))
+        print(f"{count} rows: " + ", ".join(f"{n} {with_uncertainty(v, u)} {s}" for n, v, u, s in each))
     last = steps[-1][1]
     scale = np.array([p.scale for _, p in fitted(m.description, tuple(terms))])
     met = bool((last.sigma * last.misfit / scale).max() <= until)
