@@ -15,6 +15,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.html import table, titled
 from stiffmap.machine import Machine, metres_expected, takes_machine
 from stiffmap.options import SolveKeywords, merged
+from stiffmap.short import short_repr
 from stiffmap.solving import Call, solve_call
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ STEP = 1e-3
 """Of the load, of the central differences of internal wrenches."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class DeflectionBudget:
     """Contributions to the displacement of the TCP at one pose under one wrench, SI, base axes."""

@@ -11,6 +11,8 @@ DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm")}
 FACTOR = 0.5
 """Logarithm of a factor from which it is written as one: ×1.65."""
 
+LARGEST = 3
+"""Large pulls that a line names."""
 NAMED = 12
 """Outliers that a line names."""
 
@@ -39,6 +41,7 @@ def lines(c: Facts) -> list[str]:
     out += [f"  {_beyond(b)}" for b in c.beyond]
     out += [f"  {_wider(w)}" for w in c.wider]
     out += [f"  not claimed: {r}" for r in c.refused]
+    out += _large_pulls(c)
     out.append(f"told by the readings: {c.rank} directions of {len(c.rows)} unknowns")
     out.append("groups: " + _groups(c))
     out.append(
@@ -57,6 +60,11 @@ def lines(c: Facts) -> list[str]:
             f"machine file on {f.by} that no fit saw: rms {in_display_units(f.before, c.unit)} as declared, "
             f"{measured(f.after, f.u, c.unit)} corrected"
         )
+        if f.after > f.before:
+            out.append(
+                "the file is worse than the declared machine on readings that no fit saw: do not use it; more poses are needed"
+            )
+    out.append(f"holds where it was read: {c.validity}")
     if c.floor > 0.0:
         where = ", ".join(f"{k} {in_display_units(v, _unit(k, c.unit))}" for k, v in c.rest.items())
         out.append(
@@ -76,6 +84,21 @@ def lines(c: Facts) -> list[str]:
         plural = "s" if len(c.outliers) > 1 else ""
         out.append(f"set aside as outlier{plural}: row{plural} {', '.join(c.outliers[:NAMED])}{more}")
     return out
+
+
+def _large_pulls(c: Facts) -> list[str]:
+    """Which numbers are farther off than their standard uncertainties allow."""
+    far = c.pulls
+    if far.within:
+        return []
+    of = {r.name: r for r in c.rows}
+    some = [f"{n} {in_display_units(of[n].value, of[n].unit)} (pull {v:.1f})" for n, v in far.large[:LARGEST]]
+    more = f" and {len(far.large) - LARGEST} more" if len(far.large) > LARGEST else ""
+    told = f": {', '.join(some)}{more}" if some else ""
+    return [
+        f"large pulls: the numbers are {far.rms:.2g} times as far off (rms) as their standard uncertainties say{told}; "
+        f"give the uncertainties that this machine has (u in its file), or --tolerance {far.factor:g}"
+    ]
 
 
 def _unit(name: str, unit: str) -> str:

@@ -10,6 +10,7 @@ from rich import box
 from rich.table import Table
 
 from stiffmap.cli.statuses import failed
+from stiffmap.maps.variables import BEYOND
 
 
 def across(ds: xr.Dataset) -> str:
@@ -48,6 +49,13 @@ def _row(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]], tolerance: f
 def failures(ds: xr.Dataset) -> dict[str, int]:
     """Number of poses per status in which some load or direction failed."""
     return failed(np.maximum(ds.direction_status.values, ds.status.max("case").values))
+
+
+def beyond(ds: xr.Dataset) -> dict[str, Any] | None:
+    """Share of the map (poses and loads) beyond what a calibrated machine was calibrated by; None: it was not."""
+    if BEYOND not in ds:
+        return None
+    return {"share": float(ds[BEYOND].mean()), "calibrated_by": str(ds[BEYOND].attrs["calibrated_by"])}
 
 
 def as_table(ds: xr.Dataset, rows: list[dict[str, Any]], plane: str, tolerance: float) -> Table:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -28,9 +29,12 @@ from stiffmap.cli.inputs import (
     rotation,
 )
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.cli.solve_table import force_vector, is_file_name, solve_table
 from stiffmap.cli.statuses import MEANINGS
+from stiffmap.errors import StiffmapError
 from stiffmap.free_motions import free_motions
 from stiffmap.machine import Machine
+from stiffmap.outputs.option import written
 from stiffmap.solution import Solution
 from stiffmap.status import Flag, Status
 
@@ -40,7 +44,11 @@ SCALE = np.array([1e3] * 3 + [1.0] * 3)
 
 def solve(
     machine: MachineArgument,
-    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(help="Commanded TCP in mm, e.g. 0,0,300, or a CSV file of poses. [default: home]"),
+    ] = None,
+    output: Annotated[Path | None, written(help="With a file of poses: CSV of the answers.")] = None,
     force: ForceOption = "0,0,0",
     moment: Annotated[str, typer.Option(help="Moment about the point in N mm, base axes.")] = "0,0,0",
     turned: RotationOption = None,
@@ -54,6 +62,9 @@ def solve(
 
     A force that is given by its size alone acts in the direction in space that pushes the tool furthest.
 
+    A file of poses has columns such as x [mm], y [mm], z [mm], rx [deg] …, fx [N] …, mx [N*m] …, one pose a row; --force acts
+    where it has no load.
+
     Exit codes: 0 converged, 1 any other status, 2 bad input.
 
     Examples:
@@ -65,6 +76,8 @@ def solve(
       [cyan]stiffmap solve tripteron --at 300,400,500 --force 0,0,100 --json[/cyan]
 
       [cyan]stiffmap solve orthoglide-revised --force 0,0,-50 --moment 0,2000,0 --gravity 0,0,-9.81[/cyan]
+
+      [cyan]stiffmap solve orthoglide-revised --at poses.csv --force 0,0,-100 -o answers.csv[/cyan]
     """
     m = machine_with(machine, effect)
     how: dict[str, Any] = {
@@ -73,6 +86,12 @@ def solve(
         "gravity": gravity(gravity_),
         "method": method,
     }
+    if at is not None and (is_file_name(at)):
+        load = np.r_[force_vector(force), MM * numbers(moment, "moment", 3)]
+        finish(not solve_table(m, Path(at), load, how, output, as_json))
+        return
+    if output is not None:
+        raise StiffmapError("--output: only with a file of poses (--at poses.csv)")
     size, vector = force_given(force)
     if vector is None:
         from stiffmap.worst_force import worst_force

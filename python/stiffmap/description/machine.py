@@ -61,6 +61,8 @@ class MachineDescription:
     ``gravity`` (m/s², base axes) applies unless a call says otherwise; ``None`` is none.
     A machine without legs hangs in its cables; ``freedoms`` names the components in which its platform can move
     (translations along base axes, rotations about those of the base at home), guides hold the others.
+    ``modal_damping`` holds damping ratios of the modes, lowest frequency first, the last for all further ones;
+    empty: none is declared.
     ``uncertainty`` holds a standard uncertainty (SI) beside any number, keyed by
     ``full.element.name/field``; ``notes`` says where numbers come from, by the same keys, and so does
     ``sources``: assumed, measured, computed or catalogue; its keys may be names of elements, legs, or hold ``*``.
@@ -83,6 +85,7 @@ class MachineDescription:
     freedoms: tuple[str, ...] = TASK
     title: str = ""
     source: str = ""
+    modal_damping: tuple[float, ...] = ()
     uncertainty: tuple[tuple[str, float], ...] = ()
     notes: tuple[tuple[str, str], ...] = ()
     sources: tuple[tuple[str, str], ...] = ()

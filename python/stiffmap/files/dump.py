@@ -49,6 +49,7 @@ def dump(description: MachineDescription) -> Plain:
         **_legs(declared.legs),
         "base": dump_elements(declared.base),
         "platform": dump_elements(declared.platform),
+        "modal_damping": floats(declared.modal_damping),
         "external_springs": {spring.name: _external_spring(spring) for spring in declared.external_springs},
         "effects": [_effect(effect) for effect in description.effects],
         "uncertainty": {key: float(value) for key, value in description.uncertainty},

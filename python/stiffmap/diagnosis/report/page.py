@@ -17,6 +17,7 @@ from stiffmap.diagnosis.report.sentences import UNITS, alias_words, interval, ne
 from stiffmap.diagnosis.report.wording import effect_text, five_lines, separation_text
 from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.effects import registry
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.fingerprints import digest
 from stiffmap.outputs import write_text
@@ -168,14 +169,17 @@ def _effect(e: Effect) -> dict[str, Any]:
 
 
 def _budget(d: Findings) -> dict[str, Any] | None:
-    """Shares of the corrected machine's deflection at the worst pose of the map in the pictures."""
+    """Shares of the corrected machine's deflection at the worst pose of the map in the pictures; None where it has play without load."""
     from stiffmap.diagnosis.report.pictures import worst_pose
 
     worst = worst_pose(d) if d.effects else None
     if worst is None:
         return None
     p, force = worst
-    found = deflection_budget(d.machine, p, force)
+    try:
+        found = deflection_budget(d.machine, p, force)
+    except StiffmapError:  # a machine in play has no stiffness to share out
+        return None
     whole = 1e6 * float(np.linalg.norm(found.displacement[:3]))
     return {
         "at": ", ".join(f"{1e3 * v:.0f}" for v in p),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -11,6 +13,7 @@ from stiffmap.diagnosis.report.place import place_figure
 from stiffmap.diagnosis.report.trends import trending, trends
 from stiffmap.diagnosis.report.vectors import vectors
 from stiffmap.diagnosis.report.wording import noise_size
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import WRENCH, Floats
 from stiffmap.machine import Machine
 from stiffmap.plot.loaded import loaded_figure
@@ -34,22 +37,48 @@ CAPTIONS = {
 
 
 def figures(d: Findings) -> dict[str, Figure]:
-    """All figures by the names of their files."""
-    made = {"place": place_figure(d), "before_after": before_after(d)}
-    made |= {"residual_vectors": vectors(d)} if d.experiment.axis_read[:3].any() else {}
-    told, others = trending(d)
-    made |= {"residual_trends": trends(d, told)} if told else {}
-    made |= {"residual_others": trends(d, others)} if others else {}
-    made |= {"residual_histogram": histogram(d)}
+    """All figures by the names of their files. One that cannot be drawn says so in its place: the answer does not depend on
+    its pictures."""
+    return {name: drawn(make, d) for name, make in _wanted(d).items()}
+
+
+def _wanted(d: Findings) -> dict[str, Callable[[Findings], Figure]]:
+    made: dict[str, Callable[[Findings], Figure]] = {"place": place_figure, "before_after": before_after}
+    if d.experiment.axis_read[:3].any():
+        made["residual_vectors"] = vectors
+    driven, others = trending(d)
+    if driven:
+        made["residual_trends"] = lambda d: trends(d, driven)
+    if others:
+        made["residual_others"] = lambda d: trends(d, others)
+    made["residual_histogram"] = histogram
     if d.experiment.load_direction is not None:
-        made["loops"] = loops(d)
+        made["loops"] = loops
     if d.effects and d.declared.description.workspace is not None:
-        made["maps"] = maps(d)
-        worst = worst_pose(d)
-        made |= {"loaded": loaded_figure(d.machine, *worst)} if worst else {}
+        made["maps"] = maps
+        if d.experiment.wrench[:, :3].any():
+            made["loaded"] = loaded
     if d.unexplained and d.empirical and d.experiment.groups.max() > 0:
-        made["unexplained"] = left(d)
+        made["unexplained"] = left
     return made
+
+
+def drawn(make: Callable[[Findings], Figure], d: Findings) -> Figure:
+    """A figure, or one that says why it is not drawn."""
+    try:
+        return make(d)
+    except Exception as problem:
+        figure = Figure(figsize=(7, 1.2), layout="constrained")
+        figure.text(0.5, 0.5, f"not drawn: {problem}"[:300], ha="center", va="center", wrap=True, fontsize=9)
+        return figure
+
+
+def loaded(d: Findings) -> Figure:
+    """The corrected machine under the load where it deflects most."""
+    worst = worst_pose(d)
+    if worst is None:
+        raise StiffmapError("no pose of the plane of the maps has an equilibrium under load")
+    return loaded_figure(d.machine, *worst)
 
 
 def loops(d: Findings) -> Figure:
@@ -151,6 +180,8 @@ def histogram(d: Findings) -> Figure:
 def maps(d: Findings) -> Figure:
     """Error over a z-plane: the file's machine, the corrected machine, and what changes."""
     x, y, force, one, other = plane_errors(d)
+    if not np.isfinite(one).any() or not np.isfinite(other).any():
+        raise StiffmapError("no pose of the plane of the maps has an equilibrium under this force")
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     axes = figure.subplots(1, 3)
     top = float(np.nanmax([np.nanmax(np.linalg.norm(v, axis=-1)) for v in (one, other)])) * MM
@@ -196,7 +227,7 @@ def _worst_force(d: Findings, position: Floats) -> tuple[Floats, Floats, Floats]
     size = float(np.abs(d.experiment.wrench[:, :3]).max())
     tried = [np.append(size * axis, np.zeros(3)) for axis in np.eye(3)] if size > 0 else [np.zeros(6)]
     pairs = [(_errors(d.declared, position, w), _errors(d.machine, position, w), w) for w in tried]
-    return max(pairs, key=lambda p: float(np.nanmax(np.abs(p[1] - p[0]))))
+    return max(pairs, key=lambda p: float(np.max(np.abs(np.nan_to_num(p[1] - p[0])))))
 
 
 def _errors(machine: Machine, position: Floats, wrench: Floats) -> Floats:

@@ -179,6 +179,8 @@ def next_step(d: Any) -> str:
         )
     if d.verdict == "ambiguous" and d.separations:
         return f"One more measurement decides: {separation_text(d.separations[0])}."
+    if d.verdict == "ambiguous" and not d.alternatives:
+        return "Inspect this place, and read more poses or other loads: numbers within tolerance explain these nearly as well."
     if any(e.aliases for e in d.effects):
         return (
             "Inspect this place and those which these readings cannot tell from it (the report names them); the corrected "

@@ -171,6 +171,7 @@ class SpringModel(FileModel):
     laws: dict[Literal[DIRECTIONS], LawModel] | None = None  # type: ignore[valid-type]
     rest: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = None
     stroke: Stroke | None = None
+    loss_factor: Annotated[Number | None, Field(description="Structural loss factor.")] = None
     source: Source | None = None
     note: str = ""
 

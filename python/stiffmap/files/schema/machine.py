@@ -121,6 +121,12 @@ class MachineFile(FileModel):
         ),
     ] = Field(default_factory=lambda: list(get_args(Component)))
     platform: list[ElementModel] = Field(default_factory=list)
+    modal_damping: Annotated[
+        Number | list[Number] | None,
+        Field(
+            description="Damping ratios of the modes, lowest frequency first; the last holds for all further ones."
+        ),
+    ] = None
     external_springs: dict[Name, ExternalSpringModel] = Field(default_factory=dict)
     effects: list[EffectModel] = Field(default_factory=list)
     uncertainty: dict[str, float] = Field(
