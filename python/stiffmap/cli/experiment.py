@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import typer
 from rich import box
 from rich.console import Console
@@ -27,8 +28,27 @@ def experiment(
     file: Annotated[
         Path, typer.Argument(help="Spreadsheet: .xlsx, .csv, .txt (any separator and decimal sign).")
     ],
-    machine: Annotated[str, typer.Option(help="Declared machine: shipped name or machine file.")],
     output: Annotated[Path, written(help="Folder of the experiment.")],
+    machine: Annotated[
+        str | None, typer.Option(help="Declared machine: shipped name or machine file; or give --dh.")
+    ] = None,
+    dh: Annotated[
+        Path | None,
+        typer.Option(
+            "--dh",
+            help="Instead: table of Denavit and Hartenberg of a serial arm; machine.yaml is made of it.",
+        ),
+    ] = None,
+    dh_convention: Annotated[
+        str,
+        typer.Option(
+            "--dh-convention", help="standard, or modified (Craig: a and alpha of the link before)."
+        ),
+    ] = "standard",
+    difference: Annotated[
+        str,
+        typer.Option(help="What a difference in the file is: actual-minus-target or target-minus-actual."),
+    ] = "actual-minus-target",
     quantity: Annotated[
         str | None,
         typer.Option(
@@ -48,7 +68,10 @@ def experiment(
             "--map", help="What a column is, e.g. dx='Uhr 1 [µm]'; repeats: dx='Uhr 1|Uhr 2'; repeatable."
         ),
     ] = None,
-    unit: Annotated[list[str] | None, typer.Option(help="Unit of a column without one, e.g. dx=um.")] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(help="Unit of a column without one, e.g. dx=um; length=mm, joints=deg: of all of them."),
+    ] = None,
     constant: Annotated[
         list[str] | None, typer.Option("--set", help="What is the same in all rows, mm and N, e.g. z=0.")
     ] = None,
@@ -70,12 +93,18 @@ def experiment(
 
       [cyan]stiffmap experiment new points.csv --instrument tracker --machine hexapod --noise dx=0.01 -o points[/cyan]
 
+      [cyan]stiffmap experiment new poses.csv --dh arm_dh.csv --unit joints=deg --noise dx=0.03 -o tracker[/cyan]
+
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
     from stiffmap.experiment import load_experiment
-    from stiffmap.machine import load_machine
+    from stiffmap.machine import Machine, load_machine
+    from stiffmap.outputs import make_folder
     from stiffmap.spreadsheet.convert import understand, write_folder
+    from stiffmap.spreadsheet.dh import LEG, arm, read_dh
+    from stiffmap.spreadsheet.guess import guess
     from stiffmap.spreadsheet.instrument import as_readings, load_instrument
+    from stiffmap.spreadsheet.joints import DIFFERENCES, as_seen, commanded, drives_of, turned
     from stiffmap.spreadsheet.sheet import read_sheet
 
     if action != "new":
@@ -84,29 +113,63 @@ def experiment(
     quantity = quantity or (wrote.quantity if wrote else "deflection")
     if quantity not in ("deflection", "position"):
         raise StiffmapError(f"--quantity: expected deflection or position, got '{quantity}'")
-    load_machine(machine)
+    if difference not in DIFFERENCES:
+        raise StiffmapError(f"--difference: expected {' or '.join(DIFFERENCES)}, got '{difference}'")
+    if (machine is None) == (dh is None):
+        raise StiffmapError("experiment: give either --machine or --dh")
     if (output / "experiment.yaml").exists() and not overwrite:
         raise FileError("exists already; use --overwrite to replace it", file=str(output / "experiment.yaml"))
     table = read_sheet(file, sheet)
-    chosen = {k: v.split("|") for k, v in _pairs(mapped, "map").items()}
-    units, constants = _pairs(unit, "unit"), _numbers(constant, "set")
-    if wrote is not None:
+    chosen: dict[str, Sequence[str]] = {k: v.split("|") for k, v in pairs(mapped, "map").items()}
+    units, constants = pairs(unit, "unit"), _numbers(constant, "set")
+    rows = None if dh is None else read_dh(read_sheet(dh), units)
+    drives = {f"{LEG}.{r.name}": r.slides for r in rows} if rows else drives_of(load_machine(str(machine)))
+    own = {k: v for k, v in units.items() if rows is None or k not in ("theta", "d", "a", "alpha")}
+    joints = commanded(table, drives, chosen, own)
+    if joints is None and wrote is not None:
         table, meant, assumed, constants = as_readings(table, wrote, constants)
-        chosen, units = meant | chosen, assumed | units
-    found = understand(table, chosen, units, constants)
-    write_folder(found, table, output, machine, quantity, _numbers(noise, "noise"), f"from {file.name}")
+        chosen, own = meant | chosen, assumed | own
+    if joints is not None:
+        joints = as_seen(joints, own, difference)
+        table, chosen = joints.sheet, joints.chosen
+        quantity = "position" if joints.head else quantity
+    if joints is None or not joints.head:
+        table, other_way = turned(table, guess(table.header, chosen), difference)
+        chosen = dict(chosen) | other_way
+    if rows is not None:
+        if joints is None:
+            raise StiffmapError(f"{file}: no column commands a joint; the arm has {', '.join(drives)}")
+        machine = str(make_folder(output) / "machine.yaml")
+        at = joints.coordinates()
+        middle = at[np.nanargmin(np.linalg.norm(at - np.nanmedian(at, axis=0), axis=1))]
+        Machine(arm(rows, dh_convention, output.name, f"from {dh.name}" if dh else "", middle)).save(machine)
+    known = None if joints is None else joints.columns
+    found = understand(table, chosen, own, constants, known, None if joints is None else joints.head)
+    write_folder(found, table, output, str(machine), quantity, _numbers(noise, "noise"), f"from {file.name}")
     made = load_experiment(output)
     if as_json:
         print_json({"folder": str(output), "rows": len(made), "repeats": found.repeats,
                     "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units})  # fmt: skip
         return
-    tell(found, table.header, made, machine, output)
+    for line in joints.told if joints else ():
+        print(line)
+    tell(found, table.header, made, str(machine), output, known or {})
 
 
-def tell(found: Imported, header: Sequence[str], made: Experiment, machine: str, output: Path) -> None:
+def tell(
+    found: Imported,
+    header: Sequence[str],
+    made: Experiment,
+    machine: str,
+    output: Path,
+    commands: Mapping[str, tuple[str, str]],
+) -> None:
     """What each column was taken for, the first rows, and what to do next."""
     console = Console(highlight=False, soft_wrap=True)
     for c in found.columns:
+        if c.meaning in commands:
+            console.print(f"'{escape(header[c.index])}': command of {', '.join(commands[c.meaning])}")
+            continue
         told = f"repeat {c.repeat} of {c.meaning}" if c.repeat else c.meaning
         where = (
             "kept in notes.csv" if c.meaning == "note" else f"{told}, {found.units.get(c.meaning, 'no unit')}"
@@ -114,7 +177,10 @@ def tell(found: Imported, header: Sequence[str], made: Experiment, machine: str,
         console.print(f"'{escape(header[c.index])}': {where}")
     for name, value in found.constants.items():
         console.print(f"{name} = {value:g} in every row")
-    _show(console, made)
+    if commands:
+        _show_cells(console, found)
+    else:
+        _show(console, made)
     poses = int(made.groups.max()) + 1
     console.print(
         f"{output}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
@@ -138,7 +204,19 @@ def _show(console: Console, made: object) -> None:
     console.print(table)
 
 
-def _pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
+def _show_cells(console: Console, found: Imported) -> None:
+    """The first rows as they were written."""
+    from itertools import islice
+
+    table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood")
+    for name in found.header:
+        table.add_column(name, justify="right")
+    for row in islice(iter(found.rows), 3):
+        table.add_row(*(f"{c:.7g}" if isinstance(c, float) else str(c) for c in row))
+    console.print(table)
+
+
+def pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
     out = {}
     for text in given or []:
         key, equals, value = text.partition("=")
@@ -150,7 +228,7 @@ def _pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
 
 def _numbers(given: Sequence[str] | None, name: str) -> dict[str, float]:
     out = {}
-    for key, text in _pairs(given, name).items():
+    for key, text in pairs(given, name).items():
         try:
             out[key] = number_in(text)
         except ValueError:

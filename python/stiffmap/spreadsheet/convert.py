@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.outputs import make_folder, only_job, write_rows, write_text
-from stiffmap.spreadsheet.guess import FORCES, LENGTHS, READINGS, Column, guess, known_unit
+from stiffmap.spreadsheet.guess import FORCES, LENGTHS, READINGS, SEEN, Column, guess, known_unit
 from stiffmap.spreadsheet.sheet import Sheet
 from stiffmap.yaml_text import text_of
 
@@ -34,6 +34,8 @@ class Imported:
     repeats: int
     constants: dict[str, float]
     notes: list[Column]
+    head: dict[str, Any] = field(default_factory=dict)
+    """Further keys of experiment.yaml."""
 
 
 def understand(
@@ -41,24 +43,34 @@ def understand(
     chosen: Mapping[str, Sequence[str]],
     units: Mapping[str, str],
     constants: Mapping[str, float],
+    commands: Mapping[str, tuple[str, str]] | None = None,
+    head: Mapping[str, Any] | None = None,
 ) -> Imported:
     """Columns, units and rows of data.csv; raises StiffmapError that asks for what cannot be guessed.
 
     ``units`` (meaning -> unit) for columns without brackets; ``constants`` (meaning -> number) for what the
-    sheet has no column of, in mm and N.
+    sheet has no column of, in mm and N. ``commands`` (column -> drive, unit) for columns of commanded joints, which stand for
+    poses; ``head`` holds further keys of experiment.yaml.
     """
+    drives = dict(commands or {})
     columns = guess(sheet.header, chosen)
     used = [c for c in columns if c.meaning != "note"]
     for c in used:
         if c.meaning not in WORDS and not sheet.is_numeric(c.index):
             sheet.numbers(c.index)  # raises, naming the line
     known = {c.meaning for c in used} | set(constants)
+    if drives:  # the pose follows from them
+        columns = [replace(c, meaning="note") if c.meaning in POSE else c for c in columns]
+        used = [c for c in columns if c.meaning != "note"]
+        known |= set(POSE)
     _ask(sheet, known)
-    named = {c.meaning: _unit(c, units) for c in used if c.meaning not in (*WORDS, *COUNTED)}
+    named = {c.meaning: _unit(c, units) for c in used if c.meaning not in (*WORDS, *COUNTED, *drives)}
     repeats = max([c.repeat for c in used], default=0) or 1
     header, rows = _rows(sheet, used, constants, repeats)
     return Imported(columns, named, header, rows, repeats, dict(constants),
-                    [c for c in columns if c.meaning == "note"])  # fmt: skip
+                    [c for c in columns if c.meaning == "note"],
+                    {"command": {k: {"actuator": a, "unit": u} for k, (a, u) in drives.items()}} | dict(head or {})
+                    if drives else dict(head or {}))  # fmt: skip
 
 
 def _ask(sheet: Sheet, known: set[str]) -> None:
@@ -77,7 +89,8 @@ def _ask(sheet: Sheet, known: set[str]) -> None:
 
 
 def _unit(c: Column, units: Mapping[str, str]) -> str:
-    text = units.get(c.meaning, c.unit)
+    lengths = (*POSE, *POSE2, *SEEN, "dx", "dy", "dz", "dd")
+    text = units.get(c.meaning, c.unit) or (units.get("length", "") if c.meaning in lengths else "")
     if not text:
         kind = (
             "um, mm"
@@ -91,13 +104,7 @@ def _unit(c: Column, units: Mapping[str, str]) -> str:
             f"--unit {c.meaning}={kind.split(',')[0]}"
         )
     found = known_unit(text)
-    wanted = (
-        LENGTHS
-        if c.meaning in (*POSE, *POSE2, "dx", "dy", "dz", "dd")
-        else FORCES
-        if c.meaning in FORCE
-        else None
-    )
+    wanted = LENGTHS if c.meaning in lengths else FORCES if c.meaning in FORCE else None
     if not found or (wanted is not None and found not in wanted.values()):
         raise StiffmapError(f"column '{c.name}' ({c.meaning}): the unit '{text}' is not one of this quantity")
     return found
@@ -190,6 +197,7 @@ def write_folder(
     }
     if noise:
         head["noise"] = dict(noise)
+    head |= found.head
     with only_job(make_folder(folder)):
         head["rows"] = write_rows(folder / "data.csv", found.header, found.rows)
         if found.notes:

@@ -31,12 +31,13 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     *((f"f{a}", rf"f ?_?{a}|force ?_?(in )?{a}|kraft ?_?{a}|last ?_?{a}|load ?_?{a}") for a in "xyz"),
     *((f"m{a}", rf"m ?_?{a}|moment ?_?{a}|torque ?_?{a}") for a in "xyz"),
     *((f"u_d{a}", rf"u ?_?d?{a}|sigma ?_?d?{a}|std ?_?d?{a}") for a in "xyz"),
-    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displacement|verschiebung|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr) ?_?{a}") for a in "xyz"),
+    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displacement|verschiebung|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr) ?_?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)") for a in "xyz"),
     *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
-    *((a, rf"{a}|pos ?_?{a}|{a} ?_?pos|position ?_?{a}|nominal ?_?{a}|soll ?_?{a}|{a} ?soll") for a in "xyz"),
+    *((a, rf"{a}|pos ?_?{a}|{a} ?_?pos|position ?_?{a}|nominal ?_?{a}|soll ?_?{a}|{a} ?soll|{a} ?_?(t|target|cmd|nominal|command|commanded)|target ?_?{a}") for a in "xyz"),
 )  # fmt: skip
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
-READINGS = ("dx", "dy", "dz", "rx", "ry", "rz", "dd")
+SEEN = ("px", "py", "pz")
+READINGS = ("dx", "dy", "dz", "rx", "ry", "rz", "dd", *SEEN)
 
 
 @dataclass(frozen=True)
