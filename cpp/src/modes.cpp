@@ -38,12 +38,7 @@ MatX closed_motions(const Mechanism& m, const Linearization& lin) {
   return P * left_null_vectors(C.transpose(), rank_threshold);
 }
 
-MatX tangent(const Mechanism& m, const Linearization& lin) {
-  MatX out = lin.K - lin.H;
-  for (Index j = 0; j < m.size(); ++j)
-    if (m.coordinates[at(j)].law >= 0 && lin.da[j] != 0) out(j, j) += lin.dtau[j] / lin.da[j];
-  return out;
-}
+MatX tangent(const Mechanism& m, const Linearization& lin) { return springs_only(m, lin) - lin.H; }
 
 void keep(const MatX& Z, const VecX& inverse_square, const MatX& vectors, ModesResult& out) {
   const double largest = std::max(inverse_square.cwiseAbs().maxCoeff(), 0.0);
@@ -65,7 +60,7 @@ bool unsymmetric(const MatX& Z, const MatX& K, const MatX& M, ModesResult& out) 
   const auto [values, all] = general_eigen(A);
   std::vector<Index> order(at(values.size()));
   std::iota(order.begin(), order.end(), Index{0});
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return values[a].real() < values[b].real(); });
+  std::sort(order.begin(), order.end(), [&values = values](Index a, Index b) { return values[a].real() < values[b].real(); });
   const double largest = values.cwiseAbs().maxCoeff();
   VecX mu(values.size());
   MatX vectors(K.rows(), values.size());
@@ -84,51 +79,64 @@ bool unsymmetric(const MatX& Z, const MatX& K, const MatX& M, ModesResult& out) 
 
 }  // namespace
 
+bool reduced_pose(const Mechanism& m, const Inertias& inertias, const PoseInput& in, SolveWorkspace& ws,
+                  ReducedPose& out) {
+  const ClosureResult closure = prepare_pose(m, in, ws);
+  out.status = closure.status;
+  out.flags = closure.flags;
+  if (closure.status != Status::converged) return false;
+  const EquilibriumResult eq = solve_equilibrium(m, ws.problem, {}, ws.equilibrium, ws.state);
+  out.status = eq.status;
+  out.flags |= eq.flags;
+  if (eq.status != Status::converged) return false;
+  const Linearization& lin = ws.equilibrium.lin;
+  out.x = lin.x;
+  out.Z = closed_motions(m, lin);
+  out.K = out.Z.transpose() * tangent(m, lin) * out.Z;
+  out.M = out.Z.transpose() * coordinate_mass(m, inertias, lin.frames) * out.Z;
+  out.S = 0.5 * (out.K + out.K.transpose());
+  if (out.K.rows() == 0) return true;
+  const bool definite = out.cholesky.compute(out.S);
+  const VecX pivots = out.cholesky.pivots();
+  const bool sound = definite && pivots.cwiseAbs2().minCoeff() > 1e-13 * out.S.diagonal().cwiseAbs().maxCoeff();
+  if (sound || out.M.isZero(0)) return true;
+  const VecX values = symmetric_eigen(out.S).values;
+  const double low = values[0], high = values[out.K.rows() - 1];
+  if (low > 1e-12 * high) return true;
+  out.status = low < -1e-9 * high ? Status::unstable : Status::singular;
+  return false;
+}
+
+MatX springs_only(const Mechanism& m, const Linearization& lin) {
+  MatX out = lin.K;
+  for (Index j = 0; j < m.size(); ++j)
+    if (m.coordinates[at(j)].law >= 0 && lin.da[j] != 0) out(j, j) += lin.dtau[j] / lin.da[j];
+  return out;
+}
+
 void natural_modes(const Mechanism& m, const Inertias& inertias, const PoseInput& in, Index count, SolveWorkspace& ws,
                    ModesResult& out) {
   out.square.setConstant(count, nan);
   out.shape.setConstant(m.size(), count, nan);
   out.x.setConstant(m.size(), nan);
-  const ClosureResult closure = prepare_pose(m, in, ws);
-  out.status = closure.status;
-  out.flags = closure.flags;
-  if (closure.status != Status::converged) return;
-  const EquilibriumResult eq = solve_equilibrium(m, ws.problem, {}, ws.equilibrium, ws.state);
-  out.status = eq.status;
-  out.flags |= eq.flags;
-  if (eq.status != Status::converged) return;
-  const Linearization& lin = ws.equilibrium.lin;
-  const MatX Z = closed_motions(m, lin);
-  const MatX K = Z.transpose() * tangent(m, lin) * Z;
-  const MatX M = Z.transpose() * coordinate_mass(m, inertias, lin.frames) * Z;
-  if (K.rows() == 0 || M.isZero(0)) {
-    out.x = lin.x;
-    return;  // nothing moves, or nothing has mass
-  }
-  const MatX S = 0.5 * (K + K.transpose());
-  Cholesky cholesky;
-  const bool definite = cholesky.compute(S);
-  const VecX pivots = cholesky.pivots();
-  const bool sound = definite && pivots.cwiseAbs2().minCoeff() > 1e-13 * S.diagonal().cwiseAbs().maxCoeff();
-  if (!sound) {
-    const VecX values = symmetric_eigen(S).values;
-    const double low = values[0], high = values[K.rows() - 1];
-    if (low <= 1e-12 * high) {
-      out.status = low < -1e-9 * high ? Status::unstable : Status::singular;
-      return;
-    }
-  }
-  out.x = lin.x;
-  if ((K - K.transpose()).norm() > 1e-9 * S.norm()) {
+  ReducedPose pose;
+  const bool found = reduced_pose(m, inertias, in, ws, pose);
+  out.status = pose.status;
+  out.flags = pose.flags;
+  if (!found) return;
+  out.x = pose.x;
+  const MatX &Z = pose.Z, &K = pose.K, &M = pose.M;
+  if (K.rows() == 0 || M.isZero(0)) return;  // nothing moves, or nothing has mass
+  if ((K - K.transpose()).norm() > 1e-9 * pose.S.norm()) {
     if (!unsymmetric(Z, K, M, out)) out.status = Status::unstable;
     return;
   }
   MatX X = M;
-  cholesky.solve_lower(X);
+  pose.cholesky.solve_lower(X);
   MatX reduced = X.transpose();
-  cholesky.solve_lower(reduced);
+  pose.cholesky.solve_lower(reduced);
   EigenX modes = symmetric_eigen(MatX(0.5 * (reduced + reduced.transpose())));
-  cholesky.solve_upper(modes.vectors);
+  pose.cholesky.solve_upper(modes.vectors);
   keep(Z, modes.values, modes.vectors, out);
 }
 

@@ -8,6 +8,7 @@ void bind_mechanism(pybind11::module_& m);
 void bind_one(pybind11::module_& m);
 void bind_paths(pybind11::module_& m);
 void bind_solve(pybind11::module_& m);
+void bind_vibration(pybind11::module_& m);
 }  // namespace stiffmap::bindings
 
 PYBIND11_MODULE(_core, m, pybind11::mod_gil_not_used()) {
@@ -18,4 +19,5 @@ PYBIND11_MODULE(_core, m, pybind11::mod_gil_not_used()) {
   stiffmap::bindings::bind_one(m);
   stiffmap::bindings::bind_measures(m);
   stiffmap::bindings::bind_paths(m);
+  stiffmap::bindings::bind_vibration(m);
 }

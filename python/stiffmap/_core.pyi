@@ -6,18 +6,43 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Answer', 'Chain', 'CommandError', 'DRIVE_NUMBERS', 'ExternalSpring', 'FastPlan', 'HomeMisfit', 'Law', 'Mechanism', 'OneAnswer', 'OneCall', 'Pose', 'Stroke', 'Winch', 'clamp', 'home_gaps', 'kernel_level', 'kernel_levels', 'path', 'reactions']
-class Pose:
-    def __init__(self, translation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+__all__: list[str] = ['Answer', 'Chain', 'CommandError', 'DRIVE_NUMBERS', 'ExternalSpring', 'FastPlan', 'HomeMisfit', 'Law', 'Mechanism', 'OneAnswer', 'OneCall', 'Pose', 'Stroke', 'Winch', 'clamp', 'home_gaps', 'kernel_level', 'kernel_levels', 'multipliers', 'path', 'reactions']
+class Answer:
+    @property
+    def actuator_effort(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
-class Law:
-    def __init__(self, stiffness: typing.SupportsFloat | typing.SupportsIndex, cubic: typing.SupportsFloat | typing.SupportsIndex, knots: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]], friction: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    @property
+    def compliance(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
-class CommandError:
-    def __init__(self, offset: typing.SupportsFloat | typing.SupportsIndex, slope: typing.SupportsFloat | typing.SupportsIndex, amplitude: typing.SupportsFloat | typing.SupportsIndex, period: typing.SupportsFloat | typing.SupportsIndex, phase: typing.SupportsFloat | typing.SupportsIndex, reference: typing.SupportsFloat | typing.SupportsIndex, knots: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+    @property
+    def coordinates(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
-class Stroke:
-    def __init__(self, joint: str, along: typing.SupportsInt | typing.SupportsIndex, at: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex, table: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]]) -> None:
+    @property
+    def displacement(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def flags(self) -> numpy.typing.NDArray[numpy.uint32]:
+        ...
+    @property
+    def free_twists(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def indeterminate(self) -> numpy.typing.NDArray[numpy.uint8]:
+        ...
+    @property
+    def iterations(self) -> numpy.typing.NDArray[numpy.int32]:
+        ...
+    @property
+    def leg_wrench(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def status(self) -> numpy.typing.NDArray[numpy.uint8]:
+        ...
+    @property
+    def stiffness(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def variants(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
 class Chain:
     def __init__(self) -> None:
@@ -26,19 +51,33 @@ class Chain:
         ...
     def body(self, name: str, mass: typing.SupportsFloat | typing.SupportsIndex, com: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         ...
-    def joint(self, name: str, prismatic: bool, axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], actuated: bool, home: typing.SupportsFloat | typing.SupportsIndex, law: Law | None, numbers: dict, errors: collections.abc.Sequence[CommandError], lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, guide_errors: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float64], CommandError]], friction: typing.SupportsFloat | typing.SupportsIndex, about_command: bool, rest: typing.SupportsFloat | typing.SupportsIndex | None = None, ball: str = '') -> None:
+    def joint(self, name: str, prismatic: bool, axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], actuated: bool, home: typing.SupportsFloat | typing.SupportsIndex, law: stiffmap._core.Law | None, numbers: dict, errors: collections.abc.Sequence[CommandError], lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, guide_errors: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float64], CommandError]], friction: typing.SupportsFloat | typing.SupportsIndex, about_command: bool, rest: typing.SupportsFloat | typing.SupportsIndex | None = None, ball: str = '') -> None:
         ...
     def offset(self, name: str, nominal: Pose, actual: Pose) -> None:
         ...
     def point(self, name: str, offset: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         ...
-    def spring(self, name: str, matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], compliance: bool, rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], laws: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, Law]], stroke: Stroke | None = None) -> None:
+    def spring(self, name: str, matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], compliance: bool, rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], laws: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, Law]], stroke: stiffmap._core.Stroke | None = None) -> None:
         ...
-class Winch:
-    def __init__(self, elasticity: typing.SupportsFloat | typing.SupportsIndex, lead: typing.SupportsFloat | typing.SupportsIndex, pretension: typing.SupportsFloat | typing.SupportsIndex, factor: typing.SupportsFloat | typing.SupportsIndex, lead_factor: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], anchor_error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point_error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, numbers: dict, errors: collections.abc.Sequence[CommandError]) -> None:
+class CommandError:
+    def __init__(self, offset: typing.SupportsFloat | typing.SupportsIndex, slope: typing.SupportsFloat | typing.SupportsIndex, amplitude: typing.SupportsFloat | typing.SupportsIndex, period: typing.SupportsFloat | typing.SupportsIndex, phase: typing.SupportsFloat | typing.SupportsIndex, reference: typing.SupportsFloat | typing.SupportsIndex, knots: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
 class ExternalSpring:
-    def __init__(self, name: str, point: str, anchor: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], stiffness: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex, tension_only: bool, winch: Winch | None = None) -> None:
+    def __init__(self, name: str, point: str, anchor: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], stiffness: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex, tension_only: bool, winch: stiffmap._core.Winch | None = None) -> None:
+        ...
+class FastPlan:
+    def __init__(self, mechanism: Mechanism, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], grid_nodes: typing.SupportsInt | typing.SupportsIndex = 8) -> None:
+        ...
+    @property
+    def available(self) -> bool:
+        ...
+    @property
+    def missing(self) -> str:
+        ...
+class HomeMisfit(ValueError):
+    pass
+class Law:
+    def __init__(self, stiffness: typing.SupportsFloat | typing.SupportsIndex, cubic: typing.SupportsFloat | typing.SupportsIndex, knots: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]], friction: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
 class Mechanism:
     def __init__(self, root: Chain, home: Pose, springs: collections.abc.Sequence[ExternalSpring], task: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(6)"] = [True, True, True, True, True, True], search: bool = False, like: Mechanism = None) -> None:
@@ -60,6 +99,8 @@ class Mechanism:
     def point_positions(self, point: str, coordinates: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         ...
     def solve(self, plan: FastPlan, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], load_points: collections.abc.Sequence[str], load_types: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], read_points: collections.abc.Sequence[str], gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], load_steps: typing.SupportsInt | typing.SupportsIndex, threads: typing.SupportsInt | typing.SupportsIndex, full: bool, variants: collections.abc.Sequence[FastPlan] = [], closed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> Answer:
+        ...
+    def tip_modes(self, inertias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], viscous: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], loss: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], closed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: str, count: typing.SupportsInt | typing.SupportsIndex, threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
         ...
     @property
     def actuators(self) -> list[tuple[str, int]]:
@@ -115,54 +156,6 @@ class Mechanism:
     @property
     def stiffness(self) -> float:
         ...
-class FastPlan:
-    def __init__(self, mechanism: Mechanism, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], grid_nodes: typing.SupportsInt | typing.SupportsIndex = 8) -> None:
-        ...
-    @property
-    def available(self) -> bool:
-        ...
-    @property
-    def missing(self) -> str:
-        ...
-class HomeMisfit(ValueError):
-    pass
-class Answer:
-    @property
-    def actuator_effort(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def compliance(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def coordinates(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def displacement(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def flags(self) -> numpy.typing.NDArray[numpy.uint32]:
-        ...
-    @property
-    def free_twists(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def indeterminate(self) -> numpy.typing.NDArray[numpy.uint8]:
-        ...
-    @property
-    def iterations(self) -> numpy.typing.NDArray[numpy.int32]:
-        ...
-    @property
-    def leg_wrench(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def status(self) -> numpy.typing.NDArray[numpy.uint8]:
-        ...
-    @property
-    def stiffness(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def variants(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
 class OneAnswer:
     @property
     def actuator_effort(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -202,6 +195,15 @@ class OneCall:
         ...
     def solve(self, position: typing.Any, wrench: typing.Any) -> OneAnswer:
         ...
+class Pose:
+    def __init__(self, translation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+class Stroke:
+    def __init__(self, joint: str, along: typing.SupportsInt | typing.SupportsIndex, at: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex, table: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]]) -> None:
+        ...
+class Winch:
+    def __init__(self, elasticity: typing.SupportsFloat | typing.SupportsIndex, lead: typing.SupportsFloat | typing.SupportsIndex, pretension: typing.SupportsFloat | typing.SupportsIndex, factor: typing.SupportsFloat | typing.SupportsIndex, lead_factor: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], anchor_error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point_error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, numbers: dict, errors: collections.abc.Sequence[CommandError]) -> None:
+        ...
 def clamp(mechanism: Mechanism, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], displacement: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: str, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
     ...
 def home_gaps(root: Chain, home: Pose, task: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(6)"] = [True, True, True, True, True, True], search: bool = False) -> tuple[list[tuple[str, float, float]], list[tuple[str, float, float]]]:
@@ -209,6 +211,8 @@ def home_gaps(root: Chain, home: Pose, task: typing.Annotated[collections.abc.Se
 def kernel_level() -> str:
     ...
 def kernel_levels() -> list[str]:
+    ...
+def multipliers(frequency: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], way: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], chips: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], depth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], threads: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
     ...
 def path(mechanism: Mechanism, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: str, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], control: typing.SupportsInt | typing.SupportsIndex, limit: typing.SupportsFloat | typing.SupportsIndex, steps: typing.SupportsInt | typing.SupportsIndex, cross: typing.SupportsInt | typing.SupportsIndex) -> tuple:
     ...

@@ -15,6 +15,7 @@ from stiffmap.calibration.groups import STRONG
 from stiffmap.calibration.held_out import Fold, leave_out, left_out
 from stiffmap.calibration.model import Fitted, predicted
 from stiffmap.calibration.statistics import Sums, gain_of
+from stiffmap.calibration.wording import odds
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.folds import folds
@@ -38,7 +39,7 @@ def claimed_fit(
         field, parts = judged[0]
         nats = field.log_evidence(trial) - field.log_evidence(factor)
         if nats < STRONG:
-            return f"a smooth field that knows nothing of the machine explains as much ({nats:+.0f} nats beside it)"
+            return f"a smooth field that knows nothing of the machine explains as much (odds {odds(nats)} beside it)"
         if len(parts) < 2:
             return ""
         tolerated = _tolerated(sums, factor, which)

@@ -94,21 +94,29 @@ def _unit(name: str, unit: str) -> str:
     return "rad" if name.startswith("r") else unit
 
 
+def odds(nats: float) -> str:
+    """How much likelier the readings are with something than without it, from the logarithm: ``20:1``, ``1e12:1``."""
+    power = nats / 2.302585092994046
+    if abs(power) > 3:
+        return f"1e{power:.0f}:1" if power > 0 else f"1:1e{-power:.0f}"
+    return f"{10**power:.2g}:1" if power >= 0 else f"1:{10**-power:.2g}"
+
+
 def _beyond(b: Beyond) -> str:
     other = f"; or instead: {', '.join(b.rivals[:3])}" if b.rivals else ""
     more = f" and {len(b.rivals) - 3} more" if len(b.rivals) > 3 else ""
-    return f"{b.name}: {in_display_units(b.value, b.unit)} ± {in_display_units(b.sigma, b.unit)} ({b.nats:.0f} nats){other}{more}"
+    return f"{b.name}: {in_display_units(b.value, b.unit)} ± {in_display_units(b.sigma, b.unit)} (odds {odds(b.nats)}){other}{more}"
 
 
 def _wider(w: Wider) -> str:
     other = f"; or instead: {', '.join(w.rivals)}" if w.rivals else ""
-    return f"{w.group}: standard uncertainties {w.factor:g} times too small ({w.nats:.0f} nats){other}; which of them, the readings do not tell"
+    return f"{w.group}: standard uncertainties {w.factor:g} times too small (odds {odds(w.nats)}){other}; which of them, the readings do not tell"
 
 
 def _groups(c: Facts) -> str:
     chosen = [g for g in c.groups.groups if g.name in c.groups.chosen]
     told = [
-        f"{g.name} {g.alone:+.0f} nats" + (f" (or {', '.join(g.rivals)})" if g.rivals else "")
+        f"{g.name}, odds {odds(g.alone)}" + (f" (or {', '.join(g.rivals)})" if g.rivals else "")
         for g in sorted(chosen, key=lambda g: -g.last)
     ]
     return "; ".join(told) or "none is demanded"

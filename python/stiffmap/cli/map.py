@@ -38,6 +38,7 @@ from stiffmap.cli.map_options import (
     SchedulerOption,
     StatisticsOption,
     TablesOption,
+    ToolpathOption,
     UncertaintyOption,
     XOption,
     YOption,
@@ -61,6 +62,7 @@ def map_command(
     x: XOption = None,
     points: PointsOption = 101,
     force: ForceOption = "300",
+    toolpath: ToolpathOption = None,
     plane: PlaneOption = "xy",
     tolerance: ToleranceOption = 0.25,
     directions: DirectionsOption = 4,
@@ -111,10 +113,18 @@ def map_command(
       [cyan]stiffmap map orthoglide-revised --points 2001 --estimate[/cyan]
 
       [cyan]stiffmap map orthoglide-revised --points 51 --statistics[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --toolpath trim -o results[/cyan]
     """
     kinds = named_formats(formats, "--format", ("png", "svg", "pdf")) if pictures else []
     sheets = named_formats(tables, "--table", ("csv", "xlsx")) if tables else []
     m = machine_with(machine, effect)
+    if toolpath is not None:
+        from stiffmap.cli.map_toolpath import map_toolpath
+
+        how = {"gravity": gravity(gravity_), "method": method, "threads": threads}
+        map_toolpath(m, toolpath, force, how, output, kinds, as_json)
+        return
     call: dict[str, Any] = {
         **grid(m, {"x": x, "y": y, "z": z}, points),
         "wrench": cases(plane, force),

@@ -10,10 +10,11 @@ import typer
 from scipy.spatial.transform import Rotation
 
 from stiffmap.calibration.validity import beyond
-from stiffmap.cli.inputs import EffectsOption, FolderOption, ThreadsOption, placed, plain
+from stiffmap.cli.inputs import EffectsOption, FolderOption, ThreadsOption, plain
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.experiment import Experiment, Residual, load_experiment
 from stiffmap.experiment import residual as compute
+from stiffmap.experiment.calls import placed
 from stiffmap.experiment.channels import Channel
 from stiffmap.machine import load_machine
 from stiffmap.outputs import make_folder, write_picture, write_text

@@ -24,6 +24,7 @@ from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.outputs import write_rows
+from stiffmap.short import short_repr
 from stiffmap.validity import Validity
 
 STEPS = 25
@@ -32,6 +33,7 @@ DONE = 1e-10
 MM = 1e3
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Commands:
     """Compensated commands of n poses, SI, base axes; NaN where the machine has no answer."""
@@ -133,7 +135,14 @@ def compensate(
         Pose components to correct, of x y z rx ry rz; None: those that the machine commands, positions first
         where it has fewer drives than components.
 
-    Rows out of reach hold NaN. Raises StiffmapError for bad input.
+    Notes
+    -----
+    Rows out of reach hold NaN.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     plan = _plan(machine, position, rotation, joints, wrench, approach, gravity, point)
     wanted_p, wanted_r = plan.position, _turns(machine, plan)

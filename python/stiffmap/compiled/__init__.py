@@ -1,7 +1,17 @@
 """The seam to the C++ core: the only package that imports `stiffmap._core`."""
 
-from stiffmap.compiled.machine import Answer, CompiledMachine, kernel_levels
+from stiffmap.compiled.machine import Answer, CompiledMachine, kernel_levels, multipliers
 from stiffmap.compiled.names import Names, Role
 from stiffmap.compiled.status import Flag, Status, counted
 
-__all__ = ["Answer", "CompiledMachine", "Flag", "Names", "Role", "Status", "counted", "kernel_levels"]
+__all__ = [
+    "Answer",
+    "CompiledMachine",
+    "Flag",
+    "Names",
+    "Role",
+    "Status",
+    "counted",
+    "kernel_levels",
+    "multipliers",
+]

@@ -313,6 +313,26 @@ class CompiledMachine:
         """Arrays by name: squares of the lowest angular frequencies and their shapes."""
         return self._mechanism.modes(inertias, position, rotation, wrench, gravity, count, threads)
 
+    def tip_modes(
+        self,
+        inertias: Floats,
+        viscous: Floats,
+        loss: Floats,
+        position: Floats,
+        rotation: Floats,
+        wrench: Floats,
+        *,
+        gravity: Floats,
+        closed: Floats,
+        point: str,
+        count: int,
+        threads: int,
+    ) -> dict[str, Any]:
+        """Arrays by name: the lowest modes at a point, damping between them, the flexibility of all others."""
+        return self._mechanism.tip_modes(
+            inertias, viscous, loss, position, rotation, wrench, gravity, closed, point, count, threads
+        )
+
     def frames(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """(nodes, 3) m and (nodes, 3, 3): all frames at given coordinates, nominal geometry."""
         position, rotation = self._mechanism.frames(coordinates)
@@ -328,3 +348,22 @@ Answer = _core.Answer | _core.OneAnswer
 def kernel_levels() -> list[str]:
     """Instruction sets that this CPU can run, the widest last."""
     return list(_core.kernel_levels())
+
+
+def multipliers(
+    frequency: Floats,
+    ratio: Floats,
+    mass: Floats,
+    way: Floats,
+    rest: Floats,
+    chips: Floats,
+    period: Floats,
+    depth: Floats,
+    threads: int,
+) -> Floats:
+    """(periods, depths) size of the largest multiplier of a tooth period.
+
+    (modes,) rad/s, ratio, kg and (modes, 3) unit vectors; (3, 3) m/N that follows at once; (intervals, 3, 2) N/m² means of the
+    chip's force; (periods,) s; (depths,) m.
+    """
+    return np.asarray(_core.multipliers(frequency, ratio, mass, way, rest, chips, period, depth, threads))

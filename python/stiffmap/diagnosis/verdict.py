@@ -29,6 +29,8 @@ from stiffmap.diagnosis.rivals.explain import Explanation, explain
 from stiffmap.diagnosis.rivals.separation import separation
 from stiffmap.diagnosis.search.detectability import detectable
 from stiffmap.diagnosis.search.study import Finding, Study, study
+from stiffmap.diagnosis.slips.find import find_slip
+from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.experiment.comparison.limitations import limitations, refuse
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -40,6 +42,8 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
 from stiffmap.one_thread import on_one_thread
 
+SLIPS = 2
+"""Mistakes in the readings that are undone one after the other."""
 LISTED = 20
 """Patterns that a verdict lists at most."""
 
@@ -83,8 +87,11 @@ def diagnose(
     progress
         Called with a text on what is tried.
 
-    Raises StiffmapError for files that cannot be used, poses out of reach, and noise that is unknown.
-    docs/diagnosis.md tells the method.
+    Raises
+    ------
+    StiffmapError
+        For files that cannot be used, poses out of reach, and noise that is unknown. docs/diagnosis.md
+        tells the method.
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
@@ -95,10 +102,30 @@ def diagnose(
     with clock.on_interrupt():
         predictor = Predictor(machine, data, threads=threads)
         refuse(predictor.experiment, predictor())
-        s = study(predictor, seed, None, clock, without)
+        s, slips = without_slips(study(predictor, seed, None, clock, without), seed)
         if budget is None:
             clock.bound(s.predictor)
-        return _diagnosed(s, seed, certified(tolerances, data), groups, cross_validate)
+        answer = _diagnosed(s, seed, certified(tolerances, data), groups, cross_validate)
+        return with_slips(answer, slips) if slips else answer
+
+
+def without_slips(s: Study, seed: int) -> tuple[Study, list[Slip]]:
+    """The study of the readings with mistakes of writing and mounting undone, and what they are."""
+    slips: list[Slip] = []
+    s.clock.say("units, signs, swaps and shifted rows")
+    while len(slips) < SLIPS and not s.clock.over and (found := find_slip(s)):
+        slips.append(found.slip)
+        if not found.slip.undone:
+            break
+        predictor = Predictor(s.predictor.machine, found.experiment, threads=s.predictor.threads)
+        refuse(predictor.experiment, predictor())
+        s = study(predictor, seed, None, s.clock, s.without)
+    return s, slips
+
+
+def with_slips(d: Diagnosis, slips: Sequence[Slip]) -> Diagnosis:
+    """The answer that names mistakes in the readings before any cause."""
+    return replace(d, slips=list(slips), verdict="readings")
 
 
 def _diagnosed(

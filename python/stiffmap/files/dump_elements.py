@@ -188,6 +188,8 @@ def _spring(spring: Spring) -> Plain:
         plain["laws"] = {DIRECTIONS[i]: _law_terms(law) for i, law in spring.laws}
     if any(spring.rest):
         plain["rest"] = floats(spring.rest)
+    if spring.loss_factor is not None:
+        plain["loss_factor"] = float(spring.loss_factor)
     return {**plain, **_stroke(spring)}
 
 

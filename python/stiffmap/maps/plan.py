@@ -10,19 +10,17 @@ import numpy as np
 import xarray as xr
 
 from stiffmap.broadcasting import Floats
+from stiffmap.labels import COMPONENTS, WRENCH, meaning
 from stiffmap.maps.inputs import plane_axes
 from stiffmap.maps.loading import Loading
 from stiffmap.maps.provenance import describe
 from stiffmap.maps.uncertainty import METHOD, Uncertain
 from stiffmap.maps.variables import (
-    COMPONENTS,
-    WRENCH,
     Variable,
     beyond_variable,
     deviation_variables,
     extreme_variables,
     load_variables,
-    meaning,
 )
 from stiffmap.validity import Validity
 

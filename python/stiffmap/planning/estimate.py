@@ -16,6 +16,7 @@ from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine
+from stiffmap.short import short_repr
 
 STEP = 1e-3
 """Share of a parameter's typical size over which predictions are differenced."""
@@ -26,6 +27,7 @@ share of a number in such directions from which on it is not."""
 Terms = tuple[AppliedEffect, ...]
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """Fitted values of k parameters, SI."""

@@ -13,6 +13,7 @@ from stiffmap.experiment.experiment import Experiment
 from stiffmap.machine import Machine
 from stiffmap.planning.estimate import Estimate, estimate
 from stiffmap.planning.left_over import difference
+from stiffmap.short import short_repr
 
 ALPHA = 0.01
 """Probability of naming a change in any number where there is none."""
@@ -47,6 +48,7 @@ class Change:
         )
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """Two experiments with the same effects fitted to each."""

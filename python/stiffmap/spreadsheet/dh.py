@@ -18,8 +18,9 @@ from scipy.spatial.transform import Rotation
 from stiffmap.broadcasting import Floats
 from stiffmap.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
 from stiffmap.errors import StiffmapError
-from stiffmap.spreadsheet.guess import ANGLES, LENGTHS, known_unit, split_unit
+from stiffmap.spreadsheet.guess import split_unit
 from stiffmap.spreadsheet.sheet import Sheet
+from stiffmap.spreadsheet.units import unit_of
 
 CONVENTIONS = ("standard", "modified")
 NUMBERS = {
@@ -192,15 +193,15 @@ def _columns(sheet: Sheet) -> dict[str, int]:
 
 def _factor(sheet: Sheet, index: int, name: str, units: Mapping[str, str]) -> float:
     header = sheet.header[index]
-    unit = known_unit(units.get(name, split_unit(header)[1]))
-    allowed = (LENGTHS if name in LENGTH else ANGLES).values()
-    if unit not in allowed:
+    quantity = "length" if name in LENGTH else "angle"
+    unit = unit_of(units.get(name, split_unit(header)[1]) or units.get(quantity, ""), quantity)
+    if unit is None:
         kind = "mm" if name in LENGTH else "deg"
         raise StiffmapError(
-            f"{sheet.file}: column '{header}' has no unit of {'lengths' if name in LENGTH else 'angles'}: write it in the "
-            f"header, as in '{name} [{kind}]', or say --unit {name}={kind}"
+            f"{sheet.file}: column '{header}' has no unit of {quantity}s: write it in the header, as in '{name} [{kind}]', or say "
+            f"--unit {name}={kind}"
         )
-    return TO_SI[unit]
+    return TO_SI[unit.name] * unit.factor
 
 
 def _named(text: str, number: int) -> str:

@@ -13,9 +13,10 @@ import numpy as np
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
-from stiffmap.spreadsheet.guess import ANGLES, LENGTHS, SEEN, Column, guess, known_unit, split_unit
+from stiffmap.spreadsheet.guess import SEEN, Column, guess, split_unit
 from stiffmap.spreadsheet.instrument import TO_MM, with_column
 from stiffmap.spreadsheet.sheet import Sheet
+from stiffmap.spreadsheet.units import unit_of
 
 NUMBERED = r"(joint|axis|achse|gelenk|theta|q|j|a)[ _.-]?{}"
 MOST_TURNS = 4.0 * math.pi
@@ -30,7 +31,7 @@ class Commanded:
     sheet: Sheet
     columns: dict[str, tuple[str, str]]
     """Column of data.csv -> full name of the drive, unit."""
-    chosen: dict[str, Sequence[str]]
+    chosen: dict[str, list[str]]
     """Meaning -> headers, the drives' columns among them."""
     head: dict[str, Any] = field(default_factory=dict)
     """Further keys of experiment.yaml."""
@@ -46,6 +47,11 @@ class Commanded:
             out.append(scale * self.sheet.numbers(self.sheet.header.index(header)))
         return np.column_stack(out)
 
+    def middle(self) -> Floats:
+        """(drives,) the row that is nearest to the middle of all."""
+        at = self.coordinates()
+        return np.asarray(at[np.nanargmin(np.linalg.norm(at - np.nanmedian(at, axis=0), axis=1))])
+
 
 def drives_of(machine: Machine) -> dict[str, bool]:
     """Drives of a machine by full name, and whether each slides."""
@@ -55,7 +61,7 @@ def drives_of(machine: Machine) -> dict[str, bool]:
 def commanded(
     sheet: Sheet,
     drives: Mapping[str, bool],
-    chosen: Mapping[str, Sequence[str]],
+    chosen: Mapping[str, list[str]],
     units: Mapping[str, str],
 ) -> Commanded | None:
     """The sheet as a table of joints; None where no column commands a drive.
@@ -88,7 +94,7 @@ def commanded(
     return Commanded(sheet, columns, rest, told=tuple(told))
 
 
-def _given(chosen: Mapping[str, Sequence[str]], drives: Mapping[str, bool]) -> dict[str, str]:
+def _given(chosen: Mapping[str, list[str]], drives: Mapping[str, bool]) -> dict[str, str]:
     out = {}
     for name in drives:
         for key in (name, name.split(".")[-1]):
@@ -121,10 +127,9 @@ def _unit(sheet: Sheet, index: int, name: str, slides: bool, units: Mapping[str,
         (units[k] for k in (name, name.split(".")[-1], header, "joints") if k in units),
         written or units.get("length" if slides else "angle", ""),
     )
-    unit = known_unit(said) if said else ""
-    allowed = (LENGTHS if slides else ANGLES).values()
-    if unit in allowed:
-        return unit, ""
+    unit = unit_of(said, "length" if slides else "angle") if said else None
+    if unit is not None and unit.factor == 1.0:
+        return unit.name, ""
     largest = float(np.nanmax(np.abs(sheet.numbers(index)), initial=0.0))
     if not said and not slides and largest > MOST_TURNS:
         return "deg", f"'{sheet.header[index]}' goes to {largest:.4g}: taken as degrees"
@@ -186,20 +191,20 @@ def turned(sheet: Sheet, columns: Sequence[Column], difference: str) -> tuple[Sh
 
 def _in_mm(
     sheet: Sheet,
-    chosen: dict[str, Sequence[str]],
+    chosen: dict[str, list[str]],
     meaning: str,
     parts: Sequence[tuple[float, Column]],
     units: Mapping[str, str],
-) -> tuple[Sheet, dict[str, Sequence[str]]]:
+) -> tuple[Sheet, dict[str, list[str]]]:
     total = np.zeros(len(sheet.lines))
     for sign, column in parts:
-        unit = known_unit(units.get(column.meaning, column.unit) or units.get("length", ""))
-        if unit not in TO_MM:
+        unit = unit_of(units.get(column.meaning, column.unit) or units.get("length", ""), "length")
+        if unit is None:
             raise StiffmapError(
                 f"column '{column.name}' ({column.meaning}) has no unit: write it in the header, as in '{column.name} [mm]', or say "
                 f"--unit {column.meaning}=mm (--unit length=mm: of all lengths)"
             )
-        total = total + sign * TO_MM[unit] * sheet.numbers(column.index)
+        total = total + sign * TO_MM[unit.name] * unit.factor * sheet.numbers(column.index)
     name = f"{meaning} [mm]"
     if name not in sheet.header:
         sheet = with_column(sheet, name, [float(v) for v in total])

@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 import stiffmap as sm
+from stiffmap.addresses import moved, number
 from stiffmap.cli import main
 from stiffmap.description import MachineDescription
 from stiffmap.errors import StiffmapError
@@ -22,7 +23,6 @@ from stiffmap.machine import Machine
 from stiffmap.maps.loading import Loading
 from stiffmap.maps.uncertainty import UPPER, uncertain_numbers
 from stiffmap.maps.uncertainty_block import sensitivities
-from stiffmap.maps.uncertainty_edit import moved, number
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 GRID = {"x": [-0.05, 0.1], "y": [0.1], "z": [0.05]}

@@ -10,8 +10,8 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.cli.app import main
-from stiffmap.cli.inputs import placed
 from stiffmap.experiment import random_plan, save_experiment, simulate
+from stiffmap.experiment.calls import placed
 from stiffmap.planning.budget import Budget, Line, budgets, iso_230_2, iso_9283
 from stiffmap.planning.estimate import estimate
 from stiffmap.planning.monitor import compare

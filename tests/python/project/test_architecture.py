@@ -15,8 +15,9 @@ HEADERS = sorted((ROOT / "cpp/include/stiffmap").glob("*.hpp"))
 RANKS = (
     ("types", "check", "parallel", "command_error", "drive_numbers"),
     ("dense", "se3"),
-    ("law", "spring", "load"),
+    ("law", "spring", "load", "chatter"),
     ("chain",),
+    ("whole_branches",),
     ("mechanism",),
     ("charts",),
     ("kinematics",),
@@ -28,7 +29,7 @@ RANKS = (
     ("spins",),
     ("assemble", "solve", "fast_plan"),
     ("batch", "clamp", "follower", "modes"),
-    ("path",),
+    ("path", "vibration"),
 )
 RANK = {name: i for i, names in enumerate(RANKS) for name in names}
 

@@ -17,6 +17,7 @@ from stiffmap.process.description import EndMill, Process
 from stiffmap.process.identify.models import MODELS, NAMES, Fitted, fit, power_basis, straight_basis
 from stiffmap.process.identify.runout import Runout, runout_of
 from stiffmap.process.identify.table import ForceTable, need, read_table
+from stiffmap.short import short_repr
 
 SIGNIFICANT = 0.01
 """Probability by chance below which a bend is stated."""
@@ -24,6 +25,7 @@ RIVAL = 4.0
 """Difference of the criterion within which another explanation stays a rival."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class IdentifiedLaw:
     """A law of the cutting force, SI, from n mean forces."""

@@ -1,0 +1,130 @@
+"""Readings of a tap test, and static ones with them, against machines near the declared one (docs/theory.md V8)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from stiffmap.addresses import moved, number
+from stiffmap.broadcasting import Floats
+from stiffmap.description import AppliedEffect, Body, MachineDescription
+from stiffmap.description.tree import all_elements
+from stiffmap.effects import apply_records
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment import Experiment
+from stiffmap.experiment.noise.level import noise_of
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.machine import Machine
+from stiffmap.taps.predict import predict_taps
+from stiffmap.taps.table import TapTest
+
+FELT = 0.05
+"""Numbers whose uncertainty shifts no reading by more than this share of its noise are not fitted."""
+LOST = 3.0
+"""Residual, relative, of a mode that a machine no longer has."""
+STEPS = 8
+Term = AppliedEffect | float | None
+"""An effect, the mass of a body at the TCP in kg, or none."""
+
+
+@dataclass(eq=False)
+class Problem:
+    """Residuals divided by the noise of the readings; numbers of the machine file that are uncertain move with them."""
+
+    machine: Machine
+    taps: TapTest
+    statics: Experiment | None
+    default_u: float
+    numbers: list[tuple[str, float, float]] = field(default_factory=list)
+    """Name, value and standard uncertainty of the numbers that readings feel."""
+
+    def __post_init__(self) -> None:
+        self.noise = self.taps.u / self.taps.frequency
+        if self.statics is not None:
+            at_first = Predictor(self.machine, self.statics)(())
+            self.keep = self.statics.read & np.isfinite(at_first)
+            self.noise = np.concatenate([self.noise, noise_of(self.statics).sigma[self.keep]])
+        base = self._raw(self.machine)
+        self.used = np.isfinite(base)
+        self.is_tap = np.arange(len(base)) < len(self.taps)
+        columns = []
+        for key, value, u in uncertain_numbers(self.machine.description, self.default_u):
+            other = shifted(self.machine.description, [(key, value, u)], np.ones(1))
+            column = np.nan_to_num((self._raw(Machine(other, like=self.machine)) - base) / self.noise)
+            if np.abs(column).max() > FELT:
+                self.numbers.append((key, value, u))
+                columns.append(column)
+        self.slopes = np.stack(columns, axis=1) if columns else np.zeros((len(base), 0))
+
+    def _raw(self, machine: Machine) -> Floats:
+        parts = [np.log(predict_taps(machine, self.taps).frequency / self.taps.frequency)]
+        if self.statics is not None:
+            parts.append((Predictor(machine, self.statics)(()) - self.statics.reading)[self.keep])
+        return np.concatenate(parts)
+
+    def machine_with(self, term: Term, off: Floats | None = None) -> Machine:
+        """The machine with an effect, its uncertain numbers off by so many standard uncertainties (numbers,)."""
+        d = self.machine.description
+        if off is not None and len(off):
+            d = shifted(d, self.numbers, off)
+        if isinstance(term, float):
+            return Machine(replace(d, platform=(*d.platform, Body("tapped_load", term))), like=self.machine)
+        return Machine(apply_records(d, [term]) if term else d, like=self.machine)
+
+    def residual(self, term: Term = None, off: Floats | None = None) -> Floats:
+        """(n,) by noise."""
+        raw = self._raw(self.machine_with(term, off))
+        return np.asarray(np.where(np.isfinite(raw), raw, LOST)[self.used] / self.noise[self.used])
+
+    def whitener(self, part: str = "") -> tuple[Floats, Floats]:
+        """Rows (mask) of a part of the readings (``taps``, ``statics``, all), and what whitens them to first order."""
+        tap = self.is_tap[self.used]
+        rows = tap if part == "taps" else ~tap if part == "statics" else np.ones(len(tap), bool)
+        J = self.slopes[self.used][rows]
+        return rows, np.linalg.inv(np.linalg.cholesky(np.eye(len(J)) + J @ J.T))
+
+    def settled(self, term: Term = None) -> tuple[float, Floats]:
+        """Least chi-square with the uncertain numbers free within their uncertainty, and where they then are."""
+        k = len(self.numbers)
+        if not k:
+            r = self.residual(term)
+            return float(r @ r), np.zeros(0)
+
+        def both(off: Floats) -> Floats:
+            return np.concatenate([self._safe(term, off), off])
+
+        fit = least_squares(both, np.zeros(k), bounds=(-6, 6), diff_step=1e-2, x_scale=1.0, max_nfev=STEPS)
+        return float(2 * fit.cost), fit.x
+
+    def _safe(self, term: Term, off: Floats) -> Floats:
+        try:
+            return self.residual(term, off)
+        except StiffmapError:
+            return np.asarray(np.full(int(self.used.sum()), 1e3))
+
+
+def uncertain_numbers(d: MachineDescription, default_u: float) -> list[tuple[str, float, float]]:
+    """Names, values and standard uncertainties (SI): those that the machine file declares, and masses by `default_u`."""
+    declared = dict(d.uncertainty)
+    masses = {
+        f"{full}/mass": default_u * e.mass
+        for full, e in all_elements(d)
+        if isinstance(e, Body) and e.mass > 0
+    }
+    both = {**masses, **declared}
+    return [(k, v, u) for k, u in both.items() if u > 0 and (v := number(d, k)) is not None]
+
+
+def shifted(
+    d: MachineDescription, numbers: list[tuple[str, float, float]], off: Floats
+) -> MachineDescription:
+    """Numbers off by so many standard uncertainties; stiffness, compliance and mass by factors, so that they stay positive."""
+    for (key, value, u), t in zip(numbers, off, strict=True):
+        field_ = key.partition("/")[2]
+        positive = value > 0 and field_.startswith(("compliance", "stiffness", "mass"))
+        delta = value * (np.exp(t * u / value) - 1) if positive else t * u
+        other = moved(d, key, float(delta))
+        d = d if other is None else other
+    return d
