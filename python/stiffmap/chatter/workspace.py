@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from stiffmap.broadcasting import Floats, real_array, trailing
 from stiffmap.chatter.cut import GivenProcess, cut_axes, milling_process
 from stiffmap.chatter.zero_order import FEED, TOOL, limits
-from stiffmap.machine import Machine, takes_machine
+from stiffmap.machine import Machine, as_machine
 from stiffmap.vibration.modes import TipModes, tip_modes
 from stiffmap.vibration.poles import receptance
 from stiffmap.vibration.response import frequency_axis
@@ -21,9 +22,8 @@ LOW, HIGH, LOOKED = 0.3, 2.0, 6
 """The default frequencies reach from the lowest mode to the highest of the first six, with these factors."""
 
 
-@takes_machine
 def vibration_map(
-    machine: Machine,
+    machine: Machine | str | PathLike[str],
     position: ArrayLike,
     process: GivenProcess | None = None,
     *,
@@ -59,10 +59,11 @@ def vibration_map(
 
     Raises StiffmapError for bad input, never for a pose. Source: docs/theory.md, V1 to V4.
     """
+    m = as_machine(machine)
     p = trailing(position, (3,), "position", "positions (m)")
     cut = None if process is None else milling_process(process)
     axes = cut_axes(real_array(feed, "feed"), real_array(tool, "tool"))
-    found = tip_modes(machine, p, modes=modes, **pose)
+    found = tip_modes(m, p, modes=modes, **pose)
     f = _around(found) if frequencies is None else frequency_axis(frequencies)
     n = len(found.square)
     stiffness, at, depth = np.full(n, np.nan), np.full(n, np.nan), np.full(n, np.nan)
@@ -96,7 +97,7 @@ def vibration_map(
     ds = xr.Dataset(
         {k: (dims, v.reshape(shape), {"units": u}) for k, (v, u) in values.items()},
         coords={"position": ((*dims, "axis"), p), "axis": ["x", "y", "z"]},
-        attrs={"machine": machine.name, "damping": found.damping.said},
+        attrs={"machine": m.name, "damping": found.damping.said},
     )
     ds["softest_direction"] = ((*dims, "axis"), way.reshape(*shape, 3))
     ds["status"] = (dims, found.status.reshape(shape))
@@ -115,8 +116,10 @@ def _around(found: TipModes) -> Floats:
 
 
 def _only(m: TipModes, rows: np.ndarray) -> TipModes:
-    parts = (m.square, m.tip, m.viscous, m.loss, m.rest, m.unsymmetric, m.status, m.flags)
-    return TipModes((len(rows),), *(a[rows] for a in parts), damping=m.damping)  # type: ignore[arg-type]
+    return TipModes(
+        (len(rows),), m.square[rows], m.tip[rows], m.viscous[rows], m.loss[rows], m.rest[rows], m.unsymmetric[rows],
+        m.status[rows], m.flags[rows], m.damping,
+    )  # fmt: skip
 
 
 def _real(v: np.ndarray) -> Floats:
