@@ -18,6 +18,7 @@ install="python -m pip install --quiet --no-compile"
 $install --upgrade "pip>=25.1"
 $install --group build
 
+rm -f "$build"/wheel/*.whl  # the version, and with it the name, changes with every commit
 # The core compiles while the packages that it and the tests need are fetched.
 python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir "$build/wheel" -C build-dir="$build" \
   -C cmake.define.STIFFMAP_TESTS=ON -C cmake.define.STIFFMAP_WERROR="${WERROR:-OFF}" . &

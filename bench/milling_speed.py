@@ -45,7 +45,9 @@ def main() -> None:
 
 def points(machine: sm.Machine, count: int, threads: int) -> None:
     """Loaded equilibrium and compensated commands of a washbasin's outline."""
-    path, process = outline("washbasin"), sm.load_process("trimming")
+    low, high = machine.workspace
+    width, depth = np.minimum(0.7 * (high - low)[:2], (0.34, 0.24))
+    path, process = outline("washbasin", (float(width), float(depth))), sm.load_process("trimming")
     size = float(path.length[path.cuts].sum())
     here = sampled(path, size / count)
     middle = machine.workspace.mean(axis=0)
@@ -54,13 +56,14 @@ def points(machine: sm.Machine, count: int, threads: int) -> None:
     job = setting(machine, path, process, here, path.placed(middle))
     plant = Plant(job, threads=threads)
     e = equilibrium(plant, job.position)
-    half = time.perf_counter()
+    half, busy = time.perf_counter(), time.process_time() - cpu
     found = commanded(plant, e)
-    end = time.perf_counter()
+    end, all_busy = time.perf_counter(), time.process_time() - cpu
     left = equilibrium(plant, found.position).error
     print(
-        f"{len(job)} points: equilibrium {half - start:.2f} s ({e.steps} solves), commands {end - half:.2f} s, together {end - start:.2f} s "
-        f"({time.process_time() - cpu:.2f} s of processor with the check); furthest from the path at the commands {np.abs(left).max():.1e} m"
+        f"{machine.name}, {len(job)} points: equilibrium {half - start:.2f} s ({e.steps} solves), commands {end - half:.2f} s, together "
+        f"{end - start:.2f} s; of processor {busy:.2f} s, {all_busy - busy:.2f} s, {all_busy:.2f} s; furthest from the path at the commands "
+        f"{np.abs(left).max():.1e} m"
     )
     assert np.abs(left).max() < 1e-9
 

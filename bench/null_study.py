@@ -29,6 +29,7 @@ from stiffmap.calibration.conclude import conclude
 from stiffmap.calibration.model import predicted, sensitivity, sensitivity_at
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.tasks import workers
 
 MACHINES = ("orthoglide-revised", "linear-delta", "ur10")
 SCALES = (1.0, 0.3, 1.0)
@@ -50,17 +51,25 @@ def main() -> None:
     )
     parser.add_argument("--out", type=Path, default=Path("bench/null_study.jsonl"))
     parser.add_argument("--table", action="store_true")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--scheduler", help="address of a dask scheduler whose workers make the twins")
     o = parser.parse_args()
     until = time.monotonic() + 60.0 * o.minutes
     done = {r["twin"] for r in load(o.out)}
     with o.out.open("a", encoding="utf-8") as stream:
         todo = [] if o.table else order(o.twins, o.machine or MACHINES)
-        for k in [k for k in todo if k not in done]:
-            if time.monotonic() > until:
-                break
-            stream.write(json.dumps(one(k, o.scale, k < o.diagnose)) + "\n")
-            stream.flush()
+        missing = (k for k in todo if k not in done and time.monotonic() < until)
+        with workers(twin, (o.scale, o.diagnose), scheduler=o.scheduler, processes=o.jobs) as hands:
+            for _, record in hands.as_done(missing):
+                stream.write(json.dumps(record) + "\n")
+                stream.flush()
     print(table(load(o.out)))
+
+
+def twin(shared: tuple[float | None, int], k: int) -> dict[str, Any]:
+    """One twin, as a task."""
+    scale, diagnose = shared
+    return one(k, scale, k < diagnose)
 
 
 def load(path: Path) -> list[dict[str, Any]]:

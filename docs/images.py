@@ -113,7 +113,9 @@ DRAWN: dict[str, Callable[[], Figure]] = {
 }
 
 
-EXAMPLES = {"machines/boxes.png": HERE.parent / "examples/machine_boxes.py"}
+EXAMPLES = {"machines/boxes.png": HERE.parent / "examples/machine_boxes.py"} | {
+    f"view/{name}": HERE / "view_movie.py" for name in ("corner.gif", "first.png", "why.png", "worst.png")
+}
 
 
 def pictures() -> list[str]:

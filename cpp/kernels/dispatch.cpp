@@ -27,15 +27,32 @@ struct Level {
   KernelTable wide, pair;
 };
 
+#ifdef STIFFMAP_X86_LEVELS
+#if defined(__clang__) && (__clang_major__ < 18 || defined(__apple_build_version__))
+// Older Clang knows no names of levels. Processors with these have what else belongs to the level.
+bool has_v3() {
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
+         __builtin_cpu_supports("bmi2");
+}
+bool has_v4() {
+  return has_v3() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+         __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+}
+#else
+bool has_v3() { return __builtin_cpu_supports("x86-64-v3"); }
+bool has_v4() { return __builtin_cpu_supports("x86-64-v4"); }
+#endif
+#endif
+
 /// Usable levels, lowest first. Filling a table runs no vector code.
 const std::vector<Level>& levels() {
   static const std::vector<Level> all = [] {
     const KernelTable base = table_of(&stiffmap_kernel_base);
     std::vector<Level> out{{base, base}};
 #ifdef STIFFMAP_X86_LEVELS
-    if (__builtin_cpu_supports("x86-64-v3"))
+    if (has_v3())
       out.push_back({table_of(&stiffmap_kernel_v3), table_of(&stiffmap_kernel_v3_pair)});
-    if (__builtin_cpu_supports("x86-64-v4"))
+    if (has_v4())
       out.push_back({table_of(&stiffmap_kernel_v4), table_of(&stiffmap_kernel_v4_pair)});
 #endif
     return out;

@@ -3,6 +3,8 @@
 
 #include <type_traits>
 
+#include "stiffmap/whole_branches.hpp"
+
 namespace stiffmap {
 namespace {
 

@@ -257,7 +257,7 @@ void Mechanism::set_rest() {
 /// Locked where the third axis, turned about the second by its coordinate, lies along the first.
 void Mechanism::find_balls() {
   for (const auto& [first, chart] : charts) {
-    const auto axis = [&](Index k) -> const Vec3& {
+    const auto axis = [this, first = first](Index k) -> const Vec3& {  // older clang captures no binding
       return nodes[static_cast<std::size_t>(coordinates[static_cast<std::size_t>(first + k)].node)].axis;
     };
     const Vec3 &a = axis(0), &b = axis(1), &c = axis(2);

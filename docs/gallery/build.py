@@ -1,11 +1,8 @@
-"""Runs the gallery's notebooks and writes them as pages.
-
-python docs/gallery/build.py OUT: each `NAME.py` beside this file is executed and becomes OUT/NAME.html (and NAME.ipynb).
-"""
+"""Runs the gallery's notebooks; docs/make_site.py makes pages of them."""
 
 from __future__ import annotations
 
-import sys
+import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -22,28 +19,16 @@ def executed(source: Path, seconds: int = 300) -> Any:
     """The notebook with its outputs; an error in a cell is raised."""
     import jupytext
     from nbclient import NotebookClient
+    from traitlets.config import Config
 
+    local = Config({"KernelManager": {"transport": "ipc" if os.name == "posix" else "tcp"}})
     book = jupytext.read(source, fmt="py:percent")
     with TemporaryDirectory() as folder:
         NotebookClient(
-            book, timeout=seconds, kernel_name="python3", resources={"metadata": {"path": folder}}
+            book,
+            timeout=seconds,
+            kernel_name="python3",
+            resources={"metadata": {"path": folder}},
+            config=local,
         ).execute()
     return book
-
-
-def main(out: Path) -> None:
-    """Writes every page."""
-    import nbformat
-    from nbconvert import HTMLExporter
-
-    out.mkdir(parents=True, exist_ok=True)
-    for source in notebooks():
-        book = executed(source)
-        nbformat.write(book, out / f"{source.stem}.ipynb")
-        page, _ = HTMLExporter().from_notebook_node(book)
-        (out / f"{source.stem}.html").write_text(page, encoding="utf-8")
-        print(f"wrote {out / source.stem}.html")
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "build/site/gallery"))

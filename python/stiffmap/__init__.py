@@ -10,21 +10,30 @@ from stiffmap.status import Flag, Status
 from stiffmap.version import __version__
 
 if TYPE_CHECKING:
+    from stiffmap import plot
     from stiffmap.budget import DeflectionBudget, deflection_budget
     from stiffmap.calibration import Calibration
     from stiffmap.calibration.calibrate import calibrate
     from stiffmap.chatter import floquet_multiplier, limiting_depth, stability_lobes, vibration_map
     from stiffmap.compensation import Commands, compensate
+    from stiffmap.design.search import optimize
     from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, Residual, load_experiment
-    from stiffmap.experiment.comparison.residual import residual
-    from stiffmap.experiment.virtual.simulate import simulate
+    from stiffmap.experiment.calls import residual, simulate
     from stiffmap.files.shipped import machine_names
     from stiffmap.internal_wrenches import assembly_stress
     from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
     from stiffmap.link import identify_link
     from stiffmap.machine import Machine, load_machine
-    from stiffmap.maps import error_map, map_estimate, map_statistics, polar, sweep, uncertainty_ranking
+    from stiffmap.maps import (
+        design_sweep,
+        error_map,
+        map_estimate,
+        map_statistics,
+        polar,
+        sweep,
+        uncertainty_ranking,
+    )
     from stiffmap.milling import mill
     from stiffmap.performance import (
         accuracy_transmission,
@@ -39,6 +48,7 @@ if TYPE_CHECKING:
         workspace_volume,
         worst_deflection,
     )
+    from stiffmap.planning.calls import monitor, plan
     from stiffmap.process import (
         CuttingForce,
         IdentifiedLaw,
@@ -48,6 +58,7 @@ if TYPE_CHECKING:
         load_process,
     )
     from stiffmap.solution import Solution
+    from stiffmap.urdf.to_machine import import_urdf
     from stiffmap.vibration import frequency_response
 
 # Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
@@ -88,7 +99,13 @@ _HOME = {
     "DeflectionBudget": "stiffmap.budget",
     "deflection_budget": "stiffmap.budget",
     "assembly_stress": "stiffmap.internal_wrenches",
+    "design_sweep": "stiffmap.maps",
     "error_map": "stiffmap.maps",
+    "import_urdf": "stiffmap.urdf.to_machine",
+    "monitor": "stiffmap.planning.calls",
+    "optimize": "stiffmap.design.search",
+    "plan": "stiffmap.planning.calls",
+    "plot": "stiffmap.plot",
     "forward_kinematics": "stiffmap.kinematics",
     "floquet_multiplier": "stiffmap.chatter",
     "frequency_response": "stiffmap.vibration",
@@ -128,6 +145,7 @@ __all__ = [
     "compensate",
     "cutting_force",
     "deflection_budget",
+    "design_sweep",
     "diagnose",
     "drive_efforts",
     "error_map",
@@ -137,6 +155,7 @@ __all__ = [
     "frequency_response",
     "identify_link",
     "identify_process",
+    "import_urdf",
     "inverse_kinematics",
     "largest_box",
     "limiting_depth",
@@ -149,7 +168,11 @@ __all__ = [
     "map_statistics",
     "measures",
     "mill",
+    "monitor",
     "natural_frequencies",
+    "optimize",
+    "plan",
+    "plot",
     "polar",
     "residual",
     "simulate",
@@ -169,7 +192,8 @@ if not TYPE_CHECKING:  # type checkers then know which names there are
     def __getattr__(name: str) -> Any:
         if name not in _HOME:
             raise AttributeError(f"module 'stiffmap' has no attribute {name!r}")
-        value = getattr(import_module(_HOME[name]), name)
+        home = import_module(_HOME[name])
+        value = home if _HOME[name] == f"{__name__}.{name}" else getattr(home, name)
         globals()[name] = value
         return value
 

@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats, real_array
 from stiffmap.compiled import Role, Status
+from stiffmap.description.sources import in_words, source_of
 from stiffmap.errors import StiffmapError
 from stiffmap.html import table, titled
 from stiffmap.machine import Machine, metres_expected, takes_machine
 from stiffmap.options import SolveKeywords, merged
+from stiffmap.short import short_repr
 from stiffmap.solving import Call, solve_call
 
 if TYPE_CHECKING:
@@ -23,6 +25,7 @@ STEP = 1e-3
 """Of the load, of the central differences of internal wrenches."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class DeflectionBudget:
     """Contributions to the displacement of the TCP at one pose under one wrench, SI, base axes."""
@@ -36,6 +39,17 @@ class DeflectionBudget:
     position: Floats
     wrench: Floats
     point: str
+    sources: tuple[str, ...] = ()
+    """(elements,) where the stiffness of each comes from: assumed, measured, computed, catalogue or not marked."""
+
+    @property
+    def by_source(self) -> dict[str, float]:
+        """Sum of the sizes of the shares by source, over that of all shares."""
+        out: dict[str, float] = {}
+        whole = float(np.abs(self.shares).sum()) or 1.0
+        for source, share in zip(self.sources, np.abs(self.shares), strict=True):
+            out[source] = out.get(source, 0.0) + float(share) / whole
+        return dict(sorted(out.items(), key=lambda pair: -pair[1]))
 
     @property
     def shares(self) -> Floats:
@@ -74,7 +88,8 @@ class DeflectionBudget:
             f"  {100 * s:z6.1f} %  {n:<24} ({', '.join(f'{v:z.1f}' for v in 1e6 * c[:3])}) µm"
             for n, c, s in self.ranked()
         ]
-        return "\n".join([*lines, f"  {100 * self.rest_share:z6.1f} %  of second order"])
+        lines.append(f"  {100 * self.rest_share:z6.1f} %  of second order")
+        return "\n".join([*lines, *filter(None, [in_words(self.by_source)])])
 
     def _repr_html_(self) -> str:
         """Shares, folded where there are many."""
@@ -123,7 +138,10 @@ def deflection_budget(
     moved = loaded.coordinates - free.coordinates
     names, parts = _elements(machine)
     contributions = np.array([unit[:, i] @ np.nan_to_num(moved[i]) for i in parts]).reshape(-1, 6)
-    return DeflectionBudget(names, contributions, loaded.displacement - free.displacement, p, load, point)
+    sources = tuple(source_of(machine.description, n) for n in names)
+    return DeflectionBudget(
+        names, contributions, loaded.displacement - free.displacement, p, load, point, sources
+    )
 
 
 def _unit_reactions(

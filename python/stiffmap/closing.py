@@ -11,8 +11,10 @@ from stiffmap.branches import Start, start_coordinates
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.compiled import CompiledMachine
 from stiffmap.rotations import as_rotations
+from stiffmap.short import short_repr
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Kinematics:
     """Configurations of a batch of poses; NaN where the status is UNREACHABLE."""

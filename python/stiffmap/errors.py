@@ -53,6 +53,10 @@ class UnknownMachineError(StiffmapError):
     """No shipped machine and no file of that name."""
 
 
+class HomeError(StiffmapError):
+    """The home configuration of a machine does not close."""
+
+
 class MissingPartError(StiffmapError):
     """An optional part of stiffmap, or a package that it needs, is not installed."""
 

@@ -70,8 +70,9 @@ def _pieces(value: Any) -> Iterator[bytes]:
         yield f"array {a.dtype.str} {a.shape}".encode()
         yield a.tobytes()
     elif is_dataclass(value) and not isinstance(value, type):
-        yield f"{type(value).__name__} {len(fields(value))}".encode()
-        for field in fields(value):
+        kept = [field for field in fields(value) if not field.metadata.get("derived")]
+        yield f"{type(value).__name__} {len(kept)}".encode()
+        for field in kept:
             yield field.name.encode()
             yield from _pieces(getattr(value, field.name))
     elif isinstance(value, Mapping):

@@ -11,8 +11,10 @@ from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.compiled import CompiledMachine, Status
 from stiffmap.errors import StiffmapError
 from stiffmap.rotations import as_rotations
+from stiffmap.short import short_repr
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class HoldingWrench:
     """A batch of poses with a point of the machine held; SI, base axes, moments about the point.
@@ -76,8 +78,15 @@ def holding_wrench(
     gravity
         (3,) m/s², base axes; None: what the machine file says.
 
+    Notes
+    -----
     Loaded equilibrium, not stiffness times displacement. A displacement that rigid parts forbid is
-    NOT_CONVERGED. Raises StiffmapError for bad input.
+    NOT_CONVERGED.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     p = trailing(position, (3,), "position", "positions (m)")
     d = trailing(displacement, (6,), "displacement", "displacements [dx dy dz rx ry rz] (m, rad)")

@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.broadcasting import Floats, real_array, rows, thread_count
 from stiffmap.description.tree import joints
 from stiffmap.machine import Machine, takes_machine
+from stiffmap.short import short_repr
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class InternalWrenches:
     """Wrenches inside a machine, leading batch axes (...); NaN for failed poses, with their status."""

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, wraps
 from os import PathLike
 from types import FrameType
-from typing import Any, Concatenate, ParamSpec, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stiffmap.addresses import Listed, listed
 from stiffmap.broadcasting import Floats
 from stiffmap.compiled import CompiledMachine, Status
 from stiffmap.derivatives import Prepared, Request, differentiate, prepare, read_requests
@@ -20,12 +21,17 @@ from stiffmap.description import MachineDescription
 from stiffmap.effects import add_effect
 from stiffmap.errors import StiffmapError
 from stiffmap.files import load_description, save_description
+from stiffmap.files.load import Source
+from stiffmap.files.redesign import redesigned
 from stiffmap.holding_wrench import HoldingWrench, holding_wrench
 from stiffmap.html import machine_html
-from stiffmap.options import SolveKeywords, SolveOptions, merged
+from stiffmap.options import SolveKeywords, SolveOptions, merged, spelled_out
 from stiffmap.recent import Recent
 from stiffmap.solution import Solution
 from stiffmap.solving import Call, solve_call, solve_joints
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MOST_PREPARED = 4  # sets of derivatives whose machines are kept
 PLAIN = ({"threads": 1}, {"threads": None})  # options that one pose does not notice
@@ -101,6 +107,7 @@ class Machine:
             raise StiffmapError(f"{self.name}: the machine file declares no workspace box")
         return np.array(self._description.workspace)
 
+    @spelled_out(SolveKeywords)
     def solve(
         self,
         position: ArrayLike,
@@ -179,6 +186,7 @@ class Machine:
         ready = self._derivable.get(requests.key, lambda: prepare(self._compiled, requests))
         return differentiate(ready, call, requests)
 
+    @spelled_out(SolveKeywords)
     def solve_joints(
         self,
         actuators: ArrayLike,
@@ -228,6 +236,61 @@ class Machine:
             add_effect(self._description, kind, element=element, legs=legs, **parameters), like=self
         )
 
+    def numbers(self) -> pd.DataFrame:
+        """Every number of the machine as it is declared, as a table (SI): one row per address.
+
+        Columns: value, unit, u (standard uncertainty, NaN where none is given), source (where the description says it:
+        assumed, measured, computed, catalogue), note. The address ``x.bar/beam.length`` is what `with_number` takes and the
+        key under which a file keeps uncertainties. docs/machine_files.md lists the fields.
+        """
+        import pandas as pd  # half a second, for tables alone
+
+        rows = listed(self._description.declared or self._description)
+        table = pd.DataFrame(rows, columns=[*Listed._fields]).set_index("address")
+        return table.astype({"value": float, "u": float})
+
+    def with_number(self, address: str, value: float) -> Machine:
+        """A machine with another number (SI) at an address: see `with_numbers`."""
+        return self.with_numbers({address: value})
+
+    def with_numbers(self, values: Mapping[str, float]) -> Machine:
+        """A new machine of another design: numbers (SI: m, rad, N, kg) at addresses ``name/field``.
+
+        `numbers` lists addresses of single numbers. A name without its leg (``bar/length``) stands for all legs, one without
+        its branches (``x.bar/length``) for both bars of a parallelogram. ``length`` is that of an offset, or
+        of a link: the offset before its spring and, where the spring is a beam of that length, the beam (a compliance that the
+        file gives as a matrix stays). ``beam.length``, ``beam.tube.outer``, ``beam.material.E`` are numbers of a
+        beam alone, from which its compliance is computed anew. The controller knows the new numbers (a
+        deviation from them is an effect: `with_effect`). Home is closed again on the same assembly branch. Masses, centres
+        and uncertainties are numbers of their own, which do not follow.
+
+        Raises StiffmapError for an address that the machine has not (the nearest is named), a value that cannot be, or
+        numbers with which the machine does not close.
+        """
+        return Machine(redesigned(self._description, values), like=self)
+
+    def view(
+        self,
+        position: ArrayLike | None = None,
+        *,
+        port: int | None = None,
+        browser: bool = True,
+        **state: Any,
+    ) -> Any:
+        """Look at the machine and its map live in a browser; the view that is open is returned (``close()`` ends it).
+
+        position (3,) m, None: home. port: of 127.0.0.1; None: a free one from 8080 on. browser: whether to open one.
+        state: fields of `stiffmap.view.State`, such as ``force=(0, 0, -300)`` N, ``plane="x"``, ``quantity="worst"``,
+        ``changes={"x.foot/beam.EIz": 1e4}``; SI, base axes. In a notebook the view is shown where it is the
+        last value of a cell. docs/view.md. Raises MissingPartError without the extra ``[view]`` (viser),
+        StiffmapError for bad input and for a pose that the machine cannot take.
+        """
+        from importlib import import_module
+
+        return import_module(f"{__package__}.view").open_view(
+            self, position, port=port, browser=browser, **state
+        )
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write a machine file that loads back equal."""
         save_description(self._description, path)
@@ -248,16 +311,20 @@ class Machine:
         return f"Machine({self.name!r}: legs {', '.join(self.legs)}; actuators {', '.join(self.actuators)})"
 
 
-def load_machine(name_or_path: str | PathLike[str]) -> Machine:
-    """Machine from a shipped name (`stiffmap machines` lists them) or a YAML file.
+def load_machine(source: Source) -> Machine:
+    """Machine from a shipped name (`stiffmap machines` lists them), a YAML file, its text, or its plain data as a dict.
+
+    source
+        Text is what has several lines. A dict has the keys of a machine file and the units that its ``units`` say; link
+        files that it names are looked for in the working directory.
 
     Raises StiffmapError naming file, key, what was expected and what was found.
     """
-    return Machine(load_description(name_or_path))
+    return Machine(load_description(source))
 
 
-def as_machine(machine: Machine | str | PathLike[str]) -> Machine:
-    """The machine itself, or the one of that shipped name or file."""
+def as_machine(machine: Machine | Source) -> Machine:
+    """The machine itself, or the one of that shipped name, file, text or plain data."""
     return machine if isinstance(machine, Machine) else load_machine(machine)
 
 
@@ -267,11 +334,11 @@ R = TypeVar("R")
 
 def takes_machine(
     function: Callable[Concatenate[Machine, P], R],
-) -> Callable[Concatenate[Machine | str | PathLike[str], P], R]:
+) -> Callable[Concatenate[Machine | Source, P], R]:
     """Let the first argument of a public function also be a shipped name or a machine file."""
 
     @wraps(function)
-    def with_machine(machine: Machine | str | PathLike[str], *args: P.args, **options: P.kwargs) -> R:
+    def with_machine(machine: Machine | Source, *args: P.args, **options: P.kwargs) -> R:
         return function(as_machine(machine), *args, **options)
 
     return with_machine  # type: ignore[return-value]  # the name of the first argument is kept

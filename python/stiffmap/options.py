@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypedDict
+from inspect import Parameter, signature
+from typing import Any, ParamSpec, TypedDict, TypeVar, get_type_hints
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,6 +75,51 @@ class SolveKeywords(LoadingKeywords, total=False):
     wrenches: Mapping[str, ArrayLike] | None
     read_points: Sequence[str]
     stiffness: bool
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def spelled_out(keywords: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Let `help` and editors show the keywords (a TypedDict of fields of `SolveOptions`) that a function takes as ``**given``.
+
+    What is called stays the function itself; a call pays nothing.
+    """
+    defaults = SolveOptions()
+    hints = SolveOptions.__annotations__
+
+    def show(function: Callable[P, R]) -> Callable[P, R]:
+        own = signature(function)
+        shown = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
+        names = (n for n in SolveOptions.__dataclass_fields__ if n in get_type_hints(keywords))
+        more = (
+            Parameter(n, Parameter.KEYWORD_ONLY, default=_default(defaults, n), annotation=hints[n])
+            for n in names
+        )
+        named = [p for p in more if p.name not in own.parameters]
+        function.__signature__ = own.replace(parameters=[*shown, *named])  # type: ignore[attr-defined]
+        return function
+
+    return show
+
+
+def keywords_of(other: Callable[..., Any]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Let `help` and editors show the keywords of another function, to which this one hands its ``**call`` on."""
+    more = [p for p in signature(other).parameters.values() if p.kind is Parameter.KEYWORD_ONLY]
+
+    def show(function: Callable[P, R]) -> Callable[P, R]:
+        own = signature(function)
+        shown = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
+        named = [p for p in more if p.name not in own.parameters]
+        function.__signature__ = own.replace(parameters=[*shown, *named])  # type: ignore[attr-defined]
+        return function
+
+    return show
+
+
+def _default(defaults: SolveOptions, name: str) -> Any:
+    return None if name == "wrenches" else getattr(defaults, name)
 
 
 def merged(options: SolveOptions | None, given: SolveKeywords | LoadingKeywords) -> SolveOptions:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.closing import Kinematics
 from stiffmap.compiled import Answer, Flag, Names, Status, counted
+from stiffmap.labels import solution_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Floats = NDArray[np.float64]
 Slopes = Mapping[str, Mapping[str, Floats]]  # quantity -> name of the variable -> derivative
@@ -224,6 +228,20 @@ class Solution:
         """Share of poses that the fast path left to the reference path: as good, a thousand times dearer."""
         return float(np.mean(self.flags & Flag.REFERENCE_PATH != 0)) if self.flags.size else 0.0
 
+    def to_xarray(
+        self, dims: Sequence[str] | None = None, coords: Mapping[str, Any] | None = None
+    ) -> xr.Dataset:
+        """The answer as a labelled Dataset (SI).
+
+        `dims` names the batch axes (...), one name each; None: ``pose`` for one axis, ``pose_0``, ``pose_1``, … for several.
+        `coords` are coordinates of the Dataset, such as the positions along an axis. Variables: displacement (…, component),
+        deflection (norm of the translation, m), stiffness (…, wrench_component, component), compliance (…, component,
+        wrench_component), status, flags, iterations, actuator_effort (…, actuator; N or N·m), leg_wrench (…, leg,
+        wrench_component), tension (…, cable; N) where there are cables, and coordinates (…, coordinate; m or rad).
+        StiffmapError where the number of names is not that of the axes.
+        """
+        return solution_dataset(self, dims, coords)
+
     def count(self) -> dict[str, int]:
         """Number of poses per status."""
         return counted(self.status)
@@ -239,5 +257,6 @@ class Solution:
 
     def __repr__(self) -> str:
         flags = int(np.bitwise_or.reduce(self.flags.ravel())) if self.flags.size else 0
-        states = ", ".join(f"{n} {c}" for n, c in self.count().items()) or "no poses"
-        return f"Solution of {self.status.size} poses at {self.point}: {states}; flags {Flag(flags)!r}"
+        states = ", ".join(f"{c} {n}" for n, c in self.count().items()) or "no poses"
+        names = [f.name or "" for f in Flag if f & flags]
+        return f"<Solution at {self.point}: {states}{'; ' if names else ''}{', '.join(names)}>"

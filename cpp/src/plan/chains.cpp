@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "stiffmap/dense.hpp"
+#include "stiffmap/whole_branches.hpp"
 
 namespace stiffmap {
 namespace {

@@ -13,19 +13,18 @@ import numpy as np
 
 from stiffmap.calibration.facts import Beyond
 from stiffmap.calibration.groups import STRONG
+from stiffmap.calibration.limits import FREE, refused
 from stiffmap.calibration.statistics import Sums
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.experiment.experiment import Floats
 
-FREE = 100.0
-"""Times the standard uncertainty; what goes further is no number of this machine."""
 LIKE = 0.1
 """Share of the evidence gained within which another unknown is a rival: a model is no better than that."""
 FAR = 3.0
 """Standard uncertainties that a number must be off to be called beyond tolerance."""
 MOST = 4
-WIDEST, LEAST = 100.0, 0.01
-"""A compliance's or mass's factor goes no further; beyond it something else is wrong."""
+LEAST = 0.01
+"""A compliance's or mass's factor is no smaller where a straight line makes it so."""
 SHARE = 0.7
 """Of the folds that must gain."""
 
@@ -37,13 +36,15 @@ class BeyondTolerance:
     found: tuple[Beyond, ...]
     which: tuple[int, ...]
     factor: Floats
+    refused: tuple[str, ...] = ()
+    """Those that no machine has so far off, and why."""
 
     def first(self, number: int) -> BeyondTolerance:
         """Those that were found first."""
         which = self.which[:number]
         factor = np.ones(len(self.factor))
         factor[list(which)] = FREE
-        return BeyondTolerance(self.found[:number], which, factor)
+        return BeyondTolerance(self.found[:number], which, factor, self.refused)
 
     def built(self, values: Floats, unknowns: Sequence[Unknown], at: Floats | None = None) -> Floats:
         """(p,) `values` (p,) with factors that are let go, on which readings depend linearly, turned into the logarithm
@@ -59,8 +60,8 @@ class BeyondTolerance:
 def beyond_tolerance(
     sums: Sums, unknowns: Sequence[Unknown], folds: Sequence[Sums] = (), at: Floats | None = None
 ) -> BeyondTolerance:
-    """Forward search; the instrument's scale is its certificate's and never let go, and a mass or compliance
-    stays between `LEAST` and `WIDEST` times what is declared. Most of the `folds` must gain by themselves: a
+    """Forward search; the instrument's scale is its certificate's and never let go, and what no machine has (`limits`)
+    is passed over. Most of the `folds` must gain by themselves: a
     model's error that poses share is no noise, and sums over all of them overstate what they say.
 
     at
@@ -70,10 +71,12 @@ def beyond_tolerance(
     factor = np.ones(len(unknowns))
     found: list[Beyond] = []
     which: list[int] = []
+    absurd: dict[int, str] = {}
     price = np.log(max(len(unknowns), 1)) + STRONG
-    for _ in range(MOST):
+    while len(found) < MOST and len(absurd) < MOST:
         gains = _gains(sums.scaled(factor))
-        gains[[i for i, p in enumerate(unknowns) if factor[i] > 1.0 or p.of_instrument]] = -np.inf
+        passed = [i for i, p in enumerate(unknowns) if factor[i] > 1.0 or p.of_instrument or i in absurd]
+        gains[passed] = -np.inf
         best = int(np.argmax(gains)) if len(gains) else -1
         if best < 0 or gains[best] < price:
             break
@@ -83,8 +86,12 @@ def beyond_tolerance(
         value = float(freed.estimate[best] * FREE)
         p = unknowns[best]
         times = as_factor(p, value, near[best]) if p.unit == "ln" else 1.0
-        if abs(value) < FAR or not LEAST < times < WIDEST or not _holds(folds, factor, best):
+        if abs(value) < FAR or not _holds(folds, factor, best):
             break
+        why = refused(p, value, times)
+        if why:
+            absurd[best] = f"{p.name}: {why}"
+            continue
         factor = trial
         which.append(best)
         spread = float(np.sqrt(freed.covariance[best, best])) * FREE
@@ -94,7 +101,7 @@ def beyond_tolerance(
         if p.unit == "ln":
             size, wide = float(np.log(times)), wide * float(np.exp(near[best] * p.u)) / times
         found.append(Beyond(p.name, size, wide, p.unit, float(gains[best]), rivals))
-    return BeyondTolerance(tuple(found), tuple(which), factor)
+    return BeyondTolerance(tuple(found), tuple(which), factor, tuple(absurd.values()))
 
 
 def none_beyond(number: int) -> BeyondTolerance:

@@ -56,8 +56,11 @@ def calibrate(
     progress
         Called with what is being tried, its number, and of how many.
 
-    Raises StiffmapError for files that cannot be used, poses out of reach, an unknown noise or group.
-    docs/calibration.md tells the method.
+    Raises
+    ------
+    StiffmapError
+        For files that cannot be used, poses out of reach, an unknown noise or group.
+        docs/calibration.md tells the method.
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)

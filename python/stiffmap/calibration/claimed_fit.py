@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from stiffmap.calibration.calibrator import Calibrator, pose_labels
-from stiffmap.calibration.claims import BesideField, Claims, claims
+from stiffmap.calibration.claims import BesideField, Claims, claims, held_within
 from stiffmap.calibration.floor import model_form
 from stiffmap.calibration.groups import STRONG
 from stiffmap.calibration.held_out import Fold, leave_out, left_out
 from stiffmap.calibration.model import Fitted, predicted
 from stiffmap.calibration.statistics import Sums, gain_of
+from stiffmap.calibration.wording import odds
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.folds import folds
@@ -30,17 +33,18 @@ def claimed_fit(
     judged: list[tuple[BesideField, list[Fold]]] = []
     everything = {"all": list(range(len(sums.right)))}
 
-    def why_not(factor: Floats, trial: Floats) -> str:
+    def why_not(factor: Floats, trial: Floats, which: Sequence[int]) -> str:
         if not judged:
             judged.append((_beside_field(ready), leave_out(ready, ready.fit, seed)))
         field, parts = judged[0]
         nats = field.log_evidence(trial) - field.log_evidence(factor)
         if nats < STRONG:
-            return f"a smooth field that knows nothing of the machine explains as much ({nats:+.0f} nats beside it)"
+            return f"a smooth field that knows nothing of the machine explains as much (odds {odds(nats)} beside it)"
         if len(parts) < 2:
             return ""
+        tolerated = _tolerated(sums, factor, which)
         one, other = (
-            left_out(ready, parts, everything, ready.fit, ready.rho, f)["all"] for f in (factor, trial)
+            left_out(ready, parts, everything, ready.fit, ready.rho, f)["all"] for f in (tolerated, trial)
         )
         gain, error = gain_of(one, other, [f.test for f in parts])
         # a fit that is as good as noise has nothing to gain
@@ -59,6 +63,11 @@ def claimed_fit(
     return found.withdrawn("so far off the machine does not do what its slopes say"), ready.fit, ready.rho
 
 
+def _tolerated(sums: Sums, factor: Floats, which: Sequence[int]) -> Floats:
+    """Factors (p,) under which the unknowns `which` stay where tolerances allow them to be, 95 % of the time."""
+    return held_within(sums, factor, which, float(np.sqrt(chi2.isf(0.05, len(which)) / len(which))))
+
+
 def _folds(ready: Calibrator, seed: int) -> list[Sums]:
     """The sums of each fold's own readings."""
     label = folds(ready.predictor.experiment, seed)[0][ready.problem.index[0]]
@@ -74,7 +83,10 @@ def _let_go(ready: Calibrator, claimed: Claims) -> tuple[Fitted, float]:
     """The fit with what is claimed let go, and its floor: by the slopes that there are, through the full prediction."""
     names, at = ready.sensitivity.unknowns, ready.sensitivity.at
     fit, rho, promised = ready.fit, ready.rho, 0.0
-    before = float(fit.residual @ fit.residual)
+    let_go = np.flatnonzero(claimed.factor > 1.0).tolist()
+    tolerated = _tolerated(ready.sums, np.ones(len(names)), let_go)
+    held = fit.linear - ready.columns @ (ready.sums.scaled(tolerated).estimate * tolerated)
+    before = float(held @ held)
     for again in range(AGAIN):
         blocks = ready.blocks(fit=fit).scaled(claimed.factor)
         rho = model_form(blocks)

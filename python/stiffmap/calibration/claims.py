@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiffmap.calibration.beyond import FREE, BeyondTolerance, beyond_tolerance, none_beyond
+from stiffmap.calibration.beyond import BeyondTolerance, beyond_tolerance, none_beyond
 from stiffmap.calibration.certificate import INSTRUMENT
 from stiffmap.calibration.facts import Wider
 from stiffmap.calibration.floor import Blocks, likeliest
@@ -31,8 +31,12 @@ MOST_SHAPES, MOST_COLUMNS = 80, 240
 """Of the field, per channel and in all."""
 
 
-Why = Callable[[Floats, Floats], str]
-"""Factors (p,) on the standard uncertainties before a claim and with it -> why it does not stand; empty: it does."""
+LEAST_SHARE, BISECTIONS = 1e-4, 20
+"""Of a standard uncertainty: how far a prior is narrowed that readings overrun, and in how many steps."""
+
+Why = Callable[[Floats, Floats, Sequence[int]], str]
+"""Factors (p,) on the standard uncertainties before a claim and with it, numbers of the unknowns that it lets go -> why
+it does not stand; empty: it does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,33 +72,73 @@ def claims(
 ) -> Claims:
     """Single numbers or groups that the evidence asks for, one after the other, as far as they stand."""
     singles = beyond_tolerance(sums, unknowns, folds, at)
-    groups, _ = widened(sums, members, (INSTRUMENT,))
-    if singles.found and groups and groups[0].nats > singles.found[0].nats:  # many a little, not one by much
+    groups, wide = widened(sums, members, (INSTRUMENT,))
+    if singles.found and groups and _many_a_little(sums, singles, groups, wide, members):
         singles = none_beyond(len(unknowns))
+    absurd = singles.refused
     factor = np.ones(len(unknowns))
     for k, b in enumerate(singles.found):
-        far = abs(b.value) / unknowns[singles.which[k]].u
         trial = singles.first(k + 1).factor
-        why = f"{far:.0f} standard uncertainties are no tolerance" if far > FREE else why_not(factor, trial)
+        why = why_not(factor, trial, [singles.which[k]])
         if why:
-            return Claims(singles.first(k), (), factor, (f"{b.name}: {why}",))
+            return Claims(singles.first(k), (), factor, (*absurd, f"{b.name}: {why}"))
         factor = trial
     if singles.found:
         groups, _ = widened(sums.scaled(factor), members, (INSTRUMENT,))
     for k, w in enumerate(groups):
         trial = factor.copy()
-        trial[list(members[w.group])] *= w.factor
-        why = why_not(factor, trial)
+        which = list(members[w.group])
+        trial[which] *= w.factor
+        why = why_not(factor, trial, which)
         if why:
-            refused = (f"{w.group} as a whole: {why}",)
+            refused = (*absurd, f"{w.group} as a whole: {why}")
             # that many numbers are off is no answer where it does not suffice
             return (
                 Claims(singles, groups[:k], factor, refused)
                 if singles.found or not k
-                else Claims(singles, groups[:k], factor).withdrawn(f"not without {w.group}, and {why}")
+                else Claims(singles, groups[:k], factor, absurd).withdrawn(
+                    f"not without {w.group}, and {why}"
+                )
             )
         factor = trial
-    return Claims(singles, groups, factor)
+    return Claims(singles, groups, factor, absurd)
+
+
+def _many_a_little(
+    sums: Sums,
+    singles: BeyondTolerance,
+    groups: Sequence[Wider],
+    wide: Floats,
+    members: Mapping[str, Sequence[int]],
+) -> bool:
+    """Whether groups that are off as a whole explain more than single numbers with what else is off beside them."""
+    _, beside = widened(sums.scaled(singles.factor), members, (INSTRUMENT,))
+    one = sums.scaled(singles.factor * beside).log_evidence
+    return groups[0].nats > singles.found[0].nats and sums.scaled(wide).log_evidence > one
+
+
+def held_within(sums: Sums, factor: Floats, which: Sequence[int], within: float) -> Floats:
+    """(p,) factors under which the unknowns `which` stay within so many standard uncertainties (rms), times `factor` (p,).
+
+    Many readings overrun a prior: numbers are then far beyond their uncertainties, whatever these say. What a claim
+    gains is gained beside a fit that holds the numbers where tolerances allow them to be.
+    """
+    out = factor.copy()
+    which = list(which)
+
+    def size(share: float) -> float:
+        out[which] = factor[which] * share
+        t = sums.scaled(out).estimate[which] * share
+        return float(np.sqrt(np.mean(t**2)))
+
+    if size(1.0) <= within:
+        return factor
+    low, high = LEAST_SHARE, 1.0
+    for _ in range(BISECTIONS):
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if size(middle) > within else (middle, high)
+    size(low)
+    return out
 
 
 @dataclass(frozen=True, eq=False)

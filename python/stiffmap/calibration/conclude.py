@@ -16,10 +16,12 @@ from stiffmap.calibration.groups import BASE, compare
 from stiffmap.calibration.held_out import Size, held_out
 from stiffmap.calibration.homing import own_part
 from stiffmap.calibration.model import Fitted
+from stiffmap.calibration.pulls import Pulls, pulls
 from stiffmap.calibration.result import Calibration
 from stiffmap.calibration.statistics import Sums, independent
 from stiffmap.calibration.travel import Drive, Travel, travel
-from stiffmap.calibration.unknowns import Unknown
+from stiffmap.calibration.unknowns import Unknown, joint_name
+from stiffmap.calibration.validity import covered
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.summary import rms
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
@@ -59,9 +61,20 @@ def conclude(ready: Calibrator, seed: int = 0) -> Calibration:
     rest = _outweighs(held.before, held.after, noise) if held else _outweighs(b, a, noise)
     unexplained = (rest or bool(claimed.refused)) and not claimed.any and misfits
     seconds = {**ready.seconds, "evidence": time.perf_counter() - start}
+    rows = _rows(names, freed, factor, built)
+    valid = covered(ready.predictor.machine, e, ~ready.out)
+    if unseen:
+        valid = replace(valid, error=unseen.after, error_u=unseen.u, unit=unit)
+    far = pulls(
+        freed,
+        [u.name for u in names],
+        np.array([r.pull for r in rows]),
+        np.array([r.identifiable for r in rows], dtype=bool),
+    )
     return Calibration(
-        verdict=_verdict(as_declared, found.found, wider, unexplained),
-        rows=_rows(names, freed, factor, built),
+        verdict=_verdict(as_declared, found.found, wider, unexplained, far),
+        rows=rows,
+        pulls=far,
         beyond=found.found,
         groups=choice,
         rank=sums.rank,
@@ -79,7 +92,8 @@ def conclude(ready: Calibrator, seed: int = 0) -> Calibration:
         failed=ready.sensitivity.failed,
         stopped=ready.stopped,
         unit=unit,
-        machine=correction.of(np.ones(len(e), bool)).machine,
+        machine=valid.kept_by(correction.of(np.ones(len(e), bool)).machine),
+        validity=valid,
         unseen=unseen,
         correction=correction,
         experiment=e,
@@ -110,7 +124,7 @@ def _travel(
     machine = ready.predictor.machine
     at = coordinates_of(machine, e)
     drives = [
-        Drive(name, u.unit, s.columns[..., i] / u.u, at[:, machine.compiled.names.joints[name]])
+        Drive(name, u.unit, s.columns[..., i] / u.u, at[:, machine.compiled.names.joints[joint_name(name)]])
         for i, u, name in ((i, s.unknowns[i], s.unknowns[i].moves[0][0][0]) for i in zeros)
     ]
 
@@ -146,7 +160,9 @@ def _rest(e: Experiment, left: Floats, size: Size) -> dict[str, float]:
     return out
 
 
-def _verdict(as_declared: bool, beyond: Sequence[Beyond], wider: Sequence[Wider], unexplained: bool) -> str:
+def _verdict(
+    as_declared: bool, beyond: Sequence[Beyond], wider: Sequence[Wider], unexplained: bool, far: Pulls
+) -> str:
     single = [
         b.name if not b.rivals else f"{b.name} or {len(b.rivals)} other{'s' * (len(b.rivals) > 1)}"
         for b in beyond
@@ -156,7 +172,9 @@ def _verdict(as_declared: bool, beyond: Sequence[Beyond], wider: Sequence[Wider]
         return "beyond tolerance: " + ", ".join([*single, *whole])
     if unexplained:
         return "unattributed"
-    return "as declared" if as_declared else "adjusted within tolerance"
+    if as_declared:
+        return "as declared"
+    return "adjusted within tolerance" if far.within else "adjusted beyond tolerance"
 
 
 def _rows(names: Sequence[Unknown], sums: Sums, factor: Floats, values: Floats) -> tuple[Row, ...]:

@@ -20,6 +20,7 @@ from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.model import predicted
 from stiffmap.calibration.slopes import moves_of
 from stiffmap.calibration.travel import Hats
+from stiffmap.calibration.unknowns import joint_name
 from stiffmap.description import AppliedEffect, Joint
 from stiffmap.description.tree import joints
 from stiffmap.errors import StiffmapError
@@ -86,7 +87,7 @@ class Correction:
             linear = problem.residual(prediction) + columns @ values
             declared = p.machine.description
             found = self.hats.knots(problem, columns * factor, linear, rho)
-            knots = {name: at_every_turn(joints(declared)[name], k) for name, k in found.items()}
+            knots = {name: at_every_turn(joints(declared)[joint_name(name)], k) for name, k in found.items()}
             beside = p.beside(machine=Machine(edited(declared, {}, knots), like=p.machine))
             prediction = predicted(beside, names, built, terms)
         machine = Machine(edited(p.with_terms(terms).description, own, knots), like=p.machine)

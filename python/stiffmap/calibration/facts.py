@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from stiffmap.calibration.groups import Choice
+from stiffmap.calibration.pulls import Pulls
 from stiffmap.calibration.travel import Travel
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.machine import Machine
 from stiffmap.plain import plain
+from stiffmap.validity import Validity
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,8 @@ class Facts:
     """What a machine's numbers are, given their uncertainties and the readings; SI."""
 
     verdict: str
-    """``as declared``, ``adjusted within tolerance``, ``beyond tolerance: NAME`` or ``unattributed``."""
+    """``as declared``, ``adjusted within tolerance``, ``adjusted beyond tolerance``, ``beyond tolerance: NAME`` or
+    ``unattributed``."""
     rows: tuple[Row, ...]
     beyond: tuple[Beyond, ...]
     groups: Choice
@@ -151,6 +154,10 @@ class Facts:
     values: Floats = field(repr=False, default_factory=lambda: np.zeros(0))
     """(p,) in standard uncertainties."""
     seconds: dict[str, float] = field(default_factory=dict)
+    validity: Validity = field(kw_only=True)
+    """What the readings covered; beyond it nothing vouches for `machine`."""
+    pulls: Pulls = field(kw_only=True)
+    """How far the numbers are beyond their standard uncertainties, those that are let go set aside."""
     refused: tuple[str, ...] = ()
     """What the evidence asked to let go beyond tolerance and is not claimed, and why."""
 
@@ -165,6 +172,11 @@ class Facts:
         out = {n: plain(getattr(self, n)) for n in names}
         out["held_out"] = plain(asdict(self.held_out)) if self.held_out else None
         out["unseen"] = plain(asdict(self.unseen)) if self.unseen else None
+        v = self.validity
+        out["validity"] = plain(
+            {"poses": v.poses, "drives": dict(v.drives), "loads": dict(v.loads), "temperature": v.temperature}
+        )
+        out["pulls"] = plain(asdict(self.pulls)) | {"within": self.pulls.within}
         out["groups"] = plain(asdict(self.groups))
         out["beyond"] = [plain(asdict(b)) for b in self.beyond]
         out["travel"] = self.travel.as_plain() if self.travel else None

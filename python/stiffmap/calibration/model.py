@@ -186,7 +186,7 @@ def _differences(
             failed.append((u.name, str(problem)))
             continue
         if not np.isfinite(column[np.isfinite(base)]).all():
-            failed.append((u.name, "the machine fails with it at some poses"))
+            failed.append((u.name, "the machine has no equilibrium with it at some poses"))
             continue
         if np.abs(np.nan_to_num(column)).max(initial=0.0) > 0.0:
             found.append(u)

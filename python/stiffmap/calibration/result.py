@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from stiffmap.calibration.corrected import Correction
 from stiffmap.calibration.facts import Facts
 from stiffmap.calibration.wording import lines, table
+from stiffmap.short import short_repr
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Calibration(Facts):
     """What a machine's numbers are, given their uncertainties and the readings; SI."""

@@ -132,6 +132,11 @@ def _of_sequence(
     return out, run
 
 
+def joint_name(element: str) -> str:
+    """The name that solutions give a joint: those of the base and the platform have no leg before it."""
+    return element.removeprefix("base.").removeprefix("platform.")
+
+
 def _relative(name: str, leg: str, group: str, what: str, u: float) -> Unknown:
     return Unknown(f"{what} of {name}", group, "ln", u, (((name, what), 1.0),), leg)
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 
 from stiffmap.calibration.facts import Beyond, Facts, Wider
+from stiffmap.number_text import with_uncertainty, within
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm")}
 FACTOR = 0.5
 """Logarithm of a factor from which it is written as one: ×1.65."""
 
+LARGEST = 3
+"""Large pulls that a line names."""
 NAMED = 12
 """Outliers that a line names."""
 
@@ -22,12 +25,23 @@ def in_display_units(value: float, unit: str) -> str:
     return f"{value * factor:.4g} {name}"
 
 
+def measured(value: float, u: float, unit: str) -> str:
+    """``0.0520 ± 0.0009 mm``; of the logarithm of a factor in per cent, or as the factor with its relative uncertainty."""
+    if unit == "ln":
+        if abs(value) < FACTOR:
+            return f"{with_uncertainty(100.0 * math.expm1(value), 100.0 * math.exp(value) * u)} %"
+        return f"×{within(math.exp(value), math.exp(value) * u)} ± {within(100.0 * u, 100.0 * u)} %"
+    factor, name = DISPLAY_UNITS[unit]
+    return f"{with_uncertainty(factor * value, factor * u)} {name}"
+
+
 def lines(c: Facts) -> list[str]:
     """Verdict, groups, misfit before and after, what is left."""
     out = [f"calibration: {c.verdict}{' (stopped early)' if c.stopped else ''}"]
     out += [f"  {_beyond(b)}" for b in c.beyond]
     out += [f"  {_wider(w)}" for w in c.wider]
     out += [f"  not claimed: {r}" for r in c.refused]
+    out += _large_pulls(c)
     out.append(f"told by the readings: {c.rank} directions of {len(c.rows)} unknowns")
     out.append("groups: " + _groups(c))
     out.append(
@@ -44,8 +58,13 @@ def lines(c: Facts) -> list[str]:
         f = c.unseen
         out.append(
             f"machine file on {f.by} that no fit saw: rms {in_display_units(f.before, c.unit)} as declared, "
-            f"{in_display_units(f.after, c.unit)} ± {in_display_units(f.u, c.unit)} corrected"
+            f"{measured(f.after, f.u, c.unit)} corrected"
         )
+        if f.after > f.before:
+            out.append(
+                "the file is worse than the declared machine on readings that no fit saw: do not use it; more poses are needed"
+            )
+    out.append(f"holds where it was read: {c.validity}")
     if c.floor > 0.0:
         where = ", ".join(f"{k} {in_display_units(v, _unit(k, c.unit))}" for k, v in c.rest.items())
         out.append(
@@ -67,25 +86,48 @@ def lines(c: Facts) -> list[str]:
     return out
 
 
+def _large_pulls(c: Facts) -> list[str]:
+    """Which numbers are farther off than their standard uncertainties allow."""
+    far = c.pulls
+    if far.within:
+        return []
+    of = {r.name: r for r in c.rows}
+    some = [f"{n} {in_display_units(of[n].value, of[n].unit)} (pull {v:.1f})" for n, v in far.large[:LARGEST]]
+    more = f" and {len(far.large) - LARGEST} more" if len(far.large) > LARGEST else ""
+    told = f": {', '.join(some)}{more}" if some else ""
+    return [
+        f"large pulls: the numbers are {far.rms:.2g} times as far off (rms) as their standard uncertainties say{told}; "
+        f"give the uncertainties that this machine has (u in its file), or --tolerance {far.factor:g}"
+    ]
+
+
 def _unit(name: str, unit: str) -> str:
     return "rad" if name.startswith("r") else unit
+
+
+def odds(nats: float) -> str:
+    """How much likelier the readings are with something than without it, from the logarithm: ``20:1``, ``1e12:1``."""
+    power = nats / 2.302585092994046
+    if abs(power) > 3:
+        return f"1e{power:.0f}:1" if power > 0 else f"1:1e{-power:.0f}"
+    return f"{10**power:.2g}:1" if power >= 0 else f"1:{10**-power:.2g}"
 
 
 def _beyond(b: Beyond) -> str:
     other = f"; or instead: {', '.join(b.rivals[:3])}" if b.rivals else ""
     more = f" and {len(b.rivals) - 3} more" if len(b.rivals) > 3 else ""
-    return f"{b.name}: {in_display_units(b.value, b.unit)} ± {in_display_units(b.sigma, b.unit)} ({b.nats:.0f} nats){other}{more}"
+    return f"{b.name}: {measured(b.value, b.sigma, b.unit)} (odds {odds(b.nats)}){other}{more}"
 
 
 def _wider(w: Wider) -> str:
     other = f"; or instead: {', '.join(w.rivals)}" if w.rivals else ""
-    return f"{w.group}: standard uncertainties {w.factor:g} times too small ({w.nats:.0f} nats){other}; which of them, the readings do not tell"
+    return f"{w.group}: standard uncertainties {w.factor:g} times too small (odds {odds(w.nats)}){other}; which of them, the readings do not tell"
 
 
 def _groups(c: Facts) -> str:
     chosen = [g for g in c.groups.groups if g.name in c.groups.chosen]
     told = [
-        f"{g.name} {g.alone:+.0f} nats" + (f" (or {', '.join(g.rivals)})" if g.rivals else "")
+        f"{g.name}, odds {odds(g.alone)}" + (f" (or {', '.join(g.rivals)})" if g.rivals else "")
         for g in sorted(chosen, key=lambda g: -g.last)
     ]
     return "; ".join(told) or "none is demanded"

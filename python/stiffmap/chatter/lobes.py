@@ -19,6 +19,7 @@ from stiffmap.chatter.modes import ToolModes, mode_rows, modes_of_machine
 from stiffmap.chatter.zero_order import FEED, TOOL, at_periods, frequencies_of, limits
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, as_machine
+from stiffmap.options import keywords_of
 from stiffmap.process import Process
 from stiffmap.vibration.modes import tip_modes
 
@@ -31,6 +32,7 @@ HIGHEST = 4.0
 """Top of a diagram, as a multiple of the least limit."""
 
 
+@keywords_of(tip_modes)
 def stability_lobes(
     machine: Machine | str | PathLike[str] | ToolModes | Iterable[Any],
     process: GivenProcess,
@@ -81,6 +83,8 @@ def stability_lobes(
     """
     if method not in METHODS:
         raise StiffmapError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
+    if isinstance(machine, str | PathLike):
+        machine = as_machine(machine)
     p = milling_process(process)
     modes, said = _modes(
         machine, position, cut_axes(real_array(feed, "feed"), real_array(tool, "tool")), pose

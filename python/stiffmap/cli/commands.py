@@ -27,6 +27,7 @@ COMMANDS = (
     Command("new", "stiffmap.cli.new", "new", "Start a machine file from a template that explains itself."),
     Command("check", "stiffmap.cli.check", "check", "Validate a machine file."),
     Command("show", "stiffmap.cli.show", "show", "Draw a machine and print what it is made of."),
+    Command("view", "stiffmap.cli.view", "view", "A machine and its map, live in a browser."),
     Command("effects", "stiffmap.cli.effects", "effects", "List the effects that a machine can have."),
     Command("solve", "stiffmap.cli.solve", "solve", "Deflection and stiffness at one pose under one wrench."),
     Command("map", "stiffmap.cli.map", "map_command", "Error maps of z-planes under a force."),

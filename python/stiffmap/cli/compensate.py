@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from stiffmap.calibration.validity import beyond
 from stiffmap.cli.inputs import EffectsOption, machine_with, numbers
 from stiffmap.cli.inputs import gravity as gravity_of
 from stiffmap.cli.output import JsonOption, print_json
@@ -24,17 +25,23 @@ from stiffmap.compensation import compensate as compute
 from stiffmap.description import MachineDescription
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.comparison.prediction_error import left_by
+from stiffmap.experiment.experiment import Experiment, Mask
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.files.plan_file import load_plan
 from stiffmap.experiment.poses.orientation import against_base
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine
 from stiffmap.maps.files import read_dataset
 from stiffmap.outputs import write_text
 from stiffmap.outputs.option import written
+from stiffmap.validity import Validity
 
 MM = 1e3
 WORSE = "worse: these commands would enlarge the error of these readings; the file does not hold where they were taken"
 BETTER = "better"
+BEYOND = "rows beyond what the machine was calibrated by"
+NAMED = 12
+"""Rows that a line names."""
 
 
 def compensate(
@@ -118,16 +125,39 @@ def compensate(
 
 
 def _checked(m: Machine, folder: Path) -> dict[str, object]:
-    """Sizes of readings as they are, and less what the corrected machine says of them."""
-    before, after = left_by(m, load_experiment(folder))
+    """Sizes of readings as they are, and less what the corrected machine says of them; those beyond what it was calibrated
+    by apart."""
+    e = Predictor(m, load_experiment(folder)).experiment
+    out, worse = _sizes(m, e, None)
+    far = beyond(m, e)
+    if far is not None:
+        out |= _promise(m)
+        out[BEYOND] = f"{int(far.sum())} of {len(far)}"
+        if far.any() and not far.all():
+            there, harm = _sizes(m, e, far)
+            out |= {f"there, {k}": v for k, v in there.items() if k != "readings"}
+            worse |= harm
+    out["verdict"] = WORSE if worse else BETTER
+    return out
+
+
+def _sizes(m: Machine, e: Experiment, rows: Mask | None) -> tuple[dict[str, object], bool]:
+    before, after = left_by(m, e, rows)
     out: dict[str, object] = {"readings": before.n}
     for name, s in (("as measured", before), ("left by compensation", after)):
         size, unit = s.size
         out[f"rms {name}, m{unit}"] = round(MM * size, 6)
         if unit == "m":
             out[f"largest {name}, mm"] = round(MM * s.max, 6)
-    out["verdict"] = WORSE if after.size[0] > before.size[0] else BETTER
-    return out
+    return out, after.size[0] > before.size[0]
+
+
+def _promise(m: Machine) -> dict[str, object]:
+    """What the machine file says of itself."""
+    v = Validity.of_machine(m)
+    if v is None or v.error is None:
+        return {}
+    return {f"promised by the file, m{v.unit}": f"{MM * v.error:.4g} ± {MM * v.error_u:.1g} rms ({v})"}
 
 
 def _say(out: dict[str, object], as_json: bool) -> None:
@@ -194,7 +224,12 @@ def _commands(
     if output is not None:
         found.write(output)
     lost = [plan.ids[i] for i in np.flatnonzero(~found.ok)]
-    return {
+    told: dict[str, object] = {}
+    if found.beyond is not None:
+        far = [plan.ids[i] for i in np.flatnonzero(found.beyond)]
+        more = f" and {len(far) - NAMED} more" if len(far) > NAMED else ""
+        told[BEYOND] = f"{', '.join(far[:NAMED])}{more}" or "none"
+    return told | {
         "rows": len(plan),
         "corrected components": " ".join(found.components),
         "rms error at declared commands, mm": round(MM * found.rms(found.before), 6),

@@ -81,7 +81,7 @@ def write(result: Diagnosis, folder: Path, date: str | None = None, inputs: Sequ
     from stiffmap.diagnosis.report.pictures import figures
 
     write_text(make_folder(folder) / "diagnosis.json", result.to_json())
+    result.machine.save(folder / "machine.yaml")
     for name, figure in figures(result).items():
         write_picture(folder / f"{name}.png", figure, dpi=130)
     result.report(folder / "report.html", date=date, inputs=inputs)
-    result.machine.save(folder / "machine.yaml")

@@ -39,6 +39,9 @@ def efforts(
             help="s, from rest to rest along the path; default: the file's, else as fast as the drives can."
         ),
     ] = None,
+    feed: Annotated[
+        float | None, typer.Option(help="mm/min along the path all the way, in place of a duration.")
+    ] = None,
     friction: Annotated[bool, typer.Option(help="Coulomb and viscous friction of the drives.")] = True,
     effect: EffectsOption = None,
     gravity_: GravityOption = None,
@@ -48,8 +51,9 @@ def efforts(
 ) -> None:
     """Efforts, speeds and powers of the drives along a motion of the tool: inverse dynamics of the closed machine.
 
-    A CSV table has columns such as x [mm], y [mm], z [mm], with t [s] a motion over time, without it a path;
-    fx [N], fy [N], fz [N] act on the tool. A YAML file describes a line, a circle or points.
+    A CSV table has columns such as x [mm], y [mm], z [mm]; with t [s] a motion over time, with feed [mm/min] a path at this
+    speed, without either a path; fx [N], fy [N], fz [N] act on the tool and may vary. A YAML file describes a line, a
+    circle or points.
 
     With -o: the data (NetCDF) and a picture.
 
@@ -62,13 +66,17 @@ def efforts(
 
       [cyan]stiffmap efforts orthoglide-revised cut.yaml --gravity 0,0,-9.81[/cyan]
 
+      [cyan]stiffmap efforts ur10 path.csv --feed 3000 --gravity 0,0,-9.81[/cyan]
+
       [cyan]stiffmap efforts ur10 path.csv --duration 2 --gravity 0,0,-9.81 --json[/cyan]
     """
     from stiffmap.performance import drive_efforts, load_motion
 
     m = machine_with(machine, effect)
     g = gravity(gravity_)
-    run = load_motion(trajectory).trajectory(m, duration=duration, gravity=g)
+    run = load_motion(trajectory).trajectory(
+        m, duration=duration, gravity=g, feed=None if feed is None else feed * 1e-3 / 60
+    )
     found = drive_efforts(m, run, gravity=g, friction=friction, threads=threads)
     files = write(found, make_folder(output)) if output else []
     if as_json:

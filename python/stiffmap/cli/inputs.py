@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,7 +16,6 @@ from stiffmap.number_text import number_in
 from stiffmap.outputs.option import written
 
 if TYPE_CHECKING:
-    from stiffmap.description import AppliedEffect
     from stiffmap.machine import Machine
 
 MM = 1e-3
@@ -112,21 +110,6 @@ def machine_with(name: str, effects: Sequence[str] | None) -> Machine:
     return Machine(
         apply_records(machine.description, [parse_effect(text, machine.description) for text in effects])
     )
-
-
-def placed(machine: Machine, text: str) -> AppliedEffect:
-    """An effect with the machine's own names of element and legs filled in; one of the measurement too."""
-    from stiffmap.effects import parse_effect, registry
-    from stiffmap.effects.check import place_of
-
-    term = parse_effect(text, machine.description)
-    effect = registry.get(term.kind)
-    if effect.measurement:
-        element, legs = place_of(effect, machine.description, term.element or None, term.legs or None)
-        return replace(term, element=element, legs=legs)
-    given = {**dict(term.parameters), **dict(term.options)}
-    added = machine.with_effect(term.kind, element=term.element or None, legs=term.legs or None, **given)
-    return added.description.effects[-1]
 
 
 def plain(value: Any) -> Any:

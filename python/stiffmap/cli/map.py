@@ -38,13 +38,14 @@ from stiffmap.cli.map_options import (
     SchedulerOption,
     StatisticsOption,
     TablesOption,
+    ToolpathOption,
     UncertaintyOption,
     XOption,
     YOption,
     ZarrOption,
     ZOption,
 )
-from stiffmap.cli.map_summary import as_table, failures, summary
+from stiffmap.cli.map_summary import as_table, beyond, failures, summary
 from stiffmap.cli.map_uncertainty import print_uncertainty, uncertainty_data
 from stiffmap.cli.map_worst import in_words, worst_pose
 from stiffmap.cli.output import JsonOption, print_json
@@ -61,6 +62,7 @@ def map_command(
     x: XOption = None,
     points: PointsOption = 101,
     force: ForceOption = "300",
+    toolpath: ToolpathOption = None,
     plane: PlaneOption = "xy",
     tolerance: ToleranceOption = 0.25,
     directions: DirectionsOption = 4,
@@ -111,10 +113,18 @@ def map_command(
       [cyan]stiffmap map orthoglide-revised --points 2001 --estimate[/cyan]
 
       [cyan]stiffmap map orthoglide-revised --points 51 --statistics[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --toolpath trim -o results[/cyan]
     """
     kinds = named_formats(formats, "--format", ("png", "svg", "pdf")) if pictures else []
     sheets = named_formats(tables, "--table", ("csv", "xlsx")) if tables else []
     m = machine_with(machine, effect)
+    if toolpath is not None:
+        from stiffmap.cli.map_toolpath import map_toolpath
+
+        how = {"gravity": gravity(gravity_), "method": method, "threads": threads}
+        map_toolpath(m, toolpath, force, how, output, kinds, as_json)
+        return
     call: dict[str, Any] = {
         **grid(m, {"x": x, "y": y, "z": z}, points),
         "wrench": cases(plane, force),
@@ -153,9 +163,11 @@ def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wa
     table = as_table(ds, rows, wanted.plane, wanted.tolerance)
     files = [how["out"], *write_files(machine, ds, wanted, table, worst, failed, call["gravity"])]
     band = uncertainty_data(ds, wanted.plane) if wanted.uncertainty else None
+    far = beyond(ds)
     if as_json:
         data: dict[str, Any] = {"machine": machine.name, "rows": rows, "failed": failed}
         data |= {"files": list(map(str, files)), "worst_pose": worst}
+        data |= {} if far is None else {"beyond_calibration": far}
         print_json(plain(data if band is None else data | {"uncertainty": band}))
     else:
         console = Console(highlight=False)
@@ -164,6 +176,9 @@ def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wa
             print_uncertainty(console, band, wanted.plane)
         if worst is not None:
             console.print(in_words(worst), soft_wrap=True)
+        if far is not None:
+            told = f"{100 * far['share']:.3g} % of it beyond what the machine was calibrated by ({far['calibrated_by']})"
+            console.print(f"[yellow]{told}[/yellow]" if far["share"] else told, soft_wrap=True)
         for line in failed_in_words(failed):
             console.print(f"[yellow]{line}[/yellow]", soft_wrap=True)
         console.print(f"wrote {', '.join(map(str, files))}", soft_wrap=True)

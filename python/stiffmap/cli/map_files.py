@@ -12,6 +12,7 @@ import xarray as xr
 from rich.table import Table
 
 from stiffmap.cli.inputs import MM
+from stiffmap.cli.map_summary import name_of
 from stiffmap.cli.map_uncertainty import draw_deviations
 from stiffmap.cli.map_worst import in_words
 from stiffmap.cli.table_text import as_text
@@ -52,7 +53,7 @@ def write_files(
     from stiffmap.plot import save
 
     figures = map_figures(ds, wanted.plane, MM * wanted.tolerance, wanted.own_scales) if wanted.kinds else {}
-    figures |= loaded(machine, ds, worst, gravity) if figures and worst is not None else {}
+    figures |= loaded(machine, worst, gravity) if figures and worst is not None else {}
     files = [save(f, wanted.output / f"map-{n}.{kind}") for n, f in figures.items() for kind in wanted.kinds]
     files += [write_map_table(ds, wanted.output / f"map.{kind}") for kind in wanted.tables]
     files += draw_deviations(ds, wanted.output, wanted.plane) if wanted.uncertainty and figures else []
@@ -68,20 +69,21 @@ def map_figures(ds: xr.Dataset, plane: str, tolerance: float, own_scales: bool) 
     chosen: dict[str, dict[str, Any]] = {
         w: {"variable": f"{w}_deflection_{plane}"} for w in ("worst", "best")
     }
-    chosen |= {str(c): {"variable": f"deflection_{plane}", "case": str(c)} for c in ds.case.values}
+    chosen |= {str(c): {"variable": name_of(ds, plane, c), "case": str(c)} for c in ds.case.values}
     return {
         n: map_figure(ds, tolerance=tolerance, common_scale=not own_scales, **how)
         for n, how in chosen.items()
     }
 
 
-def loaded(machine: Machine, ds: xr.Dataset, worst: dict[str, Any], gravity: Any) -> dict[str, Figure]:
+def loaded(machine: Machine, worst: dict[str, Any], gravity: Any) -> dict[str, Figure]:
     """The machine deformed at the worst pose; nothing where it has no stable shape without the load."""
     from stiffmap.plot import loaded_figure
 
     try:
-        wrench = ds.wrench.sel(case=worst["case"]).values
-        return {"loaded": loaded_figure(machine, worst["position"], wrench, gravity=gravity)}
+        return {
+            "loaded": loaded_figure(machine, worst["position"], np.array(worst["wrench"]), gravity=gravity)
+        }
     except StiffmapError:
         return {}
 

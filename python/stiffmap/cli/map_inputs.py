@@ -11,6 +11,7 @@ from stiffmap.cli.inputs import MM, force_given
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.maps.inputs import magnitude, plane_axes
+from stiffmap.maps.workspace_grid import grid_of
 
 
 def grid(machine: Machine, planes: dict[str, list[float] | None], points: int) -> dict[str, Any]:
@@ -18,22 +19,7 @@ def grid(machine: Machine, planes: dict[str, list[float] | None], points: int) -
     given = {a: MM * np.array(v) for a, v in planes.items() if v}
     if len(given) > 1:
         raise StiffmapError(f"--{' and --'.join(given)}: expected planes across one axis")
-    low, high = machine.workspace
-    task = machine.description.task
-    out: dict[str, Any] = {}
-    for i, a in enumerate("xyz"):
-        if a in given:
-            out[a] = given[a]
-        elif task and a not in task:
-            out[a] = [float(machine.description.home.p[i])]
-        elif a == "z" and not given:
-            middle = 0.0 if low[2] < 0 < high[2] else (low[2] + high[2]) / 2
-            out[a] = [low[2], middle, high[2]]
-        else:
-            out[a] = np.linspace(low[i], high[i], max(points, 0))
-    if task and np.size(out["x"]) == np.size(out["y"]) == 1 and not given:
-        out["z"] = np.linspace(low[2], high[2], max(points, 0))  # only the height is commanded
-    return out
+    return grid_of(machine, given, points)
 
 
 def named_formats(text: str, option: str, known: Sequence[str]) -> list[str]:

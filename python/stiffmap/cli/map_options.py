@@ -51,3 +51,9 @@ StatisticsOption = Annotated[
 SchedulerOption = Annotated[
     str | None, typer.Option(help="Address of a dask scheduler whose workers solve the map.")
 ]
+ToolpathOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Along a path of the tool instead of over planes: CSV or YAML, as for `efforts`; or a shipped one: trim."
+    ),
+]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
+from stiffmap.broadcasting import Floats
 from stiffmap.cli.inputs import (
     EffectsOption,
     FolderOption,
@@ -21,13 +23,16 @@ from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import load_machine
 from stiffmap.milling import mill_job
+from stiffmap.milling.entry import best_entry
 from stiffmap.milling.placement import placements
 from stiffmap.milling.redundancy import redundancy as choose_turns
 from stiffmap.milling.report import placement_summary, summary, write_report
-from stiffmap.milling.setting import setting
+from stiffmap.milling.setting import Setting, setting
+from stiffmap.milling.speed import other_side
 from stiffmap.process import Process, load_process
 from stiffmap.status import Status
-from stiffmap.toolpath import load_path, sampled
+from stiffmap.toolpath import Toolpath, box, load_path, sampled
+from stiffmap.toolpath.entry import entered_at, turned_round
 
 MM = 1e-3
 
@@ -72,6 +77,27 @@ def mill(
             help="Try so many placements first and take the best, refined; instead of --at and --turn."
         ),
     ] = None,
+    stock: Annotated[
+        str | None,
+        typer.Option(
+            help="Box of stock, mm, axes of the part: lowest and highest corner, e.g. -90,-60,-5,90,60,0."
+        ),
+    ] = None,
+    reverse: Annotated[
+        bool, typer.Option(help="Run the path the other way, conventional for climb and the other way round.")
+    ] = False,
+    entry: Annotated[
+        str | None,
+        typer.Option(
+            help="Enter a closed outline elsewhere: so many mm along it, or 'best' (the least step)."
+        ),
+    ] = None,
+    feeds: Annotated[
+        bool,
+        typer.Option(
+            help="Choose the largest feed of each move that keeps the error within the tolerance before compensation."
+        ),
+    ] = False,
     redundancy: Annotated[
         int | None,
         typer.Option(help="Arms: choose the turn about the tool from so many over a full turn, e.g. 72."),
@@ -82,13 +108,15 @@ def mill(
     """The part as a machine will cut it, and a program that makes it right.
 
     The cutting force and the deflection are found together; the compensated program is read back and simulated.
-    Exit code 1: a point without an equilibrium, or an error beyond the tolerance after compensation.
+    Exit code 1: a point without an equilibrium, an error beyond the tolerance after compensation, or a drive or joint beyond its limits.
 
     Examples:
 
       [cyan]stiffmap mill orthoglide-revised outline.ngc --process trimming --at 50,50,0 -o result[/cyan]
 
       [cyan]stiffmap mill linear-delta rectangle --size 120,80,15 --process trimming.yaml --at 0,0,300 -o result[/cyan]
+
+      [cyan]stiffmap mill linear-delta circle --size 60 --process trimming --at 0,0,300 --entry best --feeds --tolerance 0.1 -o result[/cyan]
 
       [cyan]stiffmap mill corrected.yaml outline.ngc --process trimming --true my.yaml --band -o cut[/cyan]
     """
@@ -97,29 +125,44 @@ def mill(
         path,
         size=None if size is None else tuple(float(v) * MM for v in numbers(size, "size")),
         offsets=_offsets(offset),
+        progress=None if as_json or not sys.stderr.isatty() else _read,
     )
     cut = _process(process, tolerance)
+    if reverse:
+        p, cut = turned_round(p), other_side(cut)
+    plate = None
+    if stock is not None:
+        corners = MM * numbers(stock, "stock", 6)
+        plate = box(corners[:3], corners[3:])
     where = None if at is None else MM * numbers(at, "at", 3)
     angle = float(np.radians(turn))
     out: dict[str, object] = {}
     if place is not None:
         best = placements(m, p, cut, count=place, threads=threads)
         where, angle = best.best.at, best.best.turn
-        out["placement"] = placement_summary(best)
-    turns = None
-    if redundancy is not None:
-        arm = setting(
-            m, p, cut, sampled(p, MM * step), p.placed(m.description.home.p if where is None else where, angle),
+        out["placement"] = {"words": best.words(cut.tolerance), **placement_summary(best)}
+
+    def job(path: Toolpath, turns: Floats | None = None) -> Setting:
+        place = path.placed(m.description.home.p if where is None else where, angle)
+        return setting(
+            m, path, cut, sampled(path, MM * step), place, stock=plate, angle=turns,
             thickness=None if thickness is None else MM * thickness,
         )  # fmt: skip
-        chosen = choose_turns(arm, redundancy, threads=threads)
+
+    turns = None
+    if redundancy is not None:
+        turns = choose_turns(job(p), redundancy, threads=threads).angle
+    if entry is not None:
+        p, out["entry"] = _entered(p, entry, job(p, turns), threads)
+    if redundancy is not None:
+        chosen = choose_turns(job(p), redundancy, threads=threads)
         turns = chosen.angle
         out["redundancy"] = {
             "largest_mm": float(1e3 * np.abs(chosen.error).max()), "best_fixed_turn_mm": float(1e3 * chosen.fixed.min()),
             "as_at_home_mm": float(1e3 * np.interp(0.0, chosen.turns, chosen.fixed)),
         }  # fmt: skip
     found = mill_job(
-        m, p, cut, at=where, turn=angle, step=MM * step, within=MM * within, angle=turns,
+        m, p, cut, at=where, turn=angle, step=MM * step, within=MM * within, angle=turns, feeds=feeds, stock=plate,
         true_machine=None if true_machine is None else load_machine(true_machine),
         thickness=None if thickness is None else MM * thickness, passes=passes, band=band, threads=threads,
     )  # fmt: skip
@@ -132,8 +175,28 @@ def mill(
         _say(out)
     states: Any = found.dataset.status.values
     t = cut.tolerance
-    after = found.dataset.error_normal_after.values
-    finish(bool((states != Status.CONVERGED).any() or (t is not None and np.nanmax(np.abs(after)) > t)))
+    after = np.abs(found.dataset.error_normal_after.values)
+    beyond = t is not None and not (after <= t).all()
+    finish(bool((states != Status.CONVERGED).any() or beyond or any(w.finding for w in found.warnings)))
+
+
+def _entered(p: Toolpath, text: str, here: Setting, threads: int | None) -> tuple[Toolpath, dict[str, float]]:
+    """The path entered elsewhere, and what the step there is."""
+    if text == "best":
+        best = best_entry(here, threads)
+        said = {
+            "way_mm": 1e3 * best.way,
+            "step_there_mm": 1e3 * best.step,
+            "step_as_given_mm": 1e3 * best.given,
+        }
+        return entered_at(p, best.way), said
+    way = float(numbers(text, "entry", 1)[0])
+    return entered_at(p, MM * way), {"way_mm": way}
+
+
+def _read(count: int) -> None:
+    """Progress of a long program, on a terminal only."""
+    print(f"\r{count} lines read", end="", file=sys.stderr, flush=True)
 
 
 def _process(name: str, tolerance: float | None) -> Process:
@@ -162,7 +225,11 @@ def _say(out: dict[str, object]) -> None:
     for key, value in out.items():
         if key == "verdict":
             continue
-        if isinstance(value, dict):
+        if value == [] or value is None:
+            continue
+        if key == "warnings" and isinstance(value, list):
+            text = " ".join(w["text"] for w in value)
+        elif isinstance(value, dict):
             text = ", ".join(f"{k} {v:.6g}" if isinstance(v, float) else f"{k} {v}" for k, v in value.items())
         else:
             text = f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -7,11 +7,12 @@ from typing import Annotated, Any
 
 import typer
 
-from stiffmap.cli.inputs import EffectsOption, placed, plain
+from stiffmap.cli.inputs import EffectsOption, plain
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.experiment import load_experiment
+from stiffmap.experiment.calls import placed
 from stiffmap.json_text import parse_json
 from stiffmap.machine import Machine, load_machine
 from stiffmap.planning.budget import budgets

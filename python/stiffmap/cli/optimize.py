@@ -28,6 +28,9 @@ def optimize(
     output: Annotated[Path, written(help="Folder for results; resumed from there.")] = Path("design"),
     generations: Annotated[int | None, typer.Option(help="Generations; default: the file's.")] = None,
     processes: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler whose workers judge the designs.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Machines that are best under several measures at once: a Pareto set, and chosen designs as machine files.
@@ -44,6 +47,8 @@ def optimize(
       [cyan]stiffmap optimize redesign -o results/redesign[/cyan]
 
       [cyan]stiffmap optimize my_design.yaml --generations 5 --json[/cyan]
+
+      [cyan]stiffmap optimize redesign --scheduler tcp://HOST:8786 -o results/redesign[/cyan]
     """
     from stiffmap.cli.inputs import finish
     from stiffmap.design import load_design
@@ -58,7 +63,14 @@ def optimize(
 
     problem = load_design(design)
     place = make_folder(output)
-    found = search(problem, folder=place, generations=generations, processes=processes, progress=tell)
+    found = search(
+        problem,
+        folder=place,
+        generations=generations,
+        processes=processes,
+        progress=tell,
+        scheduler=scheduler,
+    )
     report = measured(found, place)
     tables = report.tables
     files = write(found, place, report)

@@ -24,11 +24,10 @@ def paper(
     threads: ThreadsOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Reproduce the paper's application: Figures 5a–h, 6, 7 and every quantitative statement of §5.2 and "
-    "§5.3.
+    """Reproduce the paper's application: Figures 5a–h, 6, 7 and every quantitative statement of §5.2 and §5.3.
 
-    The table has the paper's words, our number and a verdict: agrees, differs because …, or cannot be
-    checked because …. With -o: the figures (PNG) and the table (CSV, Markdown).
+    Each statement has the paper's words and number, our number and a verdict: agrees, differs because …, or cannot be
+    checked because …; agreement with a number that our model took from the paper is marked as such. With -o: the figures (PNG) and the table (CSV, Markdown).
 
     Exit codes: 0 done (whatever the verdicts), 2 bad input.
 
@@ -41,7 +40,7 @@ def paper(
       [cyan]stiffmap paper --points 31 --no-figures -o results[/cyan]
     """
     from stiffmap.paper import all_statements, compute
-    from stiffmap.paper.table import as_plain, as_rich, count
+    from stiffmap.paper.table import as_plain, as_rich, count, count_text
 
     target = make_folder(output) if output else None
     results = compute(points, threads=threads, progress=False if as_json else None)
@@ -52,7 +51,10 @@ def paper(
         return
     console = Console(highlight=False)
     console.print(as_rich(statements))
-    console.print("; ".join(f"{n} {verdict}" for verdict, n in count(statements).items()))
+    console.print(count_text(statements))
+    console.print(
+        "The paper prints no numbers of the curves in Figures 5 to 7; the numbers above are those of its text and Table 1."
+    )
     if files:
         console.print(f"wrote {', '.join(files)}", soft_wrap=True)
 

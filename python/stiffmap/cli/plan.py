@@ -9,16 +9,18 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from stiffmap.cli.inputs import numbers, placed, plain
+from stiffmap.cli.inputs import numbers, plain
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment import simulate
+from stiffmap.experiment.calls import placed
 from stiffmap.experiment.files.save import plan_columns
 from stiffmap.machine import Machine, load_machine
+from stiffmap.number_text import with_uncertainty
 from stiffmap.outputs import write_rows
 from stiffmap.outputs.option import written
-from stiffmap.planning import Design, design, follow
+from stiffmap.planning import Design, Estimate, design, follow
 from stiffmap.planning.estimate import fitted
 
 MM = 1e-3
@@ -88,7 +90,7 @@ def plan(
         "tool": tool, "noise": None if noise is None else MM * noise, "seed": seed,
     }  # fmt: skip
     if until is not None:
-        _sequential(m, terms, twin, until, rows, options)
+        _sequential(m, terms, twin, until, rows, options, as_json)
         return
     workpiece = np.array([MM * numbers(t, "at", 3) for t in at]) if at else None
     found = design(
@@ -109,6 +111,7 @@ def _sequential(
     until: float,
     rows: int,
     options: dict[str, Any],
+    as_json: bool,
 ) -> None:
     """Plan, simulate, fit, again; prints each step."""
     truth = [placed(m, t) for t in twin] if twin else terms
@@ -116,13 +119,22 @@ def _sequential(
     steps = follow(
         m, terms, lambda e: simulate(m, e, truth, seed=next(seeds)), until=until, batch=rows, **options
     )
-    for count, e in steps:
-        each = zip(e.names, e.values, e.sigma * e.misfit, e.units, strict=True)
-        print(f"{count} rows: " + ", ".join(f"{n} {v:.5g} ± {u:.2g} {s}" for n, v, u, s in each))
     last = steps[-1][1]
     scale = np.array([p.scale for _, p in fitted(m.description, tuple(terms))])
     met = bool((last.sigma * last.misfit / scale).max() <= until)
+    if as_json:
+        print_json(plain({"met": met, "steps": [{"rows": n, "parameters": _numbers(e)} for n, e in steps]}))
+        return
+    for count, e in steps:
+        each = zip(e.names, e.values, e.sigma * e.misfit, e.units, strict=True)
+        print(f"{count} rows: " + ", ".join(f"{n} {with_uncertainty(v, u)} {s}" for n, v, u, s in each))
     print(f"stopped: every u is at most {until:g} of a typical size" if met else "stopped: rows used up")
+
+
+def _numbers(e: Estimate) -> list[dict[str, object]]:
+    """Values and uncertainties of a step, SI."""
+    each = zip(e.names, e.units, e.values, e.sigma * e.misfit, strict=True)
+    return [{"name": n, "unit": s, "value": v, "u": u} for n, s, v, u in each]
 
 
 def _write(found: Design, path: Path) -> None:

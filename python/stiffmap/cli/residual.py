@@ -9,10 +9,12 @@ import numpy as np
 import typer
 from scipy.spatial.transform import Rotation
 
-from stiffmap.cli.inputs import EffectsOption, FolderOption, ThreadsOption, placed, plain
+from stiffmap.calibration.validity import beyond
+from stiffmap.cli.inputs import EffectsOption, FolderOption, ThreadsOption, plain
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.experiment import Experiment, Residual, load_experiment
 from stiffmap.experiment import residual as compute
+from stiffmap.experiment.calls import placed
 from stiffmap.experiment.channels import Channel
 from stiffmap.machine import load_machine
 from stiffmap.outputs import make_folder, write_picture, write_text
@@ -45,10 +47,18 @@ def residual(
     result = compute(declared, load_experiment(data), terms, threads=threads)
     if output is not None:
         _write(result, rows, output)
+    far = beyond(declared, result.experiment)
     if as_json:
-        print_json(as_plain(result, rows))
+        print_json(
+            as_plain(result, rows) | ({} if far is None else {"rows_beyond_calibration": int(far.sum())})
+        )
     else:
-        print("\n".join(lines(result, rows)))
+        told = (
+            []
+            if far is None
+            else [f"  beyond what the machine was calibrated by: {int(far.sum())} of {len(far)} rows"]
+        )
+        print("\n".join([*lines(result, rows), *told]))
     if result.lack_of_fit < 1e-3:
         raise typer.Exit(1)
 

@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from stiffmap.cli import plan_options as plans
-from stiffmap.cli.inputs import placed
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment import Loop, save_experiment
 from stiffmap.experiment import simulate as run
+from stiffmap.experiment.calls import placed
 from stiffmap.experiment.virtual import plans as make
 from stiffmap.machine import load_machine
 from stiffmap.outputs.option import written

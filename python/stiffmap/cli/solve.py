@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -28,7 +29,12 @@ from stiffmap.cli.inputs import (
     rotation,
 )
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.cli.solve_table import force_vector, is_file_name, solve_table
+from stiffmap.cli.statuses import MEANINGS
+from stiffmap.errors import StiffmapError
 from stiffmap.free_motions import free_motions
+from stiffmap.machine import Machine
+from stiffmap.outputs.option import written
 from stiffmap.solution import Solution
 from stiffmap.status import Flag, Status
 
@@ -38,7 +44,11 @@ SCALE = np.array([1e3] * 3 + [1.0] * 3)
 
 def solve(
     machine: MachineArgument,
-    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(help="Commanded TCP in mm, e.g. 0,0,300, or a CSV file of poses. [default: home]"),
+    ] = None,
+    output: Annotated[Path | None, written(help="With a file of poses: CSV of the answers.")] = None,
     force: ForceOption = "0,0,0",
     moment: Annotated[str, typer.Option(help="Moment about the point in N mm, base axes.")] = "0,0,0",
     turned: RotationOption = None,
@@ -52,6 +62,9 @@ def solve(
 
     A force that is given by its size alone acts in the direction in space that pushes the tool furthest.
 
+    A file of poses has columns such as x [mm], y [mm], z [mm], rx [deg] …, fx [N] …, mx [N*m] …, one pose a row; --force acts
+    where it has no load.
+
     Exit codes: 0 converged, 1 any other status, 2 bad input.
 
     Examples:
@@ -63,6 +76,8 @@ def solve(
       [cyan]stiffmap solve tripteron --at 300,400,500 --force 0,0,100 --json[/cyan]
 
       [cyan]stiffmap solve orthoglide-revised --force 0,0,-50 --moment 0,2000,0 --gravity 0,0,-9.81[/cyan]
+
+      [cyan]stiffmap solve orthoglide-revised --at poses.csv --force 0,0,-100 -o answers.csv[/cyan]
     """
     m = machine_with(machine, effect)
     how: dict[str, Any] = {
@@ -71,6 +86,12 @@ def solve(
         "gravity": gravity(gravity_),
         "method": method,
     }
+    if at is not None and (is_file_name(at)):
+        load = np.r_[force_vector(force), MM * numbers(moment, "moment", 3)]
+        finish(not solve_table(m, Path(at), load, how, output, as_json))
+        return
+    if output is not None:
+        raise StiffmapError("--output: only with a file of poses (--at poses.csv)")
     size, vector = force_given(force)
     if vector is None:
         from stiffmap.worst_force import worst_force
@@ -81,13 +102,15 @@ def solve(
     load = np.r_[acting, MM * numbers(moment, "moment", 3)]
     s = m.solve(position(at, m), load, **how)
     if as_json:
-        print_json(as_plain(m.name, s, load))
+        print_json(as_plain(m.name, s, load) | {"reason": reason(m, s, position(at, m), how["rotation"])})
     else:
         console = Console(highlight=False)
         if vector is None:
             told = ", ".join(f"{v:.1f}" for v in acting)
             console.print(f"{size:g} N in the direction that pushes furthest: force ({told}) N")
         show(console, s)
+        if why := reason(m, s, position(at, m), how["rotation"]):
+            console.print(f"reason: {why}", soft_wrap=True)
         if int(s.status) == Status.SINGULAR and (ways := free_motions(m, s.free_twists)):
             console.print(f"free: the platform can {'; '.join(ways)}", soft_wrap=True)
     finish(int(s.status) != Status.CONVERGED)
@@ -119,14 +142,27 @@ def show(console: Console, s: Solution) -> None:
     flags = ", ".join(str(f.name) for f in Flag(int(s.flags)))
     console.print(f"status {Status(int(s.status)).name.lower()}" + (f"; flags {flags}" if flags else ""))
     d = s.displacement
-    shift = ", ".join(f"{v:.6f}" for v in 1e3 * d[:3])
-    console.print(f"displacement of {s.point}: ({shift}) mm, norm {1e3 * np.linalg.norm(d[:3]):.6f} mm")
-    console.print(f"rotation: ({', '.join(f'{v:.6f}' for v in np.rad2deg(d[3:]))}) deg")
+    if np.isfinite(d).all():
+        shift = ", ".join(f"{v:.6f}" for v in 1e3 * d[:3])
+        console.print(f"displacement of {s.point}: ({shift}) mm, norm {1e3 * np.linalg.norm(d[:3]):.6f} mm")
+        console.print(f"rotation: ({', '.join(f'{v:.6f}' for v in np.rad2deg(d[3:]))}) deg")
     for name, effort in zip(s.actuators, s.actuator_effort, strict=True):
-        console.print(f"drive {name}: {effort:.4f} (N, or N m for a revolute one)")
-    console.print(
-        _matrix("loaded compliance: mm and rad per N and N mm", s.compliance * np.outer(SCALE, SCALE) / 1e3)
-    )
+        if np.isfinite(effort):
+            console.print(f"drive {name}: {effort:.4f} (N, or N m for a revolute one)")
+    if np.isfinite(s.compliance).any():
+        scaled = s.compliance * np.outer(SCALE, SCALE) / 1e3
+        console.print(_matrix("loaded compliance: mm and rad per N and N mm", scaled))
+
+
+def reason(m: Machine, s: Solution, at: Any, turned: Any) -> str | None:
+    """Why a pose has no answer, in words; None where it has one."""
+    if int(s.status) == Status.CONVERGED:
+        return None
+    if int(s.status) != Status.UNREACHABLE:
+        return MEANINGS[Status(int(s.status)).name]
+    from stiffmap.unreachable import why_unreachable
+
+    return why_unreachable(m, m.description.home.p if at is None else at, turned)
 
 
 def _matrix(title: str, values: Any) -> Table:

@@ -24,6 +24,8 @@ from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.outputs import write_rows
+from stiffmap.short import short_repr
+from stiffmap.validity import Validity
 
 STEPS = 25
 DONE = 1e-10
@@ -31,6 +33,7 @@ DONE = 1e-10
 MM = 1e3
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Commands:
     """Compensated commands of n poses, SI, base axes; NaN where the machine has no answer."""
@@ -55,6 +58,9 @@ class Commands:
     """What the drives can correct, and was: of x, y, z along base axes, rx, ry, rz about the tool's axes."""
     prismatic: tuple[bool, ...]
     """Whether each actuator slides."""
+    beyond: NDArray[np.bool_] | None
+    """(n,) rows outside what the readings of a calibrated machine covered: nothing vouches for its numbers there. None: the
+    machine was not calibrated."""
 
     @property
     def ok(self) -> NDArray[np.bool_]:
@@ -85,6 +91,8 @@ class Commands:
         columns |= {f"pose_rot{a}_deg": turn[:, i] for i, a in enumerate("xyz")}
         for word, values in (("before", self.before), ("after", self.after)):
             columns |= {f"{word}_{a}_mm": values[:, i] * MM for i, a in enumerate(AXES[:3])}
+        if self.beyond is not None:
+            columns["beyond_calibration"] = self.beyond.astype(float)
         rows = zip(*columns.values(), strict=True)
         write_rows(
             path, list(columns), (["" if not np.isfinite(v) else f"{v:.9g}" for v in row] for row in rows)
@@ -127,7 +135,14 @@ def compensate(
         Pose components to correct, of x y z rx ry rz; None: those that the machine commands, positions first
         where it has fewer drives than components.
 
-    Rows out of reach hold NaN. Raises StiffmapError for bad input.
+    Notes
+    -----
+    Rows out of reach hold NaN.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     plan = _plan(machine, position, rotation, joints, wrench, approach, gravity, point)
     wanted_p, wanted_r = plan.position, _turns(machine, plan)
@@ -135,6 +150,7 @@ def compensate(
     start = coordinates_of(machine, plan)
     drives = [machine.compiled.names.joints[a] for a in machine.actuators]
     declared = start[:, drives]
+    valid = Validity.of_machine(machine)
     lost = np.asarray(~np.isfinite(start).all(axis=1))
     u = np.where(lost[:, None], np.nan, declared)
     inverse = np.linalg.pinv(_rows(np.nan_to_num(drive_jacobian(machine, plan)), wanted_r, chosen))
@@ -159,6 +175,7 @@ def compensate(
         after,
         tuple(TASK[i] for i in chosen),
         tuple(machine.compiled.names.is_prismatic(a) for a in machine.actuators),
+        None if valid is None else valid.outside(machine, start, plan.wrench),
     )
 
 

@@ -29,7 +29,7 @@ from stiffmap.description import (
 from stiffmap.description.numbers import numbers_of
 from stiffmap.description.strokes import present_rows
 from stiffmap.description.tree import ENDS, all_elements, core_name
-from stiffmap.errors import StiffmapError
+from stiffmap.errors import HomeError, StiffmapError
 from stiffmap.home import Gap, misfit_text
 
 UNLIMITED = 1e300
@@ -55,7 +55,7 @@ def build_mechanism(machine: MachineDescription, like: _core.Mechanism | None = 
         known = () if like is None else (like,)
         return _core.Mechanism(root, pose(machine.home), springs, task(machine), machine.search_home, *known)
     except _core.HomeMisfit as problem:
-        raise StiffmapError(f"{machine.name}: {misfit_text(machine, *problem.args[1:])}") from None
+        raise HomeError(f"{machine.name}: {misfit_text(machine, *problem.args[1:])}") from None
     except ValueError as problem:
         raise StiffmapError(f"{machine.name}: {problem}") from None
 

@@ -1,5 +1,6 @@
 """The immutable description of a machine: what it is made of, in SI units, with no numerics."""
 
+from stiffmap.description.beam import BeamNumbers
 from stiffmap.description.elements import (
     Block,
     Body,
@@ -26,6 +27,7 @@ from stiffmap.description.strokes import BeamStroke, TableStroke
 __all__ = [
     "TASK",
     "AppliedEffect",
+    "BeamNumbers",
     "BeamStroke",
     "Block",
     "Body",

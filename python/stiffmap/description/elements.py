@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from stiffmap.description.beam import BeamNumbers
 from stiffmap.description.laws import CommandError, GuideError, JointFriction, Law
 from stiffmap.description.numbers import interval, number
 from stiffmap.description.pose import IDENTITY, Pose, Rows, Vector
@@ -161,6 +162,7 @@ class Spring:
     laws, ((direction index, law), ...): allowed where that direction is not coupled.
     ``rest`` is the deflection (6,) at which the spring is free of force (preload).
     ``stroke`` says how a ``compliance`` varies with a joint's coordinate (None: not at all).
+    ``beam`` is what the compliance was computed from, where it was; it does not count in comparisons.
     ``loss_factor`` is its structural damping: the stiffness of a vibration is (1 + i loss) times that.
     """
 
@@ -170,6 +172,7 @@ class Spring:
     laws: tuple[tuple[int, Law], ...] = ()
     rest: tuple[float, ...] = (0.0,) * 6
     stroke: BeamStroke | TableStroke | None = None
+    beam: BeamNumbers | None = field(default=None, compare=False, repr=False, metadata={"derived": True})
     loss_factor: float | None = None
 
 

@@ -64,7 +64,8 @@ class MachineDescription:
     ``modal_damping`` holds damping ratios of the modes, lowest frequency first, the last for all further ones;
     empty: none is declared.
     ``uncertainty`` holds a standard uncertainty (SI) beside any number, keyed by
-    ``full.element.name/field``; ``notes`` says where numbers come from, by the same keys.
+    ``full.element.name/field``; ``notes`` says where numbers come from, by the same keys, and so does
+    ``sources``: assumed, measured, computed or catalogue; its keys may be names of elements, legs, or hold ``*``.
     ``declared`` is the machine before its effects were added (``None``: no effect has been);
     files save it together with the records in ``effects``. ``units`` are those of the file, for
     messages. Neither counts in comparisons.
@@ -87,6 +88,7 @@ class MachineDescription:
     modal_damping: tuple[float, ...] = ()
     uncertainty: tuple[tuple[str, float], ...] = ()
     notes: tuple[tuple[str, str], ...] = ()
+    sources: tuple[tuple[str, str], ...] = ()
     extra: tuple[tuple[str, Any], ...] = ()
     declared: MachineDescription | None = field(default=None, compare=False)
     units: UnitSystem = field(default=UnitSystem(), compare=False)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
-from multiprocessing import get_context
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -21,6 +19,7 @@ from stiffmap.design.store import Evaluations
 from stiffmap.errors import MissingPartError, StiffmapError
 from stiffmap.outputs import make_folder, only_job
 from stiffmap.performance.registry import get_measure
+from stiffmap.tasks import workers
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +80,9 @@ def optimize(
     generations: int | None = None,
     processes: int | None = None,
     progress: Progress | None = None,
+    scheduler: Any = None,
 ) -> ParetoSet:
-    """Pareto set of a design problem; the same for the same seed, on any number of processes.
+    """Pareto set of a design problem; the same for the same seed, on any number of processes or machines.
 
     folder
         Where evaluations are kept: a search that was killed goes on from there.
@@ -92,13 +92,16 @@ def optimize(
         None: all cores.
     progress
         Called after each generation with its number, evaluations, hypervolume, feasible designs.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers judge the designs of a generation. What a
+        lost worker had is judged again.
 
     Raises StiffmapError where no design meets all constraints: which one is missed, by how much at least.
     """
     problem = design if isinstance(design, Design) else load_design(design)
     place = None if folder is None else Path(folder)
     with nullcontext() if place is None else only_job(make_folder(place)):
-        return _searched(problem, place, generations, processes, progress)
+        return _searched(problem, place, generations, processes, progress, scheduler)
 
 
 def _searched(
@@ -107,6 +110,7 @@ def _searched(
     generations: int | None,
     processes: int | None,
     progress: Progress | None,
+    scheduler: Any,
 ) -> ParetoSet:
     kept = Evaluations(problem, None if place is None else place / "evaluations.jsonl")
     count = problem.model.search.generations
@@ -116,12 +120,12 @@ def _searched(
     history: list[tuple[int, int, float]] = []
     seen: list[Floats] = []
     measure: Any = None
-    with _workers(problem, thread_count(processes)) as judge_all:
+    with workers(judge, problem, scheduler=scheduler, processes=thread_count(processes)) as judges:
         while algorithm.has_next():
             asked = algorithm.ask()
             x = np.ascontiguousarray(asked.get("X"), dtype=float)
             todo = kept.missing(x)
-            kept.add(x[todo], judge_all(x[todo]))
+            kept.add(x[todo], judges.in_order(list(x[todo])))
             judged = [kept.get(row) for row in x]
             asked.set("F", np.array([j.objectives for j in judged]))
             if problem.constraints:
@@ -222,26 +226,3 @@ def _algorithm(problem: Design, generations: int) -> Any:
         )
     algorithm.setup(task, termination=("n_gen", generations), seed=search.seed, verbose=False)
     return algorithm
-
-
-_DESIGN: list[Design] = []
-
-
-def _begin(design: Design) -> None:
-    _DESIGN[:] = [design]
-
-
-def _judge_one(x: Floats) -> Judged:
-    return judge(_DESIGN[0], x)
-
-
-@contextmanager
-def _workers(design: Design, count: int) -> Iterator[Callable[[Floats], list[Judged]]]:
-    """Judges many designs, in order; one process each core."""
-    if count == 1:
-        yield lambda x: [judge(design, row) for row in x]
-        return
-    with ProcessPoolExecutor(
-        count, mp_context=get_context("spawn"), initializer=_begin, initargs=(design,)
-    ) as pool:
-        yield lambda x: list(pool.map(_judge_one, list(x), chunksize=max(1, len(x) // (4 * count) or 1)))

@@ -15,12 +15,13 @@ from stiffmap.calibration import GROUPS, Tolerances, certified
 from stiffmap.diagnosis.candidates.candidates import check_kinds
 from stiffmap.diagnosis.clock import Clock, Progress
 from stiffmap.diagnosis.decision.beside_calibration import Answer, find_effects
+from stiffmap.diagnosis.decision.beside_noise import noise_left
 from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
 from stiffmap.diagnosis.decision.empirical import empirical
 from stiffmap.diagnosis.decision.judge import after_checks
 from stiffmap.diagnosis.decision.largest_residual import located
+from stiffmap.diagnosis.decision.result_machine import result_machine
 from stiffmap.diagnosis.decision.stability import explained
-from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.report.describe import aliases_of, as_place, named_effects
 from stiffmap.diagnosis.report.findings import Detectability, Effect, NoiseReport
 from stiffmap.diagnosis.report.result import Diagnosis
@@ -28,6 +29,8 @@ from stiffmap.diagnosis.rivals.explain import Explanation, explain
 from stiffmap.diagnosis.rivals.separation import separation
 from stiffmap.diagnosis.search.detectability import detectable
 from stiffmap.diagnosis.search.study import Finding, Study, study
+from stiffmap.diagnosis.slips.find import find_slip
+from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.experiment.comparison.limitations import limitations, refuse
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -39,6 +42,8 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
 from stiffmap.one_thread import on_one_thread
 
+SLIPS = 2
+"""Mistakes in the readings that are undone one after the other."""
 LISTED = 20
 """Patterns that a verdict lists at most."""
 
@@ -82,8 +87,11 @@ def diagnose(
     progress
         Called with a text on what is tried.
 
-    Raises StiffmapError for files that cannot be used, poses out of reach, and noise that is unknown.
-    docs/diagnosis.md tells the method.
+    Raises
+    ------
+    StiffmapError
+        For files that cannot be used, poses out of reach, and noise that is unknown. docs/diagnosis.md
+        tells the method.
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
@@ -94,10 +102,30 @@ def diagnose(
     with clock.on_interrupt():
         predictor = Predictor(machine, data, threads=threads)
         refuse(predictor.experiment, predictor())
-        s = study(predictor, seed, None, clock, without)
+        s, slips = without_slips(study(predictor, seed, None, clock, without), seed)
         if budget is None:
             clock.bound(s.predictor)
-        return _diagnosed(s, seed, certified(tolerances, data), groups, cross_validate)
+        answer = _diagnosed(s, seed, certified(tolerances, data), groups, cross_validate)
+        return with_slips(answer, slips) if slips else answer
+
+
+def without_slips(s: Study, seed: int) -> tuple[Study, list[Slip]]:
+    """The study of the readings with mistakes of writing and mounting undone, and what they are."""
+    slips: list[Slip] = []
+    s.clock.say("units, signs, swaps and shifted rows")
+    while len(slips) < SLIPS and not s.clock.over and (found := find_slip(s)):
+        slips.append(found.slip)
+        if not found.slip.undone:
+            break
+        predictor = Predictor(s.predictor.machine, found.experiment, threads=s.predictor.threads)
+        refuse(predictor.experiment, predictor())
+        s = study(predictor, seed, None, s.clock, s.without)
+    return s, slips
+
+
+def with_slips(d: Diagnosis, slips: Sequence[Slip]) -> Diagnosis:
+    """The answer that names mistakes in the readings before any cause."""
+    return replace(d, slips=list(slips), verdict="readings")
 
 
 def _diagnosed(
@@ -131,7 +159,8 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
     after = left_over - nuisance_part(exact, left_over)
     if other and verdict == "effects":
         verdict = "ambiguous"
-    inflation = max(1.0, float(np.sqrt(model.chi2 / max(search.problem.freedom, 1)))) if left else 1.0
+    noise = noise_left(finding, model)
+    inflation = max(1.0, noise.widening) if left else noise.widening
     keep = ~finding.outliers
     as_declared = verdict == "unattributed" and s.layer is None  # what the folds found is not in the machine
     sums = _summaries(None if as_declared else held, before, after, s, keep)
@@ -152,13 +181,17 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
         unexplained=[
             located(p, e, np.where(keep[:, None], after, np.nan), s.noise.sigma) for p in left[:LISTED]
         ],
-        limitations=limitations(e, s.noise, s.predictor.machine),
+        limitations=[
+            *found.notes,
+            *limitations(e, s.noise, s.predictor.machine),
+            *([] if left else noise.sentences()),
+        ],
         significance={
             "effective_trials": s.effective_trials,
             "alpha": search.alpha,
             "needed_minus_ln_p": search.threshold,
         },
-        machine=corrected_machine(s, model, made.machine),
+        machine=result_machine(s, model, made.machine, keep, None if as_declared else held),
         declared=s.predictor.machine,
         experiment=e,
         residual_before=before,
@@ -198,19 +231,6 @@ def _detectable(s: Study, finding: Finding) -> list[Detectability]:
         for d in detectable(search.screen.beside(finding.model.tangent()), search.threshold)
         if any(v is not None for v in d.sizes.values())
     ]
-
-
-def corrected_machine(s: Study, model: Model, machine: Machine) -> Machine:
-    """The corrected machine, whose source says what it has from which experiment."""
-    if machine is s.predictor.machine:
-        return machine
-    d = machine.description
-    added = "; ".join(f"{c}, from experiment {s.experiment.name}" for c in model.candidates)
-    source = f"{d.source} Effects added by a diagnosis: {added}." if added else d.source
-    if s.layer is not None:
-        source = f"{source} Numbers calibrated by experiment {s.experiment.name}."
-    declared = None if d.declared is None else replace(d.declared, source=source.strip())
-    return Machine(replace(d, source=source.strip(), declared=declared))
 
 
 def _summaries(

@@ -35,8 +35,11 @@ def add_effect(
     parameters
         In SI units, and options in words.
 
-    Raises StiffmapError for an unknown kind, element, leg or parameter, a value out of its bounds, a
-    missing one, and effects that exclude each other.
+    Raises
+    ------
+    StiffmapError
+        For an unknown kind, element, leg or parameter, a value out of its bounds, a missing one, and
+        effects that exclude each other.
     """
     declared = _declared(description)
     record = _checked(declared, description.effects, kind, element, legs, parameters)

@@ -1,12 +1,12 @@
 """Measured data: experiments as files, prediction of every reading, residuals, virtual experiments."""
 
-from stiffmap.experiment.comparison.residual import Residual, residual
+from stiffmap.experiment.calls import residual, simulate
+from stiffmap.experiment.comparison.residual import Residual
 from stiffmap.experiment.experiment import Experiment, Loop
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.files.save import save_experiment
 from stiffmap.experiment.prediction.predict import Predictor, predict
 from stiffmap.experiment.virtual.plans import random_plan
-from stiffmap.experiment.virtual.simulate import simulate
 
 __all__ = [
     "Experiment",

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.notebook import experiment_html
 from stiffmap.experiment.ramps import directions
+from stiffmap.short import short_repr
 
 __all__ = ["AXES", "BRANCHES", "WRENCH", "Channel", "Experiment", "Floats", "Integers", "Loop"]
 
@@ -49,6 +50,7 @@ class Loop:
     force_against: str = "floor"
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Experiment:
     """Rows of one experiment, SI, base axes. n rows, c channels; wrenches as in `WRENCH`.
@@ -145,6 +147,8 @@ class Experiment:
     ``frame_direction`` (rad)."""
     loop: Loop = Loop()
     title: str = ""
+    record: tuple[tuple[str, str], ...] = ()
+    """Operator, instrument, certificate, date, temperature, source (of a sheet) with its sha256, notes: in words, of a report."""
     source: str = ""
 
     def _repr_html_(self) -> str:

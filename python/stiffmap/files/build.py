@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -44,6 +45,7 @@ def build(
         tried(partial(_external_spring, name, s, context.at("external_springs", name).inside(name)))
         for name, s in model.external_springs.items()
     ]
+    home = tried(partial(build_pose, model.home, context.at("home"), "home.")) or Pose()
     description = MachineDescription(
         task=tuple(c for c in TASK if c in model.task),
         freedoms=tuple(c for c in TASK if c in model.freedoms),
@@ -51,9 +53,9 @@ def build(
         legs=tuple(leg for leg in legs if leg is not None),
         base=build_elements(model.base, context.at("base").inside("base")),
         platform=build_elements(model.platform, context.at("platform").inside("platform")),
-        home=tried(partial(build_pose, model.home, context.at("home"), "home.")) or Pose(),
+        home=home,
         search_home=model.home is not None and model.home.solve,
-        workspace=tried(partial(_workspace, model.workspace, context.at("workspace"))),
+        workspace=tried(partial(_workspace, model.workspace, context.at("workspace"), model.task, home)),
         gravity=tried(partial(_gravity, model.gravity, context.at("gravity"))),
         external_springs=tuple(s for s in springs if s is not None),
         modal_damping=tried(partial(_ratios, model.modal_damping, context.at("modal_damping"))) or (),
@@ -72,6 +74,7 @@ def build(
         uncertainty=tuple({**gathered.uncertainty, **model.uncertainty}.items()),
         extra=with_links(description.extra, gathered.links, context),
         notes=tuple({**gathered.notes, **model.notes}.items()),
+        sources=tuple({**gathered.sources, **model.sources}.items()),
     )
 
 
@@ -84,17 +87,32 @@ def _check_points(description: MachineDescription, context: Context) -> None:
             context.at(spring.name, "point").fail(f"no point '{spring.point}'{near}; there are: {there}")
 
 
-def _workspace(box: Box | None, context: Context) -> tuple[Vector, Vector] | None:
+def _workspace(
+    box: Box | None, context: Context, task: Sequence[str], home: Pose
+) -> tuple[Vector, Vector] | None:
+    """The box; flat at home along an axis that it leaves out, which the tool is not commanded along."""
     if box is None:
         return None
-    for axis in "xyz":
-        low, high = getattr(box, axis)
-        if low.value == high.value:
+    ranges = []
+    for axis, at_home in zip("xyz", home.translation, strict=True):
+        given = getattr(box, axis)
+        if given is None and axis in task:
+            context.fail(
+                f"missing key '{axis}': the tool is commanded along {axis} (task), so the box needs [min, max]"
+            )
+        if given is None:
+            ranges.append((at_home, at_home))
+            continue
+        low, high = given
+        if low.value != high.value:
+            ranges.append(build_range(given, LENGTH, context, axis))
+        elif axis in task:
             context.at(axis).fail(
                 f"{low.value} to {high.value} is no interval; where the tool does not move, give some room around it: "
                 f"[{float(low.value) - 1:g}, {float(high.value) + 1:g}]"
             )
-    ranges = [build_range(getattr(box, axis), LENGTH, context, axis) for axis in "xyz"]
+        else:
+            ranges.append((context.si(low, LENGTH),) * 2)
     (x0, x1), (y0, y1), (z0, z1) = ranges
     return (x0, y0, z0), (x1, y1, z1)
 
@@ -121,6 +139,7 @@ def _ratios(given: Number | list[Number] | None, context: Context) -> tuple[floa
 
 def _external_spring(name: str, model: ExternalSpringModel, context: Context) -> ExternalSpring:
     context.note(model.note)
+    context.mark(model.source)
     for key in ("stiffness", "length"):
         if getattr(model, key).value < 0.0:
             context.at(key).fail(f"must not be negative; found {getattr(model, key).value}")

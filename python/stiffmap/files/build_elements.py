@@ -78,26 +78,27 @@ def build_element(
     """One element; `among`: its number and the sequence it is in."""
     match model:
         case OffsetModel():
-            return _offset(model, _named(model.offset, model.note, context))
+            return _offset(model, _named(model.offset, model, context))
         case JointModel():
-            return _joint(model, _named(model.joint, model.note, context))
+            return _joint(model, _named(model.joint, model, context))
         case ActuatorModel():
-            return _actuator(model, _named(model.actuator, model.note, context))
+            return _actuator(model, _named(model.actuator, model, context))
         case CableModel():
-            return _cable(model, _named(model.cable, model.note, context))
+            return _cable(model, _named(model.cable, model, context))
         case SpringModel():
-            return build_spring(model, _named(model.spring, model.note, context))
+            return build_spring(model, _named(model.spring, model, context))
         case BodyModel():
-            return _body(model, _named(model.body, model.note, context), *among)
+            return _body(model, _named(model.body, model, context), *among)
         case PointModel():
-            return _point(model, _named(model.point, model.note, context))
+            return _point(model, _named(model.point, model, context))
         case BlockModel():
             return _block(model, context)
 
 
-def _named(name: str, note: str, context: Context) -> Context:
+def _named(name: str, model: ElementModel, context: Context) -> Context:
     inside = context.inside(name)
-    inside.note(note)
+    inside.note(model.note)
+    inside.mark(model.source)
     return inside
 
 
@@ -331,6 +332,7 @@ def _point(model: PointModel, context: Context) -> Point:
 
 def _block(model: BlockModel, context: Context) -> Block:
     context.inside(model.block).note(model.note)
+    context.inside(model.block).mark(model.source)
     branches = tuple(
         # a full name holds the branch, not the block
         Branch(name, build_elements(models, context.at("branches", name).inside(name)))

@@ -22,6 +22,7 @@ def build_leg(name: str, leg: LegModel, templates: dict[str, list[ElementModel]]
     if name in RESERVED:
         here.fail(f"'{name}' cannot be a leg's name: full names use it")
     here.note(leg.note)
+    here.mark(leg.source)
     problems = len(context.gathered.problems)
     if leg.template is not None:
         if leg.template not in templates:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap import beams
-from stiffmap.description import Law, Spring
+from stiffmap.addresses.beam import SECTIONS
+from stiffmap.description import BeamNumbers, Law, Spring
 from stiffmap.description.elements import Matrix6
 from stiffmap.files.context import Context, LinkUse, StrokeUse
 from stiffmap.files.matrix_checks import asymmetry, lowest_eigenvalue
@@ -42,10 +43,11 @@ def build_spring(model: SpringModel, context: Context) -> Spring:
     stiffness, compliance = (matrix, None) if word == "stiffness" else (None, matrix)
     if model.stroke is not None:
         context.gathered.strokes.append(StrokeUse(context.full, model, context.at("stroke")))
+    beam = None if model.beam is None else _beam_numbers(model.beam, context.at("beam"))
     loss = None if model.loss_factor is None else context.si(model.loss_factor, NONE, "loss_factor")
     if loss is not None and loss < 0.0:
         context.at("loss_factor").fail(f"must not be negative; found {loss:g}")
-    return Spring(model.spring, compliance, stiffness, laws, rest or (0.0,) * 6, loss_factor=loss)
+    return Spring(model.spring, compliance, stiffness, laws, rest or (0.0,) * 6, beam=beam, loss_factor=loss)
 
 
 def _spring_matrix(model: SpringModel, context: Context) -> Matrix6:
@@ -109,6 +111,23 @@ def build_beam(beam: Beam, context: Context) -> NDArray[np.float64]:
         s = _section(beam, context)
         values = [e * s.area, g * s.torsion, e * s.about_width, e * s.about_height]
     return beams.cantilever_compliance(length, beam.along, *values)
+
+
+def _beam_numbers(beam: Beam, context: Context) -> BeamNumbers:
+    """What a beam that has been built was computed from, SI."""
+    given: list[tuple[str, Number, Dimension]] = [("length", beam.length, LENGTH)]
+    material = context.materials[beam.material] if isinstance(beam.material, str) else beam.material
+    if material is None:
+        dimensions = (FORCE, BENDING, BENDING, BENDING)
+        pairs = zip(beam.products, dimensions, strict=True)
+        given += [(name, getattr(beam, name), dimension) for name, dimension in pairs]
+    else:
+        sort = next(s for s in SECTIONS if getattr(beam, s) is not None)
+        given += [(f"{sort}.{k}", getattr(getattr(beam, sort), k), LENGTH) for k in SECTIONS[sort][0]]
+        given.append(("material.E", material.E, MODULUS))
+        second, dimension = ("G", MODULUS) if material.G is not None else ("nu", NONE)
+        given.append((f"material.{second}", getattr(material, second), dimension))
+    return BeamNumbers(beam.along, tuple((name, context.si(n, d)) for name, n, d in given))
 
 
 def beam_body(beam: Beam, context: Context) -> tuple[float, float, NDArray[np.float64]]:

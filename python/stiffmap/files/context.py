@@ -44,6 +44,7 @@ class Gathered:
 
     uncertainty: dict[str, float] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
+    sources: dict[str, str] = field(default_factory=dict)
     links: dict[str, LinkUse] = field(default_factory=dict)
     strokes: list[StrokeUse] = field(default_factory=list)
     problems: list[FileError] = field(default_factory=list)
@@ -92,6 +93,11 @@ class Context:
         if self.gathered.problems:
             raise together(self.gathered.problems)
 
+    def mark(self, source: str | None, field_name: str = "") -> None:
+        """Keep where the numbers of the element, or one of them, come from."""
+        if source:
+            self.gathered.sources[f"{self.full}/{field_name}" if field_name else self.full or "/"] = source
+
     def note(self, text: str, field_name: str = "") -> None:
         """Keep a note about the element, or about one of its fields."""
         if text:
@@ -101,6 +107,7 @@ class Context:
         """SI value; its uncertainty and note are kept under ``field_name`` of the element."""
         if field_name:
             self.note(number.note, field_name)
+            self.mark(number.source, field_name)
             if number.u is not None:
                 u = self._converted(number.u, dimension)
                 self.gathered.uncertainty[f"{self.full}/{field_name}"] = u
@@ -124,6 +131,7 @@ class Context:
         if value <= 0.0 or math.isinf(1.0 / value):
             self.fail(f"a compliance must be positive (use rigid: true for none); found {number.value}")
         self.note(number.note, field_name)
+        self.mark(number.source, field_name)
         if number.u is not None:
             u = self._converted(number.u, dimension)
             self.gathered.uncertainty[f"{self.full}/{field_name}"] = u / value**2

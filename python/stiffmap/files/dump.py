@@ -27,7 +27,7 @@ TEMPLATE = "leg"
 def dump(description: MachineDescription) -> Plain:
     """Plain data of the declared machine and of the effects added to it.
 
-    Uncertainties and notes are gathered at the end, by full names. Raises `StiffmapError` for a
+    Uncertainties, sources and notes are gathered at the end, by full names. Raises `StiffmapError` for a
     machine with effects whose declared machine is unknown.
     """
     declared = description.declared or description
@@ -53,6 +53,7 @@ def dump(description: MachineDescription) -> Plain:
         "external_springs": {spring.name: _external_spring(spring) for spring in declared.external_springs},
         "effects": [_effect(effect) for effect in description.effects],
         "uncertainty": {key: float(value) for key, value in description.uncertainty},
+        "sources": dict(description.sources),
         "notes": dict(description.notes),
         "extra": {key: _lists(value) for key, value in description.extra},
     }

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from stiffmap.description import MachineDescription
 from stiffmap.effects import apply_records
+from stiffmap.errors import StiffmapError
 from stiffmap.files.build import build, build_effect
 from stiffmap.files.report import validated
 from stiffmap.files.schema import MachineFile
@@ -15,14 +21,44 @@ from stiffmap.files.shipped import find
 from stiffmap.files.templates import expanded
 from stiffmap.yaml_text import Document, parse, read
 
+Source = str | PathLike[str] | Mapping[str, Any]
+"""A shipped name, a path, the text of a machine file, or its plain data."""
 
-def load_description(name_or_path: str | PathLike[str]) -> MachineDescription:
-    """Description of a shipped machine (by name) or of a machine file (by path).
 
-    Raises `UnknownMachineError` where there is neither, `FileError` for anything wrong in the file.
+def load_description(source: Source) -> MachineDescription:
+    """Description of a shipped machine (by name), of a machine file (by path), of its text (several lines), or of its plain data.
+
+    Link files that text and plain data name are looked for in the working directory.
+    Raises `UnknownMachineError` where there is no such machine, `FileError` for anything wrong in it.
     """
-    path = find(name_or_path)
+    if isinstance(source, Mapping):
+        return describe_document(Document(_plain(source)), "dict", Path())
+    if isinstance(source, str) and ("\n" in source or source.lstrip().startswith("{")):
+        return description_from_text(source)
+    if not isinstance(source, str | PathLike):
+        raise StiffmapError(
+            "expected a machine: a shipped name, a path, the text of a machine file or its plain data as a dict, "
+            f"got {type(source).__name__}"
+        )
+    path = find(source)
     return describe_document(read(path), str(path), path.parent)
+
+
+_POWER = re.compile(r"[-+]?\d+(\.\d*)?[eE][-+]?\d+")
+"""A number such as ``7.0e4``, which readers of YAML 1.1 take for text."""
+
+
+def _plain(data: Any) -> Any:
+    """Plain data with text keys; arrays and numbers of NumPy as Python has them, every part a copy of its own."""
+    if isinstance(data, Mapping):
+        return {str(k): _plain(v) for k, v in data.items()}
+    if isinstance(data, np.ndarray | np.generic):
+        return data.tolist()
+    if isinstance(data, list | tuple):
+        return [_plain(v) for v in data]
+    if isinstance(data, str) and _POWER.fullmatch(data):
+        return float(data)
+    return data
 
 
 def description_from_text(text: str, file: str = "text", folder: Path = Path()) -> MachineDescription:

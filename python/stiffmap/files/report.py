@@ -42,7 +42,9 @@ def _one(error: Any, document: Document, file: str) -> FileError:
         path, message = path[:-1], f"missing key '{path[-1]}'"
     else:
         message = _message(error)
-    return FileError(message, file=file, line=document.line(path) or 1, key=key_text(path))
+    return FileError(
+        message, file=file, line=document.line(path) or (1 if document.lines else None), key=key_text(path)
+    )
 
 
 def key_text(path: KeyPath) -> str:

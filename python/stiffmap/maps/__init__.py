@@ -6,9 +6,11 @@ from stiffmap.maps.polar_diagram import polar
 from stiffmap.maps.ranking import uncertainty_ranking
 from stiffmap.maps.statistics import map_statistics
 from stiffmap.maps.sweep_line import sweep
+from stiffmap.maps.sweep_of_numbers import design_sweep
 
 __all__ = [
     "MapEstimate",
+    "design_sweep",
     "error_map",
     "map_estimate",
     "map_statistics",

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.broadcasting import Floats
+from stiffmap.kinematics import inverse_kinematics
 from stiffmap.maps.direction_sweep import DirectionSweep, even_directions
 from stiffmap.maps.extremes import find_extreme
 from stiffmap.maps.fixed_order_sums import norm
@@ -14,6 +15,8 @@ from stiffmap.maps.limit import force_limit
 from stiffmap.maps.loading import without_failed
 from stiffmap.maps.plan import MapPlan
 from stiffmap.maps.uncertainty_block import load_deviations, worst_deviations
+from stiffmap.maps.variables import BEYOND
+from stiffmap.validity import Validity
 
 ALL = (0, 1, 2)
 
@@ -22,6 +25,8 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
     """Every variable of some rows, shaped (poses, ...)."""
     position = plan.positions(rows)
     out = _loads(plan, position)
+    if plan.validity is not None:
+        out[BEYOND] = _beyond(plan, plan.validity, position)
     if plan.uncertain is not None:
         out |= load_deviations(plan, plan.uncertain, position)
     if plan.turning:
@@ -52,6 +57,16 @@ def _loads(plan: MapPlan, position: Floats) -> dict[str, Any]:
     if plan.compliance:
         out["compliance"] = without_failed(s.compliance, s.status)
     return out
+
+
+def _beyond(plan: MapPlan, covered: Validity, position: Floats) -> Any:
+    """(poses, cases)."""
+    machine = plan.loading.machine
+    r = plan.loading.options.rotation
+    turns = None if r is None else np.broadcast_to(np.asarray(r, dtype=float), (len(position), 3, 3))
+    at = inverse_kinematics(machine, position, turns).coordinates
+    each = [covered.outside(machine, at, np.broadcast_to(w, (len(position), 6))) for w in plan.wrenches]
+    return np.stack(each, axis=-1).astype(np.uint8)
 
 
 def _extremes(

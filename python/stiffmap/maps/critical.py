@@ -8,8 +8,8 @@ import numpy as np
 
 from stiffmap.broadcasting import Floats
 from stiffmap.compiled import Role
+from stiffmap.labels import meaning
 from stiffmap.machine import Machine
-from stiffmap.maps.variables import meaning
 
 
 def critical_variables(

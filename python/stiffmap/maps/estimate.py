@@ -14,6 +14,7 @@ from stiffmap.maps.block import solve_block
 from stiffmap.maps.plan import MapPlan
 from stiffmap.maps.request import map_plan
 from stiffmap.maps.tiles import POSES_AT_ONCE, blocks_of, tiles_of
+from stiffmap.options import keywords_of
 
 SAMPLES = 8
 COPIES = 3
@@ -42,6 +43,7 @@ class MapEstimate:
         )
 
 
+@keywords_of(map_plan)
 def map_estimate(machine: Machine | str | PathLike[str], **call: Any) -> MapEstimate:
     """Time, memory and disk of `error_map` with these arguments, from solving a sample of its poses.
 

@@ -33,9 +33,9 @@ from stiffmap.outputs import needs_space, only_job
 def error_map(
     machine: Machine,
     *,
-    x: ArrayLike,
-    y: ArrayLike,
-    z: ArrayLike,
+    x: ArrayLike | None = None,
+    y: ArrayLike | None = None,
+    z: ArrayLike | None = None,
     wrench: ArrayLike | Mapping[str, ArrayLike] | None = None,
     cases: Sequence[str] | None = None,
     plane: str | None = "xy",
@@ -62,7 +62,8 @@ def error_map(
     Parameters
     ----------
     x, y, z
-        Commanded TCP positions, m, base axes: one number or an axis of numbers each.
+        Commanded TCP positions, m, base axes: one number or an axis of numbers each. None: over the machine's
+        workspace (51 positions along an axis, three planes of z; a coordinate that is not commanded stays at home).
     wrench
         (6,) N, N·m at `point`; (cases, 6) or a mapping name -> (6,) for several load cases, which
         adds the dimension ``case``.
@@ -110,7 +111,12 @@ def error_map(
     highest status among the directions. SI units; unreachable, unstable and not converged poses hold
     NaN and their status. Attributes say what was computed, of what machine and how.
 
-    Raises StiffmapError for bad input, FileError where `out` cannot be written.
+    Raises
+    ------
+    StiffmapError
+        For bad input.
+    FileError
+        Where `out` cannot be written.
     """
     plan = map_plan(
         machine, x=x, y=y, z=z, wrench=wrench, cases=cases, plane=plane, force=force, directions=directions,

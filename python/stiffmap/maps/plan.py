@@ -10,19 +10,19 @@ import numpy as np
 import xarray as xr
 
 from stiffmap.broadcasting import Floats
+from stiffmap.labels import COMPONENTS, WRENCH, meaning
 from stiffmap.maps.inputs import plane_axes
 from stiffmap.maps.loading import Loading
 from stiffmap.maps.provenance import describe
 from stiffmap.maps.uncertainty import METHOD, Uncertain
 from stiffmap.maps.variables import (
-    COMPONENTS,
-    WRENCH,
     Variable,
+    beyond_variable,
     deviation_variables,
     extreme_variables,
     load_variables,
-    meaning,
 )
+from stiffmap.validity import Validity
 
 EXTREMES = (
     "loaded equilibria in {} directions and at the extremum of the trigonometric polynomial through "
@@ -76,10 +76,17 @@ class MapPlan:
         return out.reshape(-1, 3)
 
     @cached_property
+    def validity(self) -> Validity | None:
+        """What the readings covered that the machine was calibrated by."""
+        return Validity.of_machine(self.loading.machine)
+
+    @cached_property
     def variables(self) -> list[Variable]:
         """The variables that the map will hold."""
         case = () if self.cases is None else ("case",)
         out = load_variables(case, self.shown_plane, self.compliance)
+        if self.validity is not None:
+            out.append(beyond_variable(case, str(self.validity)))
         if self.uncertain is not None:
             out += deviation_variables(case, self.shown_plane, self.turning)
         return out + (extreme_variables(self.shown_plane, self.tolerance) if self.turning else [])

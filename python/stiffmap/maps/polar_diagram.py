@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats, whole_number
 from stiffmap.errors import StiffmapError
+from stiffmap.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.direction_sweep import DirectionSweep, direction, direction_sweep_of, even_angles
 from stiffmap.maps.extremes import find_extreme
@@ -17,11 +18,11 @@ from stiffmap.maps.fixed_order_sums import norm
 from stiffmap.maps.inputs import magnitude, place, plane_axes
 from stiffmap.maps.loading import Loading, without_failed
 from stiffmap.maps.provenance import describe
-from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
-from stiffmap.options import LoadingKeywords, SolveOptions
+from stiffmap.options import LoadingKeywords, SolveOptions, spelled_out
 
 
 @takes_machine
+@spelled_out(LoadingKeywords)
 def polar(
     machine: Machine,
     position: ArrayLike,

@@ -14,14 +14,17 @@ from stiffmap.maps.inputs import axis, magnitude, plane_axes, plane_force, wrenc
 from stiffmap.maps.loading import Loading
 from stiffmap.maps.plan import MapPlan
 from stiffmap.maps.uncertainty import uncertain_numbers
+from stiffmap.maps.workspace_grid import grid_of
+from stiffmap.options import LoadingKeywords, spelled_out
 
 
+@spelled_out(LoadingKeywords)
 def map_plan(
     machine: Machine,
     *,
-    x: ArrayLike,
-    y: ArrayLike,
-    z: ArrayLike,
+    x: ArrayLike | None = None,
+    y: ArrayLike | None = None,
+    z: ArrayLike | None = None,
     wrench: ArrayLike | Mapping[str, ArrayLike] | None = None,
     cases: Sequence[str] | None = None,
     plane: str | None = "xy",
@@ -37,14 +40,15 @@ def map_plan(
     Raises StiffmapError for bad input.
     """
     loading = Loading(machine, **how)
+    grid = grid_of(machine, {"x": x, "y": y, "z": z})
     wrenches, names = wrench_cases(wrench, None if cases is None else tuple(cases))
     if (directions := whole_number(directions, "directions", 1)) < 3:
         raise StiffmapError(f"directions: expected 3 or more, got {directions}")
     return MapPlan(
         loading=loading,
-        x=axis(x, "x"),
-        y=axis(y, "y"),
-        z=axis(z, "z"),
+        x=axis(grid["x"], "x"),
+        y=axis(grid["y"], "y"),
+        z=axis(grid["z"], "z"),
         wrenches=wrenches,
         cases=names,
         shown_plane="xy" if plane is None else "".join("xyz"[i] for i in plane_axes(plane)),

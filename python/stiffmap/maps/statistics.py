@@ -13,6 +13,7 @@ import xarray as xr
 
 from stiffmap.broadcasting import Floats, real_array
 from stiffmap.errors import StiffmapError
+from stiffmap.labels import meaning, status_attrs
 from stiffmap.machine import Machine, as_machine
 from stiffmap.maps.cluster import on_cluster
 from stiffmap.maps.grid_map import at_once, solve_here
@@ -21,13 +22,15 @@ from stiffmap.maps.plan import MapPlan
 from stiffmap.maps.progress import track
 from stiffmap.maps.request import map_plan
 from stiffmap.maps.tiles import Tiles, tiles_of
-from stiffmap.maps.variables import Variable, meaning, status_attrs
+from stiffmap.maps.variables import Variable
+from stiffmap.options import keywords_of
 from stiffmap.status import Status
 
 NODE = ("x", "y", "z")
 DEFLECTION = re.compile(r"(worst_|best_)?deflection(_xy|_xz|_yz)?")
 
 
+@keywords_of(map_plan)
 def map_statistics(
     machine: Machine | str | PathLike[str],
     *,
@@ -56,7 +59,10 @@ def map_statistics(
     (percentile[, case]), NAME_column_max (y, x[, case], the worst of all z); status_count (z[, case], status).
     Maxima, shares and counts are exact; a percentile is at most 0.2 % above the exact one, never below it.
 
-    Raises StiffmapError for bad input.
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     wanted = real_array(percentiles, "percentiles")
     if wanted.ndim != 1 or wanted.size == 0 or not ((wanted >= 0) & (wanted <= 100)).all():

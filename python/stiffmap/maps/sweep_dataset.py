@@ -11,11 +11,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiffmap.broadcasting import Floats
+from stiffmap.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
 from stiffmap.maps.critical import critical_variables
 from stiffmap.maps.fixed_order_sums import norm
 from stiffmap.maps.loading import Loading
 from stiffmap.maps.provenance import describe
-from stiffmap.maps.variables import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
 
 BRANCH = meaning("1", "0: from the unloaded machine; 1: the branch that crosses it")
 

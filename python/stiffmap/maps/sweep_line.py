@@ -15,10 +15,11 @@ from stiffmap.maps.inputs import force_list, place, unit
 from stiffmap.maps.load_path import check_control, load_path
 from stiffmap.maps.loading import Loading, without_failed
 from stiffmap.maps.sweep_dataset import Equilibria, Followed, sweep_dataset
-from stiffmap.options import LoadingKeywords, SolveOptions
+from stiffmap.options import LoadingKeywords, SolveOptions, spelled_out
 
 
 @takes_machine
+@spelled_out(LoadingKeywords)
 def sweep(
     machine: Machine,
     position: ArrayLike,

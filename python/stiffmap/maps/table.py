@@ -12,7 +12,7 @@ import xarray as xr
 
 from stiffmap.compiled import Status
 from stiffmap.errors import MissingPartError, StiffmapError
-from stiffmap.maps.variables import COMPONENTS
+from stiffmap.labels import COMPONENTS
 from stiffmap.outputs import write_rows, writing
 
 MICRON, MM = 1e6, 1e3

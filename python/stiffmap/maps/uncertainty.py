@@ -11,11 +11,11 @@ from itertools import chain
 
 import numpy as np
 
+from stiffmap.addresses import moved, number
 from stiffmap.broadcasting import Floats
 from stiffmap.description import MachineDescription
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
-from stiffmap.maps.uncertainty_edit import moved, number
 
 STEP = 2e-3  # of a number's size: truncation of a central difference is then about 1e-6
 LINKS = "link_covariance"

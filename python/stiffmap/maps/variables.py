@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
+from stiffmap.labels import (
+    COMPLIANCE_UNITS,
+    TWIST_UNITS,
+    flag_attrs,
+    meaning,
+    status_attrs,
+)
 
-from stiffmap.status import Flag, Status
-
-COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
-WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
-TWIST_UNITS = "m (dx, dy, dz), rad (rx, ry, rz)"
-COMPLIANCE_UNITS = "m/N, m/(N m), rad/N, rad/(N m): component per wrench_component"
+BEYOND = "beyond_calibration"
 
 
 @dataclass(frozen=True)
@@ -23,31 +24,6 @@ class Variable:
     dims: tuple[str, ...]
     attrs: dict[str, Any]
     dtype: str = "f8"
-
-
-def meaning(units: str, long_name: str, **more: Any) -> dict[str, Any]:
-    """Attributes of a variable."""
-    return {"units": units, "long_name": long_name, **more}
-
-
-def status_attrs(of: str) -> dict[str, Any]:
-    """Attributes of a variable of `Status` codes."""
-    return meaning(
-        "1",
-        f"status of {of}",
-        flag_values=np.array([int(s) for s in Status], dtype=np.uint8),
-        flag_meanings=" ".join(s.name for s in Status),
-    )
-
-
-def flag_attrs() -> dict[str, Any]:
-    """Attributes of a variable of `Flag` bits."""
-    return meaning(
-        "1",
-        "bits beside the status",
-        flag_masks=np.array([int(f) for f in Flag], dtype=np.uint32),
-        flag_meanings=" ".join(str(f.name) for f in Flag),
-    )
 
 
 def load_variables(case: tuple[str, ...], plane: str, compliance: bool) -> list[Variable]:
@@ -65,6 +41,12 @@ def load_variables(case: tuple[str, ...], plane: str, compliance: bool) -> list[
         dims = (*case, "component", "wrench_component")
         out.append(Variable("compliance", dims, meaning(COMPLIANCE_UNITS, "loaded compliance")))
     return out
+
+
+def beyond_variable(case: tuple[str, ...], covered: str) -> Variable:
+    """Where nothing vouches for the numbers of a calibrated machine."""
+    text = "1: joints or load are beyond the readings that the machine was calibrated by"
+    return Variable(BEYOND, case, meaning("1", text, calibrated_by=covered), "u1")
 
 
 def deviation_variables(case: tuple[str, ...], plane: str, turning: bool) -> list[Variable]:

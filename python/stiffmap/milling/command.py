@@ -31,7 +31,9 @@ def commanded(plant: Plant, before: Equilibrium) -> Commanded:
     """Inverse of the loaded machine: on the path the cut is the wanted one, so that its force is known there."""
     job = plant.job
     force = job.force(np.zeros((len(job), 2)))
-    u = job.position - np.nan_to_num(before.error)
+    # the machine's tangent tells where the tool would stand under the wanted cut
+    further = np.einsum("mij,mj->mi", before.compliance, force - before.force)
+    u = job.position - np.nan_to_num(before.error) - np.nan_to_num(further)
     rest = np.full((len(job), 3), np.nan)
     active = np.arange(len(job))
     for _ in range(STEPS):

@@ -35,6 +35,8 @@ class Equilibrium:
     """(m, actuators)."""
     compliance: Floats
     """(m, 3, 3) m/N."""
+    turned: Floats
+    """(m, 3) rad, rotation vector of the tool's holder from the commanded orientation."""
     steps: int
 
 
@@ -49,15 +51,17 @@ def equilibrium(plant: Plant, command: Floats, rows: NDArray[np.int64] | None = 
     force = job.force(away)
     error = np.full((len(job), 3), np.nan)
     steps, s = 0, None
-    for steps in range(1, STEPS + 1):
+    while steps < STEPS:
+        steps += 1
         s = plant.stand(command, force, full=True, rows=rows)
-        now = command + s.moved - job.position
-        change = np.nan_to_num(np.abs(now - error), nan=0.0).max(initial=0.0) if steps > 1 else np.inf
-        error = now
-        if not change > DONE:
-            break
+        error = command + s.moved - job.position
         away = _together(job, error, s.compliance, force, away)
-        force = job.force(away)
+        new = job.force(away)
+        # how far the tool goes on under the force of where it now stands
+        onward = np.einsum("mij,mj->mi", np.nan_to_num(s.compliance), new - force)
+        if not np.nan_to_num(np.abs(onward), nan=0.0).max(initial=0.0) > DONE:
+            break
+        force = new
     assert s is not None
     slopes = job.force_slopes(np.einsum("mki,mi->mk", job.ways, np.nan_to_num(error)))
     # (m, 2, 2): what the cut's answer to a small push pushes further
@@ -71,7 +75,7 @@ def equilibrium(plant: Plant, command: Floats, rows: NDArray[np.int64] | None = 
     blank = np.where(lost[:, None], np.nan, 1.0)
     return Equilibrium(
         error * blank, force * blank, np.where(np.isfinite(error).all(axis=1), gain, np.nan), status, s.flags,
-        s.effort * blank, s.compliance, steps,
+        s.effort * blank, s.compliance, s.turned * blank, steps,
     )  # fmt: skip
 
 

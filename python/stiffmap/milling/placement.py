@@ -47,11 +47,32 @@ class Placements:
     naive_error: float
     limits: str
     """What keeps the error from being smaller."""
+    naive_along: Floats
+    """(k,) m, errors across the wall over the part at the naive placement."""
+    best_along: Floats
+    """(k,) m, the same at the best one."""
 
     @property
     def gain(self) -> float:
         """How many times the naive placement's error is the best one's."""
         return self.naive_error / self.best_error
+
+    def words(self, tolerance: float | None = None) -> str:
+        """One sentence; `tolerance` m: also whether a placement reaches it before compensation."""
+        at = ", ".join(f"{1e3 * v:.1f}" for v in self.best.at)
+        best = f"{1e3 * self.best_error:.3f} mm at ({at}) mm, turned by {np.degrees(self.best.turn):.1f} deg"
+        if tolerance is None or self.best_error <= tolerance:
+            return f"Of {len(self.at)} placements the best leaves {best}; the middle of the workspace {1e3 * self.naive_error:.3f} mm."
+        return (
+            f"No placement of {len(self.at)} reaches the tolerance of {1e3 * tolerance:g} mm without compensation: the best leaves {best}; "
+            f"what limits it: {self.limits}."
+        )
+
+    @property
+    def three_times(self) -> float:
+        """Share of the placements in reach whose error is more than three times the best one's."""
+        fits = self.largest[np.isfinite(self.largest)]
+        return float((fits > 3 * self.best_error).mean())
 
     @property
     def reachable(self) -> float:
@@ -99,7 +120,16 @@ def placements(
     tried.append((search.exact(naive), naive))
     error, best = min(tried, key=lambda t: t[0])
     return Placements(
-        at, turn, largest, best, error, naive, tried[-1][0], search.what_limits(best, low, high)
+        at,
+        turn,
+        largest,
+        best,
+        error,
+        naive,
+        tried[-1][0],
+        search.what_limits(best, low, high),
+        search.errors(naive),
+        search.errors(best),
     )
 
 
@@ -172,9 +202,10 @@ class Search:
 
     def exact(self, place: Placement) -> float:
         """m: largest error, cut and deflection solved together; infinite where a point fails."""
-        return float(np.abs(self._errors(place)).max())
+        return float(np.abs(self.errors(place)).max())
 
-    def _errors(self, place: Placement) -> Floats:
+    def errors(self, place: Placement) -> Floats:
+        """(k,) m across the wall at the points of the search; infinite where one fails."""
         job = self._at(place)
         e = equilibrium(Plant(job, threads=self.threads), job.position)
         fine = np.isfinite(e.error).all(axis=1) & (e.flags & LIMITS == 0)
@@ -188,7 +219,7 @@ class Search:
         scale = np.array([*np.maximum(high - low, 1e-3), 1.0])
 
         def cost(x: Floats) -> float:
-            e = self._errors(Placement(x[:3] * scale[:3], float(x[3])))
+            e = self.errors(Placement(x[:3] * scale[:3], float(x[3])))
             top = float(np.abs(e).max())
             return (
                 1e3

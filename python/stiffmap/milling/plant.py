@@ -28,6 +28,8 @@ class Stand:
     flags: NDArray[np.uint32]
     effort: Floats
     """(m, actuators) N, N·m; NaN where not asked for."""
+    turned: Floats
+    """(m, 3) rad, rotation vector of the tool's holder from the commanded orientation; NaN where not asked for."""
 
 
 class Plant:
@@ -67,7 +69,7 @@ class Plant:
         n, a = len(mine), len(self.machine.actuators)
         moved, c = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan)
         status, flags = np.full(n, Status.NOT_CONVERGED, np.uint8), np.zeros(n, np.uint32)
-        effort = np.full((n, a), np.nan)
+        effort, turned = np.full((n, a), np.nan), np.full((n, 3), np.nan)
         wrench = np.hstack([force, np.zeros_like(force)])
         for machine, members in self.groups:
             here = np.flatnonzero(np.isin(mine, members)) if len(self.groups) > 1 else np.arange(n)
@@ -84,6 +86,7 @@ class Plant:
             moved[here] = np.where(ok[:, None], s.displacement[:, :3], np.nan)
             status[here], flags[here] = s.status, s.flags
             if full:
+                turned[here] = s.displacement[:, 3:]
                 c[here], effort[here] = s.compliance[:, :3, :3], s.actuator_effort
         bending = self.job.process.tool.compliance
         if bending:
@@ -91,7 +94,7 @@ class Plant:
             across = np.eye(3) - tool[:, :, None] * tool[:, None, :]
             moved += bending * np.einsum("mij,mj->mi", across, force)
             c += bending * across
-        return Stand(moved, c, status, flags, effort)
+        return Stand(moved, c, status, flags, effort, turned)
 
     def _turns(self, rows: NDArray[np.int64]) -> Floats:
         """One orientation where all are the same: the kernels need not check each."""

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.kinematics import inverse_kinematics
-from stiffmap.machine import Machine
 from stiffmap.milling.equilibrium import equilibrium
+from stiffmap.milling.limits import fastest as fastest_drives
 from stiffmap.milling.plant import Plant
 from stiffmap.milling.setting import Setting, orientations
-from stiffmap.performance.scaling import drive_table
 from stiffmap.status import Flag
 
 LIMITS = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
@@ -57,7 +56,7 @@ def redundancy(
     grid = -np.pi + 2 * np.pi * np.arange(turns) / turns
     error, joints = grid_of(job, grid, threads)
     time = np.linalg.norm(np.diff(job.position, axis=0), axis=1) / job.feed[1:]
-    free = Steps(joints, time, speeds(job.machine), grid, fastest)
+    free = Steps(joints, time, fastest_drives(job.machine), grid, fastest)
     stage = np.abs(error)
     # first the least largest error, then the least sum of squares among the sequences that keep it
     top = best_sequence(stage, free, largest=True)
@@ -88,11 +87,6 @@ def grid_of(job: Setting, grid: Floats, threads: int | None = None) -> tuple[Flo
             inverse_kinematics(job.machine, job.position, turned.rotation, threads=threads).actuators
         )
     return np.stack(errors, axis=1), np.stack(joints, axis=1)
-
-
-def speeds(machine: Machine) -> Floats:
-    """(actuators,) m/s, rad/s; infinite where none is declared."""
-    return np.array([d.speed if d.speed else np.inf for d in drive_table(machine)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,12 @@ from matplotlib.figure import Figure
 
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.maps.files import write_dataset
-from stiffmap.milling.job import Milled, beyond, sizes, verdict
+from stiffmap.milling.job import Milled
+from stiffmap.milling.limits import outside
 from stiffmap.milling.pictures import error_figure, machine_path_figure, outline_figure
 from stiffmap.milling.placement import Placements
 from stiffmap.milling.stability import PathStability
+from stiffmap.milling.verdict import sizes, verdict
 from stiffmap.outputs import make_folder, write_rows, write_text
 from stiffmap.plot.style import save
 from stiffmap.process import cutting_force
@@ -52,7 +54,9 @@ def summary(found: Milled) -> dict[str, object]:
         "loop_gain": {"least": float(np.nanmin(ds.gain)), "largest": float(np.nanmax(ds.gain))},
         "force_N": {"least": float(np.nanmin(force)), "largest": float(np.nanmax(force))},
         "tolerance_mm": None if job.process.tolerance is None else 1e3 * job.process.tolerance,
-        "beyond_limits": beyond(ds, job.machine),
+        "taper_mm": sizes(ds.taper),
+        "beyond_limits": {k: int(v.sum()) for k, v in outside(ds, job.machine).items()},
+        "warnings": [{"name": w.name, "points": int(w.points.sum()), "text": w.text} for w in found.warnings],
         "moves_written": found.program.pieces,
         "notes": [*job.path.notes, *([job.process.note] if job.process.note else [])],
     }
@@ -65,6 +69,9 @@ def summary(found: Milled) -> dict[str, object]:
     if "true_error_normal" in ds:
         out["true_error_normal_mm"] = sizes(ds.true_error_normal)
         out["true_error_normal_after_mm"] = sizes(ds.true_error_normal_after)
+    if found.feeds is not None:
+        f = found.feeds
+        out["feeds"] = {"time_s": f.time, "before_s": f.before, "held": bool(f.held.all())}
     waves = ds.ripple.values
     if np.isfinite(waves).any() and waves.any():
         out["ripple_mm"] = float(1e3 * np.nanmax(waves))
@@ -74,6 +81,8 @@ def summary(found: Milled) -> dict[str, object]:
 def placement_summary(found: Placements) -> dict[str, object]:
     """Numbers of a search for the placement; mm, deg."""
     fits = found.largest[np.isfinite(found.largest)]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.abs(found.naive_along) / np.abs(found.best_along)
     return {
         "at_mm": [float(1e3 * v) for v in found.best.at],
         "turn_deg": float(np.degrees(found.best.turn)),
@@ -81,6 +90,12 @@ def placement_summary(found: Placements) -> dict[str, object]:
         "naive_at_mm": [float(1e3 * v) for v in found.naive.at],
         "naive_error_mm": 1e3 * found.naive_error,
         "naive_over_best": found.gain,
+        "naive_over_best_along": {
+            "median": float(np.median(ratio)),
+            "share_over_3": float((ratio > 3).mean()),
+        },
+        "worst_over_best": float(fits.max() / found.best_error),
+        "more_than_3_times_the_best": found.three_times,
         "worst_error_mm": float(1e3 * fits.max()),
         "tried": len(found.largest),
         "in_reach": found.reachable,
@@ -159,15 +174,22 @@ def _sheet(found: Milled) -> Sheet:
         f"({', '.join(f'{v:.1f}' for v in s['at_mm'])}) mm, turned by {s['turn_deg']:.1f} deg.",  # type: ignore[attr-defined]
         f"Process {p.name}: {p.cut.side} cut, {1e3 * p.cut.axial:g} mm deep, {60 * p.feed:.3g} m/min; mean force {mean} N along the "
         f"feed, to its left, along the tool; {force.power:.0f} W at the spindle.",
-        f"Error across the wall: positive where material stays on the part. Loop gain kp/k up to {s['loop_gain']['largest']:.3g}: "  # type: ignore[index]
+        f"Error across the wall: positive where material stays on the part. Loop gain kp/k up to {abs(s['loop_gain']['largest']) if abs(s['loop_gain']['largest']) < 1e-9 else s['loop_gain']['largest']:.3g}: "  # type: ignore[index]
         f"one mirrored program would leave {s['mirror_leaves_mm']['largest']:.4f} mm.",  # type: ignore[index]
         f"The compensated program has {found.program.pieces} cutting moves; it was read back and simulated with the force "
         "evaluated anew at the true distance from the wall.",
     ]
+    lines += [w.text for w in found.warnings]
+    if found.feeds is not None:
+        lines.append(
+            f"Feed of each move chosen: {found.feeds.time:.1f} s of cutting instead of {found.feeds.before:.1f} s; "
+            + (
+                "the error stays within the tolerance."
+                if found.feeds.held.all()
+                else f"{int((~found.feeds.held).sum())} moves are beyond the tolerance at any feed."
+            )
+        )
     lines.append(str(s["stability"]["said"]))  # type: ignore[index]
-    over = {k: v for k, v in s["beyond_limits"].items() if v}  # type: ignore[attr-defined]
-    if over:
-        lines.append("Limits broken: " + ", ".join(f"{k} at {v} points" for k, v in over.items()) + ".")
     lines += [f"Note: {n}" for n in s["notes"]]  # type: ignore[attr-defined]
     rows = [
         [label, f"{s[key]['rms']:.5f}", f"{s[key]['largest']:.5f}"]  # type: ignore[index]

@@ -111,6 +111,13 @@ def setting(
     if angle is not None and np.shape(angle) != (len(points),):
         raise StiffmapError(f"angle: expected {len(points)} turns of the tool (rad), one for each point")
     _check(path, process, points)
+    if angle is None and path.turn is not None:
+        if len(machine.actuators) < 6:
+            raise FileError(
+                f"the path turns the tool about its axis (C, turn_deg); {machine.name} has no such motion: it needs six drives",
+                file=path.name,
+            )
+        angle = path.turn_at(points.move, points.share)
     tool = place.vectors(points.tool)
     return Setting(
         machine,

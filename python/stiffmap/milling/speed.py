@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.broadcasting import Floats
 from stiffmap.errors import StiffmapError
 from stiffmap.milling.equilibrium import equilibrium
-from stiffmap.milling.job import drive_speeds
+from stiffmap.milling.limits import drive_speeds, fastest
 from stiffmap.milling.plant import Plant
 from stiffmap.milling.setting import Setting
-from stiffmap.performance.scaling import drive_table
 from stiffmap.process.description import Process
-from stiffmap.toolpath import Kind, Toolpath
+from stiffmap.status import Flag
 
 ROUNDS = 20
 SLOWEST, FASTEST = 0.02, 4.0
 """Of the feed as it is."""
+EFFORT_ROOM = 1.001
+"""Force at which the drives are still strong enough, as a multiple: the compensated positions lie a little elsewhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,37 +34,41 @@ class Feeds:
     """s of all cuts."""
     before: float
     """s with the feed as it is."""
-    held: Floats
-    """(moves,) bool: the error stays within the tolerance."""
+    held: NDArray[np.bool_]
+    """(moves,) bool: the error stays within the tolerance, and the drives within their efforts."""
     limited_by: tuple[str, ...]
-    """(moves,) tolerance, drive speed, or fastest feed asked for."""
+    """(moves,) tolerance, drive effort, drive speed, or fastest feed asked for."""
 
 
 def best_feeds(job: Setting, tolerance: float | None = None, threads: int | None = None) -> Feeds:
     """Largest feed of each move at which no point of it is off by more than the tolerance (m), before compensation.
 
-    Within the drives' speeds and FASTEST times the feed as it is; by bisection at all points at once, the force re-evaluated.
+    Within the drives' speeds and efforts (of the cut as it is and of the wanted one), and FASTEST times the feed as it is; by bisection at all
+    points at once, the force re-evaluated.
     """
     t = job.process.tolerance if tolerance is None else tolerance
     if t is None or not t > 0:
         raise StiffmapError("tolerance: expected a length above zero (m), from the process or given")
-    most = np.array([d.speed if d.speed else np.inf for d in drive_table(job.machine)])
+    most = fastest(job.machine)
     with np.errstate(divide="ignore"):
         room = (most / np.maximum(np.abs(drive_speeds(job)), 1e-12)).min(axis=1)
     top = np.minimum(room, FASTEST)
 
-    def error(share: Floats) -> Floats:
+    def strong(share: Floats) -> NDArray[np.bool_]:
+        faster = replace(job, feed=job.feed * share, faster=job.faster * share, scale=job.scale * EFFORT_ROOM)
+        plant = Plant(faster, threads=threads)
+        wanted = plant.stand(job.position, faster.force(np.zeros((len(job), 2))), full=True)
+        flags = wanted.flags | equilibrium(plant, job.position).flags
+        return np.asarray(flags & Flag.DRIVE_FORCE == 0)
+
+    def exact(share: Floats) -> NDArray[np.bool_]:
         faster = replace(job, feed=job.feed * share, faster=job.faster * share)
         e = equilibrium(Plant(faster, threads=threads), job.position)
-        return np.asarray(np.abs(np.nan_to_num((e.error * job.off).sum(axis=1), nan=np.inf)))
+        return np.asarray(np.abs(np.nan_to_num((e.error * job.off).sum(axis=1), nan=np.inf)) <= t)
 
-    low, high = np.full(len(job), SLOWEST), top.copy()
-    holds_low, holds_high = error(low) <= t, error(high) <= t
-    for _ in range(ROUNDS):
-        middle = np.where(holds_high, high, (low + high) / 2)
-        good = error(middle) <= t
-        low, high = np.where(good, middle, low), np.where(good, high, middle)
-    share = np.where(holds_high, top, low)
+    borne = _largest(strong, np.full(len(job), SLOWEST), top)
+    share = _largest(exact, np.full(len(job), SLOWEST), borne)
+    holds_low = exact(np.full(len(job), SLOWEST)) & strong(np.full(len(job), SLOWEST))
     feed = job.path.feed.copy()
     held = np.ones(len(job.path), bool)
     why = ["does not cut"] * len(job.path)
@@ -71,42 +78,30 @@ def best_feeds(job: Setting, tolerance: float | None = None, threads: int | None
         at = rows[int(np.argmin(share[rows]))]
         feed[i] = job.feed[rows].min() * share[at]
         held[i] = bool(holds_low[rows].all())
-        why[i] = (
-            "tolerance"
-            if not holds_high[at]
-            else "drive speed"
-            if top[at] < FASTEST
-            else "fastest feed asked for"
-        )
+        why[i] = _limit(share[at], borne[at], top[at])
         total += job.path.length[i] / feed[i]
         before += job.path.length[i] / job.feed[rows].min()
     return Feeds(feed, float(total), float(before), held, tuple(why))
 
 
-def turned_round(path: Toolpath) -> Toolpath:
-    """The same path run the other way; what was a climb cut is a conventional one."""
-    back = slice(None, None, -1)
-    kind = path.kind[back].copy()
-    return replace(
-        path,
-        kind=kind,
-        start=path.end[back].copy(),
-        end=path.start[back].copy(),
-        centre=np.where((kind == Kind.ARC)[:, None], _centres(path)[back], np.nan),
-        normal=path.normal[back].copy(),
-        sweep=-path.sweep[back],
-        feed=path.feed[back].copy(),
-        spindle=path.spindle[back].copy(),
-        line=path.line[back].copy(),
-        tool=path.tool[back].copy(),
-        text=(),
-    )
+def _largest(good: Callable[[Floats], NDArray[np.bool_]], low: Floats, high: Floats) -> Floats:
+    """(m,) largest share from low to high that is good, by bisection; low where none is found."""
+    whole = good(high)
+    least, most = low, high
+    for _ in range(0 if whole.all() else ROUNDS):
+        middle = (least + most) / 2
+        ok = good(middle)
+        least, most = np.where(ok, middle, least), np.where(ok, most, middle)
+    return np.where(whole, high, least)
 
 
-def _centres(path: Toolpath) -> Floats:
-    """(n, 3) m, at the height of the end, where the reversed arc starts."""
-    axis = np.eye(3)[path.normal]
-    return np.asarray(path.centre * (1 - axis) + path.end * axis)
+def _limit(share: float, borne: float, top: float) -> str:
+    """What keeps a move from being faster."""
+    if share < borne:
+        return "tolerance"
+    if borne < top:
+        return "drive effort"
+    return "drive speed" if top < FASTEST else "fastest feed asked for"
 
 
 def other_side(process: Process) -> Process:

@@ -56,7 +56,7 @@ def run(
         position, tangent, bend = job.path.at(wanted, share)
         way = start[wanted] + share * job.path.length[wanted]
         points = Points(wanted, share, position, tangent, job.path.tool[wanted], bend, way, feed, spindle)
-        here = _job(job, points)
+        here = _job(job, points, p.turn_at(own.move[own_rows], own.share[own_rows]))
         plant = Plant(here, machine, threads)
         state = equilibrium(plant, u)
         at = job.place.back(here.position + np.nan_to_num(state.error))
@@ -64,11 +64,10 @@ def run(
     return Run(here, state, normal, way)
 
 
-def _job(job: Setting, points: Points) -> Setting:
-    """The job at other points; width and depth as at the nearest of its own."""
+def _job(job: Setting, points: Points, angle: Floats | None) -> Setting:
+    """The job at other points, the tool turned by `angle`; width and depth as at the nearest of its own."""
     order = np.argsort(job.points.way, kind="stable")
     way = job.points.way[order]
-    angle = None if job.angle is None else np.interp(points.way, way, np.unwrap(job.angle)[order])
     made = setting(job.machine, job.path, job.process, points, job.place, scale=job.scale, angle=angle)
     k = np.clip(np.searchsorted(way, points.way), 1, len(way) - 1)
     k -= np.abs(points.way - way[k - 1]) < np.abs(points.way - way[k])

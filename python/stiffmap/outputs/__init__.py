@@ -4,7 +4,15 @@ from stiffmap.outputs.alone import only_job, reserved
 from stiffmap.outputs.pictures import write_picture
 from stiffmap.outputs.space import mapped_array, needs_space
 from stiffmap.outputs.tables import guarded, unguarded, write_rows
-from stiffmap.outputs.writing import add_lines, make_folder, put_folder, synced, write_text, writing
+from stiffmap.outputs.writing import (
+    add_lines,
+    make_folder,
+    put_files,
+    put_folder,
+    synced,
+    write_text,
+    writing,
+)
 
 __all__ = [
     "add_lines",
@@ -13,6 +21,7 @@ __all__ = [
     "mapped_array",
     "needs_space",
     "only_job",
+    "put_files",
     "put_folder",
     "reserved",
     "synced",

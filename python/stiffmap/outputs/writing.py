@@ -105,6 +105,20 @@ def put_folder(fresh: Path, path: Path) -> None:
         raise refused(path, error) from error
 
 
+def put_files(fresh: Path, folder: str | os.PathLike[str]) -> None:
+    """Put the complete files of one folder into another one of the same disk, which is made where it is missing; FileError.
+
+    Other files of that folder stay.
+    """
+    target = make_folder(folder)
+    try:
+        for file in sorted(fresh.iterdir()):
+            os.replace(file, target / file.name)
+        synced(target)
+    except OSError as error:
+        raise refused(folder, error) from error
+
+
 def add_lines(path: Path, lines: Iterable[str], flushed: bool = True) -> None:
     """Add whole lines to a journal; OSError where the disk refuses.
 

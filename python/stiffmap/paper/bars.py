@@ -45,10 +45,12 @@ def _row(name: str, compliance: Floats) -> Statement:
         f"Table 1, {name} bar: k11 … k66 = {', '.join(PRINTED[name])}",
         text,
         judge(same),
-        "input of our model. The table is headed Stiffness but holds compliances (its units say so), and "
+        "The table is headed Stiffness but holds compliances (its units say so), and "
         "only "
         "their diagonal; our model adds k26 and k35 of beam theory",
         {f"k{i}{i}": float(v) for i, v in enumerate(ours, 1)},
+        printed=", ".join(PRINTED[name]),
+        own_input=True,
     )
 
 
@@ -62,6 +64,8 @@ def _stronger(bars: dict[str, Floats]) -> Statement:
         judge(ratio > 1),
         "with L = 310 and 775 mm; the revised length is not in the paper",
         {"EA_ratio": ratio},
+        printed="increased",
+        own_input=True,
     )
 
 
@@ -76,4 +80,6 @@ def _length(c: Floats) -> Statement:
         "within 2.5 % "
         "of both",
         {"L_from_k22_k66_mm": float(y), "L_from_k33_k55_mm": float(z)},
+        printed="not stated",
+        own_input=True,
     )

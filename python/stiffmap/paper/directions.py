@@ -66,6 +66,7 @@ def _isotropic(at: dict[str, Point]) -> Statement:
         judge(ratios["isotropic"] < 1.001 and others > 1.1),
         "the 0.03 % left at the isotropic point are the load's own effect on the configuration",
         {f"ratio_{n.replace(' ', '_')}": r for n, r in ratios.items()},
+        printed="constant there",
     )
 
 
@@ -82,6 +83,7 @@ def _quarter(at: dict[str, Point]) -> Statement:
         "exactly 90 deg for the symmetric compliance at zero load; the force of 300 N turns the strongest "
         "direction a little. At the isotropic point there is no such direction",
         {f"degrees_apart_{n.replace(' ', '_')}": a for n, a in apart.items()},
+        printed="90 deg",
     )
 
 
@@ -99,6 +101,7 @@ def _seven(p: Point) -> Statement:
         "compliance is aI + b·ones, so that 7 would force max/Fx = 1.40, against the 20 % of the next "
         "sentence",
         {"ratio": p.ratio, "worst_deg": p.worst_angle % 180, "best_deg": p.best_angle % 180},
+        printed="7 times; worst 45/-135 deg, best 135/-45 deg",
     )
 
 
@@ -113,6 +116,7 @@ def _twenty_more(p: Point) -> Statement:
         f"forces "
         f"{100 * (over_fx(7.0) - 1):.0f} %; 20 % belongs to a ratio of {ratio_of(1.2):.2f}",
         {"percent": more, "Fx_mm": p.fx, "worst_mm": p.worst},
+        printed="20 % higher",
     )
 
 
@@ -136,6 +140,7 @@ def _twenty_less(p: Point) -> Statement:
         judge(rounds_to(less, "20")),
         "agreement to the printed digit",
         {"percent": less, "Fx_mm": p.fx, "worst_mm": p.worst},
+        printed="20 % less",
     )
 
 
@@ -151,6 +156,7 @@ def _fifty_more(p: Point) -> Statement:
         f"with "
         "foot and actuators scaled from rigid to ten times softer",
         {"percent": more, "ratio": p.ratio, "best_mm": p.best},
+        printed="50 % more",
     )
 
 
@@ -162,6 +168,7 @@ def _different(p: Point) -> Statement:
         judge(abs(p.fy / p.fx - 1) > 0.05),
         "",
         {"Fx_mm": p.fx, "Fy_mm": p.fy},
+        printed="different",
     )
 
 
@@ -177,6 +184,7 @@ def _close(p: Point) -> Statement:
         f"{p.worst_angle % 180:.0f} deg, "
         "not near x and y; close is taken as within a fifth",
         {"Fx_percent": x, "Fy_percent": y},
+        printed="Fx close to the minimum, Fy to the maximum",
     )
 
 
@@ -194,6 +202,7 @@ def _seven_again(p: Point, results: Results) -> Statement:
         f"planes is "
         f"{float(ratio.max()):.1f} at {place} mm; the number occurs, though not at the stated point",
         {"ratio": p.ratio, "largest_ratio_in_planes": float(ratio.max())},
+        printed="about 7",
     )
 
 

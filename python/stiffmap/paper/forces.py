@@ -47,6 +47,7 @@ def _linear(results: Results) -> Statement:
         "Fx, Fy, weakest and strongest "
         f"direction; less than the {LINEAR:g} % that a printed line can hide, but not zero",
         {f"percent_{n.replace(' ', '_')}": v for n, v in off.items()},
+        printed="linear",
     )
 
 
@@ -60,6 +61,7 @@ def _depends(results: Results) -> Statement:
         judge(max(slope.values()) > 1.5 * min(slope.values())),
         "",
         {f"um_per_N_{n.replace(' ', '_')}": float(v) for n, v in slope.items()},
+        printed="it depends",
     )
 
 
@@ -71,6 +73,7 @@ def _600(limits: dict[str, float]) -> Statement:
         judge(rounds_to(limits["worst"], "600")),
         "0.25 mm in the plane, the same in every direction",
         {"limit_N": limits["worst"]},
+        printed="600 N",
     )
 
 
@@ -93,6 +96,7 @@ def _100(limits: dict[str, dict[str, float]]) -> Statement:
             for k, x in v.items()
             if k in ("worst", "Fx", "Fy")
         },
+        printed="less than 100 N",
     )
 
 
@@ -106,4 +110,5 @@ def _1mm(results: Results) -> Statement:
         judge(max(planes, space) >= 1.0),
         "close to 1 mm, not more; the paper's own maps say 0.5 mm",
         {"points_mm": points, "planes_mm": planes, "planes_with_z_mm": space},
+        printed="1 mm and more",
     )

@@ -25,10 +25,13 @@ def machine_statements(results: Results) -> list[Statement]:
         speed(results.original),
         _unchecked(
             "acceleration in the isotropic point of … 14 m/s²",
+            "14 m/s²",
             "the paper gives neither masses nor drive forces; those of our machine files are declared by us",
         ),
         _unchecked(
-            "payload of 4 kg", "the paper gives no criterion (drive force, deflection or stress) for it"
+            "payload of 4 kg",
+            "4 kg",
+            "the paper gives no criterion (drive force, deflection or stress) for it",
         ),
         transmission(results.original),
         geometry(results.original),
@@ -37,8 +40,8 @@ def machine_statements(results: Results) -> list[Statement]:
     ]
 
 
-def _unchecked(words: str, because: str) -> Statement:
-    return Statement("5.2", words, "–", Verdict.NOT_CHECKED, because)
+def _unchecked(words: str, printed: str, because: str) -> Statement:
+    return Statement("5.2", words, "no number", Verdict.NOT_CHECKED, because, printed=printed)
 
 
 def cube_edge(machine: Machine, reach: float) -> float:
@@ -58,6 +61,7 @@ def workspace_size(edge: float) -> Statement:
         f"200 mm by "
         f"{200 - edge:.2f} mm",
         {"edge_mm": edge},
+        printed="200 mm",
     )
 
 
@@ -73,6 +77,7 @@ def wanted_size(edge: float) -> Statement:
         "misprint. The revised machine reaches the factors 0.5–2 in a cube of this edge, "
         f"{500 - edge:.2f} mm short of 500 (L = 776.5 mm would do)",
         {"edge_mm": edge},
+        printed="200 mm",
     )
 
 
@@ -88,6 +93,8 @@ def speed(original: Machine) -> Statement:
         "taken from "
         "this sentence",
         {"largest_factor": float(f[0]), "smallest_factor": float(f[-1])},
+        printed="1.2 m/s",
+        own_input=True,
     )
 
 
@@ -104,6 +111,7 @@ def transmission(original: Machine) -> Statement:
         f"{corner:g} mm. "
         "Within 0.5–2 the box must end at -L/√18 and L/√6",
         {"smallest_factor": low, "largest_factor": high},
+        printed="0.5 … 2.0",
     )
 
 
@@ -120,8 +128,10 @@ def geometry(original: Machine) -> Statement:
         "L = 310 mm, d = 100 mm, r = 31 mm",
         f"L = {1e3 * length:.6g} mm, r = {1e3 * r:.6g} mm",
         judge(ok),
-        "input of our model, found again from its inverse kinematics; d does not enter them",
+        "found again from the inverse kinematics of our model; d does not enter them",
         {"L_mm": 1e3 * length, "r_mm": 1e3 * r},
+        printed="L = 310 mm, r = 31 mm",
+        own_input=True,
     )
 
 
@@ -134,4 +144,5 @@ def too_small(edge: float) -> Statement:
         judge(edge < 500),
         "§5.1 requires cubes of 0.5 m",
         {"edge_mm": edge},
+        printed="200 mm < 500 mm",
     )

@@ -27,6 +27,10 @@ class Statement:
     because: str
     numbers: dict[str, float] = field(default_factory=dict)
     """The numbers behind `ours`, by name; the unit is part of the name."""
+    printed: str = ""
+    """The paper's number, with its unit; empty where it states none."""
+    own_input: bool = False
+    """Whether our number is one that our model was given from this very sentence or table: agreement proves nothing."""
 
 
 def rounds_to(ours: float, printed: str) -> bool:

@@ -56,6 +56,7 @@ def _varies(ranges: Ranges) -> Statement:
         "the upper end holds for the worst direction, Fx and Fy alike; values near 0.1 mm occur in the best "
         "direction and, at z = -200 and 300, for Fy",
         both,
+        printed="0.1 mm to more than 0.5 mm",
     )
 
 
@@ -70,6 +71,7 @@ def _zero_plane(ranges: Ranges) -> Statement:
         "Fy and the "
         "worst direction",
         _numbers(ranges, 0.0),
+        printed="at most 0.25 mm (required)",
     )
 
 
@@ -86,6 +88,7 @@ def _guaranteed(ranges: Ranges, z: float, words: str, printed: str) -> Statement
         if not fitting
         else f"for the reading: {', '.join(fitting)}",
         _numbers(ranges, z),
+        printed=f"{printed} mm",
     )
 
 
@@ -99,6 +102,7 @@ def _strongest(ranges: Ranges) -> Statement:
         judge(all(v <= 0.2 for v in top.values())),
         "read as better than 0.2 mm; holds at z = -200 and 0, not in the far corner of z = 300",
         {f"z{1e3 * z:g}_best_max_mm": v for z, v in top.items()},
+        printed="better than 0.2 mm",
     )
 
 
@@ -122,4 +126,5 @@ def _three_times(maps: xr.Dataset) -> Statement:
             "share_above_3_percent": share,
             "largest_error_ratio": ends[0] / ends[1],
         },
+        printed="more than 3 times",
     )

@@ -14,11 +14,13 @@ from stiffmap.performance.box_search import BoxSearch
 from stiffmap.performance.limits import Bounds
 from stiffmap.performance.turning import best_orientation, turned
 from stiffmap.rotations import as_rotations
+from stiffmap.short import short_repr
 
 WORK = 100_000
 """Cells and poses at most; when they are used up, the bounds stay as far apart as they are."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class LargestBox:
     """Bounds on the largest similar box, and where it is."""
@@ -115,10 +117,16 @@ def largest_box(
     work
         ... or this many poses and cells were closed, those of the climb not counted; the bounds hold all the same.
 
-    The lower bound is a box all of whose poses are proven by enclosures of closure and slopes (theory D8), where
-    the machine's closure allows it (`LargestBox.guarantee`). The upper bound excludes every centre by a pose
-    that breaks a limit.
-    Raises StiffmapError for bad input.
+    Notes
+    -----
+    The lower bound is a box all of whose poses are proven by enclosures of closure and slopes
+    (theory D8), where the machine's closure allows it (`LargestBox.guarantee`). The upper bound
+    excludes every centre by a pose that breaks a limit.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     shape = real_array(proportions, "proportions")
     if shape.shape != (3,) or not (np.isfinite(shape).all() and (shape > 0).all()):

@@ -12,12 +12,14 @@ from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.inputs import plane_axes
 from stiffmap.performance.poses import box_nodes, read_box
+from stiffmap.short import short_repr
 from stiffmap.status import Status
 
 TURNS = 12
 REFINEMENTS = 4
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class WorstDeflection:
     """The largest deflection that was found, and the one at each pose asked for."""
@@ -81,7 +83,10 @@ def worst_deflection(
     linear
         Unloaded compliance times force, by superposition. Otherwise the equilibrium under each force.
 
-    Raises StiffmapError for bad input, never for a pose.
+    Raises
+    ------
+    StiffmapError
+        For bad input, never for a pose.
     """
     if not (np.isfinite(force) and force > 0):
         raise StiffmapError(f"force: expected a positive size in N, got {force!r}")

@@ -14,7 +14,7 @@ from stiffmap.description.elements import Drive
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
-from stiffmap.performance.inertia import friction_efforts, need_masses, rest_efforts, rigid_dynamics
+from stiffmap.performance.inertia import motion_friction, need_masses, rest_efforts, rigid_dynamics
 from stiffmap.performance.refusal import place_text, refuse_failed
 from stiffmap.performance.scaling import drive_table, drive_values, revolute_drives
 from stiffmap.performance.timing import quickest
@@ -67,7 +67,7 @@ def drive_efforts(
             f"{machine.name}: the trajectory asks for a motion that the machine cannot do at "
             f"{place_text(t.position[i])}, t = {t.time[i]:.4g} s (its drives leave {out['misfit'][i]:.1e} of it open)"
         )
-    friction_effort = friction_efforts(machine, out["rate"]) if friction else np.zeros_like(out["rate"])
+    friction_effort = motion_friction(machine, out["rate"]) if friction else np.zeros_like(out["rate"])
     return _dataset(machine, t, k, out, friction_effort)
 
 

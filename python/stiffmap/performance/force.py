@@ -15,11 +15,13 @@ from stiffmap.performance.inertia import rest_efforts
 from stiffmap.performance.polygons import Polygon, section_polygon
 from stiffmap.performance.scaling import characteristic_length, drive_values, weighted
 from stiffmap.performance.velocity import of_motions, singular_values
+from stiffmap.short import short_repr
 
 NOTHING = 1e-12
 """Effort of a drive per unit force below which the drive does not feel the force."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class ForceTransmission:
     """Holdable forces at the TCP at poses (...); NaN where the pose failed."""

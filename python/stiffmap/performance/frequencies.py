@@ -12,8 +12,10 @@ from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.inertia import inertias, need_masses
 from stiffmap.rotations import as_rotations
+from stiffmap.short import short_repr
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class NaturalFrequencies:
     """Undamped modes at poses (...), lowest first; NaN beyond the last one and where the pose failed."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from stiffmap.broadcasting import Floats, real_array, thread_count
 from stiffmap.compiled.names import Role
 from stiffmap.description import Body
-from stiffmap.description.tree import all_elements
+from stiffmap.description.tree import all_elements, joints
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.performance.closing import DriveKinematics
@@ -77,6 +77,28 @@ def need_masses(machine: Machine, what: str) -> None:
         raise StiffmapError(
             f"{machine.name}: {what} needs masses; these bodies have none: {', '.join(empty)}"
         )
+
+
+SLOW = 1e-4
+"""Of a drive's declared speed: below, Coulomb friction falls with the rate to zero, so that a drive that hardly moves has no friction
+of either sign."""
+
+
+def motion_friction(machine: Machine, rates: Floats) -> Floats:
+    """(..., drives) friction of the drives along a motion: as `friction_efforts`, but continuous through rest.
+
+    Where a drive declares no speed, its own largest rate along the motion, and that of the fastest drive of its kind, stand in.
+    """
+    drives = drive_table(machine)
+    named = joints(machine.description)
+    kinds = [named[name].kind == "prismatic" for name in machine.actuators]
+    own = np.abs(rates).reshape(-1, rates.shape[-1]).max(axis=0, initial=0.0)
+    fastest = np.array([max(v for v, other in zip(own, kinds, strict=True) if other == k) for k in kinds])
+    limit = SLOW * np.array([d.speed if d.speed else f for d, f in zip(drives, fastest, strict=True)])
+    coulomb = np.array([d.coulomb_friction or 0.0 for d in drives])
+    viscous = np.array([d.viscous_friction or 0.0 for d in drives])
+    share = np.clip(rates / np.where(limit > 0.0, limit, 1.0), -1.0, 1.0)
+    return np.asarray(coulomb * share + viscous * rates)
 
 
 def friction_efforts(machine: Machine, rates: Floats) -> Floats:

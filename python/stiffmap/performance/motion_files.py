@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -20,14 +19,12 @@ from stiffmap.errors import FileError, StiffmapError
 from stiffmap.files.report import validated
 from stiffmap.files.schema.base import FileModel, Name
 from stiffmap.machine import Machine
-from stiffmap.number_text import number_in
-from stiffmap.performance.quantities import quantity, quantity_in
-from stiffmap.performance.trajectory import Path, Trajectory, circle, line, through, timed
-from stiffmap.units import name_and_unit
+from stiffmap.performance.quantities import quantity_in
+from stiffmap.performance.trajectory import Path, Trajectory, at_feed, circle, line, through, timed
+from stiffmap.pose_tables import read_pose_table
 from stiffmap.yaml_text import Document, read
 
 Written = str | float | int
-COLUMNS = {"t": "s", "x": "m", "y": "m", "z": "m", "fx": "N", "fy": "N", "fz": "N"}
 LEAST_ROWS = 6
 """Of a table over time: its spline of degree 5 wants that many."""
 
@@ -72,7 +69,9 @@ class Motion:
     speed: float
     """m/s, most along the path when it is run as fast as the drives can."""
     force: Floats
-    """(3,) N on the tool."""
+    """(3,) N on the tool, or (n, 3) along the path."""
+    feed: float | None = None
+    """m/s along the path, all the way; None: as `duration` and `speed` say."""
 
     def places(self) -> tuple[Floats, Floats]:
         """Positions (n, 3) m along the path and the force (n, 3) N on the tool there."""
@@ -82,28 +81,45 @@ class Motion:
         return self.path.position, np.broadcast_to(self.force, self.path.position.shape)
 
     def trajectory(
-        self, machine: Machine, *, duration: float | None = None, gravity: ArrayLike | None = None
+        self,
+        machine: Machine,
+        *,
+        duration: float | None = None,
+        gravity: ArrayLike | None = None,
+        feed: float | None = None,
     ) -> Trajectory:
-        """The motion over time; `duration` (s) in place of the file's. StiffmapError where it cannot be run."""
+        """The motion over time; `duration` (s) or `feed` (m/s, all the way) in place of the file's. StiffmapError where it cannot be run."""
         from stiffmap.performance.efforts import fastest
 
         if self.path is None:
             assert self.timed is not None
-            if duration is not None:
-                raise StiffmapError(f"{self.name}: the table has times, so no duration can be given")
+            if duration is not None or feed is not None:
+                word = "duration" if feed is None else "feed"
+                raise StiffmapError(f"{self.name}: the table has times, so no {word} can be given")
             return self.timed
         span = self.duration if duration is None else duration
         if span is not None:
-            return timed(self.path, span).with_force(self.force)
+            return _with_force(timed(self.path, span), self)
+        if (speed := self.feed if feed is None else feed) is not None:
+            return _with_force(at_feed(self.path, speed), self)
         run = fastest(machine, self.path, gravity=gravity, speed=self.speed, force=self.force)
-        return run.with_force(self.force)
+        return _with_force(run, self)
+
+
+def _with_force(run: Trajectory, motion: Motion) -> Trajectory:
+    """The run with the motion's force, of the place where it is."""
+    if motion.force.ndim == 1:
+        return run.with_force(motion.force)
+    assert motion.path is not None
+    way, own = _way(run.position), _way(motion.path.position)
+    return run.with_force(_between(way / way[-1], own / own[-1], motion.force))
 
 
 def load_motion(file: str | PathLike[str]) -> Motion:
     """A motion of the tool from a CSV or YAML file, or a shipped one by name: ``trim`` (docs/measures.md).
 
-    CSV: columns ``x [mm]``, ``y [mm]``, ``z [mm]``, perhaps ``fx [N]`` …; with ``t [s]`` a motion over time,
-    without it a path. YAML: ``line``, ``circle`` or ``points``, ``duration`` or ``speed``, ``force``.
+    CSV (`stiffmap.pose_tables`): columns ``x [mm]``, ``y [mm]``, ``z [mm]``, perhaps ``fx [N]`` …, which may vary; with ``t [s]`` a
+    motion over time, with ``feed [mm/min]`` a path at this speed, without either a path. YAML: ``line``, ``circle`` or ``points``, ``duration`` or ``speed``, ``force``.
     Raises FileError naming file, line, what was expected and what was found.
     """
     place = _place(FilePath(file))
@@ -165,34 +181,49 @@ def _described(document: Document, file: str) -> Motion:
 
 
 def _table(place: FilePath) -> Motion:
-    values, lines = _columns(place)
-    file = str(place)
-    missing = [c for c in ("x", "y", "z") if c not in values]
-    if missing:
-        raise FileError(
-            f"no column {', '.join(missing)}; expected x [mm], y [mm], z [mm] and perhaps t [s], fx [N], fy [N], fz [N]",
-            file=file, line=1,
-        )  # fmt: skip
-    p = np.stack([values[c] for c in "xyz"], axis=1)
-    f = np.stack([values.get(c, np.zeros(len(p))) for c in ("fx", "fy", "fz")], axis=1)
-    if "t" not in values:
-        if np.ptp(f, axis=0).any():
-            raise FileError("forces that vary need times: a column t [s]", file=file, line=1)
+    table = read_pose_table(place)
+    file, p, f = table.file, table.position, table.wrench[:, :3]
+    feed = table.columns.get("feed")
+    if "t" not in table.columns:
         if len(p) < 2:
             raise FileError(f"expected two or more rows, found {len(p)}", file=file)
-        return Motion(place.stem, _through(p, file), None, None, np.inf, f[0])
-    t = values["t"]
+        if feed is not None and not (feed > 0).all():
+            line = table.lines[int(np.argmax(~(feed > 0)))]
+            raise FileError("expected a feed above zero", file=file, line=line, key="feed")
+        path = _through(p, file)
+        along = _way(p) / _way(p)[-1]
+        force = f[0] if not np.ptp(f, axis=0).any() else _between(path.s, along, f)
+        if feed is None:
+            return Motion(place.stem, path, None, None, np.inf, force)
+        if np.ptp(feed) > 1e-9 * feed[0]:
+            raise FileError(
+                "expected one feed for the whole path (or times, a column t [s])", file=file, key="feed"
+            )
+        return Motion(place.stem, path, None, None, np.inf, force, feed=float(feed[0]))
+    t = table.columns["t"]
+    if feed is not None:
+        raise FileError("give times or a feed, not both", file=file, line=1)
     if len(t) < LEAST_ROWS:
         raise FileError(f"a motion over time needs {LEAST_ROWS} or more rows, found {len(t)}", file=file)
     back = np.flatnonzero(np.diff(t) <= 0)
     if len(back):
         i = int(back[0])
         raise FileError(
-            f"times must increase; {t[i + 1]:g} s follows {t[i]:g} s", file=file, line=lines[i + 1]
+            f"times must increase; {t[i + 1]:g} s follows {t[i]:g} s", file=file, line=table.lines[i + 1]
         )
     spline = make_interp_spline(t, p, k=5)
     motion = Trajectory(t, p, spline(t, 1), spline(t, 2), f)
     return Motion(place.stem, None, motion, None, np.inf, np.zeros(3))
+
+
+def _way(points: Floats) -> Floats:
+    """(n,) m along the chords."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def _between(s: Floats, at: Floats, values: Floats) -> Floats:
+    """(n, 3) values given at some places of a path, straight between them."""
+    return np.stack([np.interp(s, at, v) for v in values.T], axis=1)
 
 
 def _through(points: Floats, file: str) -> Path:
@@ -200,54 +231,3 @@ def _through(points: Floats, file: str) -> Path:
         return through(points)
     except StiffmapError as error:
         raise FileError(str(error), file=file) from None
-
-
-def _columns(place: FilePath) -> tuple[dict[str, Floats], list[int]]:
-    """SI values by column, and the line of each row."""
-    file = str(place)
-    try:
-        with place.open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.reader(stream)
-            rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"cannot be read: {getattr(error, 'strerror', None) or error}", file=file) from error
-    if not rows:
-        raise FileError("the file is empty", file=file)
-    heads = [_head(cell, file, rows[0][0]) for cell in rows[0][1]]
-    if len({n for n, _ in heads}) < len(heads):
-        raise FileError("a column is there twice", file=file, line=rows[0][0])
-    out = np.zeros((len(rows) - 1, len(heads)))
-    for i, (number, row) in enumerate(rows[1:]):
-        for j, (name, scale) in enumerate(heads):
-            text = row[j].strip() if j < len(row) else ""
-            try:
-                out[i, j] = scale * number_in(text)
-            except ValueError:
-                raise FileError(
-                    f"expected a number, found '{text}'", file=file, line=number, key=name
-                ) from None
-            if not np.isfinite(out[i, j]):
-                raise FileError(f"expected a finite number, found '{text}'", file=file, line=number, key=name)
-    return {name: out[:, j] for j, (name, _) in enumerate(heads)}, [number for number, _ in rows[1:]]
-
-
-def _head(cell: str, file: str, number: int) -> tuple[str, float]:
-    head, unit = name_and_unit(cell)
-    name = head.lower()
-    if name not in COLUMNS:
-        raise FileError(
-            f"unknown column '{cell.strip()}'; known: {', '.join(COLUMNS)}, each with its unit as in x [mm]",
-            file=file, line=number,
-        )  # fmt: skip
-    if not unit:
-        raise FileError(
-            f"the unit is missing: write {name} [{_usual(name)}]", file=file, line=number, key=name
-        )
-    try:
-        return name, quantity(f"1 {unit}", COLUMNS[name])
-    except StiffmapError as error:
-        raise FileError(str(error), file=file, line=number, key=name) from None
-
-
-def _usual(name: str) -> str:
-    return {"m": "mm"}.get(COLUMNS[name], COLUMNS[name])

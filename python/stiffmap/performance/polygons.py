@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.broadcasting import Floats
+from stiffmap.short import short_repr
 
 NOTHING = 1e-12
 """Entries of the rows, relative to their largest, that count as zero: directions a drive does not feel."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Polygon:
     """What the drives can do in a plane, at poses (...)."""

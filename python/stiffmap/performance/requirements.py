@@ -16,6 +16,7 @@ from stiffmap.files.schema.base import FileModel, Name
 from stiffmap.performance.motion_files import near_or_shipped
 from stiffmap.performance.quantities import quantity_in
 from stiffmap.performance.registry import all_measures, get_measure
+from stiffmap.short import short_repr
 from stiffmap.yaml_text import Document, read
 
 Written = str | float | int
@@ -74,6 +75,7 @@ class Bound:
         return min(sides)
 
 
+@short_repr
 @dataclass(frozen=True)
 class Requirements:
     """A task: the box, the force on the tool and the bounds, SI."""

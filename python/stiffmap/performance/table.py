@@ -18,6 +18,7 @@ from stiffmap.performance.motion_files import Motion, load_motion
 from stiffmap.performance.poses import box_nodes, read_box
 from stiffmap.performance.registry import Case, Found, Measure, all_measures, get_measure
 from stiffmap.performance.requirements import Bound, Requirements, load_requirements
+from stiffmap.short import short_repr
 from stiffmap.status import Status
 
 
@@ -48,6 +49,7 @@ class Row:
         return "pass" if self.margin >= 0 else "fail"
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class MeasuresTable:
     """All measures of a machine over a box."""
@@ -146,7 +148,14 @@ def measures(
         m, what poses of the workspace and of the largest box keep: least distance between members of different
         legs, largest deflection under `force` in `plane`; None: the requirement's, else not asked for.
 
-    Raises StiffmapError for bad input. A measure that the machine lacks the data for says so in its row.
+    Raises
+    ------
+    StiffmapError
+        For bad input.
+
+    Notes
+    -----
+    A measure that the machine lacks the data for says so in its row.
     """
     task = (
         requirements

@@ -122,6 +122,26 @@ def timed(path: Path, duration: float) -> Trajectory:
     )
 
 
+def at_feed(path: Path, feed: float) -> Trajectory:
+    """A path run at a constant speed (m/s) all the way: it begins and ends in motion."""
+    if not (np.isfinite(feed) and feed > 0):
+        raise StiffmapError(f"feed: expected a positive speed in m/s, got {feed!r}")
+    size = np.linalg.norm(path.first, axis=1)
+    if not (size > 0).all():
+        raise StiffmapError("feed: the path stands still somewhere, so it has no direction there")
+    step = np.diff(path.s) * (size[1:] + size[:-1]) / 2
+    time = np.concatenate([[0.0], np.cumsum(step)]) / feed
+    rate = feed / size  # ds/dt
+    bend = -(path.first * path.second).sum(axis=1) / size**2 * rate**2  # d²s/dt²: the speed stays
+    return Trajectory(
+        time=time,
+        position=path.position,
+        velocity=path.first * rate[:, None],
+        acceleration=path.second * rate[:, None] ** 2 + path.first * bend[:, None],
+        force=np.zeros_like(path.position),
+    )
+
+
 def read_points(file: str | PathLike[str], unit: float = 1e-3) -> Path:
     """Path through the rows x,y,z (mm) of a CSV file with that header; FileError names row and column."""
     import csv

@@ -15,8 +15,10 @@ from stiffmap.performance.polygons import Polygon, section_polygon
 from stiffmap.performance.scaling import characteristic_length, drive_values, mixes_units, weighted
 from stiffmap.performance.sharing import facets, motions
 from stiffmap.performance.zonotopes import farthest_vertex, inscribed_sphere, inverse_rows, rows_limit
+from stiffmap.short import short_repr
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class VelocityTransmission:
     """Transmission factors at poses (...); NaN where the pose failed, and its status."""
@@ -72,7 +74,10 @@ def velocity_transmission(
     part
         ``all`` components of the twist, or its ``translation`` or ``rotation`` alone.
 
-    Raises StiffmapError for bad input, never for a pose.
+    Raises
+    ------
+    StiffmapError
+        For bad input, never for a pose.
     """
     k = drive_kinematics(machine, position, rotation, threads=threads)
     return transmission_of(machine, k, length=length, limits=limits, part=part)

@@ -16,6 +16,7 @@ from stiffmap.performance.enclosed import enclose
 from stiffmap.performance.inside import Inside, Judged
 from stiffmap.performance.limits import Bounds
 from stiffmap.rotations import as_rotations
+from stiffmap.short import short_repr
 
 CELLS = {3: 24, 2: 120, 1: 1000}
 """Along each edge, by the number of axes."""
@@ -25,6 +26,7 @@ GROWN = 4
 """Most times that a region is made larger because the workspace reaches its border."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Workspace:
     """Volume, and where it ends."""
@@ -95,7 +97,10 @@ def workspace_volume(
     seed
         Of the random poses.
 
-    Raises StiffmapError for bad input.
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     if singularity is not None and not 0 <= singularity < 1:
         raise StiffmapError(f"singularity: expected a distance from 0 to 1, got {singularity!r}")

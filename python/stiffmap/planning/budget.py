@@ -93,8 +93,15 @@ def budgets(
         Effects that were not fitted, and the standard uncertainty (SI) of each of their numbers: dimensions of
         the machine, figures of an instrument's certificate. Each adds what it would have moved the fit by.
 
-    Lines: noise of the readings (A), misfit beyond noise (model form: what the residuals show above it, spread over
-    the readings), and one per number of `others` (B). Raises StiffmapError for a number that does not exist.
+    Notes
+    -----
+    Lines: noise of the readings (A), misfit beyond noise (model form: what the residuals show above
+    it, spread over the readings), and one per number of `others` (B).
+
+    Raises
+    ------
+    StiffmapError
+        For a number that does not exist.
     """
     predictor = Predictor(machine, experiment)
     e = predictor.experiment

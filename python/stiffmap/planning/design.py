@@ -24,12 +24,14 @@ from stiffmap.planning.estimate import Estimate, estimate, fitted
 from stiffmap.planning.exchange import Value, exchange
 from stiffmap.planning.information import Information, map_weight
 from stiffmap.planning.pool import candidate_rows, in_limits, joined
+from stiffmap.short import short_repr
 
 AIMS = ("identify", "separate", "map")
 RANDOM = 20
 """Random plans beside the chosen one."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Design:
     """Chosen rows, and how they compare."""
@@ -87,7 +89,10 @@ def design(
     done
         Rows that have been measured already: their information counts.
 
-    Raises StiffmapError for bad input.
+    Raises
+    ------
+    StiffmapError
+        For bad input.
     """
     _check(aim, rival, rows)
     if candidates is None:

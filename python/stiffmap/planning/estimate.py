@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,9 +13,10 @@ from stiffmap.description import AppliedEffect, MachineDescription
 from stiffmap.effects.types import Parameter
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
-from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine
+from stiffmap.short import short_repr
 
 STEP = 1e-3
 """Share of a parameter's typical size over which predictions are differenced."""
@@ -26,6 +27,7 @@ share of a number in such directions from which on it is not."""
 Terms = tuple[AppliedEffect, ...]
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """Fitted values of k parameters, SI."""
@@ -40,6 +42,18 @@ class Estimate:
     chi2: float
     freedom: int
     """Readings less nuisances less parameters that they tell."""
+    problem: Problem = field(repr=False)
+    jacobian: Floats = field(repr=False)
+    """(N, k) change of the whitened readings per unit of each number."""
+    residual: Floats = field(repr=False)
+    """(N,) whitened, with the fitted values."""
+    left: Floats = field(repr=False)
+    """(n, c) m, rad: reading minus prediction, less unknown frames and zeros."""
+
+    @property
+    def experiment(self) -> Experiment:
+        """The readings that were fitted."""
+        return self.problem.experiment
 
     @property
     def sigma(self) -> Floats:
@@ -79,7 +93,21 @@ def estimate(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEf
     freedom = problem.freedom - rank
     names = tuple(f"{_place(begun[i])}: {p.name}" for i, p in parameters)
     units = tuple(p.unit for _, p in parameters)
-    return Estimate(names, units, x, covariance, begun, float(residual @ residual), freedom)
+    left = e.reading - predictor(begun)
+    left = left - nuisance_part(problem, left)
+    return Estimate(
+        names,
+        units,
+        x,
+        covariance,
+        begun,
+        float(residual @ residual),
+        freedom,
+        problem,
+        jacobian,
+        residual,
+        left,
+    )
 
 
 def _covariance(jacobian: Floats) -> tuple[Floats, int]:

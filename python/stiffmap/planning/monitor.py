@@ -11,7 +11,10 @@ from scipy.stats import chi2
 from stiffmap.description import AppliedEffect
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.machine import Machine
+from stiffmap.number_text import with_uncertainty, within
 from stiffmap.planning.estimate import Estimate, estimate
+from stiffmap.planning.left_over import difference
+from stiffmap.short import short_repr
 
 ALPHA = 0.01
 """Probability of naming a change in any number where there is none."""
@@ -26,7 +29,7 @@ class Change:
     before: float
     after: float
     u: float
-    """Standard uncertainty of the difference, misfit of both fits included."""
+    """Standard uncertainty of the difference, what the model leaves included."""
     p: float
     """p-value of such a difference if nothing changed, corrected for the number of numbers (Bonferroni)."""
 
@@ -41,11 +44,12 @@ class Change:
         word = "changed" if self.changed else "as before"
         step = self.after - self.before
         return (
-            f"{self.name}: {word}, {self.before:.5g} -> {self.after:.5g} {self.unit} "
-            f"({step:+.3g} ± {2 * self.u:.2g}, p = {self.p:.2g})"
+            f"{self.name}: {word}, {within(self.before, self.u)} -> {within(self.after, self.u)} {self.unit} "
+            f"({with_uncertainty(step, 2 * self.u)}, p = {self.p:.2g})"
         )
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """Two experiments with the same effects fitted to each."""
@@ -71,19 +75,19 @@ def compare(
 ) -> Comparison:
     """Numbers of `terms` in two experiments: before and after, or one specimen and another.
 
-    Each is fitted on its own; differences are judged with both covariances, enlarged where a model does not fit.
+    Each is fitted on its own; differences are judged beside what the model leaves of both: a smooth field that they share
+    and a variance per pose, as large as the readings make likeliest, since neither is a change.
     Raises StiffmapError as `estimate` does.
     """
     a, b = (estimate(machine, e, terms) for e in (first, second))
-    step = b.values - a.values
-    covariance = a.covariance * a.misfit**2 + b.covariance * b.misfit**2
+    step, covariance = difference(a, b)
     u = np.sqrt(np.diag(covariance))
     single = chi2.sf((step / u) ** 2, 1)
     told = np.flatnonzero(np.isfinite(u))
     scaled, pull = covariance[np.ix_(told, told)] / np.outer(u[told], u[told]), step[told] / u[told]
     together = float(pull @ np.linalg.pinv(scaled) @ pull)
     changes = tuple(
-        Change(n, s, float(x), float(y), float(w), float(min(1.0, len(step) * p)))
-        for n, s, x, y, w, p in zip(a.names, a.units, a.values, b.values, u, single, strict=True)
+        Change(n, s, float(x), float(x + d), float(w), float(min(1.0, len(step) * p)))
+        for n, s, x, d, w, p in zip(a.names, a.units, a.values, step, u, single, strict=True)
     )
     return Comparison(a, b, changes, float(chi2.sf(together, max(len(told), 1))))

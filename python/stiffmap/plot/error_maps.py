@@ -49,13 +49,17 @@ def map_figure(
     """A map of a deflection: one panel per plane, or one line where only one coordinate varies.
 
     Panels stand across the axis with the fewest positions. What lies beyond `tolerance` (m) is dotted, and
-    its share is written over the panel. `variable` is a deflection of `ds` (m); None: the worst one in the
-    plane in which the force turned, or the deflection of a map without directions. `case` picks a load case
+    its share is written over the panel. `variable` is a deflection of `ds` (m), or a component of its displacement: ``dx``, ``dy``, ``dz`` (m),
+    ``|d|`` for its norm, or one in any plane, ``d_xz``. None: the worst one in the
+    plane in which the force turned; the deflection of a map without directions, and of ``ds.sel(case=…)``. `case` picks a load case
     where it has several. `directions`: short lines along the force of the worst or best direction.
     `isolines`: thin lines of equal deflection. `limits` of the colour scale in m; `common_scale=False` gives
     each panel its own. Raises StiffmapError where `ds` has no such variable or case.
     """
     ds = on_grid(ds)
+    if case is None and "case" in ds.coords and not ds.case.dims:  # ds.sel(case=…): what is left is that case
+        case = str(ds.case.values)
+        variable = variable or "deflection"
     variable = default_variable(ds) if variable is None else variable
     values = pick(ds, variable, case)
     how = planes(values)
@@ -122,18 +126,35 @@ def default_variable(ds: xr.Dataset) -> str:
 
 def pick(ds: xr.Dataset, variable: str, case: str | None) -> xr.DataArray:
     """A deflection of one case, dims (z, y, x), the axes ascending."""
-    if variable not in ds or ds[variable].attrs.get("units") != "m":
-        raise StiffmapError(f"variable: the map has no deflection {variable!r}")
-    values = ds[variable]
+    values = component(ds, variable)
     if "case" in values.dims:
         if case is None and values.sizes["case"] == 1:
             case = str(values.case.values[0])
-        if case is None or case not in values["case"]:
+        if case is None or case not in values["case"].values:
             raise StiffmapError(
                 f"case: expected one of {', '.join(map(str, values.case.values))}, got {case!r}"
             )
         values = values.sel(case=case)
     return on_grid(values.to_dataset(name=variable))[variable].transpose("z", "y", "x")
+
+
+def component(ds: xr.Dataset, variable: str) -> xr.DataArray:
+    """A deflection of the map, or of its displacement a component, the norm or that in a plane; StiffmapError."""
+    if variable in ds and ds[variable].attrs.get("units") == "m":
+        return ds[variable]
+    axes = {"|d|": "xyz", **{f"d{a}": a for a in "xyz"}, **{f"d_{p}": p for p in FORCE_PLANES}}.get(variable)
+    if axes is None or "displacement" not in ds:
+        known = [str(n) for n, v in ds.data_vars.items() if v.attrs.get("units") == "m"]
+        raise StiffmapError(
+            f"variable: the map has no deflection {variable!r}; there are: {', '.join(known)}, |d|, dx, dy, dz, d_xy, d_xz, d_yz"
+        )
+    chosen = ds.displacement.sel(component=[f"d{a}" for a in axes])
+    found: xr.DataArray = (
+        chosen.isel(component=0, drop=True)
+        if len(axes) == 1
+        else (chosen**2).sum("component", skipna=False) ** 0.5
+    )
+    return found
 
 
 def colour_range(values: xr.DataArray, factor: float = MM) -> Normalize:
@@ -186,7 +207,8 @@ def draw_plane(
 
 def status_of(ds: xr.Dataset, plane: xr.DataArray, how: Planes, variable: str, case: str | None) -> Any:
     """Status of each position of a plane (up, right)."""
-    status = ds["status" if variable.startswith("deflection") else "direction_status"]
+    turned = variable.startswith(("worst_", "best_"))
+    status = ds["direction_status" if turned else "status"]
     if "case" in status.dims:
         status = status.sel(case=case) if case is not None else status.isel(case=0)
     return status.sel({how.across: plane[how.across]}).transpose(how.up, how.right).values
@@ -194,14 +216,17 @@ def status_of(ds: xr.Dataset, plane: xr.DataArray, how: Planes, variable: str, c
 
 def colour_label(values: xr.DataArray, unit: str = "mm") -> str:
     """What the colours mean."""
-    plane = values.name and str(values.name).rpartition("_")[2]
+    name = str(values.name or "")
+    if name in ("dx", "dy", "dz"):
+        return f"{name}, {unit}"
+    plane = name.rpartition("_")[2]
     return f"deflection in the {plane} plane, {unit}" if plane in FORCE_PLANES else f"deflection, {unit}"
 
 
 def title(ds: xr.Dataset, variable: str, case: str | None) -> str:
     """Machine, load and direction."""
     base = variable.removesuffix("_xy").removesuffix("_xz").removesuffix("_yz")
-    if base == "deflection":
+    if base not in TITLES or base == "deflection":
         return f"{ds.attrs['machine']}: {load_text(ds, case)}"
     return f"{ds.attrs['machine']}: {ds.attrs['turning_force_N']:g} N, {TITLES[base]}"
 

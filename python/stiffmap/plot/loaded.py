@@ -14,7 +14,8 @@ from stiffmap.budget import DeflectionBudget, deflection_budget
 from stiffmap.compiled import Status
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
-from stiffmap.plot.machines import draw_skeleton, look_from
+from stiffmap.plot.machines import draw_skeleton
+from stiffmap.plot.scene import draw_arrow, finish, on, scene_axes
 from stiffmap.plot.skeleton import Skeleton, skeleton
 from stiffmap.plot.style import BLUE, MM, ORANGE, headline, legend_below, new_figure, paper_style
 
@@ -48,6 +49,7 @@ class LoadedShape:
             mix(self.rest.actuators, self.loaded.actuators),
             mix(self.rest.passive, self.loaded.passive),
             mix(self.rest.tcp, self.loaded.tcp),
+            mix(self.rest.platform, self.loaded.platform),
         )
 
     @property
@@ -113,10 +115,12 @@ def loaded_figure(
     shape = loaded_shape(machine, position, wrench, rotation=rotation, gravity=gravity)
     budget = deflection_budget(machine, position, wrench, rotation=rotation, gravity=gravity)
     with paper_style():
-        figure = new_figure(9.4, 5.0)
-        ax: Any = figure.add_subplot(1, 2, 1, projection="3d")
+        figure = new_figure(10.4, 5.0)
+        grid = figure.add_gridspec(1, 2, width_ratios=(1.3, 1.0))
+        left, right = grid[0, 0], grid[0, 1]
+        ax: Any = scene_axes(figure, shape.rest, view, left)
         draw_loaded(ax, shape, machine.legs, view)
-        draw_budget(figure.add_subplot(1, 2, 2), budget)
+        draw_budget(figure.add_subplot(right), budget)
         where = ", ".join(f"{MM * v:g}" for v in budget.position)
         force = ", ".join(f"{v:g}" for v in budget.wrench[:3])
         headline(figure, f"{machine.name} at ({where}) mm under ({force}) N: the tool moves "
@@ -131,7 +135,7 @@ def draw_loaded(
     """Ghost, enlarged shape, arrow of the force."""
     label: str | None = "without load"
     for _, ends in shape.rest.links:
-        ax.plot(*(MM * ends.T), color="0.72", lw=1.4, ls="--", zorder=1, label=label)
+        ax.plot(*on(ax, ends), color="0.72", lw=1.4, ls="--", zorder=1, label=label)
         label = None
     moved = shape.enlarged()
     draw_skeleton(ax, moved, legs)
@@ -139,17 +143,8 @@ def draw_loaded(
     if size > 0:
         arrow = 0.16 * shape.extent * shape.force / size
         tail = moved.tcp - arrow
-        ax.quiver(
-            *(MM * tail),
-            *(MM * arrow),
-            color=FORCE,
-            lw=2.2,
-            arrow_length_ratio=0.3,
-            label=f"force {size:g} N",
-        )
-    ax.set_aspect("equal")
-    ax.set_box_aspect(None, zoom=0.88)  # room for the label of z
-    look_from(ax, shape.rest, view)
+        draw_arrow(ax, tail, arrow, color=FORCE, label=f"force {size:g} N")
+    finish(ax, shape.rest, view)
 
 
 def draw_budget(ax: Any, budget: DeflectionBudget) -> None:

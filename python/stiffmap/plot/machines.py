@@ -13,6 +13,7 @@ from stiffmap.broadcasting import Floats, real_array
 from stiffmap.errors import StiffmapError
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine, takes_machine
+from stiffmap.plot.scene import dimensions, draw_body, finish, flat_marks, on, scene_axes, tool
 from stiffmap.plot.skeleton import Skeleton, skeleton
 from stiffmap.plot.style import BLACK, CYCLE, MM, legend_below, new_figure, paper_style
 from stiffmap.status import Status
@@ -40,13 +41,12 @@ def machine_figure(
         )
     with paper_style():
         figure = new_figure(5.6, 5.2)
-        ax: Any = figure.add_subplot(projection="3d")
         shape = skeleton(machine, k.coordinates)
+        ax: Any = scene_axes(figure, shape, view)
         draw_skeleton(ax, shape, machine.legs)
         if machine.description.workspace is not None:
             draw_box(ax, machine.workspace)
-        ax.set_aspect("equal")
-        look_from(ax, shape, view)
+        finish(ax, shape, view)
         ax.set_title(f"{machine.name} at ({', '.join(f'{MM * v:g}' for v in p)}) mm", fontsize=10)
         legend_below(figure, ax.get_legend_handles_labels()[0], most=4)
     return figure
@@ -56,19 +56,24 @@ def draw_skeleton(ax: Any, s: Skeleton, legs: tuple[str, ...]) -> None:
     """Guides, links, joints, TCP."""
     colours = {leg: CYCLE[i % len(CYCLE)] for i, leg in enumerate(legs)} | {"": BLACK}
     for _, ends in s.guides:
-        ax.plot(*(MM * ends.T), color="0.75", lw=5, solid_capstyle="butt", zorder=1)
+        ax.plot(*on(ax, ends), color="0.82", lw=5, solid_capstyle="butt", zorder=1)
     named: set[str] = set()
     for leg, ends in s.links:
         label = None if leg in named or not leg else f"leg {leg}"
         named.add(leg)
-        ax.plot(*(MM * ends.T), color=colours[leg], lw=2, label=label)
+        ax.plot(*on(ax, ends), color=colours[leg], lw=2, label=label)
     if s.guides:
-        ax.plot([], [], color="0.75", lw=5, label="travel of a drive")
-    ax.scatter(*(MM * s.actuators.T), marker="s", s=32, color=BLACK, label="actuator", depthshade=False)
-    ax.scatter(*(MM * s.passive.T), marker="o", s=12, facecolor="white", edgecolor=BLACK, linewidth=0.8,
-               label="passive joint", depthshade=False)  # fmt: skip
-    ax.scatter(*(MM * s.tcp), marker="*", s=110, color=CYCLE[4], edgecolor=BLACK, linewidth=0.5, label="TCP",
-               depthshade=False)  # fmt: skip
+        ax.plot([], [], color="0.82", lw=5, label="travel of a drive")
+    if len(s.platform):
+        draw_body(ax, s.platform)
+        tool(ax, s)
+    marks = flat_marks(ax)
+    ax.scatter(*on(ax, s.actuators), marker="s", s=32, color=BLACK, label="actuator", **marks)
+    if len(s.passive):
+        ax.scatter(*on(ax, s.passive), marker="o", s=12, facecolor="white", edgecolor=BLACK, linewidth=0.8,
+                   label="passive joint", **marks)  # fmt: skip
+    ax.scatter(*on(ax, s.tcp), marker="*", s=110, color=CYCLE[4], edgecolor=BLACK, linewidth=0.5, label="TCP",
+               **marks)  # fmt: skip
 
 
 def look_from(ax: Any, shape: Skeleton, view: tuple[float, float] | None = None) -> None:
@@ -85,7 +90,8 @@ def look_from(ax: Any, shape: Skeleton, view: tuple[float, float] | None = None)
 
 def draw_box(ax: Any, box: Floats) -> None:
     """Edges of the workspace box (2, 3) m."""
-    corners = list(product(*(MM * box.T)))
+    dims = dimensions(ax)
+    corners = list(dict.fromkeys(product(*(MM * box.T)[:dims])))
     label: str | None = "workspace"
     for a, b in combinations(corners, 2):
         if sum(u != v for u, v in zip(a, b, strict=True)) == 1:

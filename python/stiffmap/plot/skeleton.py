@@ -29,6 +29,14 @@ class Skeleton:
     """(n, 3)."""
     tcp: Floats
     """(3,)."""
+    platform: Floats
+    """(n, 3) where its legs hold the platform (`plate` puts them in order); none where these are not corners of a plate."""
+
+    @property
+    def points(self) -> Floats:
+        """(n, 3) ends of everything that is drawn."""
+        ends = [e for _, e in (*self.links, *self.guides)]
+        return np.concatenate([*ends, self.platform, self.tcp[None]]) if ends else self.tcp[None]
 
 
 def skeleton(machine: Machine, coordinates: Floats, *, shortest: float = COINCIDENT) -> Skeleton:
@@ -38,6 +46,11 @@ def skeleton(machine: Machine, coordinates: Floats, *, shortest: float = COINCID
     position, rotation = core.frames(coordinates)
     owner = owners(core)
     named = joints(machine.description)
+    held = held_by(core)
+    corners = position[sorted(held)]
+    if not len(plate(corners)):
+        corners, held = np.zeros((0, 3)), set()
+    body = beyond(core, held)
     links, guides, marks = [], [], {Role.ACTUATOR: [], Role.PASSIVE: []}  # type: ignore[var-annotated]
     for i, (parent, c) in enumerate(core.nodes):
         role = core.names.roles[c] if c >= 0 else None
@@ -46,13 +59,55 @@ def skeleton(machine: Machine, coordinates: Floats, *, shortest: float = COINCID
         joint = named.get(core.names.coordinates[c]) if c >= 0 else None
         if joint is not None and joint.kind == "prismatic" and not _moves(core, parent):
             guides.append((owner[i], travel(joint, float(coordinates[c]), position[i], rotation[i])))
-        elif parent >= 0 and np.linalg.norm(position[i] - position[parent]) > shortest and parent != 0:
+        elif (
+            parent >= 0
+            and np.linalg.norm(position[i] - position[parent]) > shortest
+            and parent != 0
+            and i not in body
+        ):
             links.append((owner[i], position[[parent, i]]))
     empty = np.zeros((0, 3))
     return Skeleton(
         links, guides, np.array(marks[Role.ACTUATOR]).reshape(-1, 3) if marks[Role.ACTUATOR] else empty,
-        np.array(marks[Role.PASSIVE]).reshape(-1, 3) if marks[Role.PASSIVE] else empty, position[-1],
+        np.array(marks[Role.PASSIVE]).reshape(-1, 3) if marks[Role.PASSIVE] else empty, position[-1], corners,
     )  # fmt: skip
+
+
+def held_by(core: CompiledMachine) -> set[int]:
+    """Nodes at which legs in parallel end in the platform: the last joints of their branches."""
+    if len(core.names.legs) < 2:
+        return set()
+    owner = owners(core)
+    last = set[int]()
+    for i, (parent, c) in enumerate(core.nodes):
+        if c < 0 or not owner[i]:
+            continue
+        last.add(i)
+        while parent >= 0 and owner[parent] == owner[i]:
+            last.discard(parent)
+            parent = core.nodes[parent][0]
+    return last
+
+
+def beyond(core: CompiledMachine, held: set[int]) -> set[int]:
+    """Nodes of the legs that the platform carries: behind the last joints."""
+    owner = owners(core)
+    out = set[int]()
+    for i, (parent, _) in enumerate(core.nodes):
+        if owner[i] and (parent in held or parent in out):
+            out.add(i)
+    return out
+
+
+def plate(points: Floats) -> Floats:
+    """Points (n, 3) that span a plate, in order around its middle; none where they do not."""
+    if len(points) < 3:
+        return np.zeros((0, 3))
+    away = points - points.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(away, full_matrices=False)
+    if sizes[1] < 1e-3 * sizes[0] or sizes[2] > 0.5 * sizes[1]:
+        return np.zeros((0, 3))
+    return np.asarray(points[np.argsort(np.arctan2(away @ axes[1], away @ axes[0]))])
 
 
 def _moves(core: CompiledMachine, node: int) -> bool:

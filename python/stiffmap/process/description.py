@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import acos, pi
 
+from stiffmap.short import short_repr
+
 SIDES = ("climb", "conventional", "slot")
 """Where the part's wall is: right of the travel, left of it, on both sides (clockwise spindle, from above)."""
 PRESSURES = ("Ktc", "Krc", "Kac")
@@ -93,6 +95,7 @@ class Cut:
     """The tool passes through the stock: its depth does not follow the tool's axial deflection."""
 
 
+@short_repr
 @dataclass(frozen=True)
 class Process:
     """Tool, law, speeds and cut of one operation."""

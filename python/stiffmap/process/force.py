@@ -15,11 +15,13 @@ from stiffmap.process.description import EndMill, Process
 from stiffmap.process.load import load_process
 from stiffmap.process.mean import mean_force, slopes, tangential_force, with_coefficients
 from stiffmap.process.revolution import leaves_cut, mean_with_runout, revolution
+from stiffmap.short import short_repr
 
 ORDERS = 12
 """Harmonics of the tooth passing that are kept."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class CuttingForce:
     """Force on the tool in the axes feed, normal (left of the feed, seen against the tool), tool axis (holder to tip), N."""

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from stiffmap.errors import FileError
+from stiffmap.errors import FileError, StiffmapError
 from stiffmap.files.schema.base import suggestion
 from stiffmap.process.build import process_of
 from stiffmap.process.description import Process
@@ -29,6 +29,10 @@ def load_process(name_path_or_dict: str | PathLike[str] | Mapping[str, Any]) -> 
     """
     if isinstance(name_path_or_dict, Mapping):
         return process_of(Document(dict(name_path_or_dict)), "process")
+    if not isinstance(name_path_or_dict, str | PathLike):
+        raise StiffmapError(
+            f"process: expected a name, a file or a mapping; got {type(name_path_or_dict).__name__}"
+        )
     if str(name_path_or_dict) in process_names():
         path = FOLDER / f"{name_path_or_dict}.yaml"
     else:

@@ -7,36 +7,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from stiffmap.errors import StiffmapError
-
-LENGTHS = {"m": "m", "cm": "cm", "mm": "mm", "um": "um", "µm": "um", "μm": "um", "micron": "um", "in": "in"}
-FORCES = {"n": "N", "kn": "kN"}
-ANGLES = {"rad": "rad", "mrad": "mrad", "deg": "deg", "°": "deg", "grad": "deg"}
-MOMENTS = {
-    "nm": "N*m",
-    "n*m": "N*m",
-    "n·m": "N*m",
-    "n m": "N*m",
-    "nmm": "N*mm",
-    "n*mm": "N*mm",
-    "n·mm": "N*mm",
-}
-TEMPERATURES = {"°c": "degC", "degc": "degC", "c": "degC", "k": "K"}
+from stiffmap.spreadsheet.units import unit_of
 
 PATTERNS: tuple[tuple[str, str], ...] = (
-    ("id", r"id|nr|no|number|nummer|row|zeile|punkt|messpunkt|point"),
+    ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?"),
     ("temperature", r"t|temp|temperature|temperatur"),
     ("order", r"order|reihenfolge|sequence"),
     ("setup", r"set-?up|aufbau|aufspannung"),
     ("branch", r"branch|richtung der last|loading"),
-    *((f"f{a}", rf"f ?_?{a}|force ?_?(in )?{a}|kraft ?_?{a}|last ?_?{a}|load ?_?{a}") for a in "xyz"),
+    *((f"f{a}", rf"f ?_?{a}|force ?_?(in )?{a}|{a} ?(force|kraft|load|last)|kraft ?_?{a}|last ?_?(in )?{a}|load ?_?(in )?{a}") for a in "xyz"),
     *((f"m{a}", rf"m ?_?{a}|moment ?_?{a}|torque ?_?{a}") for a in "xyz"),
     *((f"u_d{a}", rf"u ?_?d?{a}|sigma ?_?d?{a}|std ?_?d?{a}") for a in "xyz"),
-    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displacement|verschiebung|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr) ?_?{a}") for a in "xyz"),
+    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displ\.?|displacement|verschiebung|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung) ?_?(in )?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a} ?(deflection|displ\.?|displacement|verschiebung|abweichung|dial|gau?ge|uhr|reading)") for a in "xyz"),
     *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
-    *((a, rf"{a}|pos ?_?{a}|{a} ?_?pos|position ?_?{a}|nominal ?_?{a}|soll ?_?{a}|{a} ?soll") for a in "xyz"),
+    *((a, rf"{a}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(nominal|pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|soll ?_?{a}|{a} ?soll|{a}[ _-]?(t|target|cmd|nominal|command|commanded)|target[ _-]?{a}") for a in "xyz"),
 )  # fmt: skip
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
-READINGS = ("dx", "dy", "dz", "rx", "ry", "rz", "dd")
+SEEN = ("px", "py", "pz")
+READINGS = ("dx", "dy", "dz", "rx", "ry", "rz", "dd", *SEEN)
 
 
 @dataclass(frozen=True)
@@ -55,13 +43,22 @@ class Column:
 
 
 def split_unit(header: str) -> tuple[str, str]:
-    """``Uhr 1 [µm]`` is ``Uhr 1`` in ``µm``; also round brackets, and ``x / mm``, ``x, mm``, ``x in mm``, ``x_mm``."""
+    """``Uhr 1 [µm]`` is ``Uhr 1`` in ``µm``; also round brackets, and ``x / mm``, ``x, mm``, ``x in mm``, ``x_mm``,
+    ``x 1/100 mm``."""
     match = re.match(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$", header)
     if match:
         return match[1].strip(), match[2].strip()
+    part = re.match(
+        r"^(.*?\S)(?:\s+in)?[\s,;]+((?:1/|0[.,]0*1\s?)\d*\s?(?:mm|in)?|(?:mm|in)/1\d+)\s*$", header
+    )
+    if part and known_unit(part[2]):
+        return part[1].strip(), part[2].strip()
     said = re.match(r"^(.*?)(?:\s*[/,;]\s*|\s+in\s+)(\S+)\s*$", header)
     bare = re.match(r"^(.*\S)[\s_](\S{2,})\s*$", header)
-    if said and known_unit(said[2]):
+    newton = re.match(r"^(.*?[^\s,;/])(?:\s+in)?\s(k?N)\s*$", header)
+    if newton:
+        return newton[1].strip(), newton[2]
+    if said and said[1] and known_unit(said[2]) and not known_unit(header):
         return said[1].strip(), said[2]
     if bare and bare[2].lower() != "in" and known_unit(bare[2]):
         return bare[1].strip(), bare[2]
@@ -70,13 +67,8 @@ def split_unit(header: str) -> tuple[str, str]:
 
 def known_unit(unit: str) -> str:
     """The unit as experiment files write it; empty for an unknown one."""
-    if unit.strip() in ("MN", "mN"):  # a factor of 1e9 between the two: here the case decides
-        return unit.strip()
-    key = unit.strip().lower()
-    for table in (LENGTHS, FORCES, ANGLES, MOMENTS, TEMPERATURES):
-        if key in table:
-            return table[key]
-    return ""
+    found = unit_of(unit)
+    return found.name if found else ""
 
 
 def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[Column]:

@@ -7,12 +7,12 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from stiffmap.cells import Cells
 from stiffmap.errors import FileError, StiffmapError
-from stiffmap.spreadsheet.guess import known_unit, split_unit
+from stiffmap.spreadsheet.guess import split_unit
 from stiffmap.spreadsheet.sheet import Sheet
+from stiffmap.spreadsheet.units import known, unit_of
 from stiffmap.yaml_text import read
 
 FOLDER = Path(__file__).parent / "instruments"
@@ -93,7 +93,7 @@ def as_readings(
                 f"{sheet.file}: '{sheet.header[own]}' was measured; no column is its commanded {axis}"
             )
         command = sheet.header.index(chosen[axis][0])
-        scale = [TO_MM[_named(sheet, i, m, instrument)] for i, m in ((own, reading), (command, axis))]
+        scale = [_named(sheet, i, m, instrument) for i, m in ((own, reading), (command, axis))]
         pairs = zip(sheet.numbers(own), sheet.numbers(command), strict=True)
         name = f"{sheet.header[own]} less {sheet.header[command]} [mm]"
         sheet = with_column(sheet, name, [a * scale[0] - b * scale[1] for a, b in pairs])
@@ -114,8 +114,8 @@ def _of_circle(
         if found is None:
             raise StiffmapError(f"{sheet.file}: no column is the {key}; there are: {', '.join(sheet.header)}")
         at[key] = found
-    turn = TO_RAD[_named(sheet, at["angle"], "angle", instrument)]
-    size = TO_MM[_named(sheet, at["deviation"], "deviation", instrument)]
+    turn = _named(sheet, at["angle"], "angle", instrument)
+    size = _named(sheet, at["deviation"], "deviation", instrument)
     angles = [turn * a for a in sheet.numbers(at["angle"])]
     centre = {a: constants[f"centre_{a}"] for a in "xyz"}
     plane = instrument.circle["plane"]
@@ -146,14 +146,16 @@ def _find(sheet: Sheet, pattern: str) -> int | None:
     return None
 
 
-def _named(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> str:
-    """Unit of a column: its header's, else the instrument's."""
+def _named(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> float:
+    """mm or rad that one of a column's unit is: its header's, else the instrument's."""
     text = split_unit(sheet.header[index])[1] or instrument.units.get(meaning, "")
-    found = known_unit(text)
-    table: dict[str, Any] = TO_RAD if meaning == "angle" else TO_MM
-    if found not in table:
-        raise StiffmapError(f"column '{sheet.header[index]}': the unit '{text}' is not one of this quantity")
-    return found
+    quantity = "angle" if meaning == "angle" else "length"
+    found = unit_of(text, quantity)
+    if found is None:
+        raise StiffmapError(
+            f"{sheet.file}: column '{sheet.header[index]}': expected a unit of {quantity} ({known(quantity)}); found '{text}'"
+        )
+    return found.factor * (TO_RAD if quantity == "angle" else TO_MM)[found.name]
 
 
 def _unit(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> dict[str, str]:

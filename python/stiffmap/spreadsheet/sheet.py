@@ -17,12 +17,54 @@ from stiffmap.broadcasting import Floats
 from stiffmap.cells import BETWEEN, BLOCK, Cells, filled, packed, row_numbers
 from stiffmap.errors import FileError
 from stiffmap.number_text import number_in
+from stiffmap.spreadsheet.header import header_of, record_of
 from stiffmap.spreadsheet.workbook import workbook_lines
 
 Lines = Callable[[], Iterable[tuple[int, list[str]]]]
 """Number and cells of each line, from the first one whenever it is called."""
 EXCEL = (".xlsx", ".xlsm")
-NOTHING = {"", "-", "--", "–", "na", "n/a", "n.a.", "nan", "none", "null", "#n/a"}
+NOTHING = {
+    *(
+        "",
+        "na",
+        "n/a",
+        "n.a.",
+        "nan",
+        "none",
+        "null",
+        "#n/a",
+        "#nv",
+        "n.m.",
+        "k.a.",
+        "k. a.",
+        "ka",
+        "?",
+        "x",
+        "./.",
+        "*",
+    ),
+    *(
+        "#div/0!",
+        "#value!",
+        "#wert!",
+        "#ref!",
+        "#bezug!",
+        "#name?",
+        "#num!",
+        "#zahl!",
+        "fehlt",
+        "missing",
+        "entfällt",
+    ),
+    *("out", "off", "ausreißer", "leer", "empty", "nicht gemessen", "not read", "not measured"),
+}
+DASHES = re.compile(r"[-–—_.· ]+")
+STATISTICS = re.compile(
+    r"(mean|average|avg|mittel(wert)?e?|mw|ø|sum|summe|total|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|min(imum)?|"
+    r"max(imum)?|median|range|spannweite|rms|durchschnitt|standardabweichung|streuung)\.?:?( .*)?",
+    re.IGNORECASE,
+)
+"""First cell of a row that is no reading but what a spreadsheet computed of them."""
 COMMENTS = ("#", "%", "//")
 LONGEST_HEADER, MOST_COLUMNS = 300, 1000
 SEPARATORS = ";\t|,"
@@ -44,6 +86,10 @@ class Sheet:
     lines: Sequence[int]
     """Line of each row in the file, from 1."""
     decimal_comma: bool
+    record: tuple[tuple[str, str], ...] = ()
+    """Operator, instrument and the like, from the lines above the table."""
+    aside: tuple[str, ...] = ()
+    """What was left out: rows of means, remarks below the table."""
     _read: dict[int, Floats] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
@@ -62,7 +108,8 @@ class Sheet:
         value = number(cell, False)
         if value is None:
             raise FileError(
-                f"column '{self.header[column]}': expected a number; found {cell!r}",
+                f"column '{self.header[column]}': expected a number; found {cell!r} "
+                f"(cell {column_letter(column)}{line})",
                 file=self.file,
                 line=line,
             )
@@ -80,7 +127,7 @@ class Sheet:
 def number(cell: str, decimal_comma: bool) -> float | None:
     """The number in a cell; NaN for nothing, None for text."""
     text = _plain(cell.strip())
-    if text.lower() in NOTHING:
+    if text.lower() in NOTHING or DASHES.fullmatch(text):
         return math.nan
     if decimal_comma:
         text = _with_point(text)
@@ -97,40 +144,87 @@ def read_sheet(path: Path, sheet: str | None = None) -> Sheet:
     Text: separators ; tab | , and decimal points or commas are found out, UTF-8, UTF-16 and Latin-1 are read.
     Comment lines are skipped; the header is the line before the first row of mostly numbers. Raises FileError.
     """
-    lines = workbook_lines(path, sheet) if path.suffix.lower() in EXCEL else _text(path)
-    comma = _decimal_comma(c for _, c in _kept(lines()))
-    before: tuple[int, list[str]] | None = None
-    rows = _kept(lines())
-    for n, c in rows:
-        if before is not None and _is_data(c, comma):
-            first = (n, c)
-            break
-        before = n, c
+    page = ""
+    if path.suffix.lower() in EXCEL:
+        page, lines = workbook_lines(path, sheet)
     else:
+        lines = _text(path)
+    comma = _decimal_comma(c for _, c in _kept(lines()))
+    above: list[tuple[int, list[str]]] = []
+    rows = iter(lines())
+    first = next((row for row in _above(rows, comma, above)), None)
+    found = None if first is None else header_of(above, first[1])
+    if first is None or found is None:
         raise FileError("no header line with rows of numbers below it was found", file=str(path))
-    assert before is not None
-    header = [re.sub(r"\s+", " ", c.strip()) for c in before[1]]
+    number_, header = found
     endless = next((c for c in header if len(c) > LONGEST_HEADER), None)
     if endless is not None or len(header) > MOST_COLUMNS:
         what = f"{len(header)} columns" if endless is None else f"one of {len(endless)} characters"
         raise FileError(
             f"expected a header of at most {MOST_COLUMNS} columns of {LONGEST_HEADER} characters each; found {what}",
             file=str(path),
-            line=before[0],
+            line=number_,
         )
     width = max(i for i, c in enumerate(header) if c) + 1
     names = [h or f"column {i + 1}" for i, h in enumerate(header[:width])]
     twice = sorted(h for h, n in Counter(names).items() if n > 1)
     if twice:
-        raise FileError(f"column '{twice[0]}' occurs twice", file=str(path), line=before[0])
-    numbered = row_numbers()
-    columns = packed(_even(chain([first], rows), width, numbered), width)
-    return Sheet(str(path), tuple(names), columns, numbered, comma)
+        raise FileError(f"column '{twice[0]}' occurs twice", file=str(path), line=number_)
+    numbered, aside = row_numbers(), list[str]()
+    data = _data(chain([first], _kept(rows)), header, comma, aside)
+    columns = packed(_even(data, width, numbered), width)
+    file = f"{path}, sheet '{page}'" if page else str(path)
+    return Sheet(file, tuple(names), columns, numbered, comma, record_of(above), tuple(aside))
 
 
 def _kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
     """Lines with something in them that are no comments."""
     return ((n, c) for n, c in lines if filled(c) and not c[0].strip().startswith(COMMENTS))
+
+
+def _above(
+    rows: Iterator[tuple[int, list[str]]], comma: bool, above: list[tuple[int, list[str]]]
+) -> Iterator[tuple[int, list[str]]]:
+    """The rows of data; `above` gathers the last lines before the first one."""
+    for n, cells in rows:
+        if not filled(cells):
+            continue
+        data = _is_data(cells, comma)
+        if data and not cells[0].strip().startswith(COMMENTS):
+            yield n, cells
+        elif not data:
+            above.append((n, cells))
+            del above[:-8]
+
+
+def _data(
+    rows: Iterable[tuple[int, list[str]]], header: Sequence[str], comma: bool, aside: list[str]
+) -> Iterator[tuple[int, list[str]]]:
+    """Rows of readings: without rows of means, headers that are repeated and remarks, of which `aside` says so."""
+    for n, cells in rows:
+        first = next(c.strip() for c in cells if c.strip())
+        if STATISTICS.fullmatch(first) and number(first, comma) is None:
+            aside.append(f"row {n}, '{first}', is no reading")
+        elif not any(_finite(c, comma) for c in cells):
+            again = [c.strip() for c in cells[:2]] == list(header[:2])
+            aside.append(f"row {n} {'repeats the header' if again else f'is a remark: {first[:40]}'}")
+        else:
+            yield n, cells
+
+
+def _finite(cell: str, comma: bool) -> bool:
+    value = number(cell, comma)
+    return value is not None and math.isfinite(value)
+
+
+def column_letter(index: int) -> str:
+    """``A`` for 0, ``AB`` for 27, as spreadsheets name columns."""
+    name = ""
+    index += 1
+    while index:
+        index, rest = divmod(index - 1, 26)
+        name = chr(65 + rest) + name
+    return name
 
 
 def _even(rows: Iterable[tuple[int, list[str]]], width: int, numbers: Any) -> Iterator[list[str]]:

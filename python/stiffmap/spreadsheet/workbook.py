@@ -15,13 +15,27 @@ LONGEST_GAP = 10_000
 """Blank lines after which a sheet is at its end."""
 
 
-def workbook_lines(path: Path, sheet: str | None) -> Callable[[], Iterable[tuple[int, list[str]]]]:
-    """Number and cells of each line of a sheet (the first one, or the named one). Raises FileError."""
+def sheet_names(path: Path) -> list[str]:
+    """Names of the sheets of a workbook. Raises FileError."""
+    return _opened(path, None)[0]
+
+
+def workbook_lines(
+    path: Path, sheet: str | None
+) -> tuple[str, Callable[[], Iterable[tuple[int, list[str]]]]]:
+    """Name of a sheet (the first one, or the named one), and number and cells of each of its lines. Raises FileError."""
+    names, lines = _opened(path, sheet or "")
+    return sheet or names[0], lambda: lines
+
+
+def _opened(path: Path, sheet: str | None) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Names of all sheets, and lines of one of them: the first for an empty name, of none for None."""
     try:
         from openpyxl import load_workbook
     except ModuleNotFoundError:
         raise MissingPartError(
-            f"{path}: reading Excel files needs openpyxl, which is not installed: pip install 'stiffmap[excel]'"
+            f"{path}: reading Excel files needs openpyxl, which is not installed: pip install openpyxl "
+            "(or save the sheet as CSV)"
         ) from None
     try:
         with warnings.catch_warnings():
@@ -30,9 +44,9 @@ def workbook_lines(path: Path, sheet: str | None) -> Callable[[], Iterable[tuple
             names = book.sheetnames
             if not names:
                 raise ValueError("it has no sheet")
-            if sheet is not None and sheet not in names:
+            if sheet and sheet not in names:
                 raise FileError(f"no sheet '{sheet}'; there are: {', '.join(names)}", file=str(path))
-            lines = _lines(book[sheet or names[0]], path)
+            lines = [] if sheet is None else _lines(book[sheet or names[0]], path)
     except (FileError, MemoryError):
         raise
     except FileNotFoundError:
@@ -42,7 +56,7 @@ def workbook_lines(path: Path, sheet: str | None) -> Callable[[], Iterable[tuple
     ) as error:  # openpyxl and zipfile raise many kinds for what is no workbook, or a damaged one
         what = " ".join(str(error).split()) or type(error).__name__
         raise FileError(f"cannot be read as an Excel workbook ({what})", file=str(path)) from error
-    return lambda: lines
+    return names, lines
 
 
 def _lines(page: Any, path: Path) -> list[tuple[int, list[str]]]:

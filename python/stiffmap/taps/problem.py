@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from stiffmap.addresses import moved, number
 from stiffmap.broadcasting import Floats
 from stiffmap.description import AppliedEffect, Body, MachineDescription
 from stiffmap.description.tree import all_elements
@@ -17,7 +18,6 @@ from stiffmap.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine
-from stiffmap.maps.uncertainty_edit import moved, number
 from stiffmap.taps.predict import predict_taps
 from stiffmap.taps.table import TapTest
 

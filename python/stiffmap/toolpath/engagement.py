@@ -43,7 +43,7 @@ class Engagement:
     """At m points."""
 
     radial: Floats
-    """(m,) m, width of the cut."""
+    """(m,) m, width of the stock ahead of the wall; the tool cuts at most its diameter of it."""
     curvature: Floats
     """(m,) 1/m of the centre's path, positive where the part lies outside the curve."""
     corner: Floats
@@ -101,7 +101,7 @@ def _in_box(points: Points, process: Process, stock: Box, side: float) -> tuple[
     inside = ((wall >= stock.low - 1e-9) & (wall <= stock.high + 1e-9)) | (np.abs(out) > 1e-12)
     width = np.where(inside[:, :2].all(axis=1), far - np.maximum(near, 0.0), 0.0)
     height = (stock.high[2] - points.position[:, 2]).clip(0.0, stock.high[2] - stock.low[2])
-    return width.clip(0.0, process.tool.diameter), height.clip(0.0, process.cut.axial)
+    return width.clip(0.0), height.clip(0.0, process.cut.axial)
 
 
 def _corners(points: Points, path: Toolpath, process: Process, radial: Floats, side: float) -> Floats:

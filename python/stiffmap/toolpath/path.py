@@ -51,6 +51,10 @@ class Toolpath:
     notes: tuple[str, ...] = ()
     text: tuple[str, ...] = field(default=(), repr=False)
     """Lines of the G-code, where it came from such."""
+    turn: Floats | None = None
+    """(n,) rad, turn of an arm's tool about its axis at the end of the move; None: the path says nothing."""
+    offsets: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    """Work offsets with which the G-code was read, m."""
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -74,6 +78,13 @@ class Toolpath:
         across = np.sqrt(np.maximum((way**2).sum(axis=1) - along**2, 0.0))
         moving = (self.kind == Kind.ARC) | (across > 1e-9 + 1e-3 * along)
         return np.asarray((self.kind != Kind.RAPID) & moving & (self.length > 0))
+
+    def turn_at(self, move: Integers, share: Floats) -> Floats | None:
+        """(m,) rad at shares (m,) of the moves (m,): even over each move, as axes are driven."""
+        if self.turn is None:
+            return None
+        before = np.r_[self.turn[:1], self.turn[:-1]][move]
+        return np.asarray(before + share * (self.turn[move] - before))
 
     def _radius(self, s: Floats) -> Floats:
         a, b = self._spokes()
@@ -129,7 +140,8 @@ class Toolpath:
     def only(self, chosen: NDArray[np.bool_]) -> Toolpath:
         """Some of the moves."""
         arrays = ("kind", "start", "end", "centre", "normal", "sweep", "feed", "spindle", "line", "tool")
-        return replace(self, **{n: getattr(self, n)[chosen] for n in arrays})
+        turn = None if self.turn is None else self.turn[chosen]
+        return replace(self, **{n: getattr(self, n)[chosen] for n in arrays}, turn=turn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,8 +179,9 @@ def path_of(
     lines: ArrayLike | None = None,
     name: str = "path",
     notes: tuple[str, ...] = (),
+    turn: Floats | None = None,
 ) -> Toolpath:
-    """Straight moves through points (k, 3) m; feed (k,) m/s, spindle (k,) rad/s and tool axis (k, 3) are those on arriving."""
+    """Straight moves through points (k, 3) m; feed (k,) m/s, spindle (k,) rad/s, tool axis (k, 3) and turn (k,) rad are those on arriving."""
     p = np.asarray(points, dtype=float)
     if p.ndim != 2 or p.shape[1] != 3 or len(p) < 2 or not np.isfinite(p).all():
         raise StiffmapError(f"path: expected two or more finite points (k, 3) in m, got shape {p.shape}")
@@ -182,5 +195,5 @@ def path_of(
         np.full(n, Kind.LINE, np.uint8), p[:-1].copy(), p[1:].copy(), np.full((n, 3), np.nan), np.full(n, 2, np.int8),
         np.zeros(n), np.broadcast_to(np.asarray(feed, float), len(p))[1:].copy(),
         np.broadcast_to(np.asarray(spindle, float), len(p))[1:].copy(), along.astype(np.int64), (axis / size)[1:].copy(),
-        name, notes,
+        name, notes, turn=None if turn is None else np.asarray(turn, float)[1:].copy(),
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import nan
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,8 @@ from stiffmap.toolpath.path import Kind
 
 WIDEST = np.pi
 """rad of one arc."""
+EVEN = 1e-4
+"""rad by which the turn of a tool may be off the even one over a piece."""
 
 
 class MovedPiece(NamedTuple):
@@ -20,10 +23,12 @@ class MovedPiece(NamedTuple):
     end: Floats
     centre: Floats
     sweep: float
+    turn: float = nan
+    """rad, of the tool about its axis at the end; NaN where nothing turns it."""
 
 
-def line_pieces(points: Floats, within: float) -> list[MovedPiece]:
-    """Lines through some of the points (k, 3), the others no further than `within` (m) from them."""
+def line_pieces(points: Floats, within: float, turn: Floats | None = None) -> list[MovedPiece]:
+    """Lines through some of the points (k, 3), the others no further than `within` (m) from them; turn (k,) rad is even over each."""
     out: list[MovedPiece] = []
     stack = [(0, len(points) - 1)]
     none = np.full(3, np.nan)
@@ -37,15 +42,31 @@ def line_pieces(points: Floats, within: float) -> list[MovedPiece]:
             share = (inner @ way / size).clip(0, 1) if size > 0 else np.zeros(len(inner))
             far = np.linalg.norm(inner - share[:, None] * way, axis=1)
             worst = int(np.argmax(far))
-            if far[worst] > within:
-                middle = i + 1 + worst
+            skewed = _uneven(turn, i, j)
+            if far[worst] > within or skewed:
+                middle = i + 1 + worst if far[worst] > within else skewed
                 stack += [(middle, j), (i, middle)]
                 continue
-        out.append(MovedPiece(Kind.LINE, b, none, 0.0))
+        out.append(MovedPiece(Kind.LINE, b, none, 0.0, _at(turn, j)))
     return out
 
 
-def arc_pieces(points: Floats, normal: int, sense: float, within: float) -> list[MovedPiece]:
+def _at(turn: Floats | None, k: int) -> float:
+    return nan if turn is None else float(turn[k])
+
+
+def _uneven(turn: Floats | None, i: int, j: int) -> int:
+    """The point between i and j where the turn is furthest from even; 0 where it is even."""
+    if turn is None or j < i + 2:
+        return 0
+    far = np.abs(turn[i : j + 1] - np.linspace(turn[i], turn[j], j + 1 - i))
+    worst = int(np.argmax(far))
+    return i + worst if far[worst] > EVEN else 0
+
+
+def arc_pieces(
+    points: Floats, normal: int, sense: float, within: float, turn: Floats | None = None
+) -> list[MovedPiece]:
     """Arcs about an axis (0, 1, 2) through points (k, 3), k odd; lines where three points do not make one."""
     out: list[MovedPiece] = []
     stack = [(0, len(points) - 1)]
@@ -53,10 +74,14 @@ def arc_pieces(points: Floats, normal: int, sense: float, within: float) -> list
         i, j = stack.pop()
         middle = (i + j) // 2
         arc = _arc(points[i : j + 1], middle - i, normal, sense)
-        if arc is not None and abs(arc.sweep) <= WIDEST and _off(points[i : j + 1], arc, normal) <= within:
+        arc = None if arc is None else arc._replace(turn=_at(turn, j))
+        near = arc is not None and abs(arc.sweep) <= WIDEST and _off(points[i : j + 1], arc, normal) <= within
+        if arc is not None and near and not _uneven(turn, i, j):
             out.append(arc)
         elif j - i <= 2:
-            out += line_pieces(points[i : j + 1], within) if arc is None or abs(arc.sweep) > WIDEST else [arc]
+            lines = arc is None or abs(arc.sweep) > WIDEST or bool(_uneven(turn, i, j))
+            part = None if turn is None else turn[i : j + 1]
+            out += line_pieces(points[i : j + 1], within, part) if lines or arc is None else [arc]
         else:
             middle += (middle - i) % 2  # both halves keep an even number of intervals
             stack += [(middle, j), (i, middle)]

@@ -58,14 +58,15 @@ def read_points(path: Path) -> Toolpath:
         raise FileError("expected a direction of the tool that is not zero", file=file, line=where)
     points = np.stack([got[a] for a in "xyz"], axis=1)
     return path_of(
-        points, feed=feed, spindle=spindle, tool=tool, lines=np.arange(2, len(values) + 2), name=path.stem
-    )
+        points, feed=feed, spindle=spindle, tool=tool, lines=np.arange(2, len(values) + 2), name=path.stem,
+        turn=got.get("turn"),
+    )  # fmt: skip
 
 
 def _column(header: str, file: str) -> tuple[str, float]:
     """Name and SI size of a column: ``x_mm``, ``x [mm]``, ``feed_mm_min``, ``spindle_rpm``, ``i``."""
     text = header.strip()
-    match = re.fullmatch(r"(\w+?)(?:_(mm_min|m_min|mm_s|m_s|mm|m|in|rpm)|\s*\[\s*([\w/]+)\s*\])?", text)
+    match = re.fullmatch(r"(\w+?)(?:_(mm_min|m_min|mm_s|m_s|mm|m|in|rpm|deg)|\s*\[\s*([\w/]+)\s*\])?", text)
     if match is None:
         raise FileError(
             f"column {text!r}: expected such as x_mm, feed_mm_min, spindle_rpm, i", file=file, line=1
@@ -74,17 +75,24 @@ def _column(header: str, file: str) -> tuple[str, float]:
     unit = FILE_FEEDS.get(unit, unit)
     if name in "ijk" and len(name) == 1 and not unit:
         return name, 1.0
-    tables = {"x": LENGTHS, "y": LENGTHS, "z": LENGTHS, "feed": FEEDS, "spindle": {"rpm": pi / 30}}
+    tables = {
+        "x": LENGTHS,
+        "y": LENGTHS,
+        "z": LENGTHS,
+        "feed": FEEDS,
+        "spindle": {"rpm": pi / 30},
+        "turn": {"deg": pi / 180},
+    }
     if name not in tables:
         raise FileError(
-            f"unknown column {text!r}; known: x_mm, y_mm, z_mm, feed_mm_min, spindle_rpm, i, j, k",
+            f"unknown column {text!r}; known: x_mm, y_mm, z_mm, feed_mm_min, spindle_rpm, i, j, k, turn_deg",
             file=file,
             line=1,
         )
     if unit not in tables[name]:
         what = "the unit is missing" if not unit else f"unknown unit {unit!r}"
         raise FileError(
-            f"column {text!r}: {what}; expected such as {name}_{'mm' if name in 'xyz' else 'mm_min' if name == 'feed' else 'rpm'}",
+            f"column {text!r}: {what}; expected such as {name}_{'mm' if name in 'xyz' else {'feed': 'mm_min', 'turn': 'deg'}.get(name, 'rpm')}",
             file=file,
             line=1,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -115,7 +116,7 @@ def test_a_number_farther_off_than_any_tolerance_is_not_claimed() -> None:
     zero = Unknown("zero of drive", "zeros", "m", 2e-4)
     for size, claimed in ((60.0, True), (150.0, False)):
         sums = Sums.of(column, size * column[:, 0] + rng.standard_normal(400))
-        found = claims(sums, [zero], {"zeros": [0]}, (), None, lambda before, after: "")
+        found = claims(sums, [zero], {"zeros": [0]}, (), None, lambda before, after, which: "")
         assert found.any is claimed
         assert bool(found.refused) is not claimed
     assert "150 standard uncertainties" in found.refused[0]
@@ -129,7 +130,7 @@ def test_groups_that_do_not_suffice_are_withdrawn() -> None:
     names = [Unknown(f"n{i}", "first" if i < 3 else "second", "m", 1e-4) for i in range(6)]
     asked: list[float] = []
 
-    def first_only(before: Floats, after: Floats) -> str:
+    def first_only(before: Floats, after: Floats, which: Sequence[int]) -> str:
         asked.append(float(before.max()))
         return "" if before.max() == 1.0 else "no"
 

@@ -7,9 +7,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
-from stiffmap.calibration.beyond import FREE, _gains, as_factor, beyond_tolerance
+from stiffmap.calibration.beyond import _gains, as_factor, beyond_tolerance
 from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.groups import compare
+from stiffmap.calibration.limits import FREE
 from stiffmap.calibration.statistics import Sums, directions, independent
 from stiffmap.calibration.unknowns import Unknown
 

@@ -13,7 +13,7 @@ import stiffmap as sm
 from stiffmap.calibration import Calibration, calibrate
 from stiffmap.calibration.travel import apart, hats
 from stiffmap.cli.calibrate import write
-from stiffmap.experiment import Experiment, Predictor
+from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.virtual.plans import plan_of_joints
 
@@ -92,3 +92,21 @@ def test_hats_are_straight_between_knots() -> None:
     made = hats(x, np.array([0.0, 1.0, 3.0]))
     assert made @ [0.0, 2.0, 4.0] == pytest.approx([0.0, 0.0, 0.5, 2.0, 4.0, 4.0])
     assert made.sum(axis=1) == pytest.approx(np.ones(6))
+
+
+def test_drives_of_the_platform_have_a_travel_too() -> None:
+    """Those of the hybrid's wrist have no leg: their coordinates go by another name than their elements."""
+    machine = sm.load_machine("hybrid")
+    built = machine.with_effect("periodic_error", element="a", amplitude=3e-4, period=0.7, phase=0.2)
+    plan = random_plan(machine, "position", poses=30, repeats=1, seed=2)
+    far = built.with_effect(
+        "periodic_error", element="carriage", legs=["b"], amplitude=6e-5, period=0.05, phase=0.2
+    )
+    c = sm.calibrate(machine, plan.with_readings(Predictor(far, plan)()))
+    assert c.verdict == "unattributed"
+    assert set(c.validity.drives) == {"a.carriage", "b.carriage", "c.carriage", "a", "b"}
+    assert "a 0 deg" in str(c.validity)
+    assert c.unseen is not None
+    worse = replace(c, unseen=replace(c.unseen, after=1.1 * c.unseen.before))
+    warned = [any("do not use it" in line for line in x.lines()) for x in (c, worse)]
+    assert warned == [c.unseen.after > c.unseen.before, True]

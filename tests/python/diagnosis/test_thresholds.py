@@ -146,20 +146,23 @@ def test_few_effects_are_hopeless_at_25_per_reading(
     assert few.not_few(study, found, -np.inf) is so
 
 
-@pytest.mark.parametrize(("lead", "answer"), [(3.1, "first"), (2.9, "layered")])
-def test_effects_on_an_exact_machine_lead_by_three_nats(
+@pytest.mark.parametrize(
+    ("lead", "answer"), [(6.1, "effects"), (5.9, "ambiguous"), (3.1, "ambiguous"), (2.9, "layered")]
+)
+def test_effects_on_an_exact_machine_lead_by_three_nats_and_are_alone_from_six_on(
     monkeypatch: pytest.MonkeyPatch, lead: float, answer: str
 ) -> None:
     problem = SimpleNamespace()
-    finding = SimpleNamespace(
-        model=SimpleNamespace(candidates=(ONE,)), search=SimpleNamespace(problem=problem)
-    )
+    model = SimpleNamespace(candidates=(ONE,))
+    finding = SimpleNamespace(model=model, search=SimpleNamespace(problem=problem))
     for name, value in {
         "calibrator": object(),
         "not_few": False,
         "screened": None,
         "find": finding,
         "judge": (finding, "effects", []),
+        "admissible": (model, ()),
+        "above_noise": (model, ()),
         "sparse_evidence": lead - 7.0,
         "spread_evidence": -7.0,
         "_layered": "layered",
@@ -170,7 +173,7 @@ def test_effects_on_an_exact_machine_lead_by_three_nats(
     )
     tolerances: Any = None
     got: Any = beside_calibration.find_effects(study, 0, tolerances)
-    assert (got if isinstance(got, str) else "first") == answer
+    assert (got if isinstance(got, str) else got.verdict) == answer
 
 
 @pytest.mark.parametrize(("rho", "answer"), [(0.29, "searched"), (0.31, "at the floor")])

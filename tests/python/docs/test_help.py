@@ -49,7 +49,11 @@ TAPS = Path(__file__).parents[3] / "examples/taps"
 @pytest.fixture(scope="module")
 def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files of the examples."""
-    at = tmp_path_factory.mktemp("workshop")
+    return make_workshop(tmp_path_factory.mktemp("workshop"))
+
+
+def make_workshop(at: Path) -> Path:
+    """The files, in this folder."""
 
     def simulate(machine: str, name: str, *more: str) -> None:
         assert main(["simulate", machine, "--poses", "6", *more, "-o", str(at / name)]) == 0
@@ -74,11 +78,15 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "orthoglide-revised", month, "--seed", seed, "--effect", "dead_zone actuator y half_width=10um"
         )
     assert main(["map", "orthoglide-revised", "--points", "5", "-o", str(at / "results")]) == 0
-    (at / "poses.csv").write_text("x,y,z\n0,0,0\n100,-50,80\n", encoding="utf-8")
+    (at / "poses.csv").write_text("x [mm],y [mm],z [mm]\n0,0,0\n100,-50,80\n", encoding="utf-8")
     (at / "my_poses.csv").write_text("x,y,z,fx\n0,0,0,100\n100,-50,80,200\n", encoding="utf-8")
     p = np.array(sm.load_machine("ur10").description.home.p) * 1e3
     path = [p, p + [20, 30, -10], p + [40, 0, 0]]
     rows = "\n".join(",".join(f"{v:.3f}" for v in q) for q in path)
+    (at / "path_small.csv").write_text("x [mm],y [mm],z [mm]\n0,0,0\n50,0,0\n", encoding="utf-8")
+    (at / "path_flat.csv").write_text(
+        "x [mm],y [mm],z [mm],fx [N]\n0,400,0,0\n50,420,0,90\n", encoding="utf-8"
+    )
     (at / "path.csv").write_text(f"x [mm],y [mm],z [mm]\n{rows}\n", encoding="utf-8")
     (at / "cut.yaml").write_text(
         "name: cut\nline: {start: [-100 mm, 0 mm, 0 mm], end: [150 mm, 100 mm, -100 mm]}\nduration: 2 s\n",
@@ -151,6 +159,10 @@ def test_examples_run(
     if name == "monitor":  # goes on from a diagnosis
         main(["diagnose", "orthoglide-revised", str(workshop / "january"), "-o", str(workshop / "found")])
         shutil.copy(workshop / "found/diagnosis.json", workshop / "january")
+    if name == "view":  # serves until it is interrupted
+        opening = pytest.importorskip("stiffmap.view.open", reason="needs the extra [view]")
+        monkeypatch.setattr(opening.View, "wait", opening.View.close)
+        monkeypatch.setattr("webbrowser.open", lambda *_: True)
     (workshop / name).mkdir(exist_ok=True)
     monkeypatch.chdir(workshop / name if name == "new" else workshop)
     command = next(c for c in COMMANDS if c.name == name)

@@ -9,8 +9,8 @@ import pytest
 from scipy.stats import kstest
 
 import stiffmap as sm
-from stiffmap.cli.inputs import placed
 from stiffmap.experiment import Experiment, simulate
+from stiffmap.experiment.calls import placed
 from stiffmap.experiment.noise.checks import Check, checks
 from stiffmap.experiment.virtual.plans import load_set, plan_of_poses, random_poses, with_branches
 

@@ -9,11 +9,11 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import stiffmap as sm
-from stiffmap.cli.inputs import placed
 from stiffmap.description.tree import joints
 from stiffmap.diagnosis.decision.patterns import features
 from stiffmap.effects.library.hysteresis import deflection, spring_force
 from stiffmap.experiment import Predictor, load_experiment, random_plan
+from stiffmap.experiment.calls import placed
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.history import drives_of

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.cli.inputs import placed
 from stiffmap.experiment import Predictor, residual
+from stiffmap.experiment.calls import placed
 
 from .conftest import Twin
 

@@ -114,6 +114,7 @@ def full_machine(seed: int = 0) -> MachineDescription:
         title='A "title": with # signs',
         source="line one\nline two, °C",
         uncertainty=(("z", number()), ("a.b/c", number())),
+        sources=(("three.tip", "measured"), ("*", "assumed")),
         notes=(("three.tip", "yes"), ("drive", "1e6"), ("x", "null"), ("empty", "")),
         extra=(("fit", (1.5, ("a", True, None), 3)), ("word", "true")),
     )

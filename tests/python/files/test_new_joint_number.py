@@ -28,7 +28,7 @@ from pathlib import Path
 import stiffmap as sm
 from stiffmap.description.tree import all_elements
 from stiffmap.files.json_schema import machine_schema
-from stiffmap.maps.uncertainty_edit import moved, number
+from stiffmap.addresses import moved, number
 
 assert sm.__file__.startswith(sys.argv[1]), sm.__file__
 folder = Path(sys.argv[1])

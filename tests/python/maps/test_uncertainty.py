@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 import stiffmap as sm
+from stiffmap.addresses import moved, number
 from stiffmap.cli import main
 from stiffmap.description import MachineDescription
 from stiffmap.errors import StiffmapError
@@ -22,7 +23,6 @@ from stiffmap.machine import Machine
 from stiffmap.maps.loading import Loading
 from stiffmap.maps.uncertainty import UPPER, uncertain_numbers
 from stiffmap.maps.uncertainty_block import sensitivities
-from stiffmap.maps.uncertainty_edit import moved, number
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 GRID = {"x": [-0.05, 0.1], "y": [0.1], "z": [0.05]}
@@ -63,7 +63,7 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Machine:
     return sm.load_machine(
         write_machine(
             folder,
-            ("{value: 1.4e-4, note", "{value: 1.4e-4, u: 3.0e-6, note"),
+            ("{value: 1.4e-4, source", "{value: 1.4e-4, u: 3.0e-6, source"),
             ("translation: [31, 0, 0]", "translation: [{value: 31, u: 0.004}, 0, 0]"),
         )
     )

@@ -19,8 +19,9 @@ from stiffmap.milling.placement import Search, placements
 from stiffmap.milling.plant import Plant
 from stiffmap.milling.redundancy import Steps, best_sequence, redundancy
 from stiffmap.milling.setting import Setting, setting
-from stiffmap.milling.speed import best_feeds, other_side, turned_round
+from stiffmap.milling.speed import best_feeds, other_side
 from stiffmap.toolpath import outline, path_of, sampled
+from stiffmap.toolpath.entry import turned_round
 
 ARM = Path(__file__).parents[3] / "examples/ur10-spindle.yaml"
 PROCESS = sm.load_process("trimming")
@@ -89,6 +90,16 @@ def test_placement_beats_the_naive_one_and_holds_the_path() -> None:
     ds = mill(machine, path, PROCESS, at=found.best.at, turn=found.best.turn, step=0.01)
     assert (ds.status.values == 0).all()
     assert float(np.abs(ds.error_normal).max()) == pytest.approx(found.best_error, rel=0.05)
+    assert "the best leaves" in found.words(1.0)
+    assert "No placement" not in found.words(1.0)
+    short = found.words(1e-6)
+    assert short.startswith(
+        "No placement of 64 reaches the tolerance of 0.001 mm without compensation: the best leaves"
+    )
+    assert found.limits in short
+    assert found.naive_along.max() == pytest.approx(found.naive_error)
+    assert np.abs(found.best_along).max() == pytest.approx(found.best_error)
+    assert found.three_times == pytest.approx((found.largest > 3 * found.best_error).mean())
     # the many are judged as one by one
     search = Search(machine, path, PROCESS, 60, None)
     from stiffmap.toolpath import Placement
@@ -123,6 +134,19 @@ def test_feed_up_to_the_tolerance() -> None:
     assert not best_feeds(job, 1e-7).held.any()
     with pytest.raises(StiffmapError, match="tolerance: expected"):
         best_feeds(job, 0.0)
+
+
+def test_feed_up_to_the_drives_efforts() -> None:
+    machine, path = sm.load_machine("linear-delta"), outline("circle", (0.06,))
+    job = setting(machine, path, PROCESS, sampled(path, 4e-3), path.placed((0.05, 0.05, 0.3)))
+    found = best_feeds(job, 1e-3)
+    assert set(found.limited_by) - {"does not cut"} == {"drive effort"}
+    share = found.feed[job.points.move] / job.feed
+    for more, broken in ((1.0, False), (1.01, True)):
+        faster = replace(job, faster=job.faster * share * more)
+        force = faster.force(np.zeros((len(job), 2)))
+        effort = Plant(faster).stand(job.position, force, full=True).effort
+        assert (np.abs(effort).max() > 150.0) is np.bool_(broken)  # N, from the machine's file
 
 
 def test_the_other_way_round() -> None:

@@ -51,12 +51,24 @@ def test_outline_to_report_and_program(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 def test_findings_and_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    small = ["linear-delta", "circle", "--size", "60", "--process", "trimming", "--at", "0,0,300"]
+    small = ["linear-delta", "circle", "--size", "60", "--process", "trimming", "--at", "50,50,300"]
     assert main(["mill", *small, "--tolerance", "0.000001", "--step", "5"]) == 1
     assert "beyond it compensated" in capsys.readouterr().out
-    assert main(["mill", *small[:-2]]) == 0  # at the machine's home
-    capsys.readouterr()
+    assert main(["mill", *small]) == 0
+    assert "warnings" not in capsys.readouterr().out
+    assert main(["mill", *small[:-2]]) == 1  # at the machine's home its drives are too weak
+    assert "The drive effort is broken at 12 of" in capsys.readouterr().out
+    assert (
+        main(["mill", *small, "--entry", "best", "--feeds", "--tolerance", "0.1", "--reverse", "--json"]) == 0
+    )
+    said = json.loads(capsys.readouterr().out)
+    assert said["entry"]["step_there_mm"] <= said["entry"]["step_as_given_mm"]
+    assert said["feeds"]["held"]
+    assert said["error_normal_mm"]["largest"] <= 0.1 * (1 + 1e-6)
     for wrong, message in (
+        (["--stock", "1,2,3"], "--stock"),
+        (["--stock=0,0,0,-1,1,1"], "stock: expected two corners"),
+        (["--entry", "1000"], "entry: expected 0 to"),
         (["--tolerance", "0"], "--tolerance"),
         (["--offset", "G60=1"], "--offset"),
         (["--at", "1,2"], "--at"),

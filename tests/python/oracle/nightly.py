@@ -3,10 +3,10 @@ families of `generate`, `cartesian` (bodies, constraints) for the classes of `cl
 Numbers, and every status against the eigenvalues of the energy's Hessian over the motions that keep the loops closed.
 
 usage: python -m tests.python.oracle.nightly --count 1000 [--first 0] [--only "spinning rods" ...] [--jobs 2]
-           [--out build/nightly.jsonl]
+           [--out build/nightly.jsonl] [--scheduler tcp://HOST:8786]
 
 Of every eight seeds one is a machine of `generate`, seven are of `classes`. With --out a run goes on where it was stopped.
-A machine at which the program dies is one that disagrees.
+A machine at which the program dies is one that disagrees. Workers of a cluster are started in the repository's folder.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ import numpy as np
 
 import stiffmap as sm
 from stiffmap import Flag, Status
+from stiffmap.tasks import workers
 
 from .alter import slopes, with_one_effect
 from .cartesian.structure import Unsupported
@@ -59,6 +60,7 @@ def main() -> int:
     options.add_argument("--only", nargs="+", default=[], help="machines of these names among the seeds")
     options.add_argument("--jobs", type=int, default=1)
     options.add_argument("--out", type=Path, help="results, a line per machine")
+    options.add_argument("--scheduler", help="address of a dask scheduler whose workers judge the machines")
     given = options.parse_args()
     done = (
         [json.loads(line) for line in given.out.read_text().splitlines()]
@@ -69,7 +71,7 @@ def main() -> int:
     done = [r for r in done if r["seed"] in seeds]
     seen = {r["seed"] for r in done}
     todo = [s for s in seeds if s not in seen and (not given.only or name_of(s) in given.only)]
-    for result in judged(todo, given.jobs):
+    for result in on_cluster(todo, given.scheduler) if given.scheduler else judged(todo, given.jobs):
         done.append(result)
         for wrong in result["wrong"]:
             print(f"seed {result['seed']}: {result['name']}: {wrong}", flush=True)
@@ -97,6 +99,18 @@ def judged(seeds: list[int], jobs: int) -> Iterator[dict[str, Any]]:
             except BrokenProcessPool:
                 results = [alone(seed) for seed in some]
         yield from results
+
+
+def on_cluster(seeds: list[int], scheduler: Any) -> Iterator[dict[str, Any]]:
+    """Results of a cluster's workers as they come."""
+    with workers(judge_for, None, scheduler=scheduler) as cluster:
+        for _, result in cluster.as_done(seeds):
+            yield result
+
+
+def judge_for(_: None, seed: int) -> dict[str, Any]:
+    """One machine, as a task."""
+    return judge(seed)
 
 
 def alone(seed: int) -> dict[str, Any]:

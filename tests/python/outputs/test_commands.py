@@ -146,15 +146,13 @@ def test_killed_while_it_writes_a_data_set(tmp_path: Path) -> None:
     with subprocess.Popen(
         [sys.executable, "-c", code, *args], cwd=tmp_path, stdout=subprocess.DEVNULL
     ) as job:
-        while job.poll() is None and not any((tmp_path / "e").glob(".data.csv.writing*")):
+        while job.poll() is None and not any(tmp_path.glob(".e.new/.data.csv.writing*")):
             time.sleep(0.001)
         job.send_signal(signal.SIGKILL)
-    assert (
-        not (tmp_path / "e/data.csv").exists()
-        or len((tmp_path / "e/data.csv").read_text().splitlines()) == 30_001
-    )
+    assert not (tmp_path / "e").exists()
     assert command(args, tmp_path).returncode == 0
     assert sorted(p.name for p in (tmp_path / "e").iterdir()) == ["data.csv", "experiment.yaml"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "e"]
 
 
 def test_standard_output_on_a_full_disk_is_one_message(tmp_path: Path) -> None:

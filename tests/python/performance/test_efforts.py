@@ -85,7 +85,7 @@ def test_bad_motion_files_name_the_key(tmp_path, old, new, words):
     [
         ("x [mm]", "x", r"line 1: x: the unit is missing: write x \[mm\]"),
         ("x [mm]", "x [kg]", "line 1: x: expected a unit such as"),
-        ("x [mm]", "w [mm]", "unknown column 'w .*known: t, x, y, z"),
+        ("x [mm]", "w [mm]", "unknown column 'w .*known: x, y, z, rx"),
         ("y [cm]", "x [cm]", "twice"),
         ("0.2,10", "0.05,10", r"line 4: times must increase; 0.05 s follows 0.1 s"),
         ("0.2,10", "0.2,ten", r"line 4: x: expected a number, found 'ten'"),

@@ -10,9 +10,9 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.cli.app import main
-from stiffmap.cli.inputs import placed
 from stiffmap.compensation import compensate
 from stiffmap.experiment import Predictor, simulate
+from stiffmap.experiment.calls import placed
 from stiffmap.planning import design, estimate, follow
 from stiffmap.planning.monitor import compare
 

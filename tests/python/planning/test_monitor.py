@@ -10,8 +10,8 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.cli.app import main
-from stiffmap.cli.inputs import placed
 from stiffmap.experiment import random_plan, save_experiment, simulate
+from stiffmap.experiment.calls import placed
 from stiffmap.planning.budget import Budget, Line, budgets, iso_230_2, iso_9283
 from stiffmap.planning.estimate import estimate
 from stiffmap.planning.monitor import compare
@@ -109,3 +109,31 @@ def test_pose_accuracy_in_the_words_of_iso_9283() -> None:
     accuracy, repeatability = iso_9283(attained, np.zeros(3))
     assert accuracy == pytest.approx(np.sqrt(1e-6 + 2e-8))
     assert repeatability == pytest.approx(np.sqrt(2e-8))  # all at one distance
+
+
+def test_what_a_model_leaves_is_no_change(orthoglide: sm.Machine) -> None:
+    """Two sides of the workspace, of a machine that is off elsewhere, too; a change at the same poses is seen beside that."""
+    term = [placed(orthoglide, "zero_offset actuator x error=0um")]
+    off = [
+        placed(orthoglide, text)
+        for text in (
+            "length bar x error=0.15mm",
+            "length bar y error=-0.1mm",
+            "parallelogram_width parallelogram z error=0.05mm",
+            "lead_error actuator y slope=300e-6",
+            "periodic_error actuator y amplitude=20um period=120mm phase=10deg",
+        )
+    ]
+    plan = random_plan(orthoglide, "position", poses=240, repeats=1, seed=4)
+    whole = simulate(orthoglide, plan, off, seed=1)
+    for seed in (1, 3, 5):  # misfits alone find changes in two of these, p = 0.01 and 0.005
+        along = whole.position @ np.random.default_rng(seed).standard_normal(3)
+        half = along < np.median(along)
+        assert compare(orthoglide, whole.rows(half), whole.rows(~half), term).p > 0.1
+    later = simulate(
+        orthoglide, plan, [*off, placed(orthoglide, "zero_offset actuator x error=0.02mm")], seed=2
+    )
+    found = compare(orthoglide, whole, later, term)
+    assert found.changes[0].changed
+    assert found.changes[0].after - found.changes[0].before == pytest.approx(2e-5, abs=4 * found.changes[0].u)
+    assert found.changes[0].u < 2e-6  # what is left is the same at the same poses

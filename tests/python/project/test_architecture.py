@@ -17,6 +17,7 @@ RANKS = (
     ("dense", "se3"),
     ("law", "spring", "load", "chatter"),
     ("chain",),
+    ("whole_branches",),
     ("mechanism",),
     ("charts",),
     ("kinematics",),

@@ -17,12 +17,12 @@ PACKAGE = Path(__file__).parents[3] / "python/stiffmap"
 # From a description to a machine that can be solved. Each may import earlier ranks only; whatever is not
 # listed (maps, experiments, diagnoses, commands ...) builds on all of them.
 RANKS = (
-    ("_core", "version", "errors", "recent", "units", "html", "beams", "number_text"),
-    ("description", "broadcasting", "yaml_limits", "python_file", "outputs"),
-    ("rotations", "yaml_text", "home", "fingerprints", "cells"),
+    ("_core", "version", "errors", "recent", "units", "html", "beams", "number_text", "short"),
+    ("description", "broadcasting", "yaml_limits", "python_file", "outputs", "tasks"),
+    ("rotations", "yaml_text", "home", "fingerprints", "cells", "addresses"),
     ("compiled", "link"),
     ("status", "branches"),
-    ("options", "closing"),
+    ("options", "closing", "labels"),
     ("solution",),
     ("solving", "holding_wrench"),
     ("variants", "effects"),
@@ -31,7 +31,15 @@ RANKS = (
 )
 # Rooms inside a room, each may import earlier ones only.
 INNER = {
-    "diagnosis": ("clock", "candidates", "fitting", "search", ("rivals", "decision"), "report", "verdict"),
+    "diagnosis": (
+        "clock",
+        "candidates",
+        "fitting",
+        "search",
+        ("rivals", "decision", "slips"),
+        "report",
+        "verdict",
+    ),
     "experiment": (
         ("experiment", "channels", "notebook", "ramps", "setups"),
         "readings",
@@ -41,6 +49,7 @@ INNER = {
         "comparison",
         "virtual",
         "files",
+        "calls",
     ),
 }
 RANK = {name: i for i, names in enumerate(RANKS) for name in names}

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
+
+import pytest
 
 import stiffmap as sm
 
@@ -13,14 +17,44 @@ ROOT = Path(__file__).parents[3]
 
 
 def test_one_version() -> None:
-    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
-    assert sm.__version__ in (declared, "0")
+    """The tag says it; where there is none, what the newest heading of the changes is on the way to."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    assert project["project"]["dynamic"] == ["version"]
+    next_one = project["tool"]["setuptools_scm"]["fallback_version"].removesuffix(".dev0")
+    newest = re.search(r"^## \[?([\d.]+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert newest is not None and newest[1] == next_one
+    assert f"version: {next_one}" in (ROOT / "CITATION.cff").read_text().replace('"', "")
     if sm.__version__ != "0":
-        assert version("stiffmap") == declared
-    cmake = re.search(r"project\(stiffmap VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())
-    assert cmake is not None and cmake.group(1) == declared
-    assert f"version: {declared}" in (ROOT / "CITATION.cff").read_text().replace('"', "")
-    assert re.search(rf"## \[?{re.escape(declared)}", (ROOT / "CHANGELOG.md").read_text())
+        assert sm.__version__ == version("stiffmap")
+        assert re.match(r"\d+\.\d+", sm.__version__)
+
+
+@pytest.mark.parametrize(
+    ("done", "expected"),
+    [
+        ([], r"0\.1\.0\.dev1"),
+        (["git tag v3.4.5"], r"3\.4\.5"),
+        (["git tag v3.4.5", "git commit -q --allow-empty -m next"], r"3\.4\.6\.dev1"),
+        (["rm -rf .git"], r"0\.1\.0\.dev0"),
+    ],
+    ids=["no tag", "a tag", "a commit after it", "no git"],
+)
+def test_the_version_comes_from_the_tag(tmp_path: Path, done: list[str], expected: str) -> None:
+    """A clone without tags, as in continuous integration, and an archive have a version as well."""
+    scm = pytest.importorskip("setuptools_scm")
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    who = "git -c user.name=a -c user.email=a@b"
+    for line in ["git init -q .", "git add -A", "git commit -q -m first", *done]:
+        subprocess.run(re.sub(r"^git", who, line), shell=True, cwd=tmp_path, check=True)
+    found = scm.get_version(root=str(tmp_path), local_scheme="no-local-version", fallback_version=fallback())
+    assert re.fullmatch(expected.replace(r"0\.1\.0", re.escape(fallback().removesuffix(".dev0"))), found)
+
+
+def fallback() -> str:
+    """The version where nothing tells one."""
+    return str(
+        tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools_scm"]["fallback_version"]
+    )
 
 
 def test_every_public_name_is_there() -> None:

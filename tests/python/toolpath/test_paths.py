@@ -108,7 +108,7 @@ def test_stock_says_width_and_depth() -> None:
     assert e.radial[np.abs(q.position[:, 0]) > 0.1001].max() == 0.0
     e = engagement(q, p, process, plate(3e-3, 0.0))
     assert e.axial == pytest.approx(np.full(len(q), 3e-3))
-    assert e.radial == pytest.approx(np.full(len(q), process.tool.diameter))
+    assert (e.radial > process.tool.diameter).all()  # the tool cuts its diameter of it
     assert engagement(q, p, process, thickness=2e-3).radial[0] == 2e-3
 
 

@@ -81,5 +81,5 @@ def _compute(predictor: Predictor, clock: Clock) -> tuple[Plan, bool]:
         usable = [v for v in found if v is not None]
         good += usable
         if not usable:
-            failed.append((candidate, "the machine fails with it"))
+            failed.append((candidate, "the machine has no equilibrium with it at some poses"))
     return Plan(base, Stack.of(good), tuple(failed)), whole

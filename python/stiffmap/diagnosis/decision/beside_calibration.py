@@ -20,31 +20,30 @@ from stiffmap.calibration.floor import Blocks, model_form
 from stiffmap.calibration.statistics import Sums
 from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.decision.beside_field import standing
+from stiffmap.diagnosis.decision.beside_noise import above_noise
 from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
 from stiffmap.diagnosis.decision.few import MEETING, not_few, screened
 from stiffmap.diagnosis.decision.judge import judge, unexplained, with_model
 from stiffmap.diagnosis.decision.patterns import Pattern
+from stiffmap.diagnosis.decision.refusals import EVERYWHERE, RULES, Rule, why_not
 from stiffmap.diagnosis.fitting.fit import evaluate, fit_without
-from stiffmap.diagnosis.fitting.interval import unseen
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.calibrated import Layer
 from stiffmap.diagnosis.search.study import Finding, Study, find, search_on, study
-from stiffmap.effects import Parameter, get
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 
-BEYOND = 100.0
-"""Standard uncertainties of its certificate that an instrument is never taken to be off by."""
-AT_BOUND, AT_SCALE = 1e-6, 1e-3
-"""Share of a parameter's range, and of its typical size, within which it is at its bound."""
 COVERED, FAINT = 0.95, 0.1
 """Share of an effect's signature that uncertain numbers imitate; those that ten standard uncertainties of show at all."""
 SELDOM = 1e-3
 """Odds of what tolerances may be by chance."""
+NEAR = 2.0
+"""Standard uncertainties by which numbers that are within tolerance may be off along one direction."""
 WORTH_A_FLOOR = 0.3
 """Noise variances per pose that no linear explanation takes: effects are then looked for at that floor at once."""
-LEAD = 3.0
-"""Nats by which effects on an exact machine must lead: odds of 20, strong evidence (Kass and Raftery 1995)."""
+LEAD, CLEAR = 3.0, 6.0
+"""Nats by which effects on an exact machine must lead to be considered, odds of 20, and to be the only answer, odds of 400:
+strong and very strong evidence (Kass and Raftery 1995). Between the two numbers that are a little off remain a rival."""
 REJECTED = 5.41
 """Nats by which the readings must reject the floor that a search was done at, before it is done again at the lower
 one: half the chi-square of one degree of freedom that chance exceeds once in a thousand."""
@@ -63,6 +62,8 @@ class Answer:
     held: HeldOut | None = None
     refused: tuple[str, ...] = ()
     """Effects that the readings seemed to demand and that are not named, and why."""
+    notes: tuple[str, ...] = ()
+    """What else the reader must know of the answer."""
 
 
 def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str, ...] = ()) -> Answer:
@@ -74,15 +75,29 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
         if found is not None and not_few(s, screened(s), spread_evidence(s.whole[0], found)):
             return _layered(s, found, seed, tolerances)
     finding, verdict, left = judge(s, find(s))
-    first = Answer(s, finding, verdict, left)
-    if s.clock.over or not (left or finding.model.candidates):
+    model, never = admissible(finding.model, finding, tolerances, EVERYWHERE)
+    model, noisy = above_noise(finding, model)
+    refused = never + noisy
+    if refused:
+        finding = with_model(finding, model)
+        left = unexplained(s, finding)
+        verdict = _without(finding, bool(left or never))
+    first = Answer(s, finding, verdict, left, refused=refused)
+    if s.clock.over or not (left or finding.model.candidates or refused):
         return first
     found = found or calibrator(s, tolerances, exclude)
     if found is None:
         return first
-    if not left and sparse_evidence(first) >= spread_evidence(finding.search.problem, found) + LEAD:
-        return first
+    lead = sparse_evidence(first) - spread_evidence(finding.search.problem, found)
+    if not left and lead >= LEAD:
+        return first if lead >= CLEAR or not model.candidates else _beside_numbers(first, lead)
     return _layered(s, found, seed, tolerances)
+
+
+def _beside_numbers(first: Answer, lead: float) -> Answer:
+    """Effects that numbers which are a little off explain nearly as well."""
+    note = f"every number a little off, within its tolerance, explains the readings nearly as well (odds of {np.exp(lead):.0f} for the effect)"
+    return replace(first, verdict="ambiguous", notes=(note,))
 
 
 def _layered(s: Study, found: Calibrator, seed: int, tolerances: Tolerances) -> Answer:
@@ -157,7 +172,8 @@ def _searched(s: Study, tolerances: Tolerances) -> Answer:
     finding, verdict, left = judge(s, find(s))
     model, refused = admissible(finding.model, finding, tolerances)
     model, more = _beyond_calibration(s, model, finding)
-    refused += more
+    model, noisy = above_noise(finding, model)
+    refused += more + noisy
     if refused:
         finding = with_model(finding, model)
         left = unexplained(s, finding)
@@ -180,12 +196,21 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
     model, smooth = standing(s, named) if left else (model, ())
     # what stands is held out as it was found; where nothing does, no fold is searched
     held = held_out(again, finding.outliers, seed, finding, search=bool(model.candidates))
+    beside = _tolerated(again, with_model(finding, model)) if held and model.candidates else None
+    if beside is not None and held is not None and not held.pays:
+        held = replace(held, gain=_gain_beside(beside, finding, seed))
     model, more = _shared(model, finding, held)
     named = with_model(finding, model)
     if smooth or more:
         left = unexplained(s, _on(s, named))
     refused = (*refused, *same, *smooth, *more)
     return Answer(again, named, _word(s, named, left), left, s.layer.calibration, held, refused)
+
+
+def _gain_beside(s: Study, finding: Finding, seed: int) -> tuple[float, float] | None:
+    """What effects gain on held-out readings in another study."""
+    held = held_out(s, finding.outliers, seed, finding)
+    return None if held is None else held.gain
 
 
 def _found_at(s: Study, found: Calibrator, rho: float, seed: int) -> tuple[Study, Finding]:
@@ -227,6 +252,14 @@ def _left_by(s: Study, finding: Finding) -> Blocks:
     return Blocks.of(columns, residual, pose_labels(problem))
 
 
+def _without(finding: Finding, rest: bool) -> str:
+    """The verdict on an exact machine where effects were refused; `rest`: something is left, or what they explained is."""
+    named = bool(finding.model.candidates)
+    if rest:
+        return "effects+unattributed" if named else "unattributed"
+    return "effects" if named else "none"
+
+
 def _word(s: Study, finding: Finding, left: list[Pattern]) -> str:
     named = bool(finding.model.candidates)
     calibration = None if s.layer is None else s.layer.calibration
@@ -239,13 +272,15 @@ def _word(s: Study, finding: Finding, left: list[Pattern]) -> str:
     return "effects" if named else "none"
 
 
-def admissible(model: Model, finding: Finding, tolerances: Tolerances) -> tuple[Model, tuple[str, ...]]:
+def admissible(
+    model: Model, finding: Finding, tolerances: Tolerances, rules: tuple[Rule, ...] = RULES
+) -> tuple[Model, tuple[str, ...]]:
     """The model without effects that are never named, and why they are not."""
     refused: list[str] = []
     while model.candidates:
         why = [
             (i, w)
-            for i, w in ((i, _why_not(model, i, tolerances)) for i in range(len(model.candidates)))
+            for i, w in ((i, why_not(model, i, tolerances, rules)) for i in range(len(model.candidates)))
             if w
         ]
         if not why:
@@ -254,43 +289,6 @@ def admissible(model: Model, finding: Finding, tolerances: Tolerances) -> tuple[
         refused.append(f"{model.candidates[i]}: {word}")
         model = fit_without(model, i, finding.search.predictor, finding.search.problem)
     return model, tuple(refused)
-
-
-def _why_not(model: Model, i: int, tolerances: Tolerances) -> str:
-    """Why an effect is never named beside a calibration; empty: it may be."""
-    part, candidate = model.parts()[i], model.candidates[i]
-    low, high = (b[part] for b in model.bounds())
-    x = model.values[part]
-    held = {k - part.start for k in model.held}
-    near = np.minimum(AT_BOUND * (high - low), AT_SCALE)
-    at = [
-        p.name
-        for k, p in enumerate(candidate.parameters)
-        if k not in held
-        and not _as_left_out(p, x[k] * p.scale)
-        and (
-            (x[k] - low[k] < near[k] and p.lower != p.null)
-            or (high[k] - x[k] < near[k] and p.upper != p.null)
-        )
-    ]
-    if at:
-        return f"{at[0]} is at its bound"
-    blind = [
-        p.name for k, p in enumerate(candidate.parameters) if k not in held and unseen(model, part.start + k)
-    ]
-    if len(blind) == len(candidate.parameters) - len(held):
-        return f"the readings do not determine {blind[0]}" if blind else ""
-    if get(candidate.kind).certified:
-        exact = np.array([p.null or 0.0 for p in candidate.parameters])
-        off = np.abs(model.si[part] - exact).max()
-        if off > BEYOND * tolerances.instrument:
-            return f"{off:.2g} is beyond the instrument's certificate ({tolerances.instrument:.2g}) a hundred times"
-    return ""
-
-
-def _as_left_out(p: Parameter, value: float) -> bool:
-    """Whether a shape is within what it is when nobody gives it, as a gap that is crossed at once: no bound of a search."""
-    return p.null is None and p.default is not None and value <= p.default
 
 
 def _beyond_calibration(s: Study, model: Model, finding: Finding) -> tuple[Model, tuple[str, ...]]:
@@ -314,14 +312,37 @@ def _beyond_calibration(s: Study, model: Model, finding: Finding) -> tuple[Model
 def imitated(columns: Floats, signature: Floats) -> bool:
     """Whether numbers with columns (N, p) per standard uncertainty show `COVERED` of a signature (N,), none of it by being
     off more than all of them together are once in `SELDOM`."""
-    u, size, _ = np.linalg.svd(columns, full_matrices=False)
+    needed, told = imitation(columns, signature)
+    return needed is not None and float(needed @ needed) <= float(chi2.isf(SELDOM, max(told, 1)))
+
+
+def imitation(columns: Floats, signature: Floats) -> tuple[Floats | None, int]:
+    """(p,) the most likely values with which numbers show `COVERED` of a signature (N,), None where they do not, and how
+    many directions of them the readings tell."""
+    u, size, v = np.linalg.svd(columns, full_matrices=False)
     felt = size > FAINT
     along = u[:, felt].T @ signature
+    told = int((size[felt] > 1.0).sum())
     if float(along @ along) <= COVERED * float(signature @ signature):
-        return False
-    needed = along * size[felt] / (1.0 + size[felt] ** 2)  # their most likely values
-    told = size[felt] > 1.0
-    return float(needed @ needed) <= float(chi2.isf(SELDOM, max(int(told.sum()), 1)))
+        return None, told
+    return np.asarray(v[felt].T @ (along * size[felt] / (1.0 + size[felt] ** 2))), told
+
+
+def _tolerated(s: Study, finding: Finding) -> Study | None:
+    """The study where the numbers that imitate an effect of a finding stay as near as tolerances allow; None: none does.
+
+    Many readings overrun a prior: beside numbers that are as far off as they like no such effect gains anything.
+    """
+    assert s.layer is not None
+    problem, predictor, model = finding.search.problem.exact, finding.search.predictor, finding.model
+    layer = s.layer
+    for i in range(len(model.candidates)):
+        alone = problem.white(predictor(model.terms()) - predictor(model.without(i).terms()))
+        needed, _ = imitation(problem.white(layer.columns), alone)
+        far = 0.0 if needed is None else float(np.linalg.norm(needed))
+        if needed is not None and far > NEAR:
+            layer = layer.narrowed(needed, NEAR / far)
+    return None if layer is s.layer else replace(s, layer=layer)
 
 
 def _shared(model: Model, finding: Finding, held: HeldOut | None) -> tuple[Model, tuple[str, ...]]:

@@ -11,6 +11,7 @@ import numpy as np
 from stiffmap.calibration.calibrator import pose_labels
 from stiffmap.calibration.claims import BesideField
 from stiffmap.calibration.groups import STRONG
+from stiffmap.calibration.wording import odds
 from stiffmap.diagnosis.fitting.fit import evaluate, fit_without
 from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.study import Finding, Study, search_on
@@ -39,7 +40,7 @@ def standing(s: Study, finding: Finding) -> tuple[Model, tuple[str, ...]]:
             break
         refused.append(
             f"{model.candidates[least]}: a smooth field that knows nothing of the machine explains as much "
-            f"({gain - price + STRONG:+.0f} nats beside it)"
+            f"(odds {odds(gain - price + STRONG)} beside it)"
         )
         model, now = trials[least], without[least]
     return model, tuple(refused)

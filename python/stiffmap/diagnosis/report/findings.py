@@ -12,6 +12,7 @@ from stiffmap.diagnosis.decision.cross_validation import HeldOut
 from stiffmap.diagnosis.decision.empirical import Empirical
 from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.rivals.separation import Separation
+from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.experiment.comparison.summary import Summary
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import Check
@@ -84,7 +85,8 @@ class Findings:
     """What a diagnosis found; every number in SI, base axes."""
 
     verdict: str
-    """``none``, ``effects``, ``ambiguous``, ``unattributed`` or ``effects+unattributed``."""
+    """``none``, ``effects``, ``ambiguous``, ``unattributed`` or ``effects+unattributed``; ``readings`` where a unit, a sign, a
+    swap or a shift in the readings comes first (`slips`), and all else is of readings without it."""
     effects: list[Effect]
     alternatives: list[list[Effect]]
     separations: list[Separation]
@@ -120,6 +122,8 @@ class Findings:
     """What the bound left out."""
     explained: float = 0.0
     """Share of the misfit beyond noise (and calibration) that the effects take away."""
+    slips: list[Slip] = field(default_factory=list)
+    """Mistakes of writing or mounting that the readings show, named before any cause."""
     seed: int | None = None
     """Of folds and simulated noise."""
     seconds: dict[str, float] = field(default_factory=dict)
@@ -153,6 +157,7 @@ class Findings:
             "stopped",
             "not_tried",
             "explained",
+            "slips",
         )
         out: dict[str, Any] = {"verdict": self.verdict, "units": "SI (m, rad, N, N·m, kg), base axes"}
         out |= {"machine": self.declared.name, "experiment": self.experiment.name}

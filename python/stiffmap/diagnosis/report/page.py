@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,15 +13,19 @@ from stiffmap.budget import deflection_budget
 from stiffmap.description.tree import joints
 from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.report.findings import Detectability, Effect, Findings
-from stiffmap.diagnosis.report.sentences import UNITS, next_step, opening
+from stiffmap.diagnosis.report.sentences import UNITS, alias_words, interval, next_step, opening
 from stiffmap.diagnosis.report.wording import effect_text, five_lines, separation_text
+from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.effects import registry
+from stiffmap.errors import StiffmapError
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.fingerprints import digest
 from stiffmap.outputs import write_text
 
 SHOWN = 12
 """Detectable effects above the fold."""
+FIRST, FOLDED = ("place", "before_after"), ("residual_others",)
+"""Pictures of the first page, and those that are folded."""
 PARTS = 8
 """Elements in the table of shares."""
 
@@ -43,6 +48,7 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
     from stiffmap.report.provenance import provenance
     from stiffmap.report.templates import render
 
+    pictures = {n: {"caption": CAPTIONS[n], "data": inline(f)} for n, f in figures(d).items()}
     return render(
         "diagnosis.html",
         machine=d.declared.name,
@@ -52,13 +58,17 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
         axes=", ".join(d.experiment.axes),
         opening=opening(d),
         next=next_step(d),
-        lines=five_lines(d),
+        lines=[in_shop_words(line) for line in five_lines(d)],
         effects=[_effect(e) for e in d.effects],
         rivals=[
             ("; ".join(map(effect_text, other)), separation_text(s))
             for other, s in zip(d.alternatives, d.separations, strict=True)
         ],
-        pictures=[{"caption": CAPTIONS[n], "data": inline(f)} for n, f in figures(d).items()],
+        first=[pictures[n] for n in FIRST if n in pictures],
+        pictures=[p for n, p in pictures.items() if n not in (*FIRST, *FOLDED)],
+        folded=[pictures[n] for n in FOLDED if n in pictures],
+        record=record(d, date, inputs),
+        slips=[_slip(s) for s in d.slips],
         budget=_budget(d),
         sizes=[
             (n, *(f"{1e6 * v:.2f}" for v in (s.rms, s.p95, s.max)), f"{s.ratio:.3f}", s.n)
@@ -81,10 +91,53 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
         f"{1e6 * d.empirical.after:.2f} µ{d.before.size[1]} rms.",
         seen=_seen(d),
         shown=SHOWN,
-        unseen=d.unobservable,
-        limits=d.limitations,
+        unseen=[spoken(u) for u in d.unobservable],
+        limits=[in_shop_words(v) for v in d.limitations],
         provenance=provenance(date, d.seed, inputs, _digests(d)),
     )
+
+
+def record(
+    d: Findings, date: str | None, inputs: Iterable[str | PathLike[str]] = ()
+) -> list[tuple[str, str]]:
+    """What the first page says of how the readings were taken; a blank is for the pen."""
+    told = dict(d.experiment.record)
+    source = (
+        f"{told['source']}, sha256 {told['sha256'][:16]}"
+        if {"source", "sha256"} <= set(told)
+        else told.get("source", "")
+    )
+    t = d.experiment.temperature
+    measured = "" if t is None or not np.isfinite(t).any() else f"{np.nanmin(t):.1f} to {np.nanmax(t):.1f}"
+    rows = [
+        ("operator", told.get("operator", "")),
+        (
+            "instrument, certificate",
+            ", ".join(filter(None, (told.get("instrument"), told.get("certificate")))),
+        ),
+        ("date of the readings", told.get("date", date or "")),
+        ("temperature", told.get("temperature", measured)),
+        ("source file", source or ", ".join(p.name for p in map(Path, inputs))),
+        ("notes", told.get("notes", "")),
+    ]
+    return rows
+
+
+def _slip(s: Slip) -> dict[str, Any]:
+    return {"check": s.check, "seen": s.seen, "also": s.also, "evidence": s.evidence, "undone": s.undone}
+
+
+def in_shop_words(text: str) -> str:
+    """A line of the screen with drives called so, and no marks of code."""
+    return text.replace("actuator", "drive").replace("`", "")
+
+
+def spoken(text: str) -> str:
+    """``bilinear of actuator, leg x (why)`` with the effect's title and drives called so."""
+    kind, of, rest = text.partition(" of ")
+    if not of or kind not in registry.kinds():
+        return in_shop_words(text)
+    return f"{registry.get(kind).title}: {in_shop_words(rest)}"
 
 
 def in_axis_units(axis: str, value: float) -> str:
@@ -106,33 +159,33 @@ def p_text(p: float) -> str:
 def _effect(e: Effect) -> dict[str, Any]:
     legs = f", leg {', '.join(e.legs)}" if e.legs else ""
     return {
-        "name": f"{registry.get(e.kind).title}: {e.element}{legs}",
-        "rows": [
-            (n.replace("_", " "), in_shop_units(v, u), in_shop_units(a, u), in_shop_units(b, u))
-            for n, (v, a, b, u) in e.parameters.items()
-        ],
-        "same": "; ".join(f"{a['kind']} of {a['element']} {' '.join(a['legs'])}" for a in e.aliases),
-        "definition": e.definition,
+        "name": f"{registry.get(e.kind).title}: {in_shop_words(e.element)}{legs}",
+        "rows": [(n.replace("_", " "), *interval(*v)) for n, v in e.parameters.items()],
+        "same": "; ".join(alias_words(a) for a in e.aliases),
+        "definition": in_shop_words(e.definition),
         "evidence": f"Chi-square falls by {e.evidence['delta_chi2']:.0f}; p-value over the whole search "
         f"{p_text(e.evidence['p_global'])}.",
     }
 
 
 def _budget(d: Findings) -> dict[str, Any] | None:
-    """Shares of the corrected machine's deflection at the worst pose of the map in the pictures."""
+    """Shares of the corrected machine's deflection at the worst pose of the map in the pictures; None where it has play without load."""
     from stiffmap.diagnosis.report.pictures import worst_pose
 
     worst = worst_pose(d) if d.effects else None
     if worst is None:
         return None
     p, force = worst
-    found = deflection_budget(d.machine, p, force)
+    try:
+        found = deflection_budget(d.machine, p, force)
+    except StiffmapError:  # a machine in play has no stiffness to share out
+        return None
     whole = 1e6 * float(np.linalg.norm(found.displacement[:3]))
     return {
         "at": ", ".join(f"{1e3 * v:.0f}" for v in p),
         "force": ", ".join(f"{v:.0f}" for v in force[:3]),
         "size": whole,
-        "rows": [(n, whole * s, 100 * s) for n, _, s in found.ranked()[:PARTS]],
+        "rows": [(in_shop_words(n), whole * s, 100 * s) for n, _, s in found.ranked()[:PARTS]],
     }
 
 
@@ -188,7 +241,7 @@ def _one_seen(x: Detectability, turning: set[str]) -> tuple[float, tuple[str, st
         )
         ease = min(ease, abs(value) / p.scale)
     legs = f" of {', '.join(x.legs)}" if x.legs else ""
-    return ease, (registry.get(x.kind).title, f"{x.element}{legs}", ", ".join(sizes))
+    return ease, (registry.get(x.kind).title, f"{in_shop_words(x.element)}{legs}", ", ".join(sizes))
 
 
 def _digests(d: Findings) -> dict[str, str]:

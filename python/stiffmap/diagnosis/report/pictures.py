@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from matplotlib.figure import Figure
 
+from stiffmap.diagnosis.report.drawn import AFTER, BEFORE, MM, UM, kept, pose_means
 from stiffmap.diagnosis.report.findings import Findings
-from stiffmap.experiment.comparison.pictures import vector_cases
-from stiffmap.experiment.experiment import WRENCH, Experiment, Floats
+from stiffmap.diagnosis.report.place import place_figure
+from stiffmap.diagnosis.report.trends import trending, trends
+from stiffmap.diagnosis.report.vectors import vectors
+from stiffmap.diagnosis.report.wording import noise_size
+from stiffmap.errors import StiffmapError
+from stiffmap.experiment.experiment import WRENCH, Floats
 from stiffmap.machine import Machine
 from stiffmap.plot.loaded import loaded_figure
 
-UM, MM = 1e6, 1e3
 CAPTIONS = {
     "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the machine of your file and "
     "with the corrected one; both enlarged alike.",
-    "residual_trends": "Residual of every reading against what may drive it. What depends on nothing here is noise.",
+    "place": "The machine at home. Red: what is named; where nothing of the machine is, the tool is marked.",
+    "before_after": "What the machine of your file and the corrected one leave of the readings, rms: of those that no fit saw, unless "
+    "the title says otherwise.",
+    "residual_trends": "Residual of every reading against what drives it.",
+    "residual_others": "Residual of every reading against what drives nothing here.",
     "residual_histogram": "Residuals over the noise floor. With the right machine they follow the dashed line.",
     "loops": "Reading over load in the order of time, each set-up from its own zero: what was measured, and what the machine of your file "
     "and the corrected one show.",
@@ -24,22 +34,51 @@ CAPTIONS = {
     "of each spring and drive.",
     "unexplained": "What no effect explains, over the workspace, and the empirical field that would remove it.",
 }
-BEFORE, AFTER = "#c1432e", "#2a6f97"
 
 
 def figures(d: Findings) -> dict[str, Figure]:
-    """All figures by the names of their files."""
-    made = {"residual_vectors": vectors(d)} if d.experiment.axis_read[:3].any() else {}
-    made |= {"residual_trends": trends(d), "residual_histogram": histogram(d)}
+    """All figures by the names of their files. One that cannot be drawn says so in its place: the answer does not depend on
+    its pictures."""
+    return {name: drawn(make, d) for name, make in _wanted(d).items()}
+
+
+def _wanted(d: Findings) -> dict[str, Callable[[Findings], Figure]]:
+    made: dict[str, Callable[[Findings], Figure]] = {"place": place_figure, "before_after": before_after}
+    if d.experiment.axis_read[:3].any():
+        made["residual_vectors"] = vectors
+    driven, others = trending(d)
+    if driven:
+        made["residual_trends"] = lambda d: trends(d, driven)
+    if others:
+        made["residual_others"] = lambda d: trends(d, others)
+    made["residual_histogram"] = histogram
     if d.experiment.load_direction is not None:
-        made["loops"] = loops(d)
+        made["loops"] = loops
     if d.effects and d.declared.description.workspace is not None:
-        made["maps"] = maps(d)
-        worst = worst_pose(d)
-        made |= {"loaded": loaded_figure(d.machine, *worst)} if worst else {}
+        made["maps"] = maps
+        if d.experiment.wrench[:, :3].any():
+            made["loaded"] = loaded
     if d.unexplained and d.empirical and d.experiment.groups.max() > 0:
-        made["unexplained"] = left(d)
+        made["unexplained"] = left
     return made
+
+
+def drawn(make: Callable[[Findings], Figure], d: Findings) -> Figure:
+    """A figure, or one that says why it is not drawn."""
+    try:
+        return make(d)
+    except Exception as problem:
+        figure = Figure(figsize=(7, 1.2), layout="constrained")
+        figure.text(0.5, 0.5, f"not drawn: {problem}"[:300], ha="center", va="center", wrap=True, fontsize=9)
+        return figure
+
+
+def loaded(d: Findings) -> Figure:
+    """The corrected machine under the load where it deflects most."""
+    worst = worst_pose(d)
+    if worst is None:
+        raise StiffmapError("no pose of the plane of the maps has an equilibrium under load")
+    return loaded_figure(d.machine, *worst)
 
 
 def loops(d: Findings) -> Figure:
@@ -80,9 +119,9 @@ def left(d: Findings) -> Figure:
     named = [p.axis for p in d.unexplained if p.axis in seen]
     axis = names.index(named[0] if named else seen[0])
     figure = Figure(figsize=(11, 6.4), layout="constrained")
-    at = _pose_means(d.experiment, d.experiment.position) * MM
+    at = pose_means(d.experiment, d.experiment.position) * MM
     shown = [
-        _pose_means(d.experiment, _kept(d, v))[:, axis] * UM for v in (d.residual_after, d.empirical.field)
+        pose_means(d.experiment, kept(d, v))[:, axis] * UM for v in (d.residual_after, d.empirical.field)
     ]
     top = max(float(np.nanmax(np.abs(v))) for v in shown)
     titles = (f"left in {names[axis]}, mean of each pose", "empirical field, from the other poses")
@@ -96,75 +135,22 @@ def left(d: Findings) -> Figure:
     return figure
 
 
-def vectors(d: Findings) -> Figure:
-    """Mean residual vector of each pose, before and after, on one scale."""
-    figure = Figure(figsize=(10, 5.0))
-
-    # of loads along x, y or z, turned to one sign (else + and - would cancel), those that leave most
-    def seen(values: Floats, weight: Floats) -> Floats:
-        return _pose_means(d.experiment, _kept(d, values) * weight[:, None])
-
-    both = [
-        (name, seen(d.residual_before, w), seen(d.residual_after, w))
-        for name, w in vector_cases(d.experiment)
-    ]
-    case, before, after = max(both, key=lambda b: float(np.nansum(b[1][:, :3] ** 2)))
-    at = _pose_means(d.experiment, d.experiment.position) * MM
-    longest = max(float(np.linalg.norm(np.nan_to_num(before[:, :3]), axis=1).max()), 1e-12)
-    scale = 0.25 * max(float(np.ptp(at)), 1.0) / longest
-    for i, (name, r, colour) in enumerate((("before", before, BEFORE), ("after", after, AFTER))):
-        axes = figure.add_subplot(1, 2, i + 1, projection="3d")
-        v = np.nan_to_num(r[:, :3]) * scale
-        axes.quiver(*at.T, *v.T, color=colour, linewidth=1.2)
-        axes.scatter(*at.T, s=6, color="0.4")
-        axes.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm", title=f"{name}: mean residual of each pose")
-        axes.tick_params(labelsize=8)
-        axes.locator_params(nbins=5)
-        axes.set_box_aspect(None, zoom=0.85)  # room for the label of z
-    figure.subplots_adjust(left=0.02, right=0.95, bottom=0.1, top=0.93, wspace=0.12)
-    told = f"longest arrow before: {longest * UM:.1f} µm{'; ' + case if case else ''}"
-    figure.text(0.5, 0.025, told, ha="center", fontsize=9)
+def before_after(d: Findings) -> Figure:
+    """Rms of what both machines leave of readings that no fit saw, and the noise."""
+    unit = d.before.size[1]
+    values = [UM * d.before.size[0], UM * d.after.size[0], UM * noise_size(d)]
+    figure = Figure(figsize=(4.6, 2.4), layout="constrained")
+    ax = figure.subplots()
+    bars = ax.barh(["your file", "corrected", "noise"], values, color=[BEFORE, AFTER, "0.7"])
+    ax.bar_label(bars, [f"{v:.3g} µ{unit}" for v in values], padding=3)
+    ax.invert_yaxis()
+    ax.set_xlim(0, 1.3 * max(values))
+    ax.set(xlabel=f"left of {d.after.n} readings, rms, µ{unit}")
+    if d.held_out is None:
+        ax.set_title("not held out: the fit saw these readings", fontsize=9)
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
     return figure
-
-
-def trends(d: Findings) -> Figure:
-    """Residual of each channel against what may drive it."""
-    against = _drivers(d.experiment)
-    axes_read = [int(i) for i in np.flatnonzero(d.experiment.axis_read)]
-    channels = d.experiment.channels
-    # a row per driver fits an upright page; its columns are the channels
-    figure = Figure(figsize=(max(6.0, 3.0 * len(axes_read)), 1.9 * len(against) + 0.6), layout="constrained")
-    grid = figure.subplots(len(against), len(axes_read), squeeze=False, sharex="row", sharey="col")
-    for row, (name, x) in enumerate(against):
-        for column, axis in enumerate(axes_read):
-            ax = grid[row][column]
-            for values, colour, label in (
-                (d.residual_before, BEFORE, "before"),
-                (d.residual_after, AFTER, "after"),
-            ):
-                ax.plot(x, _kept(d, values)[:, axis] * UM, ".", ms=3, color=colour, alpha=0.6, label=label)
-            ax.axhline(0, color="0.5", lw=0.6)
-            ax.set_xlabel(name, fontsize=9)
-            ax.tick_params(labelsize=8)
-            ax.set_ylabel(
-                f"{channels[axis].name}, {'µm' if channels[axis].unit == 'm' else 'µrad'}", fontsize=9
-            )
-    grid[0][0].legend(fontsize=8)
-    figure.suptitle("Residual: reading minus prediction")
-    return figure
-
-
-def _drivers(e: Experiment) -> list[tuple[str, Floats]]:
-    out = [(f"{c}, mm", e.position[:, i] * MM) for i, c in enumerate("xyz")]
-    out += [(f"f{c}, N", e.wrench[:, i]) for i, c in enumerate("xyz") if e.wrench[:, i].any()]
-    out += [("order", e.order)] if e.order is not None else []
-    out += [("temperature", e.temperature)] if e.temperature is not None else []
-    out += (
-        [("branch: 0 loading, 1 unloading", np.array([b == "unloading" for b in e.branch], float))]
-        if e.branch
-        else []
-    )
-    return out
 
 
 def histogram(d: Findings) -> Figure:
@@ -172,7 +158,7 @@ def histogram(d: Findings) -> Figure:
     figure = Figure(figsize=(6, 3.4), layout="constrained")
     ax = figure.subplots()
     floor = np.array([d.noise.floor.get(c.name, np.nan) for c in d.experiment.channels])
-    both = [(_kept(d, r) / floor) for r in (d.residual_before, d.residual_after)]
+    both = [(kept(d, r) / floor) for r in (d.residual_before, d.residual_after)]
     width = min(12.0, max(4.0, float(np.nanpercentile(np.abs(both[0]), 99))))
     bins = np.linspace(-width, width, 61)
     for z, colour, label in zip(both, (BEFORE, AFTER), ("before", "after"), strict=True):
@@ -194,6 +180,8 @@ def histogram(d: Findings) -> Figure:
 def maps(d: Findings) -> Figure:
     """Error over a z-plane: the file's machine, the corrected machine, and what changes."""
     x, y, force, one, other = plane_errors(d)
+    if not np.isfinite(one).any() or not np.isfinite(other).any():
+        raise StiffmapError("no pose of the plane of the maps has an equilibrium under this force")
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     axes = figure.subplots(1, 3)
     top = float(np.nanmax([np.nanmax(np.linalg.norm(v, axis=-1)) for v in (one, other)])) * MM
@@ -239,7 +227,7 @@ def _worst_force(d: Findings, position: Floats) -> tuple[Floats, Floats, Floats]
     size = float(np.abs(d.experiment.wrench[:, :3]).max())
     tried = [np.append(size * axis, np.zeros(3)) for axis in np.eye(3)] if size > 0 else [np.zeros(6)]
     pairs = [(_errors(d.declared, position, w), _errors(d.machine, position, w), w) for w in tried]
-    return max(pairs, key=lambda p: float(np.nanmax(np.abs(p[1] - p[0]))))
+    return max(pairs, key=lambda p: float(np.max(np.abs(np.nan_to_num(p[1] - p[0])))))
 
 
 def _errors(machine: Machine, position: Floats, wrench: Floats) -> Floats:
@@ -249,17 +237,3 @@ def _errors(machine: Machine, position: Floats, wrench: Floats) -> Floats:
 
 def _middle(machine: Machine) -> Floats:
     return np.asarray(machine.workspace.mean(axis=0))
-
-
-def _kept(d: Findings, values: Floats) -> Floats:
-    return np.where(d.set_aside[:, None], np.nan, values)
-
-
-def _pose_means(e: Experiment, values: Floats) -> Floats:
-    number = int(e.groups.max()) + 1
-    good = np.isfinite(values)
-    sums = np.stack(
-        [np.bincount(e.groups, np.where(good, values, 0.0)[:, i], number) for i in range(values.shape[1])]
-    )
-    counts = np.stack([np.bincount(e.groups, good[:, i], number) for i in range(values.shape[1])])
-    return np.asarray(np.where(counts > 0, sums / np.maximum(counts, 1), np.nan).T)

@@ -11,8 +11,10 @@ from stiffmap.diagnosis.report.findings import Findings
 from stiffmap.diagnosis.report.sentences import next_step, opening
 from stiffmap.diagnosis.report.wording import five_lines
 from stiffmap.html import titled
+from stiffmap.short import short_repr
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Diagnosis(Findings):
     """What a diagnosis found; every number in SI, base axes. Printed, it is the verdict in five lines."""

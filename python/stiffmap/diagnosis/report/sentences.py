@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from math import floor, log10
+from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 from stiffmap.diagnosis.report.findings import Effect
 from stiffmap.diagnosis.report.wording import noise_size, separation_text
+from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.effects import registry
+from stiffmap.number_text import with_uncertainty, within
 
 UNITS = {
     "m": (1e6, "µm"),
@@ -19,19 +22,28 @@ UNITS = {
 }
 """Factor from SI, and the unit that a workshop reads."""
 NAMES = {"actuator": "drive", "motor": "motor"}
+ALIASES = 2
+"""What cannot be told from an effect: how many the headline names."""
 
 
 def measured(value: float, low: float, high: float, unit: str) -> str:
-    """``0.301 ± 0.002 µm/N`` (one standard uncertainty), digits as many as the interval carries."""
+    """``0.301 ± 0.002 µm/N`` (one standard uncertainty), to the digits that it carries."""
     factor, name = UNITS.get(unit, (1.0, unit))
     half = factor * abs(high - low) / 2 / 1.96
-    digits = 3 if not half > 0 else max(0, min(6, int(-_exponent(half)) + (0 if half < 1 else 1)))
-    text = f"{factor * value:.{digits}f} ± {half:.{digits}f}" if half > 0 else f"{factor * value:.4g}"
-    return f"{text} {name}".rstrip()
+    if not (half > 0 and isfinite(half)):
+        return f"{factor * value:.4g} {name}".rstrip()
+    return f"{with_uncertainty(factor * value, half)} {name}".rstrip()
 
 
-def _exponent(value: float) -> float:
-    return floor(log10(value))
+def interval(value: float, low: float, high: float, unit: str) -> tuple[str, str, str]:
+    """Value and ends of the interval to the same digits, with the unit that a workshop reads."""
+    factor, name = UNITS.get(unit, (1.0, unit))
+    half = factor * abs(high - low) / 2 / 1.96
+    if not (half > 0 and isfinite(half)):
+        texts = [f"{factor * v:.4g}" for v in (value, low, high)]
+    else:
+        texts = [within(factor * v, half) for v in (value, low, high)]
+    return tuple(f"{text} {name}".rstrip() for text in texts)  # type: ignore[return-value]
 
 
 def place(e: Effect) -> str:
@@ -68,32 +80,87 @@ def _compared(e: Effect, more: str, less: str) -> str:
 
 
 def opening(d: Any) -> str:
-    """The verdict as one says it."""
+    """The verdict as one says it: first what is wrong with the readings, then the cause with what cannot be told from it."""
+    if not d.slips:
+        return _of_machine(d, d.verdict)
+    first = ". Then ".join(slip_sentence(s) for s in d.slips)
+    kind = inner_verdict(d)
+    if not d.slips[-1].undone:
+        return f"{_upper(first)}, before any cause is looked for in the machine."
+    return f"{_upper(first)}. With that undone: {_lower(_of_machine(d, kind))}"
+
+
+def slip_sentence(s: Slip) -> str:
+    """``check the sign of y: gauge y has the opposite sign; or check …``."""
+    also = "".join(f", or {a}" for a in s.also)
+    return f"{s.check}{also} ({s.seen})"
+
+
+def inner_verdict(d: Any) -> str:
+    """The verdict on readings without their mistakes."""
+    if d.effects:
+        return "ambiguous" if d.alternatives else "effects+unattributed" if d.unexplained else "effects"
+    return "unattributed" if d.unexplained else "none"
+
+
+def _upper(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:] if text.startswith(("The ", "No ")) else text
+
+
+def aliases(e: Effect) -> str:
+    """What these readings cannot tell from an effect, for the headline; empty where there is nothing."""
+    names = list(dict.fromkeys(alias_words(a) for a in e.aliases))
+    if not names:
+        return ""
+    shown = " or ".join(names[:ALIASES])
+    more = len(names) - ALIASES
+    return f", or as well {shown}{f' or one of {more} more' if more > 0 else ''}, which these readings cannot tell from it"
+
+
+def alias_words(a: Mapping[str, Any]) -> str:
+    """``the stiffness of the foot of leg z``, as one says it."""
+    legs = a["legs"]
+    element = NAMES.get(a["element"], a["element"])
+    of = f" of leg{'s' if len(legs) > 1 else ''} {', '.join(legs)}" if legs else ""
+    return f"{registry.get(a['kind']).title} ({element}{of})"
+
+
+def _of_machine(d: Any, verdict: str) -> str:
+    """The verdict on the machine."""
     before, unit = d.before.size
     size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * noise_size(d):.1f} µ{unit}"
-    named = "; ".join(sentence(e) for e in d.effects)
-    if d.verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
+    named = "; ".join(sentence(e) + aliases(e) for e in d.effects)
+    if verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
         return f"No cause beside the machine's uncertain numbers; these: {d.calibration.verdict} ({size})."
-    if d.verdict == "none" and d.stopped:
+    if verdict == "none" and d.stopped:
         return f"The diagnosis was stopped before it found anything ({size})."
-    if d.verdict == "none":
+    if verdict == "none":
         return f"The machine agrees with its file within what these readings can show ({size})."
-    if d.verdict == "unattributed" and d.stopped:
+    if verdict == "unattributed" and d.stopped:
         return f"The machine differs from its file ({size}), and nothing that was tried explains how."
-    if d.verdict == "unattributed":
+    if verdict == "unattributed":
         return (
             f"The machine differs from its file ({size}), and no single cause known to stiffmap explains how."
         )
-    if d.verdict == "ambiguous" and not d.effects:
+    if verdict == "ambiguous" and not d.effects:
         return f"No single number of the machine stands out; {d.calibration.verdict} ({size})."
-    if d.verdict == "ambiguous":
+    if verdict == "ambiguous":
         return f"The readings are explained by more than one cause. First of them: {named}."
-    rest = " Part of the difference remains unexplained." if "unattributed" in d.verdict else ""
+    rest = " Part of the difference remains unexplained." if "unattributed" in verdict else ""
     return f"{named}.{rest}"
 
 
 def next_step(d: Any) -> str:
     """What to do with the answer."""
+    if d.slips:
+        return (
+            "Check this at the machine and in the sheet, correct the readings and diagnose again; look for no cause in the "
+            "machine before."
+        )
     if d.verdict == "none" and d.calibration is not None and d.calibration.beyond:
         return "Inspect the number that is beyond tolerance; machine.yaml has it."
     if d.verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
@@ -104,7 +171,7 @@ def next_step(d: Any) -> str:
         return "Nothing to correct. Keep the readings as the record of this state."
     if d.verdict == "ambiguous" and not d.effects:
         tilt = "" if d.experiment.axis_read[3:6].any() else ", the tilt of the tool as well (rx, ry, rz)"
-        return f"Read what tells these groups apart{tilt}; `stiffmap plan` proposes poses."
+        return f"Read what tells these groups apart{tilt}; the command stiffmap plan proposes poses."
     if d.verdict == "unattributed":
         return (
             "Look at where the difference is largest (What is left), check the instrument's frame and the tool "
@@ -112,6 +179,8 @@ def next_step(d: Any) -> str:
         )
     if d.verdict == "ambiguous" and d.separations:
         return f"One more measurement decides: {separation_text(d.separations[0])}."
+    if d.verdict == "ambiguous" and not d.alternatives:
+        return "Inspect this place, and read more poses or other loads: numbers within tolerance explain these nearly as well."
     if any(e.aliases for e in d.effects):
         return (
             "Inspect this place and those which these readings cannot tell from it (the report names them); the corrected "

@@ -9,6 +9,8 @@ import numpy as np
 from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.report.findings import Effect, Findings
 from stiffmap.diagnosis.rivals.separation import Separation
+from stiffmap.diagnosis.slips.slip import Slip
+from stiffmap.number_text import within
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
 LISTED = 5
@@ -19,6 +21,7 @@ VERDICTS = {
     "ambiguous": "explained, but not by one explanation alone",
     "unattributed": "real structure that no known effect explains",
     "effects+unattributed": "explained in part; real structure remains",
+    "readings": "a mistake in the readings comes before any cause",
 }
 
 
@@ -26,6 +29,7 @@ def five_lines(d: Findings) -> list[str]:
     """Verdict, effects, before and after, noise, and what could not be seen; then the calibration, if any."""
     return [
         f"verdict: {d.verdict} - {VERDICTS[d.verdict]}",
+        *(f"readings: {s.check}: {s.seen}{_undone(s)}{_also(s)}" for s in d.slips),
         "effects: " + ("; ".join(effect_text(e) for e in d.effects) or "none") + _others(d),
         f"held-out readings: rms {_thousandth(*d.before.size)} before, {_thousandth(*d.after.size)} after "
         f"(noise floor {_thousandth(noise_size(d), d.before.size[1])}, ratio {_ratio(d):.3f}, n = {d.after.n})",
@@ -33,6 +37,15 @@ def five_lines(d: Findings) -> list[str]:
         _limits(d),
         *_more(d),
     ]
+
+
+def _undone(s: Slip) -> str:
+    evidence = f"; {'; '.join(s.evidence)}" if s.evidence else ""
+    return f"{evidence}; what follows is of readings with it undone" if s.undone else evidence
+
+
+def _also(s: Slip) -> str:
+    return "".join(f"; or {a}: these readings cannot tell" for a in s.also)
 
 
 def noise_size(d: Findings) -> float:
@@ -98,7 +111,9 @@ def effect_text(e: Effect) -> str:
     values = []
     for name, (value, low, high, unit) in e.parameters.items():
         factor, label = DISPLAY_UNITS.get(unit, (1.0, unit))
-        text = f"{name} {value * factor:.4g} [{low * factor:.4g}, {high * factor:.4g}]"
+        half = factor * abs(high - low) / 2 / 1.96
+        at, *ends = (within(factor * v, half) for v in (value, low, high))
+        text = f"{name} {at} [{', '.join(ends)}]"
         values.append(text if label == "1" else f"{text} {label}")
     n = len(e.aliases)
     same = f" (these readings cannot tell it from {n} other{'s' if n > 1 else ''})" if n else ""

@@ -39,6 +39,11 @@ class Layer:
         own = tuple(i for i, u in enumerate(s.unknowns) if u.setup)
         return Layer(s.columns, np.nan_to_num(bent), noise, found.out, calibration, own)
 
+    def narrowed(self, direction: Floats, share: float) -> Layer:
+        """The same where the uncertain numbers have a `share` of their uncertainty along a direction (p,)."""
+        d = direction / np.linalg.norm(direction)
+        return replace(self, columns=self.columns - (1.0 - share) * np.multiply.outer(self.columns @ d, d))
+
     @property
     def digest(self) -> str:
         """Of the uncertain numbers, for what is kept per plan."""

@@ -14,6 +14,8 @@ from stiffmap.experiment.experiment import Experiment, Floats
 UM, MM = 1e6, 1e3
 COLOUR, NOISE, ASIDE = "#2a6f97", "#d9d9d9", "#c1432e"
 MOST_LABELS = 12
+FLAT = 0.05
+"""Share of the largest extent below which poses lie in a plane."""
 
 Driver = tuple[str, Floats, list[str]]
 """Label, value of each row, and names of the values where they are classes."""
@@ -42,12 +44,16 @@ def vectors(r: Residual) -> Figure:
     means = [(name, _mean(e, _kept(r)[:, :3] * weight[:, None])) for name, weight in vector_cases(e)]
     longest = max(1e-12, *(float(np.nanmax(np.linalg.norm(m, axis=1), initial=0.0)) for _, m in means))
     scale = 0.2 * max(float(np.ptp(at, axis=0).max()), 1.0) / longest
-    figure = Figure(figsize=(11, 3.7 * len(means) + 0.3), layout="constrained")
-    grid = figure.subplots(len(means), 3, squeeze=False)
+    shown = views(at)
+    width = 11.0 if len(shown) == 3 else 6.0
+    figure = Figure(
+        figsize=(width, (3.7 if len(shown) == 3 else 5.0) * len(means) + 0.3), layout="constrained"
+    )
+    grid = figure.subplots(len(means), len(shown), squeeze=False)
     for row, (name, mean) in zip(grid, means, strict=True):
-        for ax, view in zip(row, ((0, 1), (0, 2), (1, 2)), strict=True):
+        for ax, view in zip(row, shown, strict=True):
             _arrows(ax, at, np.nan_to_num(mean) * scale, view)
-        row[1].set_title(name)
+        row[len(row) // 2].set_title(name)
     figure.suptitle(f"{e.name}: mean residual of each pose; longest arrow {longest * UM:.1f} µm")
     return figure
 
@@ -67,6 +73,16 @@ def vector_cases(e: Experiment) -> list[tuple[str, Floats]]:
     return out
 
 
+def views(at: Floats) -> tuple[tuple[int, int], ...]:
+    """Planes in which poses (n, 3) spread; of poses in a plane that plane, of those on a line or at a point the first two."""
+    extent = np.ptp(at, axis=0)
+    flat = [a for a in range(3) if extent[a] <= FLAT * max(float(extent.max()), 1.0)]
+    all_ = ((0, 1), (0, 2), (1, 2))
+    if len(flat) != 1:
+        return all_ if not flat else tuple(v for v in all_ if any(a not in flat for a in v)) or all_[:1]
+    return tuple(v for v in all_ if flat[0] not in v)
+
+
 def _arrows(ax: Any, at: Floats, arrow: Floats, view: tuple[int, int]) -> None:
     a, b = view
     ax.quiver(
@@ -74,8 +90,12 @@ def _arrows(ax: Any, at: Floats, arrow: Floats, view: tuple[int, int]) -> None:
         angles="xy", scale_units="xy", scale=1, color=COLOUR, width=0.006,
     )  # fmt: skip
     ax.plot(at[:, a], at[:, b], ".", ms=3, color="0.4")
+    ends = np.vstack([at[:, [a, b]], at[:, [a, b]] + arrow[:, [a, b]]])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    room = 0.1 * max(float((high - low).max()), 1.0)  # autoscaling sees the tails of arrows only
     ax.set(xlabel=f"{'xyz'[a]}, mm", ylabel=f"{'xyz'[b]}, mm", aspect="equal")
-    ax.margins(0.15)
+    ax.set_xlim(low[0] - room, high[0] + room)
+    ax.set_ylim(low[1] - room, high[1] + room)
 
 
 def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:

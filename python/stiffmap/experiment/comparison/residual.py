@@ -20,11 +20,13 @@ from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.notebook import residual_html
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, takes_machine
+from stiffmap.short import short_repr
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Residual:
     """Reading minus prediction, SI, base axes; n rows, c channels."""

@@ -174,6 +174,7 @@ def _setting(model: ExperimentFile, scales: Scales, file: Path) -> dict[str, Any
         "certificate": _certificate(model, scales, file),
         "loop": Loop(**model.metrology.model_dump()),
         "title": model.title,
+        "record": tuple((k, v) for k, v in {**model.record.model_dump(), "notes": model.notes}.items() if v),
         "source": str(file),
     }
 

@@ -43,6 +43,9 @@ def _head(e: Experiment, title: str) -> dict[str, Any]:
     head |= {"point": e.point} | ({"load_point": e.load_point} if e.load_point != e.point else {})
     head |= {"units": {"length": "mm", "force": "N", "angle": "rad"}}
     head |= _noise(e) | _own_columns(e)
+    told = dict(e.record)
+    head |= {"notes": told.pop("notes")} if "notes" in told else {}
+    head |= {"record": told} if told else {}
     optional = {
         "gravity": _gravity(e),
         "reference_temperature": e.reference_temperature,

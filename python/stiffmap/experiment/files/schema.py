@@ -143,6 +143,18 @@ class CertificateModel(FileModel):
     tool: Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=False)] | None = None
 
 
+class RecordModel(FileModel):
+    """What a report carries of how the readings were taken, in words."""
+
+    operator: str = ""
+    instrument: str = ""
+    certificate: str = ""
+    date: str = ""
+    temperature: str = ""
+    source: str = ""
+    sha256: str = ""
+
+
 class ExperimentFile(FileModel):
     """One experiment."""
 
@@ -171,6 +183,7 @@ class ExperimentFile(FileModel):
     certificate: CertificateModel = CertificateModel()
     orientation: OrientationModel = OrientationModel()
     columns: dict[str, str] = Field(default_factory=dict)
+    record: RecordModel = RecordModel()
     notes: str = ""
 
 

@@ -13,6 +13,8 @@ FALSE = 0.01
 """Probability of listing any row of a clean experiment."""
 FEW = 0.02
 """Largest share of the poses that were read once and may be outliers: more of them are structure."""
+MANY, LEAST_MANY = 0.1, 2
+"""Share and number of rows beyond which those that stand alone before any effect is known are an effect."""
 GROSS = 8.0
 """Robust standard deviations beyond which a reading is an outlier before any effect is known; a pose that was
 read once is beyond them as a whole."""
@@ -54,6 +56,8 @@ def suspects(experiment: Experiment, residual: Floats, sigma: Floats) -> Mask:
     away = np.abs(residual - np.nanmedian(residual, axis=0))
     gross = np.asarray(np.any(away > GROSS * np.fmax(1.4826 * np.nanmedian(away, axis=0), sigma), axis=1))
     lonely = _lonely(experiment, residual, sigma, gross)
+    if lonely.sum() > max(LEAST_MANY, MANY * len(experiment)):
+        lonely[:] = False  # they say together what no repeat had to confirm
     return whole_stays(experiment, _contradicting(experiment, residual, sigma) | lonely)
 
 

@@ -22,6 +22,9 @@ from stiffmap.options import SolveOptions
 from stiffmap.solution import Solution
 from stiffmap.status import Flag, Status
 
+ACROSS = 1e-3
+"""Share of the work that a load does along a free motion of play below which it does not press the gap."""
+
 
 @dataclass(frozen=True)
 class Work:
@@ -203,9 +206,26 @@ def solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solutio
 
 
 def _in_play(solution: Solution, plan: Experiment) -> Mask:
-    """Rows without load where nothing but play is loose: the drives stand in the middle of their gaps."""
+    """Rows where nothing but play is loose and no load lies across it: any place within a gap is an equilibrium, and friction
+    or what came before holds it; the drives stand in the middle of their gaps.
+
+    A twist that play leaves free takes no work of the load, up to `ACROSS` of what the load would do along its own
+    motion: second-order forces do not overcome friction.
+    """
     loose = (solution.status == Status.SINGULAR) & (solution.flags & Flag.FREE_PLAY > 0)
-    return np.asarray(loose & ~plan.wrench.any(axis=1))
+    out = loose & ~plan.wrench.any(axis=1)
+    asked = np.flatnonzero(loose & ~out)
+    if not asked.size:
+        return np.asarray(out)
+    twists, load = np.nan_to_num(solution.free_twists[asked]), plan.wrench[asked]
+    work = np.abs(np.einsum("ni,nij->nj", load, twists))
+    parts = (slice(0, 3), slice(3, 6))
+    most = sum(
+        np.linalg.norm(load[:, p], axis=1)[:, None] * np.linalg.norm(twists[:, p], axis=1) for p in parts
+    )
+    still = np.isfinite(solution.displacement[asked]).all(axis=1)
+    out[asked] = still & (work <= ACROSS * most + np.finfo(float).tiny).all(axis=1)
+    return np.asarray(out)
 
 
 def _reaction(machine: Machine, plan: Experiment, load_point: str, against: str) -> dict[str, Floats]:

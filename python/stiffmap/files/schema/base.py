@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from functools import cache
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BaseModel,
@@ -109,12 +109,19 @@ Name = Annotated[
 ]
 
 
+Source = Annotated[
+    Literal["assumed", "measured", "computed", "catalogue"],
+    Field(description="Where numbers come from: reports say how much of an answer rests on those assumed."),
+]
+
+
 class Number(FileModel):
-    """A number, or ``{value: 775, u: 0.05, note: "..."}`` with its standard uncertainty ``u``
-    (same unit) and a note that says where it comes from."""
+    """A number, or ``{value: 775, u: 0.05, source: measured, note: "..."}`` with its standard uncertainty ``u``
+    (same unit), where it comes from (assumed, measured, computed or catalogue) and a note."""
 
     value: Annotated[float, Field(allow_inf_nan=False)]
     u: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
+    source: Source | None = None
     note: str = ""
 
     @classmethod

@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from stiffmap.description import Cable, Drive, Joint
 from stiffmap.description.numbers import JointNumber, numbers_of
-from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Pair, Vector3
+from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Pair, Source, Vector3
 from stiffmap.files.schema.geometry import Axis, Frame
 from stiffmap.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix, Stroke
 
@@ -61,6 +61,7 @@ class OffsetModel(Frame):
 
     offset: Name
     actual: Frame | None = None
+    source: Source | None = None
     note: str = ""
 
 
@@ -77,6 +78,7 @@ class JointModel(PassiveNumbers):
     compliance: Number | Numbers | None = None
     law: LawModel | None = None
     rest: Number | Numbers | None = None
+    source: Source | None = None
     note: str = ""
 
     @model_validator(mode="after")
@@ -130,6 +132,7 @@ class ActuatorModel(DriveNumbers):
     law: LawModel | None = None
     rigid: Literal[True] | None = None
     command_errors: list[CommandErrorModel] | None = None
+    source: Source | None = None
     note: str = ""
 
     @model_validator(mode="after")
@@ -147,6 +150,7 @@ class CableModel(CableNumbers):
     at: Annotated[Vector3 | None, Field(description="Where it is fixed, in the current frame.")] = None
     guide: Annotated[Axis | None, Field(description="Axis about which the pulley turns, base axes.")] = None
     command_errors: list[CommandErrorModel] | None = None
+    source: Source | None = None
     note: str = ""
 
     @model_validator(mode="after")
@@ -168,6 +172,7 @@ class SpringModel(FileModel):
     rest: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = None
     stroke: Stroke | None = None
     loss_factor: Annotated[Number | None, Field(description="Structural loss factor.")] = None
+    source: Source | None = None
     note: str = ""
 
     @model_validator(mode="after")
@@ -200,6 +205,7 @@ class BodyModel(FileModel):
     of: Annotated[Name | None, Field(description="Spring of the same sequence whose beam it is.")] = None
     com: Vector3 | None = None
     inertia: list[Number | Vector3] | None = None
+    source: Source | None = None
     note: str = ""
 
     @model_validator(mode="after")
@@ -214,6 +220,7 @@ class PointModel(FileModel):
 
     point: Name
     at: Vector3 | None = None
+    source: Source | None = None
     note: str = ""
 
 
@@ -222,6 +229,7 @@ class BlockModel(FileModel):
 
     block: Name
     branches: Annotated[dict[Name, list[ElementModel]], Field(min_length=2)]
+    source: Source | None = None
     note: str = ""
 
 

@@ -107,8 +107,8 @@ class HomeModel(Frame):
 
 
 class Box(FileModel):
-    """Axis-aligned box of TCP positions."""
+    """Axis-aligned box of TCP positions; an axis that is not commanded may be left out: the box is flat there."""
 
-    x: Pair
-    y: Pair
-    z: Pair
+    x: Pair | None = None
+    y: Pair | None = None
+    z: Pair | None = None

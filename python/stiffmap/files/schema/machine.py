@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Vector3
+from stiffmap.files.schema.base import FileModel, Name, Number, Numbers, Source, Vector3
 from stiffmap.files.schema.elements import BodyModel, CableModel, ElementModel, OffsetModel, PointModel
 from stiffmap.files.schema.geometry import Box, Frame, HomeModel
 from stiffmap.files.schema.springs import Material
@@ -41,6 +41,7 @@ class LegModel(FileModel):
     parameters: dict[str, Number] | None = Field(
         default=None, alias="with", description="Parameters of the template."
     )
+    source: Source | None = None
     note: str = ""
 
     @model_validator(mode="after")
@@ -75,6 +76,7 @@ class ExternalSpringModel(FileModel):
     stiffness: Number
     length: Number
     tension_only: bool = False
+    source: Source | None = None
     note: str = ""
 
 
@@ -129,6 +131,10 @@ class MachineFile(FileModel):
     effects: list[EffectModel] = Field(default_factory=list)
     uncertainty: dict[str, float] = Field(
         default_factory=dict, description="Standard uncertainties by full name, SI; written on saving."
+    )
+    sources: dict[str, Source] = Field(
+        default_factory=dict,
+        description="Where numbers come from, by full name; a name may hold '*'. What an element says itself goes first.",
     )
     notes: dict[str, str] = Field(default_factory=dict)
     extra: dict[str, Any] = Field(default_factory=dict)

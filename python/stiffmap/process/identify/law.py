@@ -13,10 +13,12 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from stiffmap.broadcasting import Floats
+from stiffmap.number_text import with_uncertainty
 from stiffmap.process.description import EndMill, Process
 from stiffmap.process.identify.models import MODELS, NAMES, Fitted, fit, power_basis, straight_basis
 from stiffmap.process.identify.runout import Runout, runout_of
 from stiffmap.process.identify.table import ForceTable, need, read_table
+from stiffmap.short import short_repr
 
 SIGNIFICANT = 0.01
 """Probability by chance below which a bend is stated."""
@@ -24,6 +26,7 @@ RIVAL = 4.0
 """Difference of the criterion within which another explanation stays a rival."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class IdentifiedLaw:
     """A law of the cutting force, SI, from n mean forces."""
@@ -75,8 +78,9 @@ class IdentifiedLaw:
     def words(self) -> list[str]:
         """What a workshop reads, one sentence each."""
         out = [
-            f"{n} = {v / 10 ** (6 if n.endswith('c') else 3):.5g} ± {u / 10 ** (6 if n.endswith('c') else 3):.2g} "
-            + ("N/mm²" if n.endswith("c") else "N/mm")
+            f"{n} = {with_uncertainty(v / 1e6, u / 1e6)} N/mm²"
+            if n.endswith("c")
+            else f"{n} = {with_uncertainty(v / 1e3, u / 1e3)} N/mm"
             for n, (v, u) in self.coefficients.items()
         ]
         r = self.rms

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from stiffmap.broadcasting import Floats
 from stiffmap.errors import FileError
 from stiffmap.toolpath.gcode.read import Reader, read_moves
 from stiffmap.toolpath.path import Kind, Toolpath
@@ -49,7 +50,7 @@ def load_gcode(
         lines = _kept(lines, text)
     numbers, codes = array("d"), array("q")
     for m in read_moves(lines, reader, progress):
-        numbers.extend((*m.start, *m.end, *m.centre, m.sweep, m.feed, m.spindle, 0.0))
+        numbers.extend((*m.start, *m.end, *m.centre, m.sweep, m.feed, m.spindle, m.turn))
         codes.extend((KINDS[m.motion], m.plane, m.line))
     n = len(codes) // 3
     if n == 0:
@@ -74,7 +75,17 @@ def load_gcode(
         name=Path(file).stem,
         notes=tuple(notes),
         text=tuple(text),
+        turn=_turns(v[:, 12]),
+        offsets=dict(reader.offsets),
     )
+
+
+def _turns(given: Floats) -> Floats | None:
+    """The tool's turns; before the first one it stands as there."""
+    said = np.flatnonzero(np.isfinite(given))
+    if not said.size:
+        return None
+    return np.where(np.isfinite(given), given, given[said[0]])
 
 
 def _kept(lines: Iterable[str], text: list[str]) -> Iterator[str]:

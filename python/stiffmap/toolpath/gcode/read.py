@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from math import atan2, copysign, hypot, nan, pi, sqrt
+from math import atan2, copysign, hypot, isfinite, nan, pi, radians, sqrt
 from typing import NamedTuple
 
 from stiffmap.toolpath.gcode import state as meaning
@@ -30,6 +30,8 @@ class Move(NamedTuple):
     feed: float
     spindle: float
     line: int
+    turn: float
+    """rad of the tool about its axis; NaN where never given."""
 
 
 class Reader:
@@ -56,7 +58,7 @@ class Reader:
         if motion and not own.isdisjoint({"G53"}) and motion not in ("G0", "G1"):
             fail(self.file, number, "G53 goes with G0 or G1")
         s.motion = motion or s.motion
-        moved = [a for a in "XYZIJKR" if a in values]
+        moved = [a for a in "XYZCIJKR" if a in values]
         if "G4" in own or not moved:
             self._arc_without_words(motion, number)
             return None
@@ -95,12 +97,12 @@ class Reader:
                     self._g(value, own, number)
             elif letter == "M":
                 self._m(value, number)
-            elif letter in "XYZIJKRFSTHPN":
+            elif letter in "XYZCIJKRFSTHPN":
                 if letter in values:
                     fail(self.file, number, f"{letter} is given twice")
                 values[letter] = value
             else:
-                what = "rotary and secondary axes are not read" if letter in "ABCUVW" else "unknown word"
+                what = "rotary and secondary axes are not read" if letter in "ABUVW" else "unknown word"
                 fail(self.file, number, f"{what}: {letter}{value:g}")
         self._numbers(values, own, number)
         return values, own, motion
@@ -190,8 +192,10 @@ class Reader:
                     "no M3 stands before a move at feed: the spindle's speed is taken from the process",
                     number,
                 )
+        if "C" in values:  # the turn of the tool about its own axis
+            s.turn = radians(values["C"]) + (0.0 if s.absolute or not isfinite(s.turn) else s.turn)
         s.position = end
-        return Move(s.motion, start, goal, centre, s.plane, sweep, feed, s.rate, number)
+        return Move(s.motion, start, goal, centre, s.plane, sweep, feed, s.rate, number, s.turn)
 
     def _feed(
         self,

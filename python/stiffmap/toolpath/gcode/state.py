@@ -48,6 +48,8 @@ class State:
     """Register of the tool's length (G43 H)."""
     position: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
     known: list[bool] = field(default_factory=lambda: [False, False, False])
+    turn: float = float("nan")
+    """rad of the tool about its axis (C)."""
     ended: bool = False
 
     @property

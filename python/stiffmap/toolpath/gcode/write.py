@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from math import nan
 
 import numpy as np
 
@@ -14,9 +15,11 @@ from stiffmap.toolpath.path import Kind, Toolpath
 from stiffmap.toolpath.pieces import MovedPiece
 
 _PARTS = re.compile(r"(\([^()]*\)|;.*)")
-_MOTION = re.compile(r"G\s*0*[0123](?![\d.])|[XYZIJKR]\s*[+-]?[\d.][\d.\s]*", re.IGNORECASE)
+_MOTION = re.compile(r"G\s*0*[0123](?![\d.])|[XYZCIJKR]\s*[+-]?[\d.][\d.\s]*", re.IGNORECASE)
 _TURNS = re.compile(r"P\s*[\d.]+", re.IGNORECASE)
 _FEED = re.compile(r"F\s*[\d.][\d.\s]*", re.IGNORECASE)
+SAME_TURN = 1e-7
+"""rad."""
 DIGITS = {True: 7, False: 6}
 """Decimals of inches and of millimetres."""
 
@@ -24,14 +27,16 @@ DIGITS = {True: 7, False: 6}
 def rewritten(
     path: Toolpath,
     pieces: Mapping[int, Sequence[MovedPiece]],
-    offsets: Mapping[str, Sequence[float]] | None = None,
+    feeds: Floats | None = None,
 ) -> tuple[str, list[int]]:
     """Text of the program, and for each of its moves the move of `path` that it is a piece of.
 
     pieces: what each move (by number) becomes, m in the axes of the part; moves without pieces stay as they are
-    but for the place where they start.
+    but for the place where they start. feeds: (n,) m/s of the moves; None: as they are.
     """
-    reader = Reader(path.name, offsets)
+    reader = Reader(path.name, path.offsets)
+    speed = path.feed if feeds is None else feeds
+    turned, driven = nan, (nan, 0.0)
     by_line = {int(line): i for i, line in enumerate(path.line)}
     out: list[str] = []
     origin: list[int] = []
@@ -42,6 +47,8 @@ def rewritten(
             continue
         move = reader.block(text, number)
         i = by_line.get(number)
+        if move is None and "F" in _PARTS.sub("", text).upper():
+            driven = (nan, 0.0)
         if move is None or i is None:
             out.append(text)
             continue
@@ -52,12 +59,20 @@ def rewritten(
         shift = np.zeros(3) if machine else np.array(reader.offsets.get(reader.state.offset, (0.0, 0.0, 0.0)))
         for k, (piece, start) in enumerate(_with_starts(new, written)):
             words, written = _words(reader.state, path, i, piece, written, shift, machine)
-            feed = (
-                f" F{_number(60 * path.feed[i] / max(_size(piece, start), 1e-12), 6)}"
-                if (reader.state.inverse_time and path.kind[i] != Kind.RAPID and path.length[i] > 0)
-                else ""
-            )
-            out.append(_line(text, words + feed, bool(feed)) if k == 0 else words + feed)
+            if np.isfinite(piece.turn) and not abs(piece.turn - turned) <= SAME_TURN:
+                before = 0.0 if reader.state.absolute or np.isnan(turned) else turned
+                angle = round(float(np.degrees(piece.turn - before)), 5)
+                words += f" C{_number(angle, 5)}"
+                turned = before + float(np.radians(angle))
+            feed = ""
+            if path.kind[i] != Kind.RAPID and path.length[i] > 0:
+                now = (float(speed[i]), reader.state.unit)
+                if reader.state.inverse_time:
+                    driven = (nan, 0.0)
+                    feed = f" F{_number(60 * speed[i] / max(_size(piece, start), 1e-12), 6)}"
+                elif feeds is not None and now != driven:
+                    feed, driven = f" F{_number(60 * speed[i] / reader.state.unit, 3)}", now
+            out.append(_line(text, words + feed, bool(feed) or feeds is not None) if k == 0 else words + feed)
             origin.append(i)
     return "\n".join(out) + "\n", origin
 
@@ -80,7 +95,8 @@ def _as_it_was(path: Toolpath, i: int, written: Floats) -> MovedPiece:
     end = path.end[i]
     if path.kind[i] != Kind.ARC:
         end = np.where(end == path.start[i], written, end)
-    return MovedPiece(Kind(int(path.kind[i])), end, path.centre[i], float(path.sweep[i]))
+    turn = nan if path.turn is None else float(path.turn[i])
+    return MovedPiece(Kind(int(path.kind[i])), end, path.centre[i], float(path.sweep[i]), turn)
 
 
 def _words(
@@ -119,10 +135,9 @@ def _line(text: str, words: str, feed: bool) -> str:
         if part.startswith(("(", ";")):
             parts.append(part)
             continue
-        bare = _MOTION.sub("\0", part)
+        bare = _MOTION.sub("\0", _FEED.sub("", part) if feed else part)
         if "\0" in bare:
             bare = _TURNS.sub("", bare)
-            bare = _FEED.sub("", bare) if feed else bare
             head, _, tail = bare.partition("\0")
             bare = f"{head}{'' if placed else words}{tail.replace(chr(0), '')}"
             placed = True

@@ -1,0 +1,242 @@
+"""The measured sets: a reader and a question for each. A set is a folder of the data's folder."""
+
+from __future__ import annotations
+
+import math
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import stiffmap as sm
+from board.peers import beside_arm, plain_places
+from board.row import Row
+from stiffmap.calibration import Calibration, Tolerances
+from stiffmap.cli.calibrate import write as write_calibration
+from stiffmap.experiment.files.load import load_experiment
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+sys.path.insert(0, str(EXAMPLES))
+LENGTH = 1e3 * math.sqrt(3.0)
+"""From rms of the coordinates in m to rms of the length in mm."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the command line wants."""
+
+    quick: bool
+    peers: dict[str, str]
+    """Pythons that have a peer, by its name."""
+
+
+@dataclass(frozen=True)
+class MeasuredSet:
+    """A set that stiffmap can read."""
+
+    folder: str
+    name: str
+    source: str
+    authors: str
+    rows: Callable[[Path, Asked], Iterator[dict[str, Any]]]
+    """Fields of its rows, one after the other."""
+
+
+def all_rows(
+    data: Path, asked: Asked, say: Callable[[str], None], only: list[str] | None = None
+) -> Iterator[Row]:
+    """Every row: sets that are read, sets that are absent, folders that nothing here reads; or `only` some folders."""
+    for one in (s for s in SETS if only is None or s.folder in only):
+        known = {"source": one.source, "authors": one.authors}
+        if not (data / one.folder).is_dir():
+            yield Row(one.name, **known, status="absent", note=f"no folder {one.folder} among the data")
+            continue
+        try:
+            for fields in one.rows(data / one.folder, asked):
+                row = Row(**{"set": one.name, **known, **fields})
+                say(f"{row.set}: {row.before:.3g} -> {row.after:.3g}, {row.cause} ({row.seconds:.0f} s)")
+                yield row
+        except Exception as error:  # a set that cannot be read is a row as well, and the others follow
+            say(f"{one.name}: {error}")
+            yield Row(one.name, **known, status="failed", note=f"{type(error).__name__}: {error}")
+    known_folders = {one.folder for one in SETS}
+    for folder in sorted(data.iterdir()) if data.is_dir() and only is None else ():
+        if folder.is_dir() and folder.name not in known_folders:
+            yield Row(
+                folder.name, "see the folder", "unknown", status="absent", note="no reader for this set yet"
+            )
+
+
+@contextmanager
+def _scratch() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)
+
+
+def ur5(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
+    """The grid calibrates; 20 random poses judge. Frame and reflector are those of the grid."""
+    import measured_ur5 as example
+
+    with _scratch() as folder:
+        begun = time.process_time()
+        declared = sm.load_machine(example.MACHINE)
+        t, seen = example.joined(data, 1000)
+        example.write(declared, t, seen, folder / "all")
+        whole = load_experiment(folder / "all")
+        new = np.arange(len(whole)) >= seen
+        c = sm.calibrate(declared, whole.rows(~new), tolerances=Tolerances().scaled(3.0))
+        write_calibration(c, folder / "calibration")
+        corrected = sm.load_machine(folder / "calibration" / "machine.yaml")
+        used = time.process_time() - begun
+        before, after = (_mean(example.unseen(m, whole, new)) for m in (declared, corrected))
+        q = np.radians(np.column_stack([t[f"joint_{i}"] for i in range(1, 7)]))
+        place = 1e-3 * np.column_stack([t[f"{a}_t"] - t[f"{a}_dif"] for a in "xyz"])
+        yield {
+            "quantity": "mean length of the position error, mm",
+            "before": before,
+            "after": after,
+            "unseen_rows": int(new.sum()),
+            "unseen_by": "random poses of the authors, never fitted",
+            "cause": _cause(c),
+            "seconds": used,
+            "peers": (plain_places(declared, q, place, new),),
+        }
+
+
+def _cause(c: Calibration) -> str:
+    """The verdict, groups of numbers beyond their tolerances as a whole, and where errors along the travel are."""
+    parts = [c.verdict]
+    whole = "; ".join(" or ".join((w.group, *w.rivals)) for w in c.wider)
+    if whole and "beyond" not in c.verdict:
+        parts.append(f"beyond tolerance as a whole: {whole}")
+    if c.travel:
+        most = sorted(c.travel.profiles, key=lambda p: -p.share)[:2]
+        shares = ", ".join(f"{p.drive} {100 * p.share:.0f} %" for p in most)
+        parts.append(f"errors along the drives' travel, alone {shares}")
+    return "; ".join(parts)
+
+
+def _mean(left: Any) -> float:
+    return float(1e3 * np.linalg.norm(left[:, :3], axis=1).mean())
+
+
+def ur10(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
+    """Each series by itself: five folds of its poses."""
+    import measured_arm as example
+
+    every = 8 if asked.quick else 1
+    for series, kind in (
+        ("C", "random poses"),
+        ("B", "a grid in other configurations"),
+        ("D", "cubes of ISO 9283"),
+    ):
+        with _scratch() as folder:
+            begun = time.process_time()
+            example.write(data, [series], every, folder)
+            c = sm.calibrate("ur10", folder, tolerances=Tolerances().scaled(3.0))
+            used = time.process_time() - begun
+            assert c.unseen is not None
+            yield {
+                "set": f"UR10, laser tracker, series {series} ({kind})",
+                "quantity": "rms length of the position error, mm",
+                "before": LENGTH * c.unseen.before,
+                "after": LENGTH * c.unseen.after,
+                "unseen_rows": len(c.experiment),
+                "unseen_by": "five folds of poses" + (f", one row of {every}" if every > 1 else ""),
+                "cause": _cause(c),
+                "seconds": used,
+                "peers": beside_arm(folder, asked.peers) if series == "C" else (),
+            }
+
+
+def delta(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
+    """Heights of a bed; each session is predicted from the other three."""
+    import measured_delta_files as example
+
+    every = 7 if asked.quick else 1
+    with _scratch() as folder:
+        begun = time.process_time()
+        (folder / "heights").mkdir()
+        (folder / "flsun.yaml").write_text(example.machine(), encoding="utf-8")
+        columns = "".join(f"  q{t}: {{actuator: {t}.carriage, unit: mm}}\n" for t in example.TOWERS)
+        head = example.HEAD.replace(", dd: 0.04", "")
+        (folder / "heights" / "experiment.yaml").write_text(head + columns, encoding="utf-8")
+        lines = [["id", "setup", "qa", "qb", "qc", "contact"], *example.rows(data, every)]
+        text = "\n".join(",".join(map(str, line)) for line in lines)
+        (folder / "heights" / "data.csv").write_text(text + "\n", encoding="utf-8")
+        c = sm.calibrate(folder / "flsun.yaml", folder / "heights")
+        used = time.process_time() - begun
+        h = c.held_out
+        assert h is not None
+        yield {
+            "quantity": "rms of the height, mm",
+            "before": 1e3 * h.before,
+            "after": 1e3 * h.after,
+            "unseen_rows": len(c.experiment),
+            "unseen_by": f"left out: {h.by}, one after the other",
+            "cause": _cause(c),
+            "seconds": used,
+        }
+
+
+def gearbox(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
+    """A test of each variant and state of a gearbox; ramps of torque are left out in turn."""
+    import measured_actuator_files as example
+
+    with _scratch() as folder:
+        tests = example.write(data, folder, "")
+        first: dict[tuple[str, str], str] = {}
+        for test, kind in sorted(tests.items()):
+            first.setdefault(kind, test)
+        for (variant, state), test in sorted(first.items())[: 2 if asked.quick else None]:
+            begun = time.process_time()
+            d = sm.diagnose(folder / "gear.yaml", folder / test, seed=0)
+            effects = " + ".join(e.kind for e in d.effects)
+            yield {
+                "set": f"Cycloidal actuator, {variant.replace('_', ' ')}, {state.replace('_', ' ')}",
+                "quantity": "rms of the twist, deg",
+                "before": math.degrees(d.before.size[0]),
+                "after": math.degrees(d.after.size[0]),
+                "unseen_rows": len(d.experiment) if hasattr(d, "experiment") else None,
+                "unseen_by": "ramps of torque, one after the other",
+                "cause": f"{d.verdict}: {effects}" if effects else d.verdict,
+                "seconds": time.process_time() - begun,
+            }
+
+
+SETS = (
+    MeasuredSet(
+        "ur5_tracker",
+        "UR5, laser tracker",
+        "github.com/pauljac7700/serial_robots_datasets, MIT",
+        "0.155 mm mean (P. Jacobi's network on top of a geometric calibration; probably after compensation)",
+        ur5,
+    ),
+    MeasuredSet(
+        "ipa_ur10_accuracy",
+        "UR10, laser tracker",
+        "github.com/christianlandgraf/ipa-robot-accuracy, MIT",
+        "no calibrated figure is published with the data",
+        ur10,
+    ),
+    MeasuredSet(
+        "flsun_v400_delta",
+        "FLSUN V400 delta printer, bed heights",
+        "github.com/fzechert/FLSun-V400, CC0 1.0",
+        "at most 0.05 mm at the 7 points that the firmware's calibration was fitted to",
+        delta,
+    ),
+    MeasuredSet(
+        "cycloidal_actuator_play",
+        "Cycloidal actuator, torque ramps",
+        "github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, CC BY-SA 4.0",
+        "no model of the loops is published with the data",
+        gearbox,
+    ),
+)

@@ -1,0 +1,85 @@
+"""The scoreboard: its page is made from its rows, and sets that are absent or fail are rows as well."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+SCRIPT = ROOT / "bench/scoreboard.py"
+COLUMNS = {"set", "authors", "before", "after", "unseen_rows", "cause", "seconds"}
+
+
+def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """The command, with the sources of this tree."""
+    path = os.pathsep.join(p for p in sys.path if p)
+    return subprocess.run(
+        [sys.executable, SCRIPT, *arguments],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": path},
+    )
+
+
+def test_the_page_of_the_documentation_is_made_from_its_rows(tmp_path: Path) -> None:
+    kept = ROOT / "docs/scoreboard.json"
+    assert run("--out", tmp_path / "board.md", "--page-of", kept).returncode == 0
+    assert (tmp_path / "board.md").read_text() == (ROOT / "docs/scoreboard.md").read_text()
+    rows = json.loads(kept.read_text())["rows"]
+    assert all(set(r) >= COLUMNS for r in rows)
+    assert all(r["unseen_rows"] for r in rows if r["status"] == "measured")
+
+
+def test_absent_and_damaged_sets_are_rows(tmp_path: Path) -> None:
+    (tmp_path / "data/ur5_tracker").mkdir(parents=True)
+    (tmp_path / "data/a_new_set").mkdir()
+    done = run("--out", tmp_path / "board.html", "--data", tmp_path / "data")
+    assert done.returncode == 0, done.stderr
+    rows: list[dict[str, Any]] = json.loads((tmp_path / "board.json").read_text())["rows"]
+    said = {r["set"]: (r["status"], r["note"]) for r in rows}
+    assert said["UR5, laser tracker"][0] == "failed"
+    assert "grid.csv" in said["UR5, laser tracker"][1]
+    assert said["UR10, laser tracker"] == ("absent", "no folder ipa_ur10_accuracy among the data")
+    assert said["a_new_set"] == ("absent", "no reader for this set yet")
+    page = (tmp_path / "board.html").read_text()
+    assert all(r["set"] in page and r["note"].split(":")[0] in page for r in rows)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--out", "x.txt"], "expected a name that ends in .md or .html"),
+        (["--out", "x.md", "--peer", "figaroh"], "expected NAME=PYTHON"),
+        (["--out", "x.md", "--only", "nothing"], "expected one of ur5_tracker"),
+        (["--out", "x.md", "--page-of", "gone.json"], "gone.json"),
+    ],
+)
+def test_bad_arguments(arguments: list[str], words: str) -> None:
+    done = run(*arguments)
+    assert done.returncode != 0
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_plain_least_squares_finds_a_known_arm() -> None:
+    """The peer that costs nothing: an arm with errors is found from its places, to round-off."""
+    import numpy as np
+
+    sys.path.insert(0, str(ROOT / "bench/peers"))
+    try:
+        import arm_least_squares as plain
+    finally:
+        sys.path.pop(0)
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-2, 2, (120, 6))
+    model = np.eye(3)[[2, 1, 1, 1, 2, 1]], rng.normal(size=(6, 3)), rng.normal(size=3)
+    seen = plain.places(1e-3 * rng.normal(size=45), q, *model)
+    x = plain.fitted(q[:90], seen[:90], *model)
+    assert np.abs(plain.places(x, q[90:], *model) - seen[90:]).max() < 1e-12
+    assert np.abs(plain.places(0 * x, q, *model) - seen).max() > 1e-2
