@@ -65,6 +65,8 @@ def lines(c: Facts) -> list[str]:
                 "the file is worse than the declared machine on readings that no fit saw: do not use it; more poses are needed"
             )
     out.append(f"holds where it was read: {c.validity}")
+    if c.over_time is not None:
+        out.append(str(c.over_time))
     if c.floor > 0.0:
         where = ", ".join(f"{k} {in_display_units(v, _unit(k, c.unit))}" for k, v in c.rest.items())
         out.append(

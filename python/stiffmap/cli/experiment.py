@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,10 +21,6 @@ from stiffmap.outputs.option import written
 if TYPE_CHECKING:
     from stiffmap.experiment import Experiment
     from stiffmap.spreadsheet.convert import Imported
-    from stiffmap.spreadsheet.dialogue import Answers, Ask
-    from stiffmap.spreadsheet.instrument import Instrument
-    from stiffmap.spreadsheet.joints import Commanded
-    from stiffmap.spreadsheet.sheet import Sheet
 
 
 RECORDED = {"operator", "instrument", "certificate", "date", "temperature", "notes", "source", "sha256"}
@@ -125,6 +120,7 @@ def experiment(
     from stiffmap.spreadsheet.folder import make_experiment
     from stiffmap.spreadsheet.instrument import load_instrument
     from stiffmap.spreadsheet.joints import DIFFERENCES, drives_of
+    from stiffmap.spreadsheet.reading import Reading, read_and_ask
     from stiffmap.spreadsheet.sheet import read_sheet
 
     if action != "new":
@@ -169,69 +165,6 @@ def experiment(
     for line in (*told, *(f"left out: {text}" for text in table.aside)):
         Console(highlight=False, soft_wrap=True).print(escape(line))
     tell(found, table.header, made, machine, output, joints.columns if joints else {})
-
-
-@dataclass(frozen=True)
-class Reading:
-    """How a sheet is read: what wrote it, drives that it may command (name -> slides), sign of its differences."""
-
-    wrote: Instrument | None
-    drives: Mapping[str, bool]
-    difference: str
-
-
-def read_and_ask(
-    file: Path, sheet: str | None, how: Reading, given: Answers, ask: Ask | None
-) -> tuple[Sheet, Imported, Answers, list[str], Commanded | None]:
-    """The sheet that fits, what was understood of it, the answers in use, what the user should know of them, and the joints
-    that the sheet commands."""
-    from stiffmap.spreadsheet.dialogue import ask_all, profile_file, remember, remembered
-    from stiffmap.spreadsheet.guess import guess
-    from stiffmap.spreadsheet.instrument import as_readings
-    from stiffmap.spreadsheet.joints import as_seen, commanded, turned
-    from stiffmap.spreadsheet.sheet import EXCEL, read_sheet
-    from stiffmap.spreadsheet.workbook import sheet_names
-
-    def one(
-        name: str | None, ask: Ask | None
-    ) -> tuple[Sheet, Imported, Answers, list[str], Commanded | None]:
-        table, answers, told = read_sheet(file, name), given, list[str]()
-        form = table
-        if (kept := remembered(form)) is not None:
-            answers = kept.below(given)
-            told.append(f"answers of an earlier sheet of this form are used: {profile_file(form)}")
-        joints = commanded(table, how.drives, answers.chosen, answers.units)
-        if joints is not None:
-            joints = as_seen(joints, answers.units, how.difference)
-            table, answers = joints.sheet, replace(answers, chosen=joints.chosen)
-            told += joints.told
-        elif how.wrote is not None:
-            table, meant, assumed, constants = as_readings(table, how.wrote, answers.constants)
-            answers = replace(
-                answers, chosen=meant | answers.chosen, units=assumed | answers.units, constants=constants
-            )
-        if joints is None or not joints.head:
-            table, other = turned(table, guess(table.header, answers.chosen), how.difference)
-            answers = replace(answers, chosen=answers.chosen | other)
-        found, final = ask_all(table, answers, ask, joints)
-        if ask is not None and final != answers and joints is None:
-            told.append(f"the answers are remembered for sheets of this form: {remember(form, final)}")
-        return table, found, final, told, joints
-
-    names = sheet_names(file) if sheet is None and file.suffix.lower() in EXCEL else [sheet]
-    if len(names) == 1:
-        return one(sheet, ask)
-    reasons = {}
-    for name in names:
-        try:
-            return one(name, None)
-        except StiffmapError as problem:
-            reasons[str(name)] = problem
-    tables = [n for n, p in reasons.items() if type(p).__name__ == "Question"]
-    if ask is not None and tables:
-        return one(tables[0], ask)
-    lines = "; ".join(f"'{n}': {str(p).removeprefix(str(file)).lstrip(':, ')}" for n, p in reasons.items())
-    raise StiffmapError(f"{file}: none of its {len(names)} sheets fits (--sheet NAME reads one). {lines}")
 
 
 def _prompt(text: str) -> str:

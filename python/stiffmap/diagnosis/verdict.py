@@ -22,6 +22,7 @@ from stiffmap.diagnosis.decision.judge import after_checks
 from stiffmap.diagnosis.decision.largest_residual import located
 from stiffmap.diagnosis.decision.result_machine import result_machine
 from stiffmap.diagnosis.decision.stability import explained
+from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.report.describe import aliases_of, as_place, named_effects
 from stiffmap.diagnosis.report.findings import Detectability, Effect, NoiseReport
 from stiffmap.diagnosis.report.result import Diagnosis
@@ -37,6 +38,7 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.noise.over_time import over_time
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
@@ -185,6 +187,7 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
             *found.notes,
             *limitations(e, s.noise, s.predictor.machine),
             *([] if left else noise.sentences()),
+            *_over_time(finding, model),
         ],
         significance={
             "effective_trials": s.effective_trials,
@@ -231,6 +234,13 @@ def _detectable(s: Study, finding: Finding) -> list[Detectability]:
         for d in detectable(search.screen.beside(finding.model.tangent()), search.threshold)
         if any(v is not None for v in d.sizes.values())
     ]
+
+
+def _over_time(finding: Finding, model: Model) -> list[str]:
+    """What the model leaves over time, in words; nothing where no times were recorded."""
+    assert model.residual is not None
+    found = over_time(finding.search.problem, model.residual)
+    return [] if found is None else [str(found)]
 
 
 def _summaries(
