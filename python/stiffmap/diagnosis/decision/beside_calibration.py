@@ -119,7 +119,7 @@ def _above(s: Study, layer: Layer, seed: int) -> Study:
     """The study of the same readings above a calibration."""
     straight = copy.copy(s.predictor)  # shares what was solved
     straight.experiment = layer.straight(s.predictor.experiment)
-    return study(straight, seed, layer, s.clock, s.without)
+    return study(straight, seed, layer, s.clock, s.without, s.scheduler)
 
 
 def _floor_beside_screen(s: Study) -> float:
@@ -223,7 +223,7 @@ def _found_at(s: Study, found: Calibrator, rho: float, seed: int) -> tuple[Study
     s.clock.say("the search again, where what no model explains counts as noise")
     assert s.layer is not None
     raised = Layer.of(found, s.layer.calibration, rho)
-    again = study(s.predictor, seed, raised, s.clock, s.without)
+    again = study(s.predictor, seed, raised, s.clock, s.without, s.scheduler)
     return again, find(again)
 
 
