@@ -22,7 +22,7 @@ BEFORE, AFTER = VERMILLION, BLUE
 
 
 class Data:
-    """What is drawn beside the machine: rows of an experiment, a path of the tool (n, 3) m, or both."""
+    """What is drawn next to the machine: rows of an experiment, a path of the tool (n, 3) m, or both."""
 
     def __init__(self, experiment: Experiment | None = None, path: Floats | None = None) -> None:
         self.experiment, self.path = experiment, None if path is None else thinned(path)
