@@ -164,7 +164,7 @@ class Machine:
         threads
             None: all cores that this process may use.
         options
-            All of these at once, but the derivatives; a keyword beside it goes before its field.
+            All of these at once, but the derivatives; a keyword given as well goes before its field.
 
         Notes
         -----

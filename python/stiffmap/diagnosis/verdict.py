@@ -81,7 +81,7 @@ def diagnose(
         False leaves out the nested cross-validation: `before` and `after` are then not held out.
     tolerances
         Standard uncertainties of what the machine file declares, where it gives none: effects are named
-        only beside them (docs/calibration.md).
+        only jointly with them (docs/calibration.md).
     exclude
         Kinds of effects, or groups of the calibration, that are known not to be.
     budget
@@ -97,7 +97,7 @@ def diagnose(
     ------
     StiffmapError
         For files that cannot be used, poses out of reach, and noise that is unknown. docs/diagnosis.md
-        tells the method.
+        describes the method.
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
@@ -225,7 +225,7 @@ def _effects(s: Study, finding: Finding, why: Explanation, inflation: float) -> 
 
 
 def _detectable(s: Study, finding: Finding) -> list[Detectability]:
-    """How small each effect could be and still be found, beside those that are named."""
+    """How small each effect could be and still be found, in addition to those that are named."""
     search = finding.search
     return [
         Detectability(

@@ -190,7 +190,7 @@ def test_aliases_stand_in_the_headline() -> None:
     d = sm.diagnose("orthoglide-revised", readings("orthoglide-revised", True), seed=1, cross_validate=False)
     (effect,) = d.effects
     if effect.aliases:
-        assert "which these readings cannot tell from it" in opening(d)
+        assert "which these readings cannot distinguish from it" in opening(d)
     assert aliases(replace(effect, aliases=[])) == ""
     made = replace(effect, aliases=[{"kind": "compliance", "element": "actuator", "legs": ["z"]}] * 2)
     assert aliases(made).count("(drive of leg z)") == 1
