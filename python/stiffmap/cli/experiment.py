@@ -88,7 +88,7 @@ def experiment(
 
       [cyan]stiffmap experiment new points.csv --instrument tracker --machine hexapod --noise dx=0.01 -o points[/cyan]
 
-      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue -o asked[/cyan]
+      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue --noise dx=1 -o asked[/cyan]
 
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
