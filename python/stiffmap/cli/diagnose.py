@@ -57,7 +57,7 @@ def diagnose_command(
         seed=seed,
         threads=threads,
         exclude=exclude or (),
-        budget=budget,
+        time_limit=budget,
         tolerances=Tolerances().scaled(tolerance),
         progress=None if silent else _say,
     )
