@@ -14,6 +14,7 @@ from stiffmap.calibration.pulls import Pulls
 from stiffmap.calibration.travel import Travel
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
+from stiffmap.experiment.noise.over_time import OverTime
 from stiffmap.machine import Machine
 from stiffmap.plain import plain
 from stiffmap.validity import Validity
@@ -158,6 +159,8 @@ class Facts:
     """What the readings covered; beyond it nothing vouches for `machine`."""
     pulls: Pulls = field(kw_only=True)
     """How far the numbers are beyond their standard uncertainties, without those that have a widened prior."""
+    over_time: OverTime | None = None
+    """What the calibrated machine leaves over time; None where no times were recorded."""
     refused: tuple[str, ...] = ()
     """Hypotheses beyond tolerance that the evidence supports and that were refused, and why."""
 
@@ -176,6 +179,7 @@ class Facts:
         out["validity"] = plain(
             {"poses": v.poses, "drives": dict(v.drives), "loads": dict(v.loads), "temperature": v.temperature}
         )
+        out["over_time"] = plain(asdict(self.over_time)) if self.over_time else None
         out["pulls"] = plain(asdict(self.pulls)) | {"within": self.pulls.within}
         out["groups"] = plain(asdict(self.groups))
         out["beyond"] = [plain(asdict(b)) for b in self.beyond]

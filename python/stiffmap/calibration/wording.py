@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from stiffmap.calibration.facts import Beyond, Facts, Wider
+from stiffmap.number_text import with_uncertainty, within
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm")}
 FACTOR = 0.5
@@ -22,6 +23,16 @@ def in_display_units(value: float, unit: str) -> str:
         return f"{100.0 * math.expm1(value):.4g} %" if abs(value) < FACTOR else f"×{math.exp(value):.4g}"
     factor, name = DISPLAY_UNITS[unit]
     return f"{value * factor:.4g} {name}"
+
+
+def measured(value: float, u: float, unit: str) -> str:
+    """``0.0520 ± 0.0009 mm``; of the logarithm of a factor in per cent, or as the factor with its relative uncertainty."""
+    if unit == "ln":
+        if abs(value) < FACTOR:
+            return f"{with_uncertainty(100.0 * math.expm1(value), 100.0 * math.exp(value) * u)} %"
+        return f"×{within(math.exp(value), math.exp(value) * u)} ± {within(100.0 * u, 100.0 * u)} %"
+    factor, name = DISPLAY_UNITS[unit]
+    return f"{with_uncertainty(factor * value, factor * u)} {name}"
 
 
 def lines(c: Facts) -> list[str]:
@@ -47,13 +58,15 @@ def lines(c: Facts) -> list[str]:
         f = c.unseen
         out.append(
             f"machine file on {f.by} that no fit saw: rms {in_display_units(f.before, c.unit)} as declared, "
-            f"{in_display_units(f.after, c.unit)} ± {in_display_units(f.u, c.unit)} corrected"
+            f"{measured(f.after, f.u, c.unit)} corrected"
         )
         if f.after > f.before:
             out.append(
                 "the file is worse than the declared machine on readings that no fit saw: do not use it; more poses are needed"
             )
     out.append(f"holds where it was read: {c.validity}")
+    if c.over_time is not None:
+        out.append(str(c.over_time))
     if c.floor > 0.0:
         where = ", ".join(f"{k} {in_display_units(v, _unit(k, c.unit))}" for k, v in c.rest.items())
         out.append(
@@ -105,7 +118,7 @@ def odds(nats: float) -> str:
 def _beyond(b: Beyond) -> str:
     other = f"; or instead: {', '.join(b.rivals[:3])}" if b.rivals else ""
     more = f" and {len(b.rivals) - 3} more" if len(b.rivals) > 3 else ""
-    return f"{b.name}: {in_display_units(b.value, b.unit)} ± {in_display_units(b.sigma, b.unit)} (odds {odds(b.nats)}){other}{more}"
+    return f"{b.name}: {measured(b.value, b.sigma, b.unit)} (odds {odds(b.nats)}){other}{more}"
 
 
 def _wider(w: Wider) -> str:

@@ -17,6 +17,7 @@ from stiffmap.experiment import simulate
 from stiffmap.experiment.calls import placed
 from stiffmap.experiment.files.save import plan_columns
 from stiffmap.machine import Machine, load_machine
+from stiffmap.number_text import with_uncertainty
 from stiffmap.outputs import write_rows
 from stiffmap.outputs.option import written
 from stiffmap.planning import Design, Estimate, design, follow
@@ -126,7 +127,7 @@ def _sequential(
         return
     for count, e in steps:
         each = zip(e.names, e.values, e.sigma * e.misfit, e.units, strict=True)
-        print(f"{count} rows: " + ", ".join(f"{n} {v:.5g} ± {u:.2g} {s}" for n, v, u, s in each))
+        print(f"{count} rows: " + ", ".join(f"{n} {with_uncertainty(v, u)} {s}" for n, v, u, s in each))
     print(f"stopped: every u is at most {until:g} of a typical size" if met else "stopped: rows used up")
 
 

@@ -14,6 +14,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.performance.cell import BOX
 from stiffmap.performance.cells import shrink
 from stiffmap.performance.limits import Bounds
+from stiffmap.performance.proof import Judge, judge_cells
 
 SAMPLES = 9
 """Nodes along each edge of the region where poses that break a limit are looked for first."""
@@ -52,12 +53,19 @@ class BoxSearch:
     """Works in coordinates of the box's axes divided by its proportions: boxes are then cubes."""
 
     def __init__(
-        self, bounds: Bounds, shape: Floats, axes: Floats, region: Floats, gap: float, work: int
+        self,
+        bounds: Bounds,
+        shape: Floats,
+        axes: Floats,
+        region: Floats,
+        gap: float,
+        work: int,
+        judge: Judge | None = None,
     ) -> None:
         self.shape, self.axes, self.gap, self.work = shape, axes, gap, work
         self.low, self.high = region / shape
         self.size = float((self.high - self.low).max())
-        self.bounds = bounds
+        self.bounds, self.judge = bounds, judge or judge_cells(bounds)
         self.best, self.centre = 0.0, (self.low + self.high) / 2
         self.names: tuple[str, ...] = ()
         self.witnesses = np.zeros((0, 3))
@@ -224,7 +232,7 @@ class BoxSearch:
                 return
             share = max((self._left - self.work // 2) // 2, 500)
             begun = edge
-            found = shrink(self.bounds, self.axes, self.shape, centre, edge, self.best, 0.5 * self.gap, share)
+            found = shrink(self.judge, self.axes, self.shape, centre, edge, self.best, 0.5 * self.gap, share)
             self.exhausted |= found.cells + 64 > share
             self.witnesses = np.concatenate([self.witnesses, found.broken])
             if found.edge > self.best:

@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from stiffmap.description import AppliedEffect
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.machine import Machine
+from stiffmap.number_text import with_uncertainty, within
 from stiffmap.planning.estimate import Estimate, estimate
 from stiffmap.planning.left_over import difference
 from stiffmap.short import short_repr
@@ -43,8 +44,8 @@ class Change:
         word = "changed" if self.changed else "as before"
         step = self.after - self.before
         return (
-            f"{self.name}: {word}, {self.before:.5g} -> {self.after:.5g} {self.unit} "
-            f"({step:+.3g} ± {2 * self.u:.2g}, p = {self.p:.2g})"
+            f"{self.name}: {word}, {within(self.before, self.u)} -> {within(self.after, self.u)} {self.unit} "
+            f"({with_uncertainty(step, 2 * self.u)}, p = {self.p:.2g})"
         )
 
 

@@ -21,6 +21,7 @@ from stiffmap.calibration.statistics import Sums
 from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.decision.beside_field import standing
 from stiffmap.diagnosis.decision.beside_noise import above_noise
+from stiffmap.diagnosis.decision.beside_time import beside_time
 from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
 from stiffmap.diagnosis.decision.few import MEETING, not_few, screened
 from stiffmap.diagnosis.decision.judge import judge, unexplained, with_model
@@ -77,11 +78,12 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
     finding, verdict, left = judge(s, find(s))
     model, never = admissible(finding.model, finding, tolerances, EVERYWHERE)
     model, noisy = above_noise(finding, model)
-    refused = never + noisy
+    model, late = beside_time(finding, model)
+    refused = never + noisy + late
     if refused:
         finding = with_model(finding, model)
         left = unexplained(s, finding)
-        verdict = _without(finding, bool(left or never))
+        verdict = _without(finding, bool(left or never or late))
     first = Answer(s, finding, verdict, left, refused=refused)
     if s.clock.over or not (left or finding.model.candidates or refused):
         return first
@@ -117,7 +119,7 @@ def _above(s: Study, layer: Layer, seed: int) -> Study:
     """The study of the same readings above a calibration."""
     straight = copy.copy(s.predictor)  # shares what was solved
     straight.experiment = layer.straight(s.predictor.experiment)
-    return study(straight, seed, layer, s.clock, s.without)
+    return study(straight, seed, layer, s.clock, s.without, s.scheduler)
 
 
 def _floor_beside_screen(s: Study) -> float:
@@ -173,7 +175,8 @@ def _searched(s: Study, tolerances: Tolerances) -> Answer:
     model, refused = admissible(finding.model, finding, tolerances)
     model, more = _beyond_calibration(s, model, finding)
     model, noisy = above_noise(finding, model)
-    refused += more + noisy
+    model, late = beside_time(finding, model)
+    refused += more + noisy + late
     if refused:
         finding = with_model(finding, model)
         left = unexplained(s, finding)
@@ -191,6 +194,8 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
             again, finding = _found_at(s, found, lower, seed)
     model, refused = admissible(finding.model, finding, tolerances)
     model, same = _beyond_calibration(s, model, finding)
+    model, late = beside_time(finding, model)
+    same += late
     named = with_model(finding, model)
     left = unexplained(s, _on(s, named))
     model, smooth = standing(s, named) if left else (model, ())
@@ -218,7 +223,7 @@ def _found_at(s: Study, found: Calibrator, rho: float, seed: int) -> tuple[Study
     s.clock.say("the search again, where what no model explains counts as noise")
     assert s.layer is not None
     raised = Layer.of(found, s.layer.calibration, rho)
-    again = study(s.predictor, seed, raised, s.clock, s.without)
+    again = study(s.predictor, seed, raised, s.clock, s.without, s.scheduler)
     return again, find(again)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import floor, isfinite, log10
+from math import isfinite
 from typing import Any
 
 from stiffmap.diagnosis.report.findings import Effect
 from stiffmap.diagnosis.report.wording import noise_size, separation_text
 from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.effects import registry
+from stiffmap.number_text import with_uncertainty, within
 
 UNITS = {
     "m": (1e6, "µm"),
@@ -31,21 +32,7 @@ def measured(value: float, low: float, high: float, unit: str) -> str:
     half = factor * abs(high - low) / 2 / 1.96
     if not (half > 0 and isfinite(half)):
         return f"{factor * value:.4g} {name}".rstrip()
-    return f"{within(factor * value, half)} ± {rounded(half)} {name}".rstrip()
-
-
-def rounded(size: float) -> str:
-    """An uncertainty to its first digit, to two where that is a 1; never 0."""
-    return within(size, size)
-
-
-def within(value: float, u: float) -> str:
-    """A value to the digits that its uncertainty carries; of very small and very large ones as a power of ten."""
-    exponent = _exponent(u)
-    last = exponent - (u < 1.95 * 10.0**exponent)
-    if not -8 <= exponent <= 6:
-        return f"{value:.{max(0, min(_exponent(value) - last, 12)) if value else 0}e}"
-    return f"{round(value, -last):.{max(0, -last)}f}"
+    return f"{with_uncertainty(factor * value, half)} {name}".rstrip()
 
 
 def interval(value: float, low: float, high: float, unit: str) -> tuple[str, str, str]:
@@ -57,10 +44,6 @@ def interval(value: float, low: float, high: float, unit: str) -> tuple[str, str
     else:
         texts = [within(factor * v, half) for v in (value, low, high)]
     return tuple(f"{text} {name}".rstrip() for text in texts)  # type: ignore[return-value]
-
-
-def _exponent(value: float) -> int:
-    return floor(log10(abs(value)))
 
 
 def place(e: Effect) -> str:

@@ -10,6 +10,7 @@ from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.report.findings import Effect, Findings
 from stiffmap.diagnosis.rivals.separation import Separation
 from stiffmap.diagnosis.slips.slip import Slip
+from stiffmap.number_text import within
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
 LISTED = 5
@@ -110,7 +111,9 @@ def effect_text(e: Effect) -> str:
     values = []
     for name, (value, low, high, unit) in e.parameters.items():
         factor, label = DISPLAY_UNITS.get(unit, (1.0, unit))
-        text = f"{name} {value * factor:.4g} [{low * factor:.4g}, {high * factor:.4g}]"
+        half = factor * abs(high - low) / 2 / 1.96
+        at, *ends = (within(factor * v, half) for v in (value, low, high))
+        text = f"{name} {at} [{', '.join(ends)}]"
         values.append(text if label == "1" else f"{text} {label}")
     n = len(e.aliases)
     same = f" (these readings cannot distinguish it from {n} other{'s' if n > 1 else ''})" if n else ""
