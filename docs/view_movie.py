@@ -77,7 +77,11 @@ def movie(target: Path) -> None:
         for t in (1 - np.cos(np.linspace(0, np.pi, FRAMES))) / 2:
             view.set(position=tuple(float(v) for v in START + t * (CORNER - START)))
             frames.append(shot(view, page))
-    small = [f.resize((800, 496), Image.Resampling.LANCZOS).quantize(COLOURS) for f in frames]
+    palette = frames[-1].quantize(COLOURS)  # one for all, so that a frame holds only what differs
+    small = [
+        f.resize((800, 496), Image.Resampling.LANCZOS).quantize(palette=palette, dither=Image.Dither.NONE)
+        for f in frames
+    ]
     hold = [1200, *[160] * (FRAMES - 2), 2500]
     small[0].save(target, save_all=True, append_images=small[1:], duration=hold, loop=0, optimize=True)
 
