@@ -96,7 +96,7 @@ def view(
 
       [cyan]stiffmap view orthoglide-revised --experiment experiments/servo --diagnosis result[/cyan]
 
-      [cyan]stiffmap view my_machine.yaml --set x.foot/beam.EIx=4000 --no-browser --port 8090[/cyan]
+      [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIx=4000 --no-browser --port 8090[/cyan]
     """
     from stiffmap.view.optional import need_viser
 

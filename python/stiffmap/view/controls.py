@@ -1,4 +1,4 @@
-"""The panel beside the scene: every control changes the model, and shows what the model says."""
+"""The panel next to the scene: every control changes the model, and shows what the model says."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ Arrows = tuple[Floats, Floats]
 
 
 class Data:
-    """What is drawn beside the machine: rows of an experiment, what a diagnosis named, a path of the tool (n, 3) m."""
+    """What is drawn next to the machine: rows of an experiment, what a diagnosis named, a path of the tool (n, 3) m."""
 
     def __init__(
         self,
