@@ -69,7 +69,7 @@ def look(view: View) -> None:
 
 
 def movie(target: Path) -> None:
-    """From home to the weak corner, with the shares beside it."""
+    """From home to the weak corner, and the shares."""
     with View(model_of(sm.load_machine("orthoglide-revised"), START, **LOAD)) as view, page_of(view) as page:
         look(view)
         page.get_by_role("tab", name="Why").click()
