@@ -146,7 +146,7 @@ def _outweighs(before: float, after: float, noise: float) -> bool:
 
 
 def _unit(e: Experiment, noise: Noise) -> tuple[str, Size, float]:
-    """What misfits are told in: lengths, or angles where nothing else is read."""
+    """The unit of misfits: lengths, or angles where nothing else is read."""
     lengths = metres(e.channels)
     columns = lengths & e.axis_read if (lengths & e.axis_read).any() else e.axis_read
     floor = float(np.sqrt(np.mean(noise.floor[columns] ** 2)))

@@ -96,7 +96,7 @@ def experiment(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing experiment.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make an experiment of a spreadsheet: columns, units and repeats are understood and told in words.
+    """Make an experiment of a spreadsheet: columns, units and repeats are understood and described in words.
 
     Units stand in brackets in the header. The header may come after other lines; n/a, - and empty cells were not
     read; further columns go to notes.csv. Exit codes: 0 done, 2 bad input, or a question that --map answers.
@@ -109,7 +109,7 @@ def experiment(
 
       [cyan]stiffmap experiment new poses.csv --dh arm_dh.csv --unit joints=deg --noise dx=0.03 -o tracker[/cyan]
 
-      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue -o readings[/cyan]
+      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue --noise dx=1 -o asked[/cyan]
 
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """

@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -62,6 +63,7 @@ def diagnose(
     exclude: Sequence[str] = (),
     budget: float | None = None,
     progress: Progress | None = None,
+    scheduler: Any = None,
 ) -> Diagnosis:
     """Which physical effect the declared machine lacks, where, how large, and how sure that is.
 
@@ -79,7 +81,7 @@ def diagnose(
         False leaves out the nested cross-validation: `before` and `after` are then not held out.
     tolerances
         Standard uncertainties of what the machine file declares, where it gives none: effects are named
-        only beside them (docs/calibration.md).
+        only jointly with them (docs/calibration.md).
     exclude
         Kinds of effects, or groups of the calibration, that are known not to be.
     budget
@@ -88,12 +90,14 @@ def diagnose(
         nothing explains reach; `not_tried` then says what was left out.
     progress
         Called with a text on what is tried.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers do the bootstrap of the search, with the same answer.
 
     Raises
     ------
     StiffmapError
         For files that cannot be used, poses out of reach, and noise that is unknown. docs/diagnosis.md
-        tells the method.
+        describes the method.
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
@@ -104,7 +108,7 @@ def diagnose(
     with clock.on_interrupt():
         predictor = Predictor(machine, data, threads=threads)
         refuse(predictor.experiment, predictor())
-        s, slips = without_slips(study(predictor, seed, None, clock, without), seed)
+        s, slips = without_slips(study(predictor, seed, None, clock, without, scheduler), seed)
         if budget is None:
             clock.bound(s.predictor)
         answer = _diagnosed(s, seed, certified(tolerances, data), groups, cross_validate)
@@ -121,7 +125,7 @@ def without_slips(s: Study, seed: int) -> tuple[Study, list[Slip]]:
             break
         predictor = Predictor(s.predictor.machine, found.experiment, threads=s.predictor.threads)
         refuse(predictor.experiment, predictor())
-        s = study(predictor, seed, None, s.clock, s.without)
+        s = study(predictor, seed, None, s.clock, s.without, s.scheduler)
     return s, slips
 
 
@@ -221,7 +225,7 @@ def _effects(s: Study, finding: Finding, why: Explanation, inflation: float) -> 
 
 
 def _detectable(s: Study, finding: Finding) -> list[Detectability]:
-    """How small each effect could be and still be found, beside those that are named."""
+    """How small each effect could be and still be found, in addition to those that are named."""
     search = finding.search
     return [
         Detectability(

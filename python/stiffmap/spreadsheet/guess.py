@@ -37,7 +37,7 @@ class Column:
     unit: str
     """As written in brackets; empty where none is."""
     meaning: str
-    """Column of an experiment; ``note`` for what is kept beside."""
+    """Column of an experiment; ``note`` for what is kept in addition."""
     repeat: int = 0
     """From 1, of repeats side by side; 0: none."""
 

@@ -1,7 +1,7 @@
 """Effects on top of a calibration: a real machine is off in many small ways before it has one fault.
 
 One fault on an exact machine, and a machine whose every number is a little off, are compared by their evidence. Where
-the second explains the readings better, effects are looked for beside it, all uncertain numbers integrated
+the second explains the readings better, effects are looked for jointly with it, all uncertain numbers integrated
 out, and named only at the floor of what no model explains, where folds share them and held-out readings gain.
 """
 
@@ -119,7 +119,7 @@ def _above(s: Study, layer: Layer, seed: int) -> Study:
     """The study of the same readings above a calibration."""
     straight = copy.copy(s.predictor)  # shares what was solved
     straight.experiment = layer.straight(s.predictor.experiment)
-    return study(straight, seed, layer, s.clock, s.without)
+    return study(straight, seed, layer, s.clock, s.without, s.scheduler)
 
 
 def _floor_beside_screen(s: Study) -> float:
@@ -223,7 +223,7 @@ def _found_at(s: Study, found: Calibrator, rho: float, seed: int) -> tuple[Study
     s.clock.say("the search again, where what no model explains counts as noise")
     assert s.layer is not None
     raised = Layer.of(found, s.layer.calibration, rho)
-    again = study(s.predictor, seed, raised, s.clock, s.without)
+    again = study(s.predictor, seed, raised, s.clock, s.without, s.scheduler)
     return again, find(again)
 
 
@@ -236,7 +236,7 @@ def _on(s: Study, finding: Finding) -> Finding:
 
 
 def floor_of(s: Study, finding: Finding) -> float:
-    """What no model explains, in noise variances of one reading: REML per pose, beside calibration and effects."""
+    """What no model explains, in noise variances of one reading: REML per pose, jointly with calibration and effects."""
     blocks = _left_by(s, finding)
     return model_form(blocks) * blocks.typical
 
@@ -323,7 +323,7 @@ def imitated(columns: Floats, signature: Floats) -> bool:
 
 def imitation(columns: Floats, signature: Floats) -> tuple[Floats | None, int]:
     """(p,) the most likely values with which numbers show `COVERED` of a signature (N,), None where they do not, and how
-    many directions of them the readings tell."""
+    many directions of them the readings determine."""
     u, size, v = np.linalg.svd(columns, full_matrices=False)
     felt = size > FAINT
     along = u[:, felt].T @ signature
@@ -336,7 +336,7 @@ def imitation(columns: Floats, signature: Floats) -> tuple[Floats | None, int]:
 def _tolerated(s: Study, finding: Finding) -> Study | None:
     """The study where the numbers that imitate an effect of a finding stay as near as tolerances allow; None: none does.
 
-    Many readings overrun a prior: beside numbers that are as far off as they like no such effect gains anything.
+    Many readings overrun a prior: jointly with numbers that are as far off as they like no such effect gains anything.
     """
     assert s.layer is not None
     problem, predictor, model = finding.search.problem.exact, finding.search.predictor, finding.model

@@ -51,7 +51,7 @@ class Residual:
     """Poses whose residuals alone are beyond noise (p-value below 1e-3 over all poses)."""
     checks: list[Check]
     limitations: list[str]
-    """What this experiment cannot tell, in sentences."""
+    """What this experiment cannot determine, in sentences."""
 
     def _repr_html_(self) -> str:
         return residual_html(self)
