@@ -118,7 +118,7 @@ def aliases(e: Effect) -> str:
         return ""
     shown = " or ".join(names[:ALIASES])
     more = len(names) - ALIASES
-    return f", or as well {shown}{f' or one of {more} more' if more > 0 else ''}, which these readings cannot tell from it"
+    return f"; these readings cannot tell it from {shown}{f' or one of {more} more' if more > 0 else ''}"
 
 
 def alias_words(a: Mapping[str, Any]) -> str:
