@@ -174,7 +174,7 @@ class Machine:
             one = self._compiled.solve_one(position, wrench)
             if one is not None:
                 s = Solution(one, (), self._compiled.names, "tcp")
-                if not sum(map(abs, position)) <= METRES_TOO_FAR * self._compiled.length:  # type: ignore[union-attr, arg-type]  # plain numbers; nan too
+                if not sum(map(abs, position)) <= METRES_TOO_FAR * self._compiled.length:  # type: ignore[arg-type]  # plain numbers; nan too
                     hint_metres(self, position, bool(s.status == Status.UNREACHABLE))
                 return s
         call = Call(position, wrench, merged(options, given))

@@ -211,7 +211,7 @@ def test_a_gain_beside_a_cause_names_the_unit(low: float, high: float, words: st
     """Readings of which a soft part as well makes a factor that no unit is: the gain found beside it says which."""
     units = "check the units of force and gauge, and any lever"
     s = Slip("factor", "all readings are 11.96 times what the file predicts", units, (), 0.1, False)
-    e = Effect("load_gain", "load", (), {"gain": ((low + high) / 2, low, high, "1")}, [], "", {})
+    e = Effect("load_gain", "load", (), {"gain": ((low + high) / 2, low, high, "1")}, [], {})
     assert by_gain(s, [e]).check == (words or units)
     assert by_gain(s, []) == s
     assert by_gain(replace(s, undone=True), [e]).check == units
