@@ -164,7 +164,7 @@ class Machine:
         threads
             None: all cores that this process may use.
         options
-            All of these at once, but the derivatives; a keyword beside it goes before its field.
+            All of these at once, but the derivatives; a keyword given as well goes before its field.
 
         Notes
         -----
@@ -281,7 +281,9 @@ class Machine:
 
         position (3,) m, None: home. port: of 127.0.0.1; None: a free one from 8080 on. browser: whether to open one.
         state: fields of `stiffmap.view.State`, such as ``force=(0, 0, -300)`` N, ``plane="x"``, ``quantity="worst"``,
-        ``changes={"x.foot/compliance.c33": 2e-8}``; SI, base axes. In a notebook the view is shown where it is the
+        ``changes={"x.foot/beam.EIx": 4000.0}``; SI, base axes; and what is drawn beside the machine: ``experiment``
+        (an `Experiment` or its folder), ``diagnosis`` (a `Diagnosis`, or the folder of one), ``path`` (a `Toolpath`, its
+        file, or positions (n, 3) m). In a notebook the view is shown where it is the
         last value of a cell. docs/view.md. Raises MissingPartError without the extra ``[view]`` (viser),
         StiffmapError for bad input and for a pose that the machine cannot take.
         """

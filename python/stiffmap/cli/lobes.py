@@ -69,6 +69,9 @@ def lobes(
     gravity_: GravityOption = None,
     output: FolderOption = None,
     threads: ThreadsOption = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler whose workers take the speeds.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Stability lobes: at which speed of the spindle what depth of cut does not chatter.
@@ -99,10 +102,11 @@ def lobes(
     if depth is not None and not depth > 0:
         raise StiffmapError(f"--depth: expected a depth above zero in mm, got {depth:g}")
     given: dict[str, Any] = {
-        "speeds": None if ends is None else np.linspace(*ends, many[0]) / RPM,
+        "speeds": None if ends is None else np.linspace(ends[0], ends[1], many[0]) / RPM,
         "depths": None if depth is None else MM * np.linspace(0, depth, many[1] + 1)[1:],
         "feed": numbers(feed, "feed", 3), "tool": numbers(tool, "tool", 3), "also": _modes(mode), "method": method,
         "rotation": rotation(rotation_), "gravity": gravity(gravity_), "threads": threads,
+        "scheduler": scheduler,
         "damping": None if damping is None else numbers(damping, "damping") / 100,
     }  # fmt: skip
     answers = [_one(m, p, text, given, output, i) for i, text in enumerate(at or [None])]

@@ -103,6 +103,9 @@ def mill(
         typer.Option(help="Arms: choose the turn about the tool from so many over a full turn, e.g. 72."),
     ] = None,
     threads: ThreadsOption = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler whose workers try placements and turns.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """The part as a machine will cut it, and a program that makes it right.
@@ -138,7 +141,7 @@ def mill(
     angle = float(np.radians(turn))
     out: dict[str, object] = {}
     if place is not None:
-        best = placements(m, p, cut, count=place, threads=threads)
+        best = placements(m, p, cut, count=place, threads=threads, scheduler=scheduler)
         where, angle = best.best.at, best.best.turn
         out["placement"] = {"words": best.words(cut.tolerance), **placement_summary(best)}
 
@@ -151,11 +154,11 @@ def mill(
 
     turns = None
     if redundancy is not None:
-        turns = choose_turns(job(p), redundancy, threads=threads).angle
+        turns = choose_turns(job(p), redundancy, threads=threads, scheduler=scheduler).angle
     if entry is not None:
         p, out["entry"] = _entered(p, entry, job(p, turns), threads)
     if redundancy is not None:
-        chosen = choose_turns(job(p), redundancy, threads=threads)
+        chosen = choose_turns(job(p), redundancy, threads=threads, scheduler=scheduler)
         turns = chosen.angle
         out["redundancy"] = {
             "largest_mm": float(1e3 * np.abs(chosen.error).max()), "best_fixed_turn_mm": float(1e3 * chosen.fixed.min()),

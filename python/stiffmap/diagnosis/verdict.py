@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -22,6 +23,7 @@ from stiffmap.diagnosis.decision.judge import after_checks
 from stiffmap.diagnosis.decision.largest_residual import located
 from stiffmap.diagnosis.decision.result_machine import result_machine
 from stiffmap.diagnosis.decision.stability import explained
+from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.report.describe import aliases_of, as_place, named_effects
 from stiffmap.diagnosis.report.findings import Detectability, Effect, NoiseReport
 from stiffmap.diagnosis.report.result import Diagnosis
@@ -38,6 +40,7 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.noise.over_time import over_time
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
@@ -63,6 +66,7 @@ def diagnose(
     exclude: Sequence[str] = (),
     budget: float | None = None,
     progress: Progress | None = None,
+    scheduler: Any = None,
 ) -> Diagnosis:
     """Which physical effect the declared machine lacks, where, how large, and how sure that is.
 
@@ -80,7 +84,7 @@ def diagnose(
         False leaves out the nested cross-validation: `before` and `after` are then not held out.
     tolerances
         Standard uncertainties of what the machine file declares, where it gives none: effects are named
-        only beside them (docs/calibration.md).
+        only jointly with them (docs/calibration.md).
     exclude
         Kinds of effects, or groups of the calibration, that are known not to be.
     budget
@@ -89,12 +93,14 @@ def diagnose(
         nothing explains reach; `not_tried` then says what was left out.
     progress
         Called with a text on what is tried.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers do the bootstrap of the search, with the same answer.
 
     Raises
     ------
     StiffmapError
         For files that cannot be used, poses out of reach, and noise that is unknown. docs/diagnosis.md
-        tells the method.
+        describes the method.
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
@@ -105,7 +111,7 @@ def diagnose(
     with clock.on_interrupt():
         predictor = Predictor(machine, data, threads=threads)
         refuse(predictor.experiment, predictor())
-        s, slips = without_slips(study(predictor, seed, None, clock, without), seed)
+        s, slips = without_slips(study(predictor, seed, None, clock, without, scheduler), seed)
         if budget is None:
             clock.bound(s.predictor)
         answer = _diagnosed(s, seed, certified(tolerances, data), groups, cross_validate)
@@ -122,7 +128,7 @@ def without_slips(s: Study, seed: int) -> tuple[Study, list[Slip]]:
             break
         predictor = Predictor(s.predictor.machine, found.experiment, threads=s.predictor.threads)
         refuse(predictor.experiment, predictor())
-        s = study(predictor, seed, None, s.clock, s.without)
+        s = study(predictor, seed, None, s.clock, s.without, s.scheduler)
     return s, slips
 
 
@@ -201,6 +207,7 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
             *found.notes,
             *limitations(e, s.noise, s.predictor.machine),
             *([] if left else noise.sentences()),
+            *_over_time(finding, model),
         ],
         significance={
             "effective_trials": s.effective_trials,
@@ -234,7 +241,7 @@ def _effects(s: Study, finding: Finding, why: Explanation, inflation: float) -> 
 
 
 def _detectable(s: Study, finding: Finding) -> list[Detectability]:
-    """How small each effect could be and still be found, beside those that are named."""
+    """How small each effect could be and still be found, in addition to those that are named."""
     search = finding.search
     return [
         Detectability(
@@ -247,6 +254,13 @@ def _detectable(s: Study, finding: Finding) -> list[Detectability]:
         for d in detectable(search.screen.beside(finding.model.tangent()), search.threshold)
         if any(v is not None for v in d.sizes.values())
     ]
+
+
+def _over_time(finding: Finding, model: Model) -> list[str]:
+    """What the model leaves over time, in words; nothing where no times were recorded."""
+    assert model.residual is not None
+    found = over_time(finding.search.problem, model.residual)
+    return [] if found is None else [str(found)]
 
 
 def _summaries(

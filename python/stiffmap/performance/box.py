@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +13,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.box_search import BoxSearch
 from stiffmap.performance.limits import Bounds
+from stiffmap.performance.proof import judge_on
 from stiffmap.performance.turning import best_orientation, turned
 from stiffmap.rotations import as_rotations
 from stiffmap.short import short_repr
@@ -84,6 +86,7 @@ def largest_box(
     gap: float = 1e-4,
     work: int = WORK,
     threads: int | None = None,
+    scheduler: Any = None,
 ) -> LargestBox:
     """Largest box of given proportions, anywhere in the workspace, all of it within the limits.
 
@@ -116,6 +119,8 @@ def largest_box(
         m: search goes on until upper and lower bound are this near ...
     work
         ... or this many poses and cells were closed, those of the climb not counted; the bounds hold all the same.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers prove the cells, with the same answer.
 
     Notes
     -----
@@ -145,7 +150,8 @@ def largest_box(
     else:
         axes = np.eye(3) if orientation is None else as_rotations(real_array(orientation, "orientation"))
     space = space if region is not None and not isinstance(orientation, str) else turned(space, axes)
-    found = BoxSearch(bounds, shape, axes, space, gap, work).run()
+    with judge_on(bounds, scheduler) as judge:
+        found = BoxSearch(bounds, shape, axes, space, gap, work, judge).run()
     why = bounds.unproven
     return LargestBox(
         edge=found.edge, edge_upper=found.upper, edges=found.edge * shape,

@@ -193,7 +193,7 @@ def test_aliases_stand_in_the_headline() -> None:
     d = sm.diagnose("orthoglide-revised", readings("orthoglide-revised", True), seed=1, cross_validate=False)
     (effect,) = d.effects
     if effect.aliases:
-        assert "these readings cannot tell it from " in opening(d)
+        assert "these readings cannot distinguish it from " in opening(d)
     assert aliases(replace(effect, aliases=[])) == ""
     made = replace(effect, aliases=[{"kind": "compliance", "element": "actuator", "legs": ["z"]}] * 2)
     assert aliases(made).count("(drive of leg z)") == 1

@@ -117,6 +117,19 @@ def test_errors_name_the_sheet_and_leave_nothing(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["sheet.csv"]
 
 
+def test_a_workbook_names_sheet_row_and_cell(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def fill(book: Any) -> None:
+        book.active.title = "March"
+        book.active.append(["x [mm]", "y [mm]", "z [mm]", "fx [N]", "dx [µm]"])
+        book.active.append([0, 400, 0, 100, 12.5])
+        book.active.append([50, 400, 0, 100, "soft"])
+
+    assert imported(Ugly(fill), tmp_path)[0] == 2
+    err = capsys.readouterr().err
+    assert "sheet 'March', line 3: column 'dx [µm]': expected a number; found 'soft' (cell E3)" in err
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["sheet.xlsx"]
+
+
 def test_a_failure_leaves_an_old_experiment_alone(tmp_path: Path) -> None:
     assert imported(Ugly(CLEAN), tmp_path)[0] == 0
     before = (tmp_path / "e/data.csv").read_text(encoding="utf-8")

@@ -16,6 +16,7 @@ from stiffmap.performance.cells import shrink
 from stiffmap.performance.enclosed import enclose
 from stiffmap.performance.limit import Limit
 from stiffmap.performance.limits import Bounds
+from stiffmap.performance.proof import judge_cells
 from stiffmap.performance.turning import best_orientation
 
 EDGE = 1 / np.sqrt(18) + 1 / np.sqrt(6)  # of the cube within 0.5…2, times L
@@ -89,10 +90,10 @@ def test_cells_that_stick_out_are_cut_off():
     bounds = Bounds(sm.load_machine("orthoglide-revised"), transmission=(0.5, 2.0))
     low = -0.775 / np.sqrt(18)
     centre = np.full(3, low + 0.05)
-    kept = shrink(bounds, np.eye(3), np.ones(3), centre, 0.104, 0.0, 1e-4, 20000)
+    kept = shrink(judge_cells(bounds), np.eye(3), np.ones(3), centre, 0.104, 0.0, 1e-4, 20000)
     assert 0.099 <= kept.edge <= 0.1 and len(kept.broken)
     assert "transmission above" in kept.names
-    whole = shrink(bounds, np.eye(3), np.ones(3), centre, 0.0999, 0.0, 1e-4, 20000)
+    whole = shrink(judge_cells(bounds), np.eye(3), np.ones(3), centre, 0.0999, 0.0, 1e-4, 20000)
     assert whole.edge == 0.0999 and not len(whole.broken)
 
 
