@@ -107,6 +107,7 @@ def mill_job(
     stability = path_stability(job, threads)
     if isinstance(stability, PathStability):
         ds["multiplier"] = ("point", np.interp(job.points.way, stability.way, stability.multiplier))
+        ds["multiplier"].attrs["said"] = stability.sentence(job.process.spindle)
     out = Milled(
         job, before, found.position, made, after, ds, stability, feeds=chosen, warnings=warned(job, ds)
     )
