@@ -164,7 +164,7 @@ class Machine:
         threads
             None: all cores that this process may use.
         options
-            All of these at once, but the derivatives; a keyword beside it goes before its field.
+            All of these at once, but the derivatives; a keyword given as well goes before its field.
 
         Notes
         -----
@@ -174,7 +174,7 @@ class Machine:
             one = self._compiled.solve_one(position, wrench)
             if one is not None:
                 s = Solution(one, (), self._compiled.names, "tcp")
-                if max(abs(v) for v in position) > METRES_TOO_FAR * self._compiled.length:  # type: ignore[union-attr, arg-type]  # plain numbers
+                if not sum(map(abs, position)) <= METRES_TOO_FAR * self._compiled.length:  # type: ignore[union-attr, arg-type]  # plain numbers; nan too
                     hint_metres(self, position, bool(s.status == Status.UNREACHABLE))
                 return s
         call = Call(position, wrench, merged(options, given))
@@ -281,7 +281,9 @@ class Machine:
 
         position (3,) m, None: home. port: of 127.0.0.1; None: a free one from 8080 on. browser: whether to open one.
         state: fields of `stiffmap.view.State`, such as ``force=(0, 0, -300)`` N, ``plane="x"``, ``quantity="worst"``,
-        ``changes={"x.foot/compliance.c33": 2e-8}``; SI, base axes. In a notebook the view is shown where it is the
+        ``changes={"x.foot/beam.EIx": 4000.0}``; SI, base axes; and what is drawn beside the machine: ``experiment``
+        (an `Experiment` or its folder), ``diagnosis`` (a `Diagnosis`, or the folder of one), ``path`` (a `Toolpath`, its
+        file, or positions (n, 3) m). In a notebook the view is shown where it is the
         last value of a cell. docs/view.md. Raises MissingPartError without the extra ``[view]`` (viser),
         StiffmapError for bad input and for a pose that the machine cannot take.
         """
@@ -348,7 +350,14 @@ METRES_TOO_FAR = 100.0
 
 
 def hint_metres(machine: Machine, position: ArrayLike, failed: bool) -> None:
-    """Warn, at the caller's line, where every pose failed and lies as far outside as millimetres read as metres do."""
+    """Warn, at the caller's line, of positions that are no numbers, and where every pose failed and lies as far outside as
+    millimetres read as metres do."""
+    finite = np.isfinite(np.asarray(position, dtype=float))
+    if not finite.all():
+        rows = np.atleast_1d(finite.all(axis=-1))
+        text = f"{int((~rows).sum())} of {rows.size} positions are not finite numbers (nan or inf); their status is UNREACHABLE"
+        warnings.warn(text, stacklevel=_frames_of_this_package())
+        return
     text = metres_expected(machine.compiled, position) if failed else ""
     if text:
         warnings.warn(f"no pose can be reached: {text}", stacklevel=_frames_of_this_package())

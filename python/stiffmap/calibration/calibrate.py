@@ -37,7 +37,7 @@ def calibrate(
     budget: float | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
-    """What a machine's uncertain numbers are, and which of them the readings can tell.
+    """What a machine's uncertain numbers are, and which of them the readings can determine.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def calibrate(
     ------
     StiffmapError
         For files that cannot be used, poses out of reach, an unknown noise or group.
-        docs/calibration.md tells the method.
+        docs/calibration.md describes the method.
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)

@@ -1,4 +1,4 @@
-"""What the readings are claimed to tell, and the fit with that let go."""
+"""The hypotheses that the readings support, and the fit with their priors widened."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ BORNE_OUT = 0.5
 def claimed_fit(
     ready: Calibrator, sums: Sums, members: dict[str, list[int]], seed: int
 ) -> tuple[Claims, Fitted, float]:
-    """What is claimed, the fit with that let go, and its floor."""
+    """Accepted hypotheses, the fit with their priors widened, and its variance per pose."""
     judged: list[tuple[BesideField, list[Fold]]] = []
     everything = {"all": list(range(len(sums.right)))}
 
@@ -39,7 +39,7 @@ def claimed_fit(
         field, parts = judged[0]
         nats = field.log_evidence(trial) - field.log_evidence(factor)
         if nats < STRONG:
-            return f"a smooth field that knows nothing of the machine explains as much (odds {odds(nats)} beside it)"
+            return f"a smooth field that does not depend on the machine explains as much (odds {odds(nats)} with the field in the model)"
         if len(parts) < 2:
             return ""
         tolerated = _tolerated(sums, factor, which)
@@ -80,7 +80,7 @@ def _beside_field(ready: Calibrator) -> BesideField:
 
 
 def _let_go(ready: Calibrator, claimed: Claims) -> tuple[Fitted, float]:
-    """The fit with what is claimed let go, and its floor: by the slopes that there are, through the full prediction."""
+    """The fit with the priors of the accepted hypotheses widened, and its floor: by the slopes that there are, through the full prediction."""
     names, at = ready.sensitivity.unknowns, ready.sensitivity.at
     fit, rho, promised = ready.fit, ready.rho, 0.0
     let_go = np.flatnonzero(claimed.factor > 1.0).tolist()

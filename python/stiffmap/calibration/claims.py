@@ -1,4 +1,4 @@
-"""What may be claimed beyond tolerance: it must stand beside a smooth field that knows nothing of the machine, hold on
+"""What may be accepted as beyond tolerance: it must gain with a smooth field that does not depend on the machine in the model, hold on
 readings that it has not seen, and be no further off than a number of this machine can be.
 
 A calibration has many numbers; some of them imitate in part whatever the readings show. Numbers that are the cause
@@ -111,7 +111,7 @@ def _many_a_little(
     wide: Floats,
     members: Mapping[str, Sequence[int]],
 ) -> bool:
-    """Whether groups that are off as a whole explain more than single numbers with what else is off beside them."""
+    """Whether groups that are off as a whole explain more than single numbers with the others free as well."""
     _, beside = widened(sums.scaled(singles.factor), members, (INSTRUMENT,))
     one = sums.scaled(singles.factor * beside).log_evidence
     return groups[0].nats > singles.found[0].nats and sums.scaled(wide).log_evidence > one
@@ -121,7 +121,7 @@ def held_within(sums: Sums, factor: Floats, which: Sequence[int], within: float)
     """(p,) factors under which the unknowns `which` stay within so many standard uncertainties (rms), times `factor` (p,).
 
     Many readings overrun a prior: numbers are then far beyond their uncertainties, whatever these say. What a claim
-    gains is gained beside a fit that holds the numbers where tolerances allow them to be.
+    gains is measured against a fit that holds the numbers where tolerances allow them to be.
     """
     out = factor.copy()
     which = list(which)
@@ -158,7 +158,7 @@ class BesideField:
         return BesideField(blocks, columns.shape[1])
 
     def log_evidence(self, factor: Floats) -> float:
-        """Of the unknowns at `factor` (p,) times their uncertainties, beside the field and the floor that suit best."""
+        """Of the unknowns at `factor` (p,) times their uncertainties, jointly with the field and the floor that suit best."""
         best = self.at(factor, 0.0)
         for k in range(len(self.blocks)):
             before = -np.inf

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from stiffmap.calibration.facts import Beyond, Facts, Wider
+from stiffmap.number_text import with_uncertainty, within
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm")}
 FACTOR = 0.5
@@ -24,14 +25,24 @@ def in_display_units(value: float, unit: str) -> str:
     return f"{value * factor:.4g} {name}"
 
 
+def measured(value: float, u: float, unit: str) -> str:
+    """``0.0520 ± 0.0009 mm``; of the logarithm of a factor in per cent, or as the factor with its relative uncertainty."""
+    if unit == "ln":
+        if abs(value) < FACTOR:
+            return f"{with_uncertainty(100.0 * math.expm1(value), 100.0 * math.exp(value) * u)} %"
+        return f"×{within(math.exp(value), math.exp(value) * u)} ± {within(100.0 * u, 100.0 * u)} %"
+    factor, name = DISPLAY_UNITS[unit]
+    return f"{with_uncertainty(factor * value, factor * u)} {name}"
+
+
 def lines(c: Facts) -> list[str]:
     """Verdict, groups, misfit before and after, what is left."""
     out = [f"calibration: {c.verdict}{' (stopped early)' if c.stopped else ''}"]
     out += [f"  {_beyond(b)}" for b in c.beyond]
     out += [f"  {_wider(w)}" for w in c.wider]
-    out += [f"  not claimed: {r}" for r in c.refused]
+    out += [f"  refused: {r}" for r in c.refused]
     out += _large_pulls(c)
-    out.append(f"told by the readings: {c.rank} directions of {len(c.rows)} unknowns")
+    out.append(f"identifiable from the readings: {c.rank} directions of {len(c.rows)} unknowns")
     out.append("groups: " + _groups(c))
     out.append(
         f"misfit: rms {in_display_units(c.rms_before, c.unit)} as declared, {in_display_units(c.rms_after, c.unit)} calibrated; "
@@ -47,13 +58,15 @@ def lines(c: Facts) -> list[str]:
         f = c.unseen
         out.append(
             f"machine file on {f.by} that no fit saw: rms {in_display_units(f.before, c.unit)} as declared, "
-            f"{in_display_units(f.after, c.unit)} ± {in_display_units(f.u, c.unit)} corrected"
+            f"{measured(f.after, f.u, c.unit)} corrected"
         )
         if f.after > f.before:
             out.append(
                 "the file is worse than the declared machine on readings that no fit saw: do not use it; more poses are needed"
             )
     out.append(f"holds where it was read: {c.validity}")
+    if c.over_time is not None:
+        out.append(str(c.over_time))
     if c.floor > 0.0:
         where = ", ".join(f"{k} {in_display_units(v, _unit(k, c.unit))}" for k, v in c.rest.items())
         out.append(
@@ -105,12 +118,12 @@ def odds(nats: float) -> str:
 def _beyond(b: Beyond) -> str:
     other = f"; or instead: {', '.join(b.rivals[:3])}" if b.rivals else ""
     more = f" and {len(b.rivals) - 3} more" if len(b.rivals) > 3 else ""
-    return f"{b.name}: {in_display_units(b.value, b.unit)} ± {in_display_units(b.sigma, b.unit)} (odds {odds(b.nats)}){other}{more}"
+    return f"{b.name}: {measured(b.value, b.sigma, b.unit)} (odds {odds(b.nats)}){other}{more}"
 
 
 def _wider(w: Wider) -> str:
     other = f"; or instead: {', '.join(w.rivals)}" if w.rivals else ""
-    return f"{w.group}: standard uncertainties {w.factor:g} times too small (odds {odds(w.nats)}){other}; which of them, the readings do not tell"
+    return f"{w.group}: standard uncertainties {w.factor:g} times too small (odds {odds(w.nats)}){other}; the readings do not determine which of them"
 
 
 def _groups(c: Facts) -> str:
@@ -125,7 +138,9 @@ def _groups(c: Facts) -> str:
 def table(c: Facts, most: int | None = None) -> list[str]:
     """Name, value, u, posterior sigma, pull, observability."""
     width = max((len(r.name) for r in c.rows), default=4)
-    out = [f"{'unknown':{width}}  {'value':>12}  {'u':>11}  {'sigma':>11}  {'pull':>6}  {'u/sigma':>8}  told"]
+    out = [
+        f"{'unknown':{width}}  {'value':>12}  {'u':>11}  {'sigma':>11}  {'pull':>6}  {'u/sigma':>8}  identifiable"
+    ]
     for r in sorted(c.rows, key=lambda r: -r.observability)[:most]:
         told = ("minimal" if r.minimal else "yes") if r.identifiable else "no"
         cells = (in_display_units(v, r.unit) for v in (r.value, r.u, r.sigma))

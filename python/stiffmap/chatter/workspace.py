@@ -130,8 +130,10 @@ def _around(found: TipModes) -> Floats:
 
 
 def _only(m: TipModes, rows: np.ndarray) -> TipModes:
-    parts = (m.square, m.tip, m.viscous, m.loss, m.rest, m.unsymmetric, m.status, m.flags)
-    return TipModes((len(rows),), *(a[rows] for a in parts), damping=m.damping)  # type: ignore[arg-type]
+    return TipModes(
+        (len(rows),), m.square[rows], m.tip[rows], m.viscous[rows], m.loss[rows], m.rest[rows], m.unsymmetric[rows],
+        m.status[rows], m.flags[rows], m.damping,
+    )  # fmt: skip
 
 
 def _real(v: np.ndarray) -> Floats:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,9 +21,6 @@ from stiffmap.outputs.option import written
 if TYPE_CHECKING:
     from stiffmap.experiment import Experiment
     from stiffmap.spreadsheet.convert import Imported
-    from stiffmap.spreadsheet.dialogue import Answers, Ask
-    from stiffmap.spreadsheet.instrument import Instrument
-    from stiffmap.spreadsheet.sheet import Sheet
 
 
 RECORDED = {"operator", "instrument", "certificate", "date", "temperature", "notes", "source", "sha256"}
@@ -34,8 +31,27 @@ def experiment(
     file: Annotated[
         Path, typer.Argument(help="Spreadsheet: .xlsx, .csv, .txt (any separator and decimal sign).")
     ],
-    machine: Annotated[str, typer.Option(help="Declared machine: shipped name or machine file.")],
     output: Annotated[Path, written(help="Folder of the experiment.")],
+    machine: Annotated[
+        str | None, typer.Option(help="Declared machine: shipped name or machine file; or give --dh.")
+    ] = None,
+    dh: Annotated[
+        Path | None,
+        typer.Option(
+            "--dh",
+            help="Instead: table of Denavit and Hartenberg of a serial arm, of which machine.yaml is made.",
+        ),
+    ] = None,
+    dh_convention: Annotated[
+        str,
+        typer.Option(
+            "--dh-convention", help="standard, or modified (Craig: a and alpha of the link before)."
+        ),
+    ] = "standard",
+    difference: Annotated[
+        str,
+        typer.Option(help="What differences in the file are: actual-minus-target or target-minus-actual."),
+    ] = "actual-minus-target",
     quantity: Annotated[
         str | None,
         typer.Option(
@@ -55,7 +71,10 @@ def experiment(
             "--map", help="What a column is, e.g. dx='Uhr 1 [µm]'; repeats: dx='Uhr 1|Uhr 2'; repeatable."
         ),
     ] = None,
-    unit: Annotated[list[str] | None, typer.Option(help="Unit of a column without one, e.g. dx=um.")] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(help="Unit of a column without one, e.g. dx=um; length=mm, joints=deg: of all of them."),
+    ] = None,
     constant: Annotated[
         list[str] | None, typer.Option("--set", help="What is the same in all rows, mm and N, e.g. z=0.")
     ] = None,
@@ -77,7 +96,7 @@ def experiment(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing experiment.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make an experiment of a spreadsheet: columns, units and repeats are understood and told in words.
+    """Make an experiment of a spreadsheet: columns, units and repeats are understood and described in words.
 
     Units stand in brackets in the header. The header may come after other lines; n/a, - and empty cells were not
     read; further columns go to notes.csv. Exit codes: 0 done, 2 bad input, or a question that --map answers.
@@ -88,15 +107,21 @@ def experiment(
 
       [cyan]stiffmap experiment new points.csv --instrument tracker --machine hexapod --noise dx=0.01 -o points[/cyan]
 
-      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue -o readings[/cyan]
+      [cyan]stiffmap experiment new poses.csv --dh arm_dh.csv --unit joints=deg --noise dx=0.03 -o tracker[/cyan]
+
+      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue --noise dx=1 -o asked[/cyan]
 
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
     from stiffmap.fingerprints import file_digest
-    from stiffmap.machine import load_machine
+    from stiffmap.machine import Machine, load_machine
+    from stiffmap.spreadsheet.dh import LEG, arm, read_dh
     from stiffmap.spreadsheet.dialogue import Answers
     from stiffmap.spreadsheet.folder import make_experiment
     from stiffmap.spreadsheet.instrument import load_instrument
+    from stiffmap.spreadsheet.joints import DIFFERENCES, drives_of
+    from stiffmap.spreadsheet.reading import Reading, read_and_ask
+    from stiffmap.spreadsheet.sheet import read_sheet
 
     if action != "new":
         raise StiffmapError(f"experiment: expected 'new', got '{action}'")
@@ -104,71 +129,42 @@ def experiment(
     quantity = quantity or (wrote.quantity if wrote else "deflection")
     if quantity not in ("deflection", "position"):
         raise StiffmapError(f"--quantity: expected deflection or position, got '{quantity}'")
-    load_machine(machine)
+    if difference not in DIFFERENCES:
+        raise StiffmapError(f"--difference: expected {' or '.join(DIFFERENCES)}, got '{difference}'")
+    if (machine is None) == (dh is None):
+        raise StiffmapError("experiment: give either --machine or --dh")
     if (output / "experiment.yaml").exists() and not overwrite:
         raise FileError("exists already; use --overwrite to replace it", file=str(output / "experiment.yaml"))
     given = Answers(
-        {k: v.split("|") for k, v in _pairs(mapped, "map").items()},
-        _pairs(unit, "unit"),
+        {k: v.split("|") for k, v in pairs(mapped, "map").items()},
+        pairs(unit, "unit"),
         _numbers(constant, "set"),
         _numbers(noise, "noise"),
     )
     ask = _prompt if dialogue else None
-    table, found, answers, told = read_and_ask(file, sheet, wrote, given, ask)
+    rows = None if dh is None else read_dh(read_sheet(dh), given.units)
+    drives = {f"{LEG}.{r.name}": r.slides for r in rows} if rows else drives_of(load_machine(str(machine)))
+    read = Reading(wrote, drives, difference)
+    table, found, answers, told, joints = read_and_ask(file, sheet, read, given, ask)
+    if rows is not None and joints is None:
+        raise StiffmapError(f"{file}: no column commands a joint; the arm has {', '.join(drives)}")
+    quantity = "position" if joints and joints.head else quantity
+    machine = machine or str(output / "machine.yaml")
     title = f"from {table.file.replace(str(file), file.name)}"
-    kept = {"source": file.name, "sha256": file_digest(file), **_pairs(record, "record")}
+    kept = {"source": file.name, "sha256": file_digest(file), **pairs(record, "record")}
     wrong = sorted(set(kept) - RECORDED)
     if wrong:
         raise StiffmapError(f"--record: expected one of {', '.join(sorted(RECORDED))}; got '{wrong[0]}'")
     made = make_experiment(found, table, output, machine, quantity, answers.noise, title, kept)
+    if rows is not None and joints is not None and dh is not None:
+        Machine(arm(rows, dh_convention, output.name, f"from {dh.name}", joints.middle())).save(machine)
     if as_json:
         print_json({"folder": str(output), "rows": len(made), "repeats": found.repeats,
                     "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units})  # fmt: skip
         return
     for line in (*told, *(f"left out: {text}" for text in table.aside)):
         Console(highlight=False, soft_wrap=True).print(escape(line))
-    tell(found, table.header, made, machine, output)
-
-
-def read_and_ask(
-    file: Path, sheet: str | None, wrote: Instrument | None, given: Answers, ask: Ask | None
-) -> tuple[Sheet, Imported, Answers, list[str]]:
-    """The sheet that fits, what was understood of it, the answers in use, and what the user should know of them."""
-    from stiffmap.spreadsheet.dialogue import ask_all, profile_file, remember, remembered
-    from stiffmap.spreadsheet.instrument import as_readings
-    from stiffmap.spreadsheet.sheet import EXCEL, read_sheet
-    from stiffmap.spreadsheet.workbook import sheet_names
-
-    def one(name: str | None, ask: Ask | None) -> tuple[Sheet, Imported, Answers, list[str]]:
-        table, answers, told = read_sheet(file, name), given, list[str]()
-        form = table
-        if (kept := remembered(form)) is not None:
-            answers = kept.below(given)
-            told.append(f"answers of an earlier sheet of this form are used: {profile_file(form)}")
-        if wrote is not None:
-            table, meant, assumed, constants = as_readings(table, wrote, answers.constants)
-            answers = replace(
-                answers, chosen=meant | answers.chosen, units=assumed | answers.units, constants=constants
-            )
-        found, final = ask_all(table, answers, ask)
-        if ask is not None and final != answers:
-            told.append(f"the answers are remembered for sheets of this form: {remember(form, final)}")
-        return table, found, final, told
-
-    names = sheet_names(file) if sheet is None and file.suffix.lower() in EXCEL else [sheet]
-    if len(names) == 1:
-        return one(sheet, ask)
-    reasons = {}
-    for name in names:
-        try:
-            return one(name, None)
-        except StiffmapError as problem:
-            reasons[str(name)] = problem
-    tables = [n for n, p in reasons.items() if type(p).__name__ == "Question"]
-    if ask is not None and tables:
-        return one(tables[0], ask)
-    lines = "; ".join(f"'{n}': {str(p).removeprefix(str(file)).lstrip(':, ')}" for n, p in reasons.items())
-    raise StiffmapError(f"{file}: none of its {len(names)} sheets fits (--sheet NAME reads one). {lines}")
+    tell(found, table.header, made, machine, output, joints.columns if joints else {})
 
 
 def _prompt(text: str) -> str:
@@ -180,10 +176,20 @@ def _prompt(text: str) -> str:
         ) from None
 
 
-def tell(found: Imported, header: Sequence[str], made: Experiment, machine: str, output: Path) -> None:
+def tell(
+    found: Imported,
+    header: Sequence[str],
+    made: Experiment,
+    machine: str,
+    output: Path,
+    commands: Mapping[str, tuple[str, str]],
+) -> None:
     """What each column was taken for, the first rows, and what to do next."""
     console = Console(highlight=False, soft_wrap=True)
     for c in found.columns:
+        if c.meaning in commands:
+            console.print(f"'{escape(header[c.index])}': command of {', '.join(commands[c.meaning])}")
+            continue
         told = f"repeat {c.repeat} of {c.meaning}" if c.repeat else c.meaning
         where = (
             "kept in notes.csv"
@@ -194,7 +200,10 @@ def tell(found: Imported, header: Sequence[str], made: Experiment, machine: str,
         console.print(f"'{escape(header[c.index])}': {where}")
     for name, value in found.constants.items():
         console.print(f"{name} = {value:g} in every row")
-    _show(console, made)
+    if commands:
+        _show_cells(console, found)
+    else:
+        _show(console, made)
     poses = int(made.groups.max()) + 1
     console.print(
         f"{output}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
@@ -218,7 +227,17 @@ def _show(console: Console, made: object) -> None:
     console.print(table)
 
 
-def _pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
+def _show_cells(console: Console, found: Imported) -> None:
+    """The first rows as they were written."""
+    table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood")
+    for name in found.header:
+        table.add_column(name, justify="right")
+    for row in islice(iter(found.rows), 3):
+        table.add_row(*(f"{c:.7g}" if isinstance(c, float) else str(c) for c in row))
+    console.print(table)
+
+
+def pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
     out = {}
     for text in given or []:
         key, equals, value = text.partition("=")
@@ -230,7 +249,7 @@ def _pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
 
 def _numbers(given: Sequence[str] | None, name: str) -> dict[str, float]:
     out = {}
-    for key, text in _pairs(given, name).items():
+    for key, text in pairs(given, name).items():
         try:
             out[key] = number_in(text)
         except ValueError:

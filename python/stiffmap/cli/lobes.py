@@ -102,7 +102,7 @@ def lobes(
     if depth is not None and not depth > 0:
         raise StiffmapError(f"--depth: expected a depth above zero in mm, got {depth:g}")
     given: dict[str, Any] = {
-        "speeds": None if ends is None else np.linspace(*ends, many[0]) / RPM,
+        "speeds": None if ends is None else np.linspace(ends[0], ends[1], many[0]) / RPM,
         "depths": None if depth is None else MM * np.linspace(0, depth, many[1] + 1)[1:],
         "feed": numbers(feed, "feed", 3), "tool": numbers(tool, "tool", 3), "also": _modes(mode), "method": method,
         "rotation": rotation(rotation_), "gravity": gravity(gravity_), "threads": threads,

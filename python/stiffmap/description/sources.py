@@ -29,12 +29,14 @@ def source_of(description: MachineDescription, element: str) -> str:
 
 
 def in_words(by_source: Mapping[str, float]) -> str:
-    """``83 % of it rests on assumed numbers, 17 % on computed ones``; empty where no number is marked."""
+    """``83 % of it rests on assumed numbers, 17 % on computed ones``; empty where no number is marked or nothing moves."""
     if set(by_source) <= {UNMARKED}:
         return ""
     parts = [
         f"{100 * v:.0f} % of it rests on numbers that are {s}" for s, v in by_source.items() if v >= 0.005
     ]
+    if not parts:
+        return ""
     return ", ".join(
         [parts[0], *(p.replace(" of it rests on numbers that are ", " on ") + " ones" for p in parts[1:])]
     )

@@ -23,6 +23,7 @@ from stiffmap.diagnosis.decision.judge import after_checks
 from stiffmap.diagnosis.decision.largest_residual import located
 from stiffmap.diagnosis.decision.result_machine import result_machine
 from stiffmap.diagnosis.decision.stability import explained
+from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.report.describe import aliases_of, as_place, named_effects
 from stiffmap.diagnosis.report.findings import Detectability, Effect, NoiseReport
 from stiffmap.diagnosis.report.result import Diagnosis
@@ -38,6 +39,7 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.noise.over_time import over_time
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
@@ -79,7 +81,7 @@ def diagnose(
         False leaves out the nested cross-validation: `before` and `after` are then not held out.
     tolerances
         Standard uncertainties of what the machine file declares, where it gives none: effects are named
-        only beside them (docs/calibration.md).
+        only jointly with them (docs/calibration.md).
     exclude
         Kinds of effects, or groups of the calibration, that are known not to be.
     budget
@@ -95,7 +97,7 @@ def diagnose(
     ------
     StiffmapError
         For files that cannot be used, poses out of reach, and noise that is unknown. docs/diagnosis.md
-        tells the method.
+        describes the method.
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
@@ -189,6 +191,7 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
             *found.notes,
             *limitations(e, s.noise, s.predictor.machine),
             *([] if left else noise.sentences()),
+            *_over_time(finding, model),
         ],
         significance={
             "effective_trials": s.effective_trials,
@@ -222,7 +225,7 @@ def _effects(s: Study, finding: Finding, why: Explanation, inflation: float) -> 
 
 
 def _detectable(s: Study, finding: Finding) -> list[Detectability]:
-    """How small each effect could be and still be found, beside those that are named."""
+    """How small each effect could be and still be found, in addition to those that are named."""
     search = finding.search
     return [
         Detectability(
@@ -235,6 +238,13 @@ def _detectable(s: Study, finding: Finding) -> list[Detectability]:
         for d in detectable(search.screen.beside(finding.model.tangent()), search.threshold)
         if any(v is not None for v in d.sizes.values())
     ]
+
+
+def _over_time(finding: Finding, model: Model) -> list[str]:
+    """What the model leaves over time, in words; nothing where no times were recorded."""
+    assert model.residual is not None
+    found = over_time(finding.search.problem, model.residual)
+    return [] if found is None else [str(found)]
 
 
 def _summaries(

@@ -35,7 +35,7 @@ def residual(
     experiment
         An experiment, its folder or its YAML file.
     effects
-        What the prediction has beside the machine, as text or records; effects of the measurement may be among them.
+        What the prediction has in addition to the machine, as text or records; effects of the measurement may be among them.
     threads
         None: all cores that this process may use.
 

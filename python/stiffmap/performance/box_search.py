@@ -136,7 +136,7 @@ class BoxSearch:
         return cKDTree(self.witnesses if len(self.witnesses) else np.full((1, 3), 1e9))
 
     def _room(self, tree: cKDTree, centres: Floats) -> Floats:
-        """Edge of the cube about each centre that touches the nearest witness or the region's border."""
+        """Edge of the cube about each centre that touches the nearest counterexample or the region's border."""
         near = tree.query(centres, p=np.inf)[0]
         border = np.minimum(centres - self.low, self.high - centres).min(axis=1)
         return np.asarray(2 * np.minimum(near, border))
@@ -167,7 +167,7 @@ class BoxSearch:
         """Linear programs over the limits at the points watched, within a shrinking trust region."""
         trust, edge, before = 0.1 * self.size, 0.9 * edge, self.bounds.counter[0]
         while edge > self.gap and not self._inside(centre + self.touched * edge / 2).all():
-            edge *= 0.8  # a limit between the witnesses
+            edge *= 0.8  # a limit between the counterexamples
         for _ in range(ROUNDS):
             better = self._program(centre, edge, trust)
             if better is None or better[1] <= edge + 0.1 * self.gap:
@@ -258,7 +258,7 @@ class BoxSearch:
             edge = self.best + (min(roomier, edge) - self.best) / 2
 
     def _roomier(self, centre: Floats) -> tuple[Floats, float]:
-        """A centre nearby with the most room between the witnesses."""
+        """A centre nearby with the most room between the counterexamples."""
         tree, step = self._tree(), 0.05 * self.size
         room = float(self._room(tree, centre[None])[0])
         while step > 0.05 * self.gap:

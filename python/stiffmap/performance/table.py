@@ -1,4 +1,4 @@
-"""All measures of a machine in one table, beside what a task requires (docs/measures.md)."""
+"""All measures of a machine in one table, next to what a task requires (docs/measures.md)."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def measures(
 
 
 def _rows(chosen: Sequence[Measure], case: Case, task: Requirements) -> tuple[Row, ...]:
-    """In the order given; measures of their own run beside those that share kinematics."""
+    """In the order given; measures of their own run in parallel to those that share kinematics."""
     machine = case.machine
     beside = [m for m in chosen if m.apart] if thread_count(case.threads) > 1 else []
     _ = machine.fast, machine.compiled.not_enclosed  # made once, before two threads ask for it

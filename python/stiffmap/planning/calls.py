@@ -37,7 +37,7 @@ def plan(
     seed: int = 0,
     done: Experiment | str | PathLike[str] | None = None,
 ) -> Design:
-    """Which poses, loads and readings tell most, before the instrument is booked.
+    """Which poses, loads and readings are most informative, before the instrument is booked.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def plan(
     rows
         Number of rows to measure.
     rival
-        Another explanation, to be told apart from `identify`.
+        Another explanation, to be distinguished from `identify`.
     aim
         ``identify`` (D-optimal), ``separate`` (needs `rival`), ``map`` (the map at the workpiece); None: ``separate`` where there
         is a rival, else ``identify``.

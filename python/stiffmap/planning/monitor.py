@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from stiffmap.description import AppliedEffect
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.machine import Machine
+from stiffmap.number_text import with_uncertainty, within
 from stiffmap.planning.estimate import Estimate, estimate
 from stiffmap.planning.left_over import difference
 from stiffmap.short import short_repr
@@ -39,12 +40,12 @@ class Change:
 
     def __str__(self) -> str:
         if not np.isfinite(self.u):
-            return f"{self.name}: not told by these readings"
+            return f"{self.name}: not identifiable from these readings"
         word = "changed" if self.changed else "as before"
         step = self.after - self.before
         return (
-            f"{self.name}: {word}, {self.before:.5g} -> {self.after:.5g} {self.unit} "
-            f"({step:+.3g} ± {2 * self.u:.2g}, p = {self.p:.2g})"
+            f"{self.name}: {word}, {within(self.before, self.u)} -> {within(self.after, self.u)} {self.unit} "
+            f"({with_uncertainty(step, 2 * self.u)}, p = {self.p:.2g})"
         )
 
 
@@ -74,7 +75,7 @@ def compare(
 ) -> Comparison:
     """Numbers of `terms` in two experiments: before and after, or one specimen and another.
 
-    Each is fitted on its own; differences are judged beside what the model leaves of both: a smooth field that they share
+    Each is fitted on its own; differences are judged against what the model leaves of both: a smooth field that they share
     and a variance per pose, as large as the readings make likeliest, since neither is a change.
     Raises StiffmapError as `estimate` does.
     """

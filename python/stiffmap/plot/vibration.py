@@ -84,7 +84,7 @@ def response_figure(responses: Mapping[str, xr.DataArray], axes: str = "xyz") ->
 
 def waterfall_figure(way: np.ndarray, responses: xr.DataArray, axis: str = "y") -> Figure:
     """Size of a receptance (µm/N) along one base axis over the way along a path (m) and the frequency."""
-    own = MICRO * np.abs(responses.sel(response=axis, force=f"f{axis}")).values
+    own = MICRO * np.abs(responses.sel(response=axis, force=f"f{axis}").values)
     with paper_style():
         figure = new_figure(5.4, 3.4)
         ax = figure.add_subplot()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,8 @@ class Imported:
     repeats: int
     constants: dict[str, float]
     notes: list[Column]
+    head: dict[str, Any] = field(default_factory=dict)
+    """Further keys of experiment.yaml."""
 
 
 def understand(
@@ -53,27 +55,38 @@ def understand(
     chosen: Mapping[str, Sequence[str]],
     units: Mapping[str, str],
     constants: Mapping[str, float],
+    commands: Mapping[str, tuple[str, str]] | None = None,
+    head: Mapping[str, Any] | None = None,
 ) -> Imported:
     """Columns, units and rows of data.csv; raises StiffmapError that asks for what cannot be guessed.
 
     ``units`` (meaning -> unit) for columns without brackets; ``constants`` (meaning -> number) for what the
-    sheet has no column of, in mm and N.
+    sheet has no column of, in mm and N. ``commands`` (column -> drive, unit) for columns of commanded joints, which stand for
+    poses; ``head`` holds further keys of experiment.yaml.
     """
+    drives = dict(commands or {})
     columns = guess(sheet.header, chosen)
     used = [c for c in columns if c.meaning != "note"]
     for c in used:
         if c.meaning not in WORDS and not sheet.is_numeric(c.index):
             sheet.numbers(c.index)  # raises, naming the line
     known = {c.meaning for c in used} | set(constants)
+    if drives:  # the pose follows from them
+        columns = [replace(c, meaning="note") if c.meaning in POSE else c for c in columns]
+        used = [c for c in columns if c.meaning != "note"]
+        known |= set(POSE)
     _ask(sheet, known)
     beside = _beside(sheet, columns)
-    found = {c.meaning: _unit(sheet, c, units, beside) for c in used if c.meaning not in (*WORDS, *COUNTED)}
+    plain = (*WORDS, *COUNTED, *drives)
+    found = {c.meaning: _unit(sheet, c, units, beside) for c in used if c.meaning not in plain}
     named = {m: u.name for m, u in found.items()}
     factors = {m: u.factor for m, u in found.items() if u.factor != 1.0}
     repeats = max([c.repeat for c in used], default=0) or 1
     header, rows = _rows(sheet, used, constants, repeats, factors)
+    told = {"command": {k: {"actuator": a, "unit": u} for k, (a, u) in drives.items()}} if drives else {}
+    further = told | dict(head or {})
     return Imported(columns, named, factors, header, rows, repeats, dict(constants),
-                    [c for c in columns if c.meaning == "note"])  # fmt: skip
+                    [c for c in columns if c.meaning == "note"], further)  # fmt: skip
 
 
 def _ask(sheet: Sheet, known_: set[str]) -> None:
@@ -113,8 +126,8 @@ def _beside(sheet: Sheet, columns: Sequence[Column]) -> dict[int, str]:
 
 
 def _unit(sheet: Sheet, c: Column, units: Mapping[str, str], beside: Mapping[int, str]) -> Unit:
-    text = units.get(c.meaning, c.unit) or beside.get(c.index, "")
     quantity = quantity_of(c.meaning)
+    text = units.get(c.meaning, c.unit) or beside.get(c.index, "") or units.get(quantity, "")
     place = f"{sheet.file}: column '{c.name}' ({c.meaning})"
     if not text:
         usual = {"length": "um" if c.meaning in READINGS else "mm", "force": "N", "moment": "N*m"}
@@ -260,6 +273,7 @@ def write_folder(
     }
     if noise:
         head["noise"] = {n: v * found.factors.get(n, 1.0) for n, v in noise.items()}
+    head |= found.head
     told = {**dict(sheet.record), **(record or {})}
     if "notes" in told:
         head["notes"] = told.pop("notes")

@@ -15,6 +15,7 @@ from stiffmap.number_text import number_in
 from stiffmap.outputs import make_folder, write_text
 from stiffmap.spreadsheet.convert import Imported, Question, understand
 from stiffmap.spreadsheet.guess import READINGS
+from stiffmap.spreadsheet.joints import Commanded
 from stiffmap.spreadsheet.sheet import Sheet, column_letter
 from stiffmap.spreadsheet.units import known, quantity_of, unit_of
 from stiffmap.yaml_text import read, text_of
@@ -78,11 +79,14 @@ def remember(sheet: Sheet, a: Answers) -> Path:
     return file
 
 
-def ask_all(sheet: Sheet, a: Answers, ask: Ask | None) -> tuple[Imported, Answers]:
+def ask_all(
+    sheet: Sheet, a: Answers, ask: Ask | None, joints: Commanded | None = None
+) -> tuple[Imported, Answers]:
     """The sheet understood with the answers to every question that it leaves; raises StiffmapError."""
+    commands, head = (joints.columns, joints.head) if joints else ({}, {})
     for _ in range(MOST):
         try:
-            found = understand(sheet, a.chosen, a.units, a.constants)
+            found = understand(sheet, a.chosen, a.units, a.constants, commands, head)
         except Question as question:
             if ask is None:
                 raise

@@ -18,12 +18,13 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     *((f"f{a}", rf"f ?_?{a}|force ?_?(in )?{a}|{a} ?(force|kraft|load|last)|kraft ?_?{a}|last ?_?(in )?{a}|load ?_?(in )?{a}") for a in "xyz"),
     *((f"m{a}", rf"m ?_?{a}|moment ?_?{a}|torque ?_?{a}") for a in "xyz"),
     *((f"u_d{a}", rf"u ?_?d?{a}|sigma ?_?d?{a}|std ?_?d?{a}") for a in "xyz"),
-    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displ\.?|displacement|verschiebung|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung) ?_?(in )?{a}|{a} ?(deflection|displ\.?|displacement|verschiebung|abweichung|dial|gau?ge|uhr|reading)") for a in "xyz"),
+    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displ\.?|displacement|verschiebung|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung) ?_?(in )?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a} ?(deflection|displ\.?|displacement|verschiebung|abweichung|dial|gau?ge|uhr|reading)") for a in "xyz"),
     *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
-    *((a, rf"{a}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(nominal|pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|soll ?_?{a}|{a} ?soll") for a in "xyz"),
+    *((a, rf"{a}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(nominal|pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|soll ?_?{a}|{a} ?soll|{a}[ _-]?(t|target|cmd|nominal|command|commanded)|target[ _-]?{a}") for a in "xyz"),
 )  # fmt: skip
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
-READINGS = ("dx", "dy", "dz", "rx", "ry", "rz", "dd")
+SEEN = ("px", "py", "pz")
+READINGS = ("dx", "dy", "dz", "rx", "ry", "rz", "dd", *SEEN)
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Column:
     unit: str
     """As written in brackets; empty where none is."""
     meaning: str
-    """Column of an experiment; ``note`` for what is kept beside."""
+    """Column of an experiment; ``note`` for what is kept in addition."""
     repeat: int = 0
     """From 1, of repeats side by side; 0: none."""
 

@@ -16,6 +16,9 @@ from stiffmap.vibration.modes import tip_modes
 
 OCTAVE = 0.35
 """Difference of the logarithms of two frequencies that weighs as much as directions at right angles."""
+NEAR = 0.05
+"""Difference of the logarithms of two frequencies within which small errors of the machine mix the directions of two modes: together
+they then count as one plane of directions, and frequency decides."""
 SEEN = 1e-6
 """Share of the largest motion at the tool from which on a mode can be seen there."""
 
@@ -54,8 +57,10 @@ def predict_taps(
         seen = np.flatnonzero((size > SEEN * size.max(initial=0.0)) & (found.square[k] > 0))
         way, hertz = (b[:, seen] / size[seen]).T, found.frequency[k, seen]
         cosine = (taps.direction[rows] @ way.T) ** 2
+        near = np.exp(-0.5 * (np.log(hertz[:, None] / hertz) / NEAR) ** 2)
+        alike = np.minimum(1.0, cosine @ near)
         apart = (np.log(taps.frequency[rows, None] / hertz) / OCTAVE) ** 2
-        mine, theirs = linear_sum_assignment(np.where(np.isnan(cosine), 0.0, 1 - cosine) + apart)
+        mine, theirs = linear_sum_assignment(np.where(np.isnan(alike), 0.0, 1 - alike) + apart)
         f[rows[mine]], ratio[rows[mine]] = hertz[theirs], found.ratio[k, seen[theirs]]
         mac[rows[mine]] = cosine[mine, theirs]
     if np.isnan(f).all():

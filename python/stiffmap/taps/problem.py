@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from stiffmap.addresses import moved, number
@@ -48,7 +49,7 @@ class Problem:
             self.noise = np.concatenate([self.noise, noise_of(self.statics).sigma[self.keep]])
         base = self._raw(self.machine)
         self.used = np.isfinite(base)
-        self.is_tap = np.arange(len(base)) < len(self.taps)
+        self.is_tap: NDArray[np.bool_] = np.arange(len(base)) < len(self.taps)
         columns = []
         for key, value, u in uncertain_numbers(self.machine.description, self.default_u):
             other = shifted(self.machine.description, [(key, value, u)], np.ones(1))
@@ -78,10 +79,10 @@ class Problem:
         raw = self._raw(self.machine_with(term, off))
         return np.asarray(np.where(np.isfinite(raw), raw, LOST)[self.used] / self.noise[self.used])
 
-    def whitener(self, part: str = "") -> tuple[Floats, Floats]:
+    def whitener(self, part: str = "") -> tuple[NDArray[np.bool_], Floats]:
         """Rows (mask) of a part of the readings (``taps``, ``statics``, all), and what whitens them to first order."""
         tap = self.is_tap[self.used]
-        rows = tap if part == "taps" else ~tap if part == "statics" else np.ones(len(tap), bool)
+        rows = tap if part == "taps" else ~tap if part == "statics" else np.ones(len(tap), np.bool_)
         J = self.slopes[self.used][rows]
         return rows, np.linalg.inv(np.linalg.cholesky(np.eye(len(J)) + J @ J.T))
 

@@ -78,7 +78,8 @@ def _csv(path: Path) -> MeasuredResponse:
             ) from None
     f = values[:, 0]
     coherence = values[:, 3] if len(head) == 4 else np.full(len(f), np.nan)
-    complex_ = (values[:, 1] + 1j * values[:, 2]) * UNITS.get(unit, 9.80665 if unit == "g/N" else 1.0)
+    scale = UNITS.get(unit, 9.80665 if unit == "g/N" else 1.0)
+    complex_ = np.asarray(scale * (values[:, 1] + 1j * values[:, 2]), complex)
     return MeasuredResponse(path.stem, f, _receptance(f, complex_, KINDS[unit]), coherence)
 
 

@@ -67,7 +67,7 @@ class TipModes:
         c = np.einsum("nkk->nk", self.viscous)
         eta = np.einsum("nkk->nk", self.loss)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(self.square > 0, c / (2 * np.sqrt(self.square)), 0.0) + eta / 2
+            return np.asarray(np.where(self.square > 0, c / (2 * np.sqrt(self.square)), 0.0) + eta / 2)
 
 
 def tip_modes(

@@ -26,7 +26,7 @@ def receptance(modes: TipModes, frequency: Floats, threads: int | None = None) -
     n, f = len(modes.square), len(frequency)
     out = np.empty((n, f, 6, 6), complex)
     solve = _real_modes if modes.proportional else _poles
-    s = 2j * np.pi * frequency
+    s = np.asarray(2j * np.pi * frequency, complex)
 
     def block(first: int) -> None:
         rows = np.arange(first, min(n, first + BLOCK))

@@ -24,7 +24,7 @@ def beam_stiffness(
     for name, v in (("length", length), ("diameter", diameter), ("modulus", modulus), ("density", density)):
         if not real_number(v, name) > 0:
             raise StiffmapError(f"{name}: expected a number above zero (SI), got {v!r}")
-    E = modulus * (1 + 1j * loss * (frequency > 0))
+    E: Complex = np.asarray(modulus * (1 + 1j * loss * (frequency > 0)), complex)
     A, second = pi * diameter**2 / 4, pi * diameter**4 / 64
     w = 2 * pi * frequency
     out = np.zeros((len(w), 12, 12), complex)

@@ -49,7 +49,9 @@ class Outputs:
         if event.client is None:
             return
         moment = self._viewer.now()
-        content = page_of(moment).encode() if kind == "html" else _picture(moment, kind)
+        content = (
+            page_of(moment, self._viewer.data_again()).encode() if kind == "html" else _picture(moment, kind)
+        )
         event.client.send_file_download(f"{moment.machine.name}.{kind}", content, save_immediately=True)
 
 

@@ -1,4 +1,4 @@
-"""What is said beside the scene, as HTML: every text of a file or a person is escaped here."""
+"""What is said next to the scene, as HTML: every text of a file or a person is escaped here."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def status(s: Solution, load: Load) -> Floats:
 
 def greatest(c: Floats) -> Floats:
     """(...) greatest singular value of matrices (..., 3, 3), NaN where one is not finite."""
-    bad = ~np.isfinite(c).all(axis=(-1, -2))
+    bad = np.asarray(~np.isfinite(c).all(axis=(-1, -2)))
     square = np.swapaxes(c, -1, -2) @ c
     scale = np.abs(square).max(axis=(-1, -2))
     safe = np.where(bad | (scale == 0), 1.0, scale)

@@ -12,12 +12,13 @@ import pytest
 import stiffmap as sm
 from stiffmap import effects
 from stiffmap.description import AppliedEffect
-from stiffmap.diagnosis.report.sentences import aliases, measured, next_step, opening, within
+from stiffmap.diagnosis.report.sentences import aliases, measured, next_step, opening
 from stiffmap.diagnosis.search.study import study
 from stiffmap.diagnosis.slips.find import Found, find_slip
 from stiffmap.experiment import random_plan, simulate
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.number_text import within
 
 Change = Callable[[Experiment], Experiment]
 
@@ -175,7 +176,7 @@ def test_the_headline_names_the_unit_before_any_cause() -> None:
 
 
 def test_figures_have_the_digits_of_their_interval() -> None:
-    assert measured(3.2e-11, 3.1e-11, 3.3e-11, "m") == "0.0000320 ± 0.0000005 µm"
+    assert measured(3.2e-11, 3.1e-11, 3.3e-11, "m") == "3.20e-05 ± 5e-07 µm"
     assert measured(3.2e-11, 3.1999999e-11, 3.2000001e-11, "m").endswith("µm")
     assert " 0.000000 " not in measured(3.2e-11, 3.1999999e-11, 3.2000001e-11, "m")
     assert (
@@ -189,7 +190,7 @@ def test_aliases_stand_in_the_headline() -> None:
     d = sm.diagnose("orthoglide-revised", readings("orthoglide-revised", True), seed=1, cross_validate=False)
     (effect,) = d.effects
     if effect.aliases:
-        assert "which these readings cannot tell from it" in opening(d)
+        assert "which these readings cannot distinguish from it" in opening(d)
     assert aliases(replace(effect, aliases=[])) == ""
     made = replace(effect, aliases=[{"kind": "compliance", "element": "actuator", "legs": ["z"]}] * 2)
     assert aliases(made).count("(drive of leg z)") == 1

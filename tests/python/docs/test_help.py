@@ -159,6 +159,10 @@ def test_examples_run(
     if name == "monitor":  # goes on from a diagnosis
         main(["diagnose", "orthoglide-revised", str(workshop / "january"), "-o", str(workshop / "found")])
         shutil.copy(workshop / "found/diagnosis.json", workshop / "january")
+    if name == "view":  # serves until it is interrupted
+        opening = pytest.importorskip("stiffmap.view.open", reason="needs the extra [view]")
+        monkeypatch.setattr(opening.View, "wait", opening.View.close)
+        monkeypatch.setattr("webbrowser.open", lambda *_: True)
     (workshop / name).mkdir(exist_ok=True)
     monkeypatch.chdir(workshop / name if name == "new" else workshop)
     command = next(c for c in COMMANDS if c.name == name)

@@ -62,7 +62,10 @@ def arm_with(change: tuple[str, str]) -> sm.Machine:
     return machine_of(text.replace(*change, 1))
 
 
-RIGID = 'compliance: {value: 1.25e-07, u: 3.75e-08, note: "declared, not the maker\'s"}', "rigid: true"
+RIGID = (
+    'compliance: {value: 1.25e-07, u: 3.75e-08, source: assumed, note: "declared, not the maker\'s"}',
+    "rigid: true",
+)
 BENDS = (
     "- {offset: link_3, translation: [-572.3, 0, 0]}",
     "- {offset: link_3, translation: [-572.3, 0, 0]}\n"

@@ -63,7 +63,7 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Machine:
     return sm.load_machine(
         write_machine(
             folder,
-            ("{value: 1.4e-4, note", "{value: 1.4e-4, u: 3.0e-6, note"),
+            ("{value: 1.4e-4, source", "{value: 1.4e-4, u: 3.0e-6, source"),
             ("translation: [31, 0, 0]", "translation: [{value: 31, u: 0.004}, 0, 0]"),
         )
     )

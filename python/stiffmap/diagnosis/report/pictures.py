@@ -154,7 +154,7 @@ def before_after(d: Findings) -> Figure:
 
 
 def histogram(d: Findings) -> Figure:
-    """Residuals over the noise floor, beside the normal distribution that noise alone would give."""
+    """Residuals over the noise floor, with the normal distribution that noise alone would give."""
     figure = Figure(figsize=(6, 3.4), layout="constrained")
     ax = figure.subplots()
     floor = np.array([d.noise.floor.get(c.name, np.nan) for c in d.experiment.channels])

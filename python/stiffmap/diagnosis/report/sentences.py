@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import floor, isfinite, log10
+from math import isfinite
 from typing import Any
 
 from stiffmap.diagnosis.report.findings import Effect
 from stiffmap.diagnosis.report.wording import noise_size, separation_text
 from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.effects import registry
+from stiffmap.number_text import with_uncertainty, within
 
 UNITS = {
     "m": (1e6, "µm"),
@@ -22,7 +23,7 @@ UNITS = {
 """Factor from SI, and the unit that a workshop reads."""
 NAMES = {"actuator": "drive", "motor": "motor"}
 ALIASES = 2
-"""What cannot be told from an effect: how many the headline names."""
+"""What cannot be distinguished from an effect: how many the headline names."""
 
 
 def measured(value: float, low: float, high: float, unit: str) -> str:
@@ -31,21 +32,7 @@ def measured(value: float, low: float, high: float, unit: str) -> str:
     half = factor * abs(high - low) / 2 / 1.96
     if not (half > 0 and isfinite(half)):
         return f"{factor * value:.4g} {name}".rstrip()
-    return f"{within(factor * value, half)} ± {rounded(half)} {name}".rstrip()
-
-
-def rounded(size: float) -> str:
-    """An uncertainty to its first digit, to two where that is a 1; never 0."""
-    return within(size, size)
-
-
-def within(value: float, u: float) -> str:
-    """A value to the digits that its uncertainty carries; of very small and very large ones as a power of ten."""
-    exponent = _exponent(u)
-    last = exponent - (u < 1.95 * 10.0**exponent)
-    if not -8 <= exponent <= 6:
-        return f"{value:.{max(0, min(_exponent(value) - last, 12)) if value else 0}e}"
-    return f"{round(value, -last):.{max(0, -last)}f}"
+    return f"{with_uncertainty(factor * value, half)} {name}".rstrip()
 
 
 def interval(value: float, low: float, high: float, unit: str) -> tuple[str, str, str]:
@@ -57,10 +44,6 @@ def interval(value: float, low: float, high: float, unit: str) -> tuple[str, str
     else:
         texts = [within(factor * v, half) for v in (value, low, high)]
     return tuple(f"{text} {name}".rstrip() for text in texts)  # type: ignore[return-value]
-
-
-def _exponent(value: float) -> int:
-    return floor(log10(abs(value)))
 
 
 def place(e: Effect) -> str:
@@ -97,7 +80,7 @@ def _compared(e: Effect, more: str, less: str) -> str:
 
 
 def opening(d: Any) -> str:
-    """The verdict as one says it: first what is wrong with the readings, then the cause with what cannot be told from it."""
+    """The verdict as one says it: first what is wrong with the readings, then the cause with what cannot be distinguished from it."""
     if not d.slips:
         return _of_machine(d, d.verdict)
     first = ". Then ".join(slip_sentence(s) for s in d.slips)
@@ -129,13 +112,13 @@ def _lower(text: str) -> str:
 
 
 def aliases(e: Effect) -> str:
-    """What these readings cannot tell from an effect, for the headline; empty where there is nothing."""
+    """What these readings cannot distinguish from an effect, for the headline; empty where there is nothing."""
     names = list(dict.fromkeys(alias_words(a) for a in e.aliases))
     if not names:
         return ""
     shown = " or ".join(names[:ALIASES])
     more = len(names) - ALIASES
-    return f", or as well {shown}{f' or one of {more} more' if more > 0 else ''}, which these readings cannot tell from it"
+    return f", or as well {shown}{f' or one of {more} more' if more > 0 else ''}, which these readings cannot distinguish from it"
 
 
 def alias_words(a: Mapping[str, Any]) -> str:
@@ -152,7 +135,9 @@ def _of_machine(d: Any, verdict: str) -> str:
     size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * noise_size(d):.1f} µ{unit}"
     named = "; ".join(sentence(e) + aliases(e) for e in d.effects)
     if verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
-        return f"No cause beside the machine's uncertain numbers; these: {d.calibration.verdict} ({size})."
+        return (
+            f"No cause apart from the machine's uncertain numbers; they are {d.calibration.verdict} ({size})."
+        )
     if verdict == "none" and d.stopped:
         return f"The diagnosis was stopped before it found anything ({size})."
     if verdict == "none":
@@ -188,7 +173,7 @@ def next_step(d: Any) -> str:
         return "Nothing to correct. Keep the readings as the record of this state."
     if d.verdict == "ambiguous" and not d.effects:
         tilt = "" if d.experiment.axis_read[3:6].any() else ", the tilt of the tool as well (rx, ry, rz)"
-        return f"Read what tells these groups apart{tilt}; the command stiffmap plan proposes poses."
+        return f"Read what distinguishes these groups{tilt}; the command stiffmap plan proposes poses."
     if d.verdict == "unattributed":
         return (
             "Look at where the difference is largest (What is left), check the instrument's frame and the tool "
@@ -200,7 +185,7 @@ def next_step(d: Any) -> str:
         return "Inspect this place, and read more poses or other loads: numbers within tolerance explain these nearly as well."
     if any(e.aliases for e in d.effects):
         return (
-            "Inspect this place and those which these readings cannot tell from it (the report names them); the corrected "
+            "Inspect this place and those which these readings cannot distinguish from it (the report names them); the corrected "
             "machine file predicts the tool equally well whichever it is."
         )
     return "Inspect this place; until it is mended, plan and compensate with the corrected machine file."

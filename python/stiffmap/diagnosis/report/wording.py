@@ -10,6 +10,7 @@ from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.report.findings import Effect, Findings
 from stiffmap.diagnosis.rivals.separation import Separation
 from stiffmap.diagnosis.slips.slip import Slip
+from stiffmap.number_text import within
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
 LISTED = 5
@@ -44,7 +45,7 @@ def _undone(s: Slip) -> str:
 
 
 def _also(s: Slip) -> str:
-    return "".join(f"; or {a}: these readings cannot tell" for a in s.also)
+    return "".join(f"; or {a}: these readings cannot determine which" for a in s.also)
 
 
 def noise_size(d: Findings) -> float:
@@ -67,7 +68,7 @@ def _thousandth(value: float, unit: str) -> str:
 
 
 def _more(d: Findings) -> list[str]:
-    """Share explained beside a rest, the calibration below the effects, what is not named and why."""
+    """Share explained where an unexplained residual remains, the calibration below the effects, what is not named and why."""
     out = []
     if d.unexplained:
         h = d.held_out
@@ -110,10 +111,12 @@ def effect_text(e: Effect) -> str:
     values = []
     for name, (value, low, high, unit) in e.parameters.items():
         factor, label = DISPLAY_UNITS.get(unit, (1.0, unit))
-        text = f"{name} {value * factor:.4g} [{low * factor:.4g}, {high * factor:.4g}]"
+        half = factor * abs(high - low) / 2 / 1.96
+        at, *ends = (within(factor * v, half) for v in (value, low, high))
+        text = f"{name} {at} [{', '.join(ends)}]"
         values.append(text if label == "1" else f"{text} {label}")
     n = len(e.aliases)
-    same = f" (these readings cannot tell it from {n} other{'s' if n > 1 else ''})" if n else ""
+    same = f" (these readings cannot distinguish it from {n} other{'s' if n > 1 else ''})" if n else ""
     return f"{e.kind} of {e.element}{legs}: {', '.join(values)}{same}"
 
 

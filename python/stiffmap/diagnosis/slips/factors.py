@@ -46,7 +46,7 @@ PHYSICAL = 4.0
 
 
 Left = Callable[[float, tuple[int, ...]], float]
-"""Chi-square that the best part of the machine leaves beside a factor of some channels."""
+"""Chi-square that the best part of the machine leaves together with a factor of some channels."""
 
 
 def factors(e: Experiment, problem: Problem, base: Floats, left: Left) -> Iterator[Hypothesis]:
@@ -134,7 +134,7 @@ def _known(value: float, u: float, quantity: str) -> list[tuple[float, str, bool
 def _beside_a_part(
     value: float, quantity: str, axes: tuple[int, ...], left: Left
 ) -> list[tuple[float, str, bool]]:
-    """The known factor near a value beside which one part of the machine explains the readings best, if it does so well."""
+    """The known factor near a value together with which one part of the machine explains the readings best, if it does so well."""
     near = [n for n in _named(quantity) if abs(float(np.log(abs(value) / n[0]))) < BESIDE]
     if 1 / PHYSICAL < abs(value) < PHYSICAL or not near:
         return []

@@ -13,6 +13,7 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from stiffmap.broadcasting import Floats
+from stiffmap.number_text import with_uncertainty
 from stiffmap.process.description import EndMill, Process
 from stiffmap.process.identify.models import MODELS, NAMES, Fitted, fit, power_basis, straight_basis
 from stiffmap.process.identify.runout import Runout, runout_of
@@ -77,8 +78,9 @@ class IdentifiedLaw:
     def words(self) -> list[str]:
         """What a workshop reads, one sentence each."""
         out = [
-            f"{n} = {v / 10 ** (6 if n.endswith('c') else 3):.5g} ± {u / 10 ** (6 if n.endswith('c') else 3):.2g} "
-            + ("N/mm²" if n.endswith("c") else "N/mm")
+            f"{n} = {with_uncertainty(v / 1e6, u / 1e6)} N/mm²"
+            if n.endswith("c")
+            else f"{n} = {with_uncertainty(v / 1e3, u / 1e3)} N/mm"
             for n, (v, u) in self.coefficients.items()
         ]
         r = self.rms
