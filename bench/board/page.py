@@ -15,7 +15,7 @@ TITLE = "Scoreboard"
 ABOUT = """Public measured sets with an open licence: what the authors of the data reached, and what stiffmap leaves on rows that no fit
 saw, before and after, with the cause that it names. Misses are shown like hits. `before` is the declared machine, with unknown frames
 and tools fitted; seconds are CPU time with all folds and the verdict."""
-REPEAT = """This page and the JSON file beside it are written by
+REPEAT = """This page and the JSON file next to it are written by
 
 ```text
 {command}
@@ -50,7 +50,7 @@ def tables(rows: Sequence[Row]) -> list[tuple[str, tuple[str, ...], list[list[st
     sources = [list(x) for x in dict.fromkeys((r.source, r.quantity) for r in rows)]
     out = [("Before and after", HEAD, main)]
     if peers:
-        out.append(("Beside other packages, same rows", PEERS, peers))
+        out.append(("Comparison with other packages, same rows", PEERS, peers))
     out.append(("Sources and quantities", ("source, licence", "quantity"), sources))
     return out
 
