@@ -22,6 +22,7 @@ Mechanism with_clamp(Mechanism m, const NodePoint& point) {
   add_frame(m, point.node, point.offset);
   const Index end = static_cast<Index>(m.nodes.size()) - 1;
   m.loops.push_back({"clamp", point.name, end - 1, end, false, "clamp"});
+  m.floating = false;  // the clamp carries what hangs in cables
   return m;
 }
 

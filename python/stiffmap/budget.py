@@ -10,12 +10,15 @@ from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats, real_array
 from stiffmap.compiled import Role, Status
+from stiffmap.description import Cable
 from stiffmap.description.sources import in_words, source_of
+from stiffmap.description.tree import joints
 from stiffmap.errors import StiffmapError
 from stiffmap.html import table, titled
 from stiffmap.machine import Machine, metres_expected, takes_machine
 from stiffmap.options import SolveKeywords, merged
 from stiffmap.short import short_repr
+from stiffmap.solution import Solution
 from stiffmap.solving import Call, solve_call
 
 if TYPE_CHECKING:
@@ -23,6 +26,8 @@ if TYPE_CHECKING:
 
 STEP = 1e-3
 """Of the load, of the central differences of internal wrenches."""
+PIECES = 16
+"""Of the load, over which the stretch of cables is summed."""
 
 
 @short_repr
@@ -63,7 +68,7 @@ class DeflectionBudget:
 
     @property
     def rest_share(self) -> float:
-        """What is of second order in the deflections, or lies in external springs."""
+        """What is of second order in the deflections, lies in external springs, or is how cables under tension turn."""
         return float(self.displacement[:3].any()) - float(self.shares.sum())
 
     def ranked(self) -> list[tuple[str, Floats, float]]:
@@ -138,10 +143,42 @@ def deflection_budget(
     moved = loaded.coordinates - free.coordinates
     names, parts = _elements(machine)
     contributions = np.array([unit[:, i] @ np.nan_to_num(moved[i]) for i in parts]).reshape(-1, 6)
+    if machine.compiled.names.cables:
+        pulled = _of_cables(machine, p, load, g, rotation, point)
+        contributions[[names.index(n) for n in machine.compiled.names.cables]] = pulled
     sources = tuple(source_of(machine.description, n) for n in names)
     return DeflectionBudget(
         names, contributions, loaded.displacement - free.displacement, p, load, point, sources
     )
+
+
+def _of_cables(
+    machine: Machine, p: Floats, load: Floats, gravity: Floats, rotation: ArrayLike | None, point: str
+) -> Floats:
+    """(cables, 6) along the growing load, so that a cable counts while it is taut: its stretch times dT/dw."""
+    compiled = machine.compiled
+    size = max(float(np.abs(load).max()), 1.0)
+    steps = STEP * size * np.array([1.0, 1.0, 1.0, *[compiled.length] * 3])
+    ends, middles = np.linspace(0, 1, PIECES + 1), (np.arange(PIECES) + 0.5) / PIECES
+
+    def pulled(share: float, extra: Floats) -> Solution:
+        options: SolveKeywords = {"rotation": rotation, "point": point, "gravity": share * gravity}
+        return solve_call(compiled, Call(p, share * load + extra, merged(None, options)))[0]
+
+    sides = np.concatenate([np.diag(steps), -np.diag(steps)])
+    at = [pulled(s, np.zeros(6)) for s in ends]
+    tension = np.array([s.tension for s in at])
+    per_force = np.array([pulled(s, sides).tension for s in middles])
+    unit = (per_force[:, :6] - per_force[:, 6:]) / (2 * steps[:, None])
+    named = joints(machine.description)
+    soft = []
+    for name in compiled.names.cables:
+        cable = named[name]
+        assert isinstance(cable, Cable)
+        free = float(at[0].coordinates[list(compiled.names.coordinates).index(name)])
+        c = (free + cable.lead) / cable.elasticity if cable.elasticity else 0.0
+        soft.append(cable.stretch * (c + (1.0 / cable.stiffness if cable.stiffness else 0.0)))
+    return np.asarray(np.einsum("kwc,kc->cw", unit, np.diff(tension, axis=0) * soft))
 
 
 def _unit_reactions(
@@ -171,8 +208,6 @@ def _elements(machine: Machine) -> tuple[tuple[str, ...], list[list[int]]]:
 
 
 def _elastic(machine: Machine, name: str) -> bool:
-    from stiffmap.description.tree import joints
-
     return any(
         j.law is not None and (name == n or name.rpartition(".")[0] == n)
         for n, j in joints(machine.description).items()

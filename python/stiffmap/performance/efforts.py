@@ -17,6 +17,7 @@ from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.inertia import motion_friction, need_masses, rest_efforts, rigid_dynamics
 from stiffmap.performance.refusal import place_text, refuse_failed
 from stiffmap.performance.scaling import drive_table, drive_values, revolute_drives
+from stiffmap.performance.tensions import as_tensions, farthest, held, in_cables, inertia_columns, radius
 from stiffmap.performance.timing import quickest
 from stiffmap.performance.trajectory import Path, Trajectory
 from stiffmap.performance.zonotopes import inverse_rows
@@ -42,6 +43,7 @@ def drive_efforts(
     friction of the drives, springs of passive joints and external springs, `Trajectory.force` on the
     tool. gravity (3,) m/s²; None: what the machine file says. sharing: of drives that outnumber the freedoms,
     ``least_norm`` or ``stiffness`` (docs/measures.md). The joints of a redundant machine are those nearest to home.
+    Efforts of winches are minus the tensions of their cables, none of which pushes.
 
     Returns a Dataset over (time, drive): effort, rate, acceleration, coordinate, power, friction; over
     time: kinetic, potential (J); over drive: peak_effort, rms_effort, peak_speed, peak_power,
@@ -52,6 +54,7 @@ def drive_efforts(
     reach or meets a singularity (says where and when).
     """
     need_masses(machine, "inverse dynamics")
+    h = in_cables(machine, "inverse dynamics")
     t = trajectory
     k = drive_kinematics(machine, t.position, rotation, sharing=sharing, threads=threads)
     refuse_failed(machine, k, t.time, t.position)
@@ -67,6 +70,15 @@ def drive_efforts(
             f"{machine.name}: the trajectory asks for a motion that the machine cannot do at "
             f"{place_text(t.position[i])}, t = {t.time[i]:.4g} s (its drives leave {out['misfit'][i]:.1e} of it open)"
         )
+    if h is not None:
+        out["effort"] = as_tensions(machine, h, k, out["effort"], h.most, sharing)
+        slack = np.isnan(out["effort"]).any(axis=-1)
+        if slack.any():
+            i = int(np.argmax(slack))
+            raise StiffmapError(
+                f"{machine.name}: no tensions between 0 and the largest ones hold the motion at "
+                f"{place_text(t.position[i])}, t = {t.time[i]:.4g} s"
+            )
     friction_effort = motion_friction(machine, out["rate"]) if friction else np.zeros_like(out["rate"])
     return _dataset(machine, t, k, out, friction_effort)
 
@@ -151,6 +163,9 @@ def acceleration_of(
     """The same from kinematics that are at hand."""
     most = drive_values(machine, "force", efforts, "N or N·m")
     shape, n = k.status.shape, len(most)
+    if (h := in_cables(machine, "acceleration")) is not None:
+        found = held(machine, h, k, inertia_columns(h, k.rotation), most, gravity)
+        return PeakAcceleration(radius(found), farthest(found))
     bias = rest_efforts(machine, k, gravity=gravity, velocity=None)
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
     zero = np.zeros((len(flat), 6))

@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.broadcasting import Floats
+from stiffmap.cables.structure import Hanging
+from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.inputs import plane_axes
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.inertia import rest_efforts
 from stiffmap.performance.polygons import Polygon, section_polygon
 from stiffmap.performance.scaling import characteristic_length, drive_values, weighted
+from stiffmap.performance.tensions import as_tensions, held, in_cables, pushes, radius
 from stiffmap.performance.velocity import of_motions, singular_values
 from stiffmap.short import short_repr
 
@@ -31,11 +34,11 @@ class ForceTransmission:
     sphere_max: Floats
     """(...) largest."""
     force_min: Floats
-    """(...) N, force that the drives hold in every direction of space, no moment."""
+    """(...) N, force that the drives hold in every direction of space, no moment. Cables: by any tensions from 0 to the limits."""
     plane: Polygon
     """Forces that the drives hold in the plane: N, or per unit effort."""
     bias: Floats
-    """(..., drives) N or N·m, effort that each drive needs without a force on the tool."""
+    """(..., drives) N or N·m, effort that each drive needs without a force on the tool; NaN where cables do not hold it."""
     limits: Floats
     """(drives,) effort limit of each drive."""
     status: NDArray[np.uint8]
@@ -98,21 +101,50 @@ def force_of(
     text = limits if isinstance(limits, str) else ""
     given = np.ones(()) if text == "unit" else None if text == "declared" else limits
     most = drive_values(machine, "force", given, "N or N·m")
+    if (h := in_cables(machine, "the force that is held")) is not None:
+        return _of_cables(machine, h, k, most, plane, gravity, velocity, length, sharing)
     bias = rest_efforts(machine, k, gravity=gravity, velocity=velocity, sharing=sharing)
     needed = -np.swapaxes(k.jacobian[..., :3, :], -1, -2)  # effort of the drives per force on the tool
     free = most - np.abs(bias)
     norms = np.linalg.norm(needed, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         room = np.where(norms > NOTHING, free / norms, np.where(free >= 0, np.inf, 0.0))
-        j = weighted(machine, k.jacobian, characteristic_length(machine, length), "all")
-        s, last = of_motions(machine, k, singular_values(j))
-        least, largest = 1 / s[..., 0], 1 / last
+    least, largest = _spheres(machine, k, length)
     bad = ~np.isfinite(needed).all(axis=(-2, -1))
     return ForceTransmission(
         sphere_min=least,
         sphere_max=largest,
         force_min=np.where(bad, np.nan, np.maximum(room.min(axis=-1), 0.0)),
         plane=section_polygon(needed[..., list(plane_axes(plane))], most, k.status, bias),
+        bias=bias,
+        limits=most,
+        status=k.status,
+    )
+
+
+def _spheres(machine: Machine, k: DriveKinematics, length: float | None) -> tuple[Floats, Floats]:
+    """(...) smallest and largest singular values of the efforts' transmission."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        j = weighted(machine, k.jacobian, characteristic_length(machine, length), "all")
+        s, last = of_motions(machine, k, singular_values(j))
+        return 1 / s[..., 0], 1 / last
+
+
+def _of_cables(
+    machine: Machine, h: Hanging, k: DriveKinematics, most: Floats, plane: str, gravity: ArrayLike | None,
+    velocity: ArrayLike | None, length: float | None, sharing: str,
+) -> ForceTransmission:  # fmt: skip
+    """Tensions between 0 and the limits, whichever they are, moments balanced."""
+    if velocity is not None:
+        raise StiffmapError(f"{machine.name}: velocity: for cables the force is known at rest alone")
+    rows, limits, offset = found = held(machine, h, k, pushes(h), most, gravity)
+    bias = as_tensions(machine, h, k, rest_efforts(machine, k, gravity=gravity, velocity=None), most, sharing)
+    least, largest = _spheres(machine, k, length)
+    return ForceTransmission(
+        sphere_min=least,
+        sphere_max=largest,
+        force_min=radius(found),
+        plane=section_polygon(rows[..., list(plane_axes(plane))], limits, k.status, offset),
         bias=bias,
         limits=most,
         status=k.status,

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from stiffmap.broadcasting import Floats, thread_count
+from stiffmap.description import Cable, Joint
 from stiffmap.description.tree import joints
 from stiffmap.errors import StiffmapError
+from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 
 KINDS = ("least_norm", "stiffness")
@@ -32,11 +34,22 @@ def drive_weights(machine: Machine, sharing: str) -> Floats:
     if sharing == "least_norm":
         return np.zeros(0)
     found = joints(machine.description)
-    laws = [found[name].law for name in machine.actuators]
-    rigid = [name for name, law in zip(machine.actuators, laws, strict=True) if law is None]
+    named = {name: _stiffness(machine, found[name]) for name in machine.actuators}
+    rigid = [name for name, stiffness in named.items() if stiffness is None]
     if rigid:
         raise StiffmapError(f"sharing: by stiffness needs elastic drives; rigid: {', '.join(rigid)}")
-    return np.array([law.stiffness for law in laws if law is not None])
+    return np.array([stiffness for stiffness in named.values() if stiffness is not None])
+
+
+def _stiffness(machine: Machine, joint: Joint) -> float | None:
+    """Of a drive at rest, of a cable at home; None: rigid."""
+    if not isinstance(joint, Cable):
+        return joint.law.stiffness if joint.law is not None else None
+    home = machine.description.home
+    names = list(machine.actuators)
+    free = inverse_kinematics(machine, home.p, home.r).actuators[names.index(joint.name)]
+    soft = (free + joint.lead) / joint.elasticity if joint.elasticity else 0.0
+    return 1.0 / (soft + (1.0 / joint.stiffness if joint.stiffness else 0.0))
 
 
 def motions(together: NDArray[np.int32], values: Floats, redundancy: int) -> NDArray[np.int64]:

@@ -16,6 +16,7 @@ from stiffmap.performance.closing import drive_kinematics
 from stiffmap.performance.inertia import friction_efforts, rigid_dynamics
 from stiffmap.performance.refusal import refuse_failed
 from stiffmap.performance.scaling import drive_values
+from stiffmap.performance.tensions import held, in_cables, inertia_columns, pushes
 from stiffmap.performance.trajectory import Path, Trajectory
 
 BISECTIONS = 60
@@ -34,15 +35,23 @@ def quickest(
     """See `stiffmap.performance.fastest`."""
     k = drive_kinematics(machine, path.position, rotation, threads=threads)
     refuse_failed(machine, k, None, path.position)
-    a, b, c, rate = _terms(machine, k.coordinates, path, gravity, force, threads)
     limits = drive_values(machine, "force", None, "N or N·m")
+    h = in_cables(machine, "a time-optimal run")
+    a, b, c, rate = _terms(machine, k.coordinates, path, gravity, force, threads)
     speeds = drive_values(machine, "speed", None, "m/s or rad/s")
     least, most = (
         friction_efforts(machine, np.sign(rate) * 1e-12),
         friction_efforts(machine, np.sign(rate) * speeds),
     )
     # the speed is not known yet: friction counts where it hinders, at its largest, and where it helps, at its least
-    low, high = -limits - c - np.minimum(least, most), limits - c - np.maximum(least, most)
+    if h is not None:
+        moved = inertia_columns(h, k.rotation) @ np.stack([path.first, path.second], axis=-1)
+        pushed = np.broadcast_to((pushes(h) @ force)[:, None], (*moved.shape[:-1], 1))
+        rows, room, offset = held(machine, h, k, np.concatenate([-moved, pushed], axis=-1), limits, gravity)
+        a, b, c = rows[..., 0], rows[..., 1], rows[..., 2] + offset
+        low, high = -room - c, room - c
+    else:
+        low, high = -limits - c - np.minimum(least, most), limits - c - np.maximum(least, most)
     with np.errstate(divide="ignore"):
         top = ((speeds / np.abs(rate)) ** 2).min(axis=1)
         top = np.minimum(top, (speed / np.linalg.norm(path.first, axis=1)) ** 2)
