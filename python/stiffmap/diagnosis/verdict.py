@@ -13,6 +13,7 @@ from scipy.stats import chi2
 
 from stiffmap.broadcasting import whole_number
 from stiffmap.calibration import GROUPS, Tolerances, certified
+from stiffmap.deprecation import renamed
 from stiffmap.diagnosis.candidates.candidates import check_kinds
 from stiffmap.diagnosis.clock import Clock, Progress
 from stiffmap.diagnosis.decision.beside_calibration import Answer, find_effects
@@ -55,6 +56,7 @@ LISTED = 20
 
 
 @on_one_thread
+@renamed(budget="time_limit")
 def diagnose(
     machine: Machine | str | PathLike[str],
     experiment: Experiment | str | PathLike[str],
@@ -64,7 +66,7 @@ def diagnose(
     cross_validate: bool = True,
     tolerances: Tolerances | None = None,
     exclude: Sequence[str] = (),
-    budget: float | None = None,
+    time_limit: float | None = None,
     progress: Progress | None = None,
     scheduler: Any = None,
 ) -> Diagnosis:
@@ -87,7 +89,7 @@ def diagnose(
         only jointly with them (docs/calibration.md).
     exclude
         Kinds of effects, or groups of the calibration, that are known not to be.
-    budget
+    time_limit
         Seconds after which no new step begins; the answer is then the best so far, `stopped` is set, and so it
         is after Ctrl-C, also among the sensitivities (`not_tried` lists the effects that have none). None: a bound on what is tried instead, the same on every computer, which readings that
         nothing explains reach; `not_tried` then says what was left out.
@@ -105,14 +107,14 @@ def diagnose(
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
-    clock = Clock.of(budget, progress)
+    clock = Clock.of(time_limit, progress)
     groups = tuple(n for n in exclude if n in GROUPS)
     without = check_kinds(n for n in exclude if n not in GROUPS)
     with clock.on_interrupt():
         predictor = Predictor(machine, data, threads=threads)
         refuse(predictor.experiment, predictor())
         s, slips = without_slips(study(predictor, seed, None, clock, without, scheduler), seed)
-        if budget is None:
+        if time_limit is None:
             clock.bound(s.predictor)
         answer = _diagnosed(s, seed, certified(tolerances, data), groups, cross_validate)
         return with_slips(answer, slips) if slips else answer
