@@ -16,6 +16,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         "solve orthoglide-revised --force 300,0,0",
         "solve ur10 --force 0,0,-50",
         "solve orthoglide-revised --at path_small.csv --force 0,0,-100",
+        "solve orthoglide-revised --at 0,0,900",
     ),
     "map": (
         "map five-bar --points 4 -o m --no-pictures",
