@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, wraps
 from os import PathLike
-from types import FrameType
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
 
 import numpy as np
@@ -16,6 +14,7 @@ from numpy.typing import ArrayLike
 from stiffmap.addresses import Listed, listed
 from stiffmap.broadcasting import Floats
 from stiffmap.compiled import CompiledMachine, Status
+from stiffmap.deprecation import frames_of_this_package, warn_renamed
 from stiffmap.derivatives import Prepared, Request, differentiate, prepare, read_requests
 from stiffmap.description import MachineDescription
 from stiffmap.effects import add_effect
@@ -164,7 +163,7 @@ class Machine:
         threads
             None: all cores that this process may use.
         options
-            All of these at once, but the derivatives; a keyword given as well goes before its field.
+            Deprecated: give its fields as keywords.
 
         Notes
         -----
@@ -174,9 +173,11 @@ class Machine:
             one = self._compiled.solve_one(position, wrench)
             if one is not None:
                 s = Solution(one, (), self._compiled.names, "tcp")
-                if not sum(map(abs, position)) <= METRES_TOO_FAR * self._compiled.length:  # type: ignore[union-attr, arg-type]  # plain numbers; nan too
+                if not sum(map(abs, position)) <= METRES_TOO_FAR * self._compiled.length:  # type: ignore[arg-type]  # plain numbers; nan too
                     hint_metres(self, position, bool(s.status == Status.UNREACHABLE))
                 return s
+        if options is not None:
+            warn_renamed("solve(options=)", "its fields as keywords")
         call = Call(position, wrench, merged(options, given))
         if not derivatives:
             s = solve_call(self._compiled, call)[0]
@@ -201,6 +202,8 @@ class Machine:
         (as in `solve`); `Solution.unloaded` holds it, and displacements count from there. The other arguments
         are those of `solve`. UNREACHABLE where the actuators do not go together. StiffmapError for bad input.
         """
+        if options is not None:
+            warn_renamed("solve_joints(options=)", "its fields as keywords")
         home = self._description.home.p
         return solve_joints(self._compiled, actuators, Call(home, wrench, merged(options, given)))
 
@@ -381,11 +384,11 @@ def hint_metres(machine: Machine, position: ArrayLike, failed: bool) -> None:
     if not finite.all():
         rows = np.atleast_1d(finite.all(axis=-1))
         text = f"{int((~rows).sum())} of {rows.size} positions are not finite numbers (nan or inf); their status is UNREACHABLE"
-        warnings.warn(text, stacklevel=_frames_of_this_package())
+        warnings.warn(text, stacklevel=frames_of_this_package())
         return
     text = metres_expected(machine.compiled, position) if failed else ""
     if text:
-        warnings.warn(f"no pose can be reached: {text}", stacklevel=_frames_of_this_package())
+        warnings.warn(f"no pose can be reached: {text}", stacklevel=frames_of_this_package())
 
 
 def metres_expected(machine: CompiledMachine, position: ArrayLike) -> str:
@@ -397,12 +400,3 @@ def metres_expected(machine: CompiledMachine, position: ArrayLike) -> str:
         f"positions up to {far:g} m, the machine measures {machine.length:.2g} m; "
         "metres are expected (200 mm is 0.2)"
     )
-
-
-def _frames_of_this_package() -> int:
-    """How many callers, from `hint_metres` on, stand in stiffmap itself."""
-    frame: FrameType | None = sys._getframe(1)
-    count = 1
-    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == __package__:
-        frame, count = frame.f_back, count + 1
-    return count
