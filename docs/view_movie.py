@@ -96,7 +96,7 @@ def still(target: Path) -> None:
         if target.stem == "worst":
             view.set(quantity="worst", plane="free", normal=(1.0, -1.0, 0.0))
             page.get_by_role("tab", name="Map").click()
-            page.get_by_role("textbox", name="At the tool").click()
+            page.get_by_label("At the tool").first.click()
             page.get_by_role("option", name="ellipsoid").click()
         shot(view, page, 2500).quantize(128).save(target, optimize=True)
 

@@ -69,13 +69,15 @@ def colour_bar(found: PlaneMap, limits: tuple[float, float], tolerance: float) -
     if level is not None and low < level < high:
         ticks += f'<line x1="{at(level):.1f}" x2="{at(level):.1f}" y1="14" y2="40" stroke="#D55E00" stroke-width="2.5"/>'
     words = f"{q.title}, {q.unit}"
-    note = f"; hatched: {int(found.failed.sum())} poses without an equilibrium" if found.failed.any() else ""
+    failed = int(found.failed.sum())
+    which = "1 pose" if failed == 1 else f"{failed} poses"
+    note = f'<div style="font-size:85%">hatched: {which} without an equilibrium</div>' if failed else ""
     text = f"{low:.4g} to {high:.4g} {q.unit}"
     return (
         f'<svg viewBox="0 0 300 54" width="100%" role="img" aria-label="{escape(words)}: {escape(text)}">'
         f'<defs><linearGradient id="scale">{stops}</linearGradient></defs>'
-        f'<text x="10" y="12" font-size="11" fill="currentColor">{escape(words + note)}</text>'
-        f'<rect x="10" y="18" width="280" height="18" fill="url(#scale)"/>{ticks}</svg>'
+        f'<text x="10" y="12" font-size="11" fill="currentColor">{escape(words)}</text>'
+        f'<rect x="10" y="18" width="280" height="18" fill="url(#scale)"/>{ticks}</svg>{note}'
     )
 
 

@@ -12,6 +12,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.cli.view import _change, _state
 from stiffmap.errors import StiffmapError
+from stiffmap.status import Status
 from stiffmap.view import model_of
 from stiffmap.view.drawing import element_links
 from stiffmap.view.lines import command_line, python_lines
@@ -165,3 +166,12 @@ def test_the_rim_of_a_platform_moves_with_it() -> None:
     assert len(rim) == 7 and set(rest.legs[len(rest.ends) :]) == {""}
     np.testing.assert_array_equal(rim[:6, 1], rim[np.arange(1, 7) % 6, 0])
     np.testing.assert_array_equal(rim[6, 1], rest.tcp)
+
+
+def test_the_colour_bar_says_how_many_poses_are_hatched(model: Model) -> None:
+    found = plane_map(model.machine, model.state, 5)
+    assert "hatched" not in colour_bar(found, found.range, 1.0)
+    status = found.status.copy()
+    for row, words in ((1, "hatched: 1 pose without"), (2, "hatched: 2 poses without")):
+        status[row, 2] = Status.UNREACHABLE
+        assert words in colour_bar(replace(found, status=status), found.range, 1.0)
