@@ -163,6 +163,7 @@ def test_effects_on_an_exact_machine_lead_by_three_nats_and_are_alone_from_six_o
         "judge": (finding, "effects", []),
         "admissible": (model, ()),
         "above_noise": (model, ()),
+        "beside_time": (model, ()),
         "sparse_evidence": lead - 7.0,
         "spread_evidence": -7.0,
         "_layered": "layered",

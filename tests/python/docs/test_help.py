@@ -99,6 +99,11 @@ def make_workshop(at: Path) -> Path:
     (at / "outline.ngc").write_text(OUTLINE, encoding="utf-8")
     (at / "points.csv").write_text(TRACKER, encoding="utf-8")
     _workbook(at / "readings.xlsx")
+    dh = "theta [deg],d [mm],a [mm],alpha [deg]\n0,89,0,90\n0,0,-425,0\n0,0,-392,0\n0,109,0,90\n0,95,0,-90\n0,82,0,0\n"
+    (at / "arm_dh.csv").write_text(dh, encoding="utf-8")
+    rows = "".join(f"{k},{-60 + 5 * k},90,-120,-90,{3 * k},{400 + k},{2 * k},{300 - k}\n" for k in range(8))
+    head = "q1,q2,q3,q4,q5,q6,px [mm],py [mm],pz [mm]\n"
+    (at / "joints.csv").write_text(head + rows, encoding="utf-8")
     (at / "arm.urdf").write_text(ROBOT, encoding="utf-8")
     (at / "delta.urdf").write_text(ROBOT.replace('"arm"', '"delta"'), encoding="utf-8")
     (at / "robot.yaml").write_text(
