@@ -35,6 +35,7 @@ from stiffmap.toolpath import Toolpath, box, load_path, sampled
 from stiffmap.toolpath.entry import entered_at, turned_round
 
 MM = 1e-3
+IDLE = "no turn changes the error, as the last joint turns about the tool's own axis; a spindle across the flange would make use of it"
 
 
 def mill(
@@ -165,6 +166,7 @@ def mill(
         out["redundancy"] = {
             "largest_mm": float(1e3 * np.abs(chosen.error).max()), "best_fixed_turn_mm": float(1e3 * chosen.fixed.min()),
             "as_at_home_mm": float(1e3 * np.interp(0.0, chosen.turns, chosen.fixed)),
+            **({"note": IDLE} if chosen.idle else {}),
         }  # fmt: skip
     found = mill_job(
         m, p, cut, at=where, turn=angle, step=MM * step, within=MM * within, angle=turns, feeds=feeds, stock=plate,

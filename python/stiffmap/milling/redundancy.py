@@ -21,6 +21,8 @@ from stiffmap.tasks import workers
 LIMITS = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
 FASTEST = 3.0
 """rad/s of the turn about the tool."""
+SAME = 1e-6
+"""Share by which errors differ that count as one: of such turns the one nearest to home is taken."""
 ON_ANOTHER_BRANCH = 1.0
 """rad of a drive between neighbouring points: another configuration, not a motion."""
 
@@ -39,6 +41,11 @@ class Redundancy:
     """(turns,) rad of the grid."""
     joints: Floats
     """(m, actuators) m, rad."""
+
+    @property
+    def idle(self) -> bool:
+        """Whether no turn about the tool changes the error: the last joint turns about the tool's own axis."""
+        return bool(np.ptp(self.fixed) <= SAME * self.fixed.max()) if np.isfinite(self.fixed).all() else False
 
 
 def redundancy(
@@ -75,7 +82,8 @@ def redundancy(
             f"redundancy: no turn of the tool holds the path on {job.machine.name}, as at ({where}) mm"
         )
     bound = max(stage[k, a] for k, a in enumerate(top))
-    chosen = best_sequence(np.where(stage <= bound * (1 + 1e-9), stage**2, np.inf), free, largest=False)
+    cost = stage**2 * (1 + SAME * np.abs(grid))
+    chosen = best_sequence(np.where(stage <= bound * (1 + SAME), cost, np.inf), free, largest=False)
     assert chosen is not None
     rows = np.arange(len(job))
     return Redundancy(grid[chosen], error[rows, chosen], stage.max(axis=0), grid, joints[rows, chosen])

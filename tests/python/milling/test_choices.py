@@ -81,6 +81,16 @@ def test_an_arm_turns_about_its_tool() -> None:
         redundancy(far, 4)
 
 
+def test_a_spindle_in_line_with_the_last_joint_stays_as_at_home() -> None:
+    machine, path = sm.load_machine("ur10"), outline("circle", (0.06,))
+    found = redundancy(
+        setting(machine, path, PROCESS, sampled(path, 0.02), path.placed((-0.8, -0.05, 0.3))), 9 * 2
+    )
+    assert found.idle
+    assert found.angle == pytest.approx(0.0, abs=1e-12)
+    assert not redundancy(arm_job(0.1), 8, fastest=None).idle
+
+
 def test_placement_beats_the_naive_one_and_holds_the_path() -> None:
     machine, path = sm.load_machine("orthoglide-revised"), outline("rectangle")
     found = placements(machine, path, PROCESS, count=64, points=60)
