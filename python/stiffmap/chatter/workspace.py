@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from stiffmap.broadcasting import Floats, real_array, trailing
 from stiffmap.chatter.cut import GivenProcess, cut_axes, milling_process
 from stiffmap.chatter.zero_order import FEED, TOOL, limits
-from stiffmap.machine import Machine, takes_machine
+from stiffmap.machine import Machine, as_machine
 from stiffmap.options import keywords_of
 from stiffmap.vibration.modes import TipModes, tip_modes
 from stiffmap.vibration.poles import receptance
@@ -22,10 +23,9 @@ LOW, HIGH, LOOKED = 0.3, 2.0, 6
 """The default frequencies reach from the lowest mode to the highest of the first six, with these factors."""
 
 
-@takes_machine
 @keywords_of(tip_modes)
 def vibration_map(
-    machine: Machine,
+    machine: Machine | str | PathLike[str],
     position: ArrayLike,
     process: GivenProcess | None = None,
     *,
@@ -61,10 +61,11 @@ def vibration_map(
 
     Raises StiffmapError for bad input, never for a pose. Source: docs/theory.md, V1 to V4.
     """
+    m = as_machine(machine)
     p = trailing(position, (3,), "position", "positions (m)")
     cut = None if process is None else milling_process(process)
     axes = cut_axes(real_array(feed, "feed"), real_array(tool, "tool"))
-    found = tip_modes(machine, p, modes=modes, **pose)
+    found = tip_modes(m, p, modes=modes, **pose)
     f = _around(found) if frequencies is None else frequency_axis(frequencies)
     n = len(found.square)
     stiffness, at, depth = np.full(n, np.nan), np.full(n, np.nan), np.full(n, np.nan)
@@ -98,7 +99,7 @@ def vibration_map(
     ds = xr.Dataset(
         {k: (dims, v.reshape(shape), {"units": u}) for k, (v, u) in values.items()},
         coords={"position": ((*dims, "axis"), p), "axis": ["x", "y", "z"]},
-        attrs={"machine": machine.name, "damping": found.damping.said},
+        attrs={"machine": m.name, "damping": found.damping.said},
     )
     ds["softest_direction"] = ((*dims, "axis"), way.reshape(*shape, 3))
     ds["status"] = (dims, found.status.reshape(shape))
