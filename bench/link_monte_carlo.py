@@ -1,20 +1,24 @@
 """Monte Carlo of the link identification under independent noise: the numbers behind docs/link.md §5.
 
-python bench/link_monte_carlo.py [--runs 4000]
+python bench/link_monte_carlo.py [--runs 4000] [--scheduler tcp://HOST:8786]
 """
 
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 import numpy as np
 
 from stiffmap.link import identify_link
 from stiffmap.link.zeros import miss_probability
+from stiffmap.tasks import workers
 
 L, EIZ, EIY, EA, GJ = 0.31, 43.0, 205.0, 6.8e6, 10.8
 REFERENCE = np.array([L, 0.0, 0.0])
 WRENCHES = np.diag([1000.0, 10.0, 10.0, 1.0, 1.0, 1.0])
+TOGETHER = 20
+"""Runs of one task."""
 
 
 def main() -> None:
@@ -22,8 +26,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=4000)
     parser.add_argument("--seed", type=int, default=2024)
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--scheduler", help="address of a dask scheduler whose workers take the runs")
     arguments = parser.parse_args()
-    runs, rng = arguments.runs, np.random.default_rng(arguments.seed)
+    runs = arguments.runs
+    found = run(runs, arguments.seed, scheduler=arguments.scheduler, jobs=arguments.jobs)
+    variance = np.var(found["z"], axis=0)[np.triu_indices(6)]
+    coverage = np.mean(found["covered"], axis=0)[np.triu_indices(6)]
+    predicted = float(miss_probability(3.0, 1.0, 6 * (3 * 24 - 6), 0.05, 21))
+    wrong, missed = found["wrong"].mean(), found["missed"].mean()
+    print(f"{runs} runs, 24 nodes, 6 cases")
+    print(f"variance of the z-scores of 21 entries: {variance.min():.3f} to {variance.max():.3f} (1)")
+    print(f"coverage of 95 %: {coverage.min():.4f} to {coverage.max():.4f}, mean {coverage.mean():.4f}")
+    print(f"a true zero taken for non-zero, per matrix: {wrong:.4f} (at most 0.0286)")
+    print(f"an entry of 3 standard errors called zero: {missed:.4f} (predicted {predicted:.4f})")
+
+
+def run(runs: int, seed: int, *, scheduler: Any = None, jobs: int = 1) -> dict[str, np.ndarray]:
+    """Of each run: z-scores (6, 6), entries within their intervals (6, 6), a zero taken for more, an entry missed."""
+    rng = np.random.default_rng(seed)
     C = np.diag([L / EA, L**3 / (3 * EIZ), L**3 / (3 * EIY), L / GJ, L / EIY, L / EIZ])
     C[1, 5] = C[5, 1] = L**2 / (2 * EIZ)
     C[2, 4] = C[4, 2] = -(L**2) / (2 * EIY)
@@ -35,23 +56,32 @@ def main() -> None:
     small = C.copy()
     small[0, 1] = small[1, 0] = 3 * error[0, 1]  # one entry of three standard errors: how often is it missed
     clean = _field(small, points)
-    z, covered, wrong, missed = [], [], 0, 0
-    for _ in range(runs):
-        u = clean + noise * rng.standard_normal(clean.shape)
+    counts = [min(TOGETHER, runs - k) for k in range(0, runs, TOGETHER)]
+    noisy = (clean + noise * rng.standard_normal((n, *clean.shape)) for n in counts)
+    with workers(identified, (points, small), scheduler=scheduler, processes=jobs) as hands:
+        found = [one for some in hands.in_order(noisy) for one in some]
+    names = ("z", "covered", "wrong", "missed")
+    return {name: np.array(values) for name, values in zip(names, zip(*found, strict=True), strict=True)}
+
+
+def identified(
+    shared: tuple[np.ndarray, np.ndarray], fields: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray, bool, bool]]:
+    """Of each field (cases, n, 3) m: z-scores, entries within their intervals, a zero missed, an entry missed; as a task."""
+    points, small = shared
+    out = []
+    for u in fields:
         link = identify_link(points, u, WRENCHES, reference=REFERENCE, noise="independent", outliers=False)
-        z.append((link.compliance - small) / link.standard_error)
         interval = link.interval()
-        covered.append((interval[..., 0] <= small) & (small <= interval[..., 1]))
-        wrong += bool(np.any(~link.insignificant & (small == 0)))
-        missed += bool(link.insignificant[0, 1])
-    variance = np.var(z, axis=0)[np.triu_indices(6)]
-    coverage = np.mean(covered, axis=0)[np.triu_indices(6)]
-    predicted = float(miss_probability(3.0, 1.0, 6 * (3 * 24 - 6), 0.05, 21))
-    print(f"{runs} runs, 24 nodes, 6 cases")
-    print(f"variance of the z-scores of 21 entries: {variance.min():.3f} to {variance.max():.3f} (1)")
-    print(f"coverage of 95 %: {coverage.min():.4f} to {coverage.max():.4f}, mean {coverage.mean():.4f}")
-    print(f"a true zero taken for non-zero, per matrix: {wrong / runs:.4f} (at most 0.0286)")
-    print(f"an entry of 3 standard errors called zero: {missed / runs:.4f} (predicted {predicted:.4f})")
+        out.append(
+            (
+                (link.compliance - small) / link.standard_error,
+                (interval[..., 0] <= small) & (small <= interval[..., 1]),
+                bool(np.any(~link.insignificant & (small == 0))),
+                bool(link.insignificant[0, 1]),
+            )
+        )
+    return out
 
 
 def _field(C: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ namespace stiffmap {
 namespace {
 
 constexpr double shortest_held_step = 1.0 / 256;  // of the imposed displacement
-constexpr int few_iterations = 8;                 // of a step that is trusted to stay on its branch
+constexpr int few_in_a_step = 8;                  // of a step that is trusted to stay on its branch
 
 void add_frame(Mechanism& m, Index parent, const Vec3& offset) {
   const Pose shift{offset, Mat3::Identity()};
@@ -48,7 +48,7 @@ bool Clamp::hold(const Pose& pose, Problem& problem) {
   options.load_steps = 1;
   const EquilibriumResult eq = solve_equilibrium(held_, problem, options, eq_, state_);
   // Least squares may settle at a pose that rigid parts do not allow.
-  return eq.status == Status::converged && eq.iterations <= few_iterations &&
+  return eq.status == Status::converged && eq.iterations <= few_in_a_step &&
          eq_.lin.e.cwiseAbs().maxCoeff() < 1e-8 * machine_.length;
 }
 

@@ -12,7 +12,7 @@ constexpr double longest = 0.1;               // of a step, in multiples of the 
 constexpr double first_shift = 1e-4;          // added stiffness, in multiples of the machine's
 constexpr double more = 4, most_shift = 100;  // its growth, and where it ends
 constexpr double flattened = 0.1;             // slope of the energy at the end of a step, of that at its start
-constexpr double nothing = 1e-15;             // a step that changes no force
+constexpr double same_force = 1e-15;          // a step that changes no force
 
 class Downhill {
  public:
@@ -29,7 +29,7 @@ class Downhill {
       ws_.saddle.solve(ws_.force, ws_.lin.e, ws_.dz, ws_.dlambda);
       const double norm = ws_.saddle.step_norm(m_, ws_.dz);
       if (!std::isfinite(norm)) return false;
-      if (shift_ == 0 && norm < tolerance && (norm < nothing || previous < tolerance)) {
+      if (shift_ == 0 && norm < tolerance && (norm < same_force || previous < tolerance)) {
         state_.z += ws_.dz;
         state_.lambda += ws_.dlambda;
         return true;

@@ -10,8 +10,8 @@
 namespace stiffmap {
 namespace {
 
-constexpr double sound_pivot = 1e-8;  // of the normal matrix: below it, the rank is revealed
-constexpr double apart = 1e-7;        // loop velocity per rate of the drives, below which they go together
+constexpr double sound_pivot = 1e-8;   // of the normal matrix: below it, the rank is revealed
+constexpr double not_together = 1e-7;  // loop velocity per rate of the drives, below which they go together
 
 /// Equations between rates: those of the loops, then one per cable; in blocks of six.
 Index equations(const Mechanism& m) { return m.closures() + 6 * ((static_cast<Index>(m.cables.size()) + 5) / 6); }
@@ -139,12 +139,12 @@ void LoopRates::solve(const Mechanism& m, const MatX& e, Eigen::Ref<MatX> out) c
     x = solve_scaled(scaled);
     left -= product(x);
   }
-  if (!m.drives.empty() && left.norm() > apart * scaled.norm()) {  // drives that go together move along
+  if (!m.drives.empty() && left.norm() > not_together * scaled.norm()) {  // drives that go together move along
     const MatX B = driven(m);
     MatX open = B, y;
     if (!passive_.empty()) open += product(solve_scaled(-B));
     Orthogonal rates;
-    rates.compute(open, apart);
+    rates.compute(open, not_together);
     rates.solve(left, y);
     if (!passive_.empty()) x = solve_scaled(scaled - B * y);
     for (std::size_t d = 0; d < m.drives.size(); ++d) {
@@ -162,9 +162,9 @@ void LoopRates::share(const Mechanism& m, const MatX& open, const VecX& weights,
   const Index drives = open.cols();
   out.together = drives;
   out.sharing.setIdentity(drives, drives);
-  if (drives == 0 || open.rows() == 0 || open.cwiseAbs().maxCoeff() < apart) return;
+  if (drives == 0 || open.rows() == 0 || open.cwiseAbs().maxCoeff() < not_together) return;
   const Singular parts = singular_vectors(open);
-  out.together = drives - (parts.values.array() > apart).count();
+  out.together = drives - (parts.values.array() > not_together).count();
   out.sharing.setZero();
   if (out.together == 0) return;
   VecX W(drives);

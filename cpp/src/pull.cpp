@@ -7,8 +7,8 @@
 namespace stiffmap {
 namespace {
 
-constexpr double shortest = 1e-12;  // m: a line of no direction
-constexpr double corner = 1e-12;    // of the length: a cable at its free length yields as if it were taut
+constexpr double no_length = 1e-12;  // m: a line of no direction
+constexpr double corner = 1e-12;     // of the length: a cable at its free length yields as if it were taut
 
 /// Compliance of a real element at its free length.
 double compliance_of(const NodeSpring& s, double free) {
@@ -26,7 +26,7 @@ CableLine cable_line(const Vec3& anchor, const Vec3& axis, double radius, const 
   const Vec3 d = point - anchor;
   if (radius == 0) {
     out.length = d.norm();
-    if (out.length < shortest) return out;
+    if (out.length < no_length) return out;
     out.along = d / out.length;
     out.bend = (Mat3::Identity() - out.along * out.along.transpose()) / out.length;
     return out;

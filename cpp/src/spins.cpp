@@ -7,7 +7,7 @@
 namespace stiffmap {
 namespace {
 
-constexpr double round_off = 1e-11;  // of a moment, against all loads at the machine's length
+constexpr double no_moment = 1e-11;  // of a moment, against all loads at the machine's length
 constexpr double centred = 1e-9;     // of the length: a spin that moves a body's centre less leaves it
 constexpr double longest_turn = 0.4;
 constexpr double small_turn = 1e-12;
@@ -53,7 +53,7 @@ double Spins::noise(const Problem& p) const {
   double sum = 0;
   for (const NodeBody& b : m_.bodies) sum += b.mass * p.gravity.norm() * m_.length;
   for (const Vec6& w : p.wrenches) sum += w.head<3>().norm() * m_.length + w.tail<3>().norm();
-  return round_off * sum;
+  return no_moment * sum;
 }
 
 /// How everything else moves with a unit of each held spin, the loads as they are.

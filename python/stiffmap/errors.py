@@ -10,7 +10,7 @@ MOST_PROBLEMS = 20  # shown of one file
 
 
 class StiffmapError(ValueError):
-    """A problem in what the user gave, told in one line; what was found is shortened where it is very long."""
+    """A problem in what the user gave, stated in one line; what was found is shortened where it is very long."""
 
     def __init__(self, message: object = "") -> None:
         super().__init__(shortened(str(message)))

@@ -40,7 +40,7 @@ def flag_attrs() -> dict[str, Any]:
     """Attributes of a variable of `Flag` bits."""
     return meaning(
         "1",
-        "bits beside the status",
+        "bits in addition to the status",
         flag_masks=np.array([int(f) for f in Flag], dtype=np.uint32),
         flag_meanings=" ".join(str(f.name) for f in Flag),
     )

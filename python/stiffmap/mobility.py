@@ -60,7 +60,7 @@ def mobility(machine: Machine, coordinates: Floats) -> Mobility:
 
 
 def rank(matrix: Floats, scale: Floats) -> int:
-    """Number of singular values that count beside the largest one of another matrix."""
+    """Number of singular values that count relative to the largest one of another matrix."""
     if 0 in matrix.shape:
         return 0
     largest = float(np.linalg.svd(scale, compute_uv=False)[0])

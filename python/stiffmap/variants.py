@@ -34,7 +34,7 @@ def fill_holes(
     solution: Solution,
     varied: Floats,
 ) -> Floats:
-    """The same displacements, those that one step does not tell solved in full."""
+    """The same displacements, those that one step does not give solved in full."""
     gravity = machine.description.gravity
     heavy = bool(machine.gravity(call.options.gravity).any())
     heavier = [

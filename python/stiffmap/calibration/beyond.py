@@ -1,6 +1,6 @@
 """Unknowns that their standard uncertainty cannot account for, one after the other.
 
-Each in turn is let go a hundred times beyond its standard uncertainty; where the evidence gains more than the
+Each in turn has its prior widened to a hundred times its standard uncertainty; where the evidence gains more than the
 choice among all of them is worth, it is beyond tolerance. Those that would gain as much in its place are its rivals.
 """
 
@@ -47,7 +47,7 @@ class BeyondTolerance:
         return BeyondTolerance(self.found[:number], which, factor, self.refused)
 
     def built(self, values: Floats, unknowns: Sequence[Unknown], at: Floats | None = None) -> Floats:
-        """(p,) `values` (p,) with factors that are let go, on which readings depend linearly, turned into the logarithm
+        """(p,) `values` (p,) with factors that have a widened prior, on which readings depend linearly, turned into the logarithm
         of what they are."""
         near = np.zeros(len(values)) if at is None else at
         out = values.copy()
@@ -60,7 +60,7 @@ class BeyondTolerance:
 def beyond_tolerance(
     sums: Sums, unknowns: Sequence[Unknown], folds: Sequence[Sums] = (), at: Floats | None = None
 ) -> BeyondTolerance:
-    """Forward search; the instrument's scale is its certificate's and never let go, and what no machine has (`limits`)
+    """Forward search; the instrument's scale is its certificate's and its prior never widened, and what no machine has (`limits`)
     is passed over. Most of the `folds` must gain by themselves: a
     model's error that poses share is no noise, and sums over all of them overstate what they say.
 

@@ -1,4 +1,4 @@
-"""What may be claimed beyond tolerance: it must stand beside a smooth field that knows nothing of the machine, hold on
+"""What may be accepted as beyond tolerance: it must gain with a smooth field that does not depend on the machine in the model, hold on
 readings that it has not seen, and be no further off than a number of this machine can be.
 
 A calibration has many numbers; some of them imitate in part whatever the readings show. Numbers that are the cause
@@ -8,14 +8,15 @@ explain it better than any smooth function of pose and load does; numbers that i
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from stiffmap.calibration.beyond import BeyondTolerance, beyond_tolerance, none_beyond
+from stiffmap.calibration.beyond import BeyondTolerance, as_factor, beyond_tolerance, none_beyond
 from stiffmap.calibration.certificate import INSTRUMENT
 from stiffmap.calibration.facts import Wider
 from stiffmap.calibration.floor import Blocks, likeliest
+from stiffmap.calibration.limits import refused
 from stiffmap.calibration.statistics import Sums
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.calibration.width import widened
@@ -49,6 +50,8 @@ class Claims:
     """(p,) on the standard uncertainties."""
     refused: tuple[str, ...] = ()
     """What the evidence asked for and is not claimed, and why."""
+    found_again: Mapping[str, float] = field(default_factory=dict)
+    """Share of other draws of as many readings that would show each claim."""
 
     @property
     def any(self) -> bool:
@@ -89,7 +92,7 @@ def claims(
         trial = factor.copy()
         which = list(members[w.group])
         trial[which] *= w.factor
-        why = why_not(factor, trial, which)
+        why = _absurd(sums, unknowns, trial, which, at) or why_not(factor, trial, which)
         if why:
             refused = (*absurd, f"{w.group} as a whole: {why}")
             # that many numbers are off is no answer where it does not suffice
@@ -104,6 +107,22 @@ def claims(
     return Claims(singles, groups, factor, absurd)
 
 
+def _absurd(
+    sums: Sums, unknowns: Sequence[Unknown], factor: Floats, which: Sequence[int], at: Floats | None
+) -> str:
+    """Why a group is not let go: a number of it would be one that no machine has."""
+    values = sums.scaled(factor).estimate * factor
+    for i in which:
+        times = (
+            as_factor(unknowns[i], float(values[i]), 0.0 if at is None else at[i])
+            if unknowns[i].unit == "ln"
+            else 1.0
+        )
+        if why := refused(unknowns[i], float(values[i]), times):
+            return f"{unknowns[i].name}: {why}"
+    return ""
+
+
 def _many_a_little(
     sums: Sums,
     singles: BeyondTolerance,
@@ -111,7 +130,7 @@ def _many_a_little(
     wide: Floats,
     members: Mapping[str, Sequence[int]],
 ) -> bool:
-    """Whether groups that are off as a whole explain more than single numbers with what else is off beside them."""
+    """Whether groups that are off as a whole explain more than single numbers with the others free as well."""
     _, beside = widened(sums.scaled(singles.factor), members, (INSTRUMENT,))
     one = sums.scaled(singles.factor * beside).log_evidence
     return groups[0].nats > singles.found[0].nats and sums.scaled(wide).log_evidence > one
@@ -121,7 +140,7 @@ def held_within(sums: Sums, factor: Floats, which: Sequence[int], within: float)
     """(p,) factors under which the unknowns `which` stay within so many standard uncertainties (rms), times `factor` (p,).
 
     Many readings overrun a prior: numbers are then far beyond their uncertainties, whatever these say. What a claim
-    gains is gained beside a fit that holds the numbers where tolerances allow them to be.
+    gains is measured against a fit that holds the numbers where tolerances allow them to be.
     """
     out = factor.copy()
     which = list(which)
@@ -158,7 +177,7 @@ class BesideField:
         return BesideField(blocks, columns.shape[1])
 
     def log_evidence(self, factor: Floats) -> float:
-        """Of the unknowns at `factor` (p,) times their uncertainties, beside the field and the floor that suit best."""
+        """Of the unknowns at `factor` (p,) times their uncertainties, jointly with the field and the floor that suit best."""
         best = self.at(factor, 0.0)
         for k in range(len(self.blocks)):
             before = -np.inf

@@ -27,6 +27,7 @@ from stiffmap.experiment.comparison.summary import rms
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.folds import folds
 from stiffmap.experiment.noise.level import Noise
+from stiffmap.experiment.noise.over_time import over_time
 from stiffmap.experiment.poses.configuration import coordinates_of
 
 
@@ -94,6 +95,8 @@ def conclude(ready: Calibrator, seed: int = 0) -> Calibration:
         unit=unit,
         machine=valid.kept_by(correction.of(np.ones(len(e), bool)).machine),
         validity=valid,
+        found_again=claimed.found_again,
+        over_time=over_time(ready.problem, fit.residual),
         unseen=unseen,
         correction=correction,
         experiment=e,
@@ -144,7 +147,7 @@ def _outweighs(before: float, after: float, noise: float) -> bool:
 
 
 def _unit(e: Experiment, noise: Noise) -> tuple[str, Size, float]:
-    """What misfits are told in: lengths, or angles where nothing else is read."""
+    """The unit of misfits: lengths, or angles where nothing else is read."""
     lengths = metres(e.channels)
     columns = lengths & e.axis_read if (lengths & e.axis_read).any() else e.axis_read
     floor = float(np.sqrt(np.mean(noise.floor[columns] ** 2)))

@@ -1,4 +1,4 @@
-"""Standard uncertainties that a machine file gives beside its numbers, as those of the unknowns."""
+"""Standard uncertainties that a machine file gives for its numbers, as those of the unknowns."""
 
 from __future__ import annotations
 

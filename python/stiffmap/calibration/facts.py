@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -14,6 +14,7 @@ from stiffmap.calibration.pulls import Pulls
 from stiffmap.calibration.travel import Travel
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
+from stiffmap.experiment.noise.over_time import OverTime
 from stiffmap.machine import Machine
 from stiffmap.plain import plain
 from stiffmap.validity import Validity
@@ -21,7 +22,7 @@ from stiffmap.validity import Validity
 
 @dataclass(frozen=True)
 class Row:
-    """One unknown: declared standard uncertainty, posterior, and whether the readings tell it."""
+    """One unknown: declared standard uncertainty, posterior, and whether the readings determine it."""
 
     name: str
     group: str
@@ -40,7 +41,7 @@ class Row:
     observability: float
     """u / sigma: how many times the readings sharpen it."""
     minimal: bool
-    """Whether it belongs to the minimal set that stands for all that the readings tell."""
+    """Whether it belongs to the minimal set that spans all that the readings determine."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ class HeldOut:
     chosen: float
     """With the chosen groups only."""
     groups: dict[str, float]
-    """With one group alone beside the base."""
+    """With one group alone in addition to the base."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ class Facts:
     beyond: tuple[Beyond, ...]
     groups: Choice
     rank: int
-    """Directions that the readings tell, of `len(rows)`."""
+    """Directions that the readings determine, of `len(rows)`."""
     held_out: HeldOut | None
     rms_before: float
     rms_after: float
@@ -157,9 +158,13 @@ class Facts:
     validity: Validity = field(kw_only=True)
     """What the readings covered; beyond it nothing vouches for `machine`."""
     pulls: Pulls = field(kw_only=True)
-    """How far the numbers are beyond their standard uncertainties, those that are let go set aside."""
+    """How far the numbers are beyond their standard uncertainties, without those that have a widened prior."""
+    found_again: Mapping[str, float] = field(default_factory=dict)
+    """Share of other draws of as many readings that would show each claim."""
+    over_time: OverTime | None = None
+    """What the calibrated machine leaves over time; None where no times were recorded."""
     refused: tuple[str, ...] = ()
-    """What the evidence asked to let go beyond tolerance and is not claimed, and why."""
+    """Hypotheses beyond tolerance that the evidence supports and that were refused, and why."""
 
     def to_json(self) -> str:
         """All but arrays and machines, SI; NaN is null."""
@@ -176,6 +181,8 @@ class Facts:
         out["validity"] = plain(
             {"poses": v.poses, "drives": dict(v.drives), "loads": dict(v.loads), "temperature": v.temperature}
         )
+        out["found_again"] = dict(self.found_again)
+        out["over_time"] = plain(asdict(self.over_time)) if self.over_time else None
         out["pulls"] = plain(asdict(self.pulls)) | {"within": self.pulls.within}
         out["groups"] = plain(asdict(self.groups))
         out["beyond"] = [plain(asdict(b)) for b in self.beyond]

@@ -1,7 +1,7 @@
 """The model-form floor: what the best model leaves beyond the noise, as a variance component.
 
 Readings of one pose share what a model gets wrong there, repeats or not: a random effect per pose and
-channel, variance rho in units of the noise variance, beside which the calibration is estimated again. rho
+channel, variance rho in units of the noise variance, with which the calibration is estimated again. rho
 maximises the restricted likelihood (REML; Patterson and Thompson 1971). docs/theory.md (M2).
 """
 

@@ -1,4 +1,4 @@
-"""Groups of unknowns compared by evidence, beside those that every machine has.
+"""Groups of unknowns compared by evidence, jointly with those that every machine has.
 
 The evidence of a set of groups is the marginal likelihood of all readings with every unknown of the set at
 its prior; differences in nats. Sets are compared, not single exchanges: two groups of which each
@@ -16,7 +16,7 @@ import numpy as np
 from stiffmap.calibration.statistics import Sums
 
 BASE = ("zeros", "tool")
-"""Groups that every machine has: the others are compared beside them."""
+"""Groups that every machine has: the others are compared in addition to them."""
 LIKE = 0.1
 """Share of the evidence that all chosen groups gain within which another set is a rival: models are no better."""
 STRONG = 5.0
@@ -29,7 +29,7 @@ class GroupEvidence:
 
     name: str
     alone: float
-    """Nats gained beside the base alone."""
+    """Nats gained over the base alone."""
     last: float
     """Nats lost when the group is taken out of the full set."""
     unknowns: int

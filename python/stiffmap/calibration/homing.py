@@ -1,7 +1,7 @@
 """Zeros that are set anew in every set-up: a machine that is homed or adjusted between two sessions.
 
 Nobody writes that down, so the readings are asked: a zero of each drive in each set-up, with the zero's own
-standard uncertainty, beside those that all set-ups share, where the evidence gains by it.
+standard uncertainty, in addition to those that all set-ups share, where the evidence gains by it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Whether numbers within a fit are within their tolerances at all.
 
-Many readings overrun a prior: the fit then has numbers far beyond their standard uncertainties without any being let go.
-If the uncertainties are right, the directions that the readings tell have pulls that are standard normal.
+Many readings overrun a prior: the fit then has numbers far beyond their standard uncertainties without any having a widened prior.
+If the uncertainties are right, the directions that the readings determine have pulls that are standard normal.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Pulls:
     """How far the numbers of a fit are beyond their standard uncertainties."""
 
     rms: float
-    """Of the directions that the readings tell; 1 where the uncertainties are right."""
+    """Of the directions that the readings determine; 1 where the uncertainties are right."""
     p: float
     """Probability of one as large if they are."""
     large: tuple[tuple[str, float], ...]
@@ -43,7 +43,7 @@ class Pulls:
 
 
 def pulls(sums: Sums, names: list[str], pull: Floats, told: Mask) -> Pulls:
-    """`pull` (p,) of unknowns and whether the readings tell them (p,); `sums` at the uncertainties that they are judged by.
+    """`pull` (p,) of unknowns and whether the readings determine them (p,); `sums` at the uncertainties that they are judged by.
 
     Of a direction with singular value s the estimate from the readings alone has the variance 1 + 1/s² in standard
     uncertainties.

@@ -23,7 +23,7 @@ class Calibration(Facts):
         return lines(self)
 
     def table(self, most: int | None = None) -> list[str]:
-        """The unknowns, one a line, those first that the readings tell best."""
+        """The unknowns, one a line, those first that the readings determine best."""
         return table(self, most)
 
     def __str__(self) -> str:

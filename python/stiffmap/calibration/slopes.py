@@ -19,7 +19,7 @@ from stiffmap.machine import Machine
 SMALL = 2e-4
 """Step, of a standard uncertainty."""
 AT_ONCE = 64
-"""Unknowns that are told together."""
+"""Unknowns whose slopes are computed together."""
 Moves = Mapping[tuple[str, str], float]
 
 
@@ -58,7 +58,7 @@ class Slopes:
         self._ahead = Ahead([] if apart else plain, AT_ONCE, self._tell)
 
     def of(self, k: int) -> Floats | None:
-        """(n, c) of unknown k; None where whole predictions must tell."""
+        """(n, c) of unknown k; None where whole predictions are needed."""
         return self._ahead.of(k)
 
     def _tell(self, some: Sequence[int]) -> list[Floats | None]:

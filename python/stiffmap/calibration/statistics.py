@@ -19,7 +19,7 @@ from stiffmap.experiment.experiment import Floats, Integers, Mask
 FELT = 1e-3
 """Singular value below which a direction changes no reading."""
 SEEN = 1.0
-"""Singular value of A beyond which a direction is told by the readings more than by its prior."""
+"""Singular value of A beyond which a direction is determined by the readings more than by its prior."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class Sums:
 
     @property
     def rank(self) -> int:
-        """Number of directions that the readings tell."""
+        """Number of directions that the readings determine."""
         return int((self.singular > SEEN).sum())
 
     @property
@@ -106,7 +106,7 @@ class Sums:
         return -0.5 * (self.square - float(y @ y)) - float(np.log(np.diag(root)).sum())
 
     def root(self) -> tuple[Floats, Floats]:
-        """(k, p) and (k,): R and y with RᵀR = G and Rᵀy = b, in the k directions that are felt at all."""
+        """(k, p) and (k,): R and y with RᵀR = G and Rᵀy = b, in the k directions that are observable at all."""
         size, vectors = np.linalg.eigh(self.gram)
         felt = size > FELT**2
         r = np.sqrt(size[felt])[:, None] * vectors[:, felt].T
@@ -124,9 +124,9 @@ def directions(columns: Floats) -> Floats:
 
 
 def independent(gram: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """A minimal set of unknowns that spans what the readings tell, and the others.
+    """A minimal set of unknowns that spans what the readings determine, and the others.
 
-    Pivoted elimination of AᵀA: the unknown that is felt most comes first and is projected out of the
+    Pivoted elimination of AᵀA: the unknown that is most observable comes first and is projected out of the
     others, until what remains of each is below `SEEN`.
     """
     left = np.array(gram, dtype=float)

@@ -29,7 +29,7 @@ SAME = 1e-9
 BYTES = 2**28
 """That all columns may take; with more readings there are fewer knots."""
 TOLD = 0.1
-"""Share of the squares that are left, below which profiles are not told."""
+"""Share of the squares that are left, below which profiles are not reported."""
 SURE = 2.0
 """Standard errors of the folds' gain, beyond which they are."""
 Own = Callable[[Floats, Mask], Floats]
@@ -80,7 +80,7 @@ class Hats:
     at: tuple[Floats, ...]
     scales: tuple[Floats, ...]
     variance: float
-    """Of a whitened reading, beside the profiles."""
+    """Of a whitened reading, jointly with the profiles."""
 
     def knots(
         self, problem: Problem, columns: Floats, linear: Floats, rho: float

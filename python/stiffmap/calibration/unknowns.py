@@ -2,7 +2,7 @@
 
 Six errors of each joint's frame, less those that its own coordinate takes up; zeros and gains of drives;
 lengths of links between passive joints, and their differences where links should be alike; compliances,
-masses; the tool; the scale of the instrument. Which of them a plan can tell is left to the singular
+masses; the tool; the scale of the instrument. Which of them a plan can determine is left to the singular
 values of its Jacobian (`statistics`), not to rules by hand: the same for serial arms and closed loops.
 """
 

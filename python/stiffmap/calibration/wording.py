@@ -40,9 +40,9 @@ def lines(c: Facts) -> list[str]:
     out = [f"calibration: {c.verdict}{' (stopped early)' if c.stopped else ''}"]
     out += [f"  {_beyond(b)}" for b in c.beyond]
     out += [f"  {_wider(w)}" for w in c.wider]
-    out += [f"  not claimed: {r}" for r in c.refused]
+    out += [f"  refused: {r}" for r in c.refused]
     out += _large_pulls(c)
-    out.append(f"told by the readings: {c.rank} directions of {len(c.rows)} unknowns")
+    out.append(f"identifiable from the readings: {c.rank} directions of {len(c.rows)} unknowns")
     out.append("groups: " + _groups(c))
     out.append(
         f"misfit: rms {in_display_units(c.rms_before, c.unit)} as declared, {in_display_units(c.rms_after, c.unit)} calibrated; "
@@ -65,6 +65,8 @@ def lines(c: Facts) -> list[str]:
                 "the file is worse than the declared machine on readings that no fit saw: do not use it; more poses are needed"
             )
     out.append(f"holds where it was read: {c.validity}")
+    if c.over_time is not None:
+        out.append(str(c.over_time))
     if c.floor > 0.0:
         where = ", ".join(f"{k} {in_display_units(v, _unit(k, c.unit))}" for k, v in c.rest.items())
         out.append(
@@ -121,7 +123,7 @@ def _beyond(b: Beyond) -> str:
 
 def _wider(w: Wider) -> str:
     other = f"; or instead: {', '.join(w.rivals)}" if w.rivals else ""
-    return f"{w.group}: standard uncertainties {w.factor:g} times too small (odds {odds(w.nats)}){other}; which of them, the readings do not tell"
+    return f"{w.group}: standard uncertainties {w.factor:g} times too small (odds {odds(w.nats)}){other}; the readings do not determine which of them"
 
 
 def _groups(c: Facts) -> str:
@@ -136,7 +138,9 @@ def _groups(c: Facts) -> str:
 def table(c: Facts, most: int | None = None) -> list[str]:
     """Name, value, u, posterior sigma, pull, observability."""
     width = max((len(r.name) for r in c.rows), default=4)
-    out = [f"{'unknown':{width}}  {'value':>12}  {'u':>11}  {'sigma':>11}  {'pull':>6}  {'u/sigma':>8}  told"]
+    out = [
+        f"{'unknown':{width}}  {'value':>12}  {'u':>11}  {'sigma':>11}  {'pull':>6}  {'u/sigma':>8}  identifiable"
+    ]
     for r in sorted(c.rows, key=lambda r: -r.observability)[:most]:
         told = ("minimal" if r.minimal else "yes") if r.identifiable else "no"
         cells = (in_display_units(v, r.unit) for v in (r.value, r.u, r.sigma))

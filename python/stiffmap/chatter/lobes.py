@@ -21,6 +21,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, as_machine
 from stiffmap.options import keywords_of
 from stiffmap.process import Process
+from stiffmap.tasks import workers
 from stiffmap.vibration.modes import tip_modes
 
 METHODS = ("semi-discretization", "zero order")
@@ -28,6 +29,8 @@ SPEEDS, DEPTHS = 120, 80
 PER_WAVE = 16
 """Intervals of a tooth period for each oscillation of the fastest mode in it."""
 LEAST, MOST = 40, 320
+PER_TASK = 8
+"""Speeds of one task on a cluster."""
 HIGHEST = 4.0
 """Top of a diagram, as a multiple of the least limit."""
 
@@ -46,6 +49,7 @@ def stability_lobes(
     method: str = "semi-discretization",
     intervals: int | None = None,
     threads: int | None = None,
+    scheduler: Any = None,
     **pose: Any,
 ) -> xr.Dataset:
     """Stability of a cut over speeds of the spindle and depths.
@@ -68,6 +72,8 @@ def stability_lobes(
         ``semi-discretization``, or ``zero order`` (no multipliers).
     intervals
         Parts of a tooth period; None: enough for the fastest mode, 40 to 320.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers take the speeds, with the same answer.
     **pose
         wrench, rotation, gravity, point, damping, modes, symmetrise: as of `frequency_response`.
 
@@ -114,7 +120,7 @@ def stability_lobes(
     if method == "zero order":
         ds["limit"] = ds.limit_zero_order
     else:
-        mu = _multipliers(modes, p, s, d, intervals, threads)
+        mu = _multipliers(modes, p, s, d, intervals, threads, scheduler)
         ds["multiplier"] = (("speed", "depth"), mu)
         ds["limit"] = ("speed", border(d, mu), {"units": "m"})
     ds.attrs["stable_speeds"] = pockets(s, ds.limit.values, d[-1])
@@ -154,15 +160,30 @@ def interval_counts(modes: ToolModes, p: Process, speed: Floats) -> Any:
 
 
 def _multipliers(
-    modes: ToolModes, p: Process, speed: Floats, depth: Floats, intervals: int | None, threads: int | None
+    modes: ToolModes,
+    p: Process,
+    speed: Floats,
+    depth: Floats,
+    intervals: int | None,
+    threads: int | None,
+    scheduler: Any = None,
 ) -> Floats:
     """Speeds with the same number of intervals together."""
     k = np.full(len(speed), intervals) if intervals is not None else interval_counts(modes, p, speed)
+    together = [np.flatnonzero(k == count) for count in np.unique(k)]
+    if scheduler is not None:
+        together = [rows[i : i + PER_TASK] for rows in together for i in range(0, len(rows), PER_TASK)]
     out = np.empty((len(speed), len(depth)))
-    for count in np.unique(k):
-        rows = k == count
-        out[rows] = multiplier_map(modes, p, speed[rows], depth, int(count), threads)
+    with workers(_some_speeds, (modes, p, depth, threads), scheduler=scheduler) as hands:
+        for i, found in hands.as_done((speed[rows], int(k[rows[0]])) for rows in together):
+            out[together[i]] = found
     return out
+
+
+def _some_speeds(shared: tuple[ToolModes, Process, Floats, int | None], item: tuple[Floats, int]) -> Floats:
+    """(speeds, depths) multipliers, as a task."""
+    modes, p, depth, threads = shared
+    return multiplier_map(modes, p, item[0], depth, item[1], threads)
 
 
 def border(depth: Floats, multiplier: Floats) -> Floats:

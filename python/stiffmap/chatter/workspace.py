@@ -14,6 +14,8 @@ from stiffmap.chatter.cut import GivenProcess, cut_axes, milling_process
 from stiffmap.chatter.zero_order import FEED, TOOL, limits
 from stiffmap.machine import Machine, as_machine
 from stiffmap.options import keywords_of
+from stiffmap.process import Process
+from stiffmap.tasks import workers
 from stiffmap.vibration.modes import TipModes, tip_modes
 from stiffmap.vibration.poles import receptance
 from stiffmap.vibration.response import frequency_axis
@@ -33,6 +35,7 @@ def vibration_map(
     feed: ArrayLike = FEED,
     tool: ArrayLike = TOOL,
     modes: int = 24,
+    scheduler: Any = None,
     **pose: Any,
 ) -> xr.Dataset:
     """How the machine vibrates over its workspace.
@@ -49,6 +52,8 @@ def vibration_map(
         (3,) directions of the feed and from the tool's tip to its holder, base axes.
     modes
         Modes that are kept at each pose.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers take the poses, with the same answer.
     **pose
         wrench, rotation, gravity, point, damping, symmetrise, threads: as of `frequency_response`.
 
@@ -61,31 +66,22 @@ def vibration_map(
 
     Raises StiffmapError for bad input, never for a pose. Source: docs/theory.md, V1 to V4.
     """
-    m = as_machine(machine)
+    machine = as_machine(machine)
     p = trailing(position, (3,), "position", "positions (m)")
     cut = None if process is None else milling_process(process)
     axes = cut_axes(real_array(feed, "feed"), real_array(tool, "tool"))
-    found = tip_modes(m, p, modes=modes, **pose)
+    found = tip_modes(machine, p, modes=modes, **pose)
     f = _around(found) if frequencies is None else frequency_axis(frequencies)
     n = len(found.square)
     stiffness, at, depth = np.full(n, np.nan), np.full(n, np.nan), np.full(n, np.nan)
     way = np.full((n, 3), np.nan)
-    for start in range(0, n, BLOCK):
-        rows = np.arange(start, min(n, start + BLOCK))
-        rows = rows[np.isfinite(found.rest[rows, 0, 0])]
-        if not rows.size:
-            continue
-        H = receptance(_only(found, rows), f)[:, :, :3, :3]
-        largest = np.linalg.eigvalsh(H.conj().transpose(0, 1, 3, 2) @ H)[..., -1]
-        peak = np.argmax(largest, axis=1)
-        here = np.arange(len(rows))
-        stiffness[rows], at[rows] = 1 / np.sqrt(largest[here, peak]), f[peak]
-        way[rows] = _real(
-            np.linalg.eigh(H[here, peak].conj().transpose(0, 2, 1) @ H[here, peak])[1][:, :, -1]
-        )
-        if cut is not None:
-            use = f > 0
-            depth[rows] = limits(axes @ H[:, use] @ axes.T, cut)[0].min(axis=(-1, -2))
+    blocks = [np.arange(k, min(n, k + BLOCK)) for k in range(0, n, BLOCK)]
+    blocks = [rows[np.isfinite(found.rest[rows, 0, 0])] for rows in blocks]
+    blocks = [rows for rows in blocks if rows.size]
+    with workers(_block, (f, axes, cut), scheduler=scheduler) as hands:
+        for i, some in hands.as_done(_only(found, rows) for rows in blocks):
+            rows = blocks[i]
+            stiffness[rows], at[rows], way[rows], depth[rows] = some
     shape = p.shape[:-1]
     dims = ("pose",) if len(shape) == 1 else tuple(f"pose_{i}" for i in range(len(shape)))
     lowest = np.where(np.isfinite(found.rest[:, 0, 0]), found.frequency[:, 0], np.nan)
@@ -99,13 +95,30 @@ def vibration_map(
     ds = xr.Dataset(
         {k: (dims, v.reshape(shape), {"units": u}) for k, (v, u) in values.items()},
         coords={"position": ((*dims, "axis"), p), "axis": ["x", "y", "z"]},
-        attrs={"machine": m.name, "damping": found.damping.said},
+        attrs={"machine": machine.name, "damping": found.damping.said},
     )
     ds["softest_direction"] = ((*dims, "axis"), way.reshape(*shape, 3))
     ds["status"] = (dims, found.status.reshape(shape))
     if cut is not None:
         ds.attrs["process"] = cut.name
     return ds
+
+
+def _block(
+    shared: tuple[Floats, Floats, Process | None], some: TipModes
+) -> tuple[Floats, Floats, Floats, Floats | float]:
+    """Dynamic stiffness, its frequency and direction, and the limiting depth of some poses, as a task."""
+    f, axes, cut = shared
+    H = receptance(some, f)[:, :, :3, :3]
+    largest = np.linalg.eigvalsh(H.conj().transpose(0, 1, 3, 2) @ H)[..., -1]
+    peak = np.argmax(largest, axis=1)
+    here = np.arange(len(H))
+    at_peak = H[here, peak]
+    way = _real(np.linalg.eigh(at_peak.conj().transpose(0, 2, 1) @ at_peak)[1][:, :, -1])
+    depth: Floats | float = np.nan
+    if cut is not None:
+        depth = limits(axes @ H[:, f > 0] @ axes.T, cut)[0].min(axis=(-1, -2))
+    return 1 / np.sqrt(largest[here, peak]), f[peak], way, depth
 
 
 def _around(found: TipModes) -> Floats:

@@ -33,7 +33,7 @@ def calibrate_command(
     threads: Annotated[int | None, typer.Option(help="Threads; default: all cores.")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """All uncertain numbers of a machine from readings at once, and which of them the readings can tell.
+    """All uncertain numbers of a machine from readings at once, and which of them the readings can determine.
 
     Exit codes: 0 as declared or within tolerance, 1 beyond tolerance or unattributed, 2 bad input.
 
@@ -48,7 +48,7 @@ def calibrate_command(
         data,
         tolerances=Tolerances().scaled(tolerance),
         exclude=exclude or (),
-        budget=budget,
+        time_limit=budget,
         seed=seed,
         threads=threads,
     )

@@ -50,7 +50,7 @@ COMMANDS = (
         "calibrate", "stiffmap.cli.calibrate", "calibrate_command", "All uncertain numbers of a machine."
     ),
     Command("simulate", "stiffmap.cli.simulate", "simulate", "Write a virtual experiment."),
-    Command("plan", "stiffmap.cli.plan", "plan", "Which poses, loads and readings tell most."),
+    Command("plan", "stiffmap.cli.plan", "plan", "Which poses, loads and readings are most informative."),
     Command("monitor", "stiffmap.cli.monitor", "monitor", "What changed between two experiments."),
     Command(
         "compensate", "stiffmap.cli.compensate", "compensate", "Commands that cancel what a machine lacks."

@@ -33,6 +33,9 @@ def diagnose_command(
         float, typer.Option(min=1e-3, help="Factor on the default standard uncertainties of the machine.")
     ] = 1.0,
     date: Annotated[str | None, typer.Option(help="Date that the report bears, as you write it.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler whose workers do the bootstrap.")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing of what is being tried.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -57,7 +60,8 @@ def diagnose_command(
         seed=seed,
         threads=threads,
         exclude=exclude or (),
-        budget=budget,
+        time_limit=budget,
+        scheduler=scheduler,
         tolerances=Tolerances().scaled(tolerance),
         progress=None if silent else _say,
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,10 +21,6 @@ from stiffmap.outputs.option import written
 if TYPE_CHECKING:
     from stiffmap.experiment import Experiment
     from stiffmap.spreadsheet.convert import Imported
-    from stiffmap.spreadsheet.dialogue import Answers, Ask
-    from stiffmap.spreadsheet.instrument import Instrument
-    from stiffmap.spreadsheet.joints import Commanded
-    from stiffmap.spreadsheet.sheet import Sheet
 
 
 RECORDED = {"operator", "instrument", "certificate", "date", "temperature", "notes", "source", "sha256"}
@@ -101,7 +96,7 @@ def experiment(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing experiment.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make an experiment of a spreadsheet: columns, units and repeats are understood and told in words.
+    """Make an experiment of a spreadsheet: columns, units and repeats are understood and described in words.
 
     Units stand in brackets in the header. The header may come after other lines; n/a, - and empty cells were not
     read; further columns go to notes.csv. Exit codes: 0 done, 2 bad input, or a question that --map answers.
@@ -114,7 +109,7 @@ def experiment(
 
       [cyan]stiffmap experiment new poses.csv --dh arm_dh.csv --unit joints=deg --noise dx=0.03 -o tracker[/cyan]
 
-      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue -o asked[/cyan]
+      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue --noise dx=1 -o asked[/cyan]
 
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
@@ -125,6 +120,7 @@ def experiment(
     from stiffmap.spreadsheet.folder import make_experiment
     from stiffmap.spreadsheet.instrument import load_instrument
     from stiffmap.spreadsheet.joints import DIFFERENCES, drives_of
+    from stiffmap.spreadsheet.reading import Reading, read_and_ask
     from stiffmap.spreadsheet.sheet import read_sheet
 
     if action != "new":
@@ -171,69 +167,6 @@ def experiment(
     tell(found, table.header, made, machine, output, joints.columns if joints else {})
 
 
-@dataclass(frozen=True)
-class Reading:
-    """How a sheet is read: what wrote it, drives that it may command (name -> slides), sign of its differences."""
-
-    wrote: Instrument | None
-    drives: Mapping[str, bool]
-    difference: str
-
-
-def read_and_ask(
-    file: Path, sheet: str | None, how: Reading, given: Answers, ask: Ask | None
-) -> tuple[Sheet, Imported, Answers, list[str], Commanded | None]:
-    """The sheet that fits, what was understood of it, the answers in use, what the user should know of them, and the joints
-    that the sheet commands."""
-    from stiffmap.spreadsheet.dialogue import ask_all, profile_file, remember, remembered
-    from stiffmap.spreadsheet.guess import guess
-    from stiffmap.spreadsheet.instrument import as_readings
-    from stiffmap.spreadsheet.joints import as_seen, commanded, turned
-    from stiffmap.spreadsheet.sheet import EXCEL, read_sheet
-    from stiffmap.spreadsheet.workbook import sheet_names
-
-    def one(
-        name: str | None, ask: Ask | None
-    ) -> tuple[Sheet, Imported, Answers, list[str], Commanded | None]:
-        table, answers, told = read_sheet(file, name), given, list[str]()
-        form = table
-        if (kept := remembered(form)) is not None:
-            answers = kept.below(given)
-            told.append(f"answers of an earlier sheet of this form are used: {profile_file(form)}")
-        joints = commanded(table, how.drives, answers.chosen, answers.units)
-        if joints is not None:
-            joints = as_seen(joints, answers.units, how.difference)
-            table, answers = joints.sheet, replace(answers, chosen=joints.chosen)
-            told += joints.told
-        elif how.wrote is not None:
-            table, meant, assumed, constants = as_readings(table, how.wrote, answers.constants)
-            answers = replace(
-                answers, chosen=meant | answers.chosen, units=assumed | answers.units, constants=constants
-            )
-        if joints is None or not joints.head:
-            table, other = turned(table, guess(table.header, answers.chosen), how.difference)
-            answers = replace(answers, chosen=answers.chosen | other)
-        found, final = ask_all(table, answers, ask, joints)
-        if ask is not None and final != answers and joints is None:
-            told.append(f"the answers are remembered for sheets of this form: {remember(form, final)}")
-        return table, found, final, told, joints
-
-    names = sheet_names(file) if sheet is None and file.suffix.lower() in EXCEL else [sheet]
-    if len(names) == 1:
-        return one(sheet, ask)
-    reasons = {}
-    for name in names:
-        try:
-            return one(name, None)
-        except StiffmapError as problem:
-            reasons[str(name)] = problem
-    tables = [n for n, p in reasons.items() if type(p).__name__ == "Question"]
-    if ask is not None and tables:
-        return one(tables[0], ask)
-    lines = "; ".join(f"'{n}': {str(p).removeprefix(str(file)).lstrip(':, ')}" for n, p in reasons.items())
-    raise StiffmapError(f"{file}: none of its {len(names)} sheets fits (--sheet NAME reads one). {lines}")
-
-
 def _prompt(text: str) -> str:
     try:
         return input(f"{text} ")
@@ -262,7 +195,11 @@ def tell(
             "kept in notes.csv"
             if c.meaning == "note"
             else f"{told}, {found.units.get(c.meaning, 'no unit')}"
-            + (f" (one in the sheet is {found.factors[c.meaning]:.9g})" if c.meaning in found.factors else "")
+            + (
+                f" ({escape(c.unit) or 'one'} of the sheet: {found.factors[c.meaning]:.9g} {found.units[c.meaning]})"
+                if c.meaning in found.factors
+                else ""
+            )
         )
         console.print(f"'{escape(header[c.index])}': {where}")
     for name, value in found.constants.items():
@@ -286,7 +223,7 @@ def _show(console: Console, made: object) -> None:
     from stiffmap.experiment.notebook import experiment_rows
 
     head, rows = experiment_rows(made)
-    table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood")
+    table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood", padding=(0, 1, 0, 0))
     for name in head:
         table.add_column(name, justify="right")
     for row in rows:

@@ -1,4 +1,4 @@
-"""`stiffmap link`: the command lives beside what it does; this module keeps ``--help`` quick."""
+"""`stiffmap link`: the command lives next to what it does; this module keeps ``--help`` quick."""
 
 from stiffmap.link.command import link_command
 

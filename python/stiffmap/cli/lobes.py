@@ -69,6 +69,9 @@ def lobes(
     gravity_: GravityOption = None,
     output: FolderOption = None,
     threads: ThreadsOption = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler whose workers take the speeds.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Stability lobes: at which speed of the spindle what depth of cut does not chatter.
@@ -103,6 +106,7 @@ def lobes(
         "depths": None if depth is None else MM * np.linspace(0, depth, many[1] + 1)[1:],
         "feed": numbers(feed, "feed", 3), "tool": numbers(tool, "tool", 3), "also": _modes(mode), "method": method,
         "rotation": rotation(rotation_), "gravity": gravity(gravity_), "threads": threads,
+        "scheduler": scheduler,
         "damping": None if damping is None else numbers(damping, "damping") / 100,
     }  # fmt: skip
     answers = [_one(m, p, text, given, output, i) for i, text in enumerate(at or [None])]

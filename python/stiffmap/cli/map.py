@@ -88,7 +88,7 @@ def map_command(
     The default is the paper's Figure 7: 300 N, z = -200, 0 and 300 mm over the whole xy workspace,
     deflection in the plane. The paper does not say where its force points: mapped are the worst
     direction at every position, the best one, Fx and Fy. A force that is given as a vector is mapped
-    beside the worst and the best direction of its size.
+    next to the worst and the best direction of its size.
 
     Coordinates that a machine's task does not command are left at home: a planar machine has one plane.
 

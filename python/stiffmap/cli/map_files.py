@@ -1,4 +1,4 @@
-"""Files that ``stiffmap map`` writes beside the map: pictures, tables, the report."""
+"""Files that ``stiffmap map`` writes next to the map: pictures, tables, the report."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is asked for beside the map."""
+    """What is asked for next to the map."""
 
     output: Path
     plane: str

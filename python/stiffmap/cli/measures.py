@@ -148,7 +148,7 @@ def as_table(table: MeasuresTable, narrow: bool = False) -> Table:
 
 
 def remarks(table: MeasuresTable) -> list[str]:
-    """What the numbers need said beside them."""
+    """What the numbers need said next to them."""
     return [f"{r.measure.name}: {r.reason or r.found.note}" for r in table.rows if r.reason or r.found.note]
 
 

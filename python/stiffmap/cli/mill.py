@@ -103,6 +103,9 @@ def mill(
         typer.Option(help="Arms: choose the turn about the tool from so many over a full turn, e.g. 72."),
     ] = None,
     threads: ThreadsOption = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler whose workers try placements and turns.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """The part as a machine will cut it, and a program that makes it right.
@@ -121,13 +124,15 @@ def mill(
       [cyan]stiffmap mill corrected.yaml outline.ngc --process trimming --true my.yaml --band -o cut[/cyan]
     """
     m = machine_with(machine, effect)
+    cut = _process(process, tolerance)
     p = load_path(
         path,
+        feed=cut.feed,
+        spindle=cut.spindle,
         size=None if size is None else tuple(float(v) * MM for v in numbers(size, "size")),
         offsets=_offsets(offset),
         progress=None if as_json or not sys.stderr.isatty() else _read,
     )
-    cut = _process(process, tolerance)
     if reverse:
         p, cut = turned_round(p), other_side(cut)
     plate = None
@@ -138,7 +143,7 @@ def mill(
     angle = float(np.radians(turn))
     out: dict[str, object] = {}
     if place is not None:
-        best = placements(m, p, cut, count=place, threads=threads)
+        best = placements(m, p, cut, count=place, threads=threads, scheduler=scheduler)
         where, angle = best.best.at, best.best.turn
         out["placement"] = {"words": best.words(cut.tolerance), **placement_summary(best)}
 
@@ -151,11 +156,11 @@ def mill(
 
     turns = None
     if redundancy is not None:
-        turns = choose_turns(job(p), redundancy, threads=threads).angle
+        turns = choose_turns(job(p), redundancy, threads=threads, scheduler=scheduler).angle
     if entry is not None:
         p, out["entry"] = _entered(p, entry, job(p, turns), threads)
     if redundancy is not None:
-        chosen = choose_turns(job(p), redundancy, threads=threads)
+        chosen = choose_turns(job(p), redundancy, threads=threads, scheduler=scheduler)
         turns = chosen.angle
         out["redundancy"] = {
             "largest_mm": float(1e3 * np.abs(chosen.error).max()), "best_fixed_turn_mm": float(1e3 * chosen.fixed.min()),
@@ -230,7 +235,16 @@ def _say(out: dict[str, object]) -> None:
         if key == "warnings" and isinstance(value, list):
             text = " ".join(w["text"] for w in value)
         elif isinstance(value, dict):
-            text = ", ".join(f"{k} {v:.6g}" if isinstance(v, float) else f"{k} {v}" for k, v in value.items())
+            text = ", ".join(f"{k} {_text(v)}" for k, v in value.items())
         else:
-            text = f"{value:.6g}" if isinstance(value, float) else str(value)
+            text = _text(value)
         print(f"{key}: {text}")
+
+
+def _text(value: object) -> str:
+    """A value in a line: numbers short, a table of numbers in brackets."""
+    if isinstance(value, dict):
+        return f"({', '.join(f'{k} {_text(v)}' for k, v in value.items())})"
+    if isinstance(value, list):
+        return ", ".join(_text(v) for v in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

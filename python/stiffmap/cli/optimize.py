@@ -122,7 +122,7 @@ NOTHING = 1e-9
 
 
 def as_table(found: ParetoSet, report: Report) -> Table:
-    """Measures of the machines beside it and of the chosen designs, with the standard deviations that tolerances give."""
+    """Measures of the reference machines and of the chosen designs, with the standard deviations that tolerances give."""
     out = Table(
         box=box.SIMPLE,
         padding=(0, 0, 0, 1),

@@ -31,7 +31,7 @@ def plan(
     identify: Annotated[
         list[str],
         typer.Option(
-            "--identify", help="Effect whose numbers are to be told, at the value given; repeatable."
+            "--identify", help="Effect whose numbers are to be identified, at the value given; repeatable."
         ),
     ],
     output: Annotated[Path | None, written(help="CSV file of the rows chosen.")] = None,
@@ -65,10 +65,10 @@ def plan(
     seed: Annotated[int, typer.Option(help="Seed of candidates and of the twin's noise.")] = 0,
     as_json: JsonOption = False,
 ) -> None:
-    """Which poses, loads and readings tell most, before the instrument is booked.
+    """Which poses, loads and readings are most informative, before the instrument is booked.
 
     Identifies numbers (D-optimal), separates two explanations (--rival, T-optimal) or makes a map certain (--map).
-    Rows are within reach and within the drives' range; the same number of random rows stands beside them.
+    Rows are within reach and within the drives' range; the same number of random rows is shown for comparison.
 
     Examples:
 
@@ -159,7 +159,7 @@ def _plain(d: Design) -> dict[str, object]:
 
 
 def _lines(d: Design) -> list[str]:
-    out = [f"{len(d.experiment)} rows chosen; beside them the median of 20 random plans of the same size"]
+    out = [f"{len(d.experiment)} rows chosen; for comparison the median of 20 random plans of the same size"]
     if d.aim == "separate":
         out.append(f"  the rivals differ by {d.value:.1f} standard deviations (random {d.random_value:.1f})")
         return out

@@ -61,7 +61,7 @@ def layout(
     angle_noise: float,
     seed: int,
 ) -> Experiment:
-    """The plan that ``--plan`` and the options beside it describe."""
+    """The plan that ``--plan`` and the other options describe."""
     if quantity not in make.MICRO:
         raise StiffmapError(f"--quantity: expected deflection or position, got {quantity!r}")
     if noise is not None and noise <= 0:

@@ -53,7 +53,7 @@ def polar(
     """Deflection against the direction of a force in a plane: weakest and strongest direction.
 
     Of a force that is given as a vector, the size turns in the plane, and the deflection under the vector
-    itself is told as well.
+    itself is printed as well.
 
     With -o: polar diagrams and ellipses of deflections (PNG), and the data (NetCDF).
 

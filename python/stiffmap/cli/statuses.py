@@ -1,4 +1,4 @@
-"""What failed poses are told in."""
+"""How failed poses are reported."""
 
 from __future__ import annotations
 

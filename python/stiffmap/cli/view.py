@@ -48,7 +48,7 @@ def view(
         list[str] | None,
         typer.Option(
             "--set",
-            help="A number of the machine, ADDRESS=VALUE in SI, e.g. x.foot/beam.EIz=1e4; repeatable.",
+            help="A number of the machine, ADDRESS=VALUE in SI, e.g. x.foot/beam.EIx=4000; repeatable.",
         ),
     ] = None,
     start: Annotated[
@@ -60,6 +60,10 @@ def view(
     ] = None,
     experiment: Annotated[
         Path | None, typer.Option(help="Folder of an experiment: its rows and residuals.")
+    ] = None,
+    diagnosis: Annotated[
+        Path | None,
+        typer.Option(help="Folder that stiffmap diagnose -o wrote: what it named is lit on its element."),
     ] = None,
     path: Annotated[
         str | None, typer.Option(help="Toolpath (G-code, CL, CSV, or an outline): wanted, cut, compensated.")
@@ -90,7 +94,9 @@ def view(
 
       [cyan]stiffmap view hexapod --plane x --html hexapod.html[/cyan]
 
-      [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIz=1e4 --no-browser --port 8090[/cyan]
+      [cyan]stiffmap view orthoglide-revised --experiment experiments/servo --diagnosis result[/cyan]
+
+      [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIx=4000 --no-browser --port 8090[/cyan]
     """
     from stiffmap.view.optional import need_viser
 
@@ -98,7 +104,9 @@ def view(
     model = _model(machine, effect, link, at=at, rotation=rotation, force=force, moment=moment, gravity=gravity,
                    plane=plane, quantity=quantity, tolerance=tolerance, frequency=frequency, magnify=magnify,
                    changes=changes, start=start)  # fmt: skip
-    data = _data(experiment, path)
+    from stiffmap.view.open import data_of
+
+    data = data_of(model.declared, experiment, diagnosis, path)
     if html is not None or picture is not None:
         _write(model, data, html, picture, as_json)
         return
@@ -155,24 +163,7 @@ def _change(text: str) -> tuple[str, float]:
             return address, number_in(value)
     except ValueError:
         pass
-    raise StiffmapError(f"--set: expected ADDRESS=VALUE, such as x.foot/beam.EIz=1e4; got '{text}'")
-
-
-def _data(experiment: Path | None, path: str | None) -> Any:
-    if experiment is None and path is None:
-        return None
-    from stiffmap.view.data import Data
-
-    rows = line = None
-    if experiment is not None:
-        from stiffmap.experiment import load_experiment
-
-        rows = load_experiment(experiment)
-    if path is not None:
-        from stiffmap.toolpath import load_path, sampled
-
-        line = sampled(load_path(path)).position
-    return Data(rows, line)
+    raise StiffmapError(f"--set: expected ADDRESS=VALUE, such as x.foot/beam.EIx=4000; got '{text}'")
 
 
 def _write(model: Any, data: Any, html: Path | None, picture: Path | None, as_json: bool) -> None:

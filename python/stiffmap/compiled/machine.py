@@ -48,7 +48,7 @@ class CompiledMachine:
 
     @cached_property
     def spun_balls(self) -> dict[str, tuple[Floats, Floats]]:
-        """Ball joints beside a rod that spins, with axes of their own (docs/theory.md C8): (3, 3) rotation at home, (3, 3)
+        """Ball joints next to a rod that spins, with axes of their own (docs/theory.md C8): (3, 3) rotation at home, (3, 3)
         axes (rows) in the frame behind it, where the coordinates are zero. Counted from the axes of `charted`."""
         return {
             self.names.coordinates[first].rpartition(".")[0]: (

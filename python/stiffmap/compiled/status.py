@@ -19,7 +19,7 @@ class Status(IntEnum):
 
 
 class Flag(IntFlag):
-    """Bits beside the status; a value with a flag is kept."""
+    """Bits in addition to the status; a value with a flag is kept."""
 
     LEG_SINGULAR = 1 << 0
     FREE_SPIN = 1 << 1

@@ -1,4 +1,4 @@
-"""What a beam spring was computed from, kept beside its compliance."""
+"""What a beam spring was computed from, kept next to its compliance."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class MachineDescription:
     (translations along base axes, rotations about those of the base at home), guides hold the others.
     ``modal_damping`` holds damping ratios of the modes, lowest frequency first, the last for all further ones;
     empty: none is declared.
-    ``uncertainty`` holds a standard uncertainty (SI) beside any number, keyed by
+    ``uncertainty`` holds a standard uncertainty (SI) of any number, keyed by
     ``full.element.name/field``; ``notes`` says where numbers come from, by the same keys, and so does
     ``sources``: assumed, measured, computed or catalogue; its keys may be names of elements, legs, or hold ``*``.
     ``declared`` is the machine before its effects were added (``None``: no effect has been);

@@ -39,7 +39,7 @@ class TableStroke:
 
 def present_rows(stroke: TableStroke, compliance: Matrix6) -> tuple[Matrix6, ...]:
     """Rows of a table of which the first is now ``compliance``: every entry changes in the ratio in which that
-    of the first row did, one that is zero there as the two diagonal terms beside it."""
+    of the first row did, one that is zero there as the two diagonal terms next to it."""
     first = stroke.rows[0]
     if compliance == first:
         return stroke.rows

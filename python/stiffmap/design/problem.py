@@ -192,7 +192,7 @@ def load_design(path: str | PathLike[str]) -> Design:
     if model.toolpath is not None:
         task = replace(task, toolpath=near_or_shipped(model.toolpath, given.parent))
     if task.toolpath is not None:
-        load_motion(task.toolpath)  # a mistake in it is told before the search
+        load_motion(task.toolpath)  # a mistake in it is reported before the search
     try:
         own = tuple((n, _bound(n, b, known)) for n, b in model.constraints.items())
     except StiffmapError as error:

@@ -1,4 +1,4 @@
-"""Chosen designs refined, as machine files, measured in full beside the machine that the search began with."""
+"""Chosen designs refined, as machine files, measured in full and compared with the machine that the search began with."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Chosen:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Machines beside each other."""
+    """Machines for comparison."""
 
     beside: dict[str, MeasuresTable]
     """``start`` and the machines that the design file names."""

@@ -1,4 +1,4 @@
-"""How long a diagnosis may take, how much it may try, what it is doing, and whether it was told to stop."""
+"""How long a diagnosis may take, how much it may try, what it is doing, and whether it was asked to stop."""
 
 from __future__ import annotations
 

@@ -6,12 +6,14 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
 
 from stiffmap.broadcasting import whole_number
 from stiffmap.calibration import GROUPS, Tolerances, certified
+from stiffmap.deprecation import renamed
 from stiffmap.diagnosis.candidates.candidates import check_kinds
 from stiffmap.diagnosis.clock import Clock, Progress
 from stiffmap.diagnosis.decision.beside_calibration import Answer, find_effects
@@ -22,6 +24,7 @@ from stiffmap.diagnosis.decision.judge import after_checks
 from stiffmap.diagnosis.decision.largest_residual import located
 from stiffmap.diagnosis.decision.result_machine import result_machine
 from stiffmap.diagnosis.decision.stability import explained
+from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.report.describe import aliases_of, as_place, named_effects
 from stiffmap.diagnosis.report.findings import Detectability, Effect, NoiseReport
 from stiffmap.diagnosis.report.result import Diagnosis
@@ -29,6 +32,7 @@ from stiffmap.diagnosis.rivals.explain import Explanation, explain
 from stiffmap.diagnosis.rivals.separation import separation
 from stiffmap.diagnosis.search.detectability import detectable
 from stiffmap.diagnosis.search.study import Finding, Study, study
+from stiffmap.diagnosis.slips.factors import named_within
 from stiffmap.diagnosis.slips.find import find_slip
 from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.experiment.comparison.limitations import limitations, refuse
@@ -37,18 +41,22 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.noise.over_time import over_time
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
+from stiffmap.number_text import within
 from stiffmap.one_thread import on_one_thread
 
 SLIPS = 2
 """Mistakes in the readings that are undone one after the other."""
+GAINS = ("load_gain", "sensor_gain")
 LISTED = 20
 """Patterns that a verdict lists at most."""
 
 
 @on_one_thread
+@renamed(budget="time_limit")
 def diagnose(
     machine: Machine | str | PathLike[str],
     experiment: Experiment | str | PathLike[str],
@@ -58,8 +66,9 @@ def diagnose(
     cross_validate: bool = True,
     tolerances: Tolerances | None = None,
     exclude: Sequence[str] = (),
-    budget: float | None = None,
+    time_limit: float | None = None,
     progress: Progress | None = None,
+    scheduler: Any = None,
 ) -> Diagnosis:
     """Which physical effect the declared machine lacks, where, how large, and how sure that is.
 
@@ -77,33 +86,35 @@ def diagnose(
         False leaves out the nested cross-validation: `before` and `after` are then not held out.
     tolerances
         Standard uncertainties of what the machine file declares, where it gives none: effects are named
-        only beside them (docs/calibration.md).
+        only jointly with them (docs/calibration.md).
     exclude
         Kinds of effects, or groups of the calibration, that are known not to be.
-    budget
+    time_limit
         Seconds after which no new step begins; the answer is then the best so far, `stopped` is set, and so it
         is after Ctrl-C, also among the sensitivities (`not_tried` lists the effects that have none). None: a bound on what is tried instead, the same on every computer, which readings that
         nothing explains reach; `not_tried` then says what was left out.
     progress
         Called with a text on what is tried.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers do the bootstrap of the search, with the same answer.
 
     Raises
     ------
     StiffmapError
         For files that cannot be used, poses out of reach, and noise that is unknown. docs/diagnosis.md
-        tells the method.
+        describes the method.
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
-    clock = Clock.of(budget, progress)
+    clock = Clock.of(time_limit, progress)
     groups = tuple(n for n in exclude if n in GROUPS)
     without = check_kinds(n for n in exclude if n not in GROUPS)
     with clock.on_interrupt():
         predictor = Predictor(machine, data, threads=threads)
         refuse(predictor.experiment, predictor())
-        s, slips = without_slips(study(predictor, seed, None, clock, without), seed)
-        if budget is None:
+        s, slips = without_slips(study(predictor, seed, None, clock, without, scheduler), seed)
+        if time_limit is None:
             clock.bound(s.predictor)
         answer = _diagnosed(s, seed, certified(tolerances, data), groups, cross_validate)
         return with_slips(answer, slips) if slips else answer
@@ -119,13 +130,26 @@ def without_slips(s: Study, seed: int) -> tuple[Study, list[Slip]]:
             break
         predictor = Predictor(s.predictor.machine, found.experiment, threads=s.predictor.threads)
         refuse(predictor.experiment, predictor())
-        s = study(predictor, seed, None, s.clock, s.without)
+        s = study(predictor, seed, None, s.clock, s.without, s.scheduler)
     return s, slips
 
 
 def with_slips(d: Diagnosis, slips: Sequence[Slip]) -> Diagnosis:
     """The answer that names mistakes in the readings before any cause."""
-    return replace(d, slips=list(slips), verdict="readings")
+    return replace(d, slips=[by_gain(s, d.effects) for s in slips], verdict="readings")
+
+
+def by_gain(s: Slip, effects: Sequence[Effect]) -> Slip:
+    """A common factor that no known one is, named by the gain that the diagnosis found beside a part of the machine."""
+    gains = [e.parameters["gain"] for e in effects if e.kind in GAINS and "gain" in e.parameters]
+    if s.kind != "factor" or s.undone or len(gains) != 1:
+        return s
+    value, low, high, _ = gains[0]
+    names = named_within(low, high)
+    if not names:
+        return s
+    seen = f"{s.seen}, {within(value, (high - low) / 3.92)} times beside the cause that is found as well"
+    return replace(s, check=f"check first: {', or '.join(names)}", seen=seen)
 
 
 def _diagnosed(
@@ -185,6 +209,7 @@ def _assemble(found: Answer, held: HeldOut | None, seed: int) -> Diagnosis:
             *found.notes,
             *limitations(e, s.noise, s.predictor.machine),
             *([] if left else noise.sentences()),
+            *_over_time(finding, model),
         ],
         significance={
             "effective_trials": s.effective_trials,
@@ -218,7 +243,7 @@ def _effects(s: Study, finding: Finding, why: Explanation, inflation: float) -> 
 
 
 def _detectable(s: Study, finding: Finding) -> list[Detectability]:
-    """How small each effect could be and still be found, beside those that are named."""
+    """How small each effect could be and still be found, in addition to those that are named."""
     search = finding.search
     return [
         Detectability(
@@ -231,6 +256,13 @@ def _detectable(s: Study, finding: Finding) -> list[Detectability]:
         for d in detectable(search.screen.beside(finding.model.tangent()), search.threshold)
         if any(v is not None for v in d.sizes.values())
     ]
+
+
+def _over_time(finding: Finding, model: Model) -> list[str]:
+    """What the model leaves over time, in words; nothing where no times were recorded."""
+    assert model.residual is not None
+    found = over_time(finding.search.problem, model.residual)
+    return [] if found is None else [str(found)]
 
 
 def _summaries(

@@ -26,7 +26,7 @@ def add_effect(
     Parameters
     ----------
     kind
-        One of `stiffmap.effects.library()`; docs/effects.md tells them all.
+        One of `stiffmap.effects.library()`; docs/effects.md describes them all.
     element
         Name of the element in the machine file (``actuator``, ``bar`` …), or ``machine``, ``base``,
         ``platform``; may be left out where only one is possible.
@@ -71,7 +71,7 @@ def _checked(
     legs: Sequence[str] | None,
     parameters: Mapping[str, Any],
 ) -> AppliedEffect:
-    """The record of one more effect beside others; StiffmapError for what cannot be."""
+    """The record of one more effect next to others; StiffmapError for what cannot be."""
     effect = registry.get(kind)
     if effect.measurement:
         raise StiffmapError(

@@ -14,7 +14,7 @@ from stiffmap.effects.parameter import Parameter
 
 Floats = NDArray[np.float64]
 RECORDS = ("temperature", "order", "hours", "approach", "branch", "setup", "motor")
-"""What an effect may need of an experiment beside pose, load and reading; ``motor``: an encoder on the motor's side."""
+"""What an effect may need of an experiment besides pose, load and reading; ``motor``: an encoder on the motor's side."""
 
 
 class Plan(Protocol):
@@ -146,7 +146,7 @@ MOST = 25
 
 def signatures_on_a_grid(probe: Probe, tried: Tried) -> Iterator[Signature]:
     """Parameters without a null at a few multiples of their scale, within bounds: what an effect that says nothing
-    of its signature gets. One grid for up to two of them; beyond, each alone beside typical values."""
+    of its signature gets. One grid for up to two of them; beyond, each alone with typical values of the others."""
     free = [p for p in tried.parameters if p.null is None]
     sizes = [list(dict.fromkeys(min(max(s * p.scale, p.lower), p.upper) for s in STEPS)) for p in free]
     typical = [min(max(p.scale, p.lower), p.upper) for p in free]

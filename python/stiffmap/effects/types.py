@@ -62,9 +62,9 @@ class EffectType:
     stage
         Effects are applied by ascending stage, so that the order in which they were added is no matter.
     precedence
-        Of two kinds that readings cannot tell apart the lower one is named; kinds are listed in this order.
+        Of two kinds that readings cannot distinguish the lower one is named; kinds are listed in this order.
     needs
-        What an experiment must record beside pose, load and reading, from `evidence.RECORDS`. ``better_with``: what
+        What an experiment must record besides pose, load and reading, from `evidence.RECORDS`. ``better_with``: what
         it should record.
     hidden
         Whether a plan cannot show it: its metrology loop leaves it out, or an unknown frame takes it up.

@@ -22,7 +22,7 @@ Integers = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 ASKED = tuple(f"{c}_cmd" for c in WRENCH)
-"""Columns of loads that were commanded, beside those that were measured."""
+"""Columns of loads that were commanded, in addition to those that were measured."""
 BRANCHES = ("", "loading", "unloading")
 CLUSTERS = 20
 PER_ROW = (
@@ -184,7 +184,7 @@ class Experiment:
 
     @property
     def recorded(self) -> frozenset[str]:
-        """What the experiment records beside pose, load and reading, in the words of effects."""
+        """What the experiment records besides pose, load and reading, in the words of effects."""
         columns = ("temperature", "order", "hours", "approach", "branch", "setup")
         given = {c for c in columns if getattr(self, c) is not None and len(getattr(self, c))}
         return frozenset(given | {c.side for c in self.extra if c.joint})

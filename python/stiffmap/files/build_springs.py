@@ -156,7 +156,7 @@ def _moduli(beam: Beam, context: Context) -> tuple[float, float]:
             known = ", ".join(context.materials) or "none"
             context.at("material").fail(f"unknown material '{material}'; declared under materials: {known}")
         material = context.materials[material]
-    assert material is not None  # the schema asks for it beside a section
+    assert material is not None  # the schema asks for it next to a section
     e = _positive(material.E, MODULUS, "material.E", context)
     if material.G is not None:
         return e, _positive(material.G, MODULUS, "material.G", context)

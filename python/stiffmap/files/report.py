@@ -1,4 +1,4 @@
-"""Validation errors told in one sentence: file, line, key, what was expected and what was found."""
+"""Validation errors stated in one sentence: file, line, key, what was expected and what was found."""
 
 from __future__ import annotations
 

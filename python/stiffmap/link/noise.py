@@ -26,8 +26,8 @@ class Noise(NamedTuple):
 def estimate_noise(rss: Floats, dof: Ints, floor: Floats) -> Noise:
     """Noise of each case from its residual sum of squares (m²), link (5).
 
-    The cases are pooled, with the sum of their degrees of freedom, when Bartlett's test does not tell
-    their variances apart at 1 %. ``floor`` (cases,) is the round-off of the field in m: below it a
+    The cases are pooled, with the sum of their degrees of freedom, when Bartlett's test does not distinguish their
+    variances at 1 %. ``floor`` (cases,) is the round-off of the field in m: below it a
     residual is not noise but arithmetic.
     """
     sigma = np.sqrt(rss / np.maximum(dof, 1))

@@ -10,7 +10,7 @@ from stiffmap.link.arrays import Bools, Floats
 
 
 def critical_multiple(level: float, tests: int, dof: Floats | float) -> Floats:
-    """The paper's k of "k sigma": |entry| below k standard errors is not told from zero, link (8).
+    """The paper's k of "k sigma": |entry| below k standard errors is not distinguishable from zero, link (8).
 
     Bonferroni over ``tests`` entries: the probability that any entry that is truly zero is taken for
     non-zero stays below ``level`` whatever the correlation of the entries.

@@ -32,7 +32,7 @@ def kept_attributes(path: Path, attributes: Callable[[Any], Any] = lambda whole:
             raise TypeError
     except (OSError, ValueError, LookupError, TypeError) as error:
         raise FileError(
-            "is damaged: expected the attributes of an unfinished map; without them nobody can tell whose values "
+            "is damaged: expected the attributes of an unfinished map; without them it is unknown whose values "
             "these are: start again without resume (--resume)",
             file=str(path),
         ) from error

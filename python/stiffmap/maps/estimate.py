@@ -33,7 +33,7 @@ class MapEstimate:
     result_bytes: int
     """Size of the map in memory (`out=None`) and, at most, on the disk."""
     working_bytes: int
-    """Memory beside the interpreter and its libraries while a map is written to Zarr."""
+    """Memory in addition to the interpreter and its libraries while a map is written to Zarr."""
 
     def __str__(self) -> str:
         return (

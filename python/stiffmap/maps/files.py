@@ -71,7 +71,7 @@ def _changed(ds: xr.Dataset, kind: str, change: Callable[[xr.Variable], Any]) ->
 
 
 def partial_folder(path: Path) -> Path:
-    """Folder beside `path` in which an unfinished map grows; made where it is missing."""
+    """Folder next to `path` in which an unfinished map grows; made where it is missing."""
     folder = path.with_name(f"{path.name}.partial")
     if path.is_dir() and not is_zarr(path):
         raise FileError("cannot be written: it is a folder", file=str(path))

@@ -89,7 +89,7 @@ def error_map(
     point, rotation, gravity, load_type, method, load_steps, threads
         As in `Machine.solve`; `rotation` is one (3, 3) matrix for the whole map.
     chunk
-        Poses solved at once; memory beside the result grows with it, no number depends on it.
+        Poses solved at once; memory in addition to the result grows with it, no number depends on it.
     progress
         Show a progress bar on standard error; None: where that is a terminal.
     out
@@ -97,7 +97,7 @@ def error_map(
         the disk, not in memory, and the Dataset that is returned reads it when used. Zarr is written once, in
         chunks that can be read while the rest is missing; it is the form for maps of more than 10^7 poses.
     resume
-        Take up what an interrupted run of the same call left beside `out`.
+        Take up what an interrupted run of the same call left next to `out`.
     scheduler
         Address of a dask scheduler, or a `distributed.Client`: its workers solve the map, tile by tile
         (docs/big_maps.md). No number depends on it.

@@ -1,6 +1,6 @@
 """A map that grows in a Zarr folder, a chunk of every variable per tile, and survives being killed.
 
-While it grows, the folder is called ``NAME.zarr.partial`` and holds a journal beside the arrays: a line for each
+While it grows, the folder is called ``NAME.zarr.partial`` and holds a journal next to the arrays: a line for each
 tile whose chunks are complete, with their checksums. The finished folder holds the map alone, so that its bytes
 don't depend on interruptions, threads or the order of the tiles.
 """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,11 +18,13 @@ from stiffmap.milling.plant import Plant
 from stiffmap.milling.setting import Setting, setting
 from stiffmap.process.description import Process
 from stiffmap.status import Flag
+from stiffmap.tasks import workers
 from stiffmap.toolpath import Placement, Toolpath, sampled
 from stiffmap.toolpath.sampling import Points
 
 AT_ONCE = 200_000
-"""Poses of one call."""
+"""Poses of one call; on a cluster, of one task as many as `IN_A_TASK`."""
+IN_A_TASK = 10_000
 NORM = 12
 """Power of the mean that stands for the largest error while it is refined."""
 REFINED = 3
@@ -91,11 +94,13 @@ def placements(
     points: int = 500,
     seed: int = 0,
     threads: int | None = None,
+    scheduler: Any = None,
 ) -> Placements:
     """Search for the placement with the smallest largest error across the wall, before compensation.
 
     count: placements tried (a Sobol sequence over box and turns); turns: (2,) rad; box (2, 3) m for the part, None: the
-    workspace of the machine file; points: number of points of the path in the search. Raises StiffmapError where no placement holds the path.
+    workspace of the machine file; points: number of points of the path in the search. scheduler: address of a dask
+    scheduler, or a `distributed.Client`, whose workers try the placements, with the same answer. Raises StiffmapError where no placement holds the path.
     """
     if count < 1 or points < 2:
         raise StiffmapError(f"count and points: expected 1 or more and 2 or more, got {count} and {points}")
@@ -107,16 +112,15 @@ def placements(
     unit = qmc.Sobol(4, seed=seed).random_base2(power)[:count]
     turn = turns[0] + unit[:, 3] * (turns[1] - turns[0])
     at = search.inside(unit[:, :3], turn, low, high)
-    largest = search.largest(at, turn)
+    largest = _tried(search, at, turn, scheduler)
     if not np.isfinite(largest).any():
         raise StiffmapError(
             f"no placement of {count} holds the path on {machine.name}: it measures "
             f"{', '.join(f'{v:.0f}' for v in 1e3 * search.size)} mm, the box {', '.join(f'{v:.0f}' for v in 1e3 * (high - low))} mm"
         )
     order = np.argsort(largest)[:REFINED]
-    tried = [
-        search.refined(at[i], float(turn[i]), low, high, turns) for i in order if np.isfinite(largest[i])
-    ]
+    with workers(_refined, (search, low, high, turns), scheduler=scheduler) as hands:
+        tried = hands.in_order((at[i], float(turn[i])) for i in order if np.isfinite(largest[i]))
     tried.append((search.exact(naive), naive))
     error, best = min(tried, key=lambda t: t[0])
     return Placements(
@@ -131,6 +135,27 @@ def placements(
         search.errors(naive),
         search.errors(best),
     )
+
+
+def _tried(search: Search, at: Floats, turn: Floats, scheduler: Any) -> Floats:
+    """(n,) m: largest error of each placement."""
+    count = max(1, (AT_ONCE if scheduler is None else IN_A_TASK) // len(search.points))
+    rows = [slice(k, k + count) for k in range(0, len(at), count)]
+    with workers(_largest, search, scheduler=scheduler) as hands:
+        return np.concatenate(hands.in_order((at[r], turn[r]) for r in rows))
+
+
+def _largest(search: Search, some: tuple[Floats, Floats]) -> Floats:
+    """Some placements, as a task."""
+    return search.largest(*some)
+
+
+def _refined(
+    shared: tuple[Search, Floats, Floats, tuple[float, float]], begin: tuple[Floats, float]
+) -> tuple[float, Placement]:
+    """One descent, as a task."""
+    search, low, high, turns = shared
+    return search.refined(*begin, low, high, turns)
 
 
 class Search:
@@ -174,31 +199,25 @@ class Search:
 
     def largest(self, at: Floats, turn: Floats) -> Floats:
         """(n,) m: largest error, the cut answering to first order; infinite where a point fails."""
-        out = np.full(len(at), np.inf)
-        m = len(self.points)
-        chunk = max(1, AT_ONCE // m)
-        for k in range(0, len(at), chunk):
-            rows = slice(k, k + chunk)
-            places = [Placement(a, float(t)) for a, t in zip(at[rows], turn[rows], strict=True)]
-            r = np.stack([p.rotation for p in places])
-            position = np.einsum("nij,mj->nmi", r, self.points.position) + at[rows][:, None]
-            force = np.einsum("nij,mj->nmi", r, self.force)
-            off = np.einsum("nij,mj->nmi", r, self.job.off)
-            s = self.machine.solve(
-                position,
-                np.concatenate([force, np.zeros_like(force)], axis=-1),
-                rotation=self.job.rotation[0] if self.job.rotation.strides[0] == 0 else self.job.rotation,
-                threads=self.threads,
-            )
-            slope = np.einsum("nij,mj->nmi", r, self.slope)
-            bent = np.matmul(s.compliance[..., :3, :3], slope[..., None])[..., 0]
-            loop = 1 - np.einsum("nmi,nmi->nm", off, bent)  # 1 + kp/k
-            good = (s.ok & (s.flags & LIMITS == 0) & (loop > 0)).all(axis=1)
-            error = np.einsum("nmi,nmi->nm", s.displacement[..., :3], off)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                error = np.abs(error / loop).max(axis=1)
-            out[rows] = np.where(good, error, np.inf)
-        return out
+        places = [Placement(a, float(t)) for a, t in zip(at, turn, strict=True)]
+        r = np.stack([p.rotation for p in places])
+        position = np.einsum("nij,mj->nmi", r, self.points.position) + at[:, None]
+        force = np.einsum("nij,mj->nmi", r, self.force)
+        off = np.einsum("nij,mj->nmi", r, self.job.off)
+        s = self.machine.solve(
+            position,
+            np.concatenate([force, np.zeros_like(force)], axis=-1),
+            rotation=self.job.rotation[0] if self.job.rotation.strides[0] == 0 else self.job.rotation,
+            threads=self.threads,
+        )
+        slope = np.einsum("nij,mj->nmi", r, self.slope)
+        bent = np.matmul(s.compliance[..., :3, :3], slope[..., None])[..., 0]
+        loop = 1 - np.einsum("nmi,nmi->nm", off, bent)  # 1 + kp/k
+        good = (s.ok & (s.flags & LIMITS == 0) & (loop > 0)).all(axis=1)
+        error = np.einsum("nmi,nmi->nm", s.displacement[..., :3], off)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            error = np.abs(error / loop).max(axis=1)
+        return np.asarray(np.where(good, error, np.inf))
 
     def exact(self, place: Placement) -> float:
         """m: largest error, cut and deflection solved together; infinite where a point fails."""

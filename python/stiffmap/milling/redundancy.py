@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from stiffmap.milling.limits import fastest as fastest_drives
 from stiffmap.milling.plant import Plant
 from stiffmap.milling.setting import Setting, orientations
 from stiffmap.status import Flag
+from stiffmap.tasks import workers
 
 LIMITS = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
 FASTEST = 3.0
@@ -40,12 +42,18 @@ class Redundancy:
 
 
 def redundancy(
-    job: Setting, turns: int = 72, *, fastest: float | None = FASTEST, threads: int | None = None
+    job: Setting,
+    turns: int = 72,
+    *,
+    fastest: float | None = FASTEST,
+    threads: int | None = None,
+    scheduler: Any = None,
 ) -> Redundancy:
     """Turns (m,) rad that make the largest error smallest, and of these the smallest sum of squares.
 
     turns: number of the grid over a full turn. fastest: rad/s of the turn, None: no limit of its own. Reach, joint
-    limits and the drives' speeds hold between neighbouring points. Raises StiffmapError where no sequence holds the path.
+    limits and the drives' speeds hold between neighbouring points. scheduler: address of a dask scheduler, or a
+    `distributed.Client`, whose workers take the turns, with the same answer. Raises StiffmapError where no sequence holds the path.
     """
     if len(job.machine.actuators) < 6:
         raise StiffmapError(
@@ -54,7 +62,7 @@ def redundancy(
     if turns < 2:
         raise StiffmapError(f"turns: expected 2 or more, got {turns}")
     grid = -np.pi + 2 * np.pi * np.arange(turns) / turns
-    error, joints = grid_of(job, grid, threads)
+    error, joints = grid_of(job, grid, threads, scheduler)
     time = np.linalg.norm(np.diff(job.position, axis=0), axis=1) / job.feed[1:]
     free = Steps(joints, time, fastest_drives(job.machine), grid, fastest)
     stage = np.abs(error)
@@ -73,20 +81,23 @@ def redundancy(
     return Redundancy(grid[chosen], error[rows, chosen], stage.max(axis=0), grid, joints[rows, chosen])
 
 
-def grid_of(job: Setting, grid: Floats, threads: int | None = None) -> tuple[Floats, Floats]:
+def grid_of(
+    job: Setting, grid: Floats, threads: int | None = None, scheduler: Any = None
+) -> tuple[Floats, Floats]:
     """(m, turns) m error across the wall, infinite where the arm fails, and (m, turns, actuators) drives."""
-    errors, joints = [], []
-    for angle in grid:
-        turned = replace(
-            job, rotation=orientations(job.machine, job.tool, job.place, np.full(len(job), angle))
-        )
-        e = equilibrium(Plant(turned, threads=threads), job.position)
-        good = np.isfinite(e.error).all(axis=1) & (e.flags & LIMITS == 0)
-        errors.append(np.where(good, np.nan_to_num((e.error * job.off).sum(axis=1)), np.inf))
-        joints.append(
-            inverse_kinematics(job.machine, job.position, turned.rotation, threads=threads).actuators
-        )
+    with workers(_turned, (job, threads), scheduler=scheduler) as hands:
+        errors, joints = zip(*hands.in_order(float(angle) for angle in grid), strict=True)
     return np.stack(errors, axis=1), np.stack(joints, axis=1)
+
+
+def _turned(shared: tuple[Setting, int | None], angle: float) -> tuple[Floats, Floats]:
+    """(m,) m and (m, actuators) of one turn all along, as a task."""
+    job, threads = shared
+    turned = replace(job, rotation=orientations(job.machine, job.tool, job.place, np.full(len(job), angle)))
+    e = equilibrium(Plant(turned, threads=threads), job.position)
+    good = np.isfinite(e.error).all(axis=1) & (e.flags & LIMITS == 0)
+    error = np.where(good, np.nan_to_num((e.error * job.off).sum(axis=1)), np.inf)
+    return error, inverse_kinematics(job.machine, job.position, turned.rotation, threads=threads).actuators
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Statement:
-    """The paper's words beside our number."""
+    """The paper's words next to our number."""
 
     section: str
     words: str

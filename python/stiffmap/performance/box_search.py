@@ -14,6 +14,7 @@ from stiffmap.broadcasting import Floats
 from stiffmap.performance.cell import BOX
 from stiffmap.performance.cells import shrink
 from stiffmap.performance.limits import Bounds
+from stiffmap.performance.proof import Judge, judge_cells
 
 SAMPLES = 9
 """Nodes along each edge of the region where poses that break a limit are looked for first."""
@@ -52,12 +53,19 @@ class BoxSearch:
     """Works in coordinates of the box's axes divided by its proportions: boxes are then cubes."""
 
     def __init__(
-        self, bounds: Bounds, shape: Floats, axes: Floats, region: Floats, gap: float, work: int
+        self,
+        bounds: Bounds,
+        shape: Floats,
+        axes: Floats,
+        region: Floats,
+        gap: float,
+        work: int,
+        judge: Judge | None = None,
     ) -> None:
         self.shape, self.axes, self.gap, self.work = shape, axes, gap, work
         self.low, self.high = region / shape
         self.size = float((self.high - self.low).max())
-        self.bounds = bounds
+        self.bounds, self.judge = bounds, judge or judge_cells(bounds)
         self.best, self.centre = 0.0, (self.low + self.high) / 2
         self.names: tuple[str, ...] = ()
         self.witnesses = np.zeros((0, 3))
@@ -128,7 +136,7 @@ class BoxSearch:
         return cKDTree(self.witnesses if len(self.witnesses) else np.full((1, 3), 1e9))
 
     def _room(self, tree: cKDTree, centres: Floats) -> Floats:
-        """Edge of the cube about each centre that touches the nearest witness or the region's border."""
+        """Edge of the cube about each centre that touches the nearest counterexample or the region's border."""
         near = tree.query(centres, p=np.inf)[0]
         border = np.minimum(centres - self.low, self.high - centres).min(axis=1)
         return np.asarray(2 * np.minimum(near, border))
@@ -159,7 +167,7 @@ class BoxSearch:
         """Linear programs over the limits at the points watched, within a shrinking trust region."""
         trust, edge, before = 0.1 * self.size, 0.9 * edge, self.bounds.counter[0]
         while edge > self.gap and not self._inside(centre + self.touched * edge / 2).all():
-            edge *= 0.8  # a limit between the witnesses
+            edge *= 0.8  # a limit between the counterexamples
         for _ in range(ROUNDS):
             better = self._program(centre, edge, trust)
             if better is None or better[1] <= edge + 0.1 * self.gap:
@@ -224,7 +232,7 @@ class BoxSearch:
                 return
             share = max((self._left - self.work // 2) // 2, 500)
             begun = edge
-            found = shrink(self.bounds, self.axes, self.shape, centre, edge, self.best, 0.5 * self.gap, share)
+            found = shrink(self.judge, self.axes, self.shape, centre, edge, self.best, 0.5 * self.gap, share)
             self.exhausted |= found.cells + 64 > share
             self.witnesses = np.concatenate([self.witnesses, found.broken])
             if found.edge > self.best:
@@ -250,7 +258,7 @@ class BoxSearch:
             edge = self.best + (min(roomier, edge) - self.best) / 2
 
     def _roomier(self, centre: Floats) -> tuple[Floats, float]:
-        """A centre nearby with the most room between the witnesses."""
+        """A centre nearby with the most room between the counterexamples."""
         tree, step = self._tree(), 0.05 * self.size
         room = float(self._room(tree, centre[None])[0])
         while step > 0.05 * self.gap:

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.broadcasting import Floats
-from stiffmap.performance.cell import Cells
-from stiffmap.performance.enclosed import enclose
-from stiffmap.performance.limits import Bounds
-from stiffmap.performance.sampled import sample
+from stiffmap.performance.proof import Judge
 
 FIRST = 4
 """Cells along each edge at first."""
@@ -33,13 +28,8 @@ class Shrunk:
     cells: int
 
 
-def judge_cells(bounds: Bounds) -> Callable[[Floats, Floats, Floats], Cells]:
-    """Enclosure where it can be had, else nodes."""
-    return partial(sample if bounds.unproven else enclose, bounds)
-
-
 def shrink(
-    bounds: Bounds,
+    judge: Judge,
     axes: Floats,
     shape: Floats,
     centre: Floats,
@@ -53,7 +43,6 @@ def shrink(
 
     Gives up (edge 0) below `least`, or when more than `work` cells were asked for.
     """
-    judge = judge_cells(bounds)
     step = np.arange(FIRST) / FIRST
     low = np.stack(np.meshgrid(step, step, step, indexing="ij"), axis=-1).reshape(-1, 3)
     low = centre - edge / 2 + edge * low

@@ -57,7 +57,7 @@ def force_transmission(
 ) -> ForceTransmission:
     """Smallest and largest force that the drives hold, at rest or at speed, at poses (..., 3) m.
 
-    A force f on the tool asks the drives for -J^T f (virtual work; the paper's (2) has the force that
+    A force f on the tool requires the drive efforts -J^T f (virtual work; the paper's (2) has the force that
     the machine exerts). Limits: ``declared`` in the machine file, ``unit``, or numbers (N, N·m).
 
     gravity

@@ -139,7 +139,7 @@ def _place(given: FilePath) -> FilePath:
 
 
 def near_or_shipped(name: str, folder: FilePath) -> str:
-    """What a file in this folder calls its motion: one beside it, else as `load_motion` finds it."""
+    """What a file in this folder calls its motion: one next to it, else as `load_motion` finds it."""
     near = folder / name
     return str(near) if near.is_file() or not _place(FilePath(name)).is_file() else name
 

@@ -52,7 +52,7 @@ class Case:
 
     @property
     def limits(self) -> dict[str, Any]:
-        """What a pose of the workspace keeps beside ranges of drives and joints, as `largest_box` takes it."""
+        """The limits that a pose of the workspace keeps in addition to ranges of drives and joints, as `largest_box` takes it."""
         bound = None if self.deflection is None else (self.force, self.plane, self.deflection)
         return {
             "transmission": self.transmission, "length": self.length, "clearance": self.clearance,
@@ -147,7 +147,7 @@ class Measure:
     factor: float = 1.0
     order: int = 50
     apart: bool = False
-    """Whether it asks the case for numbers only, nothing that measures share, so that it may run beside them."""
+    """Whether it asks the case for numbers only, nothing that measures share, so that it may run in parallel."""
 
 
 def over_poses(positions: Floats, values: Floats, better: str, note: str = "", **extra: object) -> Found:

@@ -74,7 +74,7 @@ def facets(j: Floats, rank: int) -> tuple[Floats, Floats]:
         left, size, _ = np.linalg.svd(part)
         normal = left[..., -1]
         reach = np.abs(np.einsum("...r,...rn->...n", normal, inside)).sum(axis=-1)
-        # columns that span less than a facet have others beside them
+        # columns that span less than a facet have others near them
         flat = size[..., -1] < 1e-12 * scale if rank > 1 else np.zeros(len(scale), dtype=bool)
         normals[ok, f] = np.einsum("...rk,...k->...r", u, normal)
         distance[ok, f] = np.where(flat, np.inf, reach)

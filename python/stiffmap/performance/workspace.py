@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from stiffmap.broadcasting import Floats, random_numbers, real_array
+from stiffmap.deprecation import renamed
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.cells import halved
-from stiffmap.performance.enclosed import enclose
 from stiffmap.performance.inside import Inside, Judged
 from stiffmap.performance.limits import Bounds
+from stiffmap.performance.proof import Judge, judge_on
 from stiffmap.rotations import as_rotations
 from stiffmap.short import short_repr
 
@@ -57,12 +59,13 @@ class Workspace:
         return self.ask(real_array(position, "position").reshape(-1, 3), self.drawn)
 
 
+@renamed(factors="norm")
 @takes_machine
 def workspace_volume(
     machine: Machine,
     *,
     transmission: tuple[float, float] | None = None,
-    factors: str = "sphere",
+    norm: str = "sphere",
     length: float | None = None,
     ranges: bool = True,
     joints: bool = True,
@@ -75,6 +78,7 @@ def workspace_volume(
     prove: int = 0,
     seed: int = 0,
     threads: int | None = None,
+    scheduler: Any = None,
 ) -> Workspace:
     """Volume of all positions that the machine comes to in one orientation, with its sampling error.
 
@@ -82,7 +86,7 @@ def workspace_volume(
 
     Parameters
     ----------
-    transmission, factors, length, ranges, joints, clearance, deflection, rotation
+    transmission, norm, length, ranges, joints, clearance, deflection, rotation
         Limits that a pose must keep, as in `largest_box`.
     singularity
         Least distance from singularities (measure ``singularity``: type 1, type 2, constraint; 0 to 1). Poses
@@ -96,6 +100,8 @@ def workspace_volume(
         Cells at most that are asked for a proof of all of their poses; their volume is a lower bound.
     seed
         Of the random poses.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers prove the cells, with the same answer.
 
     Raises
     ------
@@ -108,7 +114,7 @@ def workspace_volume(
         raise StiffmapError(f"cells: expected 2 or more along each edge, got {cells!r}")
     given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
     bounds = Bounds(
-        machine, given, transmission, factors, length, ranges, joints, clearance, deflection, threads
+        machine, given, transmission, norm, length, ranges, joints, clearance, deflection, threads
     )
     ask = Inside(bounds, singularity)
     rng = random_numbers(seed)
@@ -133,10 +139,12 @@ def workspace_volume(
     pairs = drawn.judged.inside.reshape(-1, 2)
     kept = drawn.judged.position[drawn.judged.inside]
     box = np.stack([kept.min(axis=0), kept.max(axis=0)]) if len(kept) else np.full((2, 3), np.nan)
+    with judge_on(bounds, scheduler) as judge:
+        proven = _proven(judge, bounds.unproven, drawn, low, high, axes, cells, prove)
     return Workspace(
         volume=cell * float(pairs.mean(axis=1).sum()),
         error=cell * float(np.sqrt((pairs[:, 0] != pairs[:, 1]).sum() / 4)),
-        dimension=len(axes), proven=_proven(bounds, drawn, low, high, axes, cells, prove), box=box,
+        dimension=len(axes), proven=proven, box=box,
         region=np.stack([low, high]), cut=bool(drawn.touched.any()), limited_by=_limiting(drawn),
         drawn=drawn.judged, ask=ask,
     )  # fmt: skip
@@ -210,10 +218,17 @@ def _limiting(drawn: _Drawn) -> tuple[tuple[str, float], ...]:
 
 
 def _proven(
-    bounds: Bounds, drawn: _Drawn, low: Floats, high: Floats, axes: list[int], cells: int, work: int
+    judge: Judge,
+    unproven: str,
+    drawn: _Drawn,
+    low: Floats,
+    high: Floats,
+    axes: list[int],
+    cells: int,
+    work: int,
 ) -> float:
     """Volume of the cells (halved where that decides) every pose of which was proven to keep the limits."""
-    if work <= 0 or bounds.unproven or len(axes) != 3:
+    if work <= 0 or unproven or len(axes) != 3:
         return float("nan")
     step = (high - low) / cells
     number = np.flatnonzero(drawn.judged.inside.reshape(-1, 2).all(axis=1))
@@ -223,7 +238,7 @@ def _proven(
     while len(a) and left > 0:
         a, b = a[:left], b[:left]
         left -= len(a)
-        found = enclose(bounds, (a + b) / 2, (b - a) / 2, np.eye(3))
+        found = judge((a + b) / 2, (b - a) / 2, np.eye(3))
         total += float(np.prod(b - a, axis=1)[found.inside].sum())
         open_ = ~found.inside & ~found.broken
         a, b = halved(a[open_], b[open_], found.bend[open_])

@@ -28,7 +28,7 @@ from stiffmap.short import short_repr
 
 AIMS = ("identify", "separate", "map")
 RANDOM = 20
-"""Random plans beside the chosen one."""
+"""Random plans for comparison with the chosen one."""
 
 
 @short_repr
@@ -42,7 +42,7 @@ class Design:
     names: tuple[str, ...]
     units: tuple[str, ...]
     sigma: Floats
-    """(k,) expected standard uncertainty of each parameter, SI; inf where the rows do not tell it."""
+    """(k,) expected standard uncertainty of each parameter, SI; inf where the rows do not determine it."""
     random_sigma: Floats
     """(k,) median of random plans of the same size."""
     value: float
@@ -70,12 +70,12 @@ def design(
     seed: int = 0,
     done: Experiment | None = None,
 ) -> Design:
-    """The `rows` candidate rows that tell most of the numbers in `terms`.
+    """The `rows` candidate rows that are most informative on the numbers in `terms`.
 
     Parameters
     ----------
     terms, rival
-        Effects with the values at which they are to be told; the rival's numbers are fitted away.
+        Effects with the values at which they are to be identified; the rival's numbers are fitted away.
     aim
         ``identify``, ``separate`` (needs `rival`) or ``map`` (at the poses `at` (m, 3) under the wrench `load`
         (6,); None: the workspace's corners, under `force` along x).

@@ -22,7 +22,7 @@ STEP = 1e-3
 """Share of a parameter's typical size over which predictions are differenced."""
 STEPS, DONE = 15, 1e-6
 RANK, FELT = 1e-8, 1e-6
-"""Singular values of the columns in typical sizes, relative to the largest, below which a direction is not told; the
+"""Singular values of the columns in typical sizes, relative to the largest, below which a direction is not identifiable; the
 share of a number in such directions from which on it is not."""
 Terms = tuple[AppliedEffect, ...]
 
@@ -37,11 +37,11 @@ class Estimate:
     units: tuple[str, ...]
     values: Floats
     covariance: Floats
-    """(k, k) from the noise of the readings; infinite variances of numbers that they do not tell."""
+    """(k, k) from the noise of the readings; infinite variances of numbers that they do not determine."""
     terms: Terms
     chi2: float
     freedom: int
-    """Readings less nuisances less parameters that they tell."""
+    """Readings less nuisances less parameters that they determine."""
     problem: Problem = field(repr=False)
     jacobian: Floats = field(repr=False)
     """(N, k) change of the whitened readings per unit of each number."""
@@ -111,7 +111,7 @@ def estimate(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEf
 
 
 def _covariance(jacobian: Floats) -> tuple[Floats, int]:
-    """(k, k) of the numbers with columns (n, k), infinite variances of those that the readings do not tell; the rank."""
+    """(k, k) of the numbers with columns (n, k), infinite variances of those that the readings do not determine; the rank."""
     _, size, v = np.linalg.svd(jacobian, full_matrices=len(jacobian) < jacobian.shape[1])
     size = np.append(size, np.zeros(len(v) - len(size)))
     told = size > RANK * size.max(initial=0.0)

@@ -90,7 +90,7 @@ class Information:
         return value
 
     def sigma(self, m: Floats) -> Floats:
-        """(k,) standard uncertainties, SI; inf where the rows do not tell a parameter."""
+        """(k,) standard uncertainties, SI; inf where the rows do not determine a parameter."""
         k = len(self.names)
         m = m[:-1, :-1] if self.signal else m
         values, vectors = np.linalg.eigh(self._regular(m))

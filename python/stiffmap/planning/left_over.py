@@ -1,7 +1,7 @@
-"""The difference of fitted numbers between two experiments, beside what their model leaves.
+"""The difference of fitted numbers between two experiments, judged against the residual of their model.
 
 What a model of the machine leaves is no noise: it is smooth over the workspace, shared by the readings of a pose, and the
-same in both experiments where they stand at the same poses. Both are fitted at once, each with numbers of its own, beside
+same in both experiments where they stand at the same poses. Both are fitted at once, each with numbers of its own, jointly with
 one smooth field and one variance per pose, as large as the readings make likeliest (docs/theory.md M2, M3).
 """
 

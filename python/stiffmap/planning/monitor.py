@@ -40,7 +40,7 @@ class Change:
 
     def __str__(self) -> str:
         if not np.isfinite(self.u):
-            return f"{self.name}: not told by these readings"
+            return f"{self.name}: not identifiable from these readings"
         word = "changed" if self.changed else "as before"
         step = self.after - self.before
         return (
@@ -75,7 +75,7 @@ def compare(
 ) -> Comparison:
     """Numbers of `terms` in two experiments: before and after, or one specimen and another.
 
-    Each is fitted on its own; differences are judged beside what the model leaves of both: a smooth field that they share
+    Each is fitted on its own; differences are judged against what the model leaves of both: a smooth field that they share
     and a variance per pose, as large as the readings make likeliest, since neither is a change.
     Raises StiffmapError as `estimate` does.
     """

@@ -1,6 +1,6 @@
 """Pictures for papers and screens: functions that return a matplotlib Figure, and `save`.
 
-Lengths in mm, angles in deg; colours that a colour-blind reader can tell apart; failed poses hatched,
+Lengths in mm, angles in deg; colours that a colour-blind reader can distinguish; failed poses hatched,
 never shown as a value. No display is needed.
 """
 

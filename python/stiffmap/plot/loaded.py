@@ -50,6 +50,7 @@ class LoadedShape:
             mix(self.rest.passive, self.loaded.passive),
             mix(self.rest.tcp, self.loaded.tcp),
             mix(self.rest.platform, self.loaded.platform),
+            self.rest.ends,
         )
 
     @property

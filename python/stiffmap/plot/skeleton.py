@@ -31,6 +31,8 @@ class Skeleton:
     """(3,)."""
     platform: Floats
     """(n, 3) where its legs hold the platform (`plate` puts them in order); none where these are not corners of a plate."""
+    ends: tuple[int, ...]
+    """The node of the mechanism at which each link ends."""
 
     @property
     def points(self) -> Floats:
@@ -51,7 +53,7 @@ def skeleton(machine: Machine, coordinates: Floats, *, shortest: float = COINCID
     if not len(plate(corners)):
         corners, held = np.zeros((0, 3)), set()
     body = beyond(core, held)
-    links, guides, marks = [], [], {Role.ACTUATOR: [], Role.PASSIVE: []}  # type: ignore[var-annotated]
+    links, guides, ends, marks = [], [], [], {Role.ACTUATOR: [], Role.PASSIVE: []}  # type: ignore[var-annotated]
     for i, (parent, c) in enumerate(core.nodes):
         role = core.names.roles[c] if c >= 0 else None
         if role in marks:
@@ -66,10 +68,11 @@ def skeleton(machine: Machine, coordinates: Floats, *, shortest: float = COINCID
             and i not in body
         ):
             links.append((owner[i], position[[parent, i]]))
+            ends.append(i)
     empty = np.zeros((0, 3))
     return Skeleton(
         links, guides, np.array(marks[Role.ACTUATOR]).reshape(-1, 3) if marks[Role.ACTUATOR] else empty,
-        np.array(marks[Role.PASSIVE]).reshape(-1, 3) if marks[Role.PASSIVE] else empty, position[-1], corners,
+        np.array(marks[Role.PASSIVE]).reshape(-1, 3) if marks[Role.PASSIVE] else empty, position[-1], corners, tuple(ends),
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The jinja2 templates beside this file."""
+"""The jinja2 templates next to this file."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Column:
     unit: str
     """As written in brackets; empty where none is."""
     meaning: str
-    """Column of an experiment; ``note`` for what is kept beside."""
+    """Column of an experiment; ``note`` for what is kept in addition."""
     repeat: int = 0
     """From 1, of repeats side by side; 0: none."""
 
@@ -99,6 +99,11 @@ def _find(wanted: str, headers: Sequence[str]) -> int:
     if not found:
         raise StiffmapError(f"--map: no column '{wanted}'; there are: {', '.join(headers)}")
     return found[0]
+
+
+def meaning_of(name: str) -> str:
+    """Column of an experiment that a name without its unit stands for; ``note`` for none."""
+    return _meaning(name)[0]
 
 
 def _meaning(name: str) -> tuple[str, int]:

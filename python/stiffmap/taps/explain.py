@@ -30,7 +30,7 @@ PAYLOAD = Parameter("mass", "kg", 0.0, 1e4, 0.0, 1.0, "of a body at the TCP that
 SIGNIFICANT = 1e-3
 """Probability with which the best of all candidates may be one where nothing is missing."""
 ALIKE = 6.0
-"""Chi-squares of candidates nearer than this cannot be told apart."""
+"""Chi-squares of candidates nearer than this cannot be distinguished."""
 DISAGREE = 3.0
 """Standard deviations between what statics and frequencies say."""
 REFINED = 5
@@ -82,7 +82,7 @@ class TapDiagnosis:
     readings: int
     named: Explained | None
     alike: tuple[Explained, ...]
-    """Candidates that the readings cannot tell from the best, which is the first."""
+    """Candidates that the readings cannot distinguish from the best, which is the first."""
     sentence: str
 
 
@@ -140,7 +140,7 @@ def _sentence(best: Explained, alike: tuple[Explained, ...], before: float, n: i
     if not fits:
         text = f"Not explained by one effect; the best is {text}"
     if len(alike) > 1:
-        text += f" These readings cannot tell it from: {'; '.join(e.candidate for e in alike[1:])}."
+        text += f" These readings cannot distinguish it from: {'; '.join(e.candidate for e in alike[1:])}."
     off = best.disagreement
     if off is not None and off > DISAGREE:
         text += (

@@ -14,6 +14,8 @@ from stiffmap.errors import MissingPartError, StiffmapError
 
 WAITING_PER_THREAD = 2
 """Tasks given to each of the cluster's threads in advance; they bound the memory here."""
+PATIENCE = 60
+"""s to wait for a worker where all are lost."""
 RETRIES = 5
 """Times that a task is given out anew when the worker that had it is lost."""
 
@@ -65,7 +67,11 @@ class OnCluster:
 
     def _scattered(self) -> Any:
         """What all tasks share on every worker, under a key of its own: one that was lost is not found again."""
-        return self._client.scatter([self._packed], broadcast=True, hash=False)[0]
+        try:
+            self._client.wait_for_workers(1, timeout=PATIENCE)  # lost ones may be on their way back
+            return self._client.scatter([self._packed], broadcast=True, hash=False)[0]
+        except TimeoutError as error:
+            raise StiffmapError(f"scheduler: no worker is left, and none came within {PATIENCE} s") from error
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Who does the tasks: this process, processes beside it, or the workers of a cluster."""
+"""Who does the tasks: this process, processes started by it, or the workers of a cluster."""
 
 from __future__ import annotations
 

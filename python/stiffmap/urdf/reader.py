@@ -162,7 +162,7 @@ def _check_meshes(robot: xml.Element, path: Path) -> None:
 
 
 def _found(given: str, folder: Path) -> bool:
-    """A mesh beside the file, or, for package://, below any folder above it."""
+    """A mesh next to the file, or, for package://, below any folder above it."""
     if given.startswith("package://"):
         rest = given.removeprefix("package://")
         tails = [Path(rest), *([Path(rest.split("/", 1)[1])] if "/" in rest else [])]

@@ -1,23 +1,20 @@
-"""The panel beside the scene: every control changes the model, and shows what the model says."""
+"""The panel next to the scene: every control changes the model, and shows what the model says."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.errors import StiffmapError
-from stiffmap.view.changes import addresses, unit_of
+from stiffmap.view.changes import addresses, units
 from stiffmap.view.moment import Moment
 from stiffmap.view.outputs import Outputs
 from stiffmap.view.place import first_plane, moves, rotation_of, turns
 from stiffmap.view.quantities import QUANTITIES
 from stiffmap.view.state import PLANES
-
-if TYPE_CHECKING:
-    from stiffmap.view.viewer import Viewer
 
 MOST_FORCE, MOST_GRAVITY, DECADE = 5000.0, 20.0, 1.0
 HOME = "as at home"
@@ -28,7 +25,7 @@ TITLES = {q.title: name for name, q in QUANTITIES.items()}
 class Controls:
     """Builds the panel; `show` puts the state's numbers into it."""
 
-    def __init__(self, viewer: Viewer) -> None:
+    def __init__(self, viewer: Any) -> None:
         self.viewer, gui = viewer, viewer.server.gui
         gui.configure_theme(
             control_layout="collapsible", control_width="large", show_logo=False, show_share_button=False
@@ -129,17 +126,18 @@ class Controls:
         self._why = gui.add_html("")
         number = gui.add_slider("Mode", 1, 6, 1, 1)
 
-        @number.on_update
-        def _(event: Any) -> None:
+        def changed(event: Any) -> None:
             self.viewer.swing.mode = int(event.target.value) - 1
             self.viewer.worker.ask()
+
+        number.on_update(changed)
 
         gui.add_checkbox("Mode moves", False).on_update(
             lambda e: self.viewer.swing.play(bool(e.target.value))
         )
 
     def _numbers(self, gui: Any, moment: Moment) -> None:
-        self._all = addresses(moment.machine.description)
+        self._all, self._units = addresses(moment.machine.description), units(moment.machine.description)
         names = tuple(self._all)
         self._find = gui.add_text("Find", "", hint="part of an address")
         self._address = gui.add_dropdown("Number", names, initial_value=names[0])
@@ -157,11 +155,12 @@ class Controls:
         self._pressed(gui.add_button("All as in the file"), lambda m: m.put(changes=()))
         self._changed = gui.add_text("Changed", "nothing", multiline=True, disabled=True)
 
-        @self._find.on_update
-        def _(event: Any) -> None:
+        def changed(event: Any) -> None:
             if event.client_id is not None:
                 found = tuple(a for a in self._all if event.target.value.lower() in a.lower())
                 self._address.options = found or names
+
+        self._find.on_update(changed)
 
         self._address.on_update(lambda e: self.viewer.worker.ask())
 
@@ -170,13 +169,14 @@ class Controls:
     def _typed(self, handle: Any, deed: Callable[[Any, Any], object], keep: bool = True) -> None:
         """A control whose value goes to the model; what the program itself writes into it does not."""
 
-        @handle.on_update
-        def _(event: Any) -> None:
+        def changed(event: Any) -> None:
             if event.client_id is None:
                 return
             if not keep:
                 self.viewer.model.history.mark()
             self.viewer.act(lambda m: deed(m, event.target.value))
+
+        handle.on_update(changed)
 
     def _pressed(self, handle: Any, deed: Callable[[Any], object]) -> None:
         handle.on_click(lambda _: self.viewer.act(deed))
@@ -252,7 +252,8 @@ class Controls:
         power = float(np.log10(now / plain)) if plain and now / plain > 0 else 0.0
         self._write(self._scale, "value", round(float(np.clip(power, -DECADE, DECADE)), 2))
         lines = [
-            f"{a} = {v:.6g} {unit_of(a)}, file: {self._all.get(a, float('nan')):.6g}"
+            f"{a} = {v:.6g} {self._units.get(a, 'SI')}"
+            + (f", file: {self._all[a]:.6g}" if a in self._all else "")
             for a, v in given.items()
         ]
         self._write(self._changed, "value", "\n".join(lines) or "nothing")
@@ -260,7 +261,7 @@ class Controls:
 
     def renew(self, moment: Moment) -> None:
         """The machine's file has changed."""
-        self._all = addresses(moment.machine.description)
+        self._all, self._units = addresses(moment.machine.description), units(moment.machine.description)
         self._address.options = tuple(self._all)
 
     def _write(self, handle: Any, field: str, value: Any) -> None:

@@ -11,7 +11,7 @@ from stiffmap.compiled import CompiledMachine, Role
 from stiffmap.description import Spring
 from stiffmap.description.tree import all_elements
 from stiffmap.machine import Machine
-from stiffmap.plot.skeleton import Skeleton, owners, skeleton
+from stiffmap.plot.skeleton import Skeleton, held_by, owners, plate, skeleton
 
 THICK, THIN = 0.02, 0.004
 """Of the machine's extent: most and least thickness of a link."""
@@ -24,7 +24,7 @@ class Drawing:
     """Pieces of the machine; the order of links is the same at all coordinates."""
 
     legs: tuple[str, ...]
-    """Leg of each link; empty for base and platform."""
+    """Leg of each link; empty for base and platform, whose rim comes last."""
     links: Floats
     """(n, 2, 3)."""
     guides: Floats
@@ -35,6 +35,10 @@ class Drawing:
     """(k, 3)."""
     tcp: Floats
     """(3,)."""
+    plate: Floats
+    """(n, 3) corners of the platform, in order around its middle; none where it is no plate."""
+    ends: tuple[int, ...]
+    """The node of the mechanism at which each link but those of the rim ends."""
 
     @property
     def extent(self) -> float:
@@ -50,9 +54,29 @@ class Drawing:
 def drawing(machine: Machine, coordinates: Floats) -> Drawing:
     """Geometry at coordinates, every rigid piece with the same place in every drawing of the machine."""
     s: Skeleton = skeleton(machine, coordinates, shortest=-1.0)
-    links = np.array([ends for _, ends in s.links]).reshape(-1, 2, 3)
+    corners = s.platform[_around(machine)] if len(s.platform) else s.platform
+    links = np.array([ends for _, ends in s.links] + _rim(corners, s.tcp)).reshape(-1, 2, 3)
+    legs = tuple(leg for leg, _ in s.links)
+    legs += ("",) * (len(links) - len(legs))
     guides = np.array([ends for _, ends in s.guides]).reshape(-1, 2, 3)
-    return Drawing(tuple(leg for leg, _ in s.links), links, guides, s.actuators, s.passive, s.tcp)
+    return Drawing(legs, links, guides, s.actuators, s.passive, s.tcp, corners, s.ends)
+
+
+def _around(machine: Machine) -> list[int]:
+    """The platform's corners in order around its middle, the same at all coordinates: that of home."""
+    core = machine.compiled
+    position, _ = core.frames(core.home_coordinates())
+    corners = position[sorted(held_by(core))]
+    ordered = plate(corners)
+    return [int(np.flatnonzero((corners == p).all(axis=1))[0]) for p in ordered]
+
+
+def _rim(corners: Floats, tcp: Floats) -> list[Floats]:
+    """Edges of the platform, and from its middle to the TCP."""
+    if not len(corners):
+        return []
+    edges = [np.stack(pair) for pair in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    return [*edges, np.stack([corners.mean(axis=0), tcp])]
 
 
 def thicknesses(machine: Machine, now: Drawing) -> Floats:
@@ -64,9 +88,7 @@ def thicknesses(machine: Machine, now: Drawing) -> Floats:
     springs = _springs(machine)
     position, rotation = core.frames(core.home_coordinates())
     first = _first_spring(core)
-    k = -1
-    for i in _drawn(machine):
-        k += 1
+    for k, i in enumerate(now.ends):
         name = first.get(i)
         d = position[i] - position[core.nodes[i][0]]
         length = float(np.linalg.norm(d))
@@ -79,22 +101,6 @@ def thicknesses(machine: Machine, now: Drawing) -> Floats:
         if axial > 0 and bending > 0:
             out[k] = 4 * np.sqrt(axial / bending)
     return np.asarray(np.clip(out, THIN * size, THICK * size))
-
-
-def _drawn(machine: Machine) -> list[int]:
-    """The frames at which the links of a skeleton end, in its order."""
-    from stiffmap.description.tree import joints
-    from stiffmap.plot.skeleton import _moves
-
-    core = machine.compiled
-    named = joints(machine.description)
-    out = []
-    for i, (parent, c) in enumerate(core.nodes):
-        joint = named.get(core.names.coordinates[c]) if c >= 0 else None
-        guide = joint is not None and joint.kind == "prismatic" and not _moves(core, parent)
-        if not guide and parent > 0:
-            out.append(i)
-    return out
 
 
 def _springs(machine: Machine) -> dict[str, Floats]:
@@ -129,7 +135,7 @@ def element_links(machine: Machine, element: str) -> list[int]:
     if first is None:
         return []
     position, _ = core.frames(core.home_coordinates())
-    drawn = {node: k for k, node in enumerate(_drawn(machine))}
+    drawn = {node: k for k, node in enumerate(drawing(machine, core.home_coordinates()).ends)}
     around = [*_chain_down(core, first), *_chain_up(core, first)]
     for i in around:
         parent = core.nodes[i][0]

@@ -27,7 +27,8 @@ def lines_at(found: PlaneMap, level: float) -> Floats:
     a, b = (np.linspace(-0.5, 0.5, n) * size for size in (f.width, f.height))
     masked = np.ma.masked_invalid(found.shown)
     pieces = contour_generator(a, b, masked).lines(level)
-    ends = [np.stack([line[:-1], line[1:]], axis=1) for line in pieces if len(line) > 1]
+    lines = [np.asarray(line) for line in pieces]
+    ends = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
     if not ends:
         return np.zeros((0, 2, 3))
     flat = np.concatenate(ends)

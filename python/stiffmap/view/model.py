@@ -93,8 +93,8 @@ class Model:
         wanted = np.array(position, dtype=float)
         if not np.isfinite(wanted).all():
             raise StiffmapError(f"position: expected 3 finite numbers, got {wanted.tolist()}")
-        for i, a in enumerate("xyz"):
-            if a not in m.description.task:
+        for i, axis in enumerate("xyz"):
+            if axis not in m.description.task:
                 wanted[i] = s.position[i]
         turned = now if rotation is None else np.asarray(rotation)
         reached = follow(m, (np.array(s.position), now), (wanted, turned), s.start_array)

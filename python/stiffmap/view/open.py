@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from stiffmap.broadcasting import real_array
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.view.data import Data
@@ -116,13 +117,47 @@ def open_view(
     port: int | None = None,
     browser: bool = True,
     file: str | PathLike[str] | None = None,
+    experiment: Any = None,
+    diagnosis: Any = None,
+    path: Any = None,
     **state: Any,
 ) -> View:
     """See `Machine.view`."""
-    view = View(model_of(machine, position, file, **state), port=port)
+    data = data_of(machine, experiment, diagnosis, path)
+    view = View(model_of(machine, position, file, **state), port=port, data=data)
     if browser:
         webbrowser.open(view.url)
     return view
+
+
+def data_of(machine: Machine, experiment: Any = None, diagnosis: Any = None, path: Any = None) -> Data | None:
+    """What is drawn with the machine; None where there is nothing. Raises FileError for files that cannot be read.
+
+    experiment: an `Experiment` or its folder. diagnosis: a `Diagnosis` or the folder of one. path: positions (n, 3) m,
+    a `Toolpath`, or its file or outline.
+    """
+    if experiment is None and diagnosis is None and path is None:
+        return None
+    rows = line = found = None
+    if experiment is not None:
+        from stiffmap.experiment import Experiment, load_experiment
+
+        rows = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
+    if path is not None:
+        from stiffmap.toolpath import Toolpath, load_path, sampled
+
+        if isinstance(path, str | PathLike):
+            path = load_path(path)
+        line = sampled(path).position if isinstance(path, Toolpath) else real_array(path, "path")
+        if line.ndim != 2 or line.shape[1] != 3 or len(line) < 2:
+            raise StiffmapError(
+                f"path: expected positions (n, 3) m with n of 2 or more, got shape {line.shape}"
+            )
+    if diagnosis is not None:
+        from stiffmap.view.diagnosed import findings
+
+        found = findings(diagnosis)
+    return Data(rows, line, found, machine)
 
 
 def model_of(

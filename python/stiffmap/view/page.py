@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from html import escape
 from os import PathLike
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 
 from stiffmap.errors import StiffmapError
 from stiffmap.outputs import write_text
+from stiffmap.view.data import Data
 from stiffmap.view.moment import Moment
 from stiffmap.view.optional import need_viser
 from stiffmap.view.panels import (
@@ -29,14 +29,12 @@ BOX = (
 )
 
 
-def write_page(
-    moment: Moment, path: str | PathLike[str], data: Callable[[Scene, Moment], None] | None = None
-) -> Path:
+def write_page(moment: Moment, path: str | PathLike[str], data: Data | None = None) -> Path:
     """Write the page; raises FileError where it cannot be written, MissingPartError without viser."""
     return write_text(path, page_of(moment, data))
 
 
-def page_of(moment: Moment, data: Callable[[Scene, Moment], None] | None = None) -> str:
+def page_of(moment: Moment, data: Data | None = None) -> str:
     """The page: the scene, the colour bar and the panels, all in it."""
     viser = need_viser()
     with silent():
@@ -53,10 +51,10 @@ def page_of(moment: Moment, data: Callable[[Scene, Moment], None] | None = None)
     return f"{head}{box}</body>{tail}"
 
 
-def draw(server: object, moment: Moment, data: Callable[[Scene, Moment], None] | None = None) -> str:
+def draw(server: object, moment: Moment, data: Data | None = None) -> str:
     """The whole scene of a moment; its panels as HTML."""
     scene = Scene(server.scene, moment)  # type: ignore[attr-defined]
-    scene.gizmo.visible = False
+    scene.gizmo.visible = scene.force_handle.visible = False
     solution, rest, found = moment.solve(), moment.rest(), moment.plane()
     factor = moment.magnification(rest, solution)
     scene.machine(moment, rest, moment.loaded(solution), factor)
@@ -64,6 +62,7 @@ def draw(server: object, moment: Moment, data: Callable[[Scene, Moment], None] |
     scene.plane(found, found.range, moment.state.tolerance, True)
     if data is not None:
         data(scene, moment)
+        scene.machine(moment, rest, moment.loaded(solution), factor)
     look_at_machine(server, rest, scene.extent)
     try:
         shares = shares_panel(moment.shares())
@@ -77,5 +76,5 @@ def draw(server: object, moment: Moment, data: Callable[[Scene, Moment], None] |
         f"{status_line(moment, solution, '', '')}<div>{escape(words)}</div>"
         f"{colour_bar(found, found.range, moment.state.tolerance)}"
         f"<details open><summary>where it comes from</summary>{shares}{compliance_panel(solution)}"
-        f"{efforts_panel(moment, solution)}</details>"
+        f"{efforts_panel(moment, solution)}</details>{data.html if data is not None else ''}"
     )

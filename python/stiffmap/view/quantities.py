@@ -65,7 +65,7 @@ def status(s: Solution, load: Load) -> Floats:
 
 def greatest(c: Floats) -> Floats:
     """(...) greatest singular value of matrices (..., 3, 3), NaN where one is not finite."""
-    bad = ~np.isfinite(c).all(axis=(-1, -2))
+    bad = np.asarray(~np.isfinite(c).all(axis=(-1, -2)))
     square = np.swapaxes(c, -1, -2) @ c
     scale = np.abs(square).max(axis=(-1, -2))
     safe = np.where(bad | (scale == 0), 1.0, scale)
@@ -92,7 +92,7 @@ def _largest_eigenvalue(a: Floats) -> Floats:
 QUANTITIES: dict[str, Quantity] = {
     "deflection": Quantity("deflection under this load", "µm", 1e6, deflection),
     "worst": Quantity(
-        "worst deflection under a further force of this size", "µm", 1e6, worst_deflection, stiffness=True
+        "worst deflection by a force of this size", "µm", 1e6, worst_deflection, stiffness=True
     ),
     "stiffness": Quantity(
         "stiffness of the softest direction", "N/µm", 1e-6, weakest_stiffness, stiffness=True, low_is_bad=True

@@ -24,7 +24,7 @@ ARROW = 0.16
 """Of the extent, length of the arrow of the force."""
 SURFACE = 0.12
 """The same, of the surface at the tool."""
-GHOST, LIT = ORANGE, "#FFD400"
+GHOST, LIT, DIAGNOSED = ORANGE, "#FFD400", "#E8279B"
 GREY, DARK = "#BBBBBB", "#666666"
 NOTHING = np.zeros((1, 2, 3))
 
@@ -52,6 +52,8 @@ class Scene:
         self._image: Any = None
         self._frame_size = (0.0, 0.0)
         self.lit: list[int] = []
+        self.diagnosed: list[int] = []
+        """Links on which an element that was chosen, or that a diagnosis named, is lit."""
         self._groups = _groups(moment, rest)
         api.set_up_direction("+z")
         api.world_axes.visible = False
@@ -65,6 +67,7 @@ class Scene:
             precision="float32", visible=len(rest.actuators) > 0,
         )  # fmt: skip
         self._arrow: Any = None
+        self._plate: Any = None
         self._surface: Any = None
         low, high = moment.box()
         self.lines("/box", box_edges(low, high), GREY, 1.5, "screen")
@@ -73,6 +76,10 @@ class Scene:
         self.gizmo = api.add_transform_controls(
             "/tool", scale=0.14 * self.extent, active_axes=_active(moment), disable_rotations=not any(turns(moment.machine)),
             disable_sliders=not all(moves(moment.machine)), depth_test=False, position=tuple(rest.tcp),
+        )  # fmt: skip
+
+        self.force_handle = api.add_transform_controls(
+            "/force_handle", scale=0.06 * self.extent, disable_rotations=True, depth_test=False,
         )  # fmt: skip
 
     def lines(self, name: str, points: Floats, colour: str, thick: float, units: str = "world") -> None:
@@ -89,6 +96,21 @@ class Scene:
         if there.visible != shown:
             there.visible = shown
 
+    def points(self, name: str, places: Floats, colour: str) -> None:
+        """Places (n, 3) as dots."""
+        self.api.add_point_cloud(
+            name, np.asarray(places, np.float32), rgb(colour), point_size=0.005 * self.extent,
+            point_shape="circle", precision="float32",
+        )  # fmt: skip
+
+    def mesh(self, name: str, vertices: Floats, faces: Any, colour: str) -> Any:
+        """A surface seen from both sides; without triangles it is hidden. Its handle."""
+        shown = len(faces) > 0
+        return self.api.add_mesh_simple(
+            name, np.asarray(vertices, np.float32), faces if shown else np.zeros((1, 3), np.uint32),
+            color=rgb(colour), opacity=0.4, side="double", cast_shadow=False, visible=shown,
+        )  # fmt: skip
+
     def machine(self, moment: Moment, rest: Drawing, loaded: Drawing | None, factor: float) -> None:
         """Links, joints, the deflected ghost and the tool."""
         self.rest = rest
@@ -100,8 +122,17 @@ class Scene:
         self._drives.points = (
             np.asarray(rest.actuators, np.float32) if len(rest.actuators) else np.zeros((1, 3), np.float32)
         )
+        if len(rest.plate):
+            middle = np.concatenate([rest.plate, rest.plate.mean(axis=0)[None]])
+            n = len(rest.plate)
+            fan = np.array([[i, (i + 1) % n, n] for i in range(n)], np.uint32)
+            if self._plate is None:
+                self._plate = self.mesh("/platform", middle, fan, DARK)
+            self._plate.vertices = np.asarray(middle, np.float32)
         moved = NOTHING[:0] if loaded is None or factor == 0 else rest.enlarged(loaded, factor)
         self.lines("/ghost", moved, GHOST, 0.004 * self.extent)
+        named = rest.links[self.diagnosed] if self.diagnosed else NOTHING[:0]
+        self.lines("/diagnosis/element", named, DIAGNOSED, 0.025 * self.extent)
         self.lines("/lit", rest.links[self.lit] if self.lit else NOTHING[:0], LIT, 0.03 * self.extent)
 
     def tool(self, moment: Moment) -> None:
@@ -109,12 +140,19 @@ class Scene:
         self.gizmo.position = moment.state.position
         self.gizmo.wxyz = quaternion(rotation_of(moment.machine, moment.state))
 
-    def force(self, moment: Moment) -> None:
-        """The arrow that ends at the tool."""
+    @property
+    def arrow_length(self) -> float:
+        """Of a force that is not being dragged, m."""
+        return ARROW * self.extent
+
+    def force(self, moment: Moment, pulled: float = 0.0) -> None:
+        """The arrow that ends at the tool; one that is dragged from a size `pulled` (N) is as long as it is pulled."""
         f = np.array(moment.state.force)
         size = float(np.linalg.norm(f))
         tip = np.array(moment.state.position)
-        tail = tip - (ARROW * self.extent / size * f if size else 0.0)
+        tail = tip - (self.arrow_length / (pulled or size) * f if size else 0.0)
+        if not pulled:
+            self.force_handle.position = tuple(tail if size else tip + (0.0, 0.0, self.arrow_length))
         points = np.array([[tail, tip]], np.float32)
         if self._arrow is None:
             e = self.extent

@@ -15,6 +15,7 @@ from stiffmap.view.animation import Swing
 from stiffmap.view.box_cloud import box_cloud
 from stiffmap.view.colours import colours_of
 from stiffmap.view.controls import Controls
+from stiffmap.view.data import Data
 from stiffmap.view.drawing import element_links
 from stiffmap.view.model import Model
 from stiffmap.view.moment import Moment
@@ -42,9 +43,7 @@ COUNTS = (FINE, COARSE, 35, 25, 17, 11)
 class Viewer:
     """Everything behind one address; all browsers that open it see the same."""
 
-    def __init__(
-        self, model: Model, server: Any, data: Callable[[Scene, Moment], None] | None = None
-    ) -> None:
+    def __init__(self, model: Model, server: Any, data: Data | None = None) -> None:
         self.model, self.server, self._data = model, server, data
         self.lock = threading.RLock()
         self.error = ""
@@ -56,20 +55,23 @@ class Viewer:
         self._probe: np.ndarray[Any, Any] | None = None
         self._cloud_key: object = None
         self._renewed = False
-        self.dragging = False
+        self.dragging, self.pulling = False, 0.0
+        """Whether the tool is in a hand; N of the force when its arrow was taken, 0 when it is not."""
         self.scene = Scene(server.scene, model.moment)
         self.controls = Controls(self)
         self.swing = Swing(self)
         self.worker = Worker([self.quick, self.fine, self.panels, self.cloud], self._fail)
         self._hands()
 
-        @server.scene.on_click()
-        def _(event: Any) -> None:
+        def clicked(event: Any) -> None:
             self.probe_along(np.array(event.ray_origin), np.array(event.ray_direction))
 
-        @server.on_client_disconnect
-        def _(client: Any) -> None:
-            self.dragging = False  # a tab that is closed in the middle of a drag
+        server.scene.on_click()(clicked)
+
+        def left(client: Any) -> None:
+            self.dragging, self.pulling = False, 0.0  # a tab that is closed in the middle of a drag
+
+        server.on_client_disconnect(left)
 
         if data is not None:
             data(self.scene, model.moment)
@@ -92,8 +94,7 @@ class Viewer:
     def _hands(self) -> None:
         gizmo = self.scene.gizmo
 
-        @gizmo.on_update
-        def _(event: Any) -> None:
+        def changed(event: Any) -> None:
             if event.phase == "start":
                 with self.lock:
                     self.dragging = True
@@ -102,6 +103,28 @@ class Viewer:
             if event.phase == "end":
                 self.dragging = False
                 self.worker.ask()
+
+        gizmo.on_update(changed)
+        handle = self.scene.force_handle
+
+        def pulled(event: Any) -> None:
+            if event.phase == "start":
+                with self.lock:
+                    self.pulling = max(float(np.linalg.norm(self.model.state.force)), 1.0)
+                    self.model.history.mark()
+            self.pull(np.array(handle.position))
+            if event.phase == "end":
+                self.pulling = 0.0
+                self.worker.ask()
+
+        handle.on_update(pulled)
+
+    def pull(self, tail: Any) -> None:
+        """The tail of the arrow was moved (m): the force points from there to the tool, as much larger as the arrow is longer."""
+        with self.lock:
+            size = self.pulling or max(float(np.linalg.norm(self.model.state.force)), 1.0)
+            way = (np.array(self.model.state.position) - tail) / self.scene.arrow_length
+            self.act(lambda m: m.put(force=tuple(float(v) for v in size * way), keep=False))
 
     def drag(self, position: Any, wxyz: Any) -> None:
         """The gizmo was moved (m, quaternion)."""
@@ -153,7 +176,7 @@ class Viewer:
         with self.server.atomic():
             factor = moment.magnification(rest, s)
             self.scene.machine(moment, rest, loaded, factor)
-            self.scene.force(moment)
+            self.scene.force(moment, self.pulling)
             if not self.dragging:
                 self.scene.tool(moment)
             if found is not None:
@@ -225,15 +248,16 @@ class Viewer:
         parts += [compliance_panel(s), efforts_panel(moment, s)]
         w = self.swing.frequencies(moment)
         if w is not None:
-            parts.append(frequencies_panel(w.frequency, self.swing.mode))
+            parts.append(frequencies_panel(w.frequency.tolist(), self.swing.mode))
+        if self._data is not None:
+            self._data(self.scene, moment)
+            parts.insert(0, self._data.html)
         self.scene.lit = element_links(moment.machine, lit) if lit else []
         self.controls.why("".join(parts), self.scene.surface(moment, s, self.controls.surface))
         if self._solution is s:
             self.scene.machine(
                 moment, self.scene.rest, moment.loaded(s), moment.magnification(self.scene.rest, s)
             )
-        if self._data is not None:
-            self._data(self.scene, moment)
 
     def cloud(self) -> None:
         """The quantity over the whole box."""
@@ -245,6 +269,11 @@ class Viewer:
         points, values = box_cloud(moment) if self.controls.cloud else (np.zeros((0, 3)), np.zeros(0))
         limits = self._held or (0.0, 1.0)
         self.scene.cloud(points, colours_of(values, *limits))
+
+    def data_again(self) -> Data | None:
+        """The same data for another scene, such as that of a page."""
+        d = self._data
+        return None if d is None else Data(d.experiment, d.path, d.diagnosis, d.opened)
 
     def _fail(self, problem: Exception) -> None:
         self.error = (

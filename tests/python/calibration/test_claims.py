@@ -75,7 +75,7 @@ def test_many_wrong_numbers_are_no_answer(name: str) -> None:
     assert c.verdict == "unattributed"
     assert not c.beyond and not c.wider
     assert "smooth field" in c.refused[0]
-    assert "  not claimed: " + c.refused[0] in c.lines()
+    assert "  refused: " + c.refused[0] in c.lines()
     assert c.as_plain()["refused"] == list(c.refused)
 
 

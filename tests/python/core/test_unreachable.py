@@ -63,3 +63,18 @@ def test_the_command_says_the_reason_and_no_table_of_nan(capsys: pytest.CaptureF
     assert json.loads(capsys.readouterr().out)["reason"].startswith("legs x, y end 125 mm short")
     assert main(["solve", "orthoglide-revised", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["reason"] is None
+
+
+@pytest.mark.parametrize("position", [(np.nan, 0.0, 0.0), (0.0, 0.0, np.nan), [[0.0, 0, 0], [0, np.inf, 0]]])
+def test_what_is_no_number_is_said_in_python(position: object) -> None:
+    m = sm.load_machine("orthoglide-revised")
+    with pytest.warns(UserWarning, match=r"1 of \d positions are not finite numbers .nan or inf."):
+        s = m.solve(position, np.zeros(6))
+    assert np.atleast_1d(s.status)[-1] == sm.Status.UNREACHABLE
+    with pytest.warns(UserWarning, match="not finite"):
+        sm.inverse_kinematics(m, position)
+
+
+def test_a_reachable_pose_says_nothing(recwarn: pytest.WarningsRecorder) -> None:
+    sm.load_machine("orthoglide-revised").solve((0.1, -0.2, 0.1), np.zeros(6))
+    assert not recwarn.list

@@ -76,7 +76,7 @@ def test_zero_of_a_drive(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SOFT)
 def test_soft_drive(name: str) -> None:
-    """Loads find a drive softer than declared; what the plan cannot tell from it may only stand beside it."""
+    """Loads find a drive softer than declared; what the plan cannot distinguish from it may only stand beside it."""
     element, legs, scale, force, poses = SOFT[name]
     machine = sm.load_machine(name)
     plan = random_plan(machine, "deflection", poses=poses, loads=6, force=force, seed=7)

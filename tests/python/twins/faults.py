@@ -146,7 +146,9 @@ def jitter(d: MachineDescription, rng: np.random.Generator, share: float) -> Mac
             soft = softer(float(np.expm1(0.2 * share * rng.standard_normal())))
             late = driven(offset=0.0, slope=slope)(zero)
             edits[name] = lambda e, soft=soft, late=late: late(soft(e))  # type: ignore[misc]
-        elif isinstance(e, Offset) and np.any(e.nominal.p):
+        elif (
+            isinstance(e, Offset) and np.any(e.nominal.p) and name.count(".") == 1
+        ):  # rods of a block must still close
             edits[name] = elsewhere(2e-4 * share * rng.standard_normal(3), 0.0 * rng.standard_normal(3))(1.0)
         elif isinstance(e, Spring):
             edits[name] = softer(float(np.expm1(0.2 * share * rng.standard_normal())))

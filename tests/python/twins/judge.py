@@ -103,13 +103,16 @@ def alike(twin: Twin, d: Diagnosis) -> bool:
 
 
 def covered(twin: Twin, d: Diagnosis) -> Iterator[bool]:
-    """Intervals of faults that are named by their own kind at their own place and leg."""
+    """Intervals of faults that are named by their own kind at their own place and leg; an effect on a block speaks of all its
+    branches, a fault of one."""
     own = {
         "soft": ("compliance", "scale", 1.0),
         "zero": ("zero_offset", "error", 0.0),
         "gain": ("lead_error", "slope", 0.0),
     }
     for f, size in zip(twin.faults, twin.sizes, strict=True):
+        if f.at.count(".") != 1:
+            continue
         kind, parameter, null = own[f.kind]
         for e in d.effects:
             alone = len(e.legs) == 1 and at((e.kind, e.element, e.legs), f.at) and "." not in e.element

@@ -80,7 +80,7 @@ def test_first_plane_shows_what_is_commanded(name: str, plane: str, free: tuple[
 
 def test_a_number_changed_by_its_address_is_the_machine_so_built(machine: sm.Machine) -> None:
     model = Model(machine)
-    address = "x.foot/compliance.c33"
+    address = "x.foot/beam.EIx"
     value = addresses(machine.description)[address]
     model.change(address, 4 * value)
     soft = model.machine.solve((0.1, 0.1, 0.1), (300.0, 0, 0, 0, 0, 0)).displacement
@@ -123,7 +123,7 @@ def test_effects_have_addresses_too(machine: sm.Machine) -> None:
 def test_an_unknown_address_is_refused_and_nothing_changes(machine: sm.Machine, address: str) -> None:
     model = Model(machine)
     before = model.state
-    with pytest.raises(StiffmapError, match="has no such number; expected"):
+    with pytest.raises(StiffmapError, match=r"has no number|expected"):
         model.change(address, 1.0)
     assert model.state == before
 
@@ -133,7 +133,7 @@ def test_numbers_that_cannot_be_are_refused_and_nothing_changes(machine: sm.Mach
     for deed in (
         lambda: model.put(position=(9.0, 0.0, 0.0)),
         lambda: model.put(force=(float("nan"), 0.0, 0.0)),
-        lambda: model.change("x.foot/compliance.c33", float("inf")),
+        lambda: model.change("x.foot/beam.EIx", float("inf")),
         lambda: model.drag(np.array([np.nan, 0, 0])),
     ):
         with pytest.raises(StiffmapError):

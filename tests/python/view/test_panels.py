@@ -13,6 +13,7 @@ import stiffmap as sm
 from stiffmap.cli.view import _change, _state
 from stiffmap.errors import StiffmapError
 from stiffmap.view import model_of
+from stiffmap.view.drawing import element_links
 from stiffmap.view.lines import command_line, python_lines
 from stiffmap.view.model import Model
 from stiffmap.view.panels import (
@@ -91,7 +92,7 @@ def test_the_command_makes_the_same_state(model: Model) -> None:
     full = State(
         (0.11, -0.05, 0.07), force=(10.0, 20.5, -30.0), moment=(1.0, 0.0, 0.0), gravity=(0.0, 0.0, -9.81), plane="free",
         normal=(1.0, 2.0, 2.0), quantity="worst", tolerance=1.25e-4, magnification=150.0, frequency=33.0,
-        changes=(("x.foot/compliance.c33", 2.5e-8),),
+        changes=(("x.foot/beam.EIx", 2500.0),),
     )  # fmt: skip
     words = shlex.split(command_line("my file.yaml", replace(model.moment, state=full)))
     assert words[:3] == ["stiffmap", "view", "my file.yaml"]
@@ -139,3 +140,28 @@ def test_the_picture_says_where_and_how_much(model: Model) -> None:
     words = figure.get_suptitle().replace("\n", " ")
     assert "orthoglide-revised at (200, 100, 100) mm" in words and f"{d:.1f} µm" in words
     assert any("deflection under this load, µm" in ax.get_xlabel() for ax in figure.axes)
+
+
+@pytest.mark.parametrize("name", ["orthoglide-revised", "hexapod", "3-rps", "swing-table", "ur10"])
+def test_every_share_is_lit_on_a_link_of_its_own_leg(name: str) -> None:
+    machine = sm.load_machine(name)
+    drawn = Model(machine).moment.rest()
+    for element in sm.deflection_budget(machine).elements:
+        links = element_links(machine, element)
+        assert links, element
+        assert [drawn.legs[i] for i in links] == [element.split(".")[0]]
+        assert np.linalg.norm(np.diff(drawn.links[links], axis=1), axis=-1).min() > 1e-3
+
+
+def test_the_rim_of_a_platform_moves_with_it() -> None:
+    machine = sm.load_machine("hexapod")
+    model = Model(machine)
+    rest, s = model.moment.rest(), model.moment.solve()
+    loaded = model.moment.loaded(s)
+    assert loaded is not None and len(rest.plate) == 6
+    moved = loaded.plate - rest.plate
+    np.testing.assert_allclose(moved.mean(axis=0), s.displacement[:3], atol=0.2 * np.abs(moved).max())
+    rim = rest.links[len(rest.ends) :]
+    assert len(rim) == 7 and set(rest.legs[len(rest.ends) :]) == {""}
+    np.testing.assert_array_equal(rim[:6, 1], rim[np.arange(1, 7) % 6, 0])
+    np.testing.assert_array_equal(rim[6, 1], rest.tcp)

@@ -14,7 +14,7 @@ from stiffmap.view.state import History, State, as_plain, from_permalink, from_p
 FULL = State(
     (0.1, -0.2, 0.3), rotation=(0.0, 0.1, 0.0), force=(1.0, 2.0, 3.0), moment=(0.5, 0.0, 0.0), gravity=(0.0, 0.0, -9.81),
     plane="free", normal=(1.0, 1.0, 0.0), quantity="worst", tolerance=1e-4, magnification=200.0, frequency=12.0,
-    start=(0.1, 0.2), changes=(("x.foot/compliance.c33", 2e-8),),
+    start=(0.1, 0.2), changes=(("x.foot/beam.EIx", 4000.0),),
 )  # fmt: skip
 
 
@@ -86,5 +86,5 @@ def test_reset_can_be_undone() -> None:
 
 
 def test_a_change_is_put_and_taken_back() -> None:
-    s = with_change(with_change(FULL, "a/b", 1.0), "x.foot/compliance.c33", None)
+    s = with_change(with_change(FULL, "a/b", 1.0), "x.foot/beam.EIx", None)
     assert dict(s.changes) == {"a/b": 1.0}

@@ -174,7 +174,7 @@ def test_every_quantity_is_drawn(view: View, quantity: str) -> None:
         (["--at", "9000,0,0"], "cannot reach (9000, 0, 0) mm"),
         (["--plane", "w"], "--plane: expected 3 numbers"),
         (["--quantity", "taste"], "quantity: expected one of deflection"),
-        (["--set", "x.no/at.x=1"], "has no such number"),
+        (["--set", "x.no/at.x=1"], "has no number 'x.no/at.x'"),
         (["--link", "abc"], "the link is damaged"),
         (["--tolerance", "-1"], "tolerance: expected a positive number"),
         (["--path", "no.ngc"], "no such file"),
@@ -248,3 +248,14 @@ def test_rows_and_paths_are_drawn() -> None:
     with View(model, data=Data(experiment, path)) as v:
         assert v._viewer.worker.idle(60) and not v._viewer.error
         assert {"/rows/before", "/path/cut"} <= set(v._viewer.scene._lines)
+
+
+def test_the_force_is_pulled_by_its_tail(view: View) -> None:
+    viewer = view._viewer
+    tip, length = np.array(view.state.position), viewer.scene.arrow_length
+    viewer.pull(tip - 2 * length * np.array([0.6, 0.0, 0.8]))
+    np.testing.assert_allclose(view.state.force, 600 * np.array([0.6, 0.0, 0.8]))
+    assert viewer.worker.idle()
+    np.testing.assert_allclose(viewer.scene.force_handle.position, tip - length * np.array([0.6, 0.0, 0.8]))
+    d = 1e6 * np.linalg.norm(viewer.model.machine.solve(tip, view.state.wrench).displacement[:3])
+    assert f"{d:.2f} µm" in viewer.controls._status.content

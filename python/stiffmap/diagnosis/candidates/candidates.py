@@ -80,7 +80,7 @@ def of_kind(effect: EffectType, description: MachineDescription) -> list[Candida
 
 
 def meanings(parameters: tuple[Parameter, ...]) -> list[tuple[Parameter, ...]]:
-    """The parameters, or apart the one that stands for all axes (`gain` beside `gain_x` …): together they
+    """The parameters, or apart the one that stands for all axes (`gain` in addition to `gain_x` …): together they
     would say the same thing twice."""
     names = {p.name for p in parameters}
     common = tuple(p for p in parameters if f"{p.name}_x" in names)

@@ -40,7 +40,7 @@ _PLANS: OrderedDict[str, Plan] = OrderedDict()
 
 
 def plan_of(predictor: Predictor, clock: Clock | None = None) -> Plan:
-    """Sensitivities of a machine under a plan; the last eight are kept. The clock is told which are computed; where it
+    """Sensitivities of a machine under a plan; the last eight are kept. The clock learns which are computed; where it
     is over those that there are make the plan, which is not kept."""
     clock = clock or Clock()
     registered = [(k, id(get(k))) for k in kinds()]  # users may register more

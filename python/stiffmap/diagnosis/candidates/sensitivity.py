@@ -56,7 +56,7 @@ class Variant:
 def variants(
     candidate: Candidate, predictor: Predictor, base: Floats, slopes: Slopes | None = None
 ) -> Iterator[Variant | None]:
-    """One linear model per signature of a candidate; None where the machine fails with it. `slopes`: told ahead."""
+    """One linear model per signature of a candidate; None where the machine fails with it. `slopes`: computed ahead."""
     slopes = slopes or Slopes(predictor, [candidate])
     tried = Tried(candidate.element, candidate.legs, candidate.parameters)
     linear = candidate.linear

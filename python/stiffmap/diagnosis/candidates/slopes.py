@@ -11,7 +11,7 @@ from stiffmap.experiment.prediction.ahead import Ahead
 from stiffmap.experiment.prediction.predict import Predictor
 
 AT_ONCE = 48
-"""Slopes that are told together; between two candidates a diagnosis may be stopped."""
+"""Slopes that are computed together; between two candidates a diagnosis may be stopped."""
 # Shares of a parameter's scale for a slope. One step leaves of it what is quadratic in the change: of a length or an angle
 # little, whose deflections need the larger step against round-off; of a factor on a compliance the factor's change itself,
 # and of a compliance that is added its share of what is there.
@@ -22,7 +22,7 @@ Key = tuple[Candidate, Parameter]
 
 
 class Slopes:
-    """Slopes per scale at the null, told ahead in the order in which they will be asked for."""
+    """Slopes per scale at the null, computed ahead in the order in which they will be asked for."""
 
     def __init__(self, predictor: Predictor, candidates: Iterable[Candidate]) -> None:
         self._predictor = predictor

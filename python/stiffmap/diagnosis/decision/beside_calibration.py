@@ -1,7 +1,7 @@
 """Effects on top of a calibration: a real machine is off in many small ways before it has one fault.
 
 One fault on an exact machine, and a machine whose every number is a little off, are compared by their evidence. Where
-the second explains the readings better, effects are looked for beside it, all uncertain numbers integrated
+the second explains the readings better, effects are looked for jointly with it, all uncertain numbers integrated
 out, and named only at the floor of what no model explains, where folds share them and held-out readings gain.
 """
 
@@ -21,6 +21,7 @@ from stiffmap.calibration.statistics import Sums
 from stiffmap.diagnosis.candidates.candidates import Candidate
 from stiffmap.diagnosis.decision.beside_field import standing
 from stiffmap.diagnosis.decision.beside_noise import above_noise
+from stiffmap.diagnosis.decision.beside_time import beside_time
 from stiffmap.diagnosis.decision.cross_validation import HeldOut, held_out
 from stiffmap.diagnosis.decision.few import MEETING, not_few, screened
 from stiffmap.diagnosis.decision.judge import judge, unexplained, with_model
@@ -77,11 +78,12 @@ def find_effects(s: Study, seed: int, tolerances: Tolerances, exclude: tuple[str
     finding, verdict, left = judge(s, find(s))
     model, never = admissible(finding.model, finding, tolerances, EVERYWHERE)
     model, noisy = above_noise(finding, model)
-    refused = never + noisy
+    model, late = beside_time(finding, model)
+    refused = never + noisy + late
     if refused:
         finding = with_model(finding, model)
         left = unexplained(s, finding)
-        verdict = _without(finding, bool(left or never))
+        verdict = _without(finding, bool(left or never or late))
     first = Answer(s, finding, verdict, left, refused=refused)
     if s.clock.over or not (left or finding.model.candidates or refused):
         return first
@@ -117,7 +119,7 @@ def _above(s: Study, layer: Layer, seed: int) -> Study:
     """The study of the same readings above a calibration."""
     straight = copy.copy(s.predictor)  # shares what was solved
     straight.experiment = layer.straight(s.predictor.experiment)
-    return study(straight, seed, layer, s.clock, s.without)
+    return study(straight, seed, layer, s.clock, s.without, s.scheduler)
 
 
 def _floor_beside_screen(s: Study) -> float:
@@ -173,7 +175,8 @@ def _searched(s: Study, tolerances: Tolerances) -> Answer:
     model, refused = admissible(finding.model, finding, tolerances)
     model, more = _beyond_calibration(s, model, finding)
     model, noisy = above_noise(finding, model)
-    refused += more + noisy
+    model, late = beside_time(finding, model)
+    refused += more + noisy + late
     if refused:
         finding = with_model(finding, model)
         left = unexplained(s, finding)
@@ -191,6 +194,8 @@ def _at_the_floor(s: Study, found: Calibrator, rho: float, seed: int, tolerances
             again, finding = _found_at(s, found, lower, seed)
     model, refused = admissible(finding.model, finding, tolerances)
     model, same = _beyond_calibration(s, model, finding)
+    model, late = beside_time(finding, model)
+    same += late
     named = with_model(finding, model)
     left = unexplained(s, _on(s, named))
     model, smooth = standing(s, named) if left else (model, ())
@@ -218,7 +223,7 @@ def _found_at(s: Study, found: Calibrator, rho: float, seed: int) -> tuple[Study
     s.clock.say("the search again, where what no model explains counts as noise")
     assert s.layer is not None
     raised = Layer.of(found, s.layer.calibration, rho)
-    again = study(s.predictor, seed, raised, s.clock, s.without)
+    again = study(s.predictor, seed, raised, s.clock, s.without, s.scheduler)
     return again, find(again)
 
 
@@ -231,7 +236,7 @@ def _on(s: Study, finding: Finding) -> Finding:
 
 
 def floor_of(s: Study, finding: Finding) -> float:
-    """What no model explains, in noise variances of one reading: REML per pose, beside calibration and effects."""
+    """What no model explains, in noise variances of one reading: REML per pose, jointly with calibration and effects."""
     blocks = _left_by(s, finding)
     return model_form(blocks) * blocks.typical
 
@@ -318,7 +323,7 @@ def imitated(columns: Floats, signature: Floats) -> bool:
 
 def imitation(columns: Floats, signature: Floats) -> tuple[Floats | None, int]:
     """(p,) the most likely values with which numbers show `COVERED` of a signature (N,), None where they do not, and how
-    many directions of them the readings tell."""
+    many directions of them the readings determine."""
     u, size, v = np.linalg.svd(columns, full_matrices=False)
     felt = size > FAINT
     along = u[:, felt].T @ signature
@@ -331,7 +336,7 @@ def imitation(columns: Floats, signature: Floats) -> tuple[Floats | None, int]:
 def _tolerated(s: Study, finding: Finding) -> Study | None:
     """The study where the numbers that imitate an effect of a finding stay as near as tolerances allow; None: none does.
 
-    Many readings overrun a prior: beside numbers that are as far off as they like no such effect gains anything.
+    Many readings overrun a prior: jointly with numbers that are as far off as they like no such effect gains anything.
     """
     assert s.layer is not None
     problem, predictor, model = finding.search.problem.exact, finding.search.predictor, finding.model

@@ -1,4 +1,4 @@
-"""Beside a rest that nothing explains an effect must gain beside a smooth field that knows nothing of the machine.
+"""Where an unexplained residual remains, an effect must gain with a smooth field that does not depend on the machine in the model.
 
 What is left over is seldom noise: an effect with a few free parameters takes some of it away wherever it is smooth. The
 effect that is there explains in its few directions what the field needs many for (docs/theory.md M3).
@@ -20,13 +20,13 @@ from stiffmap.experiment.noise.level import Mask
 
 
 def standing(s: Study, finding: Finding) -> tuple[Model, tuple[str, ...]]:
-    """The model without effects that gain less than their price beside the field, the least first, and why."""
+    """The model without effects that gain less than their price with the field in the model, the least first, and why."""
     model, search = finding.model, finding.search
     refused: list[str] = []
     price = STRONG + float(np.log(max(search.effective_trials, 1.0)))
     if not model.candidates or s.clock.over:
         return model, ()
-    s.clock.say("a smooth field that knows nothing of the machine")
+    s.clock.say("a smooth field that does not depend on the machine")
     left = s.free(s.experiment.reading - s.plan.base, finding.outliers)
     now = log_evidence(s, model, finding.outliers, left)
     while model.candidates:
@@ -39,15 +39,15 @@ def standing(s: Study, finding: Finding) -> tuple[Model, tuple[str, ...]]:
         if gain >= price:
             break
         refused.append(
-            f"{model.candidates[least]}: a smooth field that knows nothing of the machine explains as much "
-            f"(odds {odds(gain - price + STRONG)} beside it)"
+            f"{model.candidates[least]}: a smooth field that does not depend on the machine explains as much "
+            f"(odds {odds(gain - price + STRONG)} with the field in the model)"
         )
         model, now = trials[least], without[least]
     return model, tuple(refused)
 
 
 def log_evidence(s: Study, model: Model, out: Mask, left: Floats) -> float:
-    """Of effects with a normal prior of their own size on each parameter, beside uncertain numbers, a smooth field as large
+    """Of effects with a normal prior of their own size on each parameter, jointly with uncertain numbers, a smooth field as large
     as `left` (n, c) and a floor per pose."""
     search = search_on(s, ~out, 1)
     problem = search.problem.exact

@@ -48,7 +48,7 @@ def above_noise(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]
 
 
 def _variance(noise: AsLeft, kind: str) -> float:
-    """Of noise beside what is declared, for an effect of a kind."""
+    """Of noise relative to what is declared, for an effect of a kind."""
     own = max(noise.ratio, 1.0) if noise.other else 1.0
     in_time = "order" in get(kind).needs
     return max(noise.widening, 1.0) ** 2 if in_time else own**2

@@ -37,7 +37,7 @@ class HeldOut:
     calibrated: Summary | None = None
     """With the calibration alone, no effect; None where the declared numbers are taken as exact."""
     gain: tuple[float, float] | None = None
-    """What the effects take off the squared residual beside the calibration, in noise variances per
+    """What the effects take off the squared residual of the calibration, in noise variances per
     reading: mean over the folds and its standard error."""
 
     def shared(self, effect: str) -> bool:

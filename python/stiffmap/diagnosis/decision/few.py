@@ -21,7 +21,7 @@ from stiffmap.experiment.experiment import Floats
 MEETING = 10.0
 """Nats that each fault beyond the first costs."""
 SURE = 30.0
-"""Nats by which uncertain numbers must lead before single effects on an exact machine are not fitted at all, beside
+"""Nats by which uncertain numbers must lead before single effects on an exact machine are not fitted at all, jointly with
 what the screen was wrong by."""
 HOPELESS = 25.0
 """Chi-square per reading that the best few, fitted, leave: no few effects on an exact machine do then."""

@@ -1,4 +1,4 @@
-"""From what is left to a verdict: effects that a rest makes untrustworthy are withdrawn."""
+"""From what is left to a verdict: effects that an unexplained residual makes untrustworthy are withdrawn."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ VIOLATED = 1e-6
 def judge(s: Study, finding: Finding) -> tuple[Finding, str, list[Pattern]]:
     """What is named in the end, the verdict, and what is left.
 
-    Beside a rest that nothing explains an effect is named only if it explains more than the rest is, if all
+    Where an unexplained residual remains, an effect is named only if it explains more than the residual is, if all
     together explain `SHARE` of the misfit, and if each is the same in all halves of the data.
     """
     s.clock.say("structure in what is left")

@@ -12,9 +12,9 @@ from stiffmap.experiment.experiment import Integers
 from stiffmap.experiment.noise.whitening import Problem
 
 STEADY = 0.35
-"""Largest relative change of an effect between halves of the data beside an unexplained rest."""
+"""Largest relative change of an effect between halves of the data where an unexplained residual remains."""
 SHARE = 0.8
-"""Share of the misfit that effects must explain to be named beside an unexplained rest."""
+"""Share of the misfit that effects must explain to be named where an unexplained residual remains."""
 
 
 def steady(problem: Problem, model: Model) -> list[bool]:

@@ -178,7 +178,7 @@ def _bounded(j: Floats, r: Floats, low: Floats, high: Floats) -> Floats:
 
 
 def _foretold(j: Floats, r: Floats, tried: Floats, step: Floats) -> bool:
-    """Whether a Jacobian told what a step did, to within `BENT` of it."""
+    """Whether a Jacobian predicted what a step did, to within `BENT` of it."""
     told = j @ step
     return float(np.linalg.norm(tried - r - told)) <= BENT * float(np.linalg.norm(told)) + float(
         np.sqrt(PAYS)
@@ -238,7 +238,7 @@ def jacobian(
 
 
 def _told(model: Model, values: Floats, predictor: Predictor, numbers: Sequence[int]) -> dict[int, Floats]:
-    """Slopes of the predictions by those of the values that one step from the equilibria tells, per unit of each."""
+    """Slopes of the predictions by those of the values that one step from the equilibria gives, per unit of each."""
     _, high = model.bounds()
     parameters, steps = model.parameters, dict[int, float]()
     for i in numbers:

@@ -33,7 +33,7 @@ class Effect:
     parameters: dict[str, tuple[float, float, float, str]]
     """Name -> (value, lower and upper end of the 95 % interval, unit)."""
     aliases: list[dict[str, Any]]
-    """Kind, element, legs of what this plan cannot tell apart from it."""
+    """Kind, element, legs of what this plan cannot distinguish from it."""
     evidence: dict[str, float]
     definition: str = ""
     """Definition, pivot, frame and what moves with it."""

@@ -142,7 +142,7 @@ def before_after(d: Findings) -> Figure:
     figure = Figure(figsize=(4.6, 2.4), layout="constrained")
     ax = figure.subplots()
     bars = ax.barh(["your file", "corrected", "noise"], values, color=[BEFORE, AFTER, "0.7"])
-    ax.bar_label(bars, [f"{v:.3g} µ{unit}" for v in values], padding=3)
+    ax.bar_label(bars, [f"{v:#.3g} µ{unit}".replace(". ", " ") for v in values], padding=3)
     ax.invert_yaxis()
     ax.set_xlim(0, 1.3 * max(values))
     ax.set(xlabel=f"left of {d.after.n} readings, rms, µ{unit}")
@@ -154,7 +154,7 @@ def before_after(d: Findings) -> Figure:
 
 
 def histogram(d: Findings) -> Figure:
-    """Residuals over the noise floor, beside the normal distribution that noise alone would give."""
+    """Residuals over the noise floor, with the normal distribution that noise alone would give."""
     figure = Figure(figsize=(6, 3.4), layout="constrained")
     ax = figure.subplots()
     floor = np.array([d.noise.floor.get(c.name, np.nan) for c in d.experiment.channels])

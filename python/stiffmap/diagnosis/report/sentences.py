@@ -23,7 +23,7 @@ UNITS = {
 """Factor from SI, and the unit that a workshop reads."""
 NAMES = {"actuator": "drive", "motor": "motor"}
 ALIASES = 2
-"""What cannot be told from an effect: how many the headline names."""
+"""What cannot be distinguished from an effect: how many the headline names."""
 
 
 def measured(value: float, low: float, high: float, unit: str) -> str:
@@ -80,7 +80,7 @@ def _compared(e: Effect, more: str, less: str) -> str:
 
 
 def opening(d: Any) -> str:
-    """The verdict as one says it: first what is wrong with the readings, then the cause with what cannot be told from it."""
+    """The verdict as one says it: first what is wrong with the readings, then the cause with what cannot be distinguished from it."""
     if not d.slips:
         return _of_machine(d, d.verdict)
     first = ". Then ".join(slip_sentence(s) for s in d.slips)
@@ -112,13 +112,15 @@ def _lower(text: str) -> str:
 
 
 def aliases(e: Effect) -> str:
-    """What these readings cannot tell from an effect, for the headline; empty where there is nothing."""
+    """What these readings cannot distinguish from an effect, for the headline; empty where there is nothing."""
     names = list(dict.fromkeys(alias_words(a) for a in e.aliases))
     if not names:
         return ""
     shown = " or ".join(names[:ALIASES])
     more = len(names) - ALIASES
-    return f", or as well {shown}{f' or one of {more} more' if more > 0 else ''}, which these readings cannot tell from it"
+    return (
+        f"; these readings cannot distinguish it from {shown}{f' or one of {more} more' if more > 0 else ''}"
+    )
 
 
 def alias_words(a: Mapping[str, Any]) -> str:
@@ -135,7 +137,9 @@ def _of_machine(d: Any, verdict: str) -> str:
     size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * noise_size(d):.1f} µ{unit}"
     named = "; ".join(sentence(e) + aliases(e) for e in d.effects)
     if verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
-        return f"No cause beside the machine's uncertain numbers; these: {d.calibration.verdict} ({size})."
+        return (
+            f"No cause apart from the machine's uncertain numbers; they are {d.calibration.verdict} ({size})."
+        )
     if verdict == "none" and d.stopped:
         return f"The diagnosis was stopped before it found anything ({size})."
     if verdict == "none":
@@ -171,7 +175,7 @@ def next_step(d: Any) -> str:
         return "Nothing to correct. Keep the readings as the record of this state."
     if d.verdict == "ambiguous" and not d.effects:
         tilt = "" if d.experiment.axis_read[3:6].any() else ", the tilt of the tool as well (rx, ry, rz)"
-        return f"Read what tells these groups apart{tilt}; the command stiffmap plan proposes poses."
+        return f"Read what distinguishes these groups{tilt}; the command stiffmap plan proposes poses."
     if d.verdict == "unattributed":
         return (
             "Look at where the difference is largest (What is left), check the instrument's frame and the tool "
@@ -183,7 +187,7 @@ def next_step(d: Any) -> str:
         return "Inspect this place, and read more poses or other loads: numbers within tolerance explain these nearly as well."
     if any(e.aliases for e in d.effects):
         return (
-            "Inspect this place and those which these readings cannot tell from it (the report names them); the corrected "
+            "Inspect this place and those which these readings cannot distinguish from it (the report names them); the corrected "
             "machine file predicts the tool equally well whichever it is."
         )
     return "Inspect this place; until it is mended, plan and compensate with the corrected machine file."

@@ -45,7 +45,7 @@ def _undone(s: Slip) -> str:
 
 
 def _also(s: Slip) -> str:
-    return "".join(f"; or {a}: these readings cannot tell" for a in s.also)
+    return "".join(f"; or {a}: these readings cannot determine which" for a in s.also)
 
 
 def noise_size(d: Findings) -> float:
@@ -68,7 +68,7 @@ def _thousandth(value: float, unit: str) -> str:
 
 
 def _more(d: Findings) -> list[str]:
-    """Share explained beside a rest, the calibration below the effects, what is not named and why."""
+    """Share explained where an unexplained residual remains, the calibration below the effects, what is not named and why."""
     out = []
     if d.unexplained:
         h = d.held_out
@@ -116,7 +116,7 @@ def effect_text(e: Effect) -> str:
         text = f"{name} {at} [{', '.join(ends)}]"
         values.append(text if label == "1" else f"{text} {label}")
     n = len(e.aliases)
-    same = f" (these readings cannot tell it from {n} other{'s' if n > 1 else ''})" if n else ""
+    same = f" (these readings cannot distinguish it from {n} other{'s' if n > 1 else ''})" if n else ""
     return f"{e.kind} of {e.element}{legs}: {', '.join(values)}{same}"
 
 

@@ -24,7 +24,7 @@ class Explanation:
     aliases: tuple[tuple[Candidate, Candidate, Model], ...] = ()
     """Effect of the model, its alias at the size found, and the model with the alias in its place."""
     others: tuple[Model, ...] = ()
-    """Rivals that another plan, or luck, would have told apart."""
+    """Rivals that another plan, or luck, would have distinguished."""
 
 
 def explain(s: Study, search: Search, model: Model) -> Explanation:

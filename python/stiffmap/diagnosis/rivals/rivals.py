@@ -4,7 +4,7 @@ Two models are compared by the log-score of each pose, predicted without that po
 out, through the linearised fit), less Schwarz's penalty where they differ in the number of parameters
 (Vuong 1989). Poses are the clusters of the paired test. A rival is also refused where, were it true, it
 would hardly ever lose by so much (Cox 1961). One that is not significantly worse stays in the verdict: it
-is ambiguous, unless no reading of the plan could tell the two apart at the size found: then it is an alias.
+is ambiguous, unless no reading of the plan could distinguish the two at the size found: then it is an alias.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ODDS = 100.0
 MARGIN = 30.0
 """Rivals whose -ln p is this much below the chosen effect's are refused without a full fit."""
 LIKE = 0.1
-"""Beside a calibrated machine, whose model is never exact: share of what an effect explains that a rival may miss."""
+"""With a calibrated machine, whose model is never exact: share of what an effect explains that a rival may miss."""
 SAME, PARALLEL, NESTED = 3.0, 0.1, 1.0
 """Predictions less than 3 standard deviations apart in all readings together are the same to this plan;
 at different places also their signatures must agree in 99 % of their squares. Less than one apart, a
@@ -49,7 +49,7 @@ class Rival:
     size: float
     """Length of the replaced effect's signature in standard deviations."""
     same: bool
-    """Whether no reading of this plan could tell the two apart at the size found: an alias."""
+    """Whether no reading of this plan could distinguish the two at the size found: an alias."""
 
     @property
     def candidate(self) -> Candidate:

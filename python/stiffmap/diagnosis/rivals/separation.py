@@ -1,4 +1,4 @@
-"""The measurement that tells two explanations apart best: where, which load, which axis, how many."""
+"""The measurement that distinguishes two explanations best: where, which load, which axis, how many."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Structural aliases: candidates that this plan cannot tell apart, before any reading is looked at."""
+"""Structural aliases: candidates that this plan cannot distinguish, before any reading is looked at."""
 
 from __future__ import annotations
 

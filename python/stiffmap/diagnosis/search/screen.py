@@ -26,7 +26,7 @@ FREED = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Screen:
-    """The columns of all variants under a problem, and what makes them orthonormal beside a model. Whitened columns are
+    """The columns of all variants under a problem, and what makes them orthogonal to a model. Whitened columns are
     made where they are asked for, and never kept."""
 
     problem: Problem
@@ -46,7 +46,7 @@ class Screen:
 
     @staticmethod
     def of(problem: Problem, stack: Stack) -> Screen:
-        """Screen of the variants beside an empty model."""
+        """Screen of the variants with an empty model."""
         grams = tuple(_felt(p.gram(problem)) for p in stack.parts)
         return _screen(problem, stack, grams, np.zeros((len(problem), 0)))
 

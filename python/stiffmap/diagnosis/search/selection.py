@@ -40,7 +40,7 @@ class Search:
     predictor: Predictor
     problem: Problem
     screen: Screen
-    """Representatives of the alias classes only, beside an empty model."""
+    """Representatives of the alias classes only, with an empty model."""
     effective_trials: float
     """Number of independent tests that the search is worth."""
     finalists: int = 5
@@ -57,7 +57,7 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class Finalist:
-    """A candidate tried through the full equilibrium beside the effects in the model."""
+    """A candidate tried through the full equilibrium jointly with the effects in the model."""
 
     model: Model
     delta_chi2: float
@@ -85,9 +85,9 @@ def select(search: Search) -> Selection:
             if search.clock.over:
                 break
             if steps and search.clock.tired:
-                search.clock.leave_out(f"a further effect beside {steps[-1]}")
+                search.clock.leave_out(f"a further effect in addition to {steps[-1]}")
                 break
-            search.clock.say(f"an effect beside {steps[-1]}" if steps else "a first effect")
+            search.clock.say(f"an effect in addition to {steps[-1]}" if steps else "a first effect")
             best = best_addition(search, model)
             if best is None or best.minus_log_p < search.threshold:
                 break
@@ -104,7 +104,7 @@ def select(search: Search) -> Selection:
 def best_addition(
     search: Search, model: Model, but: Candidate | None = None, least: float = 0.0
 ) -> Finalist | None:
-    """The candidate that explains most beside the model, judged by full fits of the best few, `but` one; whoever cannot
+    """The candidate that explains most jointly with the model, judged by full fits of the best few, `but` one; whoever cannot
     come near a -ln p of `least` is not fitted."""
     found = [f for f in additions(search, model, search.finalists, but=but, least=least) if f.model.usable]
     best = max(found, key=lambda f: f.minus_log_p, default=None)
@@ -218,7 +218,7 @@ def _finalist(search: Search, model: Model, screen: Screen, i: int) -> Finalist:
             search.clock.leave_out(
                 f"the fit of {named} to its end: its predictions fail or leave the fast path"
             )
-        beside = f" beside {' + '.join(map(str, model.candidates))}" if model.candidates else ""
+        beside = f" in addition to {' + '.join(map(str, model.candidates))}" if model.candidates else ""
         search.failed[f"{variant.candidate}{beside}"] = best.failure
     delta_chi2 = model.chi2 - best.chi2
     return Finalist(best, delta_chi2, minus_log_p_of(delta_chi2, best.sizes()[-1]))
@@ -258,7 +258,7 @@ def minus_log_p_of(delta_chi2: float, freedom: int) -> float:
 def start_values(variant: Variant, estimate: Floats, flat: NDArray[np.bool_]) -> list[Floats]:
     """Values of all parameters (in scales) to start fits from: null plus the linear estimate.
 
-    `flat` (p,) are parameters that the readings do not feel at the null; beside large values of the
+    `flat` (p,) are parameters that are not observable at the null; with large values of the
     others they may, to second order, and to either side.
     """
     c = variant.candidate

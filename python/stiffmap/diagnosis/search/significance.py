@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from stiffmap.broadcasting import random_numbers
@@ -9,32 +11,40 @@ from stiffmap.diagnosis.candidates.stack import Stack
 from stiffmap.diagnosis.search.screen import Screen
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem, readings_of
+from stiffmap.tasks import workers
 
 ALPHA = 1e-4
 """Probability of naming anything where there is nothing, over the whole search."""
 DRAWS = 1000
+TOGETHER = 100
+"""Draws of one task."""
 ENOUGH, FEWER = 4000, 300
 """Readings on which the worth of a search is found out, and draws where there are more: how alike the candidates are shows
 on a part of the plan."""
 
 
-def effective_number_of_trials(screen: Screen, seed: int, draws: int = DRAWS) -> float:
+def effective_number_of_trials(screen: Screen, seed: int, draws: int = DRAWS, scheduler: Any = None) -> float:
     """How many independent tests the search is worth (parametric bootstrap of the whole search).
 
     Under the null the smallest of the candidates' p-values is below p with probability
     1 - exp(-M p). M follows from the median over simulated noise and holds for smaller p, where
     simulating would need millions of draws. Bounds and unidentified parameters are in, since every
-    draw runs the same signed search over all variants.
+    draw runs the same signed search over all variants. With a scheduler its workers search; the noise is drawn here, so
+    that the answer is the same.
     """
     if not screen.rank.any():
         return 1.0
     rng = random_numbers(seed)
-    best = [
-        screen.largest_minus_log_p(rng.standard_normal((screen.readings, 100)))
-        for _ in range(max(1, draws // 100))
-    ]
+    noise = (rng.standard_normal((screen.readings, TOGETHER)) for _ in range(max(1, draws // TOGETHER)))
+    with workers(_best_of, screen, scheduler=scheduler) as hands:
+        best = hands.in_order(noise)
     median = float(np.median(np.concatenate(best)))
     return max(1.0, float(np.log(2.0) * np.exp(median)))
+
+
+def _best_of(screen: Screen, noise: Floats) -> Floats:
+    """(draws,) the search on each column of noise (readings, draws), as a task."""
+    return screen.largest_minus_log_p(noise)
 
 
 def on_enough_rows(problem: Problem, stack: Stack, columns: Floats | None, seed: int) -> Screen:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -47,6 +48,8 @@ class Study:
     """Kinds of effects that are not tried."""
     seconds: dict[str, float] = field(default_factory=dict)
     """What the sensitivities and the bootstrap of the search took; nothing where they were known."""
+    scheduler: Any = None
+    """Of a dask cluster, whose workers do the bootstrap."""
 
     def free(
         self, residual: Floats, out: Mask, train: Mask | None = None, *, calibrated: bool = True
@@ -122,6 +125,7 @@ def study(
     layer: Layer | None = None,
     clock: Clock | None = None,
     without: frozenset[str] = frozenset(),
+    scheduler: Any = None,
 ) -> Study:
     """Prepare: sensitivities, noise floor without suspects, alias classes, null search.
 
@@ -129,6 +133,8 @@ def study(
         Calibration below the effects: its uncertain numbers are integrated out of everything.
     without
         Kinds of effects that are not tried.
+    scheduler
+        Of a dask cluster, whose workers do the bootstrap of the search.
     """
     start = time.perf_counter()
     if clock is not None:
@@ -153,9 +159,9 @@ def study(
         if len(problem) > ENOUGH:
             uncertain = None if layer is None else layer.columns
             few = on_enough_rows(problem, named.stack, uncertain, seed)
-            _TRIALS[key] = effective_number_of_trials(few, seed, FEWER)
+            _TRIALS[key] = effective_number_of_trials(few, seed, FEWER, scheduler)
         else:
-            _TRIALS[key] = effective_number_of_trials(named, seed)
+            _TRIALS[key] = effective_number_of_trials(named, seed, scheduler=scheduler)
     seconds = {"sensitivities": prepared - start, "null bootstrap": time.perf_counter() - prepared}
     return Study(
         predictor,
@@ -168,6 +174,7 @@ def study(
         clock or Clock(),
         without,
         seconds,
+        scheduler,
     )
 
 

@@ -46,7 +46,7 @@ PHYSICAL = 4.0
 
 
 Left = Callable[[float, tuple[int, ...]], float]
-"""Chi-square that the best part of the machine leaves beside a factor of some channels."""
+"""Chi-square that the best part of the machine leaves together with a factor of some channels."""
 
 
 def factors(e: Experiment, problem: Problem, base: Floats, left: Left) -> Iterator[Hypothesis]:
@@ -123,6 +123,12 @@ def _named(quantity: str) -> list[tuple[float, str, bool]]:
     ]
 
 
+def named_within(low: float, high: float) -> list[str]:
+    """What to check first, of known factors of all readings between two ends (a gain of the load or of all gauges)."""
+    found = [n for n in _named("both") if min(low, high) <= n[0] <= max(low, high)]
+    return list(dict.fromkeys(name for _, name, _ in sorted(found, key=lambda n: not n[2])))
+
+
 def _known(value: float, u: float, quantity: str) -> list[tuple[float, str, bool]]:
     """Known factors that a value is, within its uncertainty, the nearest first."""
     spread = min(NEAR, max(3.0 * u / max(abs(value), 1e-300), 0.01))
@@ -134,7 +140,7 @@ def _known(value: float, u: float, quantity: str) -> list[tuple[float, str, bool
 def _beside_a_part(
     value: float, quantity: str, axes: tuple[int, ...], left: Left
 ) -> list[tuple[float, str, bool]]:
-    """The known factor near a value beside which one part of the machine explains the readings best, if it does so well."""
+    """The known factor near a value together with which one part of the machine explains the readings best, if it does so well."""
     near = [n for n in _named(quantity) if abs(float(np.log(abs(value) / n[0]))) < BESIDE]
     if 1 / PHYSICAL < abs(value) < PHYSICAL or not near:
         return []

@@ -26,13 +26,13 @@ from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
 
 MOST, LEFT = 0.5, 0.1
-"""Share of the misfit beyond noise that may stay with a mistake alone, and beside one part of the machine."""
+"""Share of the misfit beyond noise that may stay with a mistake alone, and jointly with one part of the machine."""
 MISFIT, FEWEST = 2.0, 6
 """Misfit per reading, in noise variances, below which nothing is looked for; readings that must be there."""
 BETTER = 0.5
 """Share of what the best part of the machine leaves that a mistake may leave."""
 SAME = 0.1
-"""Relative difference of what two mistakes leave below which the readings do not tell them apart."""
+"""Relative difference of what two mistakes leave below which the readings do not distinguish them."""
 KEPT = 2.0
 """Rms of a check, over the noise, up to which it holds."""
 ROWS = 400
@@ -106,7 +106,7 @@ def find_slip(s: Study) -> Found | None:
 
 
 def _judged(s: Study, e: Experiment, sigma: Floats, base: Floats) -> list[Judged]:
-    """Mistakes that take away enough to be one, beside a fault that the machine may have as well."""
+    """Mistakes that take away enough to be one, jointly with a fault that the machine may have as well."""
     predictor = s.predictor
     if len(e) > ROWS:
         e, base, sigma = e.rows(np.arange(ROWS)), base[:ROWS], sigma[:ROWS]

@@ -19,7 +19,7 @@ class Slip:
     check: str
     """What to check, a clause."""
     also: tuple[str, ...]
-    """Other checks, of mistakes that these readings cannot tell from it."""
+    """Other checks, of mistakes that these readings cannot distinguish from it."""
     left: float
     """Share of the squared misfit that stays once it is undone."""
     undone: bool

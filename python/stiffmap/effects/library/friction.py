@@ -56,7 +56,7 @@ EFFECT = EffectType(
     reverses=True,
     title="dry friction of a drive, an elastic joint or a spring's direction",
     doc=(
-        "Coulomb friction beside the spring of a drive, an elastic joint or an uncoupled direction of a link spring "
+        "Coulomb friction parallel to the spring of a drive, an elastic joint or an uncoupled direction of a link spring "
         "(element `foot.k22`; a bolted joint that slips), against the spring's motion from its unloaded state, "
         "with the deflection a and the force F, level L and compliance c: on "
         "the branch `loading` (from zero load) a = c·(F - L·sign F); on the branch `unloading` (from a "

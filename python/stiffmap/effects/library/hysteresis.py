@@ -1,7 +1,7 @@
 """What a drive remembers: friction, play and stiffening along a sequence of loads.
 
 Theory L5. The spring's force s follows the drive's force F as a play operator does, |F - s| <= level; deflection is a
-function of s. That is Coulomb friction beside a spring, exactly, for any monotone law; many elements with levels of their
+function of s. That is Coulomb friction parallel to a spring, exactly, for any monotone law; many elements with levels of their
 own are a Prandtl-Ishlinskii model, which obeys Masing's rule.
 """
 
@@ -78,7 +78,7 @@ def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
 
 
 def jumps(plan: Plan) -> bool:
-    """Whether loads do not run in order of time: memory is then nothing that readings can tell."""
+    """Whether loads do not run in order of time: memory is then nothing that readings can determine."""
     return plan.load_direction is None
 
 

@@ -1,1 +1,1 @@
-"""Measured against predicted: residuals, their size, and what the plan cannot tell."""
+"""Measured against predicted: residuals, their size, and what the plan cannot determine."""

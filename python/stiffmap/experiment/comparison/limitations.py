@@ -53,7 +53,7 @@ def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[
         )
     if e.groups.max() == 0:
         out.append(
-            "all rows are one pose: what changes over the workspace cannot be told"
+            "all rows are one pose: what changes over the workspace cannot be determined"
             + ("" if e.runs.max() > 0 else ", nothing is held out")
         )
     if not (noise.freedom > 0).any():

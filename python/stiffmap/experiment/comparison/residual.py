@@ -16,6 +16,7 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import Check, checks
 from stiffmap.experiment.noise.level import Mask, Noise, noise_of
 from stiffmap.experiment.noise.outliers import suspects
+from stiffmap.experiment.noise.over_time import over_time
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.notebook import residual_html
 from stiffmap.experiment.prediction.predict import Predictor
@@ -50,7 +51,7 @@ class Residual:
     """Poses whose residuals alone are beyond noise (p-value below 1e-3 over all poses)."""
     checks: list[Check]
     limitations: list[str]
-    """What this experiment cannot tell, in sentences."""
+    """What this experiment cannot determine, in sentences."""
 
     def _repr_html_(self) -> str:
         return residual_html(self)
@@ -106,6 +107,7 @@ def residual(
     part = nuisance_part(problem, raw)
     kept = np.where(out[:, None], np.nan, raw - part)
     white = problem.residual(base)
+    late = over_time(problem, white)
     return Residual(
         e,
         base + part,
@@ -117,7 +119,7 @@ def residual(
         int(problem.nuisance.shape[1]),
         _groups_off(problem, white),
         checks(e, e.reading, noise.sigma, ~out),
-        limitations(e, noise, machine),
+        [*limitations(e, noise, machine), *([] if late is None else [str(late)])],
     )
 
 

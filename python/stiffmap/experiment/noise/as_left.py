@@ -1,4 +1,4 @@
-"""Noise as a fit leaves it: how large beside what is declared, along time, and in its tails."""
+"""Noise as a fit leaves it: how large compared with what is declared, along time, and in its tails."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class AsLeft:
     """Of whitened residuals."""
 
     ratio: float
-    """Root mean square beside what is declared, degrees of freedom taken off."""
+    """Root mean square relative to what is declared, degrees of freedom taken off."""
     other: bool
     """Whether that is other than declared."""
     along_time: float

@@ -1,4 +1,4 @@
-"""A smooth field over the workspace that knows nothing of the machine.
+"""A smooth field over the workspace that does not depend on the machine.
 
 Position: a field over the commanded position per channel. Deflection: a smooth compliance, i.e. a field per wrench
 component times that component, plus a smooth field.

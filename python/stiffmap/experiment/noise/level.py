@@ -43,7 +43,7 @@ class Noise:
         return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
     def contradictions(self) -> list[str]:
-        """Axes whose repeats scatter more than the declaration allows, told in words."""
+        """Axes whose repeats scatter more than the declaration allows, described in words."""
         return [
             f"{c.name}: repeats scatter by {s:.3g}, {d:.3g} stated (SI, p = {p:.1g})"
             for c, s, d, p in zip(self.channels, self.repeats, self.declared, self.consistency, strict=True)
@@ -52,7 +52,7 @@ class Noise:
 
 
 def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
-    """Noise floor from the rows in `keep`; raises StiffmapError where nothing tells the noise."""
+    """Noise floor from the rows in `keep`; raises StiffmapError where nothing determines the noise."""
     rows = np.ones(len(experiment), bool) if keep is None else keep
     squares, freedom = _within(experiment, rows)
     with np.errstate(invalid="ignore", divide="ignore"):

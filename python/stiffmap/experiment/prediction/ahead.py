@@ -1,4 +1,4 @@
-"""Slopes that are told many at once, and asked for one by one."""
+"""Slopes that are computed many at once, and asked for one by one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Ahead(Generic[K]):
     """Slopes by key, in the order in which they will be asked for; each is handed out once.
 
     tell
-        Slopes of some keys; None where whole predictions must tell.
+        Slopes of some keys; None where whole predictions are needed.
     """
 
     def __init__(self, keys: Sequence[K], at_once: int, tell: Tell[K]) -> None:
@@ -24,7 +24,7 @@ class Ahead(Generic[K]):
         self._told: dict[K, Floats | None] = {}
 
     def of(self, key: K) -> Floats | None:
-        """(n, c); None where whole predictions must tell, and for what is not among the keys."""
+        """(n, c); None where whole predictions are needed, and for what is not among the keys."""
         if key not in self._place:
             return None
         if key not in self._told:

@@ -54,7 +54,7 @@ class Nearby:
 
     def changes(self, others: Sequence[Near]) -> list[Floats | None]:
         """(n, c) m, rad each: what other machines show more than this one, to first order in where they differ. None where
-        one step does not lead there, where the plan reads what a step does not tell, or where the kernels leave too much."""
+        one step does not lead there, where the plan reads what a step does not give, or where the kernels leave too much."""
         out: list[Floats | None] = [None] * len(others)
         if not _steps_show(self.machine, self.plan):
             return out

@@ -100,7 +100,7 @@ class Predictor:
         unmoved: Sequence[Terms] | None = None,
     ) -> list[Floats | None]:
         """(n, c) m, rad each: how much more the readings of some sets of terms show than those of `base`, to first order in
-        what differs, many at a fraction of a prediction each; not to be written to. None where whole predictions must tell: other loads, laws
+        what differs, many at a fraction of a prediction each; not to be written to. None where whole predictions are needed: other loads, laws
         that bend, records, branches, memory of the drives, and all that `Nearby.changes` leaves.
 
         unmoved
@@ -138,7 +138,7 @@ class Predictor:
         return apply_records(self.machine.description, _parts(terms)[0])
 
     def changes_of_machines(self, others: Sequence[Near], terms: Terms = ()) -> list[Floats | None]:
-        """The same of other machines beside this one, of which nothing is kept; `terms` of the measurement belong to all."""
+        """The same of other machines near this one, of which nothing is kept; `terms` of the measurement belong to all."""
         motion = self._motion_of(*_parts(terms))
         before = readings(self.experiment, motion, terms)
         told = Nearby(self.machine, self._plan_under(_parts(terms)[1]), self.threads)

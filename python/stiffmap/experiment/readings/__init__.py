@@ -1,4 +1,4 @@
-"""What a row may read beside the six axes of a pose and joints: one kind, one file with a ``READING``."""
+"""What a row may read in addition to the six axes of a pose and joints: one kind, one file with a ``READING``."""
 
 from stiffmap.experiment.readings.registry import kind_of, kinds, load_readings, register, unregister
 from stiffmap.experiment.readings.types import ReadingKind, Seen

@@ -201,5 +201,7 @@ class Stroke(FileModel):
     def _one_form(self) -> Stroke:
         also = [k for k in ("at", "length", "along", "rate") if getattr(self, k) is not None]
         if self.table is not None and also:
-            raise PydanticCustomError("stroke", "a table has no {keys} beside it", {"keys": ", ".join(also)})
+            raise PydanticCustomError(
+                "stroke", "a table takes no {keys} in addition", {"keys": ", ".join(also)}
+            )
         return self

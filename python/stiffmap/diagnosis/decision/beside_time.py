@@ -1,0 +1,59 @@
+"""Effects must explain what no smooth course over time explains: creep, warming and drift do not depend on the machine."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiffmap.broadcasting import Floats
+from stiffmap.diagnosis.fitting.fit import fit_without
+from stiffmap.diagnosis.fitting.model import Model
+from stiffmap.diagnosis.search.selection import minus_log_p_of
+from stiffmap.diagnosis.search.study import Finding
+from stiffmap.effects import get
+from stiffmap.experiment.noise.over_time import courses
+from stiffmap.experiment.noise.whitening import basis
+
+
+def beside_time(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]:
+    """The model without effects that are not significant jointly with smooth courses over time, and why; those that are a
+    course over time themselves are not tested."""
+    search = finding.search
+    q = courses(search.problem)
+    refused: list[str] = []
+    while model.candidates and q.shape[1]:
+        worst = None
+        for i, c in enumerate(model.candidates):
+            if "order" in get(c.kind).needs:
+                continue
+            worth = _worth(finding, model, i, q)
+            if worth < search.threshold and (worst is None or worth < worst[1]):
+                worst = (i, worth)
+        if worst is None:
+            break
+        i = worst[0]
+        less = fit_without(model, i, search.predictor, search.problem)
+        if not less.usable:
+            break
+        refused.append(
+            f"{model.candidates[i]}: a smooth course over time (drift, creep or warming) explains as much"
+        )
+        model = less
+    return model, tuple(refused)
+
+
+def _worth(finding: Finding, model: Model, i: int, q: Floats) -> float:
+    """-ln p of an effect jointly with the courses, the other effects refitted to first order."""
+    assert model.residual is not None and model.jacobian is not None
+    less = fit_without(model, i, finding.search.predictor, finding.search.problem)
+    if not less.usable or less.residual is None:
+        return np.inf
+    own = model.parts()[i]
+    others = [k for k in range(model.jacobian.shape[1]) if not own.start <= k < own.stop]
+
+    def left(residual: Floats, columns: Floats) -> float:
+        both = basis(np.hstack([q, columns]))
+        rest = residual - both @ (both.T @ residual)
+        return float(rest @ rest)
+
+    drop = left(less.residual, model.jacobian[:, others]) - left(model.residual, model.jacobian)
+    return minus_log_p_of(drop, model.sizes()[i])
