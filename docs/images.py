@@ -57,6 +57,13 @@ COMMANDS |= {
     for name in ("outline", "error")
 } | {"milling/arm.png": (f"mill {HERE.parent / 'examples/ur10-spindle.yaml'} washbasin --process trimming --at=-750,-100,300 "
                          "--redundancy 72 --step 4 -o {out}", "error.png")}  # fmt: skip
+TAPS = "examples/taps"
+CUT = f"{TAPS}/kr210.yaml --process {TAPS}/cut.yaml --damping 3 --speeds 500,1500 --depth 1"
+COMMANDS |= {
+    "vibration/response.png": (f"taps {TAPS}/kr210.yaml {TAPS}/taps.csv -o {{out}}", ""),
+    "vibration/before.png": (f"lobes {CUT} -o {{out}}", "lobes.png"),
+    "vibration/after.png": (f"lobes {CUT} --effect 'compliance a2 arm scale=1.828' -o {{out}}", "lobes.png"),
+}
 PAPER = ("figure5", "figure6", "figure7-worst", "figure7-best", "figure7-Fx", "figure7-Fy")
 COMMANDS |= {f"{name}.png": ("paper -o {out}", "") for name in PAPER}
 

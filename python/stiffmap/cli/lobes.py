@@ -131,7 +131,7 @@ def _one(
         "at_mm": (place / MM).tolist(), "modes": a["modes"], "damping": a["damping"],
         "least_limit_mm": a["least"] / MM, "chatter_frequency_Hz": a["frequency"],
         "least_on_diagram_mm": float(ds.limit.min()) / MM,
-        "least_at_rpm": float(ds.speed[int(ds.limit.argmin())]) * RPM,
+        "least_at_rpm": float(ds.speed.values[int(ds.limit.values.argmin())]) * RPM,
         "coupling_limit_mm": a["coupling"] / MM,
         "process": {"speed_rpm": p.spindle * RPM, "depth_mm": p.cut.axial / MM, "limit_mm": limit / MM,
             "multiplier": a["at_process"],

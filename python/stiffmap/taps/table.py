@@ -60,9 +60,13 @@ def load_taps(path: str | PathLike[str]) -> TapTest:
     if not p.is_file():
         raise FileError("no such table of tap tests", file=str(path))
     with p.open(newline="", encoding="utf-8-sig") as file:
-        rows = [
-            r for r in csv.reader(file) if any(c.strip() for c in r) and not r[0].lstrip().startswith("#")
+        table = csv.reader(file)
+        filled = [
+            (table.line_num, r)
+            for r in table
+            if any(c.strip() for c in r) and not r[0].lstrip().startswith("#")
         ]
+    lines, rows = [n for n, _ in filled], [r for _, r in filled]
     head = [h.strip() for h in rows[0]] if rows else []
     missing, unknown = [c for c in NEEDED if c not in head], [c for c in head if c not in KNOWN]
     if missing or unknown or len(rows) < 2:
@@ -79,9 +83,11 @@ def load_taps(path: str | PathLike[str]) -> TapTest:
     data = {c: np.full(len(rows) - 1, np.nan) for c in KNOWN}
     for i, row in enumerate(rows[1:]):
         if len(row) != len(head):
-            raise FileError(f"expected {len(head)} cells, found {len(row)}", file=str(path), line=i + 2)
+            raise FileError(
+                f"expected {len(head)} cells, found {len(row)}", file=str(path), line=lines[i + 1]
+            )
         for name, cell in zip(head, row, strict=True):
-            data[name][i] = _number(cell, name, str(path), i + 2)
+            data[name][i] = _number(cell, name, str(path), lines[i + 1])
     f = data["frequency_Hz"]
     for name, wrong in (
         ("frequency_Hz", ~(f > 0)),
@@ -91,7 +97,9 @@ def load_taps(path: str | PathLike[str]) -> TapTest:
         if wrong.any():
             i = int(np.argmax(wrong))
             raise FileError(
-                f"{name}: expected a number above zero, found {data[name][i]:g}", file=str(path), line=i + 2
+                f"{name}: expected a number above zero, found {data[name][i]:g}",
+                file=str(path),
+                line=lines[i + 1],
             )
     way = np.stack([data[f"dir_{a}"] for a in "xyz"], axis=1)
     size = np.linalg.norm(way, axis=1, keepdims=True)

@@ -113,6 +113,8 @@ def test_statics_and_frequencies_must_say_the_same(arm, static_scale, agree):
         ("x_mm,y_mm,z_mm,frequency_Hz,u_Hz\n1,2,3,9,0\n", "u_Hz: expected a number above zero"),
         ("x_mm,y_mm,z_mm,frequency_Hz\n1,2,3\n", "expected 4 cells, found 3"),
         ("", "no rows|missing"),
+        ("x_mm,y_mm,z_mm,frequency_rad_s\n1,2,3,60\n", "missing frequency_Hz"),
+        ("# by hand\nx_mm,y_mm,z_mm,frequency_Hz\n1,2,3,9\n\n1,2,3,-9\n", "line 5.*found -9"),
     ],
 )
 def test_bad_tables_are_one_message(tmp_path, text, message):
@@ -126,3 +128,26 @@ def test_poses_out_of_reach_are_said(arm):
     far = tapped(arm)
     with pytest.raises(sm.StiffmapError, match="no pose of the tap test can be reached"):
         predict_taps(arm, TapTest(far.position + 50.0, far.frequency, far.u, far.ratio, far.direction))
+
+
+def test_poses_to_tap_are_chosen_one_by_one(arm):
+    from stiffmap.taps import where_to_tap
+
+    chosen = where_to_tap(arm, 2, tries=12, seed=3)
+    assert chosen.shape == (2, 3) and not np.allclose(*chosen)
+    low, high = arm.workspace
+    assert ((chosen >= low) & (chosen <= high)).all()
+    np.testing.assert_array_equal(where_to_tap(arm, 1, tries=12, seed=3)[0], chosen[0])
+    with pytest.raises(sm.StiffmapError, match="at most 2 poses"):
+        where_to_tap(arm, 3, tries=2)
+
+
+def test_information_of_poses_is_that_of_the_inverse_covariance():
+    from stiffmap.taps.plan import information
+
+    rng = np.random.default_rng(0)
+    A, J, rows = rng.normal(size=(6, 2)), rng.normal(size=(6, 3)), np.array([1, 1, 0, 1, 1, 0], bool)
+    both = np.hstack([A, J])[rows]
+    joint = np.linalg.inv(np.eye(5) + both.T @ both)[:2, :2]
+    assert information(A, J, rows) == pytest.approx(-np.log(np.linalg.det(joint)), rel=1e-12)
+    assert information(A, J, np.ones(6, bool)) > information(A, J, rows)
