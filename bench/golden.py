@@ -91,7 +91,7 @@ def held() -> Iterator[Item]:
         p, w = poses(machine, 8)
         d = 0.5 * machine.solve(p, w).displacement
         yield from fields(f"{name} held", machine.wrench(p, np.nan_to_num(d)), HELD)
-        inside = sm.assembly_stress(machine, p, wrench=w)
+        inside = sm.assembly_wrenches(machine, p, wrench=w, gravity=(0.0, 0.0, 0.0))
         for group in ("springs", "joints", "legs"):
             yield from ((f"{name} {group} {n}", v) for n, v in getattr(inside, group).items())
 

@@ -102,7 +102,7 @@ def swing_table_stress() -> Figure:
     changed = replace(d, legs=legs)
     assert changed != d, "no offset of the bar's length was found"
     return stress_figure(
-        sm.assembly_stress(sm.Machine(changed), d.home.p), "swing-table, bar back_right 0.05 mm too long"
+        sm.assembly_wrenches(sm.Machine(changed), d.home.p), "swing-table, bar back_right 0.05 mm too long"
     )
 
 

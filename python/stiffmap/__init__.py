@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from stiffmap.experiment import Experiment, Residual, load_experiment
     from stiffmap.experiment.calls import residual, simulate
     from stiffmap.files.shipped import machine_names
-    from stiffmap.internal_wrenches import assembly_stress
+    from stiffmap.internal_wrenches import assembly_stress, assembly_wrenches
     from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
     from stiffmap.link import identify_link
     from stiffmap.machine import Machine, load_machine
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
         load_process,
     )
     from stiffmap.solution import Solution
+    from stiffmap.unreachable import why_unreachable
     from stiffmap.urdf.to_machine import import_urdf
     from stiffmap.vibration import frequency_response
 
@@ -76,6 +77,7 @@ _HOME = {
     "velocity_transmission": "stiffmap.performance",
     "workspace_volume": "stiffmap.performance",
     "worst_deflection": "stiffmap.performance",
+    "why_unreachable": "stiffmap.unreachable",
     "Diagnosis": "stiffmap.diagnosis",
     "compensate": "stiffmap.compensation",
     "Experiment": "stiffmap.experiment",
@@ -99,6 +101,7 @@ _HOME = {
     "DeflectionBudget": "stiffmap.budget",
     "deflection_budget": "stiffmap.budget",
     "assembly_stress": "stiffmap.internal_wrenches",
+    "assembly_wrenches": "stiffmap.internal_wrenches",
     "design_sweep": "stiffmap.maps",
     "error_map": "stiffmap.maps",
     "import_urdf": "stiffmap.urdf.to_machine",
@@ -141,6 +144,7 @@ __all__ = [
     "__version__",
     "accuracy_transmission",
     "assembly_stress",
+    "assembly_wrenches",
     "calibrate",
     "compensate",
     "cutting_force",
@@ -182,6 +186,7 @@ __all__ = [
     "velocity_section",
     "velocity_transmission",
     "vibration_map",
+    "why_unreachable",
     "workspace_volume",
     "worst_deflection",
 ]

@@ -104,7 +104,7 @@ class DeflectionBudget:
 def deflection_budget(
     machine: Machine,
     position: ArrayLike | None = None,
-    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    wrench: ArrayLike | None = None,
     *,
     rotation: ArrayLike | None = None,
     point: str = "tcp",
@@ -112,7 +112,7 @@ def deflection_budget(
 ) -> DeflectionBudget:
     """How much of the tool's deflection each spring, elastic joint and drive causes.
 
-    position (3,) m, None: home; wrench (6,) N, N·m at `point`; gravity (3,) m/s², None: the machine
+    position (3,) m, None: home; wrench (6,) N, N·m at `point`, None: none; gravity (3,) m/s², None: the machine
     file's. By the unit-load theorem an element that deflects by t moves the point by Nᵀ t, where N is the
     wrench in the element under a unit wrench at the point. With N at half of the load the contributions sum
     to the displacement to first order; what is left is of second order in the load (`rest_share`).
@@ -120,7 +120,7 @@ def deflection_budget(
     Raises StiffmapError where the pose has no stable equilibrium.
     """
     p = machine.description.home.p if position is None else real_array(position, "position")
-    load = real_array(wrench, "wrench")
+    load = np.zeros(6) if wrench is None else real_array(wrench, "wrench")
     g = machine.compiled.gravity(gravity)
     options: SolveKeywords = {"rotation": rotation, "point": point, "method": "reference"}
     cases = ((load, g), (np.zeros(6), np.zeros(3)))

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.broadcasting import Floats, real_array, rows, thread_count
+from stiffmap.deprecation import warn_renamed
 from stiffmap.description.tree import joints
+from stiffmap.files.load import Source
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.short import short_repr
 
@@ -39,20 +41,20 @@ class InternalWrenches:
 
 
 @takes_machine
-def assembly_stress(
+def assembly_wrenches(
     machine: Machine,
     position: ArrayLike,
     *,
     wrench: ArrayLike | None = None,
     rotation: ArrayLike | None = None,
     point: str = "tcp",
-    gravity: ArrayLike | None = (0.0, 0.0, 0.0),
+    gravity: ArrayLike | None = None,
     threads: int | None = None,
 ) -> InternalWrenches:
-    """Internal wrenches at commanded poses, by default without any load.
+    """Internal wrenches at commanded poses, by default under the gravity of the machine file alone.
 
     They come from `actual` geometry that differs from the nominal one where legs are over-constrained
-    (assembly stress), and from springs with a `rest` deflection (preload). Statically determinate legs
+    (assembly), and from springs with a `rest` deflection (preload). Statically determinate legs
     carry none.
 
     position (..., 3) m; wrench (..., 6) at `point`, None: none; gravity (3,) m/s², None: what the
@@ -95,4 +97,24 @@ def _has_law(machine: Machine, name: str) -> bool:
     return any(
         any(j.laws) and (name == n or name.rpartition(".")[0] == n)
         for n, j in joints(machine.description).items()
+    )
+
+
+def assembly_stress(
+    machine: Machine | Source,
+    position: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    point: str = "tcp",
+    gravity: ArrayLike | None = (0.0, 0.0, 0.0),
+    threads: int | None = None,
+) -> InternalWrenches:
+    """Deprecated name of `assembly_wrenches`, without gravity by default: (..., 3) m, (..., 6) N, N·m.
+
+    Raises StiffmapError for bad input.
+    """
+    warn_renamed("assembly_stress()", "assembly_wrenches(gravity=)")
+    return assembly_wrenches(
+        machine, position, wrench=wrench, rotation=rotation, point=point, gravity=gravity, threads=threads
     )

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, wraps
 from os import PathLike
-from types import FrameType
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
 
 import numpy as np
@@ -16,6 +14,7 @@ from numpy.typing import ArrayLike
 from stiffmap.addresses import Listed, listed
 from stiffmap.broadcasting import Floats
 from stiffmap.compiled import CompiledMachine, Status
+from stiffmap.deprecation import frames_of_this_package, warn_renamed
 from stiffmap.derivatives import Prepared, Request, differentiate, prepare, read_requests
 from stiffmap.description import MachineDescription
 from stiffmap.effects import add_effect
@@ -164,7 +163,7 @@ class Machine:
         threads
             None: all cores that this process may use.
         options
-            All of these at once, but the derivatives; a keyword given as well goes before its field.
+            Deprecated: give its fields as keywords.
 
         Notes
         -----
@@ -174,9 +173,11 @@ class Machine:
             one = self._compiled.solve_one(position, wrench)
             if one is not None:
                 s = Solution(one, (), self._compiled.names, "tcp")
-                if not sum(map(abs, position)) <= METRES_TOO_FAR * self._compiled.length:  # type: ignore[union-attr, arg-type]  # plain numbers; nan too
+                if not sum(map(abs, position)) <= METRES_TOO_FAR * self._compiled.length:  # type: ignore[arg-type]  # plain numbers; nan too
                     hint_metres(self, position, bool(s.status == Status.UNREACHABLE))
                 return s
+        if options is not None:
+            warn_renamed("solve(options=)", "its fields as keywords")
         call = Call(position, wrench, merged(options, given))
         if not derivatives:
             s = solve_call(self._compiled, call)[0]
@@ -201,6 +202,8 @@ class Machine:
         (as in `solve`); `Solution.unloaded` holds it, and displacements count from there. The other arguments
         are those of `solve`. UNREACHABLE where the actuators do not go together. StiffmapError for bad input.
         """
+        if options is not None:
+            warn_renamed("solve_joints(options=)", "its fields as keywords")
         home = self._description.home.p
         return solve_joints(self._compiled, actuators, Call(home, wrench, merged(options, given)))
 
@@ -275,22 +278,47 @@ class Machine:
         *,
         port: int | None = None,
         browser: bool = True,
-        **state: Any,
+        rotation: ArrayLike | None = None,
+        force: ArrayLike | None = None,
+        moment: ArrayLike | None = None,
+        gravity: ArrayLike | None = None,
+        plane: str | None = None,
+        normal: ArrayLike | None = None,
+        quantity: str | None = None,
+        tolerance: float | None = None,
+        magnification: float | None = None,
+        frequency: float | None = None,
+        start: ArrayLike | None = None,
+        changes: Mapping[str, float] | None = None,
+        experiment: Any = None,
+        diagnosis: Any = None,
+        path: Any = None,
     ) -> Any:
         """Look at the machine and its map live in a browser; the view that is open is returned (``close()`` ends it).
 
-        position (3,) m, None: home. port: of 127.0.0.1; None: a free one from 8080 on. browser: whether to open one.
-        state: fields of `stiffmap.view.State`, such as ``force=(0, 0, -300)`` N, ``plane="x"``, ``quantity="worst"``,
-        ``changes={"x.foot/beam.EIx": 4000.0}``; SI, base axes; and what is drawn beside the machine: ``experiment``
-        (an `Experiment` or its folder), ``diagnosis`` (a `Diagnosis`, or the folder of one), ``path`` (a `Toolpath`, its
-        file, or positions (n, 3) m). In a notebook the view is shown where it is the
-        last value of a cell. docs/view.md. Raises MissingPartError without the extra ``[view]`` (viser),
-        StiffmapError for bad input and for a pose that the machine cannot take.
+        All in SI and base axes; what is None is as `stiffmap.view.State` has it. In a notebook the view is shown where it is
+        the last value of a cell. docs/view.md.
+
+        position (3,) m, None: home; rotation (3,) rad, rotation vector. port: of 127.0.0.1; None: a free one from 8080 on.
+        browser: whether to open one. force (3,) N and moment (3,) N·m on the tool; gravity (3,) m/s². plane: the axis across
+        which it lies (x, y, z), or ``free`` with a `normal` (3,). quantity: deflection, worst, stiffness, margin, status,
+        frequency, dynamic. tolerance m; magnification of the deflected machine; frequency (Hz) of the dynamic stiffness.
+        start: all coordinates that name an assembly mode. changes: numbers by their addresses, such as
+        ``{"x.foot/beam.EIx": 4000.0}``. Drawn as well: an experiment (or its folder), a diagnosis (or the folder of
+        one), a path of the tool (a `Toolpath`, its file, or positions (n, 3) m).
+
+        Raises MissingPartError without the extra ``[view]`` (viser), StiffmapError for bad input and for a pose that the
+        machine cannot take.
         """
         from importlib import import_module
 
+        given = {
+            "rotation": rotation, "force": force, "moment": moment, "gravity": gravity, "plane": plane, "normal": normal,
+            "quantity": quantity, "tolerance": tolerance, "magnification": magnification, "frequency": frequency,
+            "start": start, "changes": changes, "experiment": experiment, "diagnosis": diagnosis, "path": path,
+        }  # fmt: skip
         return import_module(f"{__package__}.view").open_view(
-            self, position, port=port, browser=browser, **state
+            self, position, port=port, browser=browser, **{k: v for k, v in given.items() if v is not None}
         )
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -356,11 +384,11 @@ def hint_metres(machine: Machine, position: ArrayLike, failed: bool) -> None:
     if not finite.all():
         rows = np.atleast_1d(finite.all(axis=-1))
         text = f"{int((~rows).sum())} of {rows.size} positions are not finite numbers (nan or inf); their status is UNREACHABLE"
-        warnings.warn(text, stacklevel=_frames_of_this_package())
+        warnings.warn(text, stacklevel=frames_of_this_package())
         return
     text = metres_expected(machine.compiled, position) if failed else ""
     if text:
-        warnings.warn(f"no pose can be reached: {text}", stacklevel=_frames_of_this_package())
+        warnings.warn(f"no pose can be reached: {text}", stacklevel=frames_of_this_package())
 
 
 def metres_expected(machine: CompiledMachine, position: ArrayLike) -> str:
@@ -372,12 +400,3 @@ def metres_expected(machine: CompiledMachine, position: ArrayLike) -> str:
         f"positions up to {far:g} m, the machine measures {machine.length:.2g} m; "
         "metres are expected (200 mm is 0.2)"
     )
-
-
-def _frames_of_this_package() -> int:
-    """How many callers, from `hint_metres` on, stand in stiffmap itself."""
-    frame: FrameType | None = sys._getframe(1)
-    count = 1
-    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == __package__:
-        frame, count = frame.f_back, count + 1
-    return count

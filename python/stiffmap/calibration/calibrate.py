@@ -16,6 +16,7 @@ from stiffmap.calibration.defaults import Tolerances
 from stiffmap.calibration.model import Progress
 from stiffmap.calibration.result import Calibration
 from stiffmap.calibration.unknowns import GROUPS, unknowns
+from stiffmap.deprecation import renamed
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.experiment import Experiment
@@ -26,6 +27,7 @@ from stiffmap.one_thread import on_one_thread
 
 
 @on_one_thread
+@renamed(budget="time_limit")
 def calibrate(
     machine: Machine | str | PathLike[str],
     experiment: Experiment | str | PathLike[str],
@@ -34,7 +36,7 @@ def calibrate(
     exclude: Sequence[str] = (),
     seed: int = 0,
     threads: int | None = None,
-    budget: float | None = None,
+    time_limit: float | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
     """What a machine's uncertain numbers are, and which of them the readings can determine.
@@ -51,7 +53,7 @@ def calibrate(
         Groups that are left out (`GROUPS`): what is known to be right.
     seed
         Of the folds.
-    budget
+    time_limit
         Seconds after which no new step begins; the answer is then the best so far, and says so.
     progress
         Called with what is being tried, its number, and of how many.
@@ -75,5 +77,5 @@ def calibrate(
         for p in unknowns(machine.description, predictor.experiment, certified(tolerances, data))
         if p.group not in exclude
     ]
-    until = time.monotonic() + budget if budget else np.inf
+    until = time.monotonic() + time_limit if time_limit else np.inf
     return conclude(Calibrator.of(predictor, wanted, until, progress), seed)

@@ -48,7 +48,7 @@ def calibrate_command(
         data,
         tolerances=Tolerances().scaled(tolerance),
         exclude=exclude or (),
-        budget=budget,
+        time_limit=budget,
         seed=seed,
         threads=threads,
     )

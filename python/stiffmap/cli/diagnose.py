@@ -60,7 +60,7 @@ def diagnose_command(
         seed=seed,
         threads=threads,
         exclude=exclude or (),
-        budget=budget,
+        time_limit=budget,
         scheduler=scheduler,
         tolerances=Tolerances().scaled(tolerance),
         progress=None if silent else _say,

@@ -104,7 +104,7 @@ def simulate(
     layout = make.with_command(layout, chosen) if command else layout
     if not 0 <= outliers < 1:
         raise StiffmapError(f"--outliers: expected a share from 0 to below 1, got {outliers:g}")
-    twin = run(chosen, layout, [placed(chosen, e) for e in effect or []], seed=seed, outliers=outliers)
+    twin = run(chosen, layout, [placed(chosen, e) for e in effect or []], seed=seed, outlier_share=outliers)
     save_experiment(twin, output, "virtual experiment" + "".join(f"; {e}" for e in effect or []))
     number = int(twin.groups.max()) + 1
     print(f"{output}: {len(twin)} rows of {twin.quantity} at {number} poses; reads {', '.join(twin.axes)}")

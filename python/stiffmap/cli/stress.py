@@ -53,7 +53,7 @@ def stress(
 
     m = machine_with(machine, effect)
     none = (0.0, 0.0, 0.0)
-    result = stiffmap.assembly_stress(
+    result = stiffmap.assembly_wrenches(
         m, position(at, m), rotation=rotation(turned), gravity=none if gravity_ is None else gravity(gravity_)
     )
     files = []

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from stiffmap.broadcasting import Floats, trailing, wrench_array
+from stiffmap.deprecation import renamed
 from stiffmap.description import TASK
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import AXES, Experiment
@@ -99,13 +100,14 @@ class Commands:
         )
 
 
+@renamed(joints="actuators")
 @takes_machine
 def compensate(
     machine: Machine,
     position: ArrayLike | None = None,
     rotation: ArrayLike | None = None,
     *,
-    joints: ArrayLike | None = None,
+    actuators: ArrayLike | None = None,
     wrench: ArrayLike | None = None,
     approach: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
@@ -122,7 +124,7 @@ def compensate(
         declared geometry.
     position, rotation
         (n, 3) m and (n, 3, 3) wanted tool poses; rotation None: as at home.
-    joints
+    actuators
         (n, actuators) instead: wanted is the pose that the declared machine takes there, and the commands stay in
         that configuration. Needed for redundant arms and other branches.
     wrench
@@ -144,7 +146,7 @@ def compensate(
     StiffmapError
         For bad input.
     """
-    plan = _plan(machine, position, rotation, joints, wrench, approach, gravity, point)
+    plan = _plan(machine, position, rotation, actuators, wrench, approach, gravity, point)
     wanted_p, wanted_r = plan.position, _turns(machine, plan)
     chosen = _components(machine, components)
     start = coordinates_of(machine, plan)
@@ -183,19 +185,19 @@ def _plan(
     machine: Machine,
     position: ArrayLike | None,
     rotation: ArrayLike | None,
-    joints: ArrayLike | None,
+    actuators: ArrayLike | None,
     wrench: ArrayLike | None,
     approach: ArrayLike | None,
     gravity: ArrayLike | None,
     point: str,
 ) -> Experiment:
     """What is wanted, as a plan of positions."""
-    if (position is None) == (joints is None):
-        raise StiffmapError("compensate: give either position or joints")
-    if joints is not None:
+    if (position is None) == (actuators is None):
+        raise StiffmapError("compensate: give either position or actuators")
+    if actuators is not None:
         count = len(machine.actuators)
         at = forward_kinematics(
-            machine, np.atleast_2d(trailing(joints, (count,), "joints", "actuator coordinates"))
+            machine, np.atleast_2d(trailing(actuators, (count,), "actuators", "actuator coordinates"))
         )
     else:
         p = np.atleast_2d(trailing(position, (3,), "position", "positions (m)"))  # type: ignore[arg-type]

@@ -13,6 +13,7 @@ from scipy.stats import chi2
 
 from stiffmap.broadcasting import whole_number
 from stiffmap.calibration import GROUPS, Tolerances, certified
+from stiffmap.deprecation import renamed
 from stiffmap.diagnosis.candidates.candidates import check_kinds
 from stiffmap.diagnosis.clock import Clock, Progress
 from stiffmap.diagnosis.decision.beside_calibration import Answer, find_effects
@@ -31,6 +32,7 @@ from stiffmap.diagnosis.rivals.explain import Explanation, explain
 from stiffmap.diagnosis.rivals.separation import separation
 from stiffmap.diagnosis.search.detectability import detectable
 from stiffmap.diagnosis.search.study import Finding, Study, study
+from stiffmap.diagnosis.slips.factors import named_within
 from stiffmap.diagnosis.slips.find import find_slip
 from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.experiment.comparison.limitations import limitations, refuse
@@ -43,15 +45,18 @@ from stiffmap.experiment.noise.over_time import over_time
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
+from stiffmap.number_text import within
 from stiffmap.one_thread import on_one_thread
 
 SLIPS = 2
 """Mistakes in the readings that are undone one after the other."""
+GAINS = ("load_gain", "sensor_gain")
 LISTED = 20
 """Patterns that a verdict lists at most."""
 
 
 @on_one_thread
+@renamed(budget="time_limit")
 def diagnose(
     machine: Machine | str | PathLike[str],
     experiment: Experiment | str | PathLike[str],
@@ -61,7 +66,7 @@ def diagnose(
     cross_validate: bool = True,
     tolerances: Tolerances | None = None,
     exclude: Sequence[str] = (),
-    budget: float | None = None,
+    time_limit: float | None = None,
     progress: Progress | None = None,
     scheduler: Any = None,
 ) -> Diagnosis:
@@ -84,7 +89,7 @@ def diagnose(
         only jointly with them (docs/calibration.md).
     exclude
         Kinds of effects, or groups of the calibration, that are known not to be.
-    budget
+    time_limit
         Seconds after which no new step begins; the answer is then the best so far, `stopped` is set, and so it
         is after Ctrl-C, also among the sensitivities (`not_tried` lists the effects that have none). None: a bound on what is tried instead, the same on every computer, which readings that
         nothing explains reach; `not_tried` then says what was left out.
@@ -102,14 +107,14 @@ def diagnose(
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
-    clock = Clock.of(budget, progress)
+    clock = Clock.of(time_limit, progress)
     groups = tuple(n for n in exclude if n in GROUPS)
     without = check_kinds(n for n in exclude if n not in GROUPS)
     with clock.on_interrupt():
         predictor = Predictor(machine, data, threads=threads)
         refuse(predictor.experiment, predictor())
         s, slips = without_slips(study(predictor, seed, None, clock, without, scheduler), seed)
-        if budget is None:
+        if time_limit is None:
             clock.bound(s.predictor)
         answer = _diagnosed(s, seed, certified(tolerances, data), groups, cross_validate)
         return with_slips(answer, slips) if slips else answer
@@ -131,7 +136,20 @@ def without_slips(s: Study, seed: int) -> tuple[Study, list[Slip]]:
 
 def with_slips(d: Diagnosis, slips: Sequence[Slip]) -> Diagnosis:
     """The answer that names mistakes in the readings before any cause."""
-    return replace(d, slips=list(slips), verdict="readings")
+    return replace(d, slips=[by_gain(s, d.effects) for s in slips], verdict="readings")
+
+
+def by_gain(s: Slip, effects: Sequence[Effect]) -> Slip:
+    """A common factor that no known one is, named by the gain that the diagnosis found beside a part of the machine."""
+    gains = [e.parameters["gain"] for e in effects if e.kind in GAINS and "gain" in e.parameters]
+    if s.kind != "factor" or s.undone or len(gains) != 1:
+        return s
+    value, low, high, _ = gains[0]
+    names = named_within(low, high)
+    if not names:
+        return s
+    seen = f"{s.seen}, {within(value, (high - low) / 3.92)} times beside the cause that is found as well"
+    return replace(s, check=f"check first: {', or '.join(names)}", seen=seen)
 
 
 def _diagnosed(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 
+from stiffmap.deprecation import renamed
 from stiffmap.description import AppliedEffect
 from stiffmap.effects import parse_effect
 from stiffmap.effects.check import place_of
@@ -46,13 +47,14 @@ def residual(
     return comparison.residual(m, as_experiment(experiment), effects_of(m, effects), threads=threads)
 
 
+@renamed(outliers="outlier_share")
 def simulate(
     machine: Machine | Source,
     plan: Experiment | str | PathLike[str],
     effects: Effects = (),
     *,
     seed: int = 0,
-    outliers: float = 0.0,
+    outlier_share: float = 0.0,
 ) -> Experiment:
     """The plan's readings on a machine that has `effects`, with noise of the declared size.
 
@@ -66,14 +68,14 @@ def simulate(
         What the simulated machine has, as text (``dead_zone actuator y half_width=12um``) or records.
     seed
         Of the noise.
-    outliers
+    outlier_share
         Share of rows that are off by 5 to 20 standard deviations.
 
     Readings of the answer are (rows, axes) in m and rad. Raises StiffmapError where no noise is declared or the machine
     cannot be solved.
     """
     m = as_machine(machine)
-    return virtual.simulate(m, as_experiment(plan), effects_of(m, effects), seed=seed, outliers=outliers)
+    return virtual.simulate(m, as_experiment(plan), effects_of(m, effects), seed=seed, outliers=outlier_share)
 
 
 def as_experiment(given: Experiment | str | PathLike[str]) -> Experiment:

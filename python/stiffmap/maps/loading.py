@@ -28,7 +28,7 @@ class Loading:
 
     def solve(self, position: Floats, wrench: Floats, *, stiffness: bool = True) -> Solution:
         """Equilibria at positions (..., 3) under wrenches (..., 6), broadcast together; without the 6x6 if not asked."""
-        return self.machine.solve(position, wrench, options=replace(self.options, stiffness=stiffness))
+        return self.machine.solve(position, wrench, **replace(self.options, stiffness=stiffness).keywords())
 
     def solve_varied(
         self, position: Floats, wrench: Floats, variants: tuple[Machine, ...]

@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats, whole_number
+from stiffmap.deprecation import warn_renamed
 from stiffmap.errors import StiffmapError
 from stiffmap.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
 from stiffmap.machine import Machine, takes_machine
@@ -36,13 +37,15 @@ def polar(
     """Deflection against the direction of a pure force in a plane, at one position.
 
     position (3,) m; force N; `directions` equally spaced directions from the plane's first axis
-    towards its second, each a loaded equilibrium. `options` and other keywords as in `Machine.solve`.
+    towards its second, each a loaded equilibrium. Other keywords as in `Machine.solve`; `options` is deprecated.
 
     Returns a Dataset with dimension ``angle`` (rad): displacement, deflection, deflection_xy, status,
     flags, and the scalars worst_deflection, worst_direction, best_deflection, best_direction (whole
     translation; with ``_xy`` in the plane) searched between the directions. Failed directions hold NaN
     and their status. Raises StiffmapError for bad input.
     """
+    if options is not None:
+        warn_renamed("options=", "its fields as keywords")
     loading = Loading(machine, options, **given)
     p, axes = place(position), plane_axes(plane)
     force = magnitude(force, "force", "N")

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from stiffmap.deprecation import warn_renamed
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.maps.fixed_order_sums import dot
@@ -44,7 +45,7 @@ def sweep(
     other side. That branch ends at the `limit`, or where the force falls to zero.
 
     position (3,) m; direction (3,), any length; forces (n,) N, negative ones act against it;
-    limit of either sign; steps to the limit. `options` and other keywords as in `Machine.solve`.
+    limit of either sign; steps to the limit. Other keywords as in `Machine.solve`; `options` is deprecated.
 
     Returns a Dataset with dimension ``step`` and the coordinate force: displacement, deflection, deflection_xy,
     deflection_along (component along the force), compliance_along (of a little more force, m/N; NaN on a path),
@@ -56,6 +57,8 @@ def sweep(
     ``end`` and ``crossing_end`` say why its branches ended (empty for single forces).
     Raises StiffmapError for bad input.
     """
+    if options is not None:
+        warn_renamed("options=", "its fields as keywords")
     loading = Loading(machine, options, **given)
     p, u = place(position), unit(direction)
     if forces is None or control != "force":

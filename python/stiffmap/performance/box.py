@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats, real_array
+from stiffmap.deprecation import renamed
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.box_search import BoxSearch
@@ -68,13 +69,14 @@ class LargestBox:
         return np.stack([local - self.edges / 2, local + self.edges / 2])
 
 
+@renamed(factors="norm", gap="tolerance", work="max_evaluations")
 @takes_machine
 def largest_box(
     machine: Machine,
     proportions: ArrayLike = (1.0, 1.0, 1.0),
     *,
     transmission: tuple[float, float] | None = (0.5, 2.0),
-    factors: str = "sphere",
+    norm: str = "sphere",
     length: float | None = None,
     ranges: bool = True,
     joints: bool = True,
@@ -83,8 +85,8 @@ def largest_box(
     rotation: ArrayLike | None = None,
     orientation: ArrayLike | str | None = None,
     region: ArrayLike | None = None,
-    gap: float = 1e-4,
-    work: int = WORK,
+    tolerance: float = 1e-4,
+    max_evaluations: int = WORK,
     threads: int | None = None,
     scheduler: Any = None,
 ) -> LargestBox:
@@ -96,7 +98,7 @@ def largest_box(
         (3,) edges relative to each other, (1, 1, 1) for a cube.
     transmission
         Bounds on the transmission factors; None: not asked for.
-    factors
+    norm
         ``sphere``: singular values of the (weighted) Jacobian; ``cube``: `cube_min` and `cube_max` of
         `velocity_transmission`, each drive within one unit of speed.
     length
@@ -115,9 +117,9 @@ def largest_box(
         (the bounds then hold for that orientation).
     region
         (2, 3) m, where to look (in the box's axes); None: the machine's workspace, three times as large.
-    gap
+    tolerance
         m: search goes on until upper and lower bound are this near ...
-    work
+    max_evaluations
         ... or this many poses and cells were closed, those of the climb not counted; the bounds hold all the same.
     scheduler
         Address of a dask scheduler, or a `distributed.Client`: its workers prove the cells, with the same answer.
@@ -136,22 +138,22 @@ def largest_box(
     shape = real_array(proportions, "proportions")
     if shape.shape != (3,) or not (np.isfinite(shape).all() and (shape > 0).all()):
         raise StiffmapError(f"proportions: expected 3 positive numbers, got {proportions!r}")
-    if not gap > 0:
-        raise StiffmapError(f"gap: expected a positive length in m, got {gap!r}")
+    if not tolerance > 0:
+        raise StiffmapError(f"tolerance: expected a positive length in m, got {tolerance!r}")
     given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
     bounds = Bounds(
-        machine, given, transmission, factors, length, ranges, joints, clearance, deflection, threads
+        machine, given, transmission, norm, length, ranges, joints, clearance, deflection, threads
     )
     space, shape = _region(machine, region, shape / shape[0])
     if isinstance(orientation, str):
         if orientation != "search":
             raise StiffmapError(f"orientation: expected 'search' or (3, 3) axes, got {orientation!r}")
-        axes = best_orientation(bounds, shape, space, gap)
+        axes = best_orientation(bounds, shape, space, tolerance)
     else:
         axes = np.eye(3) if orientation is None else as_rotations(real_array(orientation, "orientation"))
     space = space if region is not None and not isinstance(orientation, str) else turned(space, axes)
     with judge_on(bounds, scheduler) as judge:
-        found = BoxSearch(bounds, shape, axes, space, gap, work, judge).run()
+        found = BoxSearch(bounds, shape, axes, space, tolerance, max_evaluations, judge).run()
     why = bounds.unproven
     return LargestBox(
         edge=found.edge, edge_upper=found.upper, edges=found.edge * shape,

@@ -53,7 +53,7 @@ class Bounds:
                 )
         if self.factors not in ("sphere", "cube"):
             raise StiffmapError(
-                f"factors: expected 'sphere' (singular values) or 'cube' (each drive within its limit), got {self.factors!r}"
+                f"norm: expected 'sphere' (singular values) or 'cube' (each drive within its limit), got {self.factors!r}"
             )
         if self.clearance is not None and not self.clearance > 0:
             raise StiffmapError(f"clearance: expected a positive distance in m, got {self.clearance!r}")

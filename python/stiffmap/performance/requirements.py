@@ -10,6 +10,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from stiffmap.deprecation import renamed
 from stiffmap.errors import FileError
 from stiffmap.files.report import validated
 from stiffmap.files.schema.base import FileModel, Name
@@ -99,12 +100,13 @@ class Requirements:
         return dict(self.bounds).get(measure)
 
 
-def load_requirements(name_or_path: str | PathLike[str]) -> Requirements:
+@renamed(name_or_path="source")
+def load_requirements(source: str | PathLike[str]) -> Requirements:
     """Requirements from a file, or the shipped ones by name (``trimming``).
 
     Raises FileError naming file, line, key, what was expected and what was found.
     """
-    path = Path(name_or_path)
+    path = Path(source)
     shipped = Path(__file__).with_name(path.name if path.suffix else f"{path.name}.yaml")
     if not path.is_file():
         if not shipped.is_file() or len(path.parts) > 1:

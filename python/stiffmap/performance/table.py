@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import Floats, real_array, thread_count
+from stiffmap.deprecation import renamed
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.motion_files import Motion, load_motion
@@ -101,6 +102,7 @@ class MeasuresTable:
         }
 
 
+@renamed(gap="box_tolerance")
 @takes_machine
 def measures(
     machine: Machine,
@@ -115,7 +117,7 @@ def measures(
     length: float | None = None,
     gravity: ArrayLike | None = None,
     rotation: ArrayLike | None = None,
-    gap: float = 1e-4,
+    box_tolerance: float = 1e-4,
     toolpath: Motion | str | PathLike[str] | None = None,
     clearance: float | None = None,
     deflection: float | None = None,
@@ -140,7 +142,7 @@ def measures(
         Nodes along each edge of the box for kinematic measures, and for those that cost more.
     length
         Characteristic length, m, where units mix; None: the machine's own.
-    gap
+    box_tolerance
         m between the bounds of the largest box.
     toolpath
         A motion file (`load_motion`) for measures along the task's own path; None: the requirement's.
@@ -175,7 +177,7 @@ def measures(
             lowest.at_least if lowest and lowest.at_least is not None else 0.5,
             largest.at_most if largest and largest.at_most is not None else 2.0,
         ),
-        proportions=(1.0, float(edges[1] / edges[0]), float(edges[2] / edges[0])), nodes=nodes, coarse=coarse, gap=gap,
+        proportions=(1.0, float(edges[1] / edges[0]), float(edges[2] / edges[0])), nodes=nodes, coarse=coarse, gap=box_tolerance,
         length=length, gravity=None if gravity is None else real_array(gravity, "gravity"),
         rotation=None if rotation is None else real_array(rotation, "rotation"), threads=threads,
         toolpath=_motion(toolpath or task.toolpath),

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from stiffmap.broadcasting import Floats, random_numbers, real_array
+from stiffmap.deprecation import renamed
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.cells import halved
@@ -58,12 +59,13 @@ class Workspace:
         return self.ask(real_array(position, "position").reshape(-1, 3), self.drawn)
 
 
+@renamed(factors="norm")
 @takes_machine
 def workspace_volume(
     machine: Machine,
     *,
     transmission: tuple[float, float] | None = None,
-    factors: str = "sphere",
+    norm: str = "sphere",
     length: float | None = None,
     ranges: bool = True,
     joints: bool = True,
@@ -84,7 +86,7 @@ def workspace_volume(
 
     Parameters
     ----------
-    transmission, factors, length, ranges, joints, clearance, deflection, rotation
+    transmission, norm, length, ranges, joints, clearance, deflection, rotation
         Limits that a pose must keep, as in `largest_box`.
     singularity
         Least distance from singularities (measure ``singularity``: type 1, type 2, constraint; 0 to 1). Poses
@@ -112,7 +114,7 @@ def workspace_volume(
         raise StiffmapError(f"cells: expected 2 or more along each edge, got {cells!r}")
     given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
     bounds = Bounds(
-        machine, given, transmission, factors, length, ranges, joints, clearance, deflection, threads
+        machine, given, transmission, norm, length, ranges, joints, clearance, deflection, threads
     )
     ask = Inside(bounds, singularity)
     rng = random_numbers(seed)

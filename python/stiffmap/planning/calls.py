@@ -8,6 +8,7 @@ from os import PathLike
 from numpy.typing import ArrayLike
 
 from stiffmap.broadcasting import real_array
+from stiffmap.deprecation import renamed
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.calls import Effects, as_experiment, effects_of
@@ -17,6 +18,7 @@ from stiffmap.planning.design import Design, design
 from stiffmap.planning.monitor import Comparison, compare
 
 
+@renamed(at="position", load="wrench")
 def plan(
     machine: Machine | Source,
     identify: Effects,
@@ -28,8 +30,8 @@ def plan(
     poses: int = 60,
     force: float = 400.0,
     candidates: Experiment | str | PathLike[str] | None = None,
-    at: ArrayLike | None = None,
-    load: ArrayLike | None = None,
+    position: ArrayLike | None = None,
+    wrench: ArrayLike | None = None,
     frame: str = "known",
     tool: str = "known",
     axes: Sequence[str] = ("dx", "dy", "dz"),
@@ -50,7 +52,7 @@ def plan(
     aim
         ``identify`` (D-optimal), ``separate`` (needs `rival`), ``map`` (the map at the workpiece); None: ``separate`` where there
         is a rival, else ``identify``.
-    at, load
+    position, wrench
         With the aim ``map``: poses of the workpiece (m, 3) m and the wrench (6,) N, N·m there; None: corners of the
         workspace, `force` along x.
     candidates, done
@@ -75,8 +77,8 @@ def plan(
         poses=poses,
         force=force,
         candidates=None if candidates is None else as_experiment(candidates),
-        at=None if at is None else real_array(at, "at").reshape(-1, 3),
-        load=None if load is None else real_array(load, "load"),
+        at=None if position is None else real_array(position, "position").reshape(-1, 3),
+        load=None if wrench is None else real_array(wrench, "wrench"),
         frame=frame,
         tool=tool,
         axes=axes,

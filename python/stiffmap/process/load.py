@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from stiffmap.deprecation import renamed
 from stiffmap.errors import FileError, StiffmapError
 from stiffmap.files.schema.base import suggestion
 from stiffmap.process.build import process_of
@@ -21,27 +22,23 @@ def process_names() -> list[str]:
     return sorted(p.stem for p in FOLDER.glob("*.yaml"))
 
 
-def load_process(name_path_or_dict: str | PathLike[str] | Mapping[str, Any]) -> Process:
+@renamed(name_path_or_dict="source")
+def load_process(source: str | PathLike[str] | Mapping[str, Any]) -> Process:
     """A process by its shipped name (``trimming``, ``slot``), from a file, or from a mapping with the file's keys.
 
     Numbers carry units there (docs/milling.md); the result is in SI. Raises FileError naming file, line, key,
     what was expected and what was found.
     """
-    if isinstance(name_path_or_dict, Mapping):
-        return process_of(Document(dict(name_path_or_dict)), "process")
-    if not isinstance(name_path_or_dict, str | PathLike):
-        raise StiffmapError(
-            f"process: expected a name, a file or a mapping; got {type(name_path_or_dict).__name__}"
-        )
-    if str(name_path_or_dict) in process_names():
-        path = FOLDER / f"{name_path_or_dict}.yaml"
-    else:
-        path = Path(name_path_or_dict)
+    if isinstance(source, Mapping):
+        return process_of(Document(dict(source)), "process")
+    if not isinstance(source, str | PathLike):
+        raise StiffmapError(f"process: expected a name, a file or a mapping; got {type(source).__name__}")
+    path = FOLDER / f"{source}.yaml" if str(source) in process_names() else Path(source)
     if not path.is_file():
         known = process_names()
         raise FileError(
             f"no such process file, and no process of that name is shipped{suggestion(path.stem, known)}; "
             f"these are: {', '.join(known)}",
-            file=str(name_path_or_dict),
+            file=str(source),
         )
     return process_of(read(path), str(path))

@@ -1,4 +1,4 @@
-"""Tables whose rows are commanded joints: which column is which drive, and what an instrument read beside them."""
+"""Tables whose rows are commanded joints: which column is which drive, and what an instrument read with them."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def as_seen(c: Commanded, units: Mapping[str, str], difference: str) -> Commande
     """What was read as places in the instrument's own frame, where the table has them: frame, and place of the reflector on the
     tool, are then unknown.
 
-    Places are columns `px py pz`, or targets and differences side by side; `x y z` alone beside joints are asked for.
+    Places are columns `px py pz`, or targets and differences side by side; `x y z` alone with joints are asked for.
     """
     columns = guess(c.sheet.header, c.chosen)
     of = {k.meaning: k for k in columns if k.repeat == 0}
@@ -159,7 +159,7 @@ def as_seen(c: Commanded, units: Mapping[str, str], difference: str) -> Commande
         return c
     if not all(f"d{a}" in of for a in "xyz"):
         raise StiffmapError(
-            f"{c.sheet.file}: {', '.join(repr(of[a].name) for a in 'xyz')} beside commanded joints: if an instrument read them, say "
+            f"{c.sheet.file}: {', '.join(repr(of[a].name) for a in 'xyz')} with commanded joints: if an instrument read them, say "
             f"--map px='{of['x'].name}' --map py='{of['y'].name}' --map pz='{of['z'].name}'"
         )
     sign = 1.0 if difference == DIFFERENCES[0] else -1.0

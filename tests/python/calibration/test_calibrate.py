@@ -123,7 +123,7 @@ def test_unknowns_name_each_number_once() -> None:
 
 def test_a_budget_stops_early() -> None:
     machine, data, _ = drawn("linear-delta", 3)
-    c = calibrate(machine, data, budget=1e-6)
+    c = calibrate(machine, data, time_limit=1e-6)
     assert c.stopped
     assert "stopped early" in c.lines()[0]
 

@@ -54,7 +54,7 @@ def test_the_loaded_machine_stands_where_it_is_wanted(name: str) -> None:
 def test_a_redundant_configuration_stays_in_its_branch() -> None:
     machine = with_error("ur10")
     elbow_down = np.array([[0.4, -0.3, -1.7, 0.5, 1.2, 0.3]])
-    found = compensate(machine, joints=elbow_down)
+    found = compensate(machine, actuators=elbow_down)
     assert np.abs(found.actuators - elbow_down).max() < 2e-3
     np.testing.assert_allclose(found.actuators[0, 0] - elbow_down[0, 0], -1e-3, atol=1e-9)
 
@@ -77,7 +77,7 @@ def test_out_of_reach_is_nan_beside_good_rows() -> None:
 
 def test_bad_input() -> None:
     machine = sm.load_machine("ur10")
-    with pytest.raises(sm.StiffmapError, match="either position or joints"):
+    with pytest.raises(sm.StiffmapError, match="either position or actuators"):
         compensate(machine)
     with pytest.raises(sm.StiffmapError, match="got 'q'"):
         compensate(machine, [0, 0, 0], components=("q",))

@@ -93,7 +93,7 @@ def test_uncertain_numbers_widen_the_covariance() -> None:
 
 def test_a_budget_gives_the_best_so_far() -> None:
     machine, data = twin(2)
-    d = sm.diagnose(machine, data, budget=1e-3)
+    d = sm.diagnose(machine, data, time_limit=1e-3)
     assert d.stopped
     assert "stopped early" in d.lines()[-1]
 

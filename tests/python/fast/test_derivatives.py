@@ -104,7 +104,9 @@ def test_inputs(name: str) -> None:
 
         def solved(h: float, i: int = i) -> sm.Solution:
             call = _moved(machine.compiled, Call(poses, FORCE), name, i, h)
-            return machine.solve(call.position, call.wrench, options=call.options, method="reference")
+            return machine.solve(
+                call.position, call.wrench, **call.options.keywords() | {"method": "reference"}
+            )
 
         for q in QUANTITIES:
             true = richardson(

@@ -36,7 +36,7 @@ def test_one_long_bar_of_four() -> None:
     own bending, tilt about y by nothing (pins)."""
     longer = 1e-5
     machine = with_long_bar("back_right", longer)
-    stress = sm.assembly_stress(machine, [0, 0, L])
+    stress = sm.assembly_wrenches(machine, [0, 0, L])
     assert int(stress.status) == sm.Status.CONVERGED
     axial = EA / L
     about_x = 2.1e11 * 0.030 * 0.012**3 / 12
@@ -63,7 +63,7 @@ def test_three_legs_that_just_do_carry_nothing() -> None:
     moved = replace(frame, actual=Pose.of(frame.nominal.p + [1e-3, 2e-3, -1e-3]))
     wrong = (moved, *first.elements[1:])
     machine = sm.Machine(replace(description, legs=(replace(first, elements=wrong), *others)))
-    stress = sm.assembly_stress(machine, [0.05, 0, 0.7])
+    stress = sm.assembly_wrenches(machine, [0.05, 0, 0.7])
     assert np.linalg.norm(stress.displacement[:3]) > 1e-4
     for w in stress.springs.values():
         np.testing.assert_allclose(w, 0, atol=1e-5)
@@ -76,7 +76,7 @@ def test_preload_of_springs_in_line() -> None:
     left = Spring("spring", stiffness=b.matrix(np.diag([k1] + [1e6] * 5)), rest=rest)
     right = Spring("spring", stiffness=b.matrix(np.diag([k2] + [1e6] * 5)))
     machine = b.parallel((left,), (right,))
-    stress = sm.assembly_stress(machine, [0, 0, 0])
+    stress = sm.assembly_wrenches(machine, [0, 0, 0])
     force = k1 * k2 * u / (k1 + k2)
     np.testing.assert_allclose(stress.springs["leg1.spring"], [-force, 0, 0, 0, 0, 0], rtol=1e-10, atol=1e-9)
     np.testing.assert_allclose(stress.springs["leg2.spring"], [force, 0, 0, 0, 0, 0], rtol=1e-10, atol=1e-9)
@@ -85,11 +85,11 @@ def test_preload_of_springs_in_line() -> None:
 
 def test_a_drive_carries_what_hangs_on_it() -> None:
     machine = b.serial(b.motor("drive", law=Law(1e6)), b.shift("arm", (0.5, 0, 0)), home=Pose.of((0.5, 0, 0)))
-    stress = sm.assembly_stress(machine, (0.5, 0, 0), wrench=[0, 100, 0, 0, 0, 0])
+    stress = sm.assembly_wrenches(machine, (0.5, 0, 0), wrench=[0, 100, 0, 0, 0, 0])
     assert stress.joints[machine.actuators[0]] == pytest.approx(50, rel=1e-4)
 
 
 def test_unreachable_is_nan() -> None:
-    stress = sm.assembly_stress(sm.load_machine("swing-table"), [1, 0, 0.4])
+    stress = sm.assembly_wrenches(sm.load_machine("swing-table"), [1, 0, 0.4])
     assert int(stress.status) == sm.Status.UNREACHABLE
     assert all(np.isnan(w).all() for w in stress.springs.values())

@@ -99,9 +99,9 @@ def test_cells_that_stick_out_are_cut_off():
 
 def test_linear_delta_with_and_without_transmission_ends_within_its_work():
     machine = sm.load_machine("linear-delta")
-    b = sm.largest_box(machine, gap=1e-3)
+    b = sm.largest_box(machine, tolerance=1e-3)
     assert b.proven and b.gap <= 1e-3
-    free = sm.largest_box(machine, transmission=None, gap=5e-3, work=20_000)
+    free = sm.largest_box(machine, transmission=None, tolerance=5e-3, max_evaluations=20_000)
     assert free.poses <= 2 * 20_000 and free.edge > b.edge and free.edge_upper > free.edge
     p = np.random.default_rng(0).uniform(*free.corners, (500, 3))
     k = drive_kinematics(machine, p, patient=False)
@@ -150,8 +150,8 @@ def test_a_deflection_as_limit_is_sampled_and_says_so():
         ranges=False,
         joints=False,
         deflection=(300.0, "xy", 4e-4),
-        gap=0.02,
-        work=6000,
+        tolerance=0.02,
+        max_evaluations=6000,
         region=[[-0.1, -0.1, -0.1], [0.2, 0.2, 0.2]],
     )
     assert b.guarantee.startswith("sampled: a deflection") and not b.proven
@@ -189,9 +189,9 @@ def test_a_box_is_turned_to_where_it_fits():
     [
         ({"proportions": (1, 0, 1)}, "proportions"),
         ({"transmission": (2.0, 0.5)}, "transmission"),
-        ({"gap": 0.0}, "gap"),
+        ({"tolerance": 0.0}, "tolerance"),
         ({"clearance": -1.0}, "clearance"),
-        ({"factors": "ball"}, "factors: expected 'sphere'"),
+        ({"norm": "ball"}, "norm: expected 'sphere'"),
         ({"orientation": "best"}, "orientation: expected 'search'"),
         ({"deflection": (300.0, "xy", 0.0)}, "deflection"),
         ({"region": [[0, 0, 0], [0, 1, 1]]}, "region"),
@@ -219,7 +219,7 @@ def test_what_is_proven_of_bars_depends_on_no_thread():
 
 def test_bounds_and_volumes_depend_on_no_thread():
     machine = sm.load_machine("orthoglide-original")
-    boxes = [sm.largest_box(machine, gap=1e-2, threads=n) for n in (1, 2)]
+    boxes = [sm.largest_box(machine, tolerance=1e-2, threads=n) for n in (1, 2)]
     assert boxes[0].edge == boxes[1].edge
     assert boxes[0].edge_upper == boxes[1].edge_upper
     assert boxes[0].poses == boxes[1].poses
@@ -235,7 +235,7 @@ def test_a_drive_whose_range_ends_in_the_middle_of_a_face(tmp_path):
     a = -(r + length - low)
     c = high - r  # b + c = sqrt(L^2 - 2 b^2)
     b = (-2 * c + np.sqrt(4 * c**2 + 12 * (length**2 - c**2))) / 6
-    box = sm.largest_box(tmp_path / "short.yaml", transmission=None, gap=3e-3)
+    box = sm.largest_box(tmp_path / "short.yaml", transmission=None, tolerance=3e-3)
     assert box.proven
     assert box.edge > b + a - 4e-3
     assert box.edge_upper >= b + a

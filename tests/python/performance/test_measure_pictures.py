@@ -20,7 +20,7 @@ from stiffmap.report.pictures import animation, inline
 
 def test_sections_of_the_box_meet_at_the_corner_that_is_limited():
     machine = sm.load_machine("orthoglide-original")
-    box = largest_box(machine, gap=0.01)
+    box = largest_box(machine, tolerance=0.01)
     figure = box_figure(machine, box, nodes=12)
     low, high = box.corners
     for axes, title in zip(figure.axes, "zyx", strict=True):
@@ -33,13 +33,13 @@ def test_sections_of_the_box_meet_at_the_corner_that_is_limited():
 
 def test_a_plane_and_a_line_and_nothing():
     plane = sm.load_machine("five-bar")
-    assert len(box_figure(plane, largest_box(plane, gap=0.02, work=5000), nodes=8).axes) == 1
+    assert len(box_figure(plane, largest_box(plane, tolerance=0.02, max_evaluations=5000), nodes=8).axes) == 1
     line = sm.load_machine("swing-table")
     with pytest.raises(sm.StiffmapError, match="is a line"):
-        box_figure(line, largest_box(line, gap=0.02, work=5000))
+        box_figure(line, largest_box(line, tolerance=0.02, max_evaluations=5000))
     ur10 = sm.load_machine("ur10")
     with pytest.raises(sm.StiffmapError, match="no box was found"):
-        box_figure(ur10, largest_box(ur10, gap=0.02, work=1000))
+        box_figure(ur10, largest_box(ur10, tolerance=0.02, max_evaluations=1000))
 
 
 def test_measures_along_the_shipped_path():

@@ -138,7 +138,9 @@ def test_limits_of_the_workspace_from_a_file(tmp_path):
     assert dict(table["workspace"].found.extra["workspace"].limited_by)["deflection"] > 0
     same = sm.measures(machine, force=200.0, clearance=0.02, deflection=6e-4, **asked)
     assert same["workspace"].found.worst == table["workspace"].found.worst
-    none = sm.measures(machine, only=["largest_box"], clearance=0.08, gap=0.02, nodes=3)["largest_box"].found
+    none = sm.measures(machine, only=["largest_box"], clearance=0.08, box_tolerance=0.02, nodes=3)[
+        "largest_box"
+    ].found
     assert none.worst == 0 and none.extra["box"].guarantee == "none"
     with pytest.raises(sm.StiffmapError, match="clearance: expected a positive"):
         sm.measures(machine, clearance=-0.1)

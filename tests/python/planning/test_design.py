@@ -67,7 +67,7 @@ def test_what_no_reading_tells_is_not_known() -> None:
     alone = compare(machine, *readings, terms[:1])
     assert compared.p == pytest.approx(alone.p)
     assert (compared.changes[1].p, compared.changes[1].u) == (1.0, np.inf)
-    assert "not told" in str(compared.changes[1])
+    assert "not identifiable" in str(compared.changes[1])
 
 
 def test_rivals_are_told_apart_better_than_at_random(orthoglide: sm.Machine) -> None:

@@ -61,7 +61,7 @@ def turning(scheduler: Any) -> dict[str, Any]:
 
 
 def box(scheduler: Any) -> dict[str, Any]:
-    found = sm.largest_box(GLIDE, gap=1e-3, scheduler=scheduler)
+    found = sm.largest_box(GLIDE, tolerance=1e-3, scheduler=scheduler)
     assert found.proven
     return {k: getattr(found, k) for k in ("edge", "edge_upper", "centre", "limited_by", "poses")}
 

@@ -1,4 +1,4 @@
-"""Effects must explain what no smooth course over time explains: creep, warming and drift know nothing of the machine."""
+"""Effects must explain what no smooth course over time explains: creep, warming and drift do not depend on the machine."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from stiffmap.experiment.noise.whitening import basis
 
 
 def beside_time(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]:
-    """The model without effects that are not significant beside smooth courses over time, and why; those that are a
-    course over time themselves have nothing to stand beside."""
+    """The model without effects that are not significant jointly with smooth courses over time, and why; those that are a
+    course over time themselves are not tested."""
     search = finding.search
     q = courses(search.problem)
     refused: list[str] = []
@@ -42,7 +42,7 @@ def beside_time(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]
 
 
 def _worth(finding: Finding, model: Model, i: int, q: Floats) -> float:
-    """-ln p of an effect beside the courses, the other effects refitted to first order."""
+    """-ln p of an effect jointly with the courses, the other effects refitted to first order."""
     assert model.residual is not None and model.jacobian is not None
     less = fit_without(model, i, finding.search.predictor, finding.search.problem)
     if not less.usable or less.residual is None:

@@ -1,4 +1,4 @@
-"""What is left over time: drift, creep and warming are smooth courses that know nothing of the machine."""
+"""What is left over time: drift, creep and warming are smooth courses that do not depend on the machine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stiffmap.experiment.noise.whitening import Problem, basis
 SELDOM = 1e-4
 """p-value below which what is left goes with time."""
 FEWEST = 12
-"""Rows of a set-up over which a course is told from noise."""
+"""Rows of a set-up over which a course is distinguished from noise."""
 SETTLING = 5.0
 """Time constants of a set-up that settles, within the session."""
 

@@ -199,10 +199,10 @@ def solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solutio
         known = plan.near is not None and tuple(machine.compiled.names.coordinates) == plan.near_names
         start = plan.near if known else None
         options = replace(options, rotation=plan.rotation, start=start)
-        return machine.solve(plan.position, plan.wrench, options=options)
+        return machine.solve(plan.position, plan.wrench, **options.keywords())
     start = coordinates_of(machine, plan)
     drives = [machine.compiled.names.joints[a] for a in machine.actuators]
-    return machine.solve_joints(start[:, drives], plan.wrench, options=replace(options, start=start))
+    return machine.solve_joints(start[:, drives], plan.wrench, **replace(options, start=start).keywords())
 
 
 def _in_play(solution: Solution, plan: Experiment) -> Mask:
