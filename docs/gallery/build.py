@@ -27,6 +27,7 @@ def executed(source: Path, seconds: int = 300) -> Any:
         NotebookClient(
             book,
             timeout=seconds,
+            startup_timeout=seconds,
             kernel_name="python3",
             resources={"metadata": {"path": folder}},
             config=local,
