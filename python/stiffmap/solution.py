@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from stiffmap.closing import Kinematics
 from stiffmap.compiled import Answer, Flag, Names, Status, counted
 from stiffmap.labels import solution_dataset
+from stiffmap.results import OverPoses
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,7 +34,7 @@ FIELDS = (
 )
 
 
-class Solution:
+class Solution(OverPoses):
     """Equilibria of a batch of poses; SI, base axes, linear part first, leading batch axes (...).
 
     Failed poses hold NaN and their status. Arrays are made when they are first asked for.
