@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap.broadcasting import Floats
 from stiffmap.closing import Kinematics
 from stiffmap.compiled import Answer, Flag, Names, Status, counted
 from stiffmap.labels import solution_dataset
@@ -17,7 +18,6 @@ from stiffmap.results import OverPoses
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = NDArray[np.float64]
 Slopes = Mapping[str, Mapping[str, Floats]]  # quantity -> name of the variable -> derivative
 FIELDS = (
     "displacement",
