@@ -6,7 +6,8 @@
 
 Writes the page (Markdown, or HTML where the name ends so) and FILE.json beside it with the same rows: set, authors, before, after,
 unseen rows, cause, seconds. Sets that are absent are rows that say so; a set that fails is a row with its message. About ten minutes
-of CPU; with --quick, some rows of each set, two. `--page-of FILE.json` writes the page again from rows that were measured before.
+of CPU; with --quick, some rows of each set, two. `--page-of FILE.json` writes the page again from rows that were measured before. `--speed` measures speed
+beside programs on Pinocchio and adds its table.
 """
 
 from __future__ import annotations
@@ -48,20 +49,33 @@ def main() -> int:
         help="measure this set, keep the others' rows of FILE.json",
     )
     parser.add_argument("--page-of", type=Path, metavar="JSON", help="only write the page of these rows")
+    parser.add_argument(
+        "--speed",
+        nargs="?",
+        const="",
+        metavar="PROGRAM",
+        help="measure speed only, keep the rows of FILE.json; PROGRAM: pinocchio_vjm.cpp, compiled",
+    )
     a = parser.parse_args()
     if bad := [p for p in a.peer if "=" not in p]:
         parser.error(f"--peer: expected NAME=PYTHON, got {bad[0]!r}")
     if a.out.suffix not in (".md", ".html"):
         parser.error(f"--out: expected a name that ends in .md or .html, got {a.out}")
-    if a.page_of:
+    beside = a.out.with_suffix(".json")
+    kept = a.page_of or (beside if a.speed is not None and beside.exists() else None)
+    if kept:
         try:
-            data = json.loads(a.page_of.read_text(encoding="utf-8"))
+            data = json.loads(kept.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            parser.error(f"--page-of {a.page_of}: {error}")
+            parser.error(f"{kept}: {error}")
     else:
-        data = measured(
-            a.data, a.quick, dict(p.split("=", 1) for p in a.peer), a.only, a.out.with_suffix(".json")
-        )
+        data = measured(a.data, a.quick, dict(p.split("=", 1) for p in a.peer), a.only, beside)
+        if beside.exists():
+            data["speed"] = json.loads(beside.read_text(encoding="utf-8")).get("speed", [])
+    if a.speed is not None:
+        from board.speed import speed
+
+        data["speed"] = speed(a.speed or None)
     a.out.parent.mkdir(parents=True, exist_ok=True)
     a.out.with_suffix(".json").write_text(
         json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
@@ -108,7 +122,7 @@ def measured(
 def written(data: dict[str, Any], suffix: str) -> str:
     """The page of measured rows."""
     make = page if suffix == ".html" else markdown
-    return make([Row.of(r) for r in data["rows"]], data["command"], data["about"])
+    return make([Row.of(r) for r in data["rows"]], data["command"], data["about"], data.get("speed", []))
 
 
 if __name__ == "__main__":

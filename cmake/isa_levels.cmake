@@ -25,7 +25,7 @@ function(stiffmap_kernel name lanes)
   stiffmap_compile_options(${target})
   set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden WINDOWS_EXPORT_ALL_SYMBOLS ON)
   if(SKBUILD)
-    install(TARGETS ${target} LIBRARY DESTINATION . RUNTIME DESTINATION . COMPONENT python)
+    install(TARGETS ${target} LIBRARY DESTINATION . COMPONENT python RUNTIME DESTINATION . COMPONENT python)
   endif()
 endfunction()
 

@@ -69,7 +69,7 @@ def look(view: View) -> None:
 
 
 def movie(target: Path) -> None:
-    """From home to the weak corner, with the shares beside it."""
+    """From home to the weak corner, and the shares."""
     with View(model_of(sm.load_machine("orthoglide-revised"), START, **LOAD)) as view, page_of(view) as page:
         look(view)
         page.get_by_role("tab", name="Why").click()
@@ -77,7 +77,11 @@ def movie(target: Path) -> None:
         for t in (1 - np.cos(np.linspace(0, np.pi, FRAMES))) / 2:
             view.set(position=tuple(float(v) for v in START + t * (CORNER - START)))
             frames.append(shot(view, page))
-    small = [f.resize((800, 496), Image.Resampling.LANCZOS).quantize(COLOURS) for f in frames]
+    palette = frames[-1].quantize(COLOURS)  # one for all, so that a frame holds only what differs
+    small = [
+        f.resize((800, 496), Image.Resampling.LANCZOS).quantize(palette=palette, dither=Image.Dither.NONE)
+        for f in frames
+    ]
     hold = [1200, *[160] * (FRAMES - 2), 2500]
     small[0].save(target, save_all=True, append_images=small[1:], duration=hold, loop=0, optimize=True)
 
@@ -90,9 +94,10 @@ def still(target: Path) -> None:
         if target.stem == "why":
             page.get_by_role("tab", name="Why").click()
         if target.stem == "worst":
-            view._viewer.controls.surface = "ellipsoid"
             view.set(quantity="worst", plane="free", normal=(1.0, -1.0, 0.0))
             page.get_by_role("tab", name="Map").click()
+            page.get_by_role("textbox", name="At the tool").click()
+            page.get_by_role("option", name="ellipsoid").click()
         shot(view, page, 2500).quantize(128).save(target, optimize=True)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from board.row import Row
 
 HEAD = ("set", "authors", "before", "after", "unseen rows", "cause", "s")
+SPEED = ("case", "program", "µs a pose", "times stiffmap's", "note")
 PEERS = ("set", "package", "after", "s", "note")
 TITLE = "Scoreboard"
 ABOUT = """Public measured sets with an open licence: what the authors of the data reached, and what stiffmap leaves on rows that no fit
@@ -54,19 +55,40 @@ def tables(rows: Sequence[Row]) -> list[tuple[str, tuple[str, ...], list[list[st
     return out
 
 
-def markdown(rows: Sequence[Row], command: str, about: dict[str, Any]) -> str:
+def speed_table(
+    speed: Sequence[dict[str, Any]],
+) -> list[tuple[str, tuple[str, ...], list[list[str]]]]:
+    """One thread on the same computer in one run; nothing where speed was not measured."""
+    if not speed:
+        return []
+    own = {r["case"]: r["microseconds"] for r in speed if r["package"] == "stiffmap"}
+    cells = []
+    for r in speed:
+        t, ratio = r["microseconds"], ""
+        if t is not None and r["package"] != "stiffmap":
+            ratio = f"{t / own[r['case']]:.3g}"
+        name = "**stiffmap**" if r["package"] == "stiffmap" else r["package"]
+        cells.append([r["case"], name, number(t), ratio, r["note"]])
+    return [("Speed: a Tripteron, one thread", SPEED, cells)]
+
+
+def markdown(
+    rows: Sequence[Row], command: str, about: dict[str, Any], speed: Sequence[dict[str, Any]] = ()
+) -> str:
     """The page for the documentation."""
     lines = [f"# {TITLE}", "", ABOUT, "", made(about)]
-    for title, head, cells in tables(rows):
+    for title, head, cells in [*tables(rows), *speed_table(speed)]:
         lines += ["", f"## {title}", "", _line(head), _line(["---"] * len(head))]
         lines += [_line(c) for c in cells]
     return "\n".join([*lines, "", "## Repeat it", "", REPEAT.format(command=command), ""])
 
 
-def page(rows: Sequence[Row], command: str, about: dict[str, Any]) -> str:
+def page(
+    rows: Sequence[Row], command: str, about: dict[str, Any], speed: Sequence[dict[str, Any]] = ()
+) -> str:
     """The page by itself, as HTML."""
     parts = [f"<h1>{TITLE}</h1>", f"<p>{_plain(ABOUT)}</p>", f"<p>{_plain(made(about))}</p>"]
-    for title, head, cells in tables(rows):
+    for title, head, cells in [*tables(rows), *speed_table(speed)]:
         body = "".join("<tr>" + "".join(f"<td>{_plain(c)}</td>" for c in row) + "</tr>" for row in cells)
         top = "".join(f"<th>{_plain(h)}</th>" for h in head)
         parts.append(f"<h2>{title}</h2><div><table><tr>{top}</tr>{body}</table></div>")

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
         load_process,
     )
     from stiffmap.solution import Solution
+    from stiffmap.unreachable import why_unreachable
     from stiffmap.urdf.to_machine import import_urdf
     from stiffmap.vibration import frequency_response
 
@@ -76,6 +77,7 @@ _HOME = {
     "velocity_transmission": "stiffmap.performance",
     "workspace_volume": "stiffmap.performance",
     "worst_deflection": "stiffmap.performance",
+    "why_unreachable": "stiffmap.unreachable",
     "Diagnosis": "stiffmap.diagnosis",
     "compensate": "stiffmap.compensation",
     "Experiment": "stiffmap.experiment",
@@ -184,6 +186,7 @@ __all__ = [
     "velocity_section",
     "velocity_transmission",
     "vibration_map",
+    "why_unreachable",
     "workspace_volume",
     "worst_deflection",
 ]

@@ -278,22 +278,47 @@ class Machine:
         *,
         port: int | None = None,
         browser: bool = True,
-        **state: Any,
+        rotation: ArrayLike | None = None,
+        force: ArrayLike | None = None,
+        moment: ArrayLike | None = None,
+        gravity: ArrayLike | None = None,
+        plane: str | None = None,
+        normal: ArrayLike | None = None,
+        quantity: str | None = None,
+        tolerance: float | None = None,
+        magnification: float | None = None,
+        frequency: float | None = None,
+        start: ArrayLike | None = None,
+        changes: Mapping[str, float] | None = None,
+        experiment: Any = None,
+        diagnosis: Any = None,
+        path: Any = None,
     ) -> Any:
         """Look at the machine and its map live in a browser; the view that is open is returned (``close()`` ends it).
 
-        position (3,) m, None: home. port: of 127.0.0.1; None: a free one from 8080 on. browser: whether to open one.
-        state: fields of `stiffmap.view.State`, such as ``force=(0, 0, -300)`` N, ``plane="x"``, ``quantity="worst"``,
-        ``changes={"x.foot/beam.EIx": 4000.0}``; SI, base axes; and what is drawn next to the machine: ``experiment``
-        (an `Experiment` or its folder), ``diagnosis`` (a `Diagnosis`, or the folder of one), ``path`` (a `Toolpath`, its
-        file, or positions (n, 3) m). In a notebook the view is shown where it is the
-        last value of a cell. docs/view.md. Raises MissingPartError without the extra ``[view]`` (viser),
-        StiffmapError for bad input and for a pose that the machine cannot take.
+        All in SI and base axes; what is None is as `stiffmap.view.State` has it. In a notebook the view is shown where it is
+        the last value of a cell. docs/view.md.
+
+        position (3,) m, None: home; rotation (3,) rad, rotation vector. port: of 127.0.0.1; None: a free one from 8080 on.
+        browser: whether to open one. force (3,) N and moment (3,) N·m on the tool; gravity (3,) m/s². plane: the axis across
+        which it lies (x, y, z), or ``free`` with a `normal` (3,). quantity: deflection, worst, stiffness, margin, status,
+        frequency, dynamic. tolerance m; magnification of the deflected machine; frequency (Hz) of the dynamic stiffness.
+        start: all coordinates that name an assembly mode. changes: numbers by their addresses, such as
+        ``{"x.foot/beam.EIx": 4000.0}``. Drawn as well: an experiment (or its folder), a diagnosis (or the folder of
+        one), a path of the tool (a `Toolpath`, its file, or positions (n, 3) m).
+
+        Raises MissingPartError without the extra ``[view]`` (viser), StiffmapError for bad input and for a pose that the
+        machine cannot take.
         """
         from importlib import import_module
 
+        given = {
+            "rotation": rotation, "force": force, "moment": moment, "gravity": gravity, "plane": plane, "normal": normal,
+            "quantity": quantity, "tolerance": tolerance, "magnification": magnification, "frequency": frequency,
+            "start": start, "changes": changes, "experiment": experiment, "diagnosis": diagnosis, "path": path,
+        }  # fmt: skip
         return import_module(f"{__package__}.view").open_view(
-            self, position, port=port, browser=browser, **state
+            self, position, port=port, browser=browser, **{k: v for k, v in given.items() if v is not None}
         )
 
     def save(self, path: str | PathLike[str]) -> None:

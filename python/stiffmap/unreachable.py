@@ -64,7 +64,11 @@ def shortfalls(machine: Machine, position: ArrayLike, rotation: ArrayLike | None
 
 @takes_machine
 def why_unreachable(machine: Machine, position: ArrayLike, rotation: ArrayLike | None = None) -> str:
-    """The same in words, in mm and deg: ``leg x ends 125.0 mm short``."""
+    """Why a commanded TCP pose cannot be reached, in words, mm and deg: ``leg x ends 125 mm short of it``.
+
+    position (3,) m, rotation (3, 3), None: as at home; base axes, springs at rest. A leg alone is judged by its lengths; where
+    all legs reach the pose, drives and joints out of their ranges are named (docs/theory.md C3).
+    """
     p = np.asarray(position, dtype=float)
     if not (
         np.isfinite(p).all() and (rotation is None or np.isfinite(np.asarray(rotation, dtype=float)).all())

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from stiffmap.calibration.calibrator import Calibrator, pose_labels
 from stiffmap.calibration.claims import BesideField, Claims, claims, held_within
@@ -22,6 +22,8 @@ from stiffmap.experiment.noise.folds import folds
 
 AGAIN, NEAR = 4, 0.3
 """Fits of what is claimed through the full prediction; change of all readings together, in noise, that ends them."""
+MOST_DRAWS = 5.0 / 6.0
+"""Share of other draws that must show what is claimed of a whole group: vague claims come and go otherwise."""
 BORNE_OUT = 0.5
 """Share of what slopes promise of a claim that the full prediction must keep."""
 
@@ -30,6 +32,7 @@ def claimed_fit(
     ready: Calibrator, sums: Sums, members: dict[str, list[int]], seed: int
 ) -> tuple[Claims, Fitted, float]:
     """Accepted hypotheses, the fit with their priors widened, and its variance per pose."""
+    shares: dict[tuple[int, ...], float] = {}
     judged: list[tuple[BesideField, list[Fold]]] = []
     everything = {"all": list(range(len(sums.right)))}
 
@@ -38,8 +41,14 @@ def claimed_fit(
             judged.append((_beside_field(ready), leave_out(ready, ready.fit, seed)))
         field, parts = judged[0]
         nats = field.log_evidence(trial) - field.log_evidence(factor)
+        shares[tuple(which)] = found_again(nats)
         if nats < STRONG:
             return f"a smooth field that does not depend on the machine explains as much (odds {odds(nats)} with the field in the model)"
+        if len(which) > 1 and found_again(nats) < MOST_DRAWS:
+            return (
+                f"{nats:+.0f} nats beside a smooth field: another draw of as many readings would show it with "
+                f"{100 * found_again(nats):.0f} % only"
+            )
         if len(parts) < 2:
             return ""
         tolerated = _tolerated(sums, factor, which)
@@ -57,10 +66,21 @@ def claimed_fit(
     )
     if not found.any:
         return found, ready.fit, ready.rho
+    names: dict[str, tuple[int, ...]] = {
+        b.name: (i,) for b, i in zip(found.singles.found, found.singles.which, strict=True)
+    }
+    names |= {f"{w.group} as a whole": tuple(members[w.group]) for w in found.groups}
+    found = replace(found, found_again={n: shares[i] for n, i in names.items() if i in shares})
     fit, rho = _let_go(ready, found)
     if fit.converged:
         return found, fit, rho
     return found.withdrawn("so far off the machine does not do what its slopes say"), ready.fit, ready.rho
+
+
+def found_again(nats: float) -> float:
+    """Share of other draws of as many readings in which a claim would be strong: a gain of so many nats, from readings with
+    normal noise, varies by √(2 nats) from draw to draw."""
+    return float(norm.cdf((nats - STRONG) / np.sqrt(2.0 * nats))) if nats > 0.0 else 0.0
 
 
 def _tolerated(sums: Sums, factor: Floats, which: Sequence[int]) -> Floats:

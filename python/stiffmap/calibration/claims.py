@@ -8,14 +8,15 @@ explain it better than any smooth function of pose and load does; numbers that i
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from stiffmap.calibration.beyond import BeyondTolerance, beyond_tolerance, none_beyond
+from stiffmap.calibration.beyond import BeyondTolerance, as_factor, beyond_tolerance, none_beyond
 from stiffmap.calibration.certificate import INSTRUMENT
 from stiffmap.calibration.facts import Wider
 from stiffmap.calibration.floor import Blocks, likeliest
+from stiffmap.calibration.limits import refused
 from stiffmap.calibration.statistics import Sums
 from stiffmap.calibration.unknowns import Unknown
 from stiffmap.calibration.width import widened
@@ -49,6 +50,8 @@ class Claims:
     """(p,) on the standard uncertainties."""
     refused: tuple[str, ...] = ()
     """What the evidence asked for and is not claimed, and why."""
+    found_again: Mapping[str, float] = field(default_factory=dict)
+    """Share of other draws of as many readings that would show each claim."""
 
     @property
     def any(self) -> bool:
@@ -89,7 +92,7 @@ def claims(
         trial = factor.copy()
         which = list(members[w.group])
         trial[which] *= w.factor
-        why = why_not(factor, trial, which)
+        why = _absurd(sums, unknowns, trial, which, at) or why_not(factor, trial, which)
         if why:
             refused = (*absurd, f"{w.group} as a whole: {why}")
             # that many numbers are off is no answer where it does not suffice
@@ -102,6 +105,22 @@ def claims(
             )
         factor = trial
     return Claims(singles, groups, factor, absurd)
+
+
+def _absurd(
+    sums: Sums, unknowns: Sequence[Unknown], factor: Floats, which: Sequence[int], at: Floats | None
+) -> str:
+    """Why a group is not let go: a number of it would be one that no machine has."""
+    values = sums.scaled(factor).estimate * factor
+    for i in which:
+        times = (
+            as_factor(unknowns[i], float(values[i]), 0.0 if at is None else at[i])
+            if unknowns[i].unit == "ln"
+            else 1.0
+        )
+        if why := refused(unknowns[i], float(values[i]), times):
+            return f"{unknowns[i].name}: {why}"
+    return ""
 
 
 def _many_a_little(

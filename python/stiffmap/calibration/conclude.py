@@ -95,6 +95,7 @@ def conclude(ready: Calibrator, seed: int = 0) -> Calibration:
         unit=unit,
         machine=valid.kept_by(correction.of(np.ones(len(e), bool)).machine),
         validity=valid,
+        found_again=claimed.found_again,
         over_time=over_time(ready.problem, fit.residual),
         unseen=unseen,
         correction=correction,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -159,6 +159,8 @@ class Facts:
     """What the readings covered; beyond it nothing vouches for `machine`."""
     pulls: Pulls = field(kw_only=True)
     """How far the numbers are beyond their standard uncertainties, without those that have a widened prior."""
+    found_again: Mapping[str, float] = field(default_factory=dict)
+    """Share of other draws of as many readings that would show each claim."""
     over_time: OverTime | None = None
     """What the calibrated machine leaves over time; None where no times were recorded."""
     refused: tuple[str, ...] = ()
@@ -179,6 +181,7 @@ class Facts:
         out["validity"] = plain(
             {"poses": v.poses, "drives": dict(v.drives), "loads": dict(v.loads), "temperature": v.temperature}
         )
+        out["found_again"] = dict(self.found_again)
         out["over_time"] = plain(asdict(self.over_time)) if self.over_time else None
         out["pulls"] = plain(asdict(self.pulls)) | {"within": self.pulls.within}
         out["groups"] = plain(asdict(self.groups))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from stiffmap.broadcasting import Floats, real_array, trailing
 from stiffmap.chatter.cut import GivenProcess, cut_axes, milling_process
 from stiffmap.chatter.zero_order import FEED, TOOL, limits
-from stiffmap.machine import Machine, takes_machine
+from stiffmap.machine import Machine, as_machine
 from stiffmap.options import keywords_of
 from stiffmap.process import Process
 from stiffmap.tasks import workers
@@ -24,10 +25,9 @@ LOW, HIGH, LOOKED = 0.3, 2.0, 6
 """The default frequencies reach from the lowest mode to the highest of the first six, with these factors."""
 
 
-@takes_machine
 @keywords_of(tip_modes)
 def vibration_map(
-    machine: Machine,
+    machine: Machine | str | PathLike[str],
     position: ArrayLike,
     process: GivenProcess | None = None,
     *,
@@ -66,6 +66,7 @@ def vibration_map(
 
     Raises StiffmapError for bad input, never for a pose. Source: docs/theory.md, V1 to V4.
     """
+    machine = as_machine(machine)
     p = trailing(position, (3,), "position", "positions (m)")
     cut = None if process is None else milling_process(process)
     axes = cut_axes(real_array(feed, "feed"), real_array(tool, "tool"))

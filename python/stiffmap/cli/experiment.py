@@ -195,7 +195,11 @@ def tell(
             "kept in notes.csv"
             if c.meaning == "note"
             else f"{told}, {found.units.get(c.meaning, 'no unit')}"
-            + (f" (one in the sheet is {found.factors[c.meaning]:.9g})" if c.meaning in found.factors else "")
+            + (
+                f" ({escape(c.unit) or 'one'} of the sheet: {found.factors[c.meaning]:.9g} {found.units[c.meaning]})"
+                if c.meaning in found.factors
+                else ""
+            )
         )
         console.print(f"'{escape(header[c.index])}': {where}")
     for name, value in found.constants.items():
@@ -219,7 +223,7 @@ def _show(console: Console, made: object) -> None:
     from stiffmap.experiment.notebook import experiment_rows
 
     head, rows = experiment_rows(made)
-    table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood")
+    table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood", padding=(0, 1, 0, 0))
     for name in head:
         table.add_column(name, justify="right")
     for row in rows:

@@ -130,6 +130,8 @@ def _one(
     out: dict[str, Any] = {
         "at_mm": (place / MM).tolist(), "modes": a["modes"], "damping": a["damping"],
         "least_limit_mm": a["least"] / MM, "chatter_frequency_Hz": a["frequency"],
+        "least_on_diagram_mm": float(ds.limit.min()) / MM,
+        "least_at_rpm": float(ds.speed[int(ds.limit.argmin())]) * RPM,
         "coupling_limit_mm": a["coupling"] / MM,
         "process": {"speed_rpm": p.spindle * RPM, "depth_mm": p.cut.axial / MM, "limit_mm": limit / MM,
             "multiplier": a["at_process"],
@@ -187,9 +189,11 @@ def _say(a: dict[str, Any]) -> None:
     if np.isfinite(limit):
         verdict += f"; from {limit:.4g} mm on it chatters"
     print(f"at ({where}) mm: {verdict}")
+    if np.isfinite(a["least_on_diagram_mm"]):
+        print(f"  least limit {a['least_on_diagram_mm']:.4g} mm, at {a['least_at_rpm']:.0f} rpm")
     print(
-        f"  stable at every speed below {a['least_limit_mm']:.4g} mm (zero order, {a['chatter_frequency_Hz']:.1f} Hz); modes couple "
-        f"without regeneration from {a['coupling_limit_mm']:.4g} mm on"
+        f"  zero order, any speed: {a['least_limit_mm']:.4g} mm ({a['chatter_frequency_Hz']:.1f} Hz); without regeneration modes "
+        f"couple from {a['coupling_limit_mm']:.4g} mm on"
     )
     if a["stable_speeds"]:
         pockets = ", ".join(f"{s['speed_rpm']:.0f} rpm ({s['limit_mm']:.4g} mm)" for s in a["stable_speeds"])

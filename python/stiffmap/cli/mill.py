@@ -124,13 +124,15 @@ def mill(
       [cyan]stiffmap mill corrected.yaml outline.ngc --process trimming --true my.yaml --band -o cut[/cyan]
     """
     m = machine_with(machine, effect)
+    cut = _process(process, tolerance)
     p = load_path(
         path,
+        feed=cut.feed,
+        spindle=cut.spindle,
         size=None if size is None else tuple(float(v) * MM for v in numbers(size, "size")),
         offsets=_offsets(offset),
         progress=None if as_json or not sys.stderr.isatty() else _read,
     )
-    cut = _process(process, tolerance)
     if reverse:
         p, cut = turned_round(p), other_side(cut)
     plate = None
@@ -233,7 +235,16 @@ def _say(out: dict[str, object]) -> None:
         if key == "warnings" and isinstance(value, list):
             text = " ".join(w["text"] for w in value)
         elif isinstance(value, dict):
-            text = ", ".join(f"{k} {v:.6g}" if isinstance(v, float) else f"{k} {v}" for k, v in value.items())
+            text = ", ".join(f"{k} {_text(v)}" for k, v in value.items())
         else:
-            text = f"{value:.6g}" if isinstance(value, float) else str(value)
+            text = _text(value)
         print(f"{key}: {text}")
+
+
+def _text(value: object) -> str:
+    """A value in a line: numbers short, a table of numbers in brackets."""
+    if isinstance(value, dict):
+        return f"({', '.join(f'{k} {_text(v)}' for k, v in value.items())})"
+    if isinstance(value, list):
+        return ", ".join(_text(v) for v in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

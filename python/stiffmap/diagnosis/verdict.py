@@ -32,6 +32,7 @@ from stiffmap.diagnosis.rivals.explain import Explanation, explain
 from stiffmap.diagnosis.rivals.separation import separation
 from stiffmap.diagnosis.search.detectability import detectable
 from stiffmap.diagnosis.search.study import Finding, Study, study
+from stiffmap.diagnosis.slips.factors import named_within
 from stiffmap.diagnosis.slips.find import find_slip
 from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.experiment.comparison.limitations import limitations, refuse
@@ -44,10 +45,12 @@ from stiffmap.experiment.noise.over_time import over_time
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.machine import Machine, load_machine
+from stiffmap.number_text import within
 from stiffmap.one_thread import on_one_thread
 
 SLIPS = 2
 """Mistakes in the readings that are undone one after the other."""
+GAINS = ("load_gain", "sensor_gain")
 LISTED = 20
 """Patterns that a verdict lists at most."""
 
@@ -133,7 +136,20 @@ def without_slips(s: Study, seed: int) -> tuple[Study, list[Slip]]:
 
 def with_slips(d: Diagnosis, slips: Sequence[Slip]) -> Diagnosis:
     """The answer that names mistakes in the readings before any cause."""
-    return replace(d, slips=list(slips), verdict="readings")
+    return replace(d, slips=[by_gain(s, d.effects) for s in slips], verdict="readings")
+
+
+def by_gain(s: Slip, effects: Sequence[Effect]) -> Slip:
+    """A common factor that no known one is, named by the gain that the diagnosis found beside a part of the machine."""
+    gains = [e.parameters["gain"] for e in effects if e.kind in GAINS and "gain" in e.parameters]
+    if s.kind != "factor" or s.undone or len(gains) != 1:
+        return s
+    value, low, high, _ = gains[0]
+    names = named_within(low, high)
+    if not names:
+        return s
+    seen = f"{s.seen}, {within(value, (high - low) / 3.92)} times beside the cause that is found as well"
+    return replace(s, check=f"check first: {', or '.join(names)}", seen=seen)
 
 
 def _diagnosed(

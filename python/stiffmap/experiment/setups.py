@@ -6,6 +6,9 @@ import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Integers
 
+SEEN = "seen_target_"
+"""Names of the points on the tool that stand for targets, with their number behind."""
+
 
 def setups_of(e: Experiment) -> tuple[Integers, list[str]]:
     """(n,) number of each row's instrument in its set-up, and their names."""

@@ -75,8 +75,8 @@ def mill_job(
     threads: int | None = None,
 ) -> Milled:
     """The same with the program and all states, for reports."""
-    p = path if isinstance(path, Toolpath) else load_path(path)
     cut = process if isinstance(process, Process) else load_process(process)
+    p = path if isinstance(path, Toolpath) else load_path(path, feed=cut.feed, spindle=cut.spindle)
     if passes < 1:
         raise StiffmapError(f"passes: expected 1 or more, got {passes}")
     place = p.placed(machine.description.home.p if at is None else at, turn)
@@ -107,6 +107,7 @@ def mill_job(
     stability = path_stability(job, threads)
     if isinstance(stability, PathStability):
         ds["multiplier"] = ("point", np.interp(job.points.way, stability.way, stability.multiplier))
+        ds["multiplier"].attrs["said"] = stability.sentence(job.process.spindle)
     out = Milled(
         job, before, found.position, made, after, ds, stability, feeds=chosen, warnings=warned(job, ds)
     )
@@ -138,7 +139,7 @@ def mill(
     machine
         What is known of the machine: as declared, with the effects that a diagnosis or calibration found.
     path
-        A built-in outline, a file (G-code, CL, CSV), or a `Toolpath` in the axes of the part, m.
+        A built-in outline (at the process's own feed and speed), a file (G-code, CL, CSV), or a `Toolpath` in the axes of the part, m.
     process
         Tool, law of the force, speeds and cut: a name, a file, a mapping.
     at, turn

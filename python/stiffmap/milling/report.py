@@ -189,7 +189,8 @@ def _sheet(found: Milled) -> Sheet:
                 else f"{int((~found.feeds.held).sum())} moves are beyond the tolerance at any feed."
             )
         )
-    lines.append(str(s["stability"]["said"]))  # type: ignore[index]
+    if not any(w.name == "chatter" for w in found.warnings):
+        lines.append(str(s["stability"]["said"]))  # type: ignore[index]
     lines += [f"Note: {n}" for n in s["notes"]]  # type: ignore[attr-defined]
     rows = [
         [label, f"{s[key]['rms']:.5f}", f"{s[key]['largest']:.5f}"]  # type: ignore[index]

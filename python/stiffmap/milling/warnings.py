@@ -41,7 +41,14 @@ def limits(job: Setting, ds: xr.Dataset) -> list[Warned]:
     return out
 
 
-SOURCES: tuple[Callable[[Setting, xr.Dataset], list[Warned]], ...] = (limits,)
+def chatter(job: Setting, ds: xr.Dataset) -> list[Warned]:
+    """Where the cut is unstable, with speeds of the spindle that are stable all along the path."""
+    if "multiplier" not in ds:
+        return []
+    return [Warned("chatter", ds.multiplier.values > 1, ds.multiplier.attrs["said"])]
+
+
+SOURCES: tuple[Callable[[Setting, xr.Dataset], list[Warned]], ...] = (limits, chatter)
 
 
 def warned(job: Setting, ds: xr.Dataset) -> tuple[Warned, ...]:

@@ -54,6 +54,8 @@ def of_sheet(error: FileError, found: Imported, sheet: Sheet, fresh: Path) -> Fi
         return match[0] if c is None else f"column '{sheet.header[c.index]}' ({column_letter(c.index)})"
 
     reason = re.sub(r"column '([^']*)'", named, reason).replace(str(fresh), sheet.file)
+    if reason.startswith("missing column"):
+        reason += f"; say which by --map fx='HEADER'; columns: {', '.join(repr(h) for h in sheet.header)}"
     at = None
     if (
         error.line is not None

@@ -101,6 +101,11 @@ def _find(wanted: str, headers: Sequence[str]) -> int:
     return found[0]
 
 
+def meaning_of(name: str) -> str:
+    """Column of an experiment that a name without its unit stands for; ``note`` for none."""
+    return _meaning(name)[0]
+
+
 def _meaning(name: str) -> tuple[str, int]:
     plain = re.sub(r"\s+", " ", name.strip().lower())
     for meaning, pattern in PATTERNS:

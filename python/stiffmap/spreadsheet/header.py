@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 
-from stiffmap.spreadsheet.guess import split_unit
+from stiffmap.spreadsheet.guess import meaning_of, split_unit
 from stiffmap.spreadsheet.units import unit_of
 
 Line = tuple[int, list[str]]
@@ -55,6 +56,7 @@ def record_of(above: Sequence[Line]) -> tuple[tuple[str, str], ...]:
     for _, cells in above:
         filled = [_plain(c) for c in cells if c.strip()]
         pairs = [tuple(filled)] if len(filled) == 2 else [tuple(c.split(":", 1)) for c in filled if ":" in c]
+        pairs += [(a, b) for a, b in pairwise(filled) if a.endswith(":")]
         for name, value in (p for p in pairs if len(p) == 2):
             for key, pattern in RECORD.items():
                 if re.fullmatch(pattern, name.strip().rstrip(":"), re.IGNORECASE) and value.strip():
@@ -99,7 +101,7 @@ def _with_unit(name: str, unit: str) -> str:
 
 def _needs_group(names: Sequence[str], group: Sequence[str], first: Sequence[str]) -> bool:
     """Whether names say too little without the line above: the same twice, or nothing where there is data."""
-    twice = [n for n, times in Counter(n for n in names if n).items() if times > 1]
+    twice = [n for n, times in Counter(n.lower() for n in names if n).items() if times > 1]
     nameless = any(
         c.strip() and not (names[i] if i < len(names) else "") and i < len(group) and group[i]
         for i, c in enumerate(first)
@@ -110,6 +112,7 @@ def _needs_group(names: Sequence[str], group: Sequence[str], first: Sequence[str
 def _grouped(group: Sequence[str], names: Sequence[str]) -> list[str]:
     """``Force [N]`` over ``x`` is ``Force x [N]``; a group reaches to the next one, as merged cells do."""
     out, current = [], ""
+    once = Counter(split_unit(n)[0].lower() for n in names)
     for i in range(max(len(group), len(names))):
         above = group[i] if i < len(group) else ""
         name = names[i] if i < len(names) else ""
@@ -117,5 +120,7 @@ def _grouped(group: Sequence[str], names: Sequence[str]) -> list[str]:
         title, unit = split_unit(current)
         plain, own = split_unit(name)
         text = " ".join(p for p in (title, plain) if p)
+        if once[plain.lower()] == 1 and meaning_of(plain) != "note" and meaning_of(text) == "note":
+            text = plain  # Force over Fx
         out.append(f"{text} [{own or unit}]" if own or unit else text)
     return out

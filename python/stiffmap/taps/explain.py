@@ -21,7 +21,7 @@ from stiffmap.effects import Parameter
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment import Experiment
 from stiffmap.machine import Machine, takes_machine
-from stiffmap.taps.problem import STEPS, Problem, Term
+from stiffmap.taps.problem import STEPS, Problem, Term, slopes_of
 from stiffmap.taps.table import TapTest
 
 KINDS = ("compliance", "joint_compliance", "base_compliance", "tool_compliance")
@@ -57,6 +57,8 @@ class Explained:
     taps: float | None = None
     u_taps: float | None = None
     machine: Machine | None = field(default=None, repr=False)
+    off: Floats | None = field(default=None, repr=False)
+    """Uncertain numbers of the fit, in standard uncertainties."""
 
     @property
     def candidate(self) -> str:
@@ -120,6 +122,7 @@ def explain_taps(
     promising = sorted(tried, key=lambda c: -_promise(problem, c))[: max(FEWEST, len(tried) // 3)]
     first = sorted((e for c in promising if (e := _fitted(problem, c))), key=lambda e: e.chi2)[:REFINED]
     found = sorted((_refined(problem, e) for e in first), key=lambda e: e.chi2)
+    before = min([before, *(problem.settled(start=e.off)[0] for e in found[:2] if e.off is not None)])
     if not found or before - found[0].chi2 < chi2.isf(SIGNIFICANT / len(tried), 1):
         said = "Nothing is missing that these readings show" if before < chi2.isf(SIGNIFICANT, n) else (
             "The readings do not fit, and no single effect explains them"
@@ -234,14 +237,16 @@ def _refined(problem: Problem, e: Explained) -> Explained:
         return np.concatenate([r, t[1:]])
 
     fit = least_squares(
-        residual, np.r_[start, np.zeros(k)], bounds=(np.r_[low, np.full(k, -6.0)], np.r_[high, np.full(k, 6.0)]),
-        diff_step=1e-3, x_scale=1.0, max_nfev=STEPS,
+        residual, np.r_[start, np.zeros(k)], slopes_of(residual), x_scale=1.0, max_nfev=STEPS,
+        bounds=(np.r_[low, np.full(k, -6.0)], np.r_[high, np.full(k, 6.0)]),
     )  # fmt: skip
     value = to(float(fit.x[0]))
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac)
     u = float(np.sqrt(covariance[0, 0])) * (value if p.null == 1.0 else p.scale)
     machine = problem.machine_with(_term(e.place, value), fit.x[1:])
-    return replace(e, parameters={p.name: value}, u={p.name: u}, chi2=float(2 * fit.cost), machine=machine)
+    return replace(
+        e, parameters={p.name: value}, u={p.name: u}, chi2=float(2 * fit.cost), machine=machine, off=fit.x[1:]
+    )
 
 
 def _both(problem: Problem, best: Explained) -> Explained:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,7 +26,9 @@ FELT = 0.05
 """Numbers whose uncertainty shifts no reading by more than this share of its noise are not fitted."""
 LOST = 3.0
 """Residual, relative, of a mode that a machine no longer has."""
-STEPS = 8
+STEPS = 15
+STEP = 0.02
+"""Of a difference, in standard uncertainties or logarithms of a factor."""
 Term = AppliedEffect | float | None
 """An effect, the mass of a body at the TCP in kg, or none."""
 
@@ -86,8 +89,8 @@ class Problem:
         J = self.slopes[self.used][rows]
         return rows, np.linalg.inv(np.linalg.cholesky(np.eye(len(J)) + J @ J.T))
 
-    def settled(self, term: Term = None) -> tuple[float, Floats]:
-        """Least chi-square with the uncertain numbers free within their uncertainty, and where they then are."""
+    def settled(self, term: Term = None, start: Floats | None = None) -> tuple[float, Floats]:
+        """Least chi-square near a start with the uncertain numbers free within their uncertainty, and where they then are."""
         k = len(self.numbers)
         if not k:
             r = self.residual(term)
@@ -96,7 +99,14 @@ class Problem:
         def both(off: Floats) -> Floats:
             return np.concatenate([self._safe(term, off), off])
 
-        fit = least_squares(both, np.zeros(k), bounds=(-6, 6), diff_step=1e-2, x_scale=1.0, max_nfev=STEPS)
+        fit = least_squares(
+            both,
+            np.zeros(k) if start is None else start,
+            slopes_of(both),
+            bounds=(-6, 6),
+            x_scale=1.0,
+            max_nfev=STEPS,
+        )
         return float(2 * fit.cost), fit.x
 
     def _safe(self, term: Term, off: Floats) -> Floats:
@@ -104,6 +114,16 @@ class Problem:
             return self.residual(term, off)
         except StiffmapError:
             return np.asarray(np.full(int(self.used.sum()), 1e3))
+
+
+def slopes_of(residual: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
+    """Differences of a residual by a step that does not shrink where a number is zero: frequencies carry round-off."""
+
+    def slopes(t: Floats) -> Floats:
+        here = residual(t)
+        return np.stack([(residual(t + STEP * e) - here) / STEP for e in np.eye(len(t))], axis=1)
+
+    return slopes
 
 
 def uncertain_numbers(d: MachineDescription, default_u: float) -> list[tuple[str, float, float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import pi
 from os import PathLike
 from pathlib import Path
 
@@ -21,16 +22,19 @@ def load_path(
     name_or_file: str | PathLike[str],
     *,
     size: tuple[float, ...] | None = None,
+    feed: float | None = None,
+    spindle: float | None = None,
     offsets: Mapping[str, Sequence[float]] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Toolpath:
     """A built-in outline by name (washbasin, bathtub, rectangle, circle, pocket; size in m), or a file: G-code (.ngc …),
     a CL file of APT (.cl, .apt …) or a table of points (.csv).
 
-    offsets: work offsets of G-code by name, m. progress: called with the number of lines read. Raises FileError.
+    feed (m/s) and spindle (rad/s): of a built-in outline. offsets: work offsets of G-code by name, m. progress: called with the number of lines read. Raises FileError.
     """
     if str(name_or_file) in outline_names():
-        return outline(str(name_or_file), size)
+        speeds = {"feed": feed, "rpm": None if spindle is None else spindle * 30 / pi}
+        return outline(str(name_or_file), size, **{k: v for k, v in speeds.items() if v is not None})
     path = Path(name_or_file)
     if not path.is_file():
         raise FileError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -16,9 +16,6 @@ from stiffmap.view.place import first_plane, moves, rotation_of, turns
 from stiffmap.view.quantities import QUANTITIES
 from stiffmap.view.state import PLANES
 
-if TYPE_CHECKING:
-    from stiffmap.view.viewer import Viewer
-
 MOST_FORCE, MOST_GRAVITY, DECADE = 5000.0, 20.0, 1.0
 HOME = "as at home"
 NONE = "none"
@@ -28,7 +25,7 @@ TITLES = {q.title: name for name, q in QUANTITIES.items()}
 class Controls:
     """Builds the panel; `show` puts the state's numbers into it."""
 
-    def __init__(self, viewer: Viewer) -> None:
+    def __init__(self, viewer: Any) -> None:
         self.viewer, gui = viewer, viewer.server.gui
         gui.configure_theme(
             control_layout="collapsible", control_width="large", show_logo=False, show_share_button=False

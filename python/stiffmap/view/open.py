@@ -131,7 +131,7 @@ def open_view(
 
 
 def data_of(machine: Machine, experiment: Any = None, diagnosis: Any = None, path: Any = None) -> Data | None:
-    """What is drawn next to the machine; None where there is nothing. Raises FileError for files that cannot be read.
+    """What is drawn with the machine; None where there is nothing. Raises FileError for files that cannot be read.
 
     experiment: an `Experiment` or its folder. diagnosis: a `Diagnosis` or the folder of one. path: positions (n, 3) m,
     a `Toolpath`, or its file or outline.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from stiffmap.view.lines import command_line, python_lines
 from stiffmap.view.moment import Moment
@@ -12,14 +12,11 @@ from stiffmap.view.page import page_of
 from stiffmap.view.picture import write_view_picture
 from stiffmap.view.state import permalink
 
-if TYPE_CHECKING:
-    from stiffmap.view.viewer import Viewer
-
 
 class Outputs:
     """Buttons that hand files to the browser, and texts to copy."""
 
-    def __init__(self, viewer: Viewer, gui: Any) -> None:
+    def __init__(self, viewer: Any, gui: Any) -> None:
         self._viewer = viewer
         gui.add_button("Picture (PNG)").on_click(lambda e: self._hand(e, "png"))
         gui.add_button("Picture (SVG)").on_click(lambda e: self._hand(e, "svg"))

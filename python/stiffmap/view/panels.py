@@ -88,7 +88,7 @@ def bars(title: str, rows: Sequence[Row]) -> str:
         for label, size, colour, text in rows
     )
     return (
-        f'<table style="width:100%;font-size:85%"><caption style="text-align:left"><b>{escape(title)}</b>'
+        f'<table style="width:100%;font-size:85%;padding:0 .8em 0 .4em"><caption style="text-align:left"><b>{escape(title)}</b>'
         f"</caption>{out}</table>"
     )
 

@@ -92,7 +92,7 @@ def _largest_eigenvalue(a: Floats) -> Floats:
 QUANTITIES: dict[str, Quantity] = {
     "deflection": Quantity("deflection under this load", "µm", 1e6, deflection),
     "worst": Quantity(
-        "worst deflection under a further force of this size", "µm", 1e6, worst_deflection, stiffness=True
+        "worst deflection by a force of this size", "µm", 1e6, worst_deflection, stiffness=True
     ),
     "stiffness": Quantity(
         "stiffness of the softest direction", "N/µm", 1e-6, weakest_stiffness, stiffness=True, low_is_bad=True

@@ -7,7 +7,8 @@ import pytest
 
 from stiffmap.calibration import Unknown
 from stiffmap.calibration.beyond import beyond_tolerance
-from stiffmap.calibration.claims import held_within
+from stiffmap.calibration.claimed_fit import found_again
+from stiffmap.calibration.claims import _absurd, claims, held_within
 from stiffmap.calibration.limits import refused
 from stiffmap.calibration.statistics import Sums
 
@@ -57,3 +58,28 @@ def test_numbers_are_held_within_their_uncertainties_whatever_the_readings_say()
     assert (sums.scaled(held).estimate * held)[0] == pytest.approx(2.0, rel=1e-2)
     assert (held[1:] == 1.0).all()
     assert held_within(sums, one, [1], 2.0) is one
+
+
+def test_a_claim_says_in_how_many_other_draws_it_would_be_found() -> None:
+    """Against draws: the gain of a column of known weight, by the evidence itself."""
+    rng = np.random.default_rng(8)
+    nats = 8.0
+    gains = 0.5 * (np.sqrt(2.0 * nats) + rng.standard_normal(200_000)) ** 2
+    assert found_again(nats) == pytest.approx(float(np.mean(gains > 5.0)), abs=0.03)
+    assert found_again(5.0) == pytest.approx(0.5)
+    assert found_again(-1.0) == 0.0
+    assert found_again(30.0) > 0.999
+
+
+def test_no_group_is_let_go_with_a_number_that_no_machine_has() -> None:
+    """Two compliances that are off: as a whole they explain much, but one of them would be negative."""
+    rng = np.random.default_rng(3)
+    pair = [Unknown(f"compliance of {n}", "drive compliance", "ln", 0.2) for n in "ab"]
+    columns = 2.0 * rng.standard_normal((400, 2))
+    free = {"drive compliance": [0, 1]}
+    for truth, said in (([-12.0, 9.0], "no part yields"), ([4.0, 4.5], "")):
+        sums = Sums.of(columns, columns @ truth + rng.standard_normal(400))
+        why = _absurd(sums, pair, np.array([10.0, 10.0]), [0, 1], None)
+        assert why.split(": ")[-1].startswith(said) and bool(why) is bool(said)
+        found = claims(sums, pair, free, (), None, lambda *_: "")
+        assert not (said and found.groups)

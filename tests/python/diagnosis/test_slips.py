@@ -12,9 +12,12 @@ import pytest
 import stiffmap as sm
 from stiffmap import effects
 from stiffmap.description import AppliedEffect
+from stiffmap.diagnosis.report.findings import Effect
 from stiffmap.diagnosis.report.sentences import aliases, measured, next_step, opening
 from stiffmap.diagnosis.search.study import study
 from stiffmap.diagnosis.slips.find import Found, find_slip
+from stiffmap.diagnosis.slips.slip import Slip
+from stiffmap.diagnosis.verdict import by_gain
 from stiffmap.experiment import random_plan, simulate
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.prediction.predict import Predictor
@@ -190,7 +193,25 @@ def test_aliases_stand_in_the_headline() -> None:
     d = sm.diagnose("orthoglide-revised", readings("orthoglide-revised", True), seed=1, cross_validate=False)
     (effect,) = d.effects
     if effect.aliases:
-        assert "which these readings cannot distinguish from it" in opening(d)
+        assert "these readings cannot distinguish it from " in opening(d)
     assert aliases(replace(effect, aliases=[])) == ""
     made = replace(effect, aliases=[{"kind": "compliance", "element": "actuator", "legs": ["z"]}] * 2)
     assert aliases(made).count("(drive of leg z)") == 1
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [
+        (9.79, 9.84, "check first: kgf (kp) and N mixed up"),
+        (4.40, 4.46, "check first: lbf and N mixed up"),
+        (7.0, 7.2, ""),
+    ],
+)
+def test_a_gain_beside_a_cause_names_the_unit(low: float, high: float, words: str) -> None:
+    """Readings of which a soft part as well makes a factor that no unit is: the gain found beside it says which."""
+    units = "check the units of force and gauge, and any lever"
+    s = Slip("factor", "all readings are 11.96 times what the file predicts", units, (), 0.1, False)
+    e = Effect("load_gain", "load", (), {"gain": ((low + high) / 2, low, high, "1")}, [], {})
+    assert by_gain(s, [e]).check == (words or units)
+    assert by_gain(s, []) == s
+    assert by_gain(replace(s, undone=True), [e]).check == units

@@ -55,6 +55,34 @@ def test_ten_more(name: str, tmp_path: Path) -> None:
     matches(e, LATER[name])
 
 
+LAYERED = """Delta No. 7;;;;;;
+Operator:;M. Weber;;Instrument:;3 dial gauges;;
+;;;;;;
+#;Position;;Force;;Gauge;Remark
+;X;Y;Fx;Fy;x;
+;mm;mm;kgf;kgf;1/100 mm;
+P1;0;400;10,0;0;1,25;touched
+P2;50;400;10,0;0;1,40;
+"""
+
+
+def test_groups_stand_over_names_that_say_enough(tmp_path: Path) -> None:
+    """Force over Fx is Fx, Position over X is the position though the gauge's x is written small."""
+    code, e = imported(Ugly(LAYERED, more=("--set", "z=0")), tmp_path)
+    assert code == 0 and e is not None
+    np.testing.assert_allclose(e.wrench[:, 0], 98.0665)
+    np.testing.assert_allclose(e.position, [[0, 0.4, 0], [0.05, 0.4, 0]])
+    np.testing.assert_allclose(e.reading[:, 0], [12.5e-6, 14e-6])
+    record = dict(e.record)
+    assert (record["operator"], record["instrument"]) == ("M. Weber", "3 dial gauges")
+
+
+def test_a_missing_load_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert imported(Ugly(CLEAN.replace("fx [N]", "pull [N]")), tmp_path)[0] == 2
+    err = capsys.readouterr().err
+    assert "--map fx='HEADER'" in err and "'pull [N]'" in err
+
+
 def test_what_is_left_out_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert imported(UGLY["means at the end"], tmp_path)[0] == 0
     out = capsys.readouterr().out
@@ -87,6 +115,19 @@ def test_errors_name_the_sheet_and_leave_nothing(
     err = capsys.readouterr().err
     assert words in err and "sheet.csv" in err and "data.csv" not in err
     assert sorted(p.name for p in tmp_path.iterdir()) == ["sheet.csv"]
+
+
+def test_a_workbook_names_sheet_row_and_cell(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def fill(book: Any) -> None:
+        book.active.title = "March"
+        book.active.append(["x [mm]", "y [mm]", "z [mm]", "fx [N]", "dx [µm]"])
+        book.active.append([0, 400, 0, 100, 12.5])
+        book.active.append([50, 400, 0, 100, "soft"])
+
+    assert imported(Ugly(fill), tmp_path)[0] == 2
+    err = capsys.readouterr().err
+    assert "sheet 'March', line 3: column 'dx [µm]': expected a number; found 'soft' (cell E3)" in err
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["sheet.xlsx"]
 
 
 def test_a_failure_leaves_an_old_experiment_alone(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from tests.python.milling.gantry import gantry
 import stiffmap as sm
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
-from stiffmap.milling import mill
+from stiffmap.milling import mill, mill_job
 from stiffmap.milling.equilibrium import equilibrium
 from stiffmap.milling.placement import Search, placements
 from stiffmap.milling.plant import Plant
@@ -164,3 +164,12 @@ def test_the_other_way_round() -> None:
     assert two.width(np.zeros(len(two)))[100:-100] == pytest.approx(
         one.width(np.zeros(len(one)))[::-1][100:-100], rel=0.2
     )
+
+
+@pytest.mark.parametrize("name", ["slot", "trimming"])
+def test_a_built_in_outline_is_run_at_the_speeds_of_its_process(name: str) -> None:
+    process = sm.load_process(name)
+    found = mill_job(sm.load_machine("orthoglide-revised"), "circle", process, at=(0.05, 0.05, 0), step=0.05)
+    assert found.job.faster == pytest.approx(1.0)
+    assert found.job.path.spindle[-1] == pytest.approx(process.spindle)
+    assert found.job.feed == pytest.approx(process.feed)

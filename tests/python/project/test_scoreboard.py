@@ -36,6 +36,21 @@ def test_the_page_of_the_documentation_is_made_from_its_rows(tmp_path: Path) -> 
     assert all(r["unseen_rows"] for r in rows if r["status"] == "measured")
 
 
+def test_speed_is_a_table_of_ratios(tmp_path: Path) -> None:
+    data = json.loads((ROOT / "docs/scoreboard.json").read_text())
+    case = {"case": "a case", "note": ""}
+    data["speed"] = [
+        {**case, "package": "stiffmap", "microseconds": 2.0},
+        {**case, "package": "by hand", "microseconds": 25.0},
+        {**case, "package": "other", "microseconds": None, "note": "not here"},
+    ]
+    (tmp_path / "rows.json").write_text(json.dumps(data))
+    assert run("--out", tmp_path / "board.md", "--page-of", tmp_path / "rows.json").returncode == 0
+    page = (tmp_path / "board.md").read_text()
+    assert "| a case | by hand | 25 | 12.5 |  |" in page
+    assert "| a case | other | – |  | not here |" in page
+
+
 def test_absent_and_damaged_sets_are_rows(tmp_path: Path) -> None:
     (tmp_path / "data/ur5_tracker").mkdir(parents=True)
     (tmp_path / "data/a_new_set").mkdir()

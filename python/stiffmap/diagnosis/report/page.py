@@ -13,7 +13,8 @@ from stiffmap.budget import deflection_budget
 from stiffmap.description.tree import joints
 from stiffmap.diagnosis.decision.patterns import Pattern
 from stiffmap.diagnosis.report.findings import Detectability, Effect, Findings
-from stiffmap.diagnosis.report.sentences import UNITS, alias_words, interval, next_step, opening
+from stiffmap.diagnosis.report.sentences import alias_words, interval, next_step, opening
+from stiffmap.diagnosis.report.shop import in_axis_units, in_shop_units, in_shop_words, p_text, spoken
 from stiffmap.diagnosis.report.wording import effect_text, five_lines, separation_text
 from stiffmap.diagnosis.slips.slip import Slip
 from stiffmap.effects import registry
@@ -58,7 +59,7 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
         axes=", ".join(d.experiment.axes),
         opening=opening(d),
         next=next_step(d),
-        lines=[in_shop_words(line) for line in five_lines(d)],
+        lines=[in_shop_words(line) for line in five_lines(d)[1:]],  # the headline has the verdict
         effects=[_effect(e) for e in d.effects],
         rivals=[
             ("; ".join(map(effect_text, other)), separation_text(s))
@@ -127,35 +128,6 @@ def _slip(s: Slip) -> dict[str, Any]:
     return {"check": s.check, "seen": s.seen, "also": s.also, "evidence": s.evidence, "undone": s.undone}
 
 
-def in_shop_words(text: str) -> str:
-    """A line of the screen with drives called so, and no marks of code."""
-    return text.replace("actuator", "drive").replace("`", "")
-
-
-def spoken(text: str) -> str:
-    """``bilinear of actuator, leg x (why)`` with the effect's title and drives called so."""
-    kind, of, rest = text.partition(" of ")
-    if not of or kind not in registry.kinds():
-        return in_shop_words(text)
-    return f"{registry.get(kind).title}: {in_shop_words(rest)}"
-
-
-def in_axis_units(axis: str, value: float) -> str:
-    """A reading's size: µm, µrad for a rotation."""
-    return f"{1e6 * value:.2f} {'µrad' if axis.startswith('r') else 'µm'}"
-
-
-def in_shop_units(value: float, unit: str) -> str:
-    """A number of an effect: µm, µm/N, mrad."""
-    factor, name = UNITS.get(unit, (1.0, unit))
-    return f"{factor * value:.4g} {name}".rstrip()
-
-
-def p_text(p: float) -> str:
-    """A p-value; 0 is what no double holds."""
-    return f"{p:.2g}" if p > 0 else "below 1e-300"
-
-
 def _effect(e: Effect) -> dict[str, Any]:
     legs = f", leg {', '.join(e.legs)}" if e.legs else ""
     return {
@@ -199,9 +171,13 @@ def _folds(d: Findings) -> str:
 def _noise(d: Findings) -> list[tuple[str, ...]]:
     n = d.noise
     return [
-        (a, *(in_axis_units(a, v[a]) for v in (n.floor, n.repeats, n.declared)), f"{n.consistency[a]:.2g}")
+        (a, *(in_axis_units(a, v[a]) for v in (n.floor, n.repeats, n.declared)), _or_none(n.consistency[a]))
         for a in n.floor
     ]
+
+
+def _or_none(value: float) -> str:
+    return f"{value:.2g}" if np.isfinite(value) else "–"
 
 
 def _checks(before: Sequence[Check], after: Sequence[Check]) -> list[tuple[object, ...]]:

@@ -142,7 +142,7 @@ def before_after(d: Findings) -> Figure:
     figure = Figure(figsize=(4.6, 2.4), layout="constrained")
     ax = figure.subplots()
     bars = ax.barh(["your file", "corrected", "noise"], values, color=[BEFORE, AFTER, "0.7"])
-    ax.bar_label(bars, [f"{v:.3g} µ{unit}" for v in values], padding=3)
+    ax.bar_label(bars, [f"{v:#.3g} µ{unit}".replace(". ", " ") for v in values], padding=3)
     ax.invert_yaxis()
     ax.set_xlim(0, 1.3 * max(values))
     ax.set(xlabel=f"left of {d.after.n} readings, rms, µ{unit}")

@@ -12,47 +12,44 @@ from stiffmap.diagnosis.report.findings import Effect, Findings
 from stiffmap.experiment.experiment import Floats
 from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
-from stiffmap.plot.machines import look_from
+from stiffmap.plot.scene import draw_body, finish, flat_marks, on, scene_axes, tool
 from stiffmap.plot.skeleton import owners, skeleton
 
-LIT, GREY, MM = "#d62728", "0.65", 1e3
+LIT, GREY = "#d62728", "0.65"
 
 
 def place_figure(d: Findings) -> Figure:
     """The declared machine at home in grey; legs of the named effects dark, their elements red."""
     machine = d.declared
     k = inverse_kinematics(machine, machine.description.home.p)
-    figure = Figure(figsize=(4.6, 3.6))
-    ax: Any = figure.add_axes((0.0, 0.02, 1.0, 0.9), projection="3d")
+    figure = Figure(figsize=(4.6, 3.4), layout="constrained")
     if int(k.status) != Status.CONVERGED:
-        ax.set_axis_off()
         return figure
     shape = skeleton(machine, k.coordinates)
+    ax: Any = scene_axes(figure, shape, None)
     legs = {leg for e in d.effects for leg in e.legs}
     for _, ends in shape.guides:
-        ax.plot(*(MM * ends.T), color="0.85", lw=4, solid_capstyle="butt")
+        ax.plot(*on(ax, ends), color="0.85", lw=4, solid_capstyle="butt")
     for leg, ends in shape.links:
         named = leg in legs and len(legs) < len(machine.legs)
-        ax.plot(*(MM * ends.T), color="0.2" if named else GREY, lw=2.4 if named else 1.6)
+        ax.plot(*on(ax, ends), color="0.2" if named else GREY, lw=2.4 if named else 1.6)
+    if len(shape.platform):
+        draw_body(ax, shape.platform)
+        tool(ax, shape)
+    marks = flat_marks(ax)
     for e in d.effects:
         points, ends_of = lit(machine, k.coordinates, e)
         for ends in ends_of:
-            ax.plot(*(MM * ends.T), color=LIT, lw=4)
-        if not len(points):
-            points = shape.tcp[None]
-        ax.scatter(*(MM * points.T), s=90, color=LIT, depthshade=False, zorder=10)
-    ax.scatter(
-        *(MM * shape.tcp), marker="*", s=90, color="#E69F00", edgecolor="black", lw=0.5, depthshade=False
-    )
-    look_from(ax, shape)
-    ax.set_aspect("equal")
-    ax.set_box_aspect(None, zoom=1.25)
+            ax.plot(*on(ax, ends), color=LIT, lw=4)
+        ax.scatter(*on(ax, points if len(points) else shape.tcp[None]), s=90, color=LIT, **marks)
+    ax.scatter(*on(ax, shape.tcp), marker="*", s=90, color="#E69F00", edgecolor="black", lw=0.5, **marks)
+    finish(ax, shape)
     ax.set_axis_off()
     names = [
         f"{e.element.replace('actuator', 'drive')}{' of leg ' + ', '.join(e.legs) if e.legs else ''}"
         for e in d.effects
     ]
-    figure.suptitle("; ".join(names)[:80] or machine.name, fontsize=10, y=0.98)
+    figure.suptitle("; ".join(names)[:80] or machine.name, fontsize=10)
     return figure
 
 

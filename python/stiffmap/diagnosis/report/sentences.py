@@ -118,7 +118,9 @@ def aliases(e: Effect) -> str:
         return ""
     shown = " or ".join(names[:ALIASES])
     more = len(names) - ALIASES
-    return f", or as well {shown}{f' or one of {more} more' if more > 0 else ''}, which these readings cannot distinguish from it"
+    return (
+        f"; these readings cannot distinguish it from {shown}{f' or one of {more} more' if more > 0 else ''}"
+    )
 
 
 def alias_words(a: Mapping[str, Any]) -> str:

@@ -123,6 +123,12 @@ def _named(quantity: str) -> list[tuple[float, str, bool]]:
     ]
 
 
+def named_within(low: float, high: float) -> list[str]:
+    """What to check first, of known factors of all readings between two ends (a gain of the load or of all gauges)."""
+    found = [n for n in _named("both") if min(low, high) <= n[0] <= max(low, high)]
+    return list(dict.fromkeys(name for _, name, _ in sorted(found, key=lambda n: not n[2])))
+
+
 def _known(value: float, u: float, quantity: str) -> list[tuple[float, str, bool]]:
     """Known factors that a value is, within its uncertainty, the nearest first."""
     spread = min(NEAR, max(3.0 * u / max(abs(value), 1e-300), 0.01))

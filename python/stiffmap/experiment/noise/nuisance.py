@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings import kind_of
-from stiffmap.experiment.setups import setups_of, targets_of
+from stiffmap.experiment.setups import SEEN, setups_of, targets_of
 
 
 def nuisance_columns(experiment: Experiment, base: Floats) -> Floats:
@@ -44,11 +44,25 @@ def _frames(experiment: Experiment, base: Floats) -> Iterator[Floats]:
 
 def _turns(here: Floats, experiment: Experiment, base: Floats) -> Iterator[Floats]:
     position = experiment.quantity == "position"
+    place = experiment.position + _levers(experiment)
     at, turned = np.nan_to_num(base[:, :3]), np.nan_to_num(base[:, 3:6])
     for axis in np.eye(3):
-        linear = np.cross(axis, experiment.position + at if position else at)
+        linear = np.cross(axis, place + at if position else at)
         angular = _of_rotation_vector(turned, axis) if position else np.cross(axis, turned)
         yield _wide(experiment, here[:, None] * np.hstack([linear, angular]))
+
+
+def _levers(experiment: Experiment) -> Floats:
+    """(n, 3) m, base axes: from the tool point to the target that was seen, where it has been found."""
+    out = np.zeros((len(experiment), 3))
+    if experiment.rotation is None:  # the same in all rows: a shift
+        return out
+    shifts = [shift for name, _, shift in experiment.registration if name.startswith("target ")]
+    for i, point in enumerate(experiment.points):
+        number = point.rpartition(SEEN)[2]
+        if SEEN in point and int(number) <= len(shifts):
+            out[i] = experiment.rotation[i] @ shifts[int(number) - 1]
+    return out
 
 
 def _of_rotation_vector(turned: Floats, turn: Floats) -> Floats:

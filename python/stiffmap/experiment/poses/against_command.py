@@ -11,11 +11,8 @@ from stiffmap.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.poses.handeye import Sighting, as_commanded, find_frames, unmoved
 from stiffmap.experiment.readings import kinds
-from stiffmap.experiment.setups import setups_of, targets_of
+from stiffmap.experiment.setups import SEEN, setups_of, targets_of
 from stiffmap.machine import Machine
-
-SEEN = "seen_target_"
-"""Names of points on the tool that carry a target."""
 
 
 def resolved(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
