@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.branches import Start, start_coordinates
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.compiled import CompiledMachine
+from stiffmap.results import OverPoses
 from stiffmap.rotations import as_rotations
 from stiffmap.short import short_repr
 
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class Kinematics:
+class Kinematics(OverPoses):
     """Configurations of a batch of poses; NaN where the status is UNREACHABLE."""
 
     actuators: Floats

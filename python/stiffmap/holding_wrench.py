@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.compiled import CompiledMachine, Status
 from stiffmap.errors import StiffmapError
+from stiffmap.results import OverPoses
 from stiffmap.rotations import as_rotations
 from stiffmap.short import short_repr
 
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class HoldingWrench:
+class HoldingWrench(OverPoses):
     """A batch of poses with a point of the machine held; SI, base axes, moments about the point.
 
     Failed poses hold NaN and their status.

@@ -12,12 +12,13 @@ from stiffmap.deprecation import warn_renamed
 from stiffmap.description.tree import joints
 from stiffmap.files.load import Source
 from stiffmap.machine import Machine, takes_machine
+from stiffmap.results import OverPoses
 from stiffmap.short import short_repr
 
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class InternalWrenches:
+class InternalWrenches(OverPoses):
     """Wrenches inside a machine, leading batch axes (...); NaN for failed poses, with their status."""
 
     springs: dict[str, Floats]

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap.broadcasting import Floats
 from stiffmap.closing import Kinematics
 from stiffmap.compiled import Answer, Flag, Names, Status, counted
 from stiffmap.labels import solution_dataset
+from stiffmap.results import OverPoses
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = NDArray[np.float64]
 Slopes = Mapping[str, Mapping[str, Floats]]  # quantity -> name of the variable -> derivative
 FIELDS = (
     "displacement",
@@ -33,7 +34,7 @@ FIELDS = (
 )
 
 
-class Solution:
+class Solution(OverPoses):
     """Equilibria of a batch of poses; SI, base axes, linear part first, leading batch axes (...).
 
     Failed poses hold NaN and their status. Arrays are made when they are first asked for.

@@ -9,10 +9,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap.broadcasting import Floats
 from stiffmap.description import AppliedEffect
 from stiffmap.effects.parameter import Parameter
 
-Floats = NDArray[np.float64]
 RECORDS = ("temperature", "order", "hours", "approach", "branch", "setup", "motor")
 """What an effect may need of an experiment besides pose, load and reading; ``motor``: an encoder on the motor's side."""
 

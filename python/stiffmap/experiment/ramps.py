@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from stiffmap.broadcasting import Floats
+
 Integers = NDArray[np.intp]
 RETREAT = 0.02
 """Share of the whole range that a load goes back before it counts as turned: less is its noise."""

@@ -14,12 +14,13 @@ from stiffmap.maps.inputs import plane_axes
 from stiffmap.performance.closing import DriveKinematics, drive_kinematics
 from stiffmap.performance.scaling import drive_values
 from stiffmap.performance.zonotopes import corners, farthest_vertex, worst_corner
+from stiffmap.results import OverPoses
 from stiffmap.short import short_repr
 
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class AccuracyTransmission:
+class AccuracyTransmission(OverPoses):
     """Largest tool error over the box of encoder errors, at poses (...); NaN where the pose failed."""
 
     translation: Floats

@@ -18,6 +18,7 @@ from stiffmap.performance.polygons import Polygon, section_polygon
 from stiffmap.performance.scaling import characteristic_length, drive_values, weighted
 from stiffmap.performance.tensions import as_tensions, held, in_cables, pushes, radius
 from stiffmap.performance.velocity import of_motions, singular_values
+from stiffmap.results import OverPoses
 from stiffmap.short import short_repr
 
 NOTHING = 1e-12
@@ -26,7 +27,7 @@ NOTHING = 1e-12
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class ForceTransmission:
+class ForceTransmission(OverPoses):
     """Holdable forces at the TCP at poses (...); NaN where the pose failed."""
 
     sphere_min: Floats

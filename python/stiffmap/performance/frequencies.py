@@ -11,13 +11,14 @@ from stiffmap.broadcasting import Floats, batch, rows, thread_count, trailing, w
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine, takes_machine
 from stiffmap.performance.inertia import inertias, need_masses
+from stiffmap.results import OverPoses
 from stiffmap.rotations import as_rotations
 from stiffmap.short import short_repr
 
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class NaturalFrequencies:
+class NaturalFrequencies(OverPoses):
     """Undamped modes at poses (...), lowest first; NaN beyond the last one and where the pose failed."""
 
     frequency: Floats

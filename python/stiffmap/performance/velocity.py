@@ -15,12 +15,13 @@ from stiffmap.performance.polygons import Polygon, section_polygon
 from stiffmap.performance.scaling import characteristic_length, drive_values, mixes_units, weighted
 from stiffmap.performance.sharing import facets, motions
 from stiffmap.performance.zonotopes import farthest_vertex, inscribed_sphere, inverse_rows, rows_limit
+from stiffmap.results import OverPoses
 from stiffmap.short import short_repr
 
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class VelocityTransmission:
+class VelocityTransmission(OverPoses):
     """Transmission factors at poses (...); NaN where the pose failed, and its status."""
 
     sphere_min: Floats

@@ -17,8 +17,20 @@ PACKAGE = Path(__file__).parents[3] / "python/stiffmap"
 # From a description to a machine that can be solved. Each may import earlier ranks only; whatever is not
 # listed (maps, experiments, diagnoses, commands ...) builds on all of them.
 RANKS = (
-    ("_core", "version", "errors", "deprecation", "recent", "units", "html", "beams", "number_text", "short"),
-    ("description", "broadcasting", "yaml_limits", "python_file", "outputs", "tasks"),
+    (
+        "_core",
+        "version",
+        "errors",
+        "deprecation",
+        "results",
+        "recent",
+        "units",
+        "html",
+        "beams",
+        "number_text",
+        "short",
+    ),
+    ("description", "broadcasting", "results", "yaml_limits", "python_file", "outputs", "tasks"),
     ("rotations", "yaml_text", "home", "fingerprints", "cells", "addresses"),
     ("compiled", "link"),
     ("status", "branches"),

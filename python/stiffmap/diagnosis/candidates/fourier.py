@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.fft import ifft, next_fast_len
 from scipy.sparse import csr_array
 
-Floats = NDArray[np.float64]
+from stiffmap.broadcasting import Floats
+
 Complex = NDArray[np.complex128]
 WIDTH = 14
 """Grid points over which a value is spread; twice as many points as frequencies."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from stiffmap.broadcasting import Floats
 from stiffmap.description import AppliedEffect
-from stiffmap.effects.evidence import Floats, Plan
+from stiffmap.effects.evidence import Plan
 from stiffmap.effects.library.geometry import AXES
 from stiffmap.effects.library.measurement import added, measured
 from stiffmap.effects.types import Option, Parameter

@@ -8,9 +8,10 @@ from itertools import product
 
 import numpy as np
 
+from stiffmap.broadcasting import Floats
 from stiffmap.description import ExternalSpring, MachineDescription
 from stiffmap.description.tree import point_names
-from stiffmap.effects.evidence import Floats, Probe, Signature, Tried
+from stiffmap.effects.evidence import Probe, Signature, Tried
 from stiffmap.effects.types import EffectType, Option, Parameter, Place, Placed
 from stiffmap.errors import StiffmapError
 

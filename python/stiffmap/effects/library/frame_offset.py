@@ -7,8 +7,9 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from stiffmap.broadcasting import Floats
 from stiffmap.description import AppliedEffect
-from stiffmap.effects.evidence import Floats, Plan
+from stiffmap.effects.evidence import Plan
 from stiffmap.effects.library.geometry import AXES
 from stiffmap.effects.library.measurement import added, measured, positions, rotation
 from stiffmap.effects.types import Parameter

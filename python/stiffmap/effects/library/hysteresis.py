@@ -12,7 +12,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.effects.evidence import Floats, Plan, Probe, Signature, Tried, shares_of_load
+from stiffmap.broadcasting import Floats
+from stiffmap.effects.evidence import Plan, Probe, Signature, Tried, shares_of_load
 from stiffmap.effects.library.drive_law import in_unit_of_joint
 from stiffmap.effects.sites import at_sites, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter

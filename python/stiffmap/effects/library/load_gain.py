@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from stiffmap.broadcasting import Floats
 from stiffmap.description import AppliedEffect
-from stiffmap.effects.evidence import Floats, Plan
+from stiffmap.effects.evidence import Plan
 from stiffmap.effects.library.measurement import gains, measured, scaled
 
 

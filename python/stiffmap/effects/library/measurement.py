@@ -13,8 +13,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from stiffmap.broadcasting import Floats
 from stiffmap.description import AppliedEffect
-from stiffmap.effects.evidence import Floats, Load, Plan, Reading
+from stiffmap.effects.evidence import Load, Plan, Reading
 from stiffmap.effects.library.geometry import AXES, names_of, rotations
 from stiffmap.effects.sites import at
 from stiffmap.effects.types import EffectType, Option, Parameter

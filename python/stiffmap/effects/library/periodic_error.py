@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from stiffmap.broadcasting import Floats
 from stiffmap.description import AppliedEffect, CommandError, MachineDescription
-from stiffmap.effects.evidence import Floats, Periods, Probe, Signature, Tried
+from stiffmap.effects.evidence import Periods, Probe, Signature, Tried
 from stiffmap.effects.library.command import add_command_error
 from stiffmap.effects.library.drive_law import in_unit_of_joint
 from stiffmap.effects.sites import at_sites, drives

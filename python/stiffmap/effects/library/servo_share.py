@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from stiffmap.broadcasting import Floats
 from stiffmap.description import AppliedEffect
-from stiffmap.effects.evidence import Floats, Plan
+from stiffmap.effects.evidence import Plan
 from stiffmap.effects.sites import at_sites, elastic_drives
 from stiffmap.effects.types import EffectType, Parameter
 

@@ -11,16 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from stiffmap.broadcasting import Floats
 from stiffmap.cells import Cells, filled, packed, row_numbers
 from stiffmap.errors import FileError
 from stiffmap.files.schema.base import suggestion
 from stiffmap.number_text import number_in
 from stiffmap.outputs import unguarded
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
