@@ -140,7 +140,7 @@ def with_slips(d: Diagnosis, slips: Sequence[Slip]) -> Diagnosis:
 
 
 def by_gain(s: Slip, effects: Sequence[Effect]) -> Slip:
-    """A common factor that no known one is, named by the gain that the diagnosis found beside a part of the machine."""
+    """A common factor that no known one is, named by the gain that the diagnosis found jointly with a part of the machine."""
     gains = [e.parameters["gain"] for e in effects if e.kind in GAINS and "gain" in e.parameters]
     if s.kind != "factor" or s.undone or len(gains) != 1:
         return s
@@ -148,7 +148,7 @@ def by_gain(s: Slip, effects: Sequence[Effect]) -> Slip:
     names = named_within(low, high)
     if not names:
         return s
-    seen = f"{s.seen}, {within(value, (high - low) / 3.92)} times beside the cause that is found as well"
+    seen = f"{s.seen}, {within(value, (high - low) / 3.92)} times jointly with the cause that is found as well"
     return replace(s, check=f"check first: {', or '.join(names)}", seen=seen)
 
 
