@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stiffmap.errors import StiffmapError
-from stiffmap.outputs import write_text
+from stiffmap.outputs import write_text, writing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,7 +78,8 @@ class OverPoses:
         elif to.suffix == ".csv":
             write_text(to, self.to_dataframe().to_csv(index_label="pose"))
         else:
-            self.to_xarray().to_netcdf(to)
+            with writing(to) as fresh:
+                self.to_xarray().to_netcdf(fresh, engine="netcdf4")
 
 
 def _arrays(result: Any) -> list[tuple[str, Any]]:
