@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stiffmap.errors import StiffmapError
+from stiffmap.outputs import write_text, writing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,11 +74,12 @@ class OverPoses:
         if to.suffix not in ENDINGS:
             raise StiffmapError(f"{to.name}: expected a name that ends in {', '.join(ENDINGS)}")
         if to.suffix == ".json":
-            to.write_text(self.to_json() + "\n", encoding="utf-8")
+            write_text(to, self.to_json() + "\n")
         elif to.suffix == ".csv":
-            self.to_dataframe().to_csv(to, index_label="pose")
+            write_text(to, self.to_dataframe().to_csv(index_label="pose"))
         else:
-            self.to_xarray().to_netcdf(to)
+            with writing(to) as fresh:
+                self.to_xarray().to_netcdf(fresh, engine="netcdf4")
 
 
 def _arrays(result: Any) -> list[tuple[str, Any]]:

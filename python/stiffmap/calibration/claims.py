@@ -110,7 +110,7 @@ def claims(
 def _absurd(
     sums: Sums, unknowns: Sequence[Unknown], factor: Floats, which: Sequence[int], at: Floats | None
 ) -> str:
-    """Why the priors of a group are not widened: a number of it would be one that no machine has."""
+    """Why a group is not widened: a number of it would be one that no machine has."""
     values = sums.scaled(factor).estimate * factor
     for i in which:
         times = (

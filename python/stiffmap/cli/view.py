@@ -63,7 +63,7 @@ def view(
     ] = None,
     diagnosis: Annotated[
         Path | None,
-        typer.Option(help="Folder that stiffmap diagnose -o wrote: what it named is lit on its element."),
+        typer.Option(help="Folder of a diagnosis: what it named is lit on its element."),
     ] = None,
     path: Annotated[
         str | None, typer.Option(help="Toolpath (G-code, CL, CSV, or an outline): wanted, cut, compensated.")

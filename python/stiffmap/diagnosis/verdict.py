@@ -148,7 +148,9 @@ def by_gain(s: Slip, effects: Sequence[Effect]) -> Slip:
     names = named_within(low, high)
     if not names:
         return s
-    seen = f"{s.seen}, {within(value, (high - low) / 3.92)} times where the cause is fitted jointly"
+    seen = (
+        f"{s.seen}, {within(value, (high - low) / 3.92)} times jointly with the cause that is found as well"
+    )
     return replace(s, check=f"check first: {', or '.join(names)}", seen=seen)
 
 
