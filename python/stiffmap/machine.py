@@ -284,7 +284,7 @@ class Machine:
         gravity: ArrayLike | None = None,
         plane: str | None = None,
         normal: ArrayLike | None = None,
-        quantity: str | None = None,
+        quantity: str = "deflection",
         tolerance: float | None = None,
         magnification: float | None = None,
         frequency: float | None = None,
