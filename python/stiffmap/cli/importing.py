@@ -50,7 +50,7 @@ def import_urdf(
 
       [cyan]stiffmap import arm.urdf -o arm.yaml[/cyan]
 
-      [cyan]stiffmap import arm_dh.csv --dh-convention modified -o arm.yaml[/cyan]
+      [cyan]stiffmap import arm_dh.csv --dh-convention modified -o craig.yaml[/cyan]
 
       [cyan]stiffmap import delta.urdf --sidecar robot.yaml --without-meshes[/cyan]
     """

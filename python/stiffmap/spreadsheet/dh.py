@@ -117,7 +117,7 @@ def arm(
         elements.append(Joint(r.name, kind, ((0.0, 0.0, 1.0),), (float(q[i]),), actuated=True, drive=drive))
         behind = own @ link if standard else own
         if np.any(behind - np.eye(4)):
-            elements.append(Offset(f"link_{i + 1}" if standard else f"joint_{i + 1}", _pose(behind)))
+            elements.append(Offset(f"link_{i + 1}" if standard else f"{r.name}_end", _pose(behind)))
     at = forward(rows, standard, q)
     reach = sum(abs(r.a) + abs(r.d) for r in rows) or 1.0
     room = ROOM * reach
