@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stiffmap.errors import StiffmapError
-from stiffmap.outputs import write_text, writing
+from stiffmap.outputs import write_rows, write_text, writing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,7 +76,8 @@ class OverPoses:
         if to.suffix == ".json":
             write_text(to, self.to_json() + "\n")
         elif to.suffix == ".csv":
-            write_text(to, self.to_dataframe().to_csv(index_label="pose"))
+            table = self.to_dataframe()
+            write_rows(to, ["pose", *table.columns], table.itertuples())
         else:
             with writing(to) as fresh:
                 self.to_xarray().to_netcdf(fresh, engine="netcdf4")
