@@ -46,7 +46,7 @@ def claimed_fit(
             return f"a smooth field that does not depend on the machine explains as much (odds {odds(nats)} with the field in the model)"
         if len(which) > 1 and found_again(nats) < MOST_DRAWS:
             return (
-                f"{nats:+.0f} nats jointly with a smooth field: another draw of as many readings would show it with "
+                f"odds {odds(nats)} jointly with a smooth field: another draw of as many readings would show it with "
                 f"{100 * found_again(nats):.0f} % only"
             )
         if len(parts) < 2:
