@@ -22,13 +22,13 @@ Held = tuple[Floats, Floats, Floats]
 def in_cables(machine: Machine, what: str) -> Hanging | None:
     """The platform of a machine in cables alone; None where there are no cables.
 
-    StiffmapError where cables pull beside legs, of which `what` is not known.
+    StiffmapError for a machine with both cables and legs, of which `what` is not known.
     """
     if not machine.compiled.names.cables:
         return None
     if machine.description.legs:
         raise StiffmapError(
-            f"{machine.name}: {what} is not known where cables pull beside legs; it is for machines that hang in cables alone"
+            f"{machine.name}: {what} is not known of a machine with both cables and legs, only of one that hangs in cables alone"
         )
     return hanging(machine)
 
@@ -37,7 +37,7 @@ def held(
     machine: Machine, h: Hanging, k: DriveKinematics, columns: Floats, most: Floats, gravity: ArrayLike | None
 ) -> Held:
     """Coordinates v of a wrench, columns (..., 6, c) times v, that tensions from 0 to `most` (cables,) N hold at poses
-    beside the weight. The tensions' wrenches fill a zonotope, whose facets are the rows."""
+    next to the weight. The tensions' wrenches fill a zonotope, whose facets are the rows."""
     if len(most) < len(h.rows):
         raise StiffmapError(
             f"{machine.name}: {len(most)} cables for {len(h.rows)} freedoms hold no force in every direction"
