@@ -1,6 +1,6 @@
 """Tap tests of machines with one undeclared effect, made by MuJoCo, and of machines without any.
 
-    python bench/tap_twins.py --twins 20 --nulls 100
+    python -m bench.tap_twins --twins 20 --nulls 100
 
 The numbers of the machine file are off by their uncertainties (masses by 5 %) in every twin; frequencies carry 0.5 % noise,
 directions 0.05. An effect is a drive 1.5 to 6 times as soft as declared that shifts the readings by 8 standard deviations or more

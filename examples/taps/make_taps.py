@@ -1,6 +1,6 @@
 """The tap tests of this example: MuJoCo plays an arm whose second joint is 1.8 times as soft as its file says.
 
-    python examples/taps/make_taps.py
+    python -m examples.taps.make_taps    # from the root of the repository
 
 Frequencies carry 0.5 % noise, directions of modes 0.05 in each component; three poses, four modes each.
 """

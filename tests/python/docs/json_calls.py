@@ -56,6 +56,9 @@ CALLS: dict[str, tuple[str, ...]] = {
     ),
     "mill": ("mill orthoglide-revised outline.ngc trimming -o mil",),
     "bench": ("bench --rounds 1",),
+    "lobes": ("lobes linear-delta --process slot --mode 1243,6.2,0.048,x --mode 1747,2.9,0.1,y",),
+    "taps": ("taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance",),
+    "view": ("view five-bar --html v.html",),
 }
 COSTLY = {
     "optimize",
@@ -68,5 +71,6 @@ COSTLY = {
     "plan",
     "monitor",
     "measures",
+    "taps",
 }
 """Left to the slow lane."""
