@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from stiffmap.cli import plan_options as plans
+from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
 from stiffmap.experiment import Loop, save_experiment
 from stiffmap.experiment import simulate as run
@@ -73,6 +74,7 @@ def simulate(
     gravity: Annotated[str | None, typer.Option(help="m/s², base axes, as 0,0,-9.81.")] = None,
     outliers: Annotated[float, typer.Option(help="Share of rows that are wild, 0 to 1.")] = 0.0,
     seed: Annotated[int, typer.Option(help="Seed of poses, loads and noise.")] = 0,
+    as_json: JsonOption = False,
 ) -> None:
     """Write a virtual experiment, to try a plan before the instrument is booked.
 
@@ -107,4 +109,8 @@ def simulate(
     twin = run(chosen, layout, [placed(chosen, e) for e in effect or []], seed=seed, outlier_share=outliers)
     save_experiment(twin, output, "virtual experiment" + "".join(f"; {e}" for e in effect or []))
     number = int(twin.groups.max()) + 1
+    if as_json:
+        found = {"rows": len(twin), "poses": number, "quantity": twin.quantity, "axes": list(twin.axes)}
+        print_json({"machine": chosen.name, **found, "folder": str(output)})
+        return
     print(f"{output}: {len(twin)} rows of {twin.quantity} at {number} poses; reads {', '.join(twin.axes)}")

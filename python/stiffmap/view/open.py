@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import webbrowser
 from os import PathLike
 from pathlib import Path
@@ -17,6 +18,9 @@ from stiffmap.view.serving import HERE, LOCAL, Guard, silent, start_server
 from stiffmap.view.state import State, from_permalink, permalink
 from stiffmap.view.viewer import Viewer
 from stiffmap.view.watch import Watch
+
+POLL = 0.2
+"""s between two looks whether the view is closed."""
 
 
 class View:
@@ -80,7 +84,8 @@ class View:
     def wait(self) -> None:
         """Until the program is interrupted."""
         try:
-            self._server.sleep_forever()
+            while self._viewer is not None:
+                time.sleep(POLL)  # short: a signal that comes just before a sleep is seen after it
         except KeyboardInterrupt:
             pass
         finally:

@@ -26,14 +26,14 @@ CALLS: dict[str, tuple[str, ...]] = {
     ),
     "polar": ("polar five-bar -o p",),
     "wrench": (
-        "wrench orthoglide-revised --displacement 0.1,0,0,0,0,0",
-        "wrench five-bar --displacement 0.1,0,0,0,0,0",
+        "wrench orthoglide-revised --by 0.1,0,0",
+        "wrench five-bar --by 0.1,0,0",
     ),
     "stress": ("stress orthoglide-revised", "stress hexapod"),
     "import": ("import arm.urdf --without-meshes -o a.yaml --overwrite",),
     "sweep": (
         "sweep orthoglide-revised --direction 1,0,0",
-        "sweep orthoglide-revised --direction 1,0,0 --limit 500 --steps 4",
+        "sweep orthoglide-revised --direction 1,0,0 --to 500 --points 4",
     ),
     "measures": (
         "measures five-bar --nodes 3 --coarse 3",
@@ -43,7 +43,9 @@ CALLS: dict[str, tuple[str, ...]] = {
     "optimize": ("optimize my_design.yaml --generations 1 -o opt",),
     "paper": ("paper --points 5 -o pap",),
     "link": ("link bar.yaml --quick --size 6 -o b.yaml",),
-    "experiment": ("experiment new clocks.csv --machine five-bar -o clocks",),
+    "experiment": (
+        "experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 --overwrite -o clocks",
+    ),
     "residual": ("residual orthoglide-revised january", "residual linear-delta experiments/heights"),
     "diagnose": ("diagnose orthoglide-revised january -o d1",),
     "calibrate": ("calibrate orthoglide-revised held_out -o c1",),
@@ -54,7 +56,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         "compensate orthoglide-revised poses.csv",
         "compensate travelling-column --axis z -o z.csv",
     ),
-    "mill": ("mill orthoglide-revised outline.ngc trimming -o mil",),
+    "mill": ("mill orthoglide-revised outline.ngc --process trimming -o mil",),
     "bench": ("bench --rounds 1",),
     "lobes": ("lobes linear-delta --process slot --mode 1243,6.2,0.048,x --mode 1747,2.9,0.1,y",),
     "taps": ("taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance",),

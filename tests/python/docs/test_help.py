@@ -168,6 +168,8 @@ def test_examples_run(
         opening = pytest.importorskip("stiffmap.view.open", reason="needs the extra [view]")
         monkeypatch.setattr(opening.View, "wait", opening.View.close)
         monkeypatch.setattr("webbrowser.open", lambda *_: True)
+        servo = str(workshop / "experiments/servo")
+        main(["diagnose", "orthoglide-revised", servo, "-o", str(workshop / "result")])
     (workshop / name).mkdir(exist_ok=True)
     monkeypatch.chdir(workshop / name if name == "new" else workshop)
     command = next(c for c in COMMANDS if c.name == name)

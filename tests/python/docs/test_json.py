@@ -32,7 +32,9 @@ def test_every_command_has_calls_and_a_schema() -> None:
     assert {p.stem for p in SCHEMAS.glob("*.json")} == set(CALLS)
 
 
-def obeys(name: str, workshop: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def obeys(
+    name: str, workshop: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     jsonschema = pytest.importorskip("jsonschema")
     monkeypatch.chdir(workshop)
     for call in CALLS[name]:

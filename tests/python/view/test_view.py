@@ -182,11 +182,12 @@ def test_every_quantity_is_drawn(view: View, quantity: str) -> None:
     ],
 )
 def test_bad_options_end_in_one_message(
-    options: list[str], words: str, capsys: pytest.CaptureFixture[str]
+    options: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["view", "orthoglide-revised", "--html", "unused.html", *options]) == 2
+    unused = tmp_path / "unused.html"
+    assert main(["view", "orthoglide-revised", "--html", str(unused), *options]) == 2
     assert words in " ".join(capsys.readouterr().err.split())
-    assert not Path("unused.html").exists()
+    assert not unused.exists()
 
 
 def test_without_viser_there_is_one_clear_error(machine: sm.Machine, monkeypatch: pytest.MonkeyPatch,
@@ -226,7 +227,10 @@ def test_the_command_serves_until_it_is_interrupted() -> None:
         with urllib.request.urlopen(url) as answer:
             assert answer.status == 200
         running.send_signal(signal.SIGINT)
-        assert running.wait(30) == 0
+        try:
+            assert running.wait(30) == 0
+        finally:
+            running.kill()
         assert running.stderr.read() == ""
 
 
