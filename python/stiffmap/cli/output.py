@@ -12,4 +12,6 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of 
 
 def print_json(data: Any) -> None:
     """JSON on standard output: one document, keys in the order given, no NaN."""
-    print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
+    print(
+        json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False), flush=True
+    )  # who reads a pipe waits for it
