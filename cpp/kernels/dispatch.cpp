@@ -50,10 +50,8 @@ const std::vector<Level>& levels() {
     const KernelTable base = table_of(&stiffmap_kernel_base);
     std::vector<Level> out{{base, base}};
 #ifdef STIFFMAP_X86_LEVELS
-    if (has_v3())
-      out.push_back({table_of(&stiffmap_kernel_v3), table_of(&stiffmap_kernel_v3_pair)});
-    if (has_v4())
-      out.push_back({table_of(&stiffmap_kernel_v4), table_of(&stiffmap_kernel_v4_pair)});
+    if (has_v3()) out.push_back({table_of(&stiffmap_kernel_v3), table_of(&stiffmap_kernel_v3_pair)});
+    if (has_v4()) out.push_back({table_of(&stiffmap_kernel_v4), table_of(&stiffmap_kernel_v4_pair)});
 #endif
     return out;
   }();

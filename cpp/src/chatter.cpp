@@ -148,8 +148,9 @@ double largest_multiplier(const ToolModes& modes, const std::vector<Chip>& chips
   for (std::size_t i = 0; i < k; ++i) {
     const Chip cut = depth * chips[i];
     ws.gain[i] = modes.rest.isZero(0) ? cut : Chip((Mat3::Identity() - cut * modes.rest.topRows<2>()).inverse() * cut);
-    const double fastest = std::sqrt(own * own + static_cast<double>(modes.omega.size()) * ws.gain[i].norm() / lightest) +
-                           2 * modes.ratio.maxCoeff() * own;
+    const double fastest =
+        std::sqrt(own * own + static_cast<double>(modes.omega.size()) * ws.gain[i].norm() / lightest) +
+        2 * modes.ratio.maxCoeff() * own;
     transition(modes, ws.gain[i], period / static_cast<double>(k), fastest, ws, ws.step.data() + i * size);
   }
   return dominant(modes, ws);

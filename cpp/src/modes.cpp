@@ -60,7 +60,8 @@ bool unsymmetric(const MatX& Z, const MatX& K, const MatX& M, ModesResult& out) 
   const auto [values, all] = general_eigen(A);
   std::vector<Index> order(at(values.size()));
   std::iota(order.begin(), order.end(), Index{0});
-  std::sort(order.begin(), order.end(), [&values = values](Index a, Index b) { return values[a].real() < values[b].real(); });
+  std::sort(order.begin(), order.end(),
+            [&values = values](Index a, Index b) { return values[a].real() < values[b].real(); });
   const double largest = values.cwiseAbs().maxCoeff();
   VecX mu(values.size());
   MatX vectors(K.rows(), values.size());

@@ -21,9 +21,11 @@ def executed(source: Path, seconds: int = 300) -> Any:
     from nbclient import NotebookClient
     from traitlets.config import Config
 
-    local = Config({"KernelManager": {"transport": "ipc" if os.name == "posix" else "tcp"}})
     book = jupytext.read(source, fmt="py:percent")
     with TemporaryDirectory() as folder:
+        # Sockets of its own: the default path is that of every kernel that was started in this folder.
+        sockets = {"transport": "ipc", "ip": f"{folder}/kernel"} if os.name == "posix" else {}
+        local = Config({"KernelManager": sockets})
         NotebookClient(
             book,
             timeout=seconds,

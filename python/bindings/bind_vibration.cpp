@@ -99,8 +99,7 @@ py::array_t<double> multipliers(const Array& frequency, const Array& ratio, cons
       ChatterWorkspace ws;
       for (long i = begin; i < end; ++i) {
         ws.start.resize(0);  // a row depends on no other
-        for (py::ssize_t j = 0; j < d; ++j)
-          found[d * i + j] = largest_multiplier(tool, cut, periods[i], depths[j], ws);
+        for (py::ssize_t j = 0; j < d; ++j) found[d * i + j] = largest_multiplier(tool, cut, periods[i], depths[j], ws);
       }
     });
   }

@@ -13,9 +13,9 @@ using Chip = Eigen::Matrix<double, 3, 2>;  ///< N/m per m of depth: force by wha
 
 /// What vibrates at the tool, in the axes feed, normal, tool axis.
 struct ToolModes {
-  VecX omega, ratio, mass;  ///< rad/s, share of critical damping, kg
+  VecX omega, ratio, mass;                       ///< rad/s, share of critical damping, kg
   Eigen::Matrix<double, 3, Eigen::Dynamic> way;  ///< unit vector of each
-  Mat3 rest = Mat3::Zero();  ///< m/N that follows the force at once
+  Mat3 rest = Mat3::Zero();                      ///< m/N that follows the force at once
 };
 
 /// Scratch of `largest_multiplier`.

@@ -20,10 +20,10 @@ struct ModesResult {
 struct ReducedPose {
   Status status = Status::unreachable;
   std::uint32_t flags = 0;
-  MatX Z;              ///< coordinates x motions
-  MatX K, S, M;        ///< tangent, its symmetric part, mass
-  Cholesky cholesky;   ///< of S
-  VecX x;              ///< coordinates at the equilibrium
+  MatX Z;             ///< coordinates x motions
+  MatX K, S, M;       ///< tangent, its symmetric part, mass
+  Cholesky cholesky;  ///< of S
+  VecX x;             ///< coordinates at the equilibrium
 };
 
 /// False where there is no equilibrium, or none that a small motion comes back to.

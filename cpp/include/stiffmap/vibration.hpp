@@ -19,10 +19,10 @@ struct VibrationResult {
   Status status = Status::unreachable;
   std::uint32_t flags = 0;
   Index kept = 0;
-  VecX square;         ///< s^2: inverse square of each angular frequency, the largest first; NaN beyond `kept`
-  MatX tip;            ///< 6 x modes
-  MatX viscous, loss;  ///< modes x modes
-  Mat6 rest;           ///< m/N and the like
+  VecX square;             ///< s^2: inverse square of each angular frequency, the largest first; NaN beyond `kept`
+  MatX tip;                ///< 6 x modes
+  MatX viscous, loss;      ///< modes x modes
+  Mat6 rest;               ///< m/N and the like
   double unsymmetric = 0;  ///< norm of what was left out of the tangent to make it symmetric, relative
 };
 

@@ -12,6 +12,5 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of 
 
 def print_json(data: Any) -> None:
     """JSON on standard output: one document, keys in the order given, no NaN."""
-    print(
-        json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False), flush=True
-    )  # who reads a pipe waits for it
+    text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
+    print(text, flush=True)  # a program that reads a pipe waits for it

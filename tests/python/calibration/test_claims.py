@@ -69,12 +69,13 @@ def test_what_nothing_explains_is_unattributed(name: str, seed: int) -> None:
 
 @pytest.mark.parametrize("name", ["rotary-delta", "orthoglide-revised"])
 def test_many_wrong_numbers_are_no_answer(name: str) -> None:
-    """Groups of numbers ten times beyond tolerance imitate a tool that yields: not better than any smooth field."""
+    """Groups of numbers ten times beyond tolerance imitate a tool that yields: not better than any smooth field, or far beyond what
+    a tolerance may be."""
     machine, data = odd_deflections(name)
     c = calibrate(machine, data)
     assert c.verdict == "unattributed"
     assert not c.beyond and not c.wider
-    assert "smooth field" in c.refused[0]
+    assert "smooth field" in c.refused[0] or "standard uncertainties are no tolerance" in c.refused[0]
     assert "  refused: " + c.refused[0] in c.lines()
     assert c.as_plain()["refused"] == list(c.refused)
 

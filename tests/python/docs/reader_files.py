@@ -38,3 +38,26 @@ def link_tables() -> tuple[str, str]:
     cases = ["fx [N],fy [N],fz [N],mx [N*mm],my [N*mm],mz [N*mm]"]
     cases += [",".join(f"{v:g}" for v in [*w[:3], *(1e3 * w[3:])]) for w in a["wrenches"]]
     return "\n".join(field) + "\n", "\n".join(cases) + "\n"
+
+
+ARM_DH = "theta [deg],d [mm],a [mm],alpha [deg]\n0,89,0,90\n0,0,-425,0\n0,0,-392,0\n0,109,0,90\n0,95,0,-90\n0,82,0,0\n"
+
+
+def joint_table(rows: int = 40) -> str:
+    """Commanded joints (deg) of the arm of `ARM_DH` and what a tracker saw of a reflector on its flange (mm), by the table's matrices."""
+    rng = np.random.default_rng(0)
+    table = [tuple(map(float, line.split(","))) for line in ARM_DH.splitlines()[1:]]
+    out = ["q1,q2,q3,q4,q5,q6,px [mm],py [mm],pz [mm]"]
+    for q in rng.uniform((-90, -120, 40, -140, -120, -90), (90, -40, 130, -40, -40, 90), (rows, 6)):
+        pose = np.eye(4)
+        for (_, d, a, alpha), angle in zip(table, np.radians(q), strict=True):
+            c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(np.radians(alpha)), np.sin(np.radians(alpha))
+            pose = pose @ [
+                [c, -s * ca, s * sa, a * c],
+                [s, c * ca, -c * sa, a * s],
+                [0, sa, ca, d],
+                [0, 0, 0, 1],
+            ]
+        seen = (pose @ [20.0, 30.0, 50.0, 1.0])[:3] + 0.03 * rng.standard_normal(3)
+        out.append(",".join(f"{v:.4f}" for v in (*q, *seen)))
+    return "\n".join(out) + "\n"

@@ -175,6 +175,9 @@ def test_examples_run(
     command = next(c for c in COMMANDS if c.name == name)
     lines = examples(load(command))
     assert lines, f"stiffmap {name} --help has no example"
+    lines = [
+        line for line in lines if "tcp://HOST" not in line
+    ]  # a cluster of the reader's; tests/python/tasks has one
     for line in lines:
         words = shlex.split(line)
         while "=" in words[0]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from blocks import Block, Reader, blocks, commands, own_part
-from reader_files import ROBOT, link_arrays, link_tables
+from reader_files import ARM_DH, ROBOT, joint_table, link_arrays, link_tables
 
 import stiffmap as sm
 
@@ -33,6 +33,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     sm.load_machine("tripteron").save(tmp_path / "my_machine.yaml")
     (tmp_path / "arm.urdf").write_text(ROBOT)
     (tmp_path / "poses.csv").write_text("x,y,z\n0,0,0\n100,-50,80\n")
+    (tmp_path / "arm_dh.csv").write_text(ARM_DH)
+    (tmp_path / "joints.csv").write_text(joint_table())
     shutil.copy(ROOT / "examples/link_bar.yaml", tmp_path / "bar.yaml")
     field, cases = link_tables()
     (tmp_path / "field.csv").write_text(field)

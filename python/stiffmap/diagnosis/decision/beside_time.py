@@ -13,10 +13,13 @@ from stiffmap.effects import get
 from stiffmap.experiment.noise.over_time import courses
 from stiffmap.experiment.noise.whitening import basis
 
+NEARLY = 3.0
+"""Nats, odds of 20: where an effect leads the courses by more, they are no rival (Kass and Raftery 1995: strong evidence)."""
+
 
 def beside_time(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]:
-    """The model without effects that are not significant jointly with smooth courses over time, and why; those that are a
-    course over time themselves are not tested."""
+    """The model without effects that are not significant jointly with smooth courses over time, where such courses explain the
+    readings nearly as well as the effect (`NEARLY`), and why; effects that are a course over time themselves are not tested."""
     search = finding.search
     q = courses(search.problem)
     refused: list[str] = []
@@ -26,7 +29,11 @@ def beside_time(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]
             if "order" in get(c.kind).needs:
                 continue
             worth = _worth(finding, model, i, q)
-            if worth < search.threshold and (worst is None or worth < worst[1]):
+            if (
+                worth < search.threshold
+                and _as_well(finding, model, i, q)
+                and (worst is None or worth < worst[1])
+            ):
                 worst = (i, worth)
         if worst is None:
             break
@@ -39,6 +46,16 @@ def beside_time(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]
         )
         model = less
     return model, tuple(refused)
+
+
+def _as_well(finding: Finding, model: Model, i: int, q: Floats) -> bool:
+    """Whether the courses in place of an effect explain the readings nearly as well as it does, by -ln p."""
+    less = fit_without(model, i, finding.search.predictor, finding.search.problem)
+    if not less.usable or less.residual is None:
+        return False
+    own = minus_log_p_of(less.chi2 - model.chi2, model.sizes()[i])
+    seen = q.T @ less.residual
+    return minus_log_p_of(float(seen @ seen), q.shape[1]) >= own - NEARLY
 
 
 def _worth(finding: Finding, model: Model, i: int, q: Floats) -> float:
