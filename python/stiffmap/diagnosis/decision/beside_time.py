@@ -10,16 +10,13 @@ from stiffmap.diagnosis.fitting.model import Model
 from stiffmap.diagnosis.search.selection import minus_log_p_of
 from stiffmap.diagnosis.search.study import Finding
 from stiffmap.effects import get
-from stiffmap.experiment.noise.over_time import courses
+from stiffmap.experiment.noise.over_time import SELDOM, courses
 from stiffmap.experiment.noise.whitening import basis
-
-NEARLY = 3.0
-"""Nats, odds of 20: where an effect leads the courses by more, they are no rival (Kass and Raftery 1995: strong evidence)."""
 
 
 def beside_time(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]:
-    """The model without effects that are not significant jointly with smooth courses over time, where such courses explain the
-    readings nearly as well as the effect (`NEARLY`), and why; effects that are a course over time themselves are not tested."""
+    """The model without effects that are not significant jointly with smooth courses over time, where the readings go
+    with time (`SELDOM`), and why; effects that are a course over time themselves are not tested."""
     search = finding.search
     q = courses(search.problem)
     refused: list[str] = []
@@ -31,7 +28,7 @@ def beside_time(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]
             worth = _worth(finding, model, i, q)
             if (
                 worth < search.threshold
-                and _as_well(finding, model, i, q)
+                and _moves(finding, model, i, q)
                 and (worst is None or worth < worst[1])
             ):
                 worst = (i, worth)
@@ -48,14 +45,13 @@ def beside_time(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]
     return model, tuple(refused)
 
 
-def _as_well(finding: Finding, model: Model, i: int, q: Floats) -> bool:
-    """Whether the courses in place of an effect explain the readings nearly as well as it does, by -ln p."""
+def _moves(finding: Finding, model: Model, i: int, q: Floats) -> bool:
+    """Whether the readings without an effect go with time at all; courses that chance may show are no rival."""
     less = fit_without(model, i, finding.search.predictor, finding.search.problem)
     if not less.usable or less.residual is None:
         return False
-    own = minus_log_p_of(less.chi2 - model.chi2, model.sizes()[i])
     seen = q.T @ less.residual
-    return minus_log_p_of(float(seen @ seen), q.shape[1]) >= own - NEARLY
+    return minus_log_p_of(float(seen @ seen), q.shape[1]) >= -np.log(SELDOM)
 
 
 def _worth(finding: Finding, model: Model, i: int, q: Floats) -> float:
