@@ -51,7 +51,7 @@ def _moves(finding: Finding, model: Model, i: int, q: Floats) -> bool:
     if not less.usable or less.residual is None:
         return False
     seen = q.T @ less.residual
-    return minus_log_p_of(float(seen @ seen), q.shape[1]) >= -np.log(SELDOM)
+    return bool(minus_log_p_of(float(seen @ seen), q.shape[1]) >= -np.log(SELDOM))
 
 
 def _worth(finding: Finding, model: Model, i: int, q: Floats) -> float:
