@@ -20,24 +20,20 @@ def beside_time(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]
     search = finding.search
     q = courses(search.problem)
     refused: list[str] = []
-    while model.candidates and q.shape[1]:
-        worst = None
+    while q.shape[1]:
+        rivals: list[tuple[float, int, Model]] = []
         for i, c in enumerate(model.candidates):
             if "order" in get(c.kind).needs:
                 continue
-            worth = _worth(finding, model, i, q)
-            if (
-                worth < search.threshold
-                and _moves(finding, model, i, q)
-                and (worst is None or worth < worst[1])
-            ):
-                worst = (i, worth)
-        if worst is None:
+            less = fit_without(model, i, search.predictor, search.problem)
+            if less.residual is None or not less.usable or not _moves(less.residual, q):
+                continue
+            worth = _worth(model, i, less.residual, q)
+            if worth < search.threshold:
+                rivals.append((worth, i, less))
+        if not rivals:
             break
-        i = worst[0]
-        less = fit_without(model, i, search.predictor, search.problem)
-        if not less.usable:
-            break
+        _, i, less = min(rivals, key=lambda r: r[:2])
         refused.append(
             f"{model.candidates[i]}: a smooth course over time (drift, creep or warming) explains as much"
         )
@@ -45,21 +41,16 @@ def beside_time(finding: Finding, model: Model) -> tuple[Model, tuple[str, ...]]
     return model, tuple(refused)
 
 
-def _moves(finding: Finding, model: Model, i: int, q: Floats) -> bool:
-    """Whether the readings without an effect go with time at all; courses that chance may show are no rival."""
-    less = fit_without(model, i, finding.search.predictor, finding.search.problem)
-    if not less.usable or less.residual is None:
-        return False
-    seen = q.T @ less.residual
+def _moves(residual: Floats, q: Floats) -> bool:
+    """Whether what the readings are without an effect goes with time at all; courses that chance may show are no rival."""
+    seen = q.T @ residual
     return bool(minus_log_p_of(float(seen @ seen), q.shape[1]) >= -np.log(SELDOM))
 
 
-def _worth(finding: Finding, model: Model, i: int, q: Floats) -> float:
-    """-ln p of an effect jointly with the courses, the other effects refitted to first order."""
+def _worth(model: Model, i: int, without: Floats, q: Floats) -> float:
+    """-ln p of an effect jointly with the courses, the other effects refitted to first order; `without`: the residual of the
+    fit that lacks it."""
     assert model.residual is not None and model.jacobian is not None
-    less = fit_without(model, i, finding.search.predictor, finding.search.problem)
-    if not less.usable or less.residual is None:
-        return np.inf
     own = model.parts()[i]
     others = [k for k in range(model.jacobian.shape[1]) if not own.start <= k < own.stop]
 
@@ -68,5 +59,5 @@ def _worth(finding: Finding, model: Model, i: int, q: Floats) -> float:
         rest = residual - both @ (both.T @ residual)
         return float(rest @ rest)
 
-    drop = left(less.residual, model.jacobian[:, others]) - left(model.residual, model.jacobian)
+    drop = left(without, model.jacobian[:, others]) - left(model.residual, model.jacobian)
     return minus_log_p_of(drop, model.sizes()[i])
