@@ -11,13 +11,13 @@ import numpy as np
 
 
 def plain(value: Any) -> Any:
-    """Data that JSON can hold; what is not finite becomes null."""
+    """Data that JSON can hold: arrays as lists, what is not finite as null."""
     if is_dataclass(value) and not isinstance(value, type):
         return {k: plain(v) for k, v in asdict(value).items()}
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(v) for v in value]
-    if isinstance(value, (np.floating, np.integer)):
-        value = value.item()
+    if isinstance(value, (np.ndarray, np.generic)):
+        return plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value

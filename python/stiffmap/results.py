@@ -12,6 +12,7 @@ import numpy as np
 
 from stiffmap.errors import StiffmapError
 from stiffmap.outputs import write_rows, write_text, writing
+from stiffmap.plain import plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,7 +66,7 @@ class OverPoses:
 
     def to_json(self) -> str:
         """Every variable of `to_xarray` as nested lists; numbers that are not finite become null."""
-        data = {str(n): _finite(v.to_numpy().tolist()) for n, v in self.to_xarray().data_vars.items()}
+        data = {str(n): plain(v.to_numpy()) for n, v in self.to_xarray().data_vars.items()}
         return json.dumps(data, ensure_ascii=False, allow_nan=False)
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -95,9 +96,3 @@ def _arrays(result: Any) -> list[tuple[str, Any]]:
         )
         out += [(n, np.asarray(v)) for n, v in pairs if isinstance(v, np.ndarray | np.generic | float | int)]
     return out
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -21,10 +21,10 @@ from stiffmap.cli.inputs import (
     finish,
     gravity,
     machine_with,
-    plain,
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.outputs import make_folder
+from stiffmap.plain import plain
 
 
 def efforts(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -110,19 +109,6 @@ def machine_with(name: str, effects: Sequence[str] | None) -> Machine:
     return Machine(
         apply_records(machine.description, [parse_effect(text, machine.description) for text in effects])
     )
-
-
-def plain(value: Any) -> Any:
-    """Data for JSON: arrays as lists, numbers that are not finite as null."""
-    if isinstance(value, dict):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(v) for v in value]
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def finish(found: bool) -> None:

@@ -20,13 +20,13 @@ from stiffmap.cli.inputs import (
     gravity,
     machine_with,
     numbers,
-    plain,
     position,
     rotation,
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
 from stiffmap.outputs import make_folder
+from stiffmap.plain import plain
 
 if TYPE_CHECKING:
     import xarray as xr

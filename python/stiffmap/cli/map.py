@@ -20,7 +20,6 @@ from stiffmap.cli.inputs import (
     finish,
     gravity,
     machine_with,
-    plain,
 )
 from stiffmap.cli.map_big import print_estimate, print_statistics
 from stiffmap.cli.map_files import Wanted, write_files
@@ -52,6 +51,7 @@ from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.cli.statuses import failed_in_words
 from stiffmap.machine import Machine
 from stiffmap.outputs import make_folder
+from stiffmap.plain import plain
 
 
 def map_command(

@@ -9,9 +9,10 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from stiffmap.cli.inputs import finish, plain
+from stiffmap.cli.inputs import finish
 from stiffmap.cli.output import print_json
 from stiffmap.machine import Machine
+from stiffmap.plain import plain
 from stiffmap.status import Status
 
 

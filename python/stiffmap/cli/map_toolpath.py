@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from stiffmap.broadcasting import Floats
-from stiffmap.cli.inputs import MM, finish, force_given, plain
+from stiffmap.cli.inputs import MM, finish, force_given
 from stiffmap.cli.output import print_json
 from stiffmap.machine import Machine
 from stiffmap.outputs import make_folder, write_rows
+from stiffmap.plain import plain
 from stiffmap.plot.style import BLACK, CYCLE, headline, legend_below, new_figure, paper_style
 
 

@@ -22,11 +22,11 @@ from stiffmap.cli.inputs import (
     gravity,
     machine_with,
     numbers,
-    plain,
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.cli.table_text import as_text
 from stiffmap.outputs import make_folder, write_text, writing
+from stiffmap.plain import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

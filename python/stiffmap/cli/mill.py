@@ -17,7 +17,6 @@ from stiffmap.cli.inputs import (
     finish,
     machine_with,
     numbers,
-    plain,
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
@@ -29,6 +28,7 @@ from stiffmap.milling.redundancy import redundancy as choose_turns
 from stiffmap.milling.report import placement_summary, summary, write_report
 from stiffmap.milling.setting import Setting, setting
 from stiffmap.milling.speed import other_side
+from stiffmap.plain import plain
 from stiffmap.process import Process, load_process
 from stiffmap.status import Status
 from stiffmap.toolpath import Toolpath, box, load_path, sampled

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from stiffmap.cli.inputs import EffectsOption, plain
+from stiffmap.cli.inputs import EffectsOption
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import FileError, StiffmapError
@@ -15,6 +15,7 @@ from stiffmap.experiment import load_experiment
 from stiffmap.experiment.calls import placed
 from stiffmap.json_text import parse_json
 from stiffmap.machine import Machine, load_machine
+from stiffmap.plain import plain
 from stiffmap.planning.budget import budgets
 from stiffmap.planning.monitor import compare
 

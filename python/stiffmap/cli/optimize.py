@@ -12,11 +12,11 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from stiffmap.cli.inputs import plain
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
 from stiffmap.outputs import make_folder
 from stiffmap.outputs.option import written
+from stiffmap.plain import plain
 
 if TYPE_CHECKING:
     from stiffmap.design import ParetoSet

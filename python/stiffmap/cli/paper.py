@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from stiffmap.cli.inputs import ThreadsOption, plain
+from stiffmap.cli.inputs import ThreadsOption
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.outputs import make_folder, write_text
 from stiffmap.outputs.option import written
+from stiffmap.plain import plain
 
 if TYPE_CHECKING:
     from stiffmap.paper import Results, Statement

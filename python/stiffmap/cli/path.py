@@ -12,10 +12,11 @@ from rich.console import Console
 from rich.table import Table
 
 from stiffmap.broadcasting import Floats
-from stiffmap.cli.inputs import finish, plain
+from stiffmap.cli.inputs import finish
 from stiffmap.cli.output import print_json
 from stiffmap.machine import Machine
 from stiffmap.outputs import make_folder
+from stiffmap.plain import plain
 from stiffmap.status import Status
 
 SHOWN = 20

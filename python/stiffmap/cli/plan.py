@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from stiffmap.cli.inputs import numbers, plain
+from stiffmap.cli.inputs import numbers
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.description import AppliedEffect
 from stiffmap.errors import StiffmapError
@@ -20,6 +20,7 @@ from stiffmap.machine import Machine, load_machine
 from stiffmap.number_text import with_uncertainty
 from stiffmap.outputs import write_rows
 from stiffmap.outputs.option import written
+from stiffmap.plain import plain
 from stiffmap.planning import Design, Estimate, design, follow
 from stiffmap.planning.estimate import fitted
 

@@ -25,12 +25,12 @@ from stiffmap.cli.inputs import (
     force_given,
     gravity,
     machine_with,
-    plain,
     position,
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.cli.statuses import failed, failed_in_words
 from stiffmap.outputs import make_folder
+from stiffmap.plain import plain
 
 AtOption = Annotated[
     list[str] | None, typer.Option(help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]")

@@ -10,7 +10,7 @@ import typer
 from scipy.spatial.transform import Rotation
 
 from stiffmap.calibration.validity import beyond
-from stiffmap.cli.inputs import EffectsOption, FolderOption, ThreadsOption, plain
+from stiffmap.cli.inputs import EffectsOption, FolderOption, ThreadsOption
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.experiment import Experiment, Residual, load_experiment
 from stiffmap.experiment import residual as compute
@@ -18,6 +18,7 @@ from stiffmap.experiment.calls import placed
 from stiffmap.experiment.channels import Channel
 from stiffmap.machine import load_machine
 from stiffmap.outputs import make_folder, write_picture, write_text
+from stiffmap.plain import plain
 
 
 def residual(

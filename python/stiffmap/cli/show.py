@@ -18,7 +18,6 @@ from stiffmap.cli.inputs import (
     RotationOption,
     machine_with,
     numbers,
-    plain,
     position,
     rotation,
 )
@@ -30,6 +29,7 @@ from stiffmap.kinematics import inverse_kinematics
 from stiffmap.machine import Machine
 from stiffmap.mobility import Mobility, mobility
 from stiffmap.outputs.option import written
+from stiffmap.plain import plain
 from stiffmap.status import Status
 
 

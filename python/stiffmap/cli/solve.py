@@ -24,7 +24,6 @@ from stiffmap.cli.inputs import (
     gravity,
     machine_with,
     numbers,
-    plain,
     position,
     rotation,
 )
@@ -35,6 +34,7 @@ from stiffmap.errors import StiffmapError
 from stiffmap.free_motions import free_motions
 from stiffmap.machine import Machine
 from stiffmap.outputs.option import written
+from stiffmap.plain import plain
 from stiffmap.solution import Solution
 from stiffmap.status import Flag, Status
 

@@ -11,11 +11,12 @@ from rich.console import Console
 from rich.table import Table
 
 from stiffmap.broadcasting import Floats
-from stiffmap.cli.inputs import MM, force_given, plain
+from stiffmap.cli.inputs import MM, force_given
 from stiffmap.cli.output import print_json
 from stiffmap.errors import StiffmapError
 from stiffmap.machine import Machine
 from stiffmap.outputs import write_rows
+from stiffmap.plain import plain
 from stiffmap.pose_tables import PoseTable, read_pose_table
 from stiffmap.solution import Solution
 from stiffmap.status import Status

@@ -18,13 +18,13 @@ from stiffmap.cli.inputs import (
     finish,
     gravity,
     machine_with,
-    plain,
     position,
     rotation,
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.internal_wrenches import InternalWrenches
 from stiffmap.outputs import make_folder
+from stiffmap.plain import plain
 from stiffmap.status import Status
 
 

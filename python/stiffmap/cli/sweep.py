@@ -23,12 +23,12 @@ from stiffmap.cli.inputs import (
     gravity,
     machine_with,
     numbers,
-    plain,
     position,
 )
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.cli.path import path
 from stiffmap.outputs import make_folder
+from stiffmap.plain import plain
 from stiffmap.status import Status
 
 

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from stiffmap.cli.inputs import EffectsOption, FolderOption, MachineArgument, finish, machine_with, plain
+from stiffmap.cli.inputs import EffectsOption, FolderOption, MachineArgument, finish, machine_with
 from stiffmap.cli.output import JsonOption, print_json
 from stiffmap.errors import StiffmapError
 from stiffmap.outputs import make_folder
+from stiffmap.plain import plain
 
 if TYPE_CHECKING:
     from stiffmap.taps import TapDiagnosis, TapTest

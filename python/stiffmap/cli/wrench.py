@@ -18,11 +18,11 @@ from stiffmap.cli.inputs import (
     gravity,
     machine_with,
     numbers,
-    plain,
     position,
     rotation,
 )
 from stiffmap.cli.output import JsonOption, print_json
+from stiffmap.plain import plain
 from stiffmap.status import Flag, Status
 
 
