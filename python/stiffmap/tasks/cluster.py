@@ -11,6 +11,7 @@ from itertools import islice
 from typing import Any
 
 from stiffmap.errors import MissingPartError, StiffmapError
+from stiffmap.one_thread import on_one_thread
 
 WAITING_PER_THREAD = 2
 """Tasks given to each of the cluster's threads in advance; they bound the memory here."""
@@ -111,4 +112,4 @@ def _unpacked(packed: bytes) -> Any:
 
 
 def _do(function: Callable[[Any, Any], Any], packed: bytes, item: Any) -> Any:
-    return function(_unpacked(packed), item)
+    return on_one_thread(function)(_unpacked(packed), item)

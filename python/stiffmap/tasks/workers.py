@@ -9,6 +9,7 @@ from itertools import islice
 from multiprocessing import get_context
 from typing import Any, Protocol
 
+from stiffmap.one_thread import on_one_thread
 from stiffmap.tasks.cluster import OnCluster, client_of
 
 Function = Callable[[Any, Any], Any]
@@ -30,7 +31,7 @@ class Workers(Protocol):
 def workers(
     function: Function, shared: Any, *, scheduler: Any = None, processes: int = 1
 ) -> Iterator[Workers]:
-    """Who does `function(shared, item)`; the results are the same everywhere.
+    """Who does `function(shared, item)`; the results are the same everywhere, since linear algebra has one thread.
 
     scheduler
         Address of a dask scheduler, or a `distributed.Client`, which stays open. Each worker gets `shared` once; what a
@@ -44,7 +45,8 @@ def workers(
         with client_of(scheduler) as client:
             yield _Base(OnCluster(client, function, shared).as_done)
     elif processes == 1:
-        yield _Base(lambda items: ((i, function(shared, item)) for i, item in enumerate(items)))
+        here = on_one_thread(function)
+        yield _Base(lambda items: ((i, here(shared, item)) for i, item in enumerate(items)))
     else:
         with ProcessPoolExecutor(
             processes, mp_context=get_context("spawn"), initializer=_begin, initargs=(function, shared)
@@ -72,7 +74,7 @@ def _begin(function: Function, shared: Any) -> None:
 
 def _one(item: Any) -> Any:
     function, shared = _GIVEN[0]
-    return function(shared, item)
+    return on_one_thread(function)(shared, item)
 
 
 def _pooled(pool: ProcessPoolExecutor, items: Iterable[Any], waiting: int) -> Iterator[tuple[int, Any]]:

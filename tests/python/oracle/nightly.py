@@ -27,6 +27,7 @@ import numpy as np
 
 import stiffmap as sm
 from stiffmap import Flag, Status
+from stiffmap.one_thread import on_one_thread
 from stiffmap.tasks import workers
 
 from .alter import slopes, with_one_effect
@@ -128,8 +129,9 @@ def alone(seed: int) -> dict[str, Any]:
             }
 
 
+@on_one_thread
 def judge(seed: int) -> dict[str, Any]:
-    """One machine."""
+    """One machine. On one thread of BLAS, as on a cluster: the last digits depend on it."""
     start = time.process_time()
     out: dict[str, Any] = {"seed": seed, "states": Counter(), "worst": {}, "wrong": []}
     try:

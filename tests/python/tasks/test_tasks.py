@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import stiffmap as sm
 from stiffmap.design import optimize
@@ -25,6 +26,11 @@ def power(shared: dict[str, float], item: float) -> float:
     if item == shared.get("bad"):
         raise ValueError(f"no power of {item}")
     return item ** shared["exponent"]
+
+
+def blas_threads(_: None, item: int) -> set[int]:
+    """A task whose last digits would depend on where it is done."""
+    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
 
 
 EXPECTED = [x**3.0 for x in ITEMS]
@@ -52,6 +58,12 @@ def cluster() -> Iterator[Any]:
         distributed.Client(here, set_as_default=False) as client,
     ):
         yield client
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_linear_algebra_of_a_task_has_one_thread(processes: int) -> None:
+    with threadpool_limits(3, "blas"), workers(blas_threads, None, processes=processes) as hands:
+        assert hands.in_order(range(3)) == [{1}] * 3
 
 
 def lose(cluster: Any, number: int) -> None:
