@@ -103,8 +103,11 @@ def compared(task: Task, machine: sm.Machine, kind: str, element: str, legs: tup
             ends = []
             for sign in (1, -1):
                 changed = machine.with_effect(kind, **at, **{**null, p.name: (p.null or 0.0) + sign * h})
-                bodies = Machine(changed.description)
-                ends.append(bodies.solve(task.loads, task.pose, None, task.kind).displacement)
+                try:
+                    bodies = Machine(changed.description)
+                    ends.append(bodies.solve(task.loads, task.pose, None, task.kind).displacement)
+                except Unsupported:  # found only where it moves
+                    return []
             differences.append((ends[0] - ends[1]) / (2 * h))
         best = (4 * differences[0] - differences[1]) / 3
         size = np.r_[[np.abs(best[:3]).max()] * 3, [max(np.abs(best[3:]).max(), np.abs(best[:3]).max())] * 3]

@@ -217,8 +217,13 @@ def test_machine_view_opens_and_closes(machine: sm.Machine) -> None:
 def test_the_command_serves_until_it_is_interrupted() -> None:
     import signal
 
+    def from_a_terminal() -> None:  # a shell's background job ignores SIGINT, and so does what it starts
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
     command = [sys.executable, "-m", "stiffmap", "view", "five-bar", "--no-browser", "--port", "0", "--json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=from_a_terminal
+    ) as running:
         assert running.stdout is not None and running.stderr is not None
         lines = ""
         while not lines.rstrip().endswith("}"):

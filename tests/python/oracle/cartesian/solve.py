@@ -150,16 +150,14 @@ def error(c: object, u: float, home: float) -> float:
 
 def answered(path: Path, at: Point, pose: Pose, command: dict[str, float], modes: int) -> Answer:
     s, t = path.system.s, at.tangent
-    i, n6 = 6 * s.tip, 6 * s.size
-    unit = np.zeros((n6, 6))
-    unit[i : i + 6] = np.eye(6)
-    compliance = path.solve(t, unit, np.zeros((len(t.gap), 6)))[0][i : i + 6]
+    i = 6 * s.tip
     p, r = at.state.p[s.tip], at.state.r[s.tip]
     turn = Rotation.from_matrix(r @ np.array(pose.r).T).as_rotvec()
     effort = {n: -float(t.force[s.names.index(n)]) for n in command if n in s.names}
     effort |= {n: -v for n, v in t.tensions.items()}
     z = closed(np.vstack([t.rows, path.holds]) if len(path.holds) else t.rows)
     h = z.T @ t.curve @ z
+    compliance = z[i : i + 6] @ np.linalg.solve(h, z[i : i + 6].T)
     values = np.linalg.eigvalsh(h + h.T)
     lowest = float(values[0] / np.abs(values).max()) if len(values) else 1.0
     return Answer(
@@ -208,8 +206,11 @@ def frequencies(s: Structure, at: State, z: Array, h: Array, modes: int) -> Arra
         mass[i : i + 6, i : i + 6] += m.body.mass * way.T @ way
         mass[i + 3 : i + 6, i + 3 : i + 6] += own
     swing = np.linalg.solve(h, z.T @ mass @ z)
-    squares = np.sort(np.linalg.eigvals(swing).real)[::-1][:modes]
+    values = np.linalg.eigvals(swing)
     out = np.full(modes, np.nan)
+    if np.abs(values.imag).max(initial=0.0) > 1e-9 * np.abs(values).max(initial=0.0):  # flutter
+        return out
+    squares = np.sort(values.real)[::-1][:modes]
     good = squares > 1e-14 * max(squares.max(initial=0.0), 1e-300)
     out[: len(squares)][good] = 1 / (2 * np.pi * np.sqrt(squares[good]))
     return out

@@ -280,19 +280,19 @@ def frames(at: list[At]) -> Frames:
     )
 
 
-def law_at(law: Law, a: float) -> tuple[float, float]:
-    """Force and slope at a deflection."""
+def law_at(law: Law, a: float, soft: float = 1.0) -> tuple[float, float]:
+    """Force and slope at a deflection, the compliance being `soft` times as large. Knots of a polyline stay."""
     if law.friction:
         raise Unsupported("dry friction")
     if not law.knots:
-        return law.stiffness * a + law.cubic * a**3, law.stiffness + 3 * law.cubic * a**2
+        return law.stiffness / soft * a + law.cubic * a**3, law.stiffness / soft + 3 * law.cubic * a**2
     x, y = np.array(law.knots).T
     if (np.diff(x) <= 0).any():
         raise Unsupported("a step of a law")
     if a < x[0]:
-        return float(y[0] + law.stiffness * (a - x[0])), law.stiffness
+        return float(y[0] + law.stiffness / soft * (a - x[0])), law.stiffness / soft
     if a >= x[-1]:
-        return float(y[-1] + law.stiffness * (a - x[-1])), law.stiffness
+        return float(y[-1] + law.stiffness / soft * (a - x[-1])), law.stiffness / soft
     i = int(np.searchsorted(x, a, side="right")) - 1
     k = (y[i + 1] - y[i]) / (x[i + 1] - x[i])
     return float(y[i] + k * (a - x[i])), float(k)

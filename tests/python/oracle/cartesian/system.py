@@ -103,10 +103,7 @@ class System:
         pieces = []
         off = value - self.target
         for i, law in self.laws:
-            force[i], stiff[i] = law_at(law, off[i])
-            if self.soft[i] != 1:
-                force[i] -= law.stiffness * off[i] * (1 - 1 / self.soft[i])
-                stiff[i] -= law.stiffness * (1 - 1 / self.soft[i])
+            force[i], stiff[i] = law_at(law, off[i], self.soft[i])
             pieces += [int(np.searchsorted([x for x, _ in law.knots], off[i]))] if law.knots else []
         if len(self.at):
             np.add.at(force, self.at, np.einsum("sij,sj->si", self.matrices, off[self.at]))
