@@ -46,6 +46,8 @@ class Path:
     crossed: bool = False
     goal: tuple[Array, Array] | None = None
     """Position and rotation to which motions that are kept lead the TCP."""
+    released: float = 0.0
+    """How far (m, rad) the TCP goes from the command to the equilibrium without load; inf: Newton finds none from there."""
     pull: Array | None = None
     """(6,) dead wrench on the TCP that holds the preloaded machine at its command, let go as the load grows."""
 
@@ -141,6 +143,9 @@ class Path:
         if start is None:
             return None, "no start"
         at, done, share = self.point(start), 0.0, 1.0
+        i = 6 * self.system.s.tip
+        far = float(np.abs(at.state.minus(self.start)[i : i + 6]).max())
+        self.released = far if self.pull is None else np.inf
         for _ in range(MOST):
             if done == 1:
                 return at, "found"

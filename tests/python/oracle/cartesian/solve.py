@@ -38,6 +38,8 @@ class Answer:
     """Eigenvalue over the largest, of the energy over the closed motions."""
     drives: dict[str, float]
     """Commanded coordinates."""
+    released: float = 0.0
+    """How far (m, rad) the TCP goes from the command to the equilibrium without load."""
 
     @property
     def found(self) -> bool:
@@ -163,7 +165,7 @@ def answered(path: Path, at: Point, pose: Pose, command: dict[str, float], modes
     return Answer(
         "found", pose, np.r_[p - np.array(pose.p), turn], compliance, effort, leg_wrenches(path, at),
         frequencies(s, at.state, z, h, modes) if modes else np.zeros(0), at.falling == 0, path.crossed, lowest,
-        command,
+        command, path.released,
     )  # fmt: skip
 
 
