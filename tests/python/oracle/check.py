@@ -129,11 +129,7 @@ def against(
         away, falling = bodies.judge(s.displacement, task.loads, task.pose, task.drives, task.kind)
         if np.isnan(away):
             return Check(how, status.name, told, f"{truth.kind}, undecided", gaps, "")
-        if (
-            not away < OFF
-            and (not truth.found or leapt(truth))
-            and balanced(machine, s, task, "drives" in how)
-        ):
+        if not away < OFF and (not truth.found or leapt(truth)) and balanced(machine, s, task, truth, how):
             # the TCP alone does not say how slender leaves are bent; which way a path goes on stays open
             return Check(how, status.name, told, f"{truth.kind}, balanced", gaps, "")
         if not away < OFF:
@@ -143,16 +139,24 @@ def against(
     return Check(how, status.name, told, truth.kind, gaps, wrong)
 
 
-def balanced(machine: sm.Machine, s: sm.Solution, task: Task, by_drives: bool) -> bool:
+def balanced(machine: sm.Machine, s: sm.Solution, task: Task, truth: Answer, how: str) -> bool:
     """The core's own coordinates by free bodies (`verify`), where the bodies here lose the path."""
-    if task.loads.at_points or task.pose is None or by_drives:
+    if task.loads.at_points:
         return False
-    p, r = np.array(task.pose.p)[None], np.array(task.pose.r)[None]
     wrench = np.r_[task.loads.force, task.loads.moment][None]
-    load = {"wrench": wrench, "rotation": r, "load_type": task.kind, "gravity": task.loads.gravity}
-    closed = coordinates(s.coordinate_names, sm.inverse_kinematics(machine, p, r).coordinates)
-    q = Question(machine, load, p, closed, max(float(np.abs(p).max()), METRE / 10))
-    verdict = verified(q, q.solve(method="reference"), np.array([0]))
+    load = {"wrench": wrench, "load_type": task.kind, "gravity": task.loads.gravity}
+    pose = task.pose or truth.pose
+    p, r = np.array(pose.p)[None], np.array(pose.r)[None]
+    if by_drives := "drives" in how:
+        drives = {n.removeprefix("platform."): v for n, v in truth.drives.items()}
+        at = np.array([[drives[n.removeprefix("platform.")] for n in machine.actuators]])
+        closed = sm.forward_kinematics(machine, at, threads=1)
+    else:
+        at, load["rotation"] = p, r
+        closed = sm.inverse_kinematics(machine, p, r)
+    size = max(float(np.abs(p).max()), METRE / 10)
+    q = Question(machine, load, at, coordinates(s.coordinate_names, closed.coordinates), size, by_drives)
+    verdict = verified(q, q.solve(method=how.split()[0]), np.array([0]))
     return not verdict.bad and not verdict.undecided
 
 
