@@ -30,7 +30,8 @@ class Skeleton:
     tcp: Floats
     """(3,)."""
     platform: Floats
-    """(n, 3) where its legs hold the platform (`plate` puts them in order); none where these are not corners of a plate."""
+    """(n, 3) where its legs hold the platform (`plate` puts them in order); none where these are
+    not corners of a plate at home."""
     ends: tuple[int, ...]
     """The node of the mechanism at which each link ends."""
 
@@ -49,8 +50,9 @@ def skeleton(machine: Machine, coordinates: Floats, *, shortest: float = COINCID
     owner = owners(core)
     named = joints(machine.description)
     held = held_by(core)
+    at_home, _ = core.frames(core.home_coordinates())  # it decides, so that the pieces are the same at all coordinates
     corners = position[sorted(held)]
-    if not len(plate(corners)):
+    if not len(plate(at_home[sorted(held)])):
         corners, held = np.zeros((0, 3)), set()
     body = beyond(core, held)
     links, guides, ends, marks = [], [], [], {Role.ACTUATOR: [], Role.PASSIVE: []}  # type: ignore[var-annotated]

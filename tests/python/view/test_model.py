@@ -179,6 +179,20 @@ def test_links_keep_their_place_and_have_the_thickness_of_their_springs(machine:
     np.testing.assert_allclose(np.linalg.norm(rest.tcp - (0, 0, 0)), 0, atol=1e-12)
 
 
+@pytest.mark.parametrize("name", sm.machine_names())
+def test_a_drawing_has_the_same_pieces_wherever_the_machine_stands(name: str) -> None:
+    """Also where joints that span a plate at home do not."""
+    machine = sm.load_machine(name)
+    low, high = machine.workspace
+    p = np.random.default_rng(0).uniform(low, high, (60, 3))
+    pieces = set()
+    for s in (machine.solve(p), machine.solve(p, [300.0, 200.0, -500.0, 0, 0, 0])):
+        for x in s.coordinates[s.status == sm.Status.CONVERGED]:
+            d = drawing(machine, x)
+            pieces.add((d.legs, d.ends, len(d.links), len(d.plate)))
+    assert len(pieces) == 1
+
+
 def test_thickness_is_that_of_the_round_bar(tmp_path: Path) -> None:
     """A cantilever of 40 mm diameter in a machine file is drawn 40 mm thick."""
     file = tmp_path / "bar.yaml"
