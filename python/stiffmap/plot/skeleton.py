@@ -50,7 +50,9 @@ def skeleton(machine: Machine, coordinates: Floats, *, shortest: float = COINCID
     owner = owners(core)
     named = joints(machine.description)
     held = held_by(core)
-    at_home, _ = core.frames(core.home_coordinates())  # it decides, so that the pieces are the same at all coordinates
+    at_home, _ = core.frames(
+        core.home_coordinates()
+    )  # it decides, so that the pieces are the same at all coordinates
     corners = position[sorted(held)]
     if not len(plate(at_home[sorted(held)])):
         corners, held = np.zeros((0, 3)), set()
