@@ -237,7 +237,13 @@ def _say(out: dict[str, object]) -> None:
         if key == "warnings" and isinstance(value, list):
             text = " ".join(w["text"] for w in value)
         elif isinstance(value, dict):
-            text = ", ".join(f"{k} {_text(v)}" for k, v in value.items())
+            numbers = {k: v for k, v in value.items() if k != "sentence" and v != []}
+            text = ", ".join(f"{k} {_text(v)}" for k, v in numbers.items())
+            text = (
+                " ".join([value["sentence"], *([f"({text})"] if text else [])])
+                if "sentence" in value
+                else text
+            )
         else:
             text = _text(value)
         print(f"{key}: {text}")

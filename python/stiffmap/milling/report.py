@@ -107,9 +107,9 @@ def _stability(found: Milled) -> dict[str, object]:
     """What is said of chatter; rpm."""
     s, spindle = found.stability, found.job.process.spindle
     if not isinstance(s, PathStability):
-        return {"said": s}
+        return {"sentence": s}
     return {
-        "said": s.sentence(spindle), "largest_multiplier": float(s.multiplier.max()), "unstable_places": s.unstable,
+        "sentence": s.sentence(spindle), "largest_multiplier": float(s.multiplier.max()), "unstable_places": s.unstable,
         "places": len(s.way), "stable_speeds_rpm": [float(60 * v / (2 * np.pi)) for v in s.offered],
         "damping": s.damping,
     }  # fmt: skip
@@ -190,7 +190,7 @@ def _sheet(found: Milled) -> Sheet:
             )
         )
     if not any(w.name == "chatter" for w in found.warnings):
-        lines.append(str(s["stability"]["said"]))  # type: ignore[index]
+        lines.append(str(s["stability"]["sentence"]))  # type: ignore[index]
     lines += [f"Note: {n}" for n in s["notes"]]  # type: ignore[attr-defined]
     rows = [
         [label, f"{s[key]['rms']:.5f}", f"{s[key]['largest']:.5f}"]  # type: ignore[index]

@@ -45,7 +45,7 @@ def test_a_path_that_chatters_is_a_warning_with_speeds_that_are_stable():
 
 def test_a_shallow_cut_is_stable_and_said_so():
     found = milled(1e-6)
-    assert "stable at" in summary(found)["stability"]["said"]
+    assert "stable at" in summary(found)["stability"]["sentence"]
     assert not any(w.name == "chatter" for w in found.warnings)
 
 
