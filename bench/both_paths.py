@@ -6,7 +6,7 @@ Rounds over all shipped machines, each plain and with each kind of effect on eve
 (effect_cases.py): random poses of the workspace box, random loads, every tenth pose without load, every other round
 under gravity, two rounds each with dead, follower and semitangential loads; then ten rounds on the same machines with
 more points: other readings, several loads of several types (`several`). The reference solves each pose once; each level's answer is compared with it and counts as one solve.
-Statuses must be equal, displacement and loaded compliance within 1e-10 (tests/python/fast/agreement.py). The state
+Statuses must be equal, displacement and loaded compliance within 1e-10 (tests/python/solve/compiled/agreement.py). The state
 file is written after each case: the command goes on where it was stopped. Exit code 1 where something disagrees;
 each such case is printed with what repeats it.
 """
@@ -20,11 +20,19 @@ import sys
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests/python/fast"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
-from agreement import LOADS, TOLERANCE, compare, draw, pointed, reading_gap, several
 from effect_cases import machines_with_effects
+from tests.python.solve.compiled.agreement import (
+    LOADS,
+    TOLERANCE,
+    compare,
+    draw,
+    pointed,
+    reading_gap,
+    several,
+)
 
 import stiffmap as sm
 from stiffmap import _core

@@ -17,12 +17,12 @@ from dataclasses import replace
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.calibration import Calibrator, unknowns
-from stiffmap.calibration.conclude import conclude
-from stiffmap.calibration.model import predicted
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.virtual.plans import plan_of_joints
+from stiffmap.identification.calibration import Calibrator, unknowns
+from stiffmap.identification.calibration.conclude import conclude
+from stiffmap.identification.calibration.model import predicted
 
 NOISE, ANGLE = 3e-5, 1e-4
 

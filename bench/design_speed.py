@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.design import load_design
-from stiffmap.design.judging import judge
+from stiffmap.workspace.design import load_design
+from stiffmap.workspace.design.judging import judge
 
 
 def main() -> None:

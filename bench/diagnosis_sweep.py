@@ -22,17 +22,17 @@ from zlib import crc32
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.calibration import Tolerances
-from stiffmap.diagnosis.candidates.candidates import Candidate
-from stiffmap.diagnosis.decision.beside_calibration import find_effects
-from stiffmap.diagnosis.report.describe import named_effects
-from stiffmap.diagnosis.rivals.explain import Explanation, explain
-from stiffmap.diagnosis.search.alias import same_way
-from stiffmap.diagnosis.search.screen import Screen
-from stiffmap.diagnosis.search.selection import Search
-from stiffmap.diagnosis.search.study import Study, study
 from stiffmap.experiment import Experiment, Predictor, random_plan, simulate
 from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.identification.calibration import Tolerances
+from stiffmap.identification.diagnosis.candidates.candidates import Candidate
+from stiffmap.identification.diagnosis.decision.beside_calibration import find_effects
+from stiffmap.identification.diagnosis.report.describe import named_effects
+from stiffmap.identification.diagnosis.rivals.explain import Explanation, explain
+from stiffmap.identification.diagnosis.search.alias import same_way
+from stiffmap.identification.diagnosis.search.screen import Screen
+from stiffmap.identification.diagnosis.search.selection import Search
+from stiffmap.identification.diagnosis.search.study import Study, study
 
 SIZES = (6.0, 12.0, 3.0, 20.0, 2.0, 1.0)
 PAIR = 12.0

@@ -1,4 +1,4 @@
-"""Machines with an effect on every element that a diagnosis would suspect of it (tests/python/oracle/with_effects.py)."""
+"""Machines with an effect on every element that a diagnosis would suspect of it (tests/oracle/with_effects.py)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from tests.python.oracle.with_effects import with_effect
+from tests.oracle.with_effects import with_effect
 
 import stiffmap as sm
-from stiffmap.effects import get, kinds
+from stiffmap.model.effects import get, kinds
 
 
 def machines_with_effects(machine: sm.Machine) -> Iterator[tuple[str, sm.Machine]]:

@@ -40,10 +40,10 @@ from pathlib import Path
 import numpy as np
 import random_cases
 from effect_cases import machines_with_effects
-from tests.python.fast.agreement import pointed
+from tests.python.solve.compiled.agreement import pointed
 
 import stiffmap as sm
-from stiffmap.files import shipped_machines
+from stiffmap.model.files import shipped_machines
 
 FORCE = np.array([100.0, 50.0, -200.0, 0.0, 0.0, 0.0])
 GRAVITY = (0.0, 0.0, -9.81)

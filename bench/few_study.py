@@ -20,16 +20,16 @@ from zlib import crc32
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.calibration import Tolerances
-from stiffmap.description import AppliedEffect
-from stiffmap.diagnosis.candidates.candidates import clash
-from stiffmap.diagnosis.candidates.sensitivity import Variant
-from stiffmap.diagnosis.decision.beside_calibration import calibrator, spread_evidence
-from stiffmap.diagnosis.decision.few import fitted, not_few, screened
-from stiffmap.diagnosis.search.selection import start_values
-from stiffmap.diagnosis.search.study import Study, study
 from stiffmap.experiment import Predictor, random_plan, simulate
 from stiffmap.experiment.noise.whitening import readings_of
+from stiffmap.identification.calibration import Tolerances
+from stiffmap.identification.diagnosis.candidates.candidates import clash
+from stiffmap.identification.diagnosis.candidates.sensitivity import Variant
+from stiffmap.identification.diagnosis.decision.beside_calibration import calibrator, spread_evidence
+from stiffmap.identification.diagnosis.decision.few import fitted, not_few, screened
+from stiffmap.identification.diagnosis.search.selection import start_values
+from stiffmap.identification.diagnosis.search.study import Study, study
+from stiffmap.model.description import AppliedEffect
 
 SIZES = (20.0, 60.0, 200.0)
 MOST = 1000.0

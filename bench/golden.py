@@ -22,7 +22,7 @@ import numpy as np
 
 import stiffmap as sm
 from stiffmap.experiment import random_plan, simulate
-from stiffmap.files import shipped_machines
+from stiffmap.model.files import shipped_machines
 
 Item = tuple[str, Any]
 FIELDS = ("displacement", "stiffness", "compliance", "status", "flags", "iterations", "actuator_effort",

@@ -16,10 +16,10 @@ from dataclasses import replace
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.calibration import Unknown, calibrate, unknowns
-from stiffmap.calibration.calibrator import Calibrator
-from stiffmap.calibration.model import predicted
 from stiffmap.experiment import Experiment, Predictor, random_plan
+from stiffmap.identification.calibration import Unknown, calibrate, unknowns
+from stiffmap.identification.calibration.calibrator import Calibrator
+from stiffmap.identification.calibration.model import predicted
 
 MACHINES = ("ur10", "linear-delta", "hexapod", "rotary-delta", "orthoglide-revised")
 SMALL, LARGE = 0.5, 10.0

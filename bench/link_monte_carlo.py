@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.link import identify_link
-from stiffmap.link.zeros import miss_probability
-from stiffmap.tasks import workers
+from stiffmap.common.tasks import workers
+from stiffmap.model.link import identify_link
+from stiffmap.model.link.zeros import miss_probability
 
 L, EIZ, EIY, EA, GJ = 0.31, 43.0, 205.0, 6.8e6, 10.8
 REFERENCE = np.array([L, 0.0, 0.0])

@@ -10,13 +10,13 @@ import time
 
 import numpy as np
 
-from stiffmap.link import identify_link
-from stiffmap.link.beam import cantilever, rectangle
-from stiffmap.link.calculix import has_ccx, solve_ccx
-from stiffmap.link.inputs import UNIT_WRENCHES
-from stiffmap.link.refine import richardson
-from stiffmap.link.shapes import Bar
-from stiffmap.link.solve import Material, Setup, solve_skfem
+from stiffmap.model.link import identify_link
+from stiffmap.model.link.beam import cantilever, rectangle
+from stiffmap.model.link.calculix import has_ccx, solve_ccx
+from stiffmap.model.link.inputs import UNIT_WRENCHES
+from stiffmap.model.link.refine import richardson
+from stiffmap.model.link.shapes import Bar
+from stiffmap.model.link.solve import Material, Setup, solve_skfem
 
 
 def main() -> None:

@@ -13,14 +13,14 @@ from collections.abc import Iterator
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.milling.command import commanded
-from stiffmap.milling.equilibrium import equilibrium
-from stiffmap.milling.placement import Search
-from stiffmap.milling.plant import Plant
-from stiffmap.milling.setting import setting
-from stiffmap.toolpath import outline, sampled
-from stiffmap.toolpath.gcode.load import load_gcode
-from stiffmap.toolpath.gcode.read import Reader, read_moves
+from stiffmap.machining.milling.command import commanded
+from stiffmap.machining.milling.equilibrium import equilibrium
+from stiffmap.machining.milling.placement import Search
+from stiffmap.machining.milling.plant import Plant
+from stiffmap.machining.milling.setting import setting
+from stiffmap.machining.toolpath import outline, sampled
+from stiffmap.machining.toolpath.gcode.load import load_gcode
+from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
 
 
 def main() -> None:

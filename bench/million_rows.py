@@ -30,7 +30,7 @@ def write(path: Path, rows: int) -> None:
 def run(words: list[str], folder: str) -> None:
     """One command, its time and its memory."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    code = "import resource, sys\nfrom stiffmap.cli import main\ncode = main(sys.argv[1:])\n" \
+    code = "import resource, sys\nfrom stiffmap.ui.cli import main\ncode = main(sys.argv[1:])\n" \
            "print(f'{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6:.2f} GB', file=sys.stderr)\nsys.exit(code)"  # fmt: skip
     done = subprocess.run(
         [sys.executable, "-c", code, *words], cwd=folder, capture_output=True, text=True, check=False

@@ -24,12 +24,12 @@ from typing import Any
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.calibration import Calibrator, Tolerances, Unknown, unknowns
-from stiffmap.calibration.conclude import conclude
-from stiffmap.calibration.model import predicted, sensitivity, sensitivity_at
+from stiffmap.common.tasks import workers
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
-from stiffmap.tasks import workers
+from stiffmap.identification.calibration import Calibrator, Tolerances, Unknown, unknowns
+from stiffmap.identification.calibration.conclude import conclude
+from stiffmap.identification.calibration.model import predicted, sensitivity, sensitivity_at
 
 MACHINES = ("orthoglide-revised", "linear-delta", "ur10")
 SCALES = (1.0, 0.3, 1.0)

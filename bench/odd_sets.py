@@ -21,9 +21,9 @@ from itertools import product
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.description import Point
 from stiffmap.experiment import Experiment, random_plan, simulate
 from stiffmap.experiment.experiment import Floats
+from stiffmap.model.description import Point
 
 MACHINES = ("orthoglide-revised", "linear-delta", "rotary-delta", "ur10", "travelling-column")
 

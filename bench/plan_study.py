@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.cli.inputs import placed
 from stiffmap.experiment import simulate
-from stiffmap.planning import design, estimate, follow
+from stiffmap.identification.planning import design, estimate, follow
+from stiffmap.ui.cli.inputs import placed
 
 MORE = (12, 16, 24, 32, 48)
 POSES = 40

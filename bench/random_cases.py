@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from tests.python.oracle.classes import Classes
-from tests.python.oracle.generate import Generator
-from tests.python.oracle.unseen import UNSEEN
+from tests.oracle.classes import Classes
+from tests.oracle.generate import Generator
+from tests.oracle.unseen import UNSEEN
 
 import stiffmap as sm
-from stiffmap.description import Block, Joint
+from stiffmap.model.description import Block, Joint
 
 GRAVITY = (0.0, 0.0, -9.81)
 FORCE = 230.0  # N, as that of the shipped machines

@@ -13,13 +13,13 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
-from tests.python.vibration.mujoco_frf import machine_of, modes
+from tests.python.workspace.vibration.mujoco_frf import machine_of, modes
 
 import stiffmap as sm
-from stiffmap.effects import apply_records
-from stiffmap.taps import TapTest, explain_taps
-from stiffmap.taps.explain import _candidates, _fitted, _refined
-from stiffmap.taps.problem import Problem, shifted, uncertain_numbers
+from stiffmap.identification.taps import TapTest, explain_taps
+from stiffmap.identification.taps.explain import _candidates, _fitted, _refined
+from stiffmap.identification.taps.problem import Problem, shifted, uncertain_numbers
+from stiffmap.model.effects import apply_records
 
 MACHINES = ("ur10", "orthoglide-revised", "five-bar", "linear-delta", "travelling-column")
 POSES, MODES, NOISE, TURN, DEFAULT = 4, 5, 0.005, 0.05, 0.05

@@ -4,7 +4,7 @@
     OPENBLAS_NUM_THREADS=1 python -m bench.twins --out build/twins.jsonl [--twins 60] [--nulls 100] [--minutes 30]
     python -m bench.twins --out build/twins.jsonl --table
 
-Readings by the energy minimiser of the tests' oracle (tests/python/twins). Singles of 2 to 3 noise floors (rms), pairs, other noise than
+Readings by the energy minimiser of the tests' oracle (tests/oracle/twins). Singles of 2 to 3 noise floors (rms), pairs, other noise than
 declared, outliers, creep, 12 rows, machines that are off everywhere; and machines without a fault, under every noise. Resumable.
 """
 
@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tests.python.twins.generator import twin
-from tests.python.twins.judge import judged
-from tests.python.twins.noise import KINDS
+from tests.oracle.twins.generator import twin
+from tests.oracle.twins.judge import judged
+from tests.oracle.twins.noise import KINDS
 
 import stiffmap as sm
 

@@ -11,9 +11,9 @@ import time
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.chatter.cut import milling_process
-from stiffmap.chatter.floquet import multiplier_map
-from stiffmap.chatter.modes import mode_rows
+from stiffmap.machining.chatter.cut import milling_process
+from stiffmap.machining.chatter.floquet import multiplier_map
+from stiffmap.machining.chatter.modes import mode_rows
 
 MODES = ([(922, 0.011, 0.03993, "x")], [(922, 0.011, 0.03993, "x"), (922, 0.011, 0.03993, "y")])
 

@@ -20,7 +20,7 @@ import websockets
 import zstandard
 
 import stiffmap as sm
-from stiffmap.view.open import View, model_of
+from stiffmap.ui.view.open import View, model_of
 
 QUIET = 1.0
 """s without a message."""

@@ -18,9 +18,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import stiffmap as sm
-from stiffmap.cli import main as stiffmap
-from stiffmap.description import Offset, Pose
-from stiffmap.plot import path_figure, save, stress_figure
+from stiffmap.model.description import Offset, Pose
+from stiffmap.ui.cli import main as stiffmap
+from stiffmap.ui.plot import path_figure, save, stress_figure
 
 HERE = Path(__file__).parent
 TARGET = HERE / "img"
@@ -70,9 +70,8 @@ COMMANDS |= {f"{name}.png": ("paper -o {out}", "") for name in PAPER}
 
 def _structures() -> object:
     """Trusses and columns with known answers, from the tests."""
-    tests = HERE.parent / "tests/python"
-    sys.path[:0] = [str(tests / "loads"), str(tests / "core")]
-    import structures
+    sys.path.insert(0, str(HERE.parent))
+    from tests.python.solve import structures
 
     return structures
 

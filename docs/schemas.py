@@ -1,6 +1,6 @@
 """Writes the schemas of what commands print with --json: python docs/schemas.py [COMMAND ...]
 
-Each is inferred from the calls in tests/python/docs/json_calls.py: types of all values, keys that every call has as `required`.
+Each is inferred from the calls in tests/python/project/docs/json_calls.py: types of all values, keys that every call has as `required`.
 A key that a newer version adds breaks no reader; one that is gone or of another type is a change that the tests notice.
 """
 
@@ -24,7 +24,7 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 def printed(arguments: Sequence[str]) -> Any:
     """What a call with --json prints."""
-    from stiffmap.cli import main
+    from stiffmap.ui.cli import main
 
     text = io.StringIO()
     with contextlib.redirect_stdout(text):
@@ -84,9 +84,9 @@ def _together(forms: list[dict[str, Any]]) -> dict[str, Any]:
 
 def main() -> None:
     """Run the calls in a fresh workshop and write the schemas."""
-    sys.path.insert(0, str(ROOT / "tests/python/docs"))
-    from json_calls import CALLS
-    from test_help import make_workshop
+    sys.path.insert(0, str(ROOT))
+    from tests.python.project.docs.json_calls import CALLS
+    from tests.python.project.docs.test_help import make_workshop
 
     FOLDER.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from stiffmap.link.inputs import MATERIALS, UNIT_WRENCHES
-from stiffmap.link.pipeline import PartLink, link_from_part
-from stiffmap.link.shapes import Foot
-from stiffmap.link.solve import Material, Setup
+from stiffmap.model.link.inputs import MATERIALS, UNIT_WRENCHES
+from stiffmap.model.link.pipeline import PartLink, link_from_part
+from stiffmap.model.link.shapes import Foot
+from stiffmap.model.link.solve import Material, Setup
 
 
 class Beam(NamedTuple):

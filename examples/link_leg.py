@@ -25,16 +25,16 @@ from scipy.sparse import block_diag, csr_matrix, diags, hstack
 from scipy.sparse.linalg import splu
 
 import stiffmap as sm
-from stiffmap.files.shipped import find
-from stiffmap.link.inputs import MATERIALS, UNIT_WRENCHES
-from stiffmap.link.linkfile import save_link
-from stiffmap.link.mesh import SolidMesh
-from stiffmap.link.pipeline import PartLink, link_from_part
-from stiffmap.link.rigidfit import design_matrix
-from stiffmap.link.shapes import Foot, ForkBar
-from stiffmap.link.solve import Material, Setup, stiffness_matrix
-from stiffmap.link.transport import twist_transport
-from stiffmap.machine import Machine
+from stiffmap.model.files.shipped import find
+from stiffmap.model.link.inputs import MATERIALS, UNIT_WRENCHES
+from stiffmap.model.link.linkfile import save_link
+from stiffmap.model.link.mesh import SolidMesh
+from stiffmap.model.link.pipeline import PartLink, link_from_part
+from stiffmap.model.link.rigidfit import design_matrix
+from stiffmap.model.link.shapes import Foot, ForkBar
+from stiffmap.model.link.solve import Material, Setup, stiffness_matrix
+from stiffmap.model.link.transport import twist_transport
+from stiffmap.solve.machine import Machine
 
 Joint = Literal["bush", "pin"]
 L, D, R, H = 0.310, 0.100, 0.031, 0.100  # m, the original Orthoglide

@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from stiffmap.link.beam import fork_bar
-from stiffmap.link.inputs import MATERIALS, UNIT_WRENCHES
-from stiffmap.link.pipeline import PartLink, link_from_part
-from stiffmap.link.shapes import ForkBar
-from stiffmap.link.solve import Material, Setup
+from stiffmap.model.link.beam import fork_bar
+from stiffmap.model.link.inputs import MATERIALS, UNIT_WRENCHES
+from stiffmap.model.link.pipeline import PartLink, link_from_part
+from stiffmap.model.link.shapes import ForkBar
+from stiffmap.model.link.solve import Material, Setup
 
 # mm/N and rad/(N·mm), as printed; SI below.
 TABLE = {

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.files import shipped_machines
-from stiffmap.plot import save
-from stiffmap.plot.style import MM, new_figure, paper_style
+from stiffmap.model.files import shipped_machines
+from stiffmap.ui.plot import save
+from stiffmap.ui.plot.style import MM, new_figure, paper_style
 
 N = 21
 

@@ -19,7 +19,7 @@ from collections import Counter, defaultdict
 from pathlib import Path
 
 import stiffmap as sm
-from stiffmap.description.tree import joints
+from stiffmap.model.description.tree import joints
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "measured" / "cycloidal_actuator_play"
 MACHINE = """name: gear

@@ -21,12 +21,12 @@ from pathlib import Path
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.calibration import Calibration, Tolerances
-from stiffmap.calibration.travel import Profile
-from stiffmap.cli.calibrate import write as write_calibration
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.identification.calibration import Calibration, Tolerances
+from stiffmap.identification.calibration.travel import Profile
+from stiffmap.ui.cli.calibrate import write as write_calibration
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "measured" / "ipa_ur10_accuracy"
 JOINTS = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")

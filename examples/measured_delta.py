@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.calibration.floor import Blocks, model_form
-from stiffmap.calibration.groups import compare
-from stiffmap.calibration.statistics import Sums
+from stiffmap.identification.calibration.floor import Blocks, model_form
+from stiffmap.identification.calibration.groups import compare
+from stiffmap.identification.calibration.statistics import Sums
 
 Floats = NDArray[np.float64]
 DATA = Path(__file__).resolve().parents[2] / "shared" / "measured" / "flsun_v400_delta"

@@ -33,7 +33,9 @@ command:
 
 def machine() -> str:
     """The shipped linear delta with this one's dimensions, its home 20 mm above the bed."""
-    text = (Path(stiffmap.__file__).parent / "machines" / "linear-delta.yaml").read_text(encoding="utf-8")
+    text = (Path(stiffmap.__file__).parent / "model/machines" / "linear-delta.yaml").read_text(
+        encoding="utf-8"
+    )
     home = math.sqrt(ROD**2 - RADIUS**2) + 20.0
     for old, new in (
         ("name: linear-delta", "name: flsun"),

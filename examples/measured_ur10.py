@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
-from stiffmap.kinematics import forward_kinematics, inverse_kinematics
+from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 
 Floats = NDArray[np.float64]
 

@@ -19,13 +19,13 @@ from pathlib import Path
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.calibration import Tolerances
-from stiffmap.cli.calibrate import write as write_calibration
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.unseen import left_unseen
-from stiffmap.kinematics import forward_kinematics
+from stiffmap.identification.calibration import Tolerances
+from stiffmap.solve.kinematics import forward_kinematics
+from stiffmap.ui.cli.calibrate import write as write_calibration
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "measured" / "ur5_tracker"
 MACHINE = Path(__file__).with_name("ur5.yaml")

@@ -13,5 +13,5 @@ export ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=halt_on_error=1:print_stacktrac
 export PYTHONPATH=$package PYTHONSAFEPATH=1 OPENBLAS_NUM_THREADS=1
 python -c "import stiffmap, sys; sys.exit(not stiffmap.__file__.startswith('$package'))"
 cd tests/python
-python -m pytest -n 2 -m "not slow" -p no:cacheprovider core/test_bad_arrays.py core/test_singular_poses.py \
-  fast/test_one_pose.py fast/test_determinism.py
+python -m pytest -n 2 -m "not slow" -p no:cacheprovider solve/test_bad_arrays.py solve/test_singular_poses.py \
+  solve/compiled/test_one_pose.py solve/compiled/test_determinism.py

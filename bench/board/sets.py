@@ -17,9 +17,9 @@ import numpy as np
 import stiffmap as sm
 from board.peers import beside_arm, plain_places
 from board.row import Row
-from stiffmap.calibration import Calibration, Tolerances
-from stiffmap.cli.calibrate import write as write_calibration
 from stiffmap.experiment.files.load import load_experiment
+from stiffmap.identification.calibration import Calibration, Tolerances
+from stiffmap.ui.cli.calibrate import write as write_calibration
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 sys.path.insert(0, str(EXAMPLES))

@@ -24,9 +24,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
-from stiffmap.calibration import Tolerances
 from stiffmap.experiment import Predictor, load_experiment
 from stiffmap.experiment.noise.folds import folds
+from stiffmap.identification.calibration import Tolerances
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
 import measured_arm

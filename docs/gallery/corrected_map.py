@@ -9,8 +9,8 @@
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.compensation import axis_errors, compensation_table
-from stiffmap.plot import map_figure
+from stiffmap.machining.compensation import axis_errors, compensation_table
+from stiffmap.ui.plot import map_figure
 
 declared = sm.load_machine("travelling-column")
 corrected = declared.with_effect("lead_error", element="ram_drive", legs=["machine"], slope=3e-5)

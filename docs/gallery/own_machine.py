@@ -7,8 +7,8 @@
 # %%
 # %matplotlib inline
 import stiffmap as sm
-from stiffmap.advice import advice
-from stiffmap.trial import tried
+from stiffmap.solve.advice import advice
+from stiffmap.solve.trial import tried
 
 LEG = """
     elements:
@@ -54,7 +54,7 @@ print("N/µm:", [round(1e-6 * v, 2) for v in softest])
 # %%
 import numpy as np
 
-from stiffmap.plot import map_figure
+from stiffmap.ui.plot import map_figure
 
 x, y = np.linspace(-0.08, 0.08, 33), np.linspace(0.34, 0.44, 21)
 ds = sm.error_map(machine, x=x, y=y, z=[0.0], wrench=[50, 0, 0, 0, 0, 0], tolerance=2.5e-4, progress=False)

@@ -7,8 +7,8 @@
 # %%
 # %matplotlib inline
 import stiffmap as sm
-from stiffmap.description import AppliedEffect
 from stiffmap.experiment import random_plan, simulate
+from stiffmap.model.description import AppliedEffect
 
 machine = sm.load_machine("orthoglide-revised")
 hidden = AppliedEffect("compliance", "actuator", ("z",), (("scale", 2.15),))
@@ -36,7 +36,7 @@ found
 # What is left beside noise, before and after:
 
 # %%
-from stiffmap.diagnosis.report.pictures import histogram
+from stiffmap.ui.report.diagnosis.pictures import histogram
 
 histogram(found)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from tests.python.vibration.mujoco_frf import modes
+from tests.python.workspace.vibration.mujoco_frf import modes
 
 import stiffmap as sm
 

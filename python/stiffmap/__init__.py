@@ -5,27 +5,41 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from stiffmap.errors import StiffmapError
-from stiffmap.status import Flag, Status
-from stiffmap.version import __version__
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.from_above import PLACES
+from stiffmap.common.version import __version__
+from stiffmap.solve.status import Flag, Status
 
 if TYPE_CHECKING:
-    from stiffmap import plot
-    from stiffmap.budget import DeflectionBudget, deflection_budget
-    from stiffmap.calibration import Calibration
-    from stiffmap.calibration.calibrate import calibrate
-    from stiffmap.chatter import floquet_multiplier, limiting_depth, stability_lobes, vibration_map
-    from stiffmap.compensation import Commands, compensate
-    from stiffmap.design.search import optimize
-    from stiffmap.diagnosis import Diagnosis, diagnose
     from stiffmap.experiment import Experiment, Residual, load_experiment
     from stiffmap.experiment.calls import residual, simulate
-    from stiffmap.files.shipped import machine_names
-    from stiffmap.internal_wrenches import assembly_stress, assembly_wrenches
-    from stiffmap.kinematics import Kinematics, forward_kinematics, inverse_kinematics
-    from stiffmap.link import identify_link
-    from stiffmap.machine import Machine, load_machine
-    from stiffmap.maps import (
+    from stiffmap.identification.calibration import Calibration
+    from stiffmap.identification.calibration.calibrate import calibrate
+    from stiffmap.identification.diagnosis import Diagnosis, diagnose
+    from stiffmap.identification.planning.calls import monitor, plan
+    from stiffmap.machining.chatter import floquet_multiplier, limiting_depth, stability_lobes, vibration_map
+    from stiffmap.machining.compensation import Commands, compensate
+    from stiffmap.machining.milling import mill
+    from stiffmap.machining.process import (
+        CuttingForce,
+        IdentifiedLaw,
+        Process,
+        cutting_force,
+        identify_process,
+        load_process,
+    )
+    from stiffmap.model.files.shipped import machine_names
+    from stiffmap.model.link import identify_link
+    from stiffmap.solve.budget import DeflectionBudget, deflection_budget
+    from stiffmap.solve.internal_wrenches import assembly_stress, assembly_wrenches
+    from stiffmap.solve.kinematics import Kinematics, forward_kinematics, inverse_kinematics
+    from stiffmap.solve.machine import Machine, load_machine
+    from stiffmap.solve.solution import Solution
+    from stiffmap.solve.unreachable import why_unreachable
+    from stiffmap.solve.urdf_machine import import_urdf
+    from stiffmap.ui import plot
+    from stiffmap.workspace.design.search import optimize
+    from stiffmap.workspace.maps import (
         design_sweep,
         error_map,
         map_estimate,
@@ -34,8 +48,7 @@ if TYPE_CHECKING:
         sweep,
         uncertainty_ranking,
     )
-    from stiffmap.milling import mill
-    from stiffmap.performance import (
+    from stiffmap.workspace.performance import (
         accuracy_transmission,
         drive_efforts,
         force_transmission,
@@ -48,81 +61,74 @@ if TYPE_CHECKING:
         workspace_volume,
         worst_deflection,
     )
-    from stiffmap.planning.calls import monitor, plan
-    from stiffmap.process import (
-        CuttingForce,
-        IdentifiedLaw,
-        Process,
-        cutting_force,
-        identify_process,
-        load_process,
-    )
-    from stiffmap.solution import Solution
-    from stiffmap.unreachable import why_unreachable
-    from stiffmap.urdf.to_machine import import_urdf
-    from stiffmap.vibration import frequency_response
+    from stiffmap.workspace.vibration import frequency_response
+
+PLACES |= {
+    "Machine.view": ("stiffmap.ui.view", "open_view"),
+    "Diagnosis.report": ("stiffmap.ui.report.diagnosis.page", "write_report"),
+}
 
 # Loaded when first used, so that `import stiffmap` and `stiffmap --help` stay quick.
 _HOME = {
-    "Commands": "stiffmap.compensation",
-    "Calibration": "stiffmap.calibration",
-    "accuracy_transmission": "stiffmap.performance",
-    "drive_efforts": "stiffmap.performance",
-    "force_transmission": "stiffmap.performance",
-    "largest_box": "stiffmap.performance",
-    "load_requirements": "stiffmap.performance",
-    "measures": "stiffmap.performance",
-    "natural_frequencies": "stiffmap.performance",
-    "velocity_section": "stiffmap.performance",
-    "velocity_transmission": "stiffmap.performance",
-    "workspace_volume": "stiffmap.performance",
-    "worst_deflection": "stiffmap.performance",
-    "why_unreachable": "stiffmap.unreachable",
-    "Diagnosis": "stiffmap.diagnosis",
-    "compensate": "stiffmap.compensation",
+    "Commands": "stiffmap.machining.compensation",
+    "Calibration": "stiffmap.identification.calibration",
+    "accuracy_transmission": "stiffmap.workspace.performance",
+    "drive_efforts": "stiffmap.workspace.performance",
+    "force_transmission": "stiffmap.workspace.performance",
+    "largest_box": "stiffmap.workspace.performance",
+    "load_requirements": "stiffmap.workspace.performance",
+    "measures": "stiffmap.workspace.performance",
+    "natural_frequencies": "stiffmap.workspace.performance",
+    "velocity_section": "stiffmap.workspace.performance",
+    "velocity_transmission": "stiffmap.workspace.performance",
+    "workspace_volume": "stiffmap.workspace.performance",
+    "worst_deflection": "stiffmap.workspace.performance",
+    "why_unreachable": "stiffmap.solve.unreachable",
+    "Diagnosis": "stiffmap.identification.diagnosis",
+    "compensate": "stiffmap.machining.compensation",
     "Experiment": "stiffmap.experiment",
-    "calibrate": "stiffmap.calibration",
-    "diagnose": "stiffmap.diagnosis",
+    "calibrate": "stiffmap.identification.calibration",
+    "diagnose": "stiffmap.identification.diagnosis",
     "Residual": "stiffmap.experiment",
     "load_experiment": "stiffmap.experiment",
-    "machine_names": "stiffmap.files.shipped",
+    "machine_names": "stiffmap.model.files.shipped",
     "residual": "stiffmap.experiment",
     "simulate": "stiffmap.experiment",
-    "CuttingForce": "stiffmap.process",
-    "IdentifiedLaw": "stiffmap.process",
-    "Process": "stiffmap.process",
-    "cutting_force": "stiffmap.process",
-    "identify_process": "stiffmap.process",
-    "load_process": "stiffmap.process",
-    "mill": "stiffmap.milling",
-    "Kinematics": "stiffmap.kinematics",
-    "Machine": "stiffmap.machine",
-    "Solution": "stiffmap.solution",
-    "DeflectionBudget": "stiffmap.budget",
-    "deflection_budget": "stiffmap.budget",
-    "assembly_stress": "stiffmap.internal_wrenches",
-    "assembly_wrenches": "stiffmap.internal_wrenches",
-    "design_sweep": "stiffmap.maps",
-    "error_map": "stiffmap.maps",
-    "import_urdf": "stiffmap.urdf.to_machine",
-    "monitor": "stiffmap.planning.calls",
-    "optimize": "stiffmap.design.search",
-    "plan": "stiffmap.planning.calls",
-    "plot": "stiffmap.plot",
-    "forward_kinematics": "stiffmap.kinematics",
-    "floquet_multiplier": "stiffmap.chatter",
-    "frequency_response": "stiffmap.vibration",
-    "limiting_depth": "stiffmap.chatter",
-    "stability_lobes": "stiffmap.chatter",
-    "vibration_map": "stiffmap.chatter",
-    "identify_link": "stiffmap.link",
-    "inverse_kinematics": "stiffmap.kinematics",
-    "load_machine": "stiffmap.machine",
-    "map_estimate": "stiffmap.maps",
-    "map_statistics": "stiffmap.maps",
-    "polar": "stiffmap.maps",
-    "sweep": "stiffmap.maps",
-    "uncertainty_ranking": "stiffmap.maps",
+    "CuttingForce": "stiffmap.machining.process",
+    "IdentifiedLaw": "stiffmap.machining.process",
+    "Process": "stiffmap.machining.process",
+    "cutting_force": "stiffmap.machining.process",
+    "identify_process": "stiffmap.machining.process",
+    "load_process": "stiffmap.machining.process",
+    "mill": "stiffmap.machining.milling",
+    "Kinematics": "stiffmap.solve.kinematics",
+    "Machine": "stiffmap.solve.machine",
+    "Solution": "stiffmap.solve.solution",
+    "DeflectionBudget": "stiffmap.solve.budget",
+    "deflection_budget": "stiffmap.solve.budget",
+    "assembly_stress": "stiffmap.solve.internal_wrenches",
+    "assembly_wrenches": "stiffmap.solve.internal_wrenches",
+    "design_sweep": "stiffmap.workspace.maps",
+    "error_map": "stiffmap.workspace.maps",
+    "import_urdf": "stiffmap.solve.urdf_machine",
+    "monitor": "stiffmap.identification.planning.calls",
+    "optimize": "stiffmap.workspace.design.search",
+    "plan": "stiffmap.identification.planning.calls",
+    "plot": "stiffmap.ui.plot",
+    "forward_kinematics": "stiffmap.solve.kinematics",
+    "floquet_multiplier": "stiffmap.machining.chatter",
+    "frequency_response": "stiffmap.workspace.vibration",
+    "limiting_depth": "stiffmap.machining.chatter",
+    "stability_lobes": "stiffmap.machining.chatter",
+    "vibration_map": "stiffmap.machining.chatter",
+    "identify_link": "stiffmap.model.link",
+    "inverse_kinematics": "stiffmap.solve.kinematics",
+    "load_machine": "stiffmap.solve.machine",
+    "map_estimate": "stiffmap.workspace.maps",
+    "map_statistics": "stiffmap.workspace.maps",
+    "polar": "stiffmap.workspace.maps",
+    "sweep": "stiffmap.workspace.maps",
+    "uncertainty_ranking": "stiffmap.workspace.maps",
 }
 
 __all__ = [
@@ -198,7 +204,7 @@ if not TYPE_CHECKING:  # type checkers then know which names there are
         if name not in _HOME:
             raise AttributeError(f"module 'stiffmap' has no attribute {name!r}")
         home = import_module(_HOME[name])
-        value = home if _HOME[name] == f"{__name__}.{name}" else getattr(home, name)
+        value = home if _HOME[name].endswith(f".{name}") else getattr(home, name)
         globals()[name] = value
         return value
 

@@ -2,6 +2,6 @@
 
 import sys
 
-from stiffmap.cli import main
+from stiffmap.ui.cli import main
 
 sys.exit(main())

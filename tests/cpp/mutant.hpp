@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Mutants that are chosen at run time by STIFFMAP_MUTANT (tests/python/mutation): included in front of every source of
+// Mutants that are chosen at run time by STIFFMAP_MUTANT (tests/python/project/mutation): included in front of every source of
 // a copy of the core, never by the core itself.
 #pragma once
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 
-from stiffmap.deprecation import renamed
-from stiffmap.description import AppliedEffect
-from stiffmap.effects import parse_effect
-from stiffmap.effects.check import place_of
-from stiffmap.effects.registry import get
+from stiffmap.common.deprecation import renamed
 from stiffmap.experiment.comparison import residual as comparison
 from stiffmap.experiment.comparison.residual import Residual
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.virtual import simulate as virtual
-from stiffmap.files.load import Source
-from stiffmap.machine import Machine, as_machine
+from stiffmap.model.description import AppliedEffect
+from stiffmap.model.effects import parse_effect
+from stiffmap.model.effects.check import place_of
+from stiffmap.model.effects.registry import get
+from stiffmap.model.files.load import Source
+from stiffmap.solve.machine import Machine, as_machine
 
 Effects = str | AppliedEffect | Sequence[str | AppliedEffect]
 """One effect or several, each as text (``compliance actuator x scale=1.2``) or as a record."""

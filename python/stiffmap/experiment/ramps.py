@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats
 
 Integers = NDArray[np.intp]
 RETREAT = 0.02

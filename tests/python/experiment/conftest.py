@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import stiffmap as sm
-from stiffmap.cli.app import main
+from stiffmap.ui.cli.app import main
 
 Twin = Callable[..., sm.Experiment]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from stiffmap.cli.app import main
+from stiffmap.ui.cli.app import main
 
 HEAD = (
     "machine: orthoglide-revised\nquantity: deflection\nunits: {length: mm, force: N, angle: rad}\n"

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.description import AppliedEffect
 from stiffmap.experiment import Predictor, load_experiment, random_plan, simulate
 from stiffmap.experiment.virtual.plans import with_command
+from stiffmap.model.description import AppliedEffect
 
 DH = (
     (0.1273, 0.0, np.pi / 2),

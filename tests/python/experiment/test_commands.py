@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.cli.app import main
+from stiffmap.ui.cli.app import main
 
 from .conftest import Twin
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.description import AppliedEffect
 from stiffmap.experiment import Experiment, Predictor, load_experiment, random_plan, save_experiment
+from stiffmap.model.description import AppliedEffect
 
 HOURS = np.array([8.0, 8.5, 12.0, 20.0, 8.25, 9.0])
 

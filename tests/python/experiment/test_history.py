@@ -9,16 +9,16 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import stiffmap as sm
-from stiffmap.description.tree import joints
-from stiffmap.diagnosis.decision.patterns import features
-from stiffmap.effects.library.hysteresis import deflection, spring_force
 from stiffmap.experiment import Predictor, load_experiment, random_plan
 from stiffmap.experiment.calls import placed
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.history import drives_of
 from stiffmap.experiment.ramps import directions
-from stiffmap.planning import estimate
+from stiffmap.identification.diagnosis.decision.patterns import features
+from stiffmap.identification.planning import estimate
+from stiffmap.model.description.tree import joints
+from stiffmap.model.effects.library.hysteresis import deflection, spring_force
 
 ONE_JOINT = """
 name: gear

@@ -10,10 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
-from stiffmap.cli.app import main
-from stiffmap.description import AppliedEffect
 from stiffmap.experiment import Predictor, load_experiment, random_plan, residual
 from stiffmap.experiment.poses.against_command import resolved
+from stiffmap.model.description import AppliedEffect
+from stiffmap.ui.cli.app import main
 
 COUNT = 40
 

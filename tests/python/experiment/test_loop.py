@@ -10,10 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
-from stiffmap.description import Point
 from stiffmap.experiment import Experiment, Loop, predict, random_plan
 from stiffmap.experiment.calls import placed
 from stiffmap.experiment.poses.point_kinematics import point_positions
+from stiffmap.model.description import Point
 
 OFFSET = (0.01, 0.02, 0.03)
 

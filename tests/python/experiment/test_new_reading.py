@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.description import AppliedEffect
 from stiffmap.experiment import Experiment, Predictor, load_experiment, random_plan, save_experiment, simulate
 from stiffmap.experiment.readings import ReadingKind, kinds, load_readings, register, unregister
+from stiffmap.model.description import AppliedEffect
 
 # An electronic level on the platform: the slope about an axis across x and y, whose zero nobody knows.
 LEVEL = """

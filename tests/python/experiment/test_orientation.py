@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
-from stiffmap.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import Experiment, Predictor, save_experiment
 
 HEAD = """machine: ur10

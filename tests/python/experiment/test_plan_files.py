@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.errors import FileError
+from stiffmap.common.errors import FileError
 from stiffmap.experiment.files.plan_file import load_plan
 
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.description import AppliedEffect
 from stiffmap.experiment import Predictor, predict, random_plan, simulate
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.outliers import outliers, suspects
 from stiffmap.experiment.prediction.measurement import readings, true_wrench
+from stiffmap.model.description import AppliedEffect
 
 
 @pytest.fixture(scope="module")

@@ -122,10 +122,10 @@ def test_kernels_use_no_eigen() -> None:
 
 def test_the_description_computes_nothing() -> None:
     """Descriptions are plain data: no compiled core, no files, no numerics beyond NumPy."""
-    for path in (ROOT / "python/stiffmap/description").glob("*.py"):
+    for path in (ROOT / "python/stiffmap/model/description").glob("*.py"):
         for line in text(path).splitlines():
             if line.startswith(("import stiffmap", "from stiffmap")):
-                assert line.startswith(("from stiffmap.description", "from stiffmap.units")), (
+                assert line.startswith(("from stiffmap.model.description", "from stiffmap.common.units")), (
                     f"{path.name}: {line}"
                 )
             assert not re.match(r"(from|import) (scipy|yaml|pydantic|xarray)", line), f"{path.name}: {line}"

@@ -1,4 +1,4 @@
-"""Files are written in one room: `stiffmap.outputs`, or to the scratch path of its `writing`."""
+"""Files are written in one room: `stiffmap.common.outputs`, or to the scratch path of its `writing`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import typer
 from tests.python.project.test_imports import MODULES
 
-from stiffmap.cli.commands import COMMANDS
+from stiffmap.ui.cli.commands import COMMANDS
 
 METHODS = {
     "write_text", "write_bytes", "touch", "savefig", "to_netcdf", "to_zarr", "to_csv", "to_excel", "dump", "tofile",
@@ -20,11 +20,18 @@ METHODS = {
 MODULE_ONLY = {"replace": "os", "rename": "os", "dump": "json", "copy": "shutil", "move": "shutil"}
 """Words that are writers as functions of a module only: ``text.replace`` writes nothing."""
 ELSEWHERE = {
-    "stiffmap.maps.files": {"mkdir", "to_zarr"},  # the folder in which a map grows; a folder that is renamed
-    "stiffmap.maps.store": {"open_memmap"},  # takes up what `mapped_array` made
-    "stiffmap.maps.zarr_map": {"to_zarr", "copyfile", "mkdir"},  # chunks and frame of a map that grows
-    "stiffmap.link.calculix": {"write_text"},  # a temporary folder, for another program
-    "stiffmap.report.pictures": {"savefig"},  # into memory
+    "stiffmap.workspace.maps.files": {
+        "mkdir",
+        "to_zarr",
+    },  # the folder in which a map grows; a folder that is renamed
+    "stiffmap.workspace.maps.store": {"open_memmap"},  # takes up what `mapped_array` made
+    "stiffmap.workspace.maps.zarr_map": {
+        "to_zarr",
+        "copyfile",
+        "mkdir",
+    },  # chunks and frame of a map that grows
+    "stiffmap.model.link.calculix": {"write_text"},  # a temporary folder, for another program
+    "stiffmap.ui.report.pictures": {"savefig"},  # into memory
 }
 
 
@@ -59,7 +66,7 @@ def test_no_module_writes_files_itself() -> None:
     wrong = {
         name: found
         for name, path in MODULES.items()
-        if not name.startswith("stiffmap.outputs")
+        if not name.startswith("stiffmap.common.outputs")
         and (found := direct_writes(path) - ELSEWHERE.get(name, set()))
     }
     assert wrong == {}

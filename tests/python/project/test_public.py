@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 import stiffmap as sm
-from stiffmap import options
-from stiffmap.compiled import Flag, Status
+from stiffmap.solve import options
+from stiffmap.solve.compiled import Flag, Status
 
 ROOT = Path(__file__).parents[3]
 API = (ROOT / "docs/api.md").read_text(encoding="utf-8")
@@ -80,9 +80,9 @@ def test_values_agree_with_the_core() -> None:
     """What Python names by position is what the headers say."""
     folder = ROOT / "cpp/include/stiffmap"
     text = {p.stem: p.read_text(encoding="utf-8") for p in folder.glob("*.hpp")}
-    from stiffmap.compiled import Role
-    from stiffmap.compiled.machine import LOAD_TYPES, PATH_CONTROLS
-    from stiffmap.maps.load_path import ENDS
+    from stiffmap.solve.compiled import Role
+    from stiffmap.solve.compiled.machine import LOAD_TYPES, PATH_CONTROLS
+    from stiffmap.workspace.maps.load_path import ENDS
 
     assert enum_of(text["types"], "Status") == {s.name: s.value for s in Status}
     assert enum_of(text["mechanism"], "Role") == {r.name: r.value for r in Role}

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import stiffmap as sm
-from stiffmap.deprecation import renamed
+from stiffmap.common.deprecation import renamed
 
 PAGE = (Path(__file__).parents[3] / "docs/arguments.md").read_text(encoding="utf-8")
 REQUIRED = "required"
@@ -126,7 +126,7 @@ def test_an_earlier_name_works_and_warns_with_the_new_one() -> None:
 
 def test_earlier_calls_of_the_library_answer_as_the_new_ones_do() -> None:
     machine, p, w = sm.load_machine("orthoglide-revised"), [0.1, 0.0, 0.0], [100.0, 0, 0, 0, 0, 0]
-    from stiffmap.options import SolveOptions
+    from stiffmap.solve.options import SolveOptions
 
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from words import ABOUT_WORDS, INSTEAD, ROOT, found, pages, prose, strings
+from tests.python.project.words import ABOUT_WORDS, INSTEAD, ROOT, found, pages, prose, strings
 
 MODULES = sorted((ROOT / "python/stiffmap").rglob("*.py"))
 MOST_TERMS, MOST_LINES = 60, 30

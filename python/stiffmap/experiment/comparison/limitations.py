@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import WRENCH, Experiment, Floats
 from stiffmap.experiment.noise.level import Noise
-from stiffmap.machine import Machine
+from stiffmap.solve.machine import Machine
 
 FEWEST = 6
 """Readings: as many as the parameters of the largest effect."""

@@ -10,7 +10,7 @@ from stiffmap.experiment.experiment import Experiment, Mask
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.machine import Machine
+from stiffmap.solve.machine import Machine
 
 
 def left_by(machine: Machine, experiment: Experiment, rows: Mask | None = None) -> tuple[Summary, Summary]:

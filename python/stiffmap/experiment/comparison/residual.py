@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.description import AppliedEffect
+from stiffmap.common.short import short_repr
 from stiffmap.experiment.comparison.limitations import limitations, refuse_unreachable
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -20,8 +20,8 @@ from stiffmap.experiment.noise.over_time import over_time
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.notebook import residual_html
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.machine import Machine, takes_machine
-from stiffmap.short import short_repr
+from stiffmap.model.description import AppliedEffect
+from stiffmap.solve.machine import Machine, takes_machine
 
 if TYPE_CHECKING:
     import pandas as pd

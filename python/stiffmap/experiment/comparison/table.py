@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.common.outputs import write_rows
 from stiffmap.experiment.comparison.residual import Residual
-from stiffmap.outputs import write_rows
 
 MM = 1e3
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.errors import FileError
+from stiffmap.common.errors import FileError
 from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import ASKED, AXES, BRANCHES, WRENCH, Floats, Integers
 from stiffmap.experiment.files.orientation import TURNED, TURNED2

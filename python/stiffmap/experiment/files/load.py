@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.errors import FileError
+from stiffmap.common.errors import FileError
+from stiffmap.common.yaml_text import read
 from stiffmap.experiment.channels import AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Experiment, Floats, Loop
 from stiffmap.experiment.files import columns as read_columns
@@ -17,9 +18,8 @@ from stiffmap.experiment.files.schema import ExperimentFile, file_model
 from stiffmap.experiment.files.table import Table, read_table
 from stiffmap.experiment.files.units import ANGLES, Scales
 from stiffmap.experiment.readings import kinds
-from stiffmap.files.report import validated
-from stiffmap.files.schema.base import suggestion
-from stiffmap.yaml_text import read
+from stiffmap.model.files.report import validated
+from stiffmap.model.files.schema.base import suggestion
 
 
 def load_experiment(path: str | PathLike[str]) -> Experiment:

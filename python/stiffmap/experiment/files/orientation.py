@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.errors import FileError
+from stiffmap.common.errors import FileError
 from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.files.schema import OrientationModel
 from stiffmap.experiment.files.table import Table

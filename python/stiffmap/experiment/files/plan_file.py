@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 from pydantic import ValidationError
 
-from stiffmap.errors import FileError
+from stiffmap.common.errors import FileError
+from stiffmap.common.units import name_and_unit
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS
 from stiffmap.experiment.experiment import WRENCH, Experiment
 from stiffmap.experiment.files import columns
@@ -19,9 +20,8 @@ from stiffmap.experiment.files.schema import ExperimentFile, UnitsModel
 from stiffmap.experiment.files.table import Table, read_table
 from stiffmap.experiment.files.units import Scales
 from stiffmap.experiment.virtual.plans import MICRO
-from stiffmap.files.schema.base import suggestion
-from stiffmap.machine import Machine
-from stiffmap.units import name_and_unit
+from stiffmap.model.files.schema.base import suggestion
+from stiffmap.solve.machine import Machine
 
 KNOWN = tuple(c for c in columns.PLAN if c not in (*EULER, *TURNED2))
 

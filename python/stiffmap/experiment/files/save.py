@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
+from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Channel, Experiment, Floats, Loop
 from stiffmap.experiment.files.columns import APPROACH, POSE, POSE2, SEEN, SEEN_TURNED
 from stiffmap.experiment.files.orientation import VECTOR
 from stiffmap.experiment.readings import kinds
-from stiffmap.outputs import make_folder, only_job, write_rows, write_text
-from stiffmap.yaml_text import text_of
 
 MM = 1e3
 PLAIN = {"unloaded": "centre", "frame": "known", "tool": "known"}

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, create_model
 
 from stiffmap.experiment.readings import kinds
-from stiffmap.files.schema.base import FileModel
+from stiffmap.model.files.schema.base import FileModel
 
 Positive = Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=False)]

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from stiffmap.broadcasting import Floats
-from stiffmap.cells import Cells, filled, packed, row_numbers
-from stiffmap.errors import FileError
-from stiffmap.files.schema.base import suggestion
-from stiffmap.number_text import number_in
-from stiffmap.outputs import unguarded
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.cells import Cells, filled, packed, row_numbers
+from stiffmap.common.errors import FileError
+from stiffmap.common.number_text import number_in
+from stiffmap.common.outputs import unguarded
+from stiffmap.model.files.schema.base import suggestion
 
 
 @dataclass(frozen=True)

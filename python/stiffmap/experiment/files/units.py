@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiffmap.errors import FileError
+from stiffmap.common.errors import FileError
+from stiffmap.common.units import FORCES, LENGTHS, MOMENTS, PLANE_ANGLES, size_of
 from stiffmap.experiment.experiment import WRENCH, Channel, Floats
 from stiffmap.experiment.files.schema import ExperimentFile
-from stiffmap.units import FORCES, LENGTHS, MOMENTS, PLANE_ANGLES, size_of
 
 ANGLES = {a: float(PLANE_ANGLES[a]) for a in ("rad", "mrad", "deg")}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stiffmap.broadcasting import random_numbers
+from stiffmap.common.broadcasting import random_numbers
 from stiffmap.experiment.experiment import Experiment, Integers
 
 FOLDS = 5

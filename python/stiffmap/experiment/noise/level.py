@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from stiffmap.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import Channel, metres
 from stiffmap.experiment.experiment import Experiment, Floats
 

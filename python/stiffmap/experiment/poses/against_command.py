@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.description import Point
-from stiffmap.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.poses.handeye import Sighting, as_commanded, find_frames, unmoved
 from stiffmap.experiment.readings import kinds
 from stiffmap.experiment.setups import SEEN, setups_of, targets_of
-from stiffmap.machine import Machine
+from stiffmap.model.description import Point
+from stiffmap.solve.machine import Machine
 
 
 def resolved(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Mask
 from stiffmap.experiment.poses.orientation import against_base
-from stiffmap.kinematics import Kinematics, forward_kinematics
-from stiffmap.machine import Machine
+from stiffmap.solve.kinematics import Kinematics, forward_kinematics
+from stiffmap.solve.machine import Machine
 
 AS_HOME = 1e-9
 NAMED = 5

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.description.rigid import straight
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.poses.once import Once
-from stiffmap.kinematics import inverse_kinematics
-from stiffmap.machine import Machine
+from stiffmap.model.description.rigid import straight
+from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.solve.machine import Machine
 
 
 def coordinates_of(machine: Machine, plan: Experiment) -> Floats:

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import coordinates_of, poses_once
 from stiffmap.experiment.poses.once import Once
-from stiffmap.kinematics import forward_kinematics
-from stiffmap.machine import Machine
+from stiffmap.solve.kinematics import forward_kinematics
+from stiffmap.solve.machine import Machine
 
 STEP = 1e-6
 """m or rad of a drive to either side."""

@@ -8,10 +8,10 @@ from weakref import WeakKeyDictionary
 
 from numpy.typing import NDArray
 
-from stiffmap.description.rigid import nominal_geometry
+from stiffmap.common.recent import Recent
 from stiffmap.experiment.experiment import Experiment
-from stiffmap.machine import Machine
-from stiffmap.recent import Recent
+from stiffmap.model.description.rigid import nominal_geometry
+from stiffmap.solve.machine import Machine
 
 Array = TypeVar("Array", bound=NDArray[Any])
 

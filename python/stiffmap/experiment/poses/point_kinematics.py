@@ -7,7 +7,7 @@ import numpy as np
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.poses.once import Once
-from stiffmap.machine import Machine
+from stiffmap.solve.machine import Machine
 
 
 def point_positions(machine: Machine, name: str, plan: Experiment) -> Floats:

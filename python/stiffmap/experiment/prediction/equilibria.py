@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.description.strain import rests_at_command
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.level import Mask
 from stiffmap.experiment.poses.configuration import coordinates_of, in_reach
@@ -17,10 +16,11 @@ from stiffmap.experiment.prediction.joints import joint_channels, joint_motions
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
 from stiffmap.experiment.prediction.unloaded_state import lagging, lags, signs
 from stiffmap.experiment.readings import Seen, kind_of
-from stiffmap.machine import Machine
-from stiffmap.options import SolveOptions
-from stiffmap.solution import Solution
-from stiffmap.status import Flag, Status
+from stiffmap.model.description.strain import rests_at_command
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.options import SolveOptions
+from stiffmap.solve.solution import Solution
+from stiffmap.solve.status import Flag, Status
 
 ACROSS = 1e-3
 """Share of the work that a load does along a free motion of play below which it does not press the gap."""

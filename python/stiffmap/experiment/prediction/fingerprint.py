@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from stiffmap.common.fingerprints import code, digest
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.fingerprints import code, digest
 
 
 def fingerprint(predictor: Predictor) -> str:

@@ -10,20 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiffmap.description import AppliedEffect
-from stiffmap.description.tree import joints
-from stiffmap.effects.check import values_at
-from stiffmap.effects.evidence import Drive
-from stiffmap.effects.registry import get
-from stiffmap.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
 from stiffmap.experiment.poses.point_kinematics import positions_of
 from stiffmap.experiment.prediction.equilibria import solved
 from stiffmap.experiment.prediction.metrology_loop import targets
 from stiffmap.experiment.readings import Seen, kind_of
-from stiffmap.machine import Machine
-from stiffmap.options import SolveOptions
+from stiffmap.model.description import AppliedEffect
+from stiffmap.model.description.tree import joints
+from stiffmap.model.effects.check import values_at
+from stiffmap.model.effects.evidence import Drive
+from stiffmap.model.effects.registry import get
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.options import SolveOptions
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from stiffmap.description import CommandError
-from stiffmap.description.tree import joints
-from stiffmap.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import coordinates_of
-from stiffmap.machine import Machine
+from stiffmap.model.description import CommandError
+from stiffmap.model.description.tree import joints
+from stiffmap.solve.machine import Machine
 
 
 def joint_motions(machine: Machine, plan: Experiment, coordinates: Floats, names: tuple[str, ...]) -> Floats:

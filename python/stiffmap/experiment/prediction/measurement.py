@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from stiffmap.description import AppliedEffect
-from stiffmap.effects import registry
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.model.description import AppliedEffect
+from stiffmap.model.effects import registry
 
 
 def true_wrench(experiment: Experiment, terms: Iterable[AppliedEffect]) -> Floats:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.description import Element, Point, Spring
-from stiffmap.effects import get, kinds
 from stiffmap.experiment.experiment import Experiment, Loop
-from stiffmap.machine import Machine
+from stiffmap.model.description import Element, Point, Spring
+from stiffmap.model.effects import get, kinds
+from stiffmap.solve.machine import Machine
 
 BASE, PLATFORM = "base.rig_on_base", "platform.rig_on_platform"
 

@@ -11,9 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.description import Body, MachineDescription, Offset, Point
-from stiffmap.description.alike import alike
-from stiffmap.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.point_kinematics import point_positions, positions_of
 from stiffmap.experiment.prediction.equilibria import Work, moves_unloaded
@@ -21,11 +19,13 @@ from stiffmap.experiment.prediction.joints import joint_channels
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
 from stiffmap.experiment.prediction.unloaded_state import lags
 from stiffmap.experiment.readings import kind_of
-from stiffmap.machine import Machine
-from stiffmap.options import SolveOptions
-from stiffmap.solving import Call, solve_call
-from stiffmap.status import Flag
-from stiffmap.variants import fill_holes
+from stiffmap.model.description import Body, MachineDescription, Offset, Point
+from stiffmap.model.description.alike import alike
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.options import SolveOptions
+from stiffmap.solve.solving import Call, solve_call
+from stiffmap.solve.status import Flag
+from stiffmap.solve.variants import fill_holes
 
 MOST_BYTES = 2**25
 """Of the displacements of all machines of one call."""

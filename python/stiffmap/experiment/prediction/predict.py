@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap import effects
-from stiffmap.description import AppliedEffect, MachineDescription
-from stiffmap.effects import apply_records
-from stiffmap.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.kept import Kept
+from stiffmap.common.recent import Recent
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.poses.against_command import resolved
 from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, without
@@ -21,12 +20,13 @@ from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.equilibria import Work, motions
 from stiffmap.experiment.prediction.history import Drives, drives_of, history_motion
 from stiffmap.experiment.prediction.joints import check_joints
-from stiffmap.experiment.prediction.kept import Kept
 from stiffmap.experiment.prediction.measurement import readings, true_wrench
 from stiffmap.experiment.prediction.nearby import FEW, Near, Nearby
 from stiffmap.experiment.prediction.recorded import at_records, records_of
-from stiffmap.machine import Machine
-from stiffmap.recent import Recent
+from stiffmap.model import effects
+from stiffmap.model.description import AppliedEffect, MachineDescription
+from stiffmap.model.effects import apply_records
+from stiffmap.solve.machine import Machine
 
 Terms = tuple[AppliedEffect, ...]
 FAILURE = 20.0

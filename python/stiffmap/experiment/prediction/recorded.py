@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.description import AppliedEffect
-from stiffmap.effects import registry
-from stiffmap.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.model.description import AppliedEffect
+from stiffmap.model.effects import registry
 
 Terms = tuple[AppliedEffect, ...]
 Solve = Callable[[Experiment, Terms], Floats]

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.description import CommandError, Element, Joint, Leg, MachineDescription
-from stiffmap.description.tree import edit_sequences
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
-from stiffmap.kinematics import inverse_kinematics
-from stiffmap.machine import Machine
+from stiffmap.model.description import CommandError, Element, Joint, Leg, MachineDescription
+from stiffmap.model.description.tree import edit_sequences
+from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.solve.machine import Machine
 
 TRAVEL = 1e-3
 """m along the approach over which drives are asked for their direction."""

@@ -7,10 +7,10 @@ from os import PathLike
 from pkgutil import iter_modules
 
 import stiffmap.experiment.readings.library as library
-from stiffmap.errors import FileError, StiffmapError
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.python_file import run_python_file
 from stiffmap.experiment.channels import AXES, Channel
 from stiffmap.experiment.readings.types import ReadingKind
-from stiffmap.python_file import run_python_file
 
 _LIBRARY: dict[str, ReadingKind] = {
     kind.name: kind

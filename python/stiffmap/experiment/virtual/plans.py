@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.broadcasting import random_numbers
-from stiffmap.errors import StiffmapError
+from stiffmap.common.broadcasting import random_numbers
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings.library.distance import READING
-from stiffmap.kinematics import forward_kinematics, inverse_kinematics
-from stiffmap.machine import Machine
+from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
+from stiffmap.solve.machine import Machine
 
 MICRO = {"deflection": 3e-6, "position": 8e-6}
 """m: default noise of a reading."""

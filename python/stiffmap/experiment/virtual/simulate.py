@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.broadcasting import random_numbers
-from stiffmap.description import AppliedEffect
-from stiffmap.errors import StiffmapError
+from stiffmap.common.broadcasting import random_numbers
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.comparison.limitations import refuse_unreachable
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.machine import Machine, takes_machine
+from stiffmap.model.description import AppliedEffect
+from stiffmap.solve.machine import Machine, takes_machine
 
 UNKNOWN = 1e-4
 """m, rad: standard deviation of an unknown frame, tool point or zero."""

@@ -1,7 +1,0 @@
-"""Every number of a machine by one address, ``full.name/field``: read, listed, set to a value, moved as built."""
-
-from stiffmap.addresses.as_built import moved, number
-from stiffmap.addresses.listing import Listed, listed
-from stiffmap.addresses.setting import known_values, with_values
-
-__all__ = ["Listed", "known_values", "listed", "moved", "number", "with_values"]

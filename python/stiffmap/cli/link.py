@@ -1,5 +1,0 @@
-"""`stiffmap link`: the command lives next to what it does; this module keeps ``--help`` quick."""
-
-from stiffmap.link.command import link_command
-
-__all__ = ["link_command"]

@@ -1,0 +1,1 @@
+"""What knows no robot: units, tables, YAML, output files, tasks, caches, errors."""

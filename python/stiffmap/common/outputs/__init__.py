@@ -1,0 +1,33 @@
+"""The one place that writes files: whole or not at all, one job at a time, space asked for before."""
+
+from stiffmap.common.outputs.alone import only_job, reserved
+from stiffmap.common.outputs.pictures import write_picture
+from stiffmap.common.outputs.space import mapped_array, needs_space
+from stiffmap.common.outputs.tables import guarded, unguarded, write_rows
+from stiffmap.common.outputs.writing import (
+    add_lines,
+    make_folder,
+    put_files,
+    put_folder,
+    synced,
+    write_text,
+    writing,
+)
+
+__all__ = [
+    "add_lines",
+    "guarded",
+    "make_folder",
+    "mapped_array",
+    "needs_space",
+    "only_job",
+    "put_files",
+    "put_folder",
+    "reserved",
+    "synced",
+    "unguarded",
+    "write_picture",
+    "write_rows",
+    "write_text",
+    "writing",
+]

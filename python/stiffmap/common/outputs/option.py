@@ -1,0 +1,24 @@
+"""The option of a command that says where it writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from stiffmap.common.outputs.alone import reserved
+
+
+def written(*names: str, help: str) -> Any:
+    """Option for a file or folder that a command writes: no other job writes there while the command runs.
+
+    `names` as of ``typer.Option``; ``-o, --output`` where there are none.
+    """
+    return typer.Option(*(names or ("-o", "--output")), help=help, callback=_alone)
+
+
+def _alone(context: typer.Context, path: Path | None) -> Path | None:
+    if path is not None and not context.resilient_parsing:
+        context.with_resource(reserved(path))
+    return path

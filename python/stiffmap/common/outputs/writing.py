@@ -1,0 +1,135 @@
+"""An output appears whole: written next to its place, flushed to the disk, then renamed over what was there."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from stiffmap.common.errors import FileError
+from stiffmap.common.outputs.alone import is_device, refused, reserved, short
+
+
+@contextmanager
+def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A path, with the same ending, to write a file to; what was at `path` stays until the new file is complete.
+
+    A symbolic link stays and its file is replaced; a device or a pipe is given the whole file at its end. Raises
+    FileError where it cannot be written or another job writes it.
+    """
+    target = Path(os.path.realpath(path))
+    try:
+        if target.is_dir():
+            raise FileError("cannot be written: it is a folder", file=os.fspath(path))
+        if is_device(target):
+            with tempfile.TemporaryDirectory() as folder:
+                fresh = Path(folder) / f"output{target.suffix}"
+                yield fresh
+                with fresh.open("rb") as source, target.open("wb") as sink:
+                    shutil.copyfileobj(source, sink)
+            return
+        with reserved(path):
+            yield from _replaced(target)
+    except OSError as error:
+        raise refused(path, error) from error
+
+
+def _replaced(target: Path) -> Iterator[Path]:
+    """The scratch file, then the rename."""
+    mode = None
+    if target.exists():
+        mode = target.stat().st_mode & 0o777
+        if not os.access(target, os.W_OK):  # a rename would not ask
+            raise PermissionError(13, "Permission denied")
+    fresh = target.with_name(f".{short(target.name)}.writing{target.suffix[:20]}")
+    fresh.unlink(missing_ok=True)  # what a killed job left
+    try:
+        os.close(os.open(fresh, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        yield fresh
+        if mode is not None:
+            fresh.chmod(mode)
+        synced(fresh)
+        os.replace(fresh, target)
+        synced(target.parent)
+    finally:
+        with suppress(OSError):
+            fresh.unlink(missing_ok=True)
+
+
+def synced(path: Path) -> None:
+    """Wait until a file or the names in a folder are on the disk."""
+    if os.name == "nt" and path.is_dir():
+        return  # a folder cannot be opened there
+    handle = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def write_text(
+    path: str | os.PathLike[str], text: str, encoding: str = "utf-8", errors: str = "strict"
+) -> Path:
+    """Write a text file; raises FileError where it cannot be written."""
+    with writing(path) as fresh:
+        fresh.write_text(text, encoding=encoding, errors=errors)
+    return Path(path)
+
+
+def make_folder(path: str | os.PathLike[str]) -> Path:
+    """The folder, made where it is missing; raises FileError where it cannot be."""
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise refused(path, error) from error
+    return folder
+
+
+def put_folder(fresh: Path, path: Path) -> None:
+    """Put a complete folder in the place of another one (of files that stiffmap wrote); FileError."""
+    try:
+        for file in fresh.rglob("*"):
+            synced(file)
+        old = path.with_name(f".{path.name}.old")
+        shutil.rmtree(old, ignore_errors=True)
+        if path.is_dir():
+            os.replace(path, old)
+        os.replace(fresh, path)
+        synced(path.parent)
+        shutil.rmtree(old, ignore_errors=True)
+    except OSError as error:
+        raise refused(path, error) from error
+
+
+def put_files(fresh: Path, folder: str | os.PathLike[str]) -> None:
+    """Put the complete files of one folder into another one of the same disk, which is made where it is missing; FileError.
+
+    Other files of that folder stay.
+    """
+    target = make_folder(folder)
+    try:
+        for file in sorted(fresh.iterdir()):
+            os.replace(file, target / file.name)
+        synced(target)
+    except OSError as error:
+        raise refused(folder, error) from error
+
+
+def add_lines(path: Path, lines: Iterable[str], flushed: bool = True) -> None:
+    """Add whole lines to a journal; OSError where the disk refuses.
+
+    A line that a killed job did not finish is ended first, so that it is one damaged line and no more.
+    """
+    with path.open("ab+") as file:
+        if file.tell():
+            file.seek(-1, os.SEEK_END)
+            if file.read(1) != b"\n":
+                file.write(b"\n")
+        file.write("".join(f"{line}\n" for line in lines).encode())
+        file.flush()
+        if flushed:
+            os.fsync(file.fileno())

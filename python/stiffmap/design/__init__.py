@@ -1,6 +1,0 @@
-"""Multicriterion design: any numbers of a machine file, any measures (docs/design.md)."""
-
-from stiffmap.design.problem import Design, load_design
-from stiffmap.design.search import ParetoSet, optimize
-
-__all__ = ["Design", "ParetoSet", "load_design", "optimize"]

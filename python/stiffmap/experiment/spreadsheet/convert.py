@@ -1,0 +1,305 @@
+"""A sheet to an experiment folder: experiment.yaml, data.csv, notes.csv."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.cells import row_numbers
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
+from stiffmap.common.sheet_units import Unit, known, quantity_of, unit_of
+from stiffmap.common.yaml_text import text_of
+from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
+from stiffmap.experiment.spreadsheet.sheet import Sheet, column_letter
+
+WORDS = ("id", "setup", "branch")
+POSE = ("x", "y", "z")
+FORCE = ("fx", "fy", "fz")
+POSE2 = ("x2", "y2", "z2")
+COUNTED = ("order", "repeat")
+
+
+class Question(StiffmapError):
+    """What cannot be guessed. `kind`: ``column`` or ``unit``; `meaning`: of which column of an experiment."""
+
+    def __init__(self, message: str, kind: str, meaning: str) -> None:
+        super().__init__(message)
+        self.kind, self.meaning = kind, meaning
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What was understood of a sheet."""
+
+    columns: list[Column]
+    units: dict[str, str]
+    factors: dict[str, float]
+    """Of columns in units that experiment files do not have: how many of `units` one of the sheet's is."""
+    header: list[str]
+    rows: Rows
+    repeats: int
+    constants: dict[str, float]
+    notes: list[Column]
+    head: dict[str, Any] = field(default_factory=dict)
+    """Further keys of experiment.yaml."""
+
+
+def understand(
+    sheet: Sheet,
+    chosen: Mapping[str, Sequence[str]],
+    units: Mapping[str, str],
+    constants: Mapping[str, float],
+    commands: Mapping[str, tuple[str, str]] | None = None,
+    head: Mapping[str, Any] | None = None,
+) -> Imported:
+    """Columns, units and rows of data.csv; raises StiffmapError that asks for what cannot be guessed.
+
+    ``units`` (meaning -> unit) for columns without brackets; ``constants`` (meaning -> number) for what the
+    sheet has no column of, in mm and N. ``commands`` (column -> drive, unit) for columns of commanded joints, which stand for
+    poses; ``head`` holds further keys of experiment.yaml.
+    """
+    drives = dict(commands or {})
+    columns = guess(sheet.header, chosen)
+    used = [c for c in columns if c.meaning != "note"]
+    for c in used:
+        if c.meaning not in WORDS and not sheet.is_numeric(c.index):
+            sheet.numbers(c.index)  # raises, naming the line
+    known = {c.meaning for c in used} | set(constants)
+    if drives:  # the pose follows from them
+        columns = [replace(c, meaning="note") if c.meaning in POSE else c for c in columns]
+        used = [c for c in columns if c.meaning != "note"]
+        known |= set(POSE)
+    _ask(sheet, known)
+    beside = _beside(sheet, columns)
+    plain = (*WORDS, *COUNTED, *drives)
+    found = {c.meaning: _unit(sheet, c, units, beside) for c in used if c.meaning not in plain}
+    named = {m: u.name for m, u in found.items()}
+    factors = {m: u.factor for m, u in found.items() if u.factor != 1.0}
+    repeats = max([c.repeat for c in used], default=0) or 1
+    header, rows = _rows(sheet, used, constants, repeats, factors)
+    told = {"command": {k: {"actuator": a, "unit": u} for k, (a, u) in drives.items()}} if drives else {}
+    further = told | dict(head or {})
+    return Imported(columns, named, factors, header, rows, repeats, dict(constants),
+                    [c for c in columns if c.meaning == "note"], further)  # fmt: skip
+
+
+def _ask(sheet: Sheet, known_: set[str]) -> None:
+    there = ", ".join(f"'{h}'" for h in sheet.header)
+    lost = [a for a in POSE if a not in known_]
+    if lost:
+        raise Question(
+            f"{sheet.file}: which column is the position {lost[0]}? Say --map {lost[0]}='HEADER', or "
+            f"--set {lost[0]}=NUMBER (mm) where it is the same in every row; columns: {there}",
+            "column",
+            lost[0],
+        )
+    if not known_ & set(READINGS):
+        raise Question(
+            f"{sheet.file}: which column is a reading? Say --map dx='HEADER' (dy, dz, rx, ry, rz), several "
+            f"headers with | between them for repeats; columns: {there}",
+            "column",
+            "reading",
+        )
+
+
+def _beside(sheet: Sheet, columns: Sequence[Column]) -> dict[int, str]:
+    """Units in cells of their own: column -> what stands to its right in a column that holds nothing else."""
+    out = {}
+    for c in columns:
+        if c.meaning != "note" or c.index == 0 or columns[c.index - 1].unit:
+            continue
+        cells = {cell.strip() for cell in sheet.columns[c.index]} - {""}
+        if cells and all(unit_of(cell) is not None for cell in cells):
+            if len(cells) > 1:
+                raise StiffmapError(
+                    f"{sheet.file}: column '{c.name}' ({column_letter(c.index)}): expected one unit in all rows; found "
+                    f"{', '.join(sorted(cells))}"
+                )
+            out[c.index - 1] = cells.pop()
+    return out
+
+
+def _unit(sheet: Sheet, c: Column, units: Mapping[str, str], beside: Mapping[int, str]) -> Unit:
+    quantity = quantity_of(c.meaning)
+    text = units.get(c.meaning, c.unit) or beside.get(c.index, "") or units.get(quantity, "")
+    place = f"{sheet.file}: column '{c.name}' ({c.meaning})"
+    if not text:
+        usual = {"length": "um" if c.meaning in READINGS else "mm", "force": "N", "moment": "N*m"}
+        raise Question(
+            f"{place} has no unit: write it in the header, as in '{c.name} [mm]', or say "
+            f"--unit {c.meaning}={usual.get(quantity, 'deg' if quantity == 'angle' else 'degC')}",
+            "unit",
+            c.meaning,
+        )
+    found = unit_of(text, quantity)
+    if found is None:
+        if unit_of(text) is not None or text.strip() == "mN":
+            raise Question(
+                f"{place}: the unit '{text}' is not one of this quantity; those of {quantity} are: {known(quantity)}",
+                "unit",
+                c.meaning,
+            )
+        raise Question(
+            f"{place}: the unit '{text}' is not known; those of {quantity} are: {known(quantity)}",
+            "unit",
+            c.meaning,
+        )
+    return found
+
+
+def _rows(
+    sheet: Sheet,
+    used: list[Column],
+    constants: Mapping[str, float],
+    repeats: int,
+    factors: Mapping[str, float],
+) -> tuple[list[str], Rows]:
+    """Cells of data.csv: repeats side by side become rows one below the other."""
+    common = [c for c in used if c.repeat == 0]
+    meanings = list(dict.fromkeys(c.meaning for c in used if c.repeat))
+    header = [*(c.meaning for c in common), *constants, *meanings, *(["repeat"] if repeats > 1 else [])]
+    return header, Rows(sheet, common, constants, meanings, repeats, used, factors)
+
+
+class Rows:
+    """Rows of data.csv, made block by block whenever they are asked for: text, and numbers as floats."""
+
+    def __init__(
+        self,
+        sheet: Sheet,
+        common: list[Column],
+        constants: Mapping[str, float],
+        meanings: list[str],
+        repeats: int,
+        used: list[Column],
+        factors: Mapping[str, float],
+    ) -> None:
+        self._sheet, self._repeats = sheet, repeats
+        numbers = {
+            c.index: sheet.numbers(c.index) * factors.get(c.meaning, 1.0)
+            if c.meaning in factors
+            else sheet.numbers(c.index)
+            for c in used
+            if c.meaning not in WORDS
+        }
+        at = {(c.meaning, c.repeat): c.index for c in used}
+        wanted: list[list[int | float | None]] = []
+        for k in range(1, repeats + 1):
+            side = [at.get((m, k)) for m in meanings]
+            wanted.append([*(c.index for c in common), *map(float, constants.values()), *side])
+        self._numbers, self._wanted = numbers, wanted
+        self._words = [c.index for c in used if c.meaning in WORDS]
+        header = [*(c.meaning for c in common), *constants, *meanings]
+        self._id = header.index("id") if repeats > 1 and "id" in header else None
+        self._name = header.index("id") if "id" in header else None
+        self.lines = row_numbers()
+        """Line in the sheet of each row, once they were made."""
+        self._readings = [header.index(m) for m in READINGS if m in header]
+
+    def __iter__(self) -> Iterator[Sequence[Any]]:
+        self.lines = row_numbers()
+        taken: set[str] = set()
+        words = {i: self._sheet.columns[i].parts() for i in self._words}
+        start = 0
+        for size in map(len, self._sheet.columns[0].parts()):
+            here = slice(start, start + size)
+            cells = {i: next(parts) for i, parts in words.items()}
+            cells |= {i: _written(values[here]) for i, values in self._numbers.items()}
+            each = [self._block(k, cells, size) for k in range(self._repeats)]
+            for n, rows in enumerate(zip(*each, strict=True), start):
+                for row in rows:
+                    if any(row[i] != "" for i in self._readings):
+                        self.lines.append(self._sheet.lines[n])
+                        yield self._once(row, taken)
+            start += size
+
+    def _once(self, row: Sequence[Any], taken: set[str]) -> Sequence[Any]:
+        """A point that is read again is a repeat: its second row is called ``P1.2``."""
+        if self._name is None:
+            return row
+        name = str(row[self._name]) or "row"
+        free = name
+        count = 1
+        while free in taken:
+            count += 1
+            free = f"{name}.{count}"
+        taken.add(free)
+        return row if free == row[self._name] else [*row[: self._name], free, *row[self._name + 1 :]]
+
+    def _block(self, k: int, cells: dict[int, list[Any]], size: int) -> Iterator[Sequence[Any]]:
+        """Rows of one of the repeats that stand side by side."""
+        columns = [
+            [""] * size if w is None else [w] * size if isinstance(w, float) else cells[w]
+            for w in self._wanted[k]
+        ]
+        if self._repeats > 1:
+            if self._id is not None:
+                columns[self._id] = [f"{name}.{k + 1}" for name in columns[self._id]]
+            columns.append([k + 1] * size)
+        return zip(*columns, strict=True)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+def _written(values: Floats) -> list[Any]:
+    """Numbers, and nothing where there are none."""
+    out: list[Any] = values.tolist()
+    return ["" if v != v else v for v in out] if np.isnan(values).any() else out
+
+
+def write_folder(
+    found: Imported,
+    sheet: Sheet,
+    folder: Path,
+    machine: str,
+    quantity: str,
+    noise: Mapping[str, float],
+    title: str,
+    record: Mapping[str, str] | None = None,
+) -> None:
+    """Write the folder; raises FileError where it cannot be written."""
+    head: dict[str, Any] = {
+        "title": title,
+        "machine": machine,
+        "quantity": quantity,
+        "units": head_units(found),
+    }
+    if noise:
+        head["noise"] = {n: v * found.factors.get(n, 1.0) for n, v in noise.items()}
+    head |= found.head
+    told = {**dict(sheet.record), **(record or {})}
+    if "notes" in told:
+        head["notes"] = told.pop("notes")
+    if told:
+        head["record"] = told
+    with only_job(make_folder(folder)):
+        head["rows"] = write_rows(folder / "data.csv", found.header, found.rows)
+        if found.notes:
+            kept = ([row[c.index] for c in found.notes] for row in sheet.rows)
+            write_rows(folder / "notes.csv", [sheet.header[c.index] for c in found.notes], kept)
+        write_text(folder / "experiment.yaml", text_of(head))
+
+
+def head_units(found: Imported) -> dict[str, str]:
+    """Units for experiment.yaml: mm and N in common, every column that differs by its name."""
+    common = {"length": "mm", "force": "N"}
+    out = dict(common)
+    for meaning, unit in found.units.items():
+        base = meaning.removeprefix("u_")
+        if meaning == "temperature":
+            out["temperature"] = unit
+        elif meaning.startswith("u_"):
+            if found.units.get(base) != unit:
+                raise StiffmapError(
+                    f"columns {base} and {meaning} need the same unit; found {found.units.get(base)} and {unit}"
+                )
+        elif unit not in common.values():
+            out[meaning] = unit
+    return out

@@ -1,0 +1,209 @@
+"""A serial arm from its table of Denavit and Hartenberg: one row a joint, theta, d, a, alpha.
+
+Standard: the frame behind joint i is Rz(theta) Tz(d) Tx(a) Rx(alpha) of the one before (Denavit and Hartenberg 1955).
+Modified: Rx(alpha) Tx(a) Rz(theta) Tz(d), alpha and a being those of the link before (Craig 1986). theta is what is added
+to the joint's coordinate, or d for a joint that slides.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.sheet_units import unit_of
+from stiffmap.experiment.spreadsheet.guess import split_unit
+from stiffmap.experiment.spreadsheet.sheet import Sheet
+from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
+
+CONVENTIONS = ("standard", "modified")
+NUMBERS = {
+    "theta": r"(theta|θ|offset|theta[ _-]?(offset|0)|q[ _-]?offset)[ _-]?(i)?(_?\(?offset\)?)?",
+    "d": r"d[ _-]?(i)?",
+    "a": r"(a|r)[ _-]?(i|i-1|\(i-1\)|i_1)?",
+    "alpha": r"(alpha|α)[ _-]?(i|i-1|\(i-1\)|i_1)?",
+}
+WORDS = {
+    "name": r"name|joint|axis|achse|gelenk|id|link",
+    "type": r"type|kind|art",
+    "low": r"low|min|lower",
+    "high": r"high|max|upper",
+}
+LENGTH, ANGLE = ("d", "a"), ("theta", "alpha")
+TO_SI = {
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "in": 0.0254,
+    "rad": 1.0,
+    "mrad": 1e-3,
+    "deg": math.pi / 180.0,
+}
+LEG = "arm"
+STEP, TRIES = math.radians(30.0), 200
+"""Of the coordinates among which a home is looked for, and how many are tried."""
+ROOM = 0.2
+"""Half of the workspace, of the arm's reach."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One joint, SI."""
+
+    name: str
+    theta: float
+    d: float
+    a: float
+    alpha: float
+    slides: bool
+    range: tuple[float, float] | None
+
+
+def read_dh(sheet: Sheet, units: Mapping[str, str]) -> list[Row]:
+    """Rows of a table; `units` (theta, d, a, alpha -> unit) for columns without brackets.
+
+    Raises StiffmapError that names the column which is missing or has no unit.
+    """
+    at = _columns(sheet)
+    lost = [n for n in NUMBERS if n not in at]
+    if lost:
+        raise StiffmapError(
+            f"{sheet.file}: no column is {', '.join(lost)}: a table of Denavit and Hartenberg has theta, d, a and alpha, one "
+            f"row a joint; found {', '.join(sheet.header)}"
+        )
+    numbers = {n: _factor(sheet, at[n], n, units) * np.nan_to_num(sheet.numbers(at[n])) for n in NUMBERS}
+    count = len(sheet.lines)
+    words = {n: list(sheet.columns[at[n]]) for n in ("name", "type") if n in at}
+    slides = [w.strip().lower()[:1] in ("p", "t", "s", "l") for w in words.get("type", ["r"] * count)]
+    names = [_named(w, i) for i, w in enumerate(words.get("name", [""] * count))]
+    if len(set(names)) < count:
+        raise StiffmapError(f"{sheet.file}: joints of the same name: {', '.join(names)}")
+    ends = [(sheet.numbers(at["low"]), sheet.numbers(at["high"]))] if {"low", "high"} <= set(at) else []
+    out = []
+    for i in range(count):
+        scale = (
+            _factor(sheet, at["d"], "d", units) if slides[i] else _factor(sheet, at["theta"], "theta", units)
+        )
+        range_ = (float(ends[0][0][i] * scale), float(ends[0][1][i] * scale)) if ends else None
+        known = range_ is not None and all(map(math.isfinite, range_))
+        theta, d, a, alpha = (float(numbers[n][i]) for n in NUMBERS)
+        out.append(Row(names[i], theta, d, a, alpha, slides[i], range_ if known else None))
+    return out
+
+
+def arm(
+    rows: Sequence[Row], convention: str, name: str, source: str = "", home: Floats | None = None
+) -> MachineDescription:
+    """The machine; `home` (joints,) m, rad of its home configuration, None: one that is far from singular."""
+    if convention not in CONVENTIONS:
+        raise StiffmapError(f"--dh-convention: expected {' or '.join(CONVENTIONS)}, got '{convention}'")
+    standard = convention == "standard"
+    q = _home(rows, standard) if home is None else np.asarray(home, dtype=float)
+    elements: list[Element] = []
+    for i, r in enumerate(rows):
+        own = _screw("z", r.theta, r.d)
+        link = _screw("x", r.alpha, r.a)
+        if not standard and np.any(link - np.eye(4)):
+            elements.append(Offset(f"link_{i}", _pose(link)))
+        kind = "prismatic" if r.slides else "revolute"
+        drive = None if r.range is None else Drive(range=r.range)
+        elements.append(Joint(r.name, kind, ((0.0, 0.0, 1.0),), (float(q[i]),), actuated=True, drive=drive))
+        behind = own @ link if standard else own
+        if np.any(behind - np.eye(4)):
+            elements.append(Offset(f"link_{i + 1}" if standard else f"{r.name}_end", _pose(behind)))
+    at = forward(rows, standard, q)
+    reach = sum(abs(r.a) + abs(r.d) for r in rows) or 1.0
+    room = ROOM * reach
+    low, high = (tuple(float(v) for v in at[:3, 3] + side * room) for side in (-1.0, 1.0))
+    return MachineDescription(
+        name, (Leg(LEG, tuple(elements)),), home=_pose(at), workspace=(low, high), source=source,  # type: ignore[arg-type]
+        title=f"Serial arm of {len(rows)} joints",
+    )  # fmt: skip
+
+
+def forward(rows: Sequence[Row], standard: bool, q: Floats) -> Floats:
+    """(4, 4) frame behind the last row at coordinates (joints,)."""
+    out = np.eye(4)
+    for r, v in zip(rows, q, strict=True):
+        own = _screw("z", r.theta + (0.0 if r.slides else v), r.d + (v if r.slides else 0.0))
+        link = _screw("x", r.alpha, r.a)
+        out = out @ (own @ link if standard else link @ own)
+    return out
+
+
+def _home(rows: Sequence[Row], standard: bool) -> Floats:
+    """Of coordinates in steps of 30 degrees those whose slopes are farthest from losing a direction."""
+    rng = np.random.default_rng(0)
+    reach = sum(abs(r.a) + abs(r.d) for r in rows) or 1.0
+    best, where = -1.0, np.zeros(len(rows))
+    for k in range(TRIES):
+        q = np.array([_within(r, STEP * int(rng.integers(-4, 5)) if k else 0.0, reach) for r in rows])
+        size = np.linalg.svd(_slopes(rows, standard, q, reach), compute_uv=False)
+        told = float(size[min(len(rows), 6) - 1] / size[0]) if size[0] > 0 else 0.0
+        if told > 1.05 * best:
+            best, where = told, q
+    return where
+
+
+def _within(r: Row, turn: float, reach: float) -> float:
+    v = turn / math.pi * 0.5 * reach if r.slides else turn
+    return v if r.range is None else float(np.clip(v, *r.range))
+
+
+def _slopes(rows: Sequence[Row], standard: bool, q: Floats, reach: float) -> Floats:
+    """(6, joints) of the pose, lengths in reaches."""
+    out, step, at = np.zeros((6, len(q))), 1e-6, forward(rows, standard, q)
+    for i in range(len(q)):
+        moved = q.copy()
+        moved[i] += step
+        there = forward(rows, standard, moved)
+        out[:3, i] = (there - at)[:3, 3] / step / reach
+        out[3:, i] = Rotation.from_matrix(there[:3, :3] @ at[:3, :3].T).as_rotvec() / step
+    return out
+
+
+def _screw(axis: str, angle: float, shift: float) -> Floats:
+    out = np.eye(4)
+    out[:3, :3] = Rotation.from_euler(axis, angle).as_matrix()
+    out["xyz".index(axis), 3] = shift
+    return out
+
+
+def _pose(t: Floats) -> Pose:
+    return Pose.of(t[:3, 3], t[:3, :3])
+
+
+def _columns(sheet: Sheet) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for i, header in enumerate(sheet.header):
+        name = split_unit(header)[0].strip().lower()
+        for meaning, pattern in (NUMBERS | WORDS).items():
+            if meaning not in found and re.fullmatch(pattern, name):
+                found[meaning] = i
+                break
+    return found
+
+
+def _factor(sheet: Sheet, index: int, name: str, units: Mapping[str, str]) -> float:
+    header = sheet.header[index]
+    quantity = "length" if name in LENGTH else "angle"
+    unit = unit_of(units.get(name, split_unit(header)[1]) or units.get(quantity, ""), quantity)
+    if unit is None:
+        kind = "mm" if name in LENGTH else "deg"
+        raise StiffmapError(
+            f"{sheet.file}: column '{header}' has no unit of {quantity}s: write it in the header, as in '{name} [{kind}]', or say "
+            f"--unit {name}={kind}"
+        )
+    return TO_SI[unit.name] * unit.factor
+
+
+def _named(text: str, number: int) -> str:
+    plain = re.sub(r"[^A-Za-z0-9_]+", "_", text.strip()).strip("_")
+    return f"joint_{number + 1}" if not plain or plain[0].isdigit() else plain

@@ -1,0 +1,132 @@
+"""Which column of a sheet is what, and in which unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.sheet_units import unit_of
+
+PATTERNS: tuple[tuple[str, str], ...] = (
+    ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?"),
+    ("temperature", r"t|temp|temperature|temperatur"),
+    ("order", r"order|reihenfolge|sequence"),
+    ("setup", r"set-?up|aufbau|aufspannung"),
+    ("branch", r"branch|richtung der last|loading"),
+    *((f"f{a}", rf"f ?_?{a}|force ?_?(in )?{a}|{a} ?(force|kraft|load|last)|kraft ?_?{a}|last ?_?(in )?{a}|load ?_?(in )?{a}") for a in "xyz"),
+    *((f"m{a}", rf"m ?_?{a}|moment ?_?{a}|torque ?_?{a}") for a in "xyz"),
+    *((f"u_d{a}", rf"u ?_?d?{a}|sigma ?_?d?{a}|std ?_?d?{a}") for a in "xyz"),
+    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displ\.?|displacement|verschiebung|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung) ?_?(in )?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a} ?(deflection|displ\.?|displacement|verschiebung|abweichung|dial|gau?ge|uhr|reading)") for a in "xyz"),
+    *((f"p{a}", rf"p_?{a}") for a in "xyz"),
+    *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
+    *((a, rf"{a}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(nominal|pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|soll ?_?{a}|{a} ?soll|{a}[ _-]?(t|target|cmd|nominal|command|commanded)|target[ _-]?{a}") for a in "xyz"),
+)  # fmt: skip
+REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
+SEEN = ("px", "py", "pz")
+READINGS = ("dx", "dy", "dz", "rx", "ry", "rz", "dd", *SEEN)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the sheet, as understood."""
+
+    index: int
+    name: str
+    """As in the sheet, without its unit."""
+    unit: str
+    """As written in brackets; empty where none is."""
+    meaning: str
+    """Column of an experiment; ``note`` for what is kept in addition."""
+    repeat: int = 0
+    """From 1, of repeats side by side; 0: none."""
+
+
+def split_unit(header: str) -> tuple[str, str]:
+    """``Uhr 1 [µm]`` is ``Uhr 1`` in ``µm``; also round brackets, and ``x / mm``, ``x, mm``, ``x in mm``, ``x_mm``,
+    ``x 1/100 mm``."""
+    match = re.match(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$", header)
+    if match:
+        return match[1].strip(), match[2].strip()
+    part = re.match(
+        r"^(.*?\S)(?:\s+in)?[\s,;]+((?:1/|0[.,]0*1\s?)\d*\s?(?:mm|in)?|(?:mm|in)/1\d+)\s*$", header
+    )
+    if part and known_unit(part[2]):
+        return part[1].strip(), part[2].strip()
+    said = re.match(r"^(.*?)(?:\s*[/,;]\s*|\s+in\s+)(\S+)\s*$", header)
+    bare = re.match(r"^(.*\S)[\s_](\S{2,})\s*$", header)
+    newton = re.match(r"^(.*?[^\s,;/])(?:\s+in)?\s(k?N)\s*$", header)
+    if newton:
+        return newton[1].strip(), newton[2]
+    if said and said[1] and known_unit(said[2]) and not known_unit(header):
+        return said[1].strip(), said[2]
+    if bare and bare[2].lower() != "in" and known_unit(bare[2]):
+        return bare[1].strip(), bare[2]
+    return header.strip(), ""
+
+
+def known_unit(unit: str) -> str:
+    """The unit as experiment files write it; empty for an unknown one."""
+    found = unit_of(unit)
+    return found.name if found else ""
+
+
+def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[Column]:
+    """Meaning of every column; ``chosen`` (meaning -> headers) goes before any guess.
+
+    Several headers of one meaning are repeats side by side, in that order. Raises StiffmapError for a chosen
+    header that is not there.
+    """
+    given = {
+        _find(h, headers): (meaning, i) for meaning, many in chosen.items() for i, h in enumerate(many, 1)
+    }
+    out = []
+    for index, header in enumerate(headers):
+        name, unit = split_unit(header)
+        if index in given:
+            meaning, repeat = given[index]
+            out.append(Column(index, name, unit, meaning, repeat if len(chosen[meaning]) > 1 else 0))
+        else:
+            meaning, repeat = _meaning(name)
+            out.append(Column(index, name, unit, "note" if meaning in chosen else meaning, repeat))
+    return _one_each(out)
+
+
+def _find(wanted: str, headers: Sequence[str]) -> int:
+    exact = [i for i, h in enumerate(headers) if wanted in (h, split_unit(h)[0])]
+    loose = [i for i, h in enumerate(headers) if h.lower().startswith(wanted.lower())]
+    found = exact or (loose if len(loose) == 1 else [])
+    if not found:
+        raise StiffmapError(f"--map: no column '{wanted}'; there are: {', '.join(headers)}")
+    return found[0]
+
+
+def meaning_of(name: str) -> str:
+    """Column of an experiment that a name without its unit stands for; ``note`` for none."""
+    return _meaning(name)[0]
+
+
+def _meaning(name: str) -> tuple[str, int]:
+    plain = re.sub(r"\s+", " ", name.strip().lower())
+    for meaning, pattern in PATTERNS:
+        if re.fullmatch(pattern, plain):
+            return meaning, 0
+    match = REPEATED.match(plain)
+    if match and match[1]:
+        for meaning, pattern in PATTERNS:
+            if meaning in READINGS and re.fullmatch(pattern, match[1].strip()):
+                return meaning, int(match[2])
+    return "note", 0
+
+
+def _one_each(columns: list[Column]) -> list[Column]:
+    """The second column of a meaning is a note, unless they are repeats."""
+    seen: set[tuple[str, int]] = set()
+    out = []
+    for c in columns:
+        key = (c.meaning, c.repeat)
+        again = c.meaning != "note" and key in seen
+        seen.add(key)
+        out.append(Column(c.index, c.name, c.unit, "note") if again else c)
+    return out

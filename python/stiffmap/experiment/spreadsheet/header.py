@@ -1,0 +1,126 @@
+"""The header of a table: one line, or several with groups, units in a line of their own, merged cells, a leading #."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from itertools import pairwise
+
+from stiffmap.common.sheet_units import unit_of
+from stiffmap.experiment.spreadsheet.guess import meaning_of, split_unit
+
+Line = tuple[int, list[str]]
+MOST_LINES = 4
+"""Lines above the data that may be of the header."""
+
+
+def header_of(above: Sequence[Line], first: Sequence[str]) -> tuple[int, list[str]] | None:
+    """Line number and names of the columns, from the lines above the first row of data; None where none is a header."""
+    width = _width(first)
+    lines = [(n, [_plain(c) for c in cells]) for n, cells in above]
+    lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)][-MOST_LINES:]
+    units: list[str] = []
+    while lines and not _fits(lines[-1][1], width):
+        if _units(lines[-1][1]):
+            break
+        if len(lines) == 1 and sum(map(bool, lines[-1][1])) >= 1 and not _commented(above, lines[-1][0]):
+            break
+        lines.pop()
+    if lines and _units(lines[-1][1]) and len(lines) > 1:
+        units = lines.pop()[1]
+    if not lines:
+        return None
+    number, names = lines[-1]
+    names = [*names, *[""] * (len(units) - len(names))]
+    if len(lines) > 1 and _needs_group(names, lines[-2][1], first):
+        names = _grouped(lines[-2][1], names)
+    if units:
+        names = [_with_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
+    return number, names
+
+
+RECORD = {
+    "operator": r"operator|bediener|prüfer|measured by|gemessen von|name",
+    "instrument": r"instrument|messmittel|messgerät|messuhr|gauge",
+    "certificate": r"certificate|zertifikat|kalibrierschein|calibration",
+    "date": r"date|datum",
+    "temperature": r"temperature|temperatur|temp\.?|raumtemperatur",
+    "notes": r"notes?|bemerkung(en)?|remarks?",
+}
+
+
+def record_of(above: Sequence[Line]) -> tuple[tuple[str, str], ...]:
+    """``Operator;Miller`` or ``Operator: Miller`` in the lines above a table."""
+    out: dict[str, str] = {}
+    for _, cells in above:
+        filled = [_plain(c) for c in cells if c.strip()]
+        pairs = [tuple(filled)] if len(filled) == 2 else [tuple(c.split(":", 1)) for c in filled if ":" in c]
+        pairs += [(a, b) for a, b in pairwise(filled) if a.endswith(":")]
+        for name, value in (p for p in pairs if len(p) == 2):
+            for key, pattern in RECORD.items():
+                if re.fullmatch(pattern, name.strip().rstrip(":"), re.IGNORECASE) and value.strip():
+                    out.setdefault(key, value.strip())
+    return tuple(out.items())
+
+
+def _plain(cell: str) -> str:
+    text = re.sub(r"\s+", " ", cell.strip())
+    bare = text.lstrip("#%").strip() if text.startswith(("#", "%")) else text
+    return bare or text
+
+
+def _commented(above: Sequence[Line], number: int) -> bool:
+    return any(n == number and c[0].strip().startswith(("#", "%", "//")) for n, c in above)
+
+
+def _width(cells: Sequence[str]) -> int:
+    return sum(bool(c.strip()) for c in cells)
+
+
+def _fits(cells: Sequence[str], width: int) -> bool:
+    """Whether a line names at least half of the columns that hold data."""
+    return sum(map(bool, cells)) >= max(2, (width + 1) // 2)
+
+
+def _bare(cell: str) -> str:
+    return cell.strip().strip("[]()").strip()
+
+
+def _units(cells: Sequence[str]) -> bool:
+    """Whether a line holds nothing but units."""
+    filled = [_bare(c) for c in cells if _bare(c) and _bare(c) not in ("-", "–", "—", "#", "1")]
+    named = [c for c in filled if unit_of(c) is not None]
+    return bool(named) and len(named) >= 0.6 * len(filled)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    bare = _bare(unit)
+    return f"{name} [{bare}]" if bare and unit_of(bare) is not None and not split_unit(name)[1] else name
+
+
+def _needs_group(names: Sequence[str], group: Sequence[str], first: Sequence[str]) -> bool:
+    """Whether names say too little without the line above: the same twice, or nothing where there is data."""
+    twice = [n for n, times in Counter(n.lower() for n in names if n).items() if times > 1]
+    nameless = any(
+        c.strip() and not (names[i] if i < len(names) else "") and i < len(group) and group[i]
+        for i, c in enumerate(first)
+    )
+    return sum(map(bool, group)) >= 2 and bool(twice or nameless)
+
+
+def _grouped(group: Sequence[str], names: Sequence[str]) -> list[str]:
+    """``Force [N]`` over ``x`` is ``Force x [N]``; a group reaches to the next one, as merged cells do."""
+    out, current = [], ""
+    once = Counter(split_unit(n)[0].lower() for n in names)
+    for i in range(max(len(group), len(names))):
+        above = group[i] if i < len(group) else ""
+        name = names[i] if i < len(names) else ""
+        current = above or (current if name else "")
+        title, unit = split_unit(current)
+        plain, own = split_unit(name)
+        text = " ".join(p for p in (title, plain) if p)
+        if once[plain.lower()] == 1 and meaning_of(plain) != "note" and meaning_of(text) == "note":
+            text = plain  # Force over Fx
+        out.append(f"{text} [{own or unit}]" if own or unit else text)
+    return out

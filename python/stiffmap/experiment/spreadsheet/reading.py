@@ -1,0 +1,73 @@
+"""A sheet of a workbook that fits, and everything that the user says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.workbook import sheet_names
+from stiffmap.experiment.spreadsheet.convert import Imported
+from stiffmap.experiment.spreadsheet.dialogue import Answers, Ask, ask_all, profile_file, remember, remembered
+from stiffmap.experiment.spreadsheet.guess import guess
+from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings
+from stiffmap.experiment.spreadsheet.joints import Commanded, as_seen, commanded, turned
+from stiffmap.experiment.spreadsheet.sheet import EXCEL, Sheet, read_sheet
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a sheet is read: what wrote it, drives that it may command (name -> slides), sign of its differences."""
+
+    wrote: Instrument | None
+    drives: Mapping[str, bool]
+    difference: str
+
+
+def read_and_ask(
+    file: Path, sheet: str | None, how: Reading, given: Answers, ask: Ask | None
+) -> tuple[Sheet, Imported, Answers, list[str], Commanded | None]:
+    """The sheet that fits, what was understood of it, the answers in use, what the user should know of them, and the joints
+    that the sheet commands."""
+
+    def one(
+        name: str | None, ask: Ask | None
+    ) -> tuple[Sheet, Imported, Answers, list[str], Commanded | None]:
+        table, answers, told = read_sheet(file, name), given, list[str]()
+        form = table
+        if (kept := remembered(form)) is not None:
+            answers = kept.below(given)
+            told.append(f"answers of an earlier sheet of this form are used: {profile_file(form)}")
+        joints = commanded(table, how.drives, answers.chosen, answers.units)
+        if joints is not None:
+            joints = as_seen(joints, answers.units, how.difference)
+            table, answers = joints.sheet, replace(answers, chosen=joints.chosen)
+            told += joints.told
+        elif how.wrote is not None:
+            table, meant, assumed, constants = as_readings(table, how.wrote, answers.constants)
+            answers = replace(
+                answers, chosen=meant | answers.chosen, units=assumed | answers.units, constants=constants
+            )
+        if joints is None or not joints.head:
+            table, other = turned(table, guess(table.header, answers.chosen), how.difference)
+            answers = replace(answers, chosen=answers.chosen | other)
+        found, final = ask_all(table, answers, ask, joints)
+        if ask is not None and final != answers and joints is None:
+            told.append(f"the answers are remembered for sheets of this form: {remember(form, final)}")
+        return table, found, final, told, joints
+
+    names = sheet_names(file) if sheet is None and file.suffix.lower() in EXCEL else [sheet]
+    if len(names) == 1:
+        return one(sheet, ask)
+    reasons = {}
+    for name in names:
+        try:
+            return one(name, None)
+        except StiffmapError as problem:
+            reasons[str(name)] = problem
+    tables = [n for n, p in reasons.items() if type(p).__name__ == "Question"]
+    if ask is not None and tables:
+        return one(tables[0], ask)
+    lines = "; ".join(f"'{n}': {str(p).removeprefix(str(file)).lstrip(':, ')}" for n, p in reasons.items())
+    raise StiffmapError(f"{file}: none of its {len(names)} sheets fits (--sheet NAME reads one). {lines}")

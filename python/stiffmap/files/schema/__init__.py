@@ -1,5 +1,0 @@
-"""The machine file as it is written: pydantic models, no conversion and no numerics."""
-
-from stiffmap.files.schema.machine import MachineFile
-
-__all__ = ["MachineFile"]

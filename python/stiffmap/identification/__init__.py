@@ -1,0 +1,1 @@
+"""From readings to a better machine: calibrate, diagnose, plan, tap tests, monitor."""

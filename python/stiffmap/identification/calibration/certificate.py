@@ -1,0 +1,65 @@
+"""The instrument's own figures: its scale, and a frame that is known but for an uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.noise.nuisance import nuisance_columns
+from stiffmap.experiment.setups import setups_of
+from stiffmap.identification.calibration.defaults import Tolerances
+from stiffmap.model.description import AppliedEffect, MachineDescription
+from stiffmap.model.effects import get, kinds
+
+INSTRUMENT = "instrument"
+SCALE = "scale"
+
+
+def certified(tolerances: Tolerances | None, experiment: Experiment) -> Tolerances:
+    """The tolerances with what the experiment's certificate says in place of the instrument's."""
+    t, given = tolerances or Tolerances(), dict(experiment.certificate)
+    named = {"scale": "instrument", "tool": "tool", "frame": "frame", "frame_direction": "frame_direction"}
+    return replace(t, **{named[k]: v for k, v in given.items()})
+
+
+def scaled(description: MachineDescription, share: float) -> AppliedEffect:
+    """The effect of an instrument whose scale is off by this share."""
+    effect = next(e for e in map(get, kinds()) if e.instrument_scale)
+    element, legs = effect.places(description)[0]
+    off = float(effect.parameter(effect.instrument_scale).null or 0.0) + share
+    return AppliedEffect(effect.kind, element, legs, ((effect.instrument_scale, off),))
+
+
+def frame_names(experiment: Experiment) -> Iterator[tuple[str, str]]:
+    """Name and unit of what may be off of each set-up's frame, in the order of `frame_columns`."""
+    if experiment.frame == "unknown":
+        return
+    setups = np.unique(setups_of(experiment)[0])
+    for k in range(len(setups)):
+        which = f" of set-up {k + 1}" if len(setups) > 1 else ""
+        if experiment.quantity == "position" and experiment.frame == "known":
+            yield from (
+                (f"{c.name}{which}", c.unit)
+                for c, read in zip(experiment.channels[:3], experiment.axis_read[:3], strict=True)
+                if read
+            )
+        yield from ((f"about {a}{which}", "rad") for a in "xyz")
+
+
+def frame_columns(experiment: Experiment, base: Floats) -> Mapping[str, Floats]:
+    """(n, c) change of the readings per metre or radian of each of `frame_names`."""
+    whole = replace(experiment, frame="unknown", tool="known", unloaded="centre", surface="known")
+    columns = nuisance_columns(whole, base)
+    position = experiment.quantity == "position"
+    read = int(experiment.axis_read[:6].sum()) if position else 0
+    shifts = int(experiment.axis_read[:3].sum()) if position else 0
+    kept: list[int] = []
+    for k in range(len(np.unique(setups_of(experiment)[0]))):
+        begin = k * (read + 3)
+        if position and experiment.frame == "known":
+            kept += range(begin, begin + shifts)
+        kept += range(begin + read, begin + read + 3)
+    return {name: columns[..., i] for (name, _), i in zip(frame_names(experiment), kept, strict=True)}

@@ -1,0 +1,277 @@
+"""How readings change with what may be off, and Gauss-Newton with priors on it."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.prediction.fingerprint import fingerprint
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.calibration.certificate import INSTRUMENT, SCALE, frame_columns, scaled
+from stiffmap.identification.calibration.slopes import Slopes, built, moves_of
+from stiffmap.identification.calibration.unknowns import Unknown
+from stiffmap.model.description import AppliedEffect
+
+STEP = 0.1
+"""Of a standard uncertainty, for differences."""
+STEPS, FIRST, CLOSE = 30, 8, 1e-3
+"""Gauss-Newton steps at most, and before columns are taken anew; change (in standard uncertainties, or posterior ones) that ends them."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """What the readings feel of each unknown."""
+
+    unknowns: tuple[Unknown, ...]
+    columns: Floats
+    """(n, c, p) change of the readings per standard uncertainty."""
+    base: Floats
+    """(n, c) prediction of the declared machine."""
+    failed: tuple[tuple[str, str], ...] = ()
+    """Unknowns that the machine cannot be built or solved with, and why."""
+    stopped: bool = False
+    """Whether a time budget ended the differences before all unknowns had their turn."""
+    at: Floats | None = None
+    """(p,) where the columns hold, in standard uncertainties; None: at the declared numbers."""
+
+
+BENT = 0.05
+"""Share of a fit's whole change that a straight line misses, beyond which columns are taken anew at the fit."""
+MOST_KEPT = 4
+_KEPT: OrderedDict[tuple[str, tuple[Unknown, ...]], Sensitivity] = OrderedDict()
+
+
+def predicted(
+    predictor: Predictor, unknowns: Sequence[Unknown], values: Floats, terms: Sequence[AppliedEffect] = ()
+) -> Floats:
+    """(n, c) readings of the machine with unknowns at `values` (p,), in standard uncertainties, and with effects."""
+    pairs = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
+    frame = _frame_part(predictor, pairs)
+    own = list(dict.fromkeys(u.setup for u, _ in pairs if u.setup))
+    if not own:
+        return np.asarray(_predicted(predictor, pairs, terms) + frame)
+    label = np.array(predictor.experiment.setup)
+    others = ~np.isin(label, own)
+    out = np.full(predictor.experiment.reading.shape, np.nan)
+    if others.any():
+        shared = [(u, v) for u, v in pairs if not u.setup]
+        out[others] = _predicted(predictor.beside(rows=others), shared, terms)
+    for name in own:
+        here = label == name
+        mine = [(u, v) for u, v in pairs if u.setup in ("", name)]
+        out[here] = _predicted(predictor.beside(rows=here), mine, terms)
+    return np.asarray(out + frame)
+
+
+def _frame_part(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> Floats | float:
+    """(n, c) what frames add that are known within an uncertainty."""
+    moved = [(what, w * u.u * v) for u, v in pairs for (at, what), w in u.moves if at == INSTRUMENT]
+    moved = [(what, by) for what, by in moved if what != SCALE]
+    if not moved:
+        return 0.0
+    columns = frame_columns(predictor.experiment, predictor())
+    return np.asarray(sum(columns[what] * by for what, by in moved))
+
+
+def _predicted(
+    predictor: Predictor, pairs: Sequence[tuple[Unknown, float]], terms: Sequence[AppliedEffect]
+) -> Floats:
+    moves = moves_of(pairs)
+    scale = moves.pop((INSTRUMENT, SCALE), 0.0)
+    beside = predictor
+    if any(at != INSTRUMENT for at, _ in moves):
+        beside = predictor.beside(machine=built(predictor, moves))
+    return beside([*terms, scaled(predictor.machine.description, scale)] if scale else terms)
+
+
+def sensitivity(
+    predictor: Predictor,
+    unknowns: Sequence[Unknown],
+    *,
+    until: float = np.inf,
+    progress: Progress | None = None,
+) -> Sensitivity:
+    """Slopes of the readings, or differences of variants of the machine, one per unknown; `until` (s, of time.monotonic) ends them.
+
+    The last few are kept: they do not depend on the readings.
+    """
+    key = (fingerprint(predictor), tuple(unknowns))
+    if key not in _KEPT:
+        found = _differences(predictor, unknowns, until, progress)
+        if found.stopped:
+            return found
+        _KEPT[key] = found
+        if len(_KEPT) > MOST_KEPT:
+            _KEPT.popitem(last=False)
+    _KEPT.move_to_end(key)
+    return _KEPT[key]
+
+
+def bends(problem: Problem, s: Sensitivity, values: Floats, prediction: Floats) -> bool:
+    """Whether the columns at the fit differ so much from `s.columns` that standard deviations would be wrong.
+
+    Along the fit's own direction they differ by twice what the straight line misses.
+    """
+    straight = s.columns @ values
+    missed = problem.white(prediction - s.base - straight)
+    return 2.0 * float(np.linalg.norm(missed)) > BENT * float(np.linalg.norm(problem.white(straight)))
+
+
+def sensitivity_at(
+    predictor: Predictor, s: Sensitivity, values: Floats, until: float = np.inf
+) -> Sensitivity:
+    """The same unknowns with columns at `values` (p,); those that fail there keep the old ones, and so do rows that do."""
+    columns = s.columns.copy()
+    base = predicted(predictor, s.unknowns, values)
+    slopes = Slopes(predictor, s.unknowns, values)
+    for k in range(len(s.unknowns)):
+        if time.monotonic() > until:
+            break
+        moved = values.copy()
+        moved[k] += STEP
+        try:
+            column = slopes.of(k)
+            if column is None:
+                column = (_changed(predictor, s.unknowns, moved, s.unknowns[k].setup, base) - base) / STEP
+        except StiffmapError:
+            continue
+        solved = np.isfinite(base)
+        if np.isfinite(column[solved]).all():
+            columns[..., k] = np.where(solved, column, columns[..., k])
+    return replace(s, columns=columns, at=values)
+
+
+def _changed(
+    predictor: Predictor, unknowns: Sequence[Unknown], values: Floats, setup: str, base: Floats
+) -> Floats:
+    """(n, c) as `predicted`, where only rows of a set-up (of all, if there is none) differ from `base`."""
+    if not setup:
+        return predicted(predictor, unknowns, values)
+    here = np.array(predictor.experiment.setup) == setup
+    out = base.copy()
+    mine = np.array([v if u.setup in ("", setup) else 0.0 for u, v in zip(unknowns, values, strict=True)])
+    out[here] = predicted(predictor.beside(rows=here), unknowns, mine)
+    return out
+
+
+def _differences(
+    predictor: Predictor, unknowns: Sequence[Unknown], until: float, progress: Progress | None
+) -> Sensitivity:
+    base = predictor()
+    found: list[Unknown] = []
+    columns: list[Floats] = []
+    failed: list[tuple[str, str]] = []
+    stopped = False
+    slopes = Slopes(predictor, unknowns, np.zeros(len(unknowns)))
+    for k, u in enumerate(unknowns):
+        if time.monotonic() > until:
+            stopped = True
+            break
+        if progress is not None:
+            progress(u.name, k, len(unknowns))
+        try:
+            column = slopes.of(k)
+            if column is None:
+                column = (predicted(predictor, [u], np.array([STEP])) - base) / STEP
+        except StiffmapError as problem:
+            failed.append((u.name, str(problem)))
+            continue
+        if not np.isfinite(column[np.isfinite(base)]).all():
+            failed.append((u.name, "the machine has no equilibrium with it at some poses"))
+            continue
+        if np.abs(np.nan_to_num(column)).max(initial=0.0) > 0.0:
+            found.append(u)
+            columns.append(column)
+    stack = np.stack(columns, axis=-1) if columns else np.zeros((*base.shape, 0))
+    return Sensitivity(tuple(found), stack, base, tuple(failed), stopped)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Unknowns at their best."""
+
+    values: Floats
+    """(p,) in standard uncertainties."""
+    prediction: Floats
+    """(n, c)."""
+    residual: Floats
+    """(N,) whitened, at `values`."""
+    linear: Floats
+    """(N,) the residual as seen from zero: residual + A values."""
+    converged: bool
+
+
+def fitted(
+    predictor: Predictor,
+    problem: Problem,
+    s: Sensitivity,
+    columns: Floats,
+    weigh: Callable[[Floats, Floats], tuple[Floats, float]],
+    *,
+    start: Floats | None = None,
+    until: float = np.inf,
+    steps: int = STEPS,
+) -> Fitted:
+    """Gauss-Newton with one Jacobian, which small errors hardly change.
+
+    columns
+        (N, p) whitened `s.columns`.
+    start
+        (p,) values to begin with; default: the declared ones.
+    weigh
+        (columns, linear residual) -> the posterior mean under the priors, and the variance of one
+        reading's misfit in noise variances.
+    """
+    values = np.zeros(columns.shape[1]) if start is None else start
+    prediction = s.base if start is None else predicted(predictor, s.unknowns, start)
+    residual = problem.residual(prediction)
+    converged = not columns.shape[1]
+    for _ in range(steps if columns.shape[1] else 0):
+        wanted, variance = weigh(columns, residual + columns @ values)
+        step = wanted - values
+        if float(np.abs(step).max()) < CLOSE or float(np.linalg.norm(columns @ step)) < CLOSE * np.sqrt(
+            variance
+        ):
+            converged = True
+            break
+        moved = _step(predictor, problem, s, values, step, residual, variance)
+        if moved is None:
+            break
+        values, prediction, residual = moved
+        if time.monotonic() > until:
+            break
+    return Fitted(values, prediction, residual, residual + columns @ values, converged)
+
+
+def _step(
+    predictor: Predictor,
+    problem: Problem,
+    s: Sensitivity,
+    values: Floats,
+    step: Floats,
+    residual: Floats,
+    variance: float,
+) -> tuple[Floats, Floats, Floats] | None:
+    """The step, halved while the machine cannot be solved with it or the misfit and prior grow."""
+    before = float(residual @ residual) / variance + float(values @ values)
+    for _ in range(4):
+        moved = values + step
+        try:
+            prediction = predicted(predictor, s.unknowns, moved)
+            here = problem.residual(prediction)
+        except StiffmapError:
+            step = step / 2
+            continue
+        if float(here @ here) / variance + float(moved @ moved) <= before * (1.0 + 1e-6):
+            return moved, prediction, here
+        step = step / 2
+    return None

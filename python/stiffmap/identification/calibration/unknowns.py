@@ -1,0 +1,229 @@
+"""Every number of a machine and of its instrument that may be off, generated from the machine's tree.
+
+Six errors of each joint's frame, less those that its own coordinate takes up; zeros and gains of drives;
+lengths of links between passive joints, and their differences where links should be alike; compliances,
+masses; the tool; the scale of the instrument. Which of them a plan can determine is left to the singular
+values of its Jacobian (`statistics`), not to rules by hand: the same for serial arms and closed loops.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.identification.calibration.certificate import INSTRUMENT, SCALE, frame_names
+from stiffmap.identification.calibration.declared import Declared, Run
+from stiffmap.identification.calibration.defaults import Tolerances
+from stiffmap.model.description import Block, Body, Element, Joint, MachineDescription, Offset, Spring
+from stiffmap.model.with_errors import END, FRAME
+
+GROUPS = (
+    "zeros",
+    "gains",
+    "axis positions",
+    "axis directions",
+    "guide lean",
+    "link lengths",
+    "rod mismatch",
+    "width",
+    "tool",
+    "drive compliance",
+    "link compliance",
+    "masses",
+    INSTRUMENT,
+)
+GEOMETRY = GROUPS[:9]
+ALONG = 0.999
+"""Cosine beyond which an axis is that of a joint's own motion."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number that may be off by a normal error with standard uncertainty `u` (SI or relative).
+
+    moves
+        (full name, what is moved) -> weight, see `edit.edited` and, of the instrument, `certificate.seen`.
+    """
+
+    name: str
+    group: str
+    unit: str
+    u: float
+    moves: tuple[tuple[tuple[str, str], float], ...] = ()
+    leg: str = ""
+    setup: str = ""
+    """Set-up whose rows alone it moves; empty: all."""
+
+    @property
+    def of_instrument(self) -> bool:
+        """Whether the instrument is meant, not the machine."""
+        return self.group == INSTRUMENT
+
+
+def unknowns(
+    description: MachineDescription, experiment: Experiment, tolerances: Tolerances | None = None
+) -> list[Unknown]:
+    """All unknowns that readings of this kind can depend on.
+
+    Standard uncertainties are those of the machine file where it gives some, else of `tolerances`.
+    """
+    t = tolerances or Tolerances()
+    bare = description.declared or description
+    given = Declared.of(bare)
+    loaded = bool(experiment.wrench.any() or experiment.gravity or bare.gravity)
+    weighs = bool(experiment.gravity or bare.gravity)
+    out: list[Unknown] = []
+    for leg in bare.legs:
+        found, run = _of_sequence(leg.elements, leg.name, leg.name, t, given)
+        out += found
+        if len(bare.legs) > 1:
+            place = given.position(run, t.position)
+            out += _frame(f"{leg.name}.{END}", leg.name, FRAME, place, t.direction, "axis positions")
+    out += _of_sequence(bare.base, "base", "", t, given)[0]
+    found, run = _of_sequence(bare.platform, "platform", "", t, given)
+    out += found
+    out += _frame(f"platform.{END}", "", FRAME, given.position(run, t.tool), t.direction, "tool", "tool")
+    if experiment.quantity == "position":
+        out.append(
+            Unknown("scale of the instrument", INSTRUMENT, "1", t.instrument, (((INSTRUMENT, SCALE), 1.0),))
+        )
+    out += [
+        Unknown(
+            f"{'turn' if unit == 'rad' else 'shift'} of the instrument's frame, {name}",
+            INSTRUMENT,
+            unit,
+            t.frame_direction if unit == "rad" else t.frame,
+            (((INSTRUMENT, name), 1.0),),
+        )
+        for name, unit in frame_names(experiment)
+        if (t.frame_direction if unit == "rad" else t.frame) > 0.0
+    ]
+    if not loaded:
+        out = [p for p in out if p.group not in ("drive compliance", "link compliance")]
+    if not weighs:
+        out = [p for p in out if p.group != "masses"]
+    return out
+
+
+def _of_sequence(
+    elements: tuple[Element, ...], path: str, leg: str, t: Tolerances, given: Declared
+) -> tuple[list[Unknown], Run]:
+    """The unknowns, and the offsets behind the last joint."""
+    out: list[Unknown] = []
+    run: list[tuple[str, Offset]] = []
+    for e in elements:
+        name = f"{path}.{e.name}"
+        if isinstance(e, Block):
+            out += _of_block(e, path, leg, t, given)
+            run = []
+        elif isinstance(e, Joint):
+            out += _of_joint(e, name, leg, t, given, given.position(run, t.position))
+            run = []
+        elif isinstance(e, Offset):
+            run.append((name, e))
+        elif isinstance(e, Spring) and not e.laws:
+            u = given.spring(name, e, t.compliance)
+            out.append(_relative(name, leg, "link compliance", "compliance", u))
+        elif isinstance(e, Body) and e.mass > 0.0:
+            out.append(_relative(name, leg, "masses", "mass", given.mass(name, e.mass, t.mass)))
+    return out, run
+
+
+def joint_name(element: str) -> str:
+    """The name that solutions give a joint: those of the base and the platform have no leg before it."""
+    return element.removeprefix("base.").removeprefix("platform.")
+
+
+def _relative(name: str, leg: str, group: str, what: str, u: float) -> Unknown:
+    return Unknown(f"{what} of {name}", group, "ln", u, (((name, what), 1.0),), leg)
+
+
+def _of_joint(
+    e: Joint, name: str, leg: str, t: Tolerances, given: Declared, place: Floats
+) -> Iterator[Unknown]:
+    """Frame errors that the joint's own motion does not take up; of a drive its zero and gain."""
+    slides = e.kind == "prismatic"
+    kept = list(FRAME)
+    axes = [np.abs(np.array(a)) for a in e.axes]
+    for axis in axes[:1]:
+        along = int(np.argmax(axis))
+        if axis[along] > ALONG:
+            kept.remove(FRAME[along + (0 if slides else 3)])
+    if e.kind == "spherical":
+        kept = [k for k in kept if k in FRAME[:3]]
+    turned = "guide lean" if slides else "axis directions"
+    yield from _frame(name, leg, tuple(kept), place, t.direction, "axis positions", turned)
+    if e.actuated:
+        unit, u = ("m", t.zero) if slides else ("rad", t.turning_zero)
+        yield Unknown(f"zero of {name}", "zeros", unit, given.zero(name, u), (((name, "zero"), 1.0),), leg)
+        yield Unknown(
+            f"gain of {name}", "gains", "1", given.gain(name, t.gain), (((name, "gain"), 1.0),), leg
+        )
+    if e.law is not None and not e.law.cubic and not e.law.knots:
+        group = "drive compliance" if e.actuated else "link compliance"
+        yield _relative(name, leg, group, "compliance", given.law(name, e, t.compliance))
+
+
+def _frame(
+    name: str,
+    leg: str,
+    axes: tuple[str, ...],
+    place: Floats,
+    direction: float,
+    moved: str,
+    turned: str = "axis directions",
+) -> Iterator[Unknown]:
+    """`place` (3,) are the standard uncertainties along x, y, z."""
+    for a in axes:
+        turns = a in FRAME[3:]
+        yield Unknown(
+            f"{'turn' if turns else 'shift'} of {name} {'about' if turns else 'along'} {a[-1]}",
+            turned if turns else moved,
+            "rad" if turns else "m",
+            direction if turns else float(place[FRAME.index(a)]),
+            (((name, a), 1.0),),
+            leg,
+        )
+
+
+def _of_block(block: Block, path: str, leg: str, t: Tolerances, given: Declared) -> Iterator[Unknown]:
+    """Lengths of the offsets of a parallel block: their mean, and how its branches differ."""
+    lengths = [
+        [e for e in b.elements if isinstance(e, Offset) and np.linalg.norm(e.nominal.p) > 0]
+        for b in block.branches
+    ]
+    names = [e.name for e in lengths[0] if all(e.name in [o.name for o in other] for other in lengths)]
+    longest = max((float(np.linalg.norm(e.nominal.p)) for e in lengths[0]), default=0.0)
+    for element in names:
+        at = [(f"{path}.{b.name}.{element}", "length") for b in block.branches]
+        offset = next(e for e in lengths[0] if e.name == element)
+        size = float(np.linalg.norm(offset.nominal.p))
+        single = given.length([name for name, _ in at], offset)
+        rod = size > 0.5 * longest
+        place = f"{path}.{block.name}.{element}"
+        if rod:
+            common = tuple((a, 1.0) for a in at)
+            u = single / float(np.sqrt(len(at))) if single else t.length
+            yield Unknown(f"length of {place}", "link lengths", "m", u, common, leg)
+        for i, other in enumerate(at[1:]):
+            between = f"{block.branches[0].name} and {block.branches[i + 1].name}"
+            yield Unknown(
+                f"difference of {place} between {between}",
+                "rod mismatch" if rod else "width",
+                "m",
+                single * float(np.sqrt(2.0)) if single else t.mismatch,
+                ((at[0], -0.5), (other, 0.5)),
+                leg,
+            )
+    for branch in block.branches:
+        for e in branch.elements:
+            if isinstance(e, Spring) and not e.laws:
+                name = f"{path}.{branch.name}.{e.name}"
+                u = given.spring(name, e, t.compliance)
+                yield _relative(name, leg, "link compliance", "compliance", u)
+            elif isinstance(e, Body) and e.mass > 0.0:
+                name = f"{path}.{branch.name}.{e.name}"
+                yield _relative(name, leg, "masses", "mass", given.mass(name, e.mass, t.mass))

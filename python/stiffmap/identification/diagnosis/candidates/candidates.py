@@ -1,0 +1,123 @@
+"""Candidates: every effect of the registry at every place of the machine, as far as the data allow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from stiffmap.experiment.experiment import Experiment
+from stiffmap.model import effects
+from stiffmap.model.description import AppliedEffect, MachineDescription
+from stiffmap.model.effects import EffectType, Parameter, registry
+
+Names = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect at a place with the parameters that a fit may move.
+
+    ``options`` are words that make a kind of their own (never the branch of friction, which is a
+    column of the data).
+    """
+
+    kind: str
+    element: str
+    legs: Names
+    parameters: tuple[Parameter, ...]
+    options: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def place(self) -> tuple[str, str, Names]:
+        """Kind, element, legs: what a verdict names."""
+        return (self.kind, self.element, self.legs)
+
+    @property
+    def linear(self) -> tuple[Parameter, ...]:
+        """Parameters that have a null value: those whose sensitivity at the null exists."""
+        return tuple(p for p in self.parameters if p.null is not None)
+
+    @property
+    def shape(self) -> tuple[Parameter, ...]:
+        """Parameters without a null value (a period, a phase): unidentified without the effect."""
+        return tuple(p for p in self.parameters if p.null is None)
+
+    def term(self, values: Sequence[float]) -> AppliedEffect:
+        """The effect with these values (SI), in the order of `parameters`."""
+        given = tuple((p.name, float(v)) for p, v in zip(self.parameters, values, strict=True))
+        return AppliedEffect(self.kind, self.element, self.legs, given, self.options)
+
+    def __str__(self) -> str:
+        legs = f", leg{'s' if len(self.legs) > 1 else ''} {', '.join(self.legs)}" if self.legs else ""
+        axes = " by axis" if self.parameters[0].name == "gain_x" else ""
+        return f"{self.kind} of {self.element}{legs}{axes}"
+
+
+def candidates(description: MachineDescription, experiment: Experiment) -> list[Candidate]:
+    """All candidates that the data can speak of at all."""
+    found = []
+    for kind in registry.kinds():
+        effect = effects.get(kind)
+        if recorded(effect, experiment) and not (effect.hidden and effect.hidden(experiment)):
+            found += of_kind(effect, description)
+    return found
+
+
+def of_kind(effect: EffectType, description: MachineDescription) -> list[Candidate]:
+    """One candidate per place and meaning."""
+    out = []
+    for element, legs in (effect.tried or effect.places)(description):
+        parameters = tuple(
+            p
+            for p in effect.parameters_at(description, element, legs)
+            if (p.name in effect.moved if effect.moved else p.fitted or _unknown(p))
+        )
+        parameters = tuple(p for p in parameters if not _later_alternative(effect, p, parameters))
+        parameters = tuple(map(_plausible, parameters))
+        if parameters and (effect.signature or any(p.null is not None for p in parameters)):
+            out += [Candidate(effect.kind, element, legs, part) for part in meanings(parameters)]
+    return out
+
+
+def meanings(parameters: tuple[Parameter, ...]) -> list[tuple[Parameter, ...]]:
+    """The parameters, or apart the one that stands for all axes (`gain` in addition to `gain_x` …): together they
+    would say the same thing twice."""
+    names = {p.name for p in parameters}
+    common = tuple(p for p in parameters if f"{p.name}_x" in names)
+    return [common, tuple(p for p in parameters if p not in common)] if common else [parameters]
+
+
+def _plausible(p: Parameter) -> Parameter:
+    lower, upper = p.plausible or (p.lower, p.upper)
+    return replace(p, lower=max(lower, p.lower), upper=min(upper, p.upper))
+
+
+def _unknown(p: Parameter) -> bool:
+    """A number that must be given and that nobody gives, as the anchor of a cable: the fit finds it."""
+    return p.null is None and p.default is None
+
+
+def _later_alternative(effect: EffectType, p: Parameter, among: Sequence[Parameter]) -> bool:
+    alternatives = [q.name for q in among if q.name in effect.one_of]
+    return p.name in alternatives[1:]
+
+
+def recorded(effect: EffectType, experiment: Experiment) -> bool:
+    """Whether the data hold what the effect needs."""
+    return experiment.recorded.issuperset(effect.needs)
+
+
+def check_kinds(names: Iterable[str]) -> frozenset[str]:
+    """Kinds of effects by their names; StiffmapError for one that does not exist."""
+    return frozenset(effects.get(n).kind for n in names)
+
+
+def clash(candidate: Candidate, others: Iterable[Candidate]) -> bool:
+    """Whether the candidate and one of the others exclude each other at a place that they share."""
+    return any(_excludes(candidate, other) for other in others)
+
+
+def _excludes(one: Candidate, other: Candidate) -> bool:
+    legs = set(one.legs) & set(other.legs) or not one.legs or not other.legs
+    named = other.kind in effects.get(one.kind).excludes or one.kind in effects.get(other.kind).excludes
+    return bool(one.element == other.element and legs and named)

@@ -1,0 +1,85 @@
+"""Sensitivities of all candidates under a plan, kept for the next diagnosis of it."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass, replace
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.fingerprints import digest
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.prediction.fingerprint import fingerprint
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.diagnosis.candidates.candidates import Candidate, candidates
+from stiffmap.identification.diagnosis.candidates.sensitivity import Variant, variants
+from stiffmap.identification.diagnosis.candidates.slopes import Slopes
+from stiffmap.identification.diagnosis.candidates.stack import Stack
+from stiffmap.identification.diagnosis.clock import Clock
+from stiffmap.model.effects import get, kinds
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What does not depend on the readings."""
+
+    base: Floats
+    """(n, 6) prediction of the declared machine."""
+    stack: Stack
+    """All variants, with their columns."""
+    failed: tuple[tuple[Candidate, str], ...]
+    digest: str = ""
+    """Of the machine and the plan."""
+
+    @property
+    def variants(self) -> tuple[Variant, ...]:
+        """All of them."""
+        return self.stack.variants
+
+
+_PLANS: OrderedDict[str, Plan] = OrderedDict()
+
+
+def plan_of(predictor: Predictor, clock: Clock | None = None) -> Plan:
+    """Sensitivities of a machine under a plan; the last eight are kept. The clock learns which are computed; where it
+    is over those that there are make the plan, which is not kept."""
+    clock = clock or Clock()
+    registered = [(k, id(get(k))) for k in kinds()]  # users may register more
+    key = digest(fingerprint(predictor), predictor.experiment.read, registered)
+    if key not in _PLANS:
+        found, whole = _compute(predictor, clock)
+        if not whole:
+            return replace(found, digest=f"{key}, the first {len(found.variants)}")
+        _PLANS[key] = replace(found, digest=key)
+        if len(_PLANS) > 8:
+            _PLANS.popitem(last=False)
+    _PLANS.move_to_end(key)
+    return _PLANS[key]
+
+
+def _compute(predictor: Predictor, clock: Clock) -> tuple[Plan, bool]:
+    """The plan, and whether all candidates are in it."""
+    base = predictor()
+    good: list[Variant] = []
+    failed: list[tuple[Candidate, str]] = []
+    kind, whole = "", True
+    tried = candidates(predictor.machine.description, predictor.experiment)
+    slopes = Slopes(predictor, tried)
+    for candidate in tried:
+        if clock.over:
+            where = "some places" if candidate.kind == kind else "any place"
+            clock.leave_out(f"{candidate.kind} at {where}: no sensitivities")
+            whole = False
+            continue
+        if candidate.kind != kind:
+            kind = candidate.kind
+            clock.say(f"sensitivities: {kind}")
+        try:
+            found = list(variants(candidate, predictor, base, slopes))
+        except StiffmapError as problem:
+            failed.append((candidate, str(problem)))
+            continue
+        usable = [v for v in found if v is not None]
+        good += usable
+        if not usable:
+            failed.append((candidate, "the machine has no equilibrium with it at some poses"))
+    return Plan(base, Stack.of(good), tuple(failed)), whole

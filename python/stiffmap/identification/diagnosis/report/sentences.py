@@ -1,0 +1,193 @@
+"""The answer of a diagnosis in a sentence, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any
+
+from stiffmap.common.number_text import with_uncertainty, within
+from stiffmap.identification.diagnosis.report.findings import Effect
+from stiffmap.identification.diagnosis.report.wording import noise_size, separation_text
+from stiffmap.identification.diagnosis.slips.slip import Slip
+from stiffmap.model.effects import registry
+
+UNITS = {
+    "m": (1e6, "µm"),
+    "m/N": (1e6, "µm/N"),
+    "rad": (1e3, "mrad"),
+    "rad/(N*m)": (1e3, "mrad/(N·m)"),
+    "1/m": (1e-3, "1/mm"),
+    "1": (1.0, ""),
+}
+"""Factor from SI, and the unit that a workshop reads."""
+NAMES = {"actuator": "drive", "motor": "motor"}
+ALIASES = 2
+"""What cannot be distinguished from an effect: how many the headline names."""
+
+
+def measured(value: float, low: float, high: float, unit: str) -> str:
+    """``0.301 ± 0.002 µm/N`` (one standard uncertainty), to the digits that it carries."""
+    factor, name = UNITS.get(unit, (1.0, unit))
+    half = factor * abs(high - low) / 2 / 1.96
+    if not (half > 0 and isfinite(half)):
+        return f"{factor * value:.4g} {name}".rstrip()
+    return f"{with_uncertainty(factor * value, half)} {name}".rstrip()
+
+
+def interval(value: float, low: float, high: float, unit: str) -> tuple[str, str, str]:
+    """Value and ends of the interval to the same digits, with the unit that a workshop reads."""
+    factor, name = UNITS.get(unit, (1.0, unit))
+    half = factor * abs(high - low) / 2 / 1.96
+    if not (half > 0 and isfinite(half)):
+        texts = [f"{factor * v:.4g}" for v in (value, low, high)]
+    else:
+        texts = [within(factor * v, half) for v in (value, low, high)]
+    return tuple(f"{text} {name}".rstrip() for text in texts)  # type: ignore[return-value]
+
+
+def place(e: Effect) -> str:
+    """``the drive of leg z``."""
+    element = NAMES.get(e.element, e.element)
+    if not e.legs:
+        return f"the {element}"
+    return f"the {element} of leg{'s' if len(e.legs) > 1 else ''} {', '.join(e.legs)}"
+
+
+def sentence(e: Effect) -> str:
+    """One effect, with its size."""
+    p = e.parameters
+    words = registry.get(e.kind).compared
+    if words and "scale" in p and p["scale"][0] > 0:
+        return _compared(e, *words)
+    values = ", ".join(f"{n.replace('_', ' ')} {measured(*v)}" for n, v in p.items())
+    return f"{registry.get(e.kind).title} at {place(e)}: {values}"
+
+
+def _compared(e: Effect, more: str, less: str) -> str:
+    scale = e.parameters["scale"][0]
+    how = (
+        f"{scale:.2f} times as {more} as in your file"
+        if scale >= 1
+        else f"{1 / scale:.2f} times as {less} as in your file"
+    )
+    head = f"{place(e).capitalize() if place(e)[0] != 't' else 'T' + place(e)[1:]} is {how}"
+    if "value" not in e.parameters:
+        return f"{head}: scale {measured(*e.parameters['scale'])}"
+    value, low, high, unit = e.parameters["value"]
+    factor, _ = UNITS.get(unit, (1.0, unit))
+    return f"{head}: {measured(value, low, high, unit)} instead of {factor * value / scale:.3g}"
+
+
+def opening(d: Any) -> str:
+    """The verdict as one says it: first what is wrong with the readings, then the cause with what cannot be distinguished from it."""
+    if not d.slips:
+        return _of_machine(d, d.verdict)
+    first = ". Then ".join(slip_sentence(s) for s in d.slips)
+    kind = inner_verdict(d)
+    if not d.slips[-1].undone:
+        return f"{_upper(first)}, before any cause is looked for in the machine."
+    return f"{_upper(first)}. With that undone: {_lower(_of_machine(d, kind))}"
+
+
+def slip_sentence(s: Slip) -> str:
+    """``check the sign of y: gauge y has the opposite sign; or check …``."""
+    also = "".join(f", or {a}" for a in s.also)
+    return f"{s.check}{also} ({s.seen})"
+
+
+def inner_verdict(d: Any) -> str:
+    """The verdict on readings without their mistakes."""
+    if d.effects:
+        return "ambiguous" if d.alternatives else "effects+unattributed" if d.unexplained else "effects"
+    return "unattributed" if d.unexplained else "none"
+
+
+def _upper(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:] if text.startswith(("The ", "No ")) else text
+
+
+def aliases(e: Effect) -> str:
+    """What these readings cannot distinguish from an effect, for the headline; empty where there is nothing."""
+    names = list(dict.fromkeys(alias_words(a) for a in e.aliases))
+    if not names:
+        return ""
+    shown = " or ".join(names[:ALIASES])
+    more = len(names) - ALIASES
+    return (
+        f"; these readings cannot distinguish it from {shown}{f' or one of {more} more' if more > 0 else ''}"
+    )
+
+
+def alias_words(a: Mapping[str, Any]) -> str:
+    """``the stiffness of the foot of leg z``, as one says it."""
+    legs = a["legs"]
+    element = NAMES.get(a["element"], a["element"])
+    of = f" of leg{'s' if len(legs) > 1 else ''} {', '.join(legs)}" if legs else ""
+    return f"{registry.get(a['kind']).title} ({element}{of})"
+
+
+def _of_machine(d: Any, verdict: str) -> str:
+    """The verdict on the machine."""
+    before, unit = d.before.size
+    size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * noise_size(d):.1f} µ{unit}"
+    named = "; ".join(sentence(e) + aliases(e) for e in d.effects)
+    if verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
+        return (
+            f"No cause apart from the machine's uncertain numbers; they are {d.calibration.verdict} ({size})."
+        )
+    if verdict == "none" and d.stopped:
+        return f"The diagnosis was stopped before it found anything ({size})."
+    if verdict == "none":
+        return f"The machine agrees with its file within what these readings can show ({size})."
+    if verdict == "unattributed" and d.stopped:
+        return f"The machine differs from its file ({size}), and nothing that was tried explains how."
+    if verdict == "unattributed":
+        return (
+            f"The machine differs from its file ({size}), and no single cause known to stiffmap explains how."
+        )
+    if verdict == "ambiguous" and not d.effects:
+        return f"No single number of the machine stands out; {d.calibration.verdict} ({size})."
+    if verdict == "ambiguous":
+        return f"The readings are explained by more than one cause. First of them: {named}."
+    rest = " Part of the difference remains unexplained." if "unattributed" in verdict else ""
+    return f"{named}.{rest}"
+
+
+def next_step(d: Any) -> str:
+    """What to do with the answer."""
+    if d.slips:
+        return (
+            "Check this at the machine and in the sheet, correct the readings and diagnose again; look for no cause in the "
+            "machine before."
+        )
+    if d.verdict == "none" and d.calibration is not None and d.calibration.beyond:
+        return "Inspect the number that is beyond tolerance; machine.yaml has it."
+    if d.verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
+        return "Nothing to mend. machine.yaml holds the calibrated numbers and predicts this machine better than the declared file."
+    if d.verdict == "none" and d.stopped:
+        return "Let it come to its end."
+    if d.verdict == "none":
+        return "Nothing to correct. Keep the readings as the record of this state."
+    if d.verdict == "ambiguous" and not d.effects:
+        tilt = "" if d.experiment.axis_read[3:6].any() else ", the tilt of the tool as well (rx, ry, rz)"
+        return f"Read what distinguishes these groups{tilt}; the command stiffmap plan proposes poses."
+    if d.verdict == "unattributed":
+        return (
+            "Look at where the difference is largest (What is left), check the instrument's frame and the tool "
+            "first, and read again there."
+        )
+    if d.verdict == "ambiguous" and d.separations:
+        return f"One more measurement decides: {separation_text(d.separations[0])}."
+    if d.verdict == "ambiguous" and not d.alternatives:
+        return "Inspect this place, and read more poses or other loads: numbers within tolerance explain these nearly as well."
+    if any(e.aliases for e in d.effects):
+        return (
+            "Inspect this place and those which these readings cannot distinguish from it (the report names them); the corrected "
+            "machine file predicts the tool equally well whichever it is."
+        )
+    return "Inspect this place; until it is mended, plan and compensate with the corrected machine file."

@@ -1,0 +1,180 @@
+"""Gauges and forces with a wrong sign, swapped, or along another axis; rows that are shifted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from itertools import permutations, product
+
+import numpy as np
+
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.diagnosis.slips.slip import Hypothesis
+
+AXES = "xyz"
+Turn = Mapping[int, tuple[int, int]]
+"""Axis -> its true axis and the sign along it."""
+
+
+def turns(axes: list[int]) -> Iterator[Turn]:
+    """Every way to mount gauges along signed axes, but the declared one."""
+    for where in permutations(range(3), len(axes)):
+        for signs in product((1, -1), repeat=len(axes)):
+            turn = dict(zip(axes, zip(where, signs, strict=True), strict=True))
+            if any(turn[a] != (a, 1) for a in axes):
+                yield turn
+
+
+def words(turn: Turn, what: str, plural: str) -> tuple[str, str, str]:
+    """Kind, what is seen and what to check, of gauges or forces."""
+    moved = [a for a, (b, _) in turn.items() if a != b]
+    flipped = [a for a, (b, s) in turn.items() if a == b and s < 0]
+    names = _listed([AXES[a] for a in flipped])
+    if not moved:
+        if len(turn) > 1 and len(flipped) == len(turn):
+            return "sign", f"all {plural} have the opposite sign", f"check the sign of all {plural}"
+        signs = "signs" if len(flipped) > 1 else "sign"
+        of = f"{names} of the force" if what == "force" else names
+        return "sign", f"{what} {names} has the opposite sign", f"check the {signs} of {of}"
+    pair = sorted(moved)
+    if len(turn) > 1 and len(pair) == 2 and not flipped and all(turn[a][1] > 0 for a in pair):
+        a, b = (AXES[i] for i in pair)
+        if {turn[i][0] for i in pair} == set(pair):
+            return (
+                "swap",
+                f"{what}s {a} and {b} are swapped",
+                f"check which {what} is {a} and which is {b}",
+            )
+    to = ", ".join(
+        f"{AXES[a]} acts along {'-' if s < 0 else '+'}{AXES[b]}"
+        for a, (b, s) in sorted(turn.items())
+        if (b, s) != (a, 1)
+    )
+    return "direction", f"{what} {to}", f"check the direction of the {what}s and their signs"
+
+
+def _changes(turn: Turn) -> int:
+    """How many things are wrong: all signs together are one."""
+    if all(pair == (a, -1) for a, pair in turn.items()):
+        return 1
+    return sum(pair != (a, 1) for a, pair in turn.items())
+
+
+def gauges(e: Experiment, shown: Floats) -> Iterator[Hypothesis]:
+    """Gauges of x, y, z along other axes; `shown` (n, c) is what true ones show, coordinates where positions are read."""
+    axes = [int(a) for a in np.flatnonzero(e.axis_read[:3])]
+    for turn in turns(axes) if axes else ():
+        there = shown.copy()
+        for a, (b, s) in turn.items():
+            there[:, a] = s * shown[:, b]
+        kind, seen, check = words(turn, "gauge", "readings")
+        changes = _changes(turn)
+        yield Hypothesis(kind, seen, check, changes, _read(e, there), partial(mounted, turn=turn))
+    for i in range(3, 6):
+        if e.axis_read[i] and e.quantity == "deflection":
+            there = shown.copy()
+            there[:, i] *= -1.0
+            name = e.channels[i].name
+            yield Hypothesis("sign", f"{name} has the opposite sign", f"check the sign of {name}", 1,
+                             _read(e, there), partial(times, factor=-1.0, axes=(i,)))  # fmt: skip
+
+
+def mounted(e: Experiment, turn: Turn) -> Experiment:
+    """The readings moved to the axes along which their gauges are."""
+    where = _coordinates(e)
+    seen = e.reading + where
+    reading, sigma = seen.copy(), e.sigma.copy()
+    reading[:, list(turn)] = np.nan
+    for a, (b, s) in turn.items():
+        reading[:, b], sigma[:, b] = s * seen[:, a], e.sigma[:, a]
+    return replace(e, reading=reading - where, sigma=sigma)
+
+
+def times(e: Experiment, factor: float, axes: tuple[int, ...]) -> Experiment:
+    """Some channels divided by a factor, noise included."""
+    reading, sigma = e.reading.copy(), e.sigma.copy()
+    reading[:, axes] /= factor
+    sigma[:, axes] /= abs(factor)
+    return replace(e, reading=reading, sigma=sigma)
+
+
+def loads(predictor: Predictor) -> Iterator[Hypothesis]:
+    """Forces with other signs or along other axes, each through the full equilibrium."""
+    e = predictor.experiment
+    axes = [int(a) for a in np.flatnonzero(e.wrench[:, :3].any(axis=0))]
+    for turn in turns(axes) if axes else ():
+        flips = all(a == b for a, (b, _) in turn.items())
+        swaps = (
+            len(axes) > 1
+            and all(s > 0 for _, s in turn.values())
+            and {b for b, _ in turn.values()} == set(axes)
+        )
+        if not (flips or (swaps and sum(a != b for a, (b, _) in turn.items()) == 2) or len(axes) == 1):
+            continue
+        undo = partial(pulled, turn=turn)
+        there = Predictor(predictor.machine, undo(e), threads=predictor.threads)()
+        if len(there) != len(e) or not np.isfinite(there[e.read]).all():
+            continue
+        kind, seen, check = words(turn, "force", "forces")
+        yield Hypothesis(kind, seen, check, _changes(turn), there, undo)
+
+
+def pulled(e: Experiment, turn: Turn) -> Experiment:
+    """The forces along the axes that they act along."""
+    wrench = e.wrench.copy()
+    wrench[:, list(turn)] = 0.0
+    for a, (b, s) in turn.items():
+        wrench[:, b] = s * e.wrench[:, a]
+    return replace(e, wrench=wrench)
+
+
+def shifts(e: Experiment, shown: Floats) -> Iterator[Hypothesis]:
+    """Readings that stand one row too high or too low (or one group of repeats)."""
+    n = len(e)
+    for step in steps(e):
+        there = np.roll(shown, step, axis=0)
+        keep = np.ones(n, bool)
+        keep[:step] = False if step > 0 else keep[:step]
+        if step < 0:
+            keep[step:] = False
+        way = "below" if step > 0 else "above"
+        many = "one row" if abs(step) == 1 else f"{abs(step)} rows"
+        yield Hypothesis("shift", f"each reading stands {many} {way} its pose and load",
+                         f"check whether the readings are shifted by {many}", 1, _read(e, there),
+                         partial(moved, step=step), keep)  # fmt: skip
+
+
+def steps(e: Experiment) -> list[int]:
+    """Rows by which readings may be shifted: one, or one group of repeats, either way."""
+    sizes = {1} if e.repeat is None else {1, int(e.repeat.max())}
+    return sorted(s for k in sizes for s in (k, -k) if 3 * k <= len(e))
+
+
+def moved(e: Experiment, step: int) -> Experiment:
+    """The readings in the rows to which they belong; rows that are left without are gone."""
+    where = _coordinates(e)
+    seen = np.roll(e.reading + where, -step, axis=0)
+    whole = replace(e, reading=seen - where, sigma=np.roll(e.sigma, -step, axis=0))
+    return whole.rows(np.arange(len(e) - step) if step > 0 else np.arange(-step, len(e)))
+
+
+def coordinates(e: Experiment, prediction: Floats) -> Floats:
+    """(n, c) what true gauges show: deflections, or coordinates where positions are read."""
+    return np.asarray(prediction + _coordinates(e))
+
+
+def _coordinates(e: Experiment) -> Floats:
+    where = np.zeros((len(e), len(e.channels)))
+    if e.quantity == "position":
+        where[:, :3] = e.position
+    return where
+
+
+def _read(e: Experiment, shown: Floats) -> Floats:
+    return np.asarray(shown - _coordinates(e))
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else ""

@@ -1,0 +1,213 @@
+"""Uncertainty budget of a fitted number, and positioning in the words of the standards.
+
+JCGM 100 (GUM): standard uncertainties of type A (statistics of the readings) and type B (certificates, judgement)
+add in quadrature; Welch-Satterthwaite gives effective degrees of freedom; U = 2 u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment.experiment import Experiment
+from stiffmap.experiment.noise.level import noise_of
+from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.planning.estimate import Estimate, fitted, slopes
+from stiffmap.model.description import AppliedEffect
+from stiffmap.solve.machine import Machine
+
+K = 2.0
+"""Coverage factor."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One source of uncertainty of one number, SI."""
+
+    source: str
+    kind: str
+    """``A``, ``B`` or ``model form``."""
+    u: float
+    freedom: float
+    """Degrees of freedom; inf where u is taken as exact."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Budget of one number."""
+
+    name: str
+    unit: str
+    value: float
+    lines: tuple[Line, ...]
+
+    @property
+    def u(self) -> float:
+        """Combined standard uncertainty."""
+        return float(np.sqrt(sum(line.u**2 for line in self.lines)))
+
+    @property
+    def freedom(self) -> float:
+        """Effective degrees of freedom (Welch-Satterthwaite)."""
+        bottom = sum(line.u**4 / line.freedom for line in self.lines if np.isfinite(line.freedom))
+        return float(self.u**4 / bottom) if bottom > 0 else float("inf")
+
+    @property
+    def expanded(self) -> float:
+        """U at k = 2."""
+        return K * self.u
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval with Student's factor at the effective degrees of freedom."""
+        half = (
+            self.u * float(student.ppf(0.975, self.freedom)) if np.isfinite(self.freedom) else 1.96 * self.u
+        )
+        return self.value - half, self.value + half
+
+    def __str__(self) -> str:
+        head = f"{self.name}: {self.value:.5g} {self.unit}, u = {self.u:.3g}, U (k = 2) = {self.expanded:.3g}"
+        rows = [f"  {line.source} ({line.kind}): {line.u:.3g}" for line in self.lines]
+        return "\n".join([f"{head}, {self.freedom:.0f} degrees of freedom", *rows])
+
+
+def budgets(
+    machine: Machine,
+    experiment: Experiment,
+    found: Estimate,
+    others: Sequence[tuple[AppliedEffect, Mapping[str, float]]] = (),
+) -> list[Budget]:
+    """A budget for every number of an estimate.
+
+    Parameters
+    ----------
+    found
+        What `estimate` made of the experiment.
+    others
+        Effects that were not fitted, and the standard uncertainty (SI) of each of their numbers: dimensions of
+        the machine, figures of an instrument's certificate. Each adds what it would have moved the fit by.
+
+    Notes
+    -----
+    Lines: noise of the readings (A), misfit beyond noise (model form: what the residuals show above
+    it, spread over the readings), and one per number of `others` (B).
+
+    Raises
+    ------
+    StiffmapError
+        For a number that does not exist.
+    """
+    predictor = Predictor(machine, experiment)
+    e = predictor.experiment
+    problem = Problem.of(e, noise_of(e).sigma, predictor())
+    parameters = fitted(machine.description, found.terms)
+    scale = np.array([p.scale for _, p in parameters])
+    columns = np.column_stack([problem.white(c) for c in slopes(predictor, found.terms, parameters)]) * scale
+    inverse = np.linalg.pinv(columns) * scale[:, None]
+    shifts = [
+        (name, u, inverse @ move) for name, u, move in _moves(machine, predictor, problem, found, others)
+    ]
+    form = float(np.sqrt(max(0.0, found.misfit**2 - 1.0)))
+    out = []
+    for k, (name, unit, value) in enumerate(zip(found.names, found.units, found.values, strict=True)):
+        lines = [Line("noise of the readings", "A", float(found.sigma[k]), float(max(found.freedom, 1)))]
+        if form > 0:
+            lines.append(
+                Line(
+                    "misfit beyond noise",
+                    "model form",
+                    form * float(found.sigma[k]),
+                    float(max(found.freedom, 1)),
+                )
+            )
+        lines += [Line(source, "B", abs(u * float(s[k])), float("inf")) for source, u, s in shifts]
+        out.append(Budget(name, unit, float(value), tuple(lines)))
+    return out
+
+
+def _moves(
+    machine: Machine,
+    predictor: Predictor,
+    problem: Problem,
+    found: Estimate,
+    others: Sequence[tuple[AppliedEffect, Mapping[str, float]]],
+) -> list[tuple[str, float, Floats]]:
+    """Name, standard uncertainty and whitened change of the readings per unit, of numbers that were not fitted."""
+    out = []
+    for term, given in others:
+        parameters = [p for p in fitted(machine.description, (term,)) if p[1].name in given]
+        unknown = set(given) - {p.name for _, p in parameters}
+        if unknown:
+            raise StiffmapError(f"budget: {term.kind} has no number '{sorted(unknown)[0]}' at this place")
+        both = (*found.terms, term)
+        moved = [(len(found.terms), p) for _, p in parameters]
+        for (_, p), column in zip(moved, slopes(predictor, both, moved), strict=True):
+            out.append(
+                (f"{term.kind} of {term.element}: {p.name}", float(given[p.name]), problem.white(column))
+            )
+    return out
+
+
+@dataclass(frozen=True)
+class AxisPositioning:
+    """ISO 230-2 figures of one linear axis from bidirectional approaches, m."""
+
+    targets: Floats
+    forward: Floats
+    """Mean deviation at each target, approached in the positive direction."""
+    backward: Floats
+    reversal: float
+    """B: largest difference of the two."""
+    repeatability: float
+    """R: bidirectional repeatability."""
+    systematic: float
+    """E: bidirectional systematic deviation."""
+    mean: float
+    """M: range of the mean bidirectional deviation."""
+    accuracy: float
+    """A: bidirectional accuracy."""
+
+
+def iso_230_2(targets: Floats, deviation: Floats, direction: Floats) -> AxisPositioning:
+    """Positioning of one axis: rows (n,) m of target, deviation and direction of approach (sign).
+
+    ISO 230-2:2014, 3.x: s with n - 1, coverage factor 2. Raises StiffmapError where a target lacks two
+    readings from each side.
+    """
+    places = np.unique(np.round(targets, 9))
+    means, spreads = np.empty((2, len(places))), np.empty((2, len(places)))
+    for i, at in enumerate(places):
+        for side, sign in enumerate((1.0, -1.0)):
+            here = deviation[(np.abs(targets - at) < 1e-9) & (np.sign(direction) == sign)]
+            if here.size < 2:
+                raise StiffmapError(
+                    f"iso_230_2: target {1e3 * at:g} mm has {here.size} readings approached "
+                    f"{'up' if sign > 0 else 'down'}; two or more are needed"
+                )
+            means[side, i], spreads[side, i] = here.mean(), here.std(ddof=1)
+    gap = means[0] - means[1]
+    each = np.maximum(2 * (spreads[0] + spreads[1]) + np.abs(gap), 4 * spreads.max(axis=0))
+    high, low = (means + 2 * spreads).max(), (means - 2 * spreads).min()
+    middle = means.mean(axis=0)
+    return AxisPositioning(
+        places, means[0], means[1], float(np.abs(gap).max()), float(each.max()),
+        float(means.max() - means.min()), float(np.ptp(middle)), float(high - low),
+    )  # fmt: skip
+
+
+def iso_9283(attained: Floats, commanded: Floats) -> tuple[float, float]:
+    """Pose accuracy AP and repeatability RP of a robot, m, from (n, 3) attained positions of one commanded one.
+
+    ISO 9283:1998, 7.2: AP is the distance of the barycentre, RP = mean distance from it + 3 standard deviations.
+    """
+    if len(attained) < 2:
+        raise StiffmapError("iso_9283: repeatability needs two attained poses or more")
+    centre = attained.mean(axis=0)
+    away = np.linalg.norm(attained - centre, axis=1)
+    return float(np.linalg.norm(centre - commanded)), float(away.mean() + 3 * away.std(ddof=1))

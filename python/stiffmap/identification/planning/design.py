@@ -1,0 +1,190 @@
+"""Rows chosen for their information, by exchange.
+
+Every candidate row adds the matrix XᵀX of its whitened sensitivities X (parameters, then nuisances) to the
+information M. ``identify``: largest log det M less that of the nuisances alone (D_s-optimality). ``separate``:
+largest length of the first explanation's signal that the rival's best fit leaves (T-optimality; A. C. Atkinson,
+V. V. Fedorov, Biometrika 62, 1975). ``map``: smallest mean variance of what the machine is predicted to do at
+given poses (I-optimality). Rows are taken one after the other, then exchanged while that gains
+(V. V. Fedorov, Theory of Optimal Experiments, 1972).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats, random_numbers
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.short import short_repr
+from stiffmap.experiment.experiment import Experiment
+from stiffmap.identification.planning.estimate import Estimate, estimate, fitted
+from stiffmap.identification.planning.exchange import Value, exchange
+from stiffmap.identification.planning.information import Information, map_weight
+from stiffmap.identification.planning.pool import candidate_rows, in_limits, joined
+from stiffmap.model.description import AppliedEffect
+from stiffmap.solve.machine import Machine
+
+AIMS = ("identify", "separate", "map")
+RANDOM = 20
+"""Random plans for comparison with the chosen one."""
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Chosen rows, and how they compare."""
+
+    experiment: Experiment
+    """The rows, without readings."""
+    aim: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    sigma: Floats
+    """(k,) expected standard uncertainty of each parameter, SI; inf where the rows do not determine it."""
+    random_sigma: Floats
+    """(k,) median of random plans of the same size."""
+    value: float
+    """``identify``: log det; ``separate``: standard deviations between the rivals; ``map``: m, rms."""
+    random_value: float
+
+
+def design(
+    machine: Machine,
+    terms: Sequence[AppliedEffect],
+    *,
+    rows: int,
+    aim: str = "identify",
+    rival: Sequence[AppliedEffect] = (),
+    quantity: str = "deflection",
+    poses: int = 60,
+    force: float = 400.0,
+    candidates: Experiment | None = None,
+    at: Floats | None = None,
+    load: Floats | None = None,
+    frame: str = "known",
+    tool: str = "known",
+    axes: Sequence[str] = ("dx", "dy", "dz"),
+    noise: float | None = None,
+    seed: int = 0,
+    done: Experiment | None = None,
+) -> Design:
+    """The `rows` candidate rows that are most informative on the numbers in `terms`.
+
+    Parameters
+    ----------
+    terms, rival
+        Effects with the values at which they are to be identified; the rival's numbers are fitted away.
+    aim
+        ``identify``, ``separate`` (needs `rival`) or ``map`` (at the poses `at` (m, 3) under the wrench `load`
+        (6,); None: the workspace's corners, under `force` along x).
+    candidates
+        Rows to choose from, each at most once; None: `poses` random poses of the workspace, for deflections
+        under ± `force` along x, y, z. Rows out of reach or beyond a drive's range are left out.
+    frame, tool
+        What the instrument leaves unknown, as in an experiment file.
+    noise
+        One standard deviation of a reading, m; None: 3 µm for deflections, 8 µm for positions.
+    done
+        Rows that have been measured already: their information counts.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
+    """
+    _check(aim, rival, rows)
+    if candidates is None:
+        candidates = candidate_rows(machine, quantity, poses, force, axes, noise, seed)
+    pool = replace(in_limits(machine, candidates), frame=frame, tool=tool)
+    old = 0 if done is None else len(done)
+    both = pool if done is None else joined(replace(done, frame=frame, tool=tool), pool)
+    information = Information(machine, both, tuple(rival if aim == "separate" else terms))
+    count = len(information.names)
+    weight = map_weight(machine, tuple(terms), at, load, force) if aim == "map" else None
+    value = _value(information, aim, tuple(terms), weight)
+    start = information.matrices[:old].sum(axis=0)
+    free = np.arange(old, len(both), dtype=np.intp)
+    if rows > len(free):
+        raise StiffmapError(
+            f"rows: expected at most the {len(free)} candidates that can be reached, got {rows}"
+        )
+    picked = exchange(information.matrices, start, free, rows, value)
+    rng = random_numbers(seed)
+    random = [
+        start + information.matrices[rng.choice(free, rows, replace=False)].sum(axis=0) for _ in range(RANDOM)
+    ]
+    total = start + information.matrices[picked].sum(axis=0)
+    scores = value(np.stack([total, *random]))
+    return Design(
+        _numbered(both.rows(np.sort(picked).astype(np.intp))),
+        aim,
+        information.names,
+        information.units,
+        information.sigma(total)[:count],
+        np.median([information.sigma(m)[:count] for m in random], axis=0),
+        information.in_natural_unit(aim, scores[0]),
+        information.in_natural_unit(aim, float(np.median(scores[1:]))),
+    )
+
+
+def _value(
+    information: Information, aim: str, terms: tuple[AppliedEffect, ...], weight: Floats | None
+) -> Value:
+    """What the exchange makes as large as it can."""
+    if aim == "separate":
+        information.add_signal(terms)
+        return information.separate
+    return information.identify if weight is None else information.map_of(weight)
+
+
+def _numbered(rows: Experiment) -> Experiment:
+    """With names and order from 1 on."""
+    number = np.arange(1, len(rows) + 1)
+    return replace(rows, ids=tuple(map(str, number)), order=number.astype(float))
+
+
+def follow(
+    machine: Machine,
+    terms: Sequence[AppliedEffect],
+    measure: Callable[[Experiment], Experiment],
+    *,
+    until: float,
+    batch: int = 6,
+    most: int = 120,
+    seed: int = 0,
+    **options: object,
+) -> list[tuple[int, Estimate]]:
+    """Measure in batches, each planned at the values found so far, until every number is known well enough.
+
+    measure
+        Gives the rows of a plan their readings: a person, or `simulate` for a twin.
+    until
+        Standard uncertainty of every parameter over its typical size at which to stop.
+
+    Number of rows and the estimate after each batch; the last one meets `until`, or `most` rows are used.
+    """
+    found: list[tuple[int, Estimate]] = []
+    data: Experiment | None = None
+    now = tuple(terms)
+    while data is None or len(data) < most:
+        plan = design(machine, now, rows=batch, done=data, seed=seed + len(found), **options)  # type: ignore[arg-type]
+        new = measure(plan.experiment)
+        data = new if data is None else joined(data, new)
+        result = estimate(machine, data, now)
+        found.append((len(data), result))
+        now = result.terms
+        scale = np.array([p.scale for _, p in fitted(machine.description, now)])
+        if (result.sigma * result.misfit / scale).max() <= until:
+            break
+    return found
+
+
+def _check(aim: str, rival: Sequence[AppliedEffect], rows: int) -> None:
+    if aim not in AIMS:
+        raise StiffmapError(f"aim: expected {', '.join(AIMS)}, got {aim!r}")
+    if aim == "separate" and not rival:
+        raise StiffmapError("rival: separating two explanations needs the other one")
+    if rows < 1:
+        raise StiffmapError(f"rows: expected 1 or more, got {rows}")

@@ -1,0 +1,1 @@
+"""From a corrected machine to the part: process, toolpath, milling, chatter, compensation."""

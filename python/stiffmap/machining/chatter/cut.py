@@ -1,0 +1,99 @@
+"""How the cutting force follows the difference of two passes: per metre of depth, over a tooth period (docs/theory.md V4).
+
+Axes: feed, normal (left of the feed, seen against the tool), tool axis from holder to tip, as in `process`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import pi
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats, real_number
+from stiffmap.common.errors import StiffmapError
+from stiffmap.machining.process import EndMill, Process, load_process
+from stiffmap.machining.process.mean import engaged, widened, with_coefficients
+
+GivenProcess = Process | str | PathLike[str] | Mapping[str, Any]
+
+
+def milling_process(process: GivenProcess) -> Process:
+    """The process with a law of chips; StiffmapError where its tool has no teeth, since nothing then regenerates."""
+    p = with_coefficients(process if isinstance(process, Process) else load_process(process))
+    if not p.tool.teeth or not isinstance(p.law, EndMill):
+        raise StiffmapError(
+            f"process {p.name}: a coated tool has no teeth whose passes a chip could remember; stability lobes "
+            "need a tool with teeth and a law end_mill or kienzle"
+        )
+    return p
+
+
+def chips(process: Process, intervals: int) -> Floats:
+    """(intervals, 3, 2) N/m² on the tool: force per depth by what two passes differ by along feed and normal, exact
+    means over equal parts of a tooth period. Helix and run-out are left out."""
+    p = process
+    law = p.law
+    assert isinstance(law, EndMill)
+    first, last = (float(v) for v in engaged(p, widened(p, p.cut.radial)))
+    pitch = 2 * pi / p.tool.teeth
+    edges = pitch * np.arange(intervals + 1) / intervals
+    out = np.zeros((intervals, 3, 2))
+    for tooth in range(p.tool.teeth):
+        at = edges + tooth * pitch
+        low, high = np.clip(at[:-1], first, last), np.clip(at[1:], first, last)
+        sc, ss, cc, s, c = _integrals(low, high)
+        t, r, a = law.Ktc, law.Krc, law.Kac
+        out[:, 0, 0] += -t * sc - r * ss
+        out[:, 0, 1] += -t * cc - r * sc
+        out[:, 1, 0] += t * ss - r * sc
+        out[:, 1, 1] += t * sc - r * cc
+        out[:, 2, 0] += a * s
+        out[:, 2, 1] += a * c
+    return out / (pitch / intervals)
+
+
+def _integrals(low: Floats, high: Floats) -> tuple[Floats, ...]:
+    """Of sin cos, sin², cos², sin, cos."""
+    half, twice = (high - low) / 2, (np.sin(2 * high) - np.sin(2 * low)) / 4
+    return (
+        (np.sin(high) ** 2 - np.sin(low) ** 2) / 2, half - twice, half + twice,
+        np.cos(low) - np.cos(high), np.sin(high) - np.sin(low),
+    )  # fmt: skip
+
+
+def mean_chips(process: Process) -> Floats:
+    """(3, 2) N/m²: the mean over a tooth period."""
+    return np.asarray(chips(process, 1)[0])
+
+
+def cut_axes(feed: Floats, tool: Floats) -> Floats:
+    """(3, 3) rows feed, normal, tool axis of a feed and of the tool from tip to holder, both in base axes."""
+    along = tool / np.linalg.norm(tool)
+    ahead = feed - (feed @ along) * along
+    size = float(np.linalg.norm(ahead))
+    if size < 1e-6:
+        raise StiffmapError("feed: expected a direction across the tool, got one along it")
+    ahead = ahead / size
+    return np.stack([ahead, np.cross(along, ahead), -along])
+
+
+def spindle_speed(speed: object, process: Process) -> float:
+    """rad/s of a number in rad/s, or text such as 5000 rpm; None: the process's own."""
+    if speed is None:
+        return process.spindle
+    if isinstance(speed, str):
+        number, _, unit = speed.strip().partition(" ")
+        scale = {"rpm": 2 * pi / 60, "Hz": 2 * pi, "rad/s": 1.0}.get(unit.strip())
+        try:
+            speed = float(number) * (scale or np.nan)
+        except ValueError:
+            speed = np.nan
+    out = real_number(speed, "speed", "a spindle speed in rad/s, or text such as '5000 rpm'")
+    if not (np.isfinite(out) and out > 0):
+        raise StiffmapError(
+            f"speed: expected a spindle speed above zero in rad/s, or text such as '5000 rpm', got {speed!r}"
+        )
+    return out

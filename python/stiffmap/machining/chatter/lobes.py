@@ -1,0 +1,209 @@
+"""Stability lobes of a cut on a machine at one pose: what depth is stable at which speed (docs/vibration.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import pi
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.tasks import workers
+from stiffmap.machining.chatter.coupling import coupling_depth
+from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, milling_process
+from stiffmap.machining.chatter.floquet import multiplier_map
+from stiffmap.machining.chatter.modes import ToolModes, mode_rows, modes_of_machine
+from stiffmap.machining.chatter.zero_order import FEED, TOOL, at_periods, frequencies_of, limits
+from stiffmap.machining.process import Process
+from stiffmap.solve.machine import Machine, as_machine
+from stiffmap.solve.options import keywords_of
+from stiffmap.workspace.vibration.modes import tip_modes
+
+METHODS = ("semi-discretization", "zero order")
+SPEEDS, DEPTHS = 120, 80
+PER_WAVE = 16
+"""Intervals of a tooth period for each oscillation of the fastest mode in it."""
+LEAST, MOST = 40, 320
+PER_TASK = 8
+"""Speeds of one task on a cluster."""
+HIGHEST = 4.0
+"""Top of a diagram, as a multiple of the least limit."""
+
+
+@keywords_of(tip_modes)
+def stability_lobes(
+    machine: Machine | str | PathLike[str] | ToolModes | Iterable[Any],
+    process: GivenProcess,
+    position: ArrayLike | None = None,
+    *,
+    speeds: ArrayLike | None = None,
+    depths: ArrayLike | None = None,
+    feed: ArrayLike = FEED,
+    tool: ArrayLike = TOOL,
+    also: Iterable[Any] = (),
+    method: str = "semi-discretization",
+    intervals: int | None = None,
+    threads: int | None = None,
+    scheduler: Any = None,
+    **pose: Any,
+) -> xr.Dataset:
+    """Stability of a cut over speeds of the spindle and depths.
+
+    Parameters
+    ----------
+    machine
+        Machine, name or file, whose modes at `position` are taken; or modes as of `floquet_multiplier`.
+    process
+        Tool, law and cut: a `Process`, a name, a file or a mapping.
+    position
+        (3,) m, base axes; None: the machine's home.
+    speeds, depths
+        (speed,) rad/s and (depth,) m, rising; None: around the process's speed, up to four times the least limit.
+    feed, tool
+        (3,) directions of the feed, and from the tool's tip to its holder, base axes.
+    also
+        Further modes in series with the machine's, of spindle and tool, in the axes of the cut.
+    method
+        ``semi-discretization``, or ``zero order`` (no multipliers).
+    intervals
+        Parts of a tooth period; None: enough for the fastest mode, 40 to 320.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers take the speeds, with the same answer.
+    **pose
+        wrench, rotation, gravity, point, damping, modes, symmetrise: as of `frequency_response`.
+
+    Returns
+    -------
+    Dataset
+        `limit` (speed) m: least unstable depth, infinite where none on the diagram; `limit_zero_order` (speed) m;
+        `multiplier` (speed, depth); attributes: `least` m and `frequency` Hz of zero order, `at_process` the
+        multiplier at the speed and depth of the process, `coupling` m where modes couple
+        without regeneration, `damping`, `stable_speeds` [rad/s, m]: where the limit has its largest values.
+
+    Raises StiffmapError for bad input. Source: docs/theory.md, V4 to V6.
+    """
+    if method not in METHODS:
+        raise StiffmapError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
+    if isinstance(machine, str | PathLike):
+        machine = as_machine(machine)
+    p = milling_process(process)
+    modes, said = _modes(
+        machine, position, cut_axes(real_array(feed, "feed"), real_array(tool, "tool")), pose
+    )
+    extra = list(also)
+    if extra:
+        modes = modes.and_also(mode_rows(extra))
+    modes = modes.below(np.inf)
+    frequency = frequencies_of(modes)
+    depth0, angle = limits(modes.receptance(frequency), p)
+    least = float(depth0.min())
+    s = _axis(speeds, "speeds", "rad/s") if speeds is not None else p.spindle * np.linspace(0.25, 1.5, SPEEDS)
+    top = HIGHEST * least if np.isfinite(least) else p.cut.axial
+    d = _axis(depths, "depths", "m") if depths is not None else np.linspace(0, max(top, 1e-9), DEPTHS + 1)[1:]
+    zero = at_periods(frequency, depth0, angle, 2 * pi / (p.tool.teeth * s))
+    ds = xr.Dataset(
+        {"limit_zero_order": ("speed", zero, {"units": "m"})},
+        coords={"speed": ("speed", s, {"units": "rad/s"}), "depth": ("depth", d, {"units": "m"})},
+        attrs={
+            "process": p.name, "method": method, "least": least, "damping": said, "modes": len(modes),
+            "frequency": float(frequency[int(np.argmin(depth0.min(axis=-1)))]),
+            "coupling": coupling_depth(modes, p),
+            "at_process": float(_multipliers(modes, p, np.array([p.spindle]), np.array([p.cut.axial]), intervals, 1)[0, 0]),
+            "helix": "left out: the tooth is straight" if p.tool.helix else "none",
+        },
+    )  # fmt: skip
+    if method == "zero order":
+        ds["limit"] = ds.limit_zero_order
+    else:
+        mu = _multipliers(modes, p, s, d, intervals, threads, scheduler)
+        ds["multiplier"] = (("speed", "depth"), mu)
+        ds["limit"] = ("speed", border(d, mu), {"units": "m"})
+    ds.attrs["stable_speeds"] = pockets(s, ds.limit.values, d[-1])
+    return ds
+
+
+def _modes(
+    machine: Any, position: ArrayLike | None, axes: Floats, pose: dict[str, Any]
+) -> tuple[ToolModes, str]:
+    if not isinstance(machine, Machine | str | PathLike):
+        if pose or position is not None:
+            raise StiffmapError(
+                "modes: a list of modes has no pose; position and its options are for a machine"
+            )
+        return mode_rows(machine), "of the modes as given"
+    m = as_machine(machine)
+    at = m.description.home.p if position is None else position
+    found = tip_modes(m, at, **pose)
+    return modes_of_machine(found).turned(axes), found.damping.said
+
+
+def _axis(given: ArrayLike, name: str, unit: str) -> Floats:
+    out = np.atleast_1d(real_array(given, name, f"rising numbers above zero ({unit})"))
+    if (
+        out.ndim != 1
+        or not out.size
+        or not (np.isfinite(out).all() and out[0] > 0 and (np.diff(out) > 0).all())
+    ):
+        raise StiffmapError(f"{name}: expected rising numbers above zero ({unit})")
+    return out
+
+
+def interval_counts(modes: ToolModes, p: Process, speed: Floats) -> Any:
+    """(speeds,) parts of a tooth period that the fastest mode needs, one of 40, 80, 160 and 320."""
+    waves = modes.frequency.max() * 2 * pi / (p.tool.teeth * speed)
+    return (2 ** np.ceil(np.log2(np.clip(PER_WAVE * waves, LEAST, MOST) / LEAST)) * LEAST).astype(int)
+
+
+def _multipliers(
+    modes: ToolModes,
+    p: Process,
+    speed: Floats,
+    depth: Floats,
+    intervals: int | None,
+    threads: int | None,
+    scheduler: Any = None,
+) -> Floats:
+    """Speeds with the same number of intervals together."""
+    k = np.full(len(speed), intervals) if intervals is not None else interval_counts(modes, p, speed)
+    together = [np.flatnonzero(k == count) for count in np.unique(k)]
+    if scheduler is not None:
+        together = [rows[i : i + PER_TASK] for rows in together for i in range(0, len(rows), PER_TASK)]
+    out = np.empty((len(speed), len(depth)))
+    with workers(_some_speeds, (modes, p, depth, threads), scheduler=scheduler) as hands:
+        for i, found in hands.as_done((speed[rows], int(k[rows[0]])) for rows in together):
+            out[together[i]] = found
+    return out
+
+
+def _some_speeds(shared: tuple[ToolModes, Process, Floats, int | None], item: tuple[Floats, int]) -> Floats:
+    """(speeds, depths) multipliers, as a task."""
+    modes, p, depth, threads = shared
+    return multiplier_map(modes, p, item[0], depth, item[1], threads)
+
+
+def border(depth: Floats, multiplier: Floats) -> Floats:
+    """(speeds,) m: least depth where the multiplier passes one, between depths by its value; infinite where it does not."""
+    over = multiplier >= 1
+    first = np.argmax(over, axis=1)
+    out = np.full(len(multiplier), np.inf)
+    for i in np.flatnonzero(over.any(axis=1)):
+        j = first[i]
+        a, b = (0.0, depth[0]) if j == 0 else (depth[j - 1], depth[j])
+        m0, m1 = (0.0 if j == 0 else multiplier[i, j - 1]), multiplier[i, j]
+        out[i] = a + (b - a) * ((1 - m0) / (m1 - m0) if j else 1.0)
+    return out
+
+
+def pockets(speed: Floats, limit: Floats, top: float, most: int = 5) -> list[list[float]]:
+    """[rad/s, m] of the largest limits that are higher than their neighbours, the deepest first."""
+    v = np.minimum(limit, top)
+    if len(v) < 3:
+        return []
+    peak = [i for i in range(1, len(v) - 1) if v[i] >= v[i - 1] and v[i] > v[i + 1]]
+    found = sorted(peak, key=lambda i: -v[i])[:most]
+    return [[float(speed[i]), float(v[i])] for i in found]

@@ -1,0 +1,130 @@
+"""Modes at the tool as rows: frequency Hz, damping ratio, modal mass kg, direction; from a user or from a machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats, real_array, real_number
+from stiffmap.common.errors import StiffmapError
+from stiffmap.workspace.vibration.modes import TipModes
+
+WAYS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+@dataclass(frozen=True, eq=False)
+class ToolModes:
+    """Modes of the tool's tip in the axes of their directions, SI."""
+
+    frequency: Floats
+    """(modes,) Hz."""
+    ratio: Floats
+    mass: Floats
+    """kg, for directions of length one."""
+    way: Floats
+    """(modes, 3) unit vectors."""
+    rest: Floats
+    """(3, 3) m/N that follows a force at once."""
+
+    def __len__(self) -> int:
+        return len(self.frequency)
+
+    @property
+    def stiffness(self) -> Floats:
+        """(modes,) N/m."""
+        return np.asarray(self.mass * (2 * np.pi * self.frequency) ** 2)
+
+    @property
+    def compliance(self) -> Floats:
+        """(3, 3) m/N, static."""
+        return np.asarray(np.einsum("k,ki,kj->ij", 1 / self.stiffness, self.way, self.way) + self.rest)
+
+    def turned(self, axes: Floats) -> ToolModes:
+        """The same along the rows of `axes` (3, 3)."""
+        return ToolModes(self.frequency, self.ratio, self.mass, self.way @ axes.T, axes @ self.rest @ axes.T)
+
+    def receptance(self, frequency: Floats) -> np.ndarray:
+        """(frequencies, 3, 3) m/N at Hz."""
+        w, own = 2 * np.pi * frequency[:, None], 2 * np.pi * self.frequency
+        each = 1 / (self.mass * (own**2 - w**2 + 2j * self.ratio * own * w))
+        return np.asarray(np.einsum("fk,ki,kj->fij", each, self.way, self.way) + self.rest)
+
+    def below(self, highest: float, share: float = 1e-3) -> ToolModes:
+        """Modes up to `highest` Hz that give at least `share` of the largest compliance; the others follow at once."""
+        soft = 1 / self.stiffness
+        keep = (self.frequency <= highest) & (soft >= share * soft.max(initial=0.0))
+        if not keep.any():
+            keep = self.frequency == self.frequency.min()
+        rest = self.rest + np.einsum("k,ki,kj->ij", soft[~keep], self.way[~keep], self.way[~keep])
+        return ToolModes(self.frequency[keep], self.ratio[keep], self.mass[keep], self.way[keep], rest)
+
+    def and_also(self, more: ToolModes) -> ToolModes:
+        """In series with others: both move the tool."""
+        join = np.concatenate
+        return ToolModes(
+            join([self.frequency, more.frequency]), join([self.ratio, more.ratio]), join([self.mass, more.mass]),
+            join([self.way, more.way]), self.rest + more.rest,
+        )  # fmt: skip
+
+
+def mode_rows(modes: ToolModes | Iterable[Any]) -> ToolModes:
+    """Rows (frequency Hz, damping ratio, mass kg, direction), the direction x, y, z or a vector; checked."""
+    if isinstance(modes, ToolModes):
+        return modes
+    rows = list(modes)
+    if not rows:
+        raise StiffmapError(
+            "modes: expected rows (frequency Hz, damping ratio, mass kg, direction), got none"
+        )
+    found = [_row(i, row) for i, row in enumerate(rows)]
+    f, ratio, mass, way = zip(*found, strict=True)
+    return ToolModes(np.array(f), np.array(ratio), np.array(mass), np.array(way), np.zeros((3, 3)))
+
+
+def _row(i: int, row: Any) -> tuple[float, float, float, Floats]:
+    name = f"modes, row {i + 1}"
+    try:
+        frequency, ratio, mass, *direction = row
+    except (TypeError, ValueError):
+        raise StiffmapError(
+            f"{name}: expected (frequency Hz, damping ratio, mass kg, direction), got {row!r}"
+        ) from None
+    way = direction[0] if len(direction) == 1 else direction
+    values = [real_number(v, name, "numbers") for v in (frequency, ratio, mass)]
+    for value, what in zip(values, ("a frequency (Hz)", "a damping ratio", "a mass (kg)"), strict=True):
+        if not (np.isfinite(value) and value > 0):
+            raise StiffmapError(f"{name}: expected {what} above zero, got {value:g}")
+    if values[1] >= 1:
+        raise StiffmapError(f"{name}: expected a damping ratio below 1 (0.02 is 2 %), got {values[1]:g}")
+    return values[0], values[1], values[2], _direction(name, way)
+
+
+def _direction(name: str, way: Any) -> Floats:
+    if isinstance(way, str):
+        sign, axis = (-1.0, way[1:]) if way[:1] == "-" else (1.0, way)
+        if axis not in WAYS:
+            raise StiffmapError(f"{name}: expected a direction x, y, z or three numbers, got {way!r}")
+        return sign * np.array(WAYS[axis])
+    v = real_array(way, name, "a direction")
+    if v.shape == (2,):
+        v = np.append(v, 0.0)
+    if v.shape != (3,) or not np.isfinite(v).all() or not np.linalg.norm(v) > 0:
+        raise StiffmapError(f"{name}: expected a direction x, y, z or three numbers, got {way!r}")
+    return np.asarray(v / np.linalg.norm(v))
+
+
+def modes_of_machine(modes: TipModes, i: int = 0) -> ToolModes:
+    """Those of one pose, base axes: translations only, damping of each mode alone. StiffmapError where the pose failed."""
+    if not np.isfinite(modes.rest[i, 0, 0]):
+        raise StiffmapError(f"pose {i + 1}: no equilibrium (status {int(modes.status[i])}), so no modes")
+    square, b = modes.square[i], modes.tip[i, :3]
+    size = (b**2).sum(axis=0)
+    still = modes.rest[i, :3, :3]
+    moves = (square > 0) & (size > 0)
+    rest = still + b[:, ~moves] @ b[:, ~moves].T
+    b, square, size = b[:, moves], square[moves], size[moves]
+    f = 1 / (2 * np.pi * np.sqrt(square))
+    return ToolModes(f, modes.ratio[i][moves], square / size, (b / np.sqrt(size)).T, rest)

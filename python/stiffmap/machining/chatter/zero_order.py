@@ -1,0 +1,122 @@
+"""Limits of a stable cut by the mean of the directional factors, in closed form (docs/theory.md V4; Altintas and Budak)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import pi
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.errors import StiffmapError
+from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, mean_chips, milling_process, spindle_speed
+from stiffmap.machining.chatter.modes import ToolModes, mode_rows
+
+FEED, TOOL = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+"""Directions of the feed and from the tool's tip to its holder where none is given, base axes."""
+AROUND = 400
+"""Frequencies close to each mode."""
+
+
+def limiting_depth(
+    receptance: xr.DataArray | ToolModes | Iterable[Any],
+    process: GivenProcess,
+    *,
+    speed: float | str | None = None,
+    feed: ArrayLike = FEED,
+    tool: ArrayLike = TOOL,
+) -> Any:
+    """Depth below which a cut is stable, m: at every speed of the spindle, or at one.
+
+    Parameters
+    ----------
+    receptance
+        From `frequency_response`, dimensions (..., frequency, 6, 6), base axes: the answer has the batch axes (...).
+        Or modes as of `floquet_multiplier`, in the axes of the cut: the answer is one number.
+    process
+        Tool, law and cut: a `Process`, a name, a file or a mapping.
+    speed
+        Spindle, rad/s, or text such as '5000 rpm'; None: the least depth over all speeds.
+    feed, tool
+        (3,) directions of the feed and from the tool's tip to its holder, base axes; of a receptance only.
+
+    Infinite where nothing that vibrates can chatter, NaN where a pose failed. Zero order: the mean of the directional
+    factors; for low immersion ask `floquet_multiplier`. Raises StiffmapError for bad input. Source: docs/theory.md, V4.
+    """
+    p = milling_process(process)
+    if isinstance(receptance, xr.DataArray):
+        frequency, values = _from_array(receptance)
+        axes = cut_axes(real_array(feed, "feed"), real_array(tool, "tool"))
+        G = axes @ values[..., :3, :3] @ axes.T
+    else:
+        modes = mode_rows(receptance)
+        frequency = frequencies_of(modes)
+        G = modes.receptance(frequency)
+    depth, angle = limits(G, p)
+    if speed is None:
+        out = np.min(depth, axis=(-1, -2))
+    else:
+        period = 2 * pi / (p.tool.teeth * spindle_speed(speed, p))
+        out = at_periods(frequency, depth, angle, np.array([period]))[..., 0]
+    failed = np.isnan(G).any(axis=(-1, -2, -3))
+    out = np.where(failed, np.nan, out)
+    return float(out) if out.ndim == 0 else out
+
+
+def _from_array(receptance: xr.DataArray) -> tuple[Floats, np.ndarray]:
+    if "frequency" not in receptance.dims or receptance.shape[-2:] not in ((6, 6), (3, 3)):
+        raise StiffmapError(
+            "receptance: expected an array of frequency_response, dimensions (..., frequency, 6, 6), got "
+            f"{dict(receptance.sizes)}"
+        )
+    if receptance.attrs.get("kind", "receptance") != "receptance":
+        raise StiffmapError(f"receptance: expected a receptance (m/N), got {receptance.attrs['kind']}")
+    f = np.asarray(receptance.frequency.values, dtype=float)
+    if len(f) < 3:
+        raise StiffmapError("receptance: expected three frequencies or more")
+    return f[f > 0], receptance.values[..., f > 0, :, :]
+
+
+def frequencies_of(modes: ToolModes) -> Floats:
+    """Hz, dense around each mode."""
+    widths = np.sinh(np.linspace(-4, 4, AROUND)) / np.sinh(4)
+    close = modes.frequency[:, None] * (1 + 0.5 * widths)
+    low, high = 0.2 * modes.frequency.min(), 4 * modes.frequency.max()
+    return np.unique(np.concatenate([close.ravel(), np.geomspace(low, high, 4 * AROUND)]))
+
+
+def limits(G: np.ndarray, process: Any) -> tuple[Floats, Floats]:
+    """(..., frequencies, 2) depth m (infinite: none) and the angle of a wave over a tooth period, rad, of G (..., 3, 3)."""
+    seen = G[..., :2, :] @ mean_chips(process)
+    trace = seen[..., 0, 0] + seen[..., 1, 1]
+    product = seen[..., 0, 0] * seen[..., 1, 1] - seen[..., 0, 1] * seen[..., 1, 0]
+    root = np.sqrt((trace / 2) ** 2 - product + 0j)
+    eigen = np.stack([trace / 2 + root, trace / 2 - root], axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1 / eigen
+        depth = np.where(inverse.real > 0, (inverse.real**2 + inverse.imag**2) / (2 * inverse.real), np.inf)
+        angle = 2 * np.arctan2(inverse.real, inverse.imag)
+    return np.where(np.isfinite(depth), depth, np.inf), angle
+
+
+def at_periods(frequency: Floats, depth: Floats, angle: Floats, period: Floats) -> Floats:
+    """(..., periods) m: least depth where whole waves and the angle fill a tooth period (s); infinite: none."""
+    turns = np.expand_dims(frequency, -1)[:, None] * period - angle[..., None] / (2 * pi)
+    whole = np.floor(turns)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rise = np.diff(turns, axis=-3)
+        crossed = (np.abs(np.diff(whole, axis=-3)) == 1) & (np.abs(rise) < 1)
+        level = np.maximum(whole[..., 1:, :, :], whole[..., :-1, :, :])
+        share = np.where(crossed, (level - turns[..., :-1, :, :]) / rise, 0.0)
+        a, b = depth[..., :-1, :, None], depth[..., 1:, :, None]
+        between = np.where(crossed & np.isfinite(a) & np.isfinite(b), a + share * (b - a), np.inf)
+    return np.asarray(np.min(between, axis=(-2, -3)))
+
+
+def oriented_limit(receptance: ArrayLike, pressure: float) -> float:
+    """m: -1/(2 Kf G), G the least real part of an oriented receptance (frequencies,) m/N, Kf N/m² (Tlusty's limit)."""
+    least = float(np.real(np.asarray(receptance)).min())
+    return np.inf if least >= 0 else -1 / (2 * pressure * least)

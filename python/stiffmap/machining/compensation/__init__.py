@@ -1,0 +1,23 @@
+"""Commands and geometry for a controller, from a machine whose deviations are known."""
+
+from stiffmap.machining.compensation.axis_errors import AxisErrors, axis_errors, axis_errors_of_map
+from stiffmap.machining.compensation.commands import Commands, compensate
+from stiffmap.machining.compensation.geometry import DhRow, corrected_geometry, dh_list
+from stiffmap.machining.compensation.tables import FORMATS, compensation_table, read_table, write_table
+from stiffmap.machining.compensation.urdf import urdf_text
+
+__all__ = [
+    "FORMATS",
+    "AxisErrors",
+    "Commands",
+    "DhRow",
+    "axis_errors",
+    "axis_errors_of_map",
+    "compensate",
+    "compensation_table",
+    "corrected_geometry",
+    "dh_list",
+    "read_table",
+    "urdf_text",
+    "write_table",
+]

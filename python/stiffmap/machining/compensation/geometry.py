@@ -1,0 +1,171 @@
+"""The corrected machine as geometry that a controller can take: offsets as built, Denavit-Hartenberg rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.description import Element, Joint, MachineDescription, Offset, Pose
+
+PARALLEL = 0.05
+"""rad: below it two axes count as parallel and their row has Hayati's fourth parameter: the common normal of
+axes that are almost parallel runs away without end (S. A. Hayati, "Robot arm geometric link parameter
+estimation", CDC 1983)."""
+Frame = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True)
+class DhRow:
+    """One joint, m and rad: Rz(q + theta) Tz(d) Tx(a) Rx(alpha), or Rz(q + theta) Tx(a) Rx(alpha) Ry(beta)."""
+
+    joint: str
+    theta: float
+    d: float
+    a: float
+    alpha: float
+    beta: float | None = None
+    """rad; given where the next axis is parallel, and d is then 0."""
+    prismatic: bool = False
+
+
+def corrected_geometry(description: MachineDescription) -> tuple[MachineDescription, list[str]]:
+    """The machine whose *declared* geometry is the real one: what a controller should believe.
+
+    Built offsets become nominal and zero errors become offsets before their joint. Second: what geometry
+    cannot hold and `compensate` must, in words.
+    """
+    left: list[str] = []
+
+    def part(elements: tuple[Element, ...], path: str) -> tuple[Element, ...]:
+        out: list[Element] = []
+        for e in elements:
+            if isinstance(e, Offset):
+                out.append(Offset(e.name, e.actual or e.nominal))
+            elif isinstance(e, Joint):
+                out += _joint(e, f"{path}.{e.name}", left)
+            else:
+                out.append(e)
+        return tuple(out)
+
+    legs = tuple(replace(leg, elements=part(leg.elements, leg.name)) for leg in description.legs)
+    made = replace(
+        description,
+        legs=legs,
+        base=part(description.base, "base"),
+        platform=part(description.platform, "platform"),
+        effects=(),
+        declared=None,
+        home=description.home,
+    )
+    return made, left
+
+
+def _joint(e: Joint, name: str, left: list[str]) -> list[Element]:
+    offset = sum(c.offset for c in e.command_errors)
+    if any(c.slope or c.amplitude or c.knots for c in e.command_errors) or e.guide_errors:
+        left.append(f"{name}: errors along its travel")
+    if e.law is not None:
+        left.append(f"{name}: compliance of the drive")
+    plain = replace(e, command_errors=(), guide_errors=())
+    if not offset:
+        return [plain]
+    axis = np.array(e.axes[0])
+    pose = Pose.of(offset * axis) if e.kind == "prismatic" else Pose.of(rotation=_about(axis, offset))
+    return [Offset(f"{e.name}_zero", pose), plain]
+
+
+def _about(axis: Floats, angle: float) -> Floats:
+    return np.asarray(Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix())
+
+
+def serial_joints(description: MachineDescription) -> tuple[list[tuple[Joint, Frame, Floats]], Frame]:
+    """Joints of a serial arm with their frames and axes in base axes at zero coordinates, and the tool's frame.
+
+    Nominal geometry. Raises StiffmapError for a machine with several legs, blocks or passive joints.
+    """
+    if len(description.legs) != 1:
+        raise StiffmapError(
+            f"{description.name}: a list of joints needs a serial arm; it has {len(description.legs)} legs"
+        )
+    p, r = np.zeros(3), np.eye(3)
+    joints: list[tuple[Joint, Frame, Floats]] = []
+    for e in (*description.base, *description.legs[0].elements, *description.platform):
+        if isinstance(e, Offset):
+            p, r = p + r @ e.nominal.p, r @ e.nominal.r
+        elif isinstance(e, Joint):
+            if not e.actuated:
+                raise StiffmapError(
+                    f"{description.name}: joint {e.name} is passive; a serial arm has drives only"
+                )
+            joints.append((e, (p, r), r @ np.array(e.axes[0])))
+        elif hasattr(e, "branches"):
+            raise StiffmapError(f"{description.name}: block {e.name} is no part of a serial arm")
+    return joints, (p, r)
+
+
+def dh_list(description: MachineDescription) -> tuple[Frame, list[DhRow], Frame]:
+    """Base frame, one row per joint but the last, whose frame and the tool's are left: (p, R) of the first
+    frame in base axes, rows, and (p, R) of the tool in the last row's frame turned by the last joint."""
+    joints, (tool_p, tool_r) = serial_joints(description)
+    (first, (p, _), axis) = joints[0]
+    frame = (p, _with_z(axis))
+    base = frame
+    rows = []
+    for k, (joint, _, _) in enumerate(joints[:-1]):
+        _, (q, _), ahead = joints[k + 1]
+        o, x = frame
+        row, step = _row(joint, x.T @ (q - o), x.T @ ahead)
+        rows.append(row)
+        frame = (o + x @ step[0], x @ step[1])
+    o, x = frame
+    rows.append(DhRow(joints[-1][0].name, 0.0, 0.0, 0.0, 0.0, None, joints[-1][0].kind == "prismatic"))
+    assert first is joints[0][0]
+    return base, rows, (x.T @ (tool_p - o), x.T @ tool_r)
+
+
+def _with_z(z: Floats) -> Floats:
+    z = z / np.linalg.norm(z)
+    other = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
+    x = other - z * (z @ other)
+    x = x / np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def _row(joint: Joint, q: Floats, z: Floats) -> tuple[DhRow, Frame]:
+    """Row from a frame to the next axis: a point q on it and its direction z, both in the frame."""
+    z = z / np.linalg.norm(z)
+    slides = joint.kind == "prismatic"
+    across = np.cross([0.0, 0.0, 1.0], z)
+    size = float(np.linalg.norm(across))
+    if size < np.sin(PARALLEL):
+        foot = q - z * (q[2] / z[2])
+        theta, a = float(np.arctan2(foot[1], foot[0])), float(np.hypot(foot[0], foot[1]))
+        turned = _rz(theta).T @ z
+        beta, alpha = float(np.arcsin(turned[0])), float(np.arctan2(-turned[1], turned[2]))
+        r = _rz(theta) @ _rx(alpha) @ _ry(beta)
+        return DhRow(joint.name, theta, 0.0, a, alpha, beta, slides), (foot, r)
+    x = across / size
+    # o + d z0 + a x = q + s z
+    d, a, _ = np.linalg.solve(np.column_stack([[0.0, 0.0, 1.0], x, -z]), q)
+    theta, alpha = float(np.arctan2(x[1], x[0])), float(np.arctan2(size, z[2]))
+    r = _rz(theta) @ _rx(alpha)
+    return DhRow(joint.name, theta, float(d), float(a), alpha, None, slides), (
+        d * np.array([0, 0, 1.0]) + a * x,
+        r,
+    )
+
+
+def _rx(t: float) -> Floats:
+    return np.asarray(Rotation.from_euler("x", t).as_matrix())
+
+
+def _ry(t: float) -> Floats:
+    return np.asarray(Rotation.from_euler("y", t).as_matrix())
+
+
+def _rz(t: float) -> Floats:
+    return np.asarray(Rotation.from_euler("z", t).as_matrix())

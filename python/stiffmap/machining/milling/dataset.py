@@ -1,0 +1,85 @@
+"""Errors, commands and states of a job as one table along the path."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.machining.milling.equilibrium import Equilibrium
+from stiffmap.machining.milling.limits import drive_speeds
+from stiffmap.machining.milling.setting import Setting
+from stiffmap.machining.milling.taper import taper
+from stiffmap.machining.milling.verify import Run
+
+
+def along(job: Setting, made: Run) -> xr.Variable:
+    """The error of a run at the points of the job: of the run's points nearest in way, the largest in size."""
+    order = np.argsort(made.way, kind="stable")
+    way, value = made.way[order], made.normal[order]
+    edges = (job.points.way[1:] + job.points.way[:-1]) / 2
+    bins = np.searchsorted(edges, way)
+    out = np.interp(job.points.way, way, value)
+    best = np.lexsort((np.abs(value), bins))
+    last = np.r_[np.flatnonzero(np.diff(bins[best])), len(best) - 1]
+    out[bins[best][last]] = value[best][last]
+    return xr.Variable("point", out)
+
+
+def flags_along(job: Setting, made: Run) -> NDArray[np.uint32]:
+    """Flags of a run at the points of the job: all that its points between them have."""
+    edges = (job.points.way[1:] + job.points.way[:-1]) / 2
+    out = np.zeros(len(job), np.uint32)
+    np.bitwise_or.at(out, np.searchsorted(edges, made.way), made.state.flags)
+    return out
+
+
+def dataset_of(
+    job: Setting, before: Equilibrium, command: Floats, left: Floats, after: Run, mirrored: Equilibrium
+) -> xr.Dataset:
+    normal = (before.error * job.off).sum(axis=1)
+    tolerance = job.process.tolerance
+    xyz = ("point", "axis")
+    ds = xr.Dataset(
+        {
+            "wanted": (xyz, job.position),
+            "error": (xyz, before.error),
+            "error_normal": ("point", normal),
+            "error_along": ("point", (before.error * job.tangent).sum(axis=1)),
+            "error_axial": ("point", (before.error * job.tool).sum(axis=1)),
+            "command": (xyz, command),
+            "command_left": ("point", left),
+            "error_normal_after": along(job, after),
+            "mirror_left": ("point", (mirrored.error * job.off).sum(axis=1)),
+            "taper": ("point", taper(job, before)),
+            "force": (xyz, before.force),
+            "gain": ("point", before.gain),
+            "effort": (("point", "actuator"), before.effort),
+            "speed": (("point", "actuator"), drive_speeds(job)),
+            "status": ("point", before.status),
+            "flags": ("point", before.flags),
+            "flags_after": ("point", flags_along(job, after)),
+            "width": ("point", job.width(np.zeros(len(job)))),
+            "feed": ("point", job.feed),
+        },
+        coords={
+            "way": ("point", job.points.way),
+            "line": ("point", job.path.line[job.points.move]),
+            "axis": ["x", "y", "z"],
+            "actuator": list(job.machine.actuators),
+        },
+        attrs={
+            "machine": job.machine.name,
+            "process": job.process.name,
+            "path": job.path.name,
+            "at": job.place.at.tolist(),
+            "turn": job.place.turn,
+            "notes": list(job.path.notes),
+        },
+    )
+    if tolerance is not None:
+        ds["margin"] = ("point", tolerance - np.abs(normal))
+        ds["margin_after"] = tolerance - np.abs(ds.error_normal_after)
+        ds.attrs["tolerance"] = tolerance
+    return ds

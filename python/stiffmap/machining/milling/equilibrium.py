@@ -1,0 +1,135 @@
+"""Deflection and cutting force together: each is what the other makes it (theory.md, M9)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.machining.milling.plant import Plant
+from stiffmap.machining.milling.setting import Setting
+from stiffmap.solve.status import Status
+
+STEPS, INNER = 30, 40
+DONE = 1e-11
+"""m: change of the tool's position below which an equilibrium stands."""
+LONGEST = 0.05
+"""m: no deflection of interest is longer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """m points; NaN where there is none."""
+
+    error: Floats
+    """(m, 3) m, the tool's tip from where it is wanted, base axes."""
+    force: Floats
+    """(m, 3) N, that the cut makes there."""
+    gain: Floats
+    """(m,) loop gain kp/k: largest real part of the eigenvalues of -C dF/de; below -1 the cut runs away."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+    effort: Floats
+    """(m, actuators)."""
+    compliance: Floats
+    """(m, 3, 3) m/N."""
+    turned: Floats
+    """(m, 3) rad, rotation vector of the tool's holder from the commanded orientation."""
+    steps: int
+
+
+def equilibrium(plant: Plant, command: Floats, rows: NDArray[np.int64] | None = None) -> Equilibrium:
+    """Where the tool stands at commanded positions (m, 3) m, base axes, under the force that the cut makes there.
+
+    Newton: the machine is solved at a force, the cut and the machine's tangent are solved together, until the
+    tool stands still. UNSTABLE where the force grows faster than the machine resists (det of I - C dF/de not positive).
+    """
+    job = plant.job if rows is None else of_rows(plant.job, rows)
+    away = np.zeros((len(job), 2))
+    force = job.force(away)
+    error = np.full((len(job), 3), np.nan)
+    steps, s = 0, None
+    while steps < STEPS:
+        steps += 1
+        s = plant.stand(command, force, full=True, rows=rows)
+        error = command + s.moved - job.position
+        away = _together(job, error, s.compliance, force, away)
+        new = job.force(away)
+        # how far the tool goes on under the force of where it now stands
+        onward = np.einsum("mij,mj->mi", np.nan_to_num(s.compliance), new - force)
+        if not np.nan_to_num(np.abs(onward), nan=0.0).max(initial=0.0) > DONE:
+            break
+        force = new
+    assert s is not None
+    slopes = job.force_slopes(np.einsum("mki,mi->mk", job.ways, np.nan_to_num(error)))
+    # (m, 2, 2): what the cut's answer to a small push pushes further
+    loop = -np.einsum("mki,mij,mjl->mkl", job.ways, np.nan_to_num(s.compliance), slopes)
+    status = s.status.copy()
+    unstable = (np.linalg.det(np.eye(2) + loop) <= 0) & (status == Status.CONVERGED)
+    status[unstable] = Status.UNSTABLE
+    lost = unstable | ~np.isfinite(error).all(axis=1)
+    status[lost & (status == Status.CONVERGED)] = Status.NOT_CONVERGED
+    gain = _strongest(loop)
+    blank = np.where(lost[:, None], np.nan, 1.0)
+    return Equilibrium(
+        error * blank, force * blank, np.where(np.isfinite(error).all(axis=1), gain, np.nan), status, s.flags,
+        s.effort * blank, s.compliance, s.turned * blank, steps,
+    )  # fmt: skip
+
+
+def _strongest(loop: Floats) -> Floats:
+    """(m,) real part of the eigenvalue of largest size."""
+    values = np.linalg.eigvals(loop)
+    at = np.abs(values).argmax(axis=1)
+    return np.asarray(np.take_along_axis(values, at[:, None], axis=1)[:, 0].real)
+
+
+def _together(job: Setting, error: Floats, compliance: Floats, force: Floats, away: Floats) -> Floats:
+    """(m, 2) m: the cut and the linear machine about the state (error, force) solved together."""
+    if not any(job.coupled):
+        return away
+    c = np.nan_to_num(np.einsum("mki,mij->mkj", job.ways, compliance))
+    base = np.nan_to_num(np.einsum("mki,mi->mk", job.ways, error))
+    x = base.copy()
+    for _ in range(INNER):
+        rest = x - base - np.einsum("mkj,mj->mk", c, job.force(x) - force)
+        slope = np.eye(2) - np.einsum("mkj,mjl->mkl", c, job.force_slopes(x))
+        det = slope[:, 0, 0] * slope[:, 1, 1] - slope[:, 0, 1] * slope[:, 1, 0]
+        det = np.where(np.abs(det) > 1e-6, det, np.inf)
+        move = (
+            np.stack(
+                [
+                    slope[:, 1, 1] * rest[:, 0] - slope[:, 0, 1] * rest[:, 1],
+                    slope[:, 0, 0] * rest[:, 1] - slope[:, 1, 0] * rest[:, 0],
+                ],
+                axis=1,
+            )
+            / det[:, None]
+        )
+        # the force has a root of the width in it where the cut ends: no step across more than half of what is left
+        room = np.maximum(job.engaged.radial - x[:, 0], 0.0) / 2
+        size = np.abs(move[:, 0])
+        near = (room > 0) & (size > room) & (move[:, 0] < 0)
+        move[:, 0] = np.where(near, -room, move[:, 0])
+        x = np.clip(x - move, -LONGEST, LONGEST)
+        if not np.abs(move).max(initial=0.0) > DONE / 10:
+            break
+    return np.asarray(x)
+
+
+def of_rows(job: Setting, rows: NDArray[np.int64]) -> Setting:
+    """A job of some of the points."""
+    from dataclasses import fields, replace
+
+    m = len(job)
+    engaged = replace(
+        job.engaged, **{f.name: getattr(job.engaged, f.name)[rows] for f in fields(job.engaged)}
+    )
+    arrays = {
+        n: getattr(job, n)[rows]
+        for n in ("position", "tangent", "off", "tool", "rotation", "feed", "faster")
+        if len(getattr(job, n)) == m
+    }
+    return replace(job, engaged=engaged, **arrays)

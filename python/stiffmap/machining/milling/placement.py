@@ -1,0 +1,275 @@
+"""Where the part should lie: many placements at once, the best of them refined, all of the path in reach."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.tasks import workers
+from stiffmap.machining.milling.equilibrium import equilibrium
+from stiffmap.machining.milling.plant import Plant
+from stiffmap.machining.milling.setting import Setting, setting
+from stiffmap.machining.process.description import Process
+from stiffmap.machining.toolpath import Placement, Toolpath, sampled
+from stiffmap.machining.toolpath.sampling import Points
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.status import Flag
+
+AT_ONCE = 200_000
+"""Poses of one call; on a cluster, of one task as many as `IN_A_TASK`."""
+IN_A_TASK = 10_000
+NORM = 12
+"""Power of the mean that stands for the largest error while it is refined."""
+REFINED = 3
+LIMITS = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
+
+
+@dataclass(frozen=True, eq=False)
+class Placements:
+    """n placements and the error of the part in each."""
+
+    at: Floats
+    """(n, 3) m."""
+    turn: Floats
+    """(n,) rad."""
+    largest: Floats
+    """(n,) m, across the wall, before compensation; infinite where a point of the path has no answer or breaks a limit."""
+    best: Placement
+    """Refined, and proven at all points of the path."""
+    best_error: float
+    """m, at that placement; force and deflection solved together."""
+    naive: Placement
+    """The part's middle in the middle of the workspace, not turned."""
+    naive_error: float
+    limits: str
+    """What keeps the error from being smaller."""
+    naive_along: Floats
+    """(k,) m, errors across the wall over the part at the naive placement."""
+    best_along: Floats
+    """(k,) m, the same at the best one."""
+
+    @property
+    def gain(self) -> float:
+        """How many times the naive placement's error is the best one's."""
+        return self.naive_error / self.best_error
+
+    def words(self, tolerance: float | None = None) -> str:
+        """One sentence; `tolerance` m: also whether a placement reaches it before compensation."""
+        at = ", ".join(f"{1e3 * v:.1f}" for v in self.best.at)
+        best = f"{1e3 * self.best_error:.3f} mm at ({at}) mm, turned by {np.degrees(self.best.turn):.1f} deg"
+        if tolerance is None or self.best_error <= tolerance:
+            return f"Of {len(self.at)} placements the best leaves {best}; the middle of the workspace {1e3 * self.naive_error:.3f} mm."
+        return (
+            f"No placement of {len(self.at)} reaches the tolerance of {1e3 * tolerance:g} mm without compensation: the best leaves {best}; "
+            f"what limits it: {self.limits}."
+        )
+
+    @property
+    def three_times(self) -> float:
+        """Share of the placements in reach whose error is more than three times the best one's."""
+        fits = self.largest[np.isfinite(self.largest)]
+        return float((fits > 3 * self.best_error).mean())
+
+    @property
+    def reachable(self) -> float:
+        """Share of the placements in which all of the path was in reach."""
+        return float(np.isfinite(self.largest).mean())
+
+
+def placements(
+    machine: Machine,
+    path: Toolpath,
+    process: Process,
+    *,
+    count: int = 1000,
+    turns: tuple[float, float] = (-np.pi, np.pi),
+    box: ArrayLike | None = None,
+    points: int = 500,
+    seed: int = 0,
+    threads: int | None = None,
+    scheduler: Any = None,
+) -> Placements:
+    """Search for the placement with the smallest largest error across the wall, before compensation.
+
+    count: placements tried (a Sobol sequence over box and turns); turns: (2,) rad; box (2, 3) m for the part, None: the
+    workspace of the machine file; points: number of points of the path in the search. scheduler: address of a dask
+    scheduler, or a `distributed.Client`, whose workers try the placements, with the same answer. Raises StiffmapError where no placement holds the path.
+    """
+    if count < 1 or points < 2:
+        raise StiffmapError(f"count and points: expected 1 or more and 2 or more, got {count} and {points}")
+    low, high = np.asarray(machine.workspace if box is None else box, dtype=float)
+    search = Search(machine, path, process, points, threads)
+    middle = (low + high) / 2
+    naive = Placement(middle - search.middle, 0.0)
+    power = int(np.ceil(np.log2(max(count, 2))))
+    unit = qmc.Sobol(4, seed=seed).random_base2(power)[:count]
+    turn = turns[0] + unit[:, 3] * (turns[1] - turns[0])
+    at = search.inside(unit[:, :3], turn, low, high)
+    largest = _tried(search, at, turn, scheduler)
+    if not np.isfinite(largest).any():
+        raise StiffmapError(
+            f"no placement of {count} holds the path on {machine.name}: it measures "
+            f"{', '.join(f'{v:.0f}' for v in 1e3 * search.size)} mm, the box {', '.join(f'{v:.0f}' for v in 1e3 * (high - low))} mm"
+        )
+    order = np.argsort(largest)[:REFINED]
+    with workers(_refined, (search, low, high, turns), scheduler=scheduler) as hands:
+        tried = hands.in_order((at[i], float(turn[i])) for i in order if np.isfinite(largest[i]))
+    tried.append((search.exact(naive), naive))
+    error, best = min(tried, key=lambda t: t[0])
+    return Placements(
+        at,
+        turn,
+        largest,
+        best,
+        error,
+        naive,
+        tried[-1][0],
+        search.what_limits(best, low, high),
+        search.errors(naive),
+        search.errors(best),
+    )
+
+
+def _tried(search: Search, at: Floats, turn: Floats, scheduler: Any) -> Floats:
+    """(n,) m: largest error of each placement."""
+    count = max(1, (AT_ONCE if scheduler is None else IN_A_TASK) // len(search.points))
+    rows = [slice(k, k + count) for k in range(0, len(at), count)]
+    with workers(_largest, search, scheduler=scheduler) as hands:
+        return np.concatenate(hands.in_order((at[r], turn[r]) for r in rows))
+
+
+def _largest(search: Search, some: tuple[Floats, Floats]) -> Floats:
+    """Some placements, as a task."""
+    return search.largest(*some)
+
+
+def _refined(
+    shared: tuple[Search, Floats, Floats, tuple[float, float]], begin: tuple[Floats, float]
+) -> tuple[float, Placement]:
+    """One descent, as a task."""
+    search, low, high, turns = shared
+    return search.refined(*begin, low, high, turns)
+
+
+class Search:
+    """Errors of one path on one machine at many placements."""
+
+    def __init__(
+        self, machine: Machine, path: Toolpath, process: Process, points: int, threads: int | None
+    ) -> None:
+        self.machine, self.path, self.process, self.threads = machine, path, process, threads
+        length = float(path.length[path.cuts].sum())
+        self.points: Points = sampled(path, max(length / points, 1e-6))
+        if len(self.points) > 1.3 * points:  # a table of points
+            keep = np.unique(np.linspace(0, len(self.points) - 1, points).astype(int))
+            self.points = Points(*(getattr(self.points, n)[keep] for n in Points.__dataclass_fields__))
+        self.job = self._at(Placement(np.zeros(3), 0.0))
+        still = np.zeros((len(self.job), 2))
+        self.force, self.slope = self.job.force(still), self.job.force_slopes(still)[:, :, 0]
+        p = self.points.position
+        self.middle = (p.max(axis=0) + p.min(axis=0)) / 2
+        self.size = np.ptp(p, axis=0)
+
+    def _at(self, place: Placement) -> Setting:
+        return setting(self.machine, self.path, self.process, self.points, place)
+
+    def _extent(self, turn: Floats) -> tuple[Floats, Floats]:
+        """(n, 3) lowest and highest corner of the path turned (n,) rad about its origin."""
+        c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
+        x, y, z = self.points.position.T
+        u, v = c * x - s * y, s * x + c * y
+        one = np.ones(len(turn))
+        low = np.stack([u.min(axis=1), v.min(axis=1), z.min() * one], axis=1)
+        return low, np.stack([u.max(axis=1), v.max(axis=1), z.max() * one], axis=1)
+
+    def inside(self, unit: Floats, turn: Floats, low: Floats, high: Floats) -> Floats:
+        """(n, 3) m: places for shares (n, 3) of the room that the turned part has in the box; where it has none, the middle."""
+        a, b = self._extent(turn)
+        first, last = low - a, high - b
+        middle = (first + last) / 2
+        first, last = np.minimum(first, middle), np.maximum(last, middle)
+        return np.asarray(np.where(high - b >= low - a, first + unit * (last - first), middle))
+
+    def largest(self, at: Floats, turn: Floats) -> Floats:
+        """(n,) m: largest error, the cut answering to first order; infinite where a point fails."""
+        places = [Placement(a, float(t)) for a, t in zip(at, turn, strict=True)]
+        r = np.stack([p.rotation for p in places])
+        position = np.einsum("nij,mj->nmi", r, self.points.position) + at[:, None]
+        force = np.einsum("nij,mj->nmi", r, self.force)
+        off = np.einsum("nij,mj->nmi", r, self.job.off)
+        s = self.machine.solve(
+            position,
+            np.concatenate([force, np.zeros_like(force)], axis=-1),
+            rotation=self.job.rotation[0] if self.job.rotation.strides[0] == 0 else self.job.rotation,
+            threads=self.threads,
+        )
+        slope = np.einsum("nij,mj->nmi", r, self.slope)
+        bent = np.matmul(s.compliance[..., :3, :3], slope[..., None])[..., 0]
+        loop = 1 - np.einsum("nmi,nmi->nm", off, bent)  # 1 + kp/k
+        good = (s.ok & (s.flags & LIMITS == 0) & (loop > 0)).all(axis=1)
+        error = np.einsum("nmi,nmi->nm", s.displacement[..., :3], off)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            error = np.abs(error / loop).max(axis=1)
+        return np.asarray(np.where(good, error, np.inf))
+
+    def exact(self, place: Placement) -> float:
+        """m: largest error, cut and deflection solved together; infinite where a point fails."""
+        return float(np.abs(self.errors(place)).max())
+
+    def errors(self, place: Placement) -> Floats:
+        """(k,) m across the wall at the points of the search; infinite where one fails."""
+        job = self._at(place)
+        e = equilibrium(Plant(job, threads=self.threads), job.position)
+        fine = np.isfinite(e.error).all(axis=1) & (e.flags & LIMITS == 0)
+        normal = np.where(fine, np.nan_to_num((e.error * job.off).sum(axis=1)), np.inf)
+        return np.asarray(normal)
+
+    def refined(
+        self, at: Floats, turn: float, low: Floats, high: Floats, turns: tuple[float, float]
+    ) -> tuple[float, Placement]:
+        """Error and placement after a descent along the gradient of a high mean of the errors, within the box."""
+        scale = np.array([*np.maximum(high - low, 1e-3), 1.0])
+
+        def cost(x: Floats) -> float:
+            e = self.errors(Placement(x[:3] * scale[:3], float(x[3])))
+            top = float(np.abs(e).max())
+            return (
+                1e3
+                if not np.isfinite(top)
+                else 1e3 * top * float(((np.abs(e) / top) ** NORM).mean() ** (1 / NORM))
+            )
+
+        a, b = self._extent(np.array([turn]))
+        first, last = np.minimum(low - a[0], at), np.maximum(high - b[0], at)
+        bounds = [
+            (f / s, g / s) for f, g, s in zip([*first, turns[0]], [*last, turns[1]], scale, strict=True)
+        ]
+        found = minimize(
+            cost,
+            np.array([*at, turn]) / scale,
+            method="L-BFGS-B",
+            bounds=bounds,
+            options={"maxiter": 12, "eps": 1e-4},
+        )
+        places = [Placement(at, turn), Placement(found.x[:3] * scale[:3], float(found.x[3]))]
+        errors = [self.exact(p) for p in places]
+        best = int(np.argmin(errors))
+        return errors[best], places[best]
+
+    def what_limits(self, place: Placement, low: Floats, high: Floats) -> str:
+        """Sides of the box that the part touches, else the machine's stiffness there."""
+        a, b = self._extent(np.array([place.turn]))
+        names = [
+            f"{side} {axis}"
+            for side, gap in (("low", place.at + a[0] - low), ("high", high - place.at - b[0]))
+            for axis, g in zip("xyz", gap, strict=True)
+            if g < 1e-3
+        ]
+        return f"the box at {', '.join(names)}" if names else "the machine's stiffness"

@@ -1,0 +1,120 @@
+"""Compensated commands as a program: pieces of each move, joined where the error jumps."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.machining.milling.setting import Setting
+from stiffmap.machining.toolpath.gcode.load import load_gcode
+from stiffmap.machining.toolpath.gcode.write import rewritten
+from stiffmap.machining.toolpath.path import Kind, Toolpath, path_of
+from stiffmap.machining.toolpath.pieces import MovedPiece, arc_pieces, line_pieces
+
+WITHIN = 1e-6
+"""m: chord error of the pieces."""
+TOUCH = 2e-7
+"""m: ends of neighbouring moves that are nearer than this are one point."""
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A path with compensated positions."""
+
+    text: str
+    suffix: str
+    path: Toolpath
+    """The program as its own reader sees it."""
+    origin: NDArray[np.int64]
+    """(moves of `path`,) the move of the wanted path that each is a piece of."""
+    pieces: int
+    """Cutting moves that were written."""
+
+
+def program(job: Setting, command: Floats, within: float = WITHIN, feeds: Floats | None = None) -> Program:
+    """G-code with the structure of the original, or a table where the path came from one.
+
+    command: (m, 3) m, base axes. within: chord error, m. feeds: (moves,) m/s of the path's moves; None: as they are.
+    """
+    turn = None if job.angle is None else np.unwrap(job.angle)
+    path, points = job.path, job.points
+    part = job.place.back(command)
+    first = np.flatnonzero(np.diff(points.move, prepend=-1) != 0)
+    last = np.r_[first[1:], len(points)]
+    if not path.text:
+        return _table(job, part, turn)
+    moved: dict[int, list[MovedPiece]] = {}
+    starts: dict[int, tuple[Floats, float]] = {}
+    end_before: Floats | None = None
+    for a, b in zip(first, last, strict=True):
+        i = int(points.move[a])
+        q, t = part[a:b], None if turn is None else turn[a:b]
+        if points.share[a] > 0:  # the joint with the move before stands there
+            assert end_before is not None
+            q = np.vstack([end_before, q])
+            t = None if turn is None else turn[a - 1 : b]
+        pieces = []
+        joined = end_before is not None and i > 0 and path.cuts[i - 1]
+        if joined and end_before is not None and np.linalg.norm(q[0] - end_before) > TOUCH:
+            pieces.append(MovedPiece(Kind.LINE, q[0], np.full(3, np.nan), 0.0, _first(t)))
+        if path.kind[i] == Kind.ARC:
+            pieces += arc_pieces(q, int(path.normal[i]), float(np.sign(path.sweep[i])), within, t)
+        else:
+            pieces += line_pieces(q, within, t)
+        moved[i], starts[i], end_before = pieces, (q[0], _first(t)), q[-1]
+    for i in starts:  # what leads to a cut ends where the cut now starts
+        if i > 0 and i - 1 not in starts:
+            end, angle = starts[i]
+            moved[i - 1] = [MovedPiece(Kind(int(path.kind[i - 1])), end, np.full(3, np.nan), 0.0, angle)]
+    text, origin = rewritten(_turning(path, points.move[first], turn, first, last), moved, feeds)
+    again = load_gcode(text.splitlines(), name=path.name, offsets=path.offsets or None)
+    return Program(text, ".ngc", again, np.array(origin), sum(map(len, moved.values())))
+
+
+def _turning(
+    path: Toolpath,
+    cuts: NDArray[np.int64],
+    turn: Floats | None,
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
+) -> Toolpath:
+    """The path with the tool's turn on the moves between cuts: a retreat keeps it, what follows turns to where the next cut begins."""
+    if turn is None:
+        return path
+    now = np.full(len(path), turn[first[0]])
+    for k, i in enumerate(cuts):
+        later = cuts[k + 1] if k + 1 < len(cuts) else len(path)
+        next_turn = turn[first[k + 1]] if k + 1 < len(cuts) else turn[last[k] - 1]
+        now[i] = turn[last[k] - 1]
+        now[i + 1 : later] = next_turn
+        if later > i + 2:
+            now[i + 1] = now[i]
+    return replace(path, turn=now)
+
+
+def _first(turn: Floats | None) -> float:
+    return float("nan") if turn is None else float(turn[0])
+
+
+def _table(job: Setting, part: Floats, turn: Floats | None) -> Program:
+    """Points of the compensated path with feed, spindle and tool axis."""
+    points, path = job.points, job.path
+    buffer = io.StringIO()
+    out = csv.writer(buffer, lineterminator="\n")
+    spindle = np.where(np.isfinite(points.spindle), points.spindle, job.process.spindle)
+    names = ["x_mm", "y_mm", "z_mm", "feed_mm_min", "spindle_rpm", "i", "j", "k"]
+    out.writerow(names + ([] if turn is None else ["turn_deg"]))
+    columns = np.hstack([1e3 * part, (6e4 * job.feed)[:, None], (spindle * 30 / np.pi)[:, None], points.tool])
+    if turn is not None:
+        columns = np.hstack([columns, np.degrees(turn)[:, None]])
+    for row in columns:
+        out.writerow([f"{v:.9g}" if k > 2 else f"{v:.6f}" for k, v in enumerate(row)])
+    again = path_of(
+        np.round(part, 9), feed=job.feed, spindle=spindle, tool=points.tool, name=path.name, turn=turn
+    )
+    return Program(buffer.getvalue(), ".csv", again, points.move[1:], len(again))

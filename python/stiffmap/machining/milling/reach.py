@@ -1,0 +1,52 @@
+"""Paths that leave the workspace: which points, and where the part would fit."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.machining.milling.setting import Setting
+from stiffmap.solve.status import Status
+
+
+def reached(job: Setting, position: Floats, threads: int | None = None) -> NDArray[np.bool_]:
+    """(...,) bool: poses (..., m, 3) that the machine takes without load."""
+    s = job.machine.solve(position, rotation=job.rotation, stiffness=False, threads=threads)
+    return np.asarray(s.status != Status.UNREACHABLE)
+
+
+def must_reach(job: Setting, threads: int | None = None) -> None:
+    """Raise StiffmapError naming the points out of reach, how far the part sticks out, and a place that holds it."""
+    ok = reached(job, job.position, threads)
+    if not ok.all():
+        _refuse(job, ok, threads)
+
+
+def _refuse(job: Setting, ok: NDArray[np.bool_], threads: int | None) -> NoReturn:
+    lost = np.flatnonzero(~ok)
+    lines = job.path.line[job.points.move[lost]]
+    first = 1e3 * job.position[lost[0]]
+    where = ", ".join(f"{v:.1f}" for v in first)
+    text = (
+        f"the path leaves the workspace of {job.machine.name}: {lost.size} of {len(job)} points, the first at ({where}) mm, "
+        f"line {lines[0]} of the path"
+    )
+    box = job.machine.description.workspace
+    if box is None:
+        raise StiffmapError(text)
+    low, high = np.array(box[0]), np.array(box[1])
+    out = np.maximum(np.maximum(low - job.position, job.position - high), 0.0).max(axis=0)
+    text += f"; beyond the declared box by up to ({', '.join(f'{1e3 * v:.1f}' for v in out)}) mm"
+    size = job.position.max(axis=0) - job.position.min(axis=0)
+    if (size > high - low).any():
+        raise StiffmapError(f"{text}; the part is larger than that box")
+    middle = (job.position.max(axis=0) + job.position.min(axis=0)) / 2
+    shift = (low + high) / 2 - middle
+    fits = reached(job, job.position + shift, threads).all()
+    at = 1e3 * (job.place.at + shift)
+    hint = f"; it fits with the part's origin at ({', '.join(f'{v:.1f}' for v in at)}) mm" if fits else ""
+    raise StiffmapError(text + hint)

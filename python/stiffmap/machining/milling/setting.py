@@ -1,0 +1,194 @@
+"""One job: a machine, the points of a path on it, and the force that the cut makes at each (theory.md, M9)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.machining.process.description import Process
+from stiffmap.machining.process.mean import mean_force, widened
+from stiffmap.machining.toolpath import Box, Placement, Points, Toolpath, engagement
+from stiffmap.machining.toolpath.engagement import Engagement, part_side
+from stiffmap.solve.machine import Machine
+
+SMALL = 1e-8
+"""m of a central difference of the force."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """m points in base axes, SI."""
+
+    machine: Machine
+    process: Process
+    path: Toolpath
+    points: Points
+    place: Placement
+    engaged: Engagement
+    position: Floats
+    """(m, 3) where the tool's tip is wanted."""
+    tangent: Floats
+    off: Floats
+    """(m, 3) away from the part's wall; of a slot to the left."""
+    tool: Floats
+    """(m, 3) from the tip to the holder."""
+    rotation: Floats
+    """(m, 3, 3) commanded orientation."""
+    feed: Floats
+    """(m,) m/s."""
+    faster: Floats
+    """(m,) feed per revolution as a multiple of the process's own."""
+    angle: Floats | None = None
+    """(m,) rad, turn of an arm's tool about its axis; None: as at home."""
+    scale: float = 1.0
+    """Of the force: 0.8 to 1.2 for a band of 20 %."""
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    @property
+    def coupled(self) -> tuple[bool, bool]:
+        """Whether the cut follows the deflection off the wall, and along the tool."""
+        return self.process.cut.side != "slot", not self.process.cut.through
+
+    @cached_property
+    def axes(self) -> Floats:
+        """(m, 3, 3) rows: feed, normal, along the tool from holder to tip."""
+        side = part_side(self.process)
+        return np.stack([self.tangent, -side * self.off, -self.tool], axis=1)
+
+    @cached_property
+    def ways(self) -> Floats:
+        """(m, 2, 3) directions that change the cut: off the wall, and along the tool to its holder."""
+        return np.stack([self.off, self.tool], axis=1)
+
+    def width(self, off: Floats) -> Floats:
+        """(m,) m: width of the straight cut that has the engaged arc, the tool pushed `off` (m,) m."""
+        e, r = self.engaged, self.process.tool.diameter / 2
+        radial = np.clip(e.radial - off, 0.0, 2 * r)
+        w = widened(self.process, radial, e.curvature)
+        if not e.corner.any():
+            return w
+        arc = np.arccos(np.clip(1 - w / r, -1.0, 1.0)) + np.where(radial > 0, e.corner, 0.0)
+        return np.asarray(r * (1 - np.cos(np.minimum(arc, np.pi))))
+
+    def force(self, away: Floats) -> Floats:
+        """(m, 3) N, base axes, of the tool pushed (m, 2) m off the wall and up."""
+        side, depth = self.coupled
+        width = self.width(away[:, 0] if side else np.zeros(len(self)))
+        axial = np.maximum(self.engaged.axial - (away[:, 1] if depth else 0.0), 0.0)
+        local = mean_force(self.process, width, axial, self.faster)
+        return np.asarray(self.scale * np.einsum("mi,mij->mj", local, self.axes))
+
+    def force_slopes(self, away: Floats) -> Floats:
+        """(m, 3, 2) N/m of `force` by both, central differences; 0 for what does not couple."""
+        out = np.zeros((len(self), 3, 2))
+        for k, on in enumerate(self.coupled):
+            if on:
+                step = np.zeros((1, 2))
+                step[0, k] = SMALL
+                out[:, :, k] = (self.force(away + step) - self.force(away - step)) / (2 * SMALL)
+        return out
+
+
+def setting(
+    machine: Machine,
+    path: Toolpath,
+    process: Process,
+    points: Points,
+    place: Placement,
+    *,
+    stock: Box | None = None,
+    thickness: float | None = None,
+    angle: Floats | None = None,
+    scale: float = 1.0,
+) -> Setting:
+    """A job; `angle` (m,) rad turns the tool of an arm about its axis. Raises StiffmapError for what does not go together."""
+    if angle is not None and np.shape(angle) != (len(points),):
+        raise StiffmapError(f"angle: expected {len(points)} turns of the tool (rad), one for each point")
+    _check(path, process, points)
+    if angle is None and path.turn is not None:
+        if len(machine.actuators) < 6:
+            raise FileError(
+                f"the path turns the tool about its axis (C, turn_deg); {machine.name} has no such motion: it needs six drives",
+                file=path.name,
+            )
+        angle = path.turn_at(points.move, points.share)
+    tool = place.vectors(points.tool)
+    return Setting(
+        machine,
+        process,
+        path,
+        points,
+        place,
+        engagement(points, path, process, stock, thickness),
+        place.points(points.position),
+        place.vectors(points.tangent),
+        -part_side(process) * place.vectors(points.normal),
+        tool,
+        orientations(machine, tool, place, angle),
+        np.where(np.isfinite(points.feed), points.feed, process.feed),
+        _faster(points, process),
+        angle,
+        scale,
+    )
+
+
+def _check(path: Toolpath, process: Process, points: Points) -> None:
+    for wrong, message in (
+        (points.spindle == 0, "the spindle is off in a cut: expected M3 and S above zero before it"),
+        (points.spindle < 0, "the spindle turns counter-clockwise (M4): the process is for a clockwise one"),
+        (points.feed <= 0, "expected a feed above zero"),
+    ):
+        if wrong.any():
+            line = int(path.line[points.move[int(np.argmax(wrong))]])
+            raise FileError(message, file=path.name, line=line)
+    thick = _faster(points, process) * process.chip
+    if process.tool.teeth and (thick > process.tool.diameter / 2).any():
+        at = int(np.argmax(thick))
+        raise FileError(
+            f"the chip is too thick: {1e3 * thick[at]:.4g} mm per tooth with this feed and spindle speed",
+            file=path.name,
+            line=int(path.line[points.move[at]]),
+        )
+
+
+def _faster(points: Points, process: Process) -> Floats:
+    feed = np.where(np.isfinite(points.feed), points.feed, process.feed)
+    spindle = np.where(np.isfinite(points.spindle), points.spindle, process.spindle)
+    return np.asarray(feed / spindle / (process.feed / process.spindle))
+
+
+def orientations(machine: Machine, tool: Floats, place: Placement, angle: Floats | None) -> Floats:
+    """(m, 3, 3): at home the tool stands along the base's z; elsewhere the smallest turn from there, then `angle` about it."""
+    home = machine.description.home.r
+    upright = np.array([0.0, 0.0, 1.0])
+    if np.abs(tool - upright).max() < 1e-12:
+        base = np.broadcast_to(home, (len(tool), 3, 3))
+    else:
+        axis = np.cross(upright, tool)
+        cosine = tool[:, 2]
+        if (cosine < -1 + 1e-9).any():
+            raise StiffmapError("tool axis: a tool that points upwards from below has no smallest turn")
+        skew = _skew(axis)
+        base = (np.eye(3) + skew + skew @ skew / (1 + cosine)[:, None, None]) @ home
+    if angle is None:
+        return np.asarray(base)
+    skew = _skew(tool)
+    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    return np.asarray((np.eye(3) + s * skew + (1 - c) * skew @ skew) @ base)
+
+
+def _skew(v: Floats) -> Floats:
+    out = np.zeros((len(v), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
+    return np.asarray(out - np.swapaxes(out, 1, 2))
+
+
+def scaled(job: Setting, scale: float) -> Setting:
+    """The same with the whole force scaled."""
+    return replace(job, scale=scale * job.scale)

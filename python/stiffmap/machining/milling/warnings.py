@@ -1,0 +1,62 @@
+"""Warnings at points of a job: each has a name, the points that it is about, and one sentence.
+
+A further kind of warning is a function of the job and its dataset in SOURCES.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from stiffmap.machining.milling.limits import outside
+from stiffmap.machining.milling.setting import Setting
+
+
+@dataclass(frozen=True, eq=False)
+class Warned:
+    """One warning."""
+
+    name: str
+    """Few words, as ``drive speed``."""
+    points: NDArray[np.bool_]
+    """(m,)."""
+    text: str
+    """A sentence for the report."""
+    finding: bool = True
+    """Whether the command ends with exit code 1."""
+
+
+def limits(job: Setting, ds: xr.Dataset) -> list[Warned]:
+    """Ranges, efforts and speeds of the drives; the box of the machine file is only mentioned."""
+    out = []
+    for name, points in outside(ds, job.machine).items():
+        text = f"The {name} is broken at {int(points.sum())} of {points.size} points."
+        if name == "declared workspace":
+            text = f"{int(points.sum())} of {points.size} points are outside the workspace that the machine file declares."
+        out.append(Warned(name, points, text, finding=name != "declared workspace"))
+    return out
+
+
+def chatter(job: Setting, ds: xr.Dataset) -> list[Warned]:
+    """Where the cut is unstable, with speeds of the spindle that are stable all along the path."""
+    if "multiplier" not in ds:
+        return []
+    return [Warned("chatter", ds.multiplier.values > 1, ds.multiplier.attrs["said"])]
+
+
+SOURCES: tuple[Callable[[Setting, xr.Dataset], list[Warned]], ...] = (limits, chatter)
+
+
+def warned(job: Setting, ds: xr.Dataset) -> tuple[Warned, ...]:
+    """All warnings that are about at least one point; the dataset gets `warnings` (m,), one bit for each of its attribute `names`."""
+    found = tuple(w for source in SOURCES for w in source(job, ds) if w.points.any())
+    bits = np.zeros(len(job), np.uint32)
+    for k, w in enumerate(found):
+        bits |= np.where(w.points, np.uint32(1 << k), np.uint32(0))
+    ds["warnings"] = ("point", bits)
+    ds["warnings"].attrs["names"] = [w.name for w in found]
+    return found

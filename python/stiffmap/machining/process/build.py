@@ -1,0 +1,183 @@
+"""From the keys of a process file to a process: units, bounds, what goes together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import isfinite, pi
+from typing import Any, NoReturn
+
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.yaml_text import Document
+from stiffmap.machining.process.description import Cut, EndMill, Kienzle, Law, Process, Tool, Trimming
+from stiffmap.machining.process.schema import ProcessFile, Quantity
+from stiffmap.model.files.report import key_text, validated
+from stiffmap.model.files.schema.base import describe
+from stiffmap.workspace.performance.quantities import quantity
+
+LAWS = ("end_mill", "kienzle", "trimming")
+PRESSURE, EDGE = "N/m2", "N/m"
+UNITS = {
+    **dict.fromkeys(("Ktc", "Krc", "Kac", "kc11", "rubbing", "specific_energy"), PRESSURE),
+    **dict.fromkeys(("Kte", "Kre", "Kae"), EDGE),
+}
+LARGEST = 10**30
+LONGEST = 1.0
+"""m of a tool or a cut: above, millimetres were meant."""
+
+
+@dataclass
+class Reader:
+    """Numbers of one file, with the place of what is wrong."""
+
+    document: Document
+    file: str
+    uncertainty: dict[str, float] = field(default_factory=dict)
+
+    def fail(self, message: str, *keys: str | int) -> NoReturn:
+        """Raise an error at a key."""
+        raise FileError(message, file=self.file, line=self.document.line(keys), key=key_text(keys))
+
+    def si(self, value: object, unit: str, *keys: str | int) -> float:
+        """SI value of a number with its unit."""
+        if isinstance(value, int) and abs(value) > LARGEST:
+            self.fail("the number is too large", *keys)
+        text = str(value).replace("J/", "N*m/") if unit == PRESSURE else value
+        try:
+            out = quantity(text, unit)
+        except (StiffmapError, ZeroDivisionError, OverflowError) as error:
+            self.fail(str(error), *keys)
+        if not isfinite(out):
+            self.fail(f"expected a finite number, found {value!r}", *keys)
+        return out
+
+    def positive(self, value: object, unit: str, *keys: str | int, most: float = float("inf")) -> float:
+        """The same, above zero and not above `most`."""
+        out = self.si(value, unit, *keys)
+        if not 0 < out <= most:
+            limit = "" if isfinite(most) is False else f" and at most {1e3 * most:g} mm"
+            self.fail(f"expected a number above zero{limit}, found {value!r}", *keys)
+        return out
+
+    def with_u(self, given: Quantity, unit: str, name: str, *keys: str) -> float:
+        """SI value of a number of the law; its uncertainty is kept."""
+        out = self.si(given.value, unit, *keys)
+        if given.u is not None:
+            u = self.si(given.u, unit, *keys, "u")
+            if u < 0:
+                self.fail(f"expected an uncertainty of zero or more, found {given.u!r}", *keys, "u")
+            self.uncertainty[name] = u
+        return out
+
+    def rate(self, value: object, *keys: str) -> float:
+        """rad/s of ``6000 rpm`` or ``100 Hz``."""
+        text = str(value).strip()
+        if text.endswith("rpm"):
+            return self.positive(text.removesuffix("rpm"), "", *keys) * 2 * pi / 60
+        if not text.endswith("Hz"):
+            self.fail(f"expected a speed of the spindle such as 6000 rpm, found {text!r}", *keys)
+        return self.positive(text, "Hz", *keys) * 2 * pi
+
+
+def process_of(document: Document, file: str) -> Process:
+    """Schema, then units; raises `FileError` naming file, line and key."""
+    expected = "a process file is a mapping with name, tool, law, spindle, feed and cut"
+    m = validated(ProcessFile, document, file, expected)
+    r = Reader(document, file)
+    tool = _tool(m, r)
+    spindle = r.rate(m.spindle, "spindle")
+    feed = _feed(m.feed, tool, spindle, r)
+    cut = _cut(m, tool, r)
+    law = _law(m, tool, r)
+    process = Process(
+        m.name, tool, law, spindle, feed, cut,
+        None if m.tolerance is None else r.positive(m.tolerance, "m", "tolerance"),
+        m.title, m.source, r.uncertainty,
+    )  # fmt: skip
+    if tool.teeth and process.chip > tool.diameter / 2:
+        r.fail(
+            f"the chip is too thick: {1e3 * process.chip:.4g} mm per tooth at {60e3 * feed:.4g} mm/min and "
+            f"{spindle * 30 / pi:.4g} rpm; expected at most half the tool's diameter", "feed"
+        )  # fmt: skip
+    return process
+
+
+def _tool(m: ProcessFile, r: Reader) -> Tool:
+    t = m.tool
+    diameter = r.positive(t.diameter, "m", "tool", "diameter", most=LONGEST)
+    coated = t.teeth == "coated"
+    if not coated and (not isinstance(t.teeth, int) or not 1 <= t.teeth <= 1000):
+        r.fail(f"expected 1 to 1000 teeth, or coated; found {describe(t.teeth)}", "tool", "teeth")
+    teeth = t.teeth if isinstance(t.teeth, int) else 0
+    helix = r.si(t.helix, "rad", "tool", "helix")
+    if not abs(helix) < pi / 2 * 0.95:
+        r.fail(f"expected a helix angle below 85 deg, found {t.helix!r}", "tool", "helix")
+    out, angle = 0.0, 0.0
+    if t.runout is not None:
+        out = r.si(t.runout.offset, "m", "tool", "runout", "offset")
+        angle = r.si(t.runout.angle, "rad", "tool", "runout", "angle")
+        if not 0 <= out < diameter / 4:
+            r.fail(
+                f"expected zero to a quarter of the diameter, found {t.runout.offset!r}",
+                "tool", "runout", "offset",
+            )  # fmt: skip
+    stick = r.si(t.stick_out, "m", "tool", "stick_out")
+    if stick < 0:
+        r.fail(f"expected a length of zero or more, found {t.stick_out!r}", "tool", "stick_out")
+    modulus = 0.0 if t.modulus is None else r.positive(t.modulus, PRESSURE, "tool", "modulus")
+    return Tool(diameter, teeth, helix, out, angle, stick, modulus)
+
+
+def _feed(value: object, tool: Tool, spindle: float, r: Reader) -> float:
+    text = str(value).strip()
+    if text.endswith("/tooth"):
+        if not tool.teeth:
+            r.fail("a coated tool has no feed per tooth; expected such as 10 m/min", "feed")
+        return r.positive(text.removesuffix("/tooth"), "m", "feed") * tool.teeth * spindle / (2 * pi)
+    return r.positive(value, "m/s", "feed")
+
+
+def _cut(m: ProcessFile, tool: Tool, r: Reader) -> Cut:
+    c = m.cut
+    axial = r.positive(c.axial, "m", "cut", "axial", most=LONGEST)
+    if c.radial is None:
+        if c.side != "slot":
+            r.fail(f"missing key 'radial': the width of a {c.side} cut", "cut")
+        return Cut(c.side, tool.diameter, axial, c.through)
+    radial = r.positive(c.radial, "m", "cut", "radial")
+    if c.side == "slot" and radial != tool.diameter:
+        r.fail(
+            f"a slot is as wide as the tool ({1e3 * tool.diameter:g} mm), found {c.radial!r}", "cut", "radial"
+        )
+    if radial > tool.diameter:
+        r.fail(
+            f"expected at most the tool's diameter ({1e3 * tool.diameter:g} mm), found {c.radial!r}",
+            "cut", "radial",
+        )  # fmt: skip
+    return Cut(c.side, radial, axial, c.through)
+
+
+def _law(m: ProcessFile, tool: Tool, r: Reader) -> Law:
+    given = [n for n in LAWS if getattr(m.law, n) is not None]
+    if len(given) != 1:
+        r.fail(f"expected one of {', '.join(LAWS)}, found {', '.join(given) or 'none'}", "law")
+    name = given[0]
+    if (name == "trimming") != (tool.teeth == 0):
+        r.fail(
+            f"the law {name} is for a tool {'without' if name == 'trimming' else 'with'} a number of teeth",
+            "law",
+            name,
+        )
+    model = getattr(m.law, name)
+    values: dict[str, Any] = {
+        k: r.with_u(getattr(model, k), UNITS.get(k, ""), k, "law", name, k) for k in type(model).model_fields
+    }
+    for k in ("Ktc", "kc11", "specific_energy"):
+        if k in values and not values[k] > 0:
+            r.fail(f"expected a number above zero, found {getattr(model, k).value!r}", "law", name, k)
+    if name == "end_mill":
+        return EndMill(**values)
+    if name == "trimming":
+        return Trimming(**values)
+    if not 0 <= values["mc"] < 1:
+        r.fail(f"expected an exponent from 0 to below 1, found {model.mc.value!r}", "law", name, "mc")
+    return Kienzle(values["kc11"], values["mc"], values["radial"], values["axial"])

@@ -1,0 +1,6 @@
+"""Laws of the cutting force from measured forces."""
+
+from stiffmap.machining.process.identify.law import IdentifiedLaw, identify_process
+from stiffmap.machining.process.identify.table import ForceTable, read_table
+
+__all__ = ["ForceTable", "IdentifiedLaw", "identify_process", "read_table"]

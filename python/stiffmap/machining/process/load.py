@@ -1,0 +1,44 @@
+"""Reading process files, and those that come with stiffmap."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from stiffmap.common.deprecation import renamed
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.yaml_text import Document, read
+from stiffmap.machining.process.build import process_of
+from stiffmap.machining.process.description import Process
+from stiffmap.model.files.schema.base import suggestion
+
+FOLDER = Path(__file__).with_name("library")
+
+
+def process_names() -> list[str]:
+    """Names of the processes that come with stiffmap."""
+    return sorted(p.stem for p in FOLDER.glob("*.yaml"))
+
+
+@renamed(name_path_or_dict="source")
+def load_process(source: str | PathLike[str] | Mapping[str, Any]) -> Process:
+    """A process by its shipped name (``trimming``, ``slot``), from a file, or from a mapping with the file's keys.
+
+    Numbers carry units there (docs/milling.md); the result is in SI. Raises FileError naming file, line, key,
+    what was expected and what was found.
+    """
+    if isinstance(source, Mapping):
+        return process_of(Document(dict(source)), "process")
+    if not isinstance(source, str | PathLike):
+        raise StiffmapError(f"process: expected a name, a file or a mapping; got {type(source).__name__}")
+    path = FOLDER / f"{source}.yaml" if str(source) in process_names() else Path(source)
+    if not path.is_file():
+        known = process_names()
+        raise FileError(
+            f"no such process file, and no process of that name is shipped{suggestion(path.stem, known)}; "
+            f"these are: {', '.join(known)}",
+            file=str(source),
+        )
+    return process_of(read(path), str(path))

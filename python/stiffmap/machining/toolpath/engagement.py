@@ -1,0 +1,126 @@
+"""How wide and deep the tool cuts along a path: stock, curves, inside corners (theory.md, M5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.machining.process.description import Process
+from stiffmap.machining.toolpath.path import Toolpath
+from stiffmap.machining.toolpath.sampling import Points
+
+LEAST_CORNER = np.radians(1.0)
+"""Turn below which two moves make no corner."""
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Stock as a box: (3,) m lowest and highest corner, axes of the part. A plate is a box without ends in x and y."""
+
+    low: Floats
+    high: Floats
+
+
+def box(low: ArrayLike, high: ArrayLike) -> Box:
+    """Checked corners, m."""
+    a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+    if a.shape != (3,) or b.shape != (3,) or not (a < b).all():
+        raise StiffmapError(f"stock: expected two corners (3,) in m, the lower first; got {low!r}, {high!r}")
+    return Box(a, b)
+
+
+def plate(top: float, bottom: float) -> Box:
+    """Stock without ends in x and y between two heights, m."""
+    return box([-1e3, -1e3, bottom], [1e3, 1e3, top])
+
+
+@dataclass(frozen=True, eq=False)
+class Engagement:
+    """At m points."""
+
+    radial: Floats
+    """(m,) m, width of the stock ahead of the wall; the tool cuts at most its diameter of it."""
+    curvature: Floats
+    """(m,) 1/m of the centre's path, positive where the part lies outside the curve."""
+    corner: Floats
+    """(m,) rad: arc that the next wall of an inside corner adds ahead."""
+    axial: Floats
+    """(m,) m, depth."""
+
+
+def part_side(process: Process) -> float:
+    """-1 where the part lies right of the travel (climb), 1 left; a slot has its walls on both, the left one is taken."""
+    return -1.0 if process.cut.side == "climb" else 1.0
+
+
+def engagement(
+    points: Points, path: Toolpath, process: Process, stock: Box | None = None, thickness: float | None = None
+) -> Engagement:
+    """Width and depth at each point: the process's own, or a `thickness` to trim (m), or what a box of stock holds."""
+    m = len(points)
+    side = part_side(process)
+    radial = np.full(m, process.cut.radial if thickness is None else float(thickness))
+    if thickness is not None and not 0 < thickness <= process.tool.diameter:
+        raise StiffmapError(
+            f"thickness: expected above zero and at most the tool's diameter of {1e3 * process.tool.diameter:g} mm, "
+            f"got {1e3 * thickness:g} mm"
+        )
+    axial = np.full(m, process.cut.axial)
+    if stock is not None:
+        radial, axial = _in_box(points, process, stock, side)
+    if process.cut.side == "slot":
+        return Engagement(radial, np.zeros(m), np.zeros(m), axial)
+    curvature = _over_contact(points, process, -side * (points.bend * points.normal).sum(axis=1))
+    return Engagement(radial, curvature, _corners(points, path, process, radial, side), axial)
+
+
+def _over_contact(points: Points, process: Process, curvature: Floats) -> Floats:
+    """Mean over the way from abeam to the front end of the contact: where a line becomes an arc the cut changes over that way."""
+    ahead = process.tool.diameter / 2 * np.sin(min(process.arc, np.pi / 2))
+    step = np.diff(points.way, prepend=points.way[:1])
+    before = np.r_[curvature[:1], curvature[:-1]]
+    turned = np.cumsum(step * (curvature + before) / 2)
+    end = np.minimum(points.way + ahead, points.way[-1])
+    length = end - points.way
+    mean = np.interp(end, points.way, turned) - turned
+    return np.where(length > 1e-9, mean / np.maximum(length, 1e-12), curvature)
+
+
+def _in_box(points: Points, process: Process, stock: Box, side: float) -> tuple[Floats, Floats]:
+    """From the wall of the part away from it until the stock ends; from the tip up to its top."""
+    out = -side * points.normal
+    wall = points.position - process.tool.diameter / 2 * out
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = np.stack([(stock.low - wall) / out, (stock.high - wall) / out])
+    far = np.where(np.abs(out) < 1e-12, np.inf, t.max(axis=0)).min(axis=1)
+    near = np.where(np.abs(out) < 1e-12, -np.inf, t.min(axis=0)).max(axis=1)
+    inside = ((wall >= stock.low - 1e-9) & (wall <= stock.high + 1e-9)) | (np.abs(out) > 1e-12)
+    width = np.where(inside[:, :2].all(axis=1), far - np.maximum(near, 0.0), 0.0)
+    height = (stock.high[2] - points.position[:, 2]).clip(0.0, stock.high[2] - stock.low[2])
+    return width.clip(0.0), height.clip(0.0, process.cut.axial)
+
+
+def _corners(points: Points, path: Toolpath, process: Process, radial: Floats, side: float) -> Floats:
+    """Ahead of an inside corner the tool already meets the stock of the next wall (theory.md, M8)."""
+    extra = np.zeros(len(points))
+    r = process.tool.diameter / 2
+    ends = np.flatnonzero(np.diff(points.move, append=-1) != 0)
+    starts = np.r_[0, ends[:-1] + 1]
+    here, there = ends[:-1], starts[1:]
+    a, b = points.tangent[here], points.tangent[there]
+    touch = np.linalg.norm(points.position[here] - points.position[there], axis=1) < 1e-9
+    turn = np.arctan2((np.cross(a, b) * points.tool[here]).sum(axis=1), (a * b).sum(axis=1))
+    inside = -side * turn  # positive: away from the part
+    for k in np.flatnonzero(touch & (inside > LEAST_CORNER) & (inside < np.pi)):
+        theta = inside[k]
+        rows = np.arange(starts[k], ends[k] + 1)
+        ahead = (points.way[ends[k]] - points.way[rows]) * np.sin(min(theta, np.pi / 2))
+        share = np.clip(1 - (radial[rows] - ahead) / r, -1.0, 1.0)
+        half = np.where(radial[rows] > ahead, np.arccos(share), -np.inf)
+        own = np.arccos(np.clip(1 - radial[rows] / r, -1.0, 1.0))
+        extra[rows] = np.maximum(extra[rows], np.maximum(theta + half - own, 0.0))
+    return extra

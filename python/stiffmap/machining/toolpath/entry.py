@@ -1,0 +1,106 @@
+"""Where a closed outline begins: the same moves, entered elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.machining.toolpath.gcode.fresh import with_lines
+from stiffmap.machining.toolpath.path import Kind, Toolpath
+
+CLOSED = 1e-6
+"""m between the start and the end of an outline that counts as closed."""
+NEAR = 1e-7
+"""m from the end of a move, at which no move is divided."""
+
+
+def outline_of(path: Toolpath) -> tuple[int, int]:
+    """First and last move of the one closed outline that a path cuts. Raises StiffmapError where there is none, or more than one."""
+    cuts = np.flatnonzero(path.cuts)
+    if cuts.size:
+        first, last = int(cuts[0]), int(cuts[-1])
+        whole = last - first + 1 == cuts.size
+        touch = np.linalg.norm(path.end[first:last] - path.start[first + 1 : last + 1], axis=1) < CLOSED
+        if whole and touch.all() and np.linalg.norm(path.end[last] - path.start[first]) < CLOSED:
+            return first, last
+    raise StiffmapError(
+        f"{path.name}: an entry can be chosen where the cuts are one closed outline; here they are open or several"
+    )
+
+
+def entered_at(path: Toolpath, way: float) -> Toolpath:
+    """The same closed outline begun after `way` (m) of its cuts; approach and retreat go there. The feed is that of the move.
+
+    A path read from G-code gets lines of its own; comments and modes of the old ones are not kept.
+    """
+    first, last = outline_of(path)
+    length = path.length[first : last + 1]
+    if not 0 <= way <= length.sum():
+        raise StiffmapError(
+            f"entry: expected 0 to {1e3 * length.sum():.6g} mm along the outline, got {1e3 * way:.6g} mm"
+        )
+    ends = np.cumsum(length)
+    k = int(np.searchsorted(ends, way + NEAR))
+    k, rest = (0, 0.0) if k == len(ends) else (k, way - (ends[k] - length[k]))
+    whole = rest < NEAR
+    if k == 0 and whole:
+        return path
+    loop = [*range(first + k, last + 1), *range(first, first + k)]
+    here = first + k
+    order = [*range(first), *loop, *([] if whole else [here]), *range(last + 1, len(path))]
+    start, end, sweep = path.start[order].copy(), path.end[order].copy(), path.sweep[order].copy()
+    place = path.start[here]
+    if not whole:
+        share = rest / length[k]
+        place = path.at([here], [share])[0][0]
+        start[first], end[last + 1] = place, place
+        sweep[first], sweep[last + 1] = (1 - share) * path.sweep[here], share * path.sweep[here]
+    shift = place - path.start[first]
+    pre, post = slice(0, first), slice(last + (1 if whole else 2), len(order))
+    for part, old in ((pre, path.start[first]), (post, path.end[last])):
+        start[part] = _moved(start[part], old, shift)
+        end[part] = _moved(end[part], old, shift)
+    arrays = ("kind", "centre", "normal", "feed", "spindle", "line", "tool")
+    made = replace(
+        path, start=start, end=end, sweep=sweep, text=(),
+        turn=None if path.turn is None else path.turn[order], **{n: getattr(path, n)[order] for n in arrays},
+    )  # fmt: skip
+    return with_lines(made, path)
+
+
+def turned_round(path: Toolpath) -> Toolpath:
+    """The same cuts run the other way, so that what was a climb cut is a conventional one; approach and retreat change places.
+
+    A path read from G-code gets lines of its own; comments and modes of the old ones are not kept.
+    """
+    cuts = np.flatnonzero(path.cuts)
+    if not cuts.size:
+        raise StiffmapError(f"{path.name}: no move cuts (moves at a feed across the tool)")
+    first, last = int(cuts[0]), int(cuts[-1])
+    order = [*range(first), *range(last, first - 1, -1), *range(last + 1, len(path))]
+    start, end = path.start[order].copy(), path.end[order].copy()
+    sweep, centre = path.sweep[order].copy(), path.centre[order].copy()
+    middle, pre, post = slice(first, last + 1), slice(0, first), slice(last + 1, len(path))
+    start[middle], end[middle] = end[middle].copy(), start[middle].copy()
+    sweep[middle] *= -1
+    arcs = np.flatnonzero(path.kind[order] == Kind.ARC)
+    axis = np.eye(3)[path.normal[order][arcs]]
+    centre[arcs] = centre[arcs] * (1 - axis) + start[arcs] * axis
+    shift = path.end[last] - path.start[first]
+    for part, old, way in ((pre, path.start[first], shift), (post, path.end[last], -shift)):
+        start[part], end[part] = _moved(start[part], old, way), _moved(end[part], old, way)
+    arrays = ("kind", "normal", "feed", "spindle", "line", "tool")
+    made = replace(
+        path, start=start, end=end, sweep=sweep, centre=centre, text=(),
+        turn=None if path.turn is None else path.turn[order], **{n: getattr(path, n)[order] for n in arrays},
+    )  # fmt: skip
+    return with_lines(made, path)
+
+
+def _moved(points: Floats, old: Floats, shift: Floats) -> Floats:
+    """Points over or at the old entry, over or at the new one."""
+    over = np.abs(points[:, :2] - old[:2]).max(axis=1, initial=0.0) < CLOSED
+    return np.asarray(np.where(np.reshape(over, (-1, 1)), points + shift, points))

@@ -1,0 +1,94 @@
+"""A G-code file as a toolpath."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import FileError
+from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
+from stiffmap.machining.toolpath.path import Kind, Toolpath
+
+NUMBERS = 13
+KINDS = {"G0": Kind.RAPID, "G1": Kind.LINE, "G2": Kind.ARC, "G3": Kind.ARC}
+
+
+def lines_of(path: Path) -> Iterator[str]:
+    """Lines of a text file; raises FileError where it cannot be read."""
+    try:
+        with path.open(encoding="utf-8", errors="strict") as stream:
+            yield from stream
+    except UnicodeDecodeError as error:
+        raise FileError("not UTF-8 text", file=str(path)) from error
+    except OSError as error:
+        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
+
+
+def load_gcode(
+    source: Path | Iterable[str],
+    *,
+    name: str = "",
+    offsets: Mapping[str, Sequence[float]] | None = None,
+    progress: Callable[[int], None] | None = None,
+    keep_text: bool = True,
+) -> Toolpath:
+    """Moves of a program.
+
+    offsets: work offsets by name (``G54``), m; None: all zero. progress: called with the number of lines read.
+    keep_text: False where the program will not be written again, so that memory holds numbers only.
+    Raises FileError naming file and line.
+    """
+    file = str(source) if isinstance(source, Path) else name or "program"
+    reader = Reader(file, offsets)
+    text: list[str] = []
+    lines: Iterable[str] = lines_of(source) if isinstance(source, Path) else source
+    if keep_text:
+        lines = _kept(lines, text)
+    numbers, codes = array("d"), array("q")
+    for m in read_moves(lines, reader, progress):
+        numbers.extend((*m.start, *m.end, *m.centre, m.sweep, m.feed, m.spindle, m.turn))
+        codes.extend((KINDS[m.motion], m.plane, m.line))
+    n = len(codes) // 3
+    if n == 0:
+        raise FileError("the program has no moves", file=file)
+    v, c = np.array(numbers).reshape(n, NUMBERS), np.array(codes).reshape(n, 3)
+    state = reader.state
+    missing = [a for a, k in zip("XYZ", state.known, strict=True) if not k]
+    notes = [f"line {line}: {note}" for note, line in reader.notes.items()]
+    if missing:
+        notes.append(f"{', '.join(missing)} is never given: taken as 0")
+    return Toolpath(
+        kind=c[:, 0].astype(np.uint8),
+        start=v[:, 0:3].copy(),
+        end=v[:, 3:6].copy(),
+        centre=v[:, 6:9].copy(),
+        normal=c[:, 1].astype(np.int8),
+        sweep=v[:, 9].copy(),
+        feed=v[:, 10].copy(),
+        spindle=v[:, 11].copy(),
+        line=c[:, 2].astype(np.int64),
+        tool=np.tile([0.0, 0.0, 1.0], (n, 1)),
+        name=Path(file).stem,
+        notes=tuple(notes),
+        text=tuple(text),
+        turn=_turns(v[:, 12]),
+        offsets=dict(reader.offsets),
+    )
+
+
+def _turns(given: Floats) -> Floats | None:
+    """The tool's turns; before the first one it stands as there."""
+    said = np.flatnonzero(np.isfinite(given))
+    if not said.size:
+        return None
+    return np.where(np.isfinite(given), given, given[said[0]])
+
+
+def _kept(lines: Iterable[str], text: list[str]) -> Iterator[str]:
+    for line in lines:
+        text.append(line.rstrip("\r\n"))
+        yield line

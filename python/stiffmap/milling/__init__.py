@@ -1,6 +1,0 @@
-"""The cut on a machine: the part as it will be, and what to change."""
-
-from stiffmap.milling.job import Milled, mill, mill_job
-from stiffmap.milling.verdict import sizes, verdict
-
-__all__ = ["Milled", "mill", "mill_job", "sizes", "verdict"]

@@ -1,0 +1,1 @@
+"""A machine as data: description, files, addresses, effects, springs of links, URDF."""

@@ -1,0 +1,88 @@
+"""One number of a machine as it is built moved: its controller keeps the machine that was declared."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from stiffmap.model.addresses.fields import Field, field_of
+from stiffmap.model.addresses.places import machine_fields
+from stiffmap.model.description import (
+    Body,
+    Element,
+    Joint,
+    MachineDescription,
+    Offset,
+    Point,
+    Pose,
+    Spring,
+    tree,
+)
+
+COUNTED = {
+    Spring: ("compliance.", "stiffness."),
+    Body: ("mass", "com."),
+    Point: ("at.",),
+    Offset: ("translation.", "actual.translation."),
+}
+"""Numbers that a machine as built can have otherwise, by the beginning of their names; those of joints: all but these."""
+NOT_OF_JOINTS = ("home", "rest", "range.", "limits.", "compliance", "anchor.", "at.")
+OUTSIDE = ("stiffness", "length")
+
+
+def moved(description: MachineDescription, key: str, delta: float) -> MachineDescription | None:
+    """The machine with the number ``full.name/field`` moved by `delta` (SI).
+
+    A length of an offset moves the machine as built; the controller keeps the nominal one. None: this
+    machine has no such number, or none that is an error of a machine as built (sections of a beam, angles).
+    """
+    outside = _outside(description, key)
+    if outside is not None:
+        return outside.put(outside.value + delta)  # type: ignore[return-value]  # a number outside the legs: a description
+    full, _, field = key.partition("/")
+
+    def change(element: Element) -> Element | None:
+        found = _field(element, field)
+        return None if found is None else found.put(found.value + delta)
+
+    return tree.edit(description, full, change)
+
+
+def number(description: MachineDescription, key: str) -> float | None:
+    """The number (SI) under ``full.name/field``; None as in `moved`."""
+    outside = _outside(description, key)
+    if outside is not None:
+        return outside.value
+    full, _, field = key.partition("/")
+    found = (_field(element, field) for element in tree.find(description, full))
+    return next((f.value for f in found if f is not None), None)
+
+
+def _outside(description: MachineDescription, key: str) -> Field | None:
+    name, _, field = key.partition("/")
+    if field not in OUTSIDE or name not in [s.name for s in description.external_springs]:
+        return None
+    return dict(machine_fields(description))[key]
+
+
+def _field(element: Element, field: str) -> Field | None:
+    """A number that the machine as built may have otherwise."""
+    if isinstance(element, Joint):
+        entry = field.startswith("compliance_slope") or not field.startswith(NOT_OF_JOINTS)
+        if not entry or field.startswith("stiffness."):
+            return None
+    elif not field.startswith(COUNTED.get(type(element), ())):
+        return None
+    found = field_of(element, field)
+    if found is None or not isinstance(element, Offset):
+        return found
+    if field.startswith("actual."):
+        return found
+    if element.actual is not None:
+        return None  # an error that the file states goes before
+    i, nominal = "xyz".index(field[-1]), element.nominal
+
+    def put(value: float) -> Element:
+        t = nominal.translation
+        return replace(element, actual=Pose((*t[:i], value, *t[i + 1 :]), nominal.rotation))  # type: ignore[arg-type]
+
+    return found._replace(put=put)

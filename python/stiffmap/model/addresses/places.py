@@ -1,0 +1,153 @@
+"""What an address stands for: elements, a spring outside the legs, or the machine itself.
+
+``x.bar/length`` is a number of one element, ``bar/length`` of the elements of that name in all legs. Names of branches may
+be left out: ``x.bar`` then stands for the bars of both sides of a parallelogram.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.addresses import units
+from stiffmap.model.addresses.fields import Field, fields, vector_fields
+from stiffmap.model.description import (
+    Block,
+    Body,
+    ExternalSpring,
+    MachineDescription,
+    Offset,
+    Point,
+    Spring,
+    tree,
+)
+from stiffmap.model.description.tree import Elements
+
+MACHINE = ("home", "gravity", "workspace")
+
+
+def split(address: str) -> tuple[str, str]:
+    """Name and field; StiffmapError where there is no slash between them."""
+    name, slash, field = address.partition("/") if isinstance(address, str) else ("", "", "")
+    if not (name and slash and field):
+        raise StiffmapError(f"expected the address of a number, such as 'x.bar/length', got {address!r}")
+    return name, field
+
+
+def full_names(description: MachineDescription, name: str) -> list[str]:
+    """Full names of the elements that a name stands for, each once; none: there is no such element."""
+    every = list(
+        dict.fromkeys(full for full, e in tree.all_elements(description) if not isinstance(e, Block))
+    )
+    if name in every:
+        return [name]
+    parts = name.removeprefix("*.").split(".")
+    chains = [*tree.ENDS, *(leg.name for leg in description.legs)]
+    legs = [parts[0]] if len(parts) > 1 and parts[0] in chains else chains
+    rest = parts[1:] if len(parts) > 1 and parts[0] in chains else parts
+    return [full for full in every if _stands_for(full.split("."), legs, rest)]
+
+
+def single_addresses(description: MachineDescription, address: str) -> list[str]:
+    """The addresses of single elements that one address stands for."""
+    if address in dict(machine_fields(description)):
+        return [address]
+    name, field = split(address)
+    return [
+        f"{full}/{field}"
+        for full in full_names(description, name)
+        if any(field in fields(e) for e in tree.find(description, full))
+        or (field == "length" and bar_offset(description, full))
+    ]
+
+
+def _stands_for(full: list[str], legs: list[str], rest: list[str]) -> bool:
+    """Whether leg and element agree, and the branches that are named are there in this order."""
+    if full[0] not in legs or full[-1] != rest[-1]:
+        return False
+    branches = iter(full[1:-1])
+    return all(part in branches for part in rest[:-1])
+
+
+def machine_fields(d: MachineDescription) -> Iterator[tuple[str, Field]]:
+    """Numbers of the machine itself, by whole addresses; what `Field.put` makes is a description."""
+    t = d.home.translation
+    for i, part in enumerate("xyz"):
+        yield (
+            f"home/translation.{part}",
+            Field(
+                t[i],
+                units.METRE,
+                lambda x, i=i: replace(d, home=replace(d.home, translation=(*t[:i], x, *t[i + 1 :]))),  # type: ignore
+            ),
+        )
+    if d.gravity is not None:
+        g = d.gravity
+        for i, part in enumerate("xyz"):
+            yield (
+                f"gravity/{part}",
+                Field(g[i], "m/s²", lambda x, i=i: replace(d, gravity=(*g[:i], x, *g[i + 1 :]))),  # type: ignore
+            )
+    for i, part in enumerate("xyz" if d.workspace is not None else ""):
+        for end, word in enumerate(("low", "high")):
+            assert d.workspace is not None
+            yield (
+                f"workspace/{part}.{word}",
+                Field(d.workspace[end][i], units.METRE, lambda x, i=i, end=end: _box(d, i, end, x)),  # type: ignore
+            )
+    for spring in d.external_springs:
+        for field, number in _external(spring):
+            yield (
+                f"{spring.name}/{field}",
+                number._replace(put=lambda x, s=spring, n=number: _with_spring(d, s, n.put(x))),  # type: ignore
+            )
+
+
+def _box(d: MachineDescription, i: int, end: int, value: float) -> MachineDescription:
+    assert d.workspace is not None
+    corners = [list(corner) for corner in d.workspace]
+    corners[end][i] = value
+    return replace(d, workspace=(tuple(corners[0]), tuple(corners[1])))  # type: ignore[arg-type]
+
+
+def _external(s: ExternalSpring) -> Iterator[tuple[str, Field]]:
+    yield "stiffness", Field(s.stiffness, "N/m", lambda x: replace(s, stiffness=x))  # type: ignore
+    yield "length", Field(s.length, units.METRE, lambda x: replace(s, length=x))  # type: ignore
+    yield from vector_fields(s, "anchor", "anchor", units.METRE)
+
+
+def _with_spring(d: MachineDescription, old: ExternalSpring, new: object) -> MachineDescription:
+    assert isinstance(new, ExternalSpring)
+    return replace(d, external_springs=tuple(new if s is old else s for s in d.external_springs))
+
+
+def bar_offset(d: MachineDescription, full: str) -> str | None:
+    """Full name of the offset that is the length of the link of a spring: the one before it; None: there is none, or it is
+    not as long as the beam from which the spring was computed."""
+    sequence, name = _sequence_of(d, full), full.rpartition(".")[2]
+    k = next((i for i, e in enumerate(sequence) if isinstance(e, Spring) and e.name == name), 0)
+    spring = sequence[k] if sequence else None
+    before = next((e for e in reversed(sequence[:k]) if not isinstance(e, Body | Point)), None)
+    if not isinstance(spring, Spring) or not isinstance(before, Offset) or "length" not in fields(before):
+        return None
+    if spring.beam is not None:
+        length = dict(spring.beam.numbers)["length"]
+        if abs(fields(before)["length"].value - length) > 1e-9 * length:
+            return None
+    return f"{full.rpartition('.')[0]}.{before.name}"
+
+
+def _sequence_of(d: MachineDescription, full: str) -> Elements:
+    """The sequence that holds the element of a full name."""
+    parts = full.split(".")
+    chain: Elements = (
+        getattr(d, parts[0])
+        if parts[0] in tree.ENDS
+        else next((leg.elements for leg in d.legs if leg.name == parts[0]), ())
+    )
+    for branch in parts[1:-1]:
+        chain = next(
+            (b.elements for e in chain if isinstance(e, Block) for b in e.branches if b.name == branch), ()
+        )
+    return chain

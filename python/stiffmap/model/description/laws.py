@@ -1,0 +1,70 @@
+"""Force laws of one coordinate, and errors of a commanded coordinate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from stiffmap.model.description.pose import Vector
+
+Knot = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Law:
+    """Force against deflection of one coordinate (SI: m and N, or rad and N·m).
+
+    ``stiffness`` is the slope of the linear part. With ``cubic`` the force is
+    ``stiffness * a + cubic * a**3``. With ``knots`` the law is the monotone polyline through the
+    points (deflection, force), which may contain steps in either coordinate (a dead zone is a
+    piece of zero force, a stuck friction contact a piece of zero deflection); beyond the first and
+    last knot it goes on with slope ``stiffness``. The two do not combine.
+    With ``friction`` a force of that size stands against the deflection that the load would give
+    without it (dry friction on the loading branch; docs/effects.md says where this holds).
+    A free coordinate has no law at all (``None``), a rigid one none either but is actuated.
+    """
+
+    stiffness: float
+    cubic: float = 0.0
+    knots: tuple[Knot, ...] = ()
+    friction: float = 0.0
+
+
+@dataclass(frozen=True)
+class JointFriction:
+    """Dry friction about (along) each axis of a free passive joint: its level (N·m, N) and the branch.
+
+    ``loading`` stands in full against the motion that the joint makes without friction, measured from the
+    commanded configuration; ``unloading`` acts with it (fully reversed); ``loading_stuck`` holds the joint
+    where it is commanded until the level is reached.
+    """
+
+    level: float
+    branch: str = "loading"
+
+
+@dataclass(frozen=True)
+class CommandError:
+    """Error of a commanded actuator coordinate u (m or rad), added to the command:
+
+    ``offset + slope * (u - reference) + amplitude * sin(2 pi (u - reference) / period + phase)``
+
+    and what ``knots`` say at u: pairs (coordinate, error) by rising coordinate, straight between them, level
+    beyond the ends. ``reference=None``: the coordinate of the closed home configuration.
+    """
+
+    offset: float = 0.0
+    slope: float = 0.0
+    amplitude: float = 0.0
+    period: float = 1.0
+    phase: float = 0.0
+    reference: float | None = 0.0
+    knots: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class GuideError:
+    """Deviation of a guide across its stroke: the carriage stands off along ``axis`` (unit vector, axes
+    of the guide) by the value of ``error`` at the commanded coordinate (m)."""
+
+    axis: Vector
+    error: CommandError

@@ -1,0 +1,42 @@
+"""Where the numbers of a machine come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+
+from stiffmap.model.description.machine import MachineDescription
+
+SOURCES = ("assumed", "measured", "computed", "catalogue")
+UNMARKED = "not marked"
+MASSES = ("mass", "com", "inertia")
+"""Numbers of an element that do not make it yield."""
+
+
+def source_of(description: MachineDescription, element: str) -> str:
+    """Where the stiffness of an element comes from: of its numbers the least sure, else as it is marked, else its leg, else a
+    name with ``*``; ``not marked`` where nothing says it."""
+    known = dict(description.sources)
+    own = [s for k, s in known.items() if k.startswith(f"{element}/") and k.rpartition("/")[2] not in MASSES]
+    if own:
+        return min(own, key=SOURCES.index)
+    name = element
+    while name:
+        if name in known:
+            return known[name]
+        name = name.rpartition(".")[0]
+    return next((s for k, s in known.items() if "*" in k and fnmatchcase(element, k)), UNMARKED)
+
+
+def in_words(by_source: Mapping[str, float]) -> str:
+    """``83 % of it rests on assumed numbers, 17 % on computed ones``; empty where no number is marked or nothing moves."""
+    if set(by_source) <= {UNMARKED}:
+        return ""
+    parts = [
+        f"{100 * v:.0f} % of it rests on numbers that are {s}" for s, v in by_source.items() if v >= 0.005
+    ]
+    if not parts:
+        return ""
+    return ", ".join(
+        [parts[0], *(p.replace(" of it rests on numbers that are ", " on ") + " ones" for p in parts[1:])]
+    )

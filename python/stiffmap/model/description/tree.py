@@ -1,0 +1,119 @@
+"""The tree of a machine: its sequences and elements by their full names, walked, found and edited.
+
+A full name joins the names of leg (or ``base``, ``platform``), branches and element with dots; blocks do not
+count: ``x.bar_low.bar``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from stiffmap.model.description.elements import Block, Element, Joint, Point
+from stiffmap.model.description.machine import MachineDescription
+
+Elements = tuple[Element, ...]
+Edit = Callable[[Elements], Elements]
+Change = Callable[[Element], Element | None]
+"""None: the element stays as it is."""
+ENDS = ("base", "platform")
+
+
+def walk(elements: Elements, name: str) -> Iterator[tuple[str, Element]]:
+    """Every element of a sequence with its full name, those inside blocks included."""
+    for element in elements:
+        yield f"{name}.{element.name}", element
+        if isinstance(element, Block):
+            for branch in element.branches:
+                yield from walk(branch.elements, f"{name}.{branch.name}")
+
+
+def all_elements(description: MachineDescription) -> Iterator[tuple[str, Element]]:
+    """Every element of a machine with its full name, from base to platform."""
+    yield from walk(description.base, "base")
+    for leg in description.legs:
+        yield from walk(leg.elements, leg.name)
+    yield from walk(description.platform, "platform")
+
+
+def point_names(description: MachineDescription) -> list[str]:
+    """Full names of the named points."""
+    return [name for name, element in all_elements(description) if isinstance(element, Point)]
+
+
+def core_name(full: str) -> str:
+    """What the core, and so an actuator or a coordinate, is called: without ``base.`` or ``platform.``."""
+    sequence, _, rest = full.partition(".")
+    return rest if sequence in ENDS else full
+
+
+def joints(description: MachineDescription) -> dict[str, Joint]:
+    """The joints by the names that the core gives them."""
+    return {core_name(n): e for n, e in all_elements(description) if isinstance(e, Joint)}
+
+
+def find(description: MachineDescription, full: str) -> list[Element]:
+    """The elements of a full name: a body and a point may share theirs with another sort of element."""
+    return [element for name, element in all_elements(description) if name == full]
+
+
+def sequences(elements: Elements) -> Iterator[Elements]:
+    """A sequence and those of the branches in it."""
+    yield elements
+    for element in elements:
+        if isinstance(element, Block):
+            for branch in element.branches:
+                yield from sequences(branch.elements)
+
+
+def edit_sequences(elements: Elements, edit: Edit) -> Elements:
+    """The sequence with ``edit`` applied to it and to those of the branches in it."""
+
+    def inside(element: Element) -> Element:
+        if not isinstance(element, Block):
+            return element
+        branches = tuple(replace(b, elements=edit_sequences(b.elements, edit)) for b in element.branches)
+        return replace(element, branches=branches)
+
+    return edit(tuple(inside(element) for element in elements))
+
+
+def edit_path(elements: Elements, path: str, change: Change) -> Elements | None:
+    """The sequence with the elements of a name (branches, then element) changed; None: nothing was."""
+    first, _, rest = path.partition(".")
+    out, hit = list(elements), False
+    for i, element in enumerate(elements):
+        new: Element | None = None
+        if element.name == path:
+            new = change(element)
+        elif rest and isinstance(element, Block):
+            new = _edit_branch(element, first, rest, change)
+        if new is not None:
+            out[i], hit = new, True
+    return tuple(out) if hit else None
+
+
+def _edit_branch(block: Block, name: str, path: str, change: Change) -> Block | None:
+    edited = {b.name: edit_path(b.elements, path, change) for b in block.branches if b.name == name}
+    if not any(edited.values()):
+        return None
+    return replace(
+        block, branches=tuple(replace(b, elements=edited.get(b.name) or b.elements) for b in block.branches)
+    )
+
+
+def edit(description: MachineDescription, full: str, change: Change) -> MachineDescription | None:
+    """The machine with the elements of a full name changed; None: there are none that ``change`` changes."""
+    sequence, _, path = full.partition(".")
+    if sequence in ENDS:
+        end = edit_path(getattr(description, sequence), path, change)
+        if end is None:
+            return None
+        return replace(description, base=end) if sequence == "base" else replace(description, platform=end)
+    edited = {
+        leg.name: edit_path(leg.elements, path, change) for leg in description.legs if leg.name == sequence
+    }
+    if not any(edited.values()):
+        return None
+    legs = (replace(leg, elements=edited.get(leg.name) or leg.elements) for leg in description.legs)
+    return replace(description, legs=tuple(legs))

@@ -1,0 +1,60 @@
+"""Editing the sequences of a machine: pure functions on its description."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from stiffmap.model.description import Element, MachineDescription, Offset, Pose
+from stiffmap.model.description.tree import Edit, Elements, edit_sequences
+
+Sites = Callable[[Elements], dict[str, tuple[int, ...]]]
+Change = Callable[[Element], Elements]
+
+
+def edit_legs(description: MachineDescription, legs: tuple[str, ...], edit: Edit) -> MachineDescription:
+    """``edit`` on every sequence of the legs named; without legs on those of base and platform."""
+    if not legs:
+        base, platform = (edit_sequences(e, edit) for e in (description.base, description.platform))
+        return replace(description, base=base, platform=platform)
+    changed = tuple(
+        replace(leg, elements=edit_sequences(leg.elements, edit)) if leg.name in legs else leg
+        for leg in description.legs
+    )
+    return replace(description, legs=changed)
+
+
+def change_sites(
+    description: MachineDescription, legs: tuple[str, ...], element: str, sites: Sites, change: Change
+) -> MachineDescription:
+    """Each element that ``sites`` finds under the name becomes the elements that ``change`` gives."""
+
+    def edit(elements: Elements) -> Elements:
+        found = sites(elements).get(element, ())
+        out = elements
+        for i in reversed(found):
+            out = splice(out, i, change(elements[i]))
+        return out
+
+    return edit_legs(description, legs, edit)
+
+
+def splice(elements: Elements, i: int, piece: Elements) -> Elements:
+    """``piece`` in the place of element ``i``; what is new in it gets names that are free."""
+    out = list(elements[:i] + elements[i + 1 :])
+    for k, e in enumerate(piece):
+        kept = e.name == elements[i].name
+        out.insert(i + k, e if kept else replace(e, name=fresh(e.name, tuple(out) + (elements[i],))))
+    return tuple(out)
+
+
+def fresh(name: str, elements: Elements) -> str:
+    """``name``, with a number after it where the sequence has that name already."""
+    taken = {e.name for e in elements}
+    numbered = (f"{name}_{i}" for i in range(2, len(taken) + 3))
+    return name if name not in taken else next(n for n in numbered if n not in taken)
+
+
+def built(name: str, pose: Pose) -> Offset:
+    """An error of the machine as built: nothing to the controller, ``pose`` in truth."""
+    return Offset(name, Pose(), pose)

@@ -1,0 +1,45 @@
+"""Direction of a guide or joint axis alone."""
+
+from __future__ import annotations
+
+from stiffmap.model.description import Element, Joint, MachineDescription, Pose
+from stiffmap.model.description.tree import Elements
+from stiffmap.model.effects.edit import built, change_sites
+from stiffmap.model.effects.library.geometry import about, home_position, names_of, rotation_of, rotations
+from stiffmap.model.effects.sites import at_sites, joints
+from stiffmap.model.effects.types import EffectType, Parameter, Placed
+
+PARAMETERS: tuple[Parameter, ...] = rotations("rotation of the axis")
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """The rotation before the joint, and its inverse behind it."""
+    turn = rotation_of(placed)
+
+    def change(e: Element) -> Elements:
+        assert isinstance(e, Joint)
+        before = built(f"{e.name}_axis_tilt", about(home_position(e), turn))
+        return (before, e, built(f"{e.name}_axis_tilt_back", Pose.of(rotation=turn.T)))
+
+    return change_sites(description, placed.legs, placed.element, joints, change)
+
+
+EFFECT = EffectType(
+    kind="axis_tilt",
+    precedence=180,
+    title="direction of a guide or joint axis alone",
+    doc=(
+        "The axis of a guide or joint is turned, and nothing else: at its zero (a guide: at the carriage's "
+        "home position) whatever the joint carries stands as declared. A rotation about the axis itself "
+        "does nothing."
+    ),
+    parameters=PARAMETERS,
+    places=at_sites(joints),
+    apply=apply,
+    pivot="home position of the carriage; origin of a revolute joint",
+    frame="local axes before the joint; about x, then the turned y, then the twice turned z",
+    moves="the axis alone",
+    vector=names_of(PARAMETERS),
+    excludes=("axis_tilt",),
+    stage=45,
+)

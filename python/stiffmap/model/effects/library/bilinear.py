@@ -1,0 +1,55 @@
+"""A drive or spring whose stiffness changes at a force."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from stiffmap.model.description import Law, MachineDescription
+from stiffmap.model.effects.evidence import Probe, Signature, Tried, shares_of_load
+from stiffmap.model.effects.library.drive_law import change_law, in_unit_of_joint, linear
+from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
+from stiffmap.model.effects.types import EffectType, Parameter, Placed
+
+KNEES = (0.1, 0.25, 0.5, 0.8)
+"""Shares of the largest load at which the compliance may change."""
+PARAMETERS = (
+    Parameter("ratio", "1", 1e-3, 1e3, 1.0, 0.1, "compliance beyond the knee over the declared one"),
+    Parameter("knee", "N", 1e-3, 1e6, None, 100.0, "force at which the compliance changes", angular="N·m"),
+)
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """A polyline through the knees, continued with the other slope; plain at ratio 1."""
+    ratio, knee = placed.values["ratio"], placed.values["knee"]
+
+    def law(old: Law) -> Law:
+        a = knee / linear(old).stiffness
+        return old if ratio == 1.0 else Law(old.stiffness / ratio, knots=((-a, -knee), (a, knee)))
+
+    return change_law(description, placed, law)
+
+
+def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
+    """A knee at a few shares of the largest load."""
+    return shares_of_load(probe, tried, "knee", KNEES)
+
+
+EFFECT = EffectType(
+    kind="bilinear",
+    precedence=40,
+    title="spring whose stiffness changes at a force",
+    doc=(
+        "The nominal compliance up to the force `knee` in both directions, `ratio` times it for the force "
+        "beyond (a preloaded screw that opens, a stop that closes); of a drive, an elastic joint or an uncoupled "
+        "direction of a link spring (element `foot.k22`)."
+    ),
+    parameters=PARAMETERS,
+    places=at_sites(elastic_directions),
+    apply=apply,
+    signature=signature,
+    tried=at_sites(elastic_drives),
+    frame="the coordinate",
+    excludes=("bilinear", "dead_zone", "hardening", "friction", "position_dependent_compliance", "tabulated"),
+    stage=10,
+    at=in_unit_of_joint(*PARAMETERS),
+)

@@ -1,0 +1,51 @@
+"""Backlash of a drive."""
+
+from __future__ import annotations
+
+from stiffmap.model.description import Law, MachineDescription
+from stiffmap.model.effects.library.drive_law import change_law, in_unit_of_joint, linear
+from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
+from stiffmap.model.effects.types import EffectType, Parameter, Placed
+
+HALF_WIDTH = Parameter(
+    "half_width",
+    "m",
+    0.0,
+    0.01,
+    0.0,
+    1e-5,
+    "deflection without force to each side of the centre",
+    angular="rad",
+    angular_upper=0.5,
+    angular_scale=1e-4,
+)
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """A polyline law with a piece of zero force; plain at zero width."""
+    half = placed.values["half_width"]
+
+    def law(old: Law) -> Law:
+        return Law(linear(old).stiffness, knots=((-half, 0.0), (half, 0.0))) if half > 0.0 else linear(old)
+
+    return change_law(description, placed, law)
+
+
+EFFECT = EffectType(
+    kind="dead_zone",
+    precedence=20,
+    reverses=True,
+    title="backlash of a drive, gap in a joint or a spring's direction",
+    doc=(
+        "A gap in series with the spring of a drive, an elastic joint or an uncoupled direction of a link spring (element `foot.k22`): no force while the deflection is within the half width "
+        "about the centre, the declared stiffness beyond. Unloaded, it stands in the centre."
+    ),
+    parameters=(HALF_WIDTH,),
+    places=at_sites(elastic_directions),
+    apply=apply,
+    tried=at_sites(elastic_drives),
+    frame="the coordinate",
+    excludes=("dead_zone", "hardening", "tabulated"),
+    stage=10,
+    at=in_unit_of_joint(HALF_WIDTH),
+)

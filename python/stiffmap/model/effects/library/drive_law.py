@@ -1,0 +1,76 @@
+"""What the effects on the force law of a drive, an elastic joint or a spring's direction share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.description import Element, Joint, Law, MachineDescription, Spring
+from stiffmap.model.description.tree import Elements, sequences
+from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.effects.sites import elastic_directions
+from stiffmap.model.effects.types import Parameter, ParametersAt, Placed
+
+
+def change_law(
+    description: MachineDescription, placed: Placed, change: Callable[[Law], Law]
+) -> MachineDescription:
+    """The machine with another law at each joint or spring direction of the place."""
+    entry = placed.element.partition(".")[2]
+
+    def element(e: Element) -> Elements:
+        if isinstance(e, Joint):
+            assert e.law is not None
+            return (replace(e, law=change(e.law)),)
+        assert isinstance(e, Spring)
+        return (_with_direction(e, int(entry[1]) - 1, change),)
+
+    return change_sites(description, placed.legs, placed.element, elastic_directions, element)
+
+
+def _with_direction(e: Spring, i: int, change: Callable[[Law], Law]) -> Spring:
+    old = dict(e.laws).get(i) or Law(_stiffness(e, i))
+    laws = {**dict(e.laws), i: change(old)}
+    return replace(e, laws=tuple(sorted(laws.items(), key=lambda pair: pair[0])))
+
+
+def _stiffness(e: Spring, i: int) -> float:
+    if e.stiffness is not None:
+        return e.stiffness[i][i]
+    assert e.compliance is not None
+    return 1.0 / e.compliance[i][i]
+
+
+def linear(law: Law) -> Law:
+    """The law, which must be linear yet; raises StiffmapError."""
+    if law.cubic or law.knots:
+        raise StiffmapError("the drive has a declared nonlinear law already, which this effect cannot join")
+    return law
+
+
+def is_revolute(description: MachineDescription, element: str) -> bool:
+    """Whether the joint of that name, or the spring's direction (``foot.k44``), turns."""
+    entry = element.partition(".")[2]
+    if entry:
+        return int(entry[1]) > 3
+    chains = [description.base, description.platform, *(leg.elements for leg in description.legs)]
+    named = [e for c in chains for seq in sequences(c) for e in seq if e.name == element]
+    return any(isinstance(e, Joint) and e.kind != "prismatic" for e in named)
+
+
+def _turning(p: Parameter) -> Parameter:
+    """The parameter on a joint that turns: unit, bound and size of an angle."""
+    upper, scale = p.angular_upper or p.upper, p.angular_scale or p.scale
+    return replace(p, unit=p.angular or p.unit, upper=upper, scale=scale)
+
+
+def in_unit_of_joint(*parameters: Parameter) -> ParametersAt:
+    """Parameters whose units become the angular ones where the joint turns."""
+
+    def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
+        if not is_revolute(description, element):
+            return parameters
+        return tuple(map(_turning, parameters))
+
+    return at

@@ -1,0 +1,52 @@
+"""An instrument's frame that is not where it is believed to be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.model.description import AppliedEffect
+from stiffmap.model.effects.evidence import Plan
+from stiffmap.model.effects.library.geometry import AXES
+from stiffmap.model.effects.library.measurement import added, measured, positions, rotation
+from stiffmap.model.effects.types import Parameter
+
+PARAMETERS = (
+    *positions("shift of every reading", 1e-4),
+    *(
+        Parameter(
+            f"angle_{a}", "rad", -math.pi, math.pi, 0.0, 1e-4, f"turn of the instrument's frame about {a}"
+        )
+        for a in AXES
+    ),
+)
+
+
+def offset(plan: Plan, term: AppliedEffect) -> Floats:
+    """(n, 6) of a position: the instrument's frame is offset, and turned about the base origin."""
+    if plan.quantity != "position":
+        return np.zeros((len(plan.position), 6))
+    parameters = dict(term.parameters)
+    r = rotation(parameters)
+    shift = np.array([parameters.get(a, 0.0) for a in AXES])
+    turn = np.broadcast_to(Rotation.from_matrix(r).as_rotvec(), plan.position.shape)
+    return np.hstack([shift + plan.position @ (r - np.eye(3)).T, turn])
+
+
+EFFECT = measured(
+    "frame_offset",
+    "position and orientation of the instrument's frame",
+    (
+        "The instrument's frame is not where it is believed: a measured position p reads as shift + "
+        "Rx·Ry·Rz p, so that an error of position gains shift + (Rx·Ry·Rz - 1) p."
+    ),
+    "sensor",
+    PARAMETERS,
+    360,
+    pivot="origin of the base",
+    reading=added(offset),
+    hidden=lambda plan: plan.frame != "known",
+)

@@ -1,0 +1,51 @@
+"""What the geometric errors share: three translations or three rotations as parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.common.rotations import rotation_about
+from stiffmap.model.description import Joint, Pose
+from stiffmap.model.effects.types import Parameter, Placed
+
+AXES = "xyz"
+
+
+def translations(doc: str, prefix: str = "error_") -> tuple[Parameter, ...]:
+    """``error_x``, ``error_y``, ``error_z`` (m)."""
+    return tuple(Parameter(f"{prefix}{a}", "m", -0.1, 0.1, 0.0, 1e-4, f"{doc} along {a}") for a in AXES)
+
+
+def rotations(doc: str, axes: str = AXES) -> tuple[Parameter, ...]:
+    """``angle_x``, ``angle_y``, ``angle_z`` (rad)."""
+    return tuple(Parameter(f"angle_{a}", "rad", -0.1, 0.1, 0.0, 1e-4, f"{doc} about {a}") for a in axes)
+
+
+def translation_of(placed: Placed, prefix: str = "error_") -> NDArray[np.float64]:
+    """(3,) m."""
+    return np.array([placed.values.get(f"{prefix}{a}", 0.0) for a in AXES])
+
+
+def rotation_of(placed: Placed, share: float = 1.0) -> NDArray[np.float64]:
+    """(3, 3): about x, then about the turned y, then about the twice turned z."""
+    out = np.eye(3)
+    for a, axis in zip(AXES, np.eye(3), strict=True):
+        out = out @ rotation_about(axis, share * placed.values.get(f"angle_{a}", 0.0))
+    return out
+
+
+def names_of(parameters: tuple[Parameter, ...]) -> tuple[str, ...]:
+    """Their names."""
+    return tuple(p.name for p in parameters)
+
+
+def about(pivot: NDArray[np.float64], rotation: NDArray[np.float64]) -> Pose:
+    """The rotation about a pivot (3,) m."""
+    return Pose.of(pivot - rotation @ pivot, rotation)
+
+
+def home_position(joint: Joint) -> NDArray[np.float64]:
+    """(3,) m, the frame behind the joint at home, in the frame before it."""
+    slides = joint.kind == "prismatic"
+    return np.array(joint.axes[0]) * joint.home[0] if slides else np.zeros(3)

@@ -1,0 +1,76 @@
+"""Weight of the machine's bodies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.description import Body, Element, MachineDescription
+from stiffmap.model.description.tree import Elements, sequences
+from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.effects.sites import bodies, places
+from stiffmap.model.effects.types import EffectType, Parameter, Place, Placed
+
+STANDARD = 9.81
+DOWN = (0.0, 0.0, -STANDARD)
+SCALE = Parameter("scale", "1", -10.0, 10.0, 0.0, 1.0, "factor on the declared masses; 1 = as declared")
+MASS = Parameter("mass", "kg", 0.0, 1e5, 0.0, 1.0, "mass of each body of that name", fitted=False)
+
+
+def masses(description: MachineDescription) -> list[float]:
+    """Masses of all bodies, kg."""
+    trunk = (*description.base, *description.platform)
+    chains = [trunk, *(leg.elements for leg in description.legs)]
+    return [e.mass for c in chains for seq in sequences(c) for e in seq if isinstance(e, Body)]
+
+
+def find(description: MachineDescription) -> list[Place]:
+    """The whole machine where it declares masses and no gravity; else each body."""
+    if any(masses(description)) and description.gravity is None:
+        return [("machine", ())]
+    return places(description, bodies)
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """Gravity on with the declared masses, or with the mass of one body."""
+    if placed.element == "machine":
+        if "scale" not in placed.values:
+            raise StiffmapError("give scale for the machine; mass is for a single body")
+        x, y, z = DOWN
+        s = placed.values["scale"]
+        return replace(description, gravity=(x * s, y * s, z * s))
+    if "mass" not in placed.values:
+        raise StiffmapError("give mass (kg) for a body; scale is for the machine")
+
+    def change(e: Element) -> Elements:
+        assert isinstance(e, Body)
+        return (replace(e, mass=placed.values["mass"]),)
+
+    changed = change_sites(description, placed.legs, placed.element, bodies, change)
+    return replace(changed, gravity=description.gravity or DOWN)
+
+
+def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
+    """Scale for the machine, mass for a body."""
+    whole = element == "machine"
+    return (replace(SCALE, fitted=whole), replace(MASS, fitted=not whole))
+
+
+EFFECT = EffectType(
+    kind="gravity",
+    precedence=290,
+    title="weight of the machine's bodies",
+    doc=(
+        "The bodies weigh: 9.81 m/s² along base -z. On `machine` all declared masses times `scale`; on a "
+        "body of a machine that declares no masses, or that has gravity already, `mass` is the mass of each "
+        "such body."
+    ),
+    parameters=(SCALE, MASS),
+    places=find,
+    apply=apply,
+    frame="base axes",
+    moves="nothing; each weight acts where the machine file puts the body's centre of mass",
+    one_of=("scale", "mass"),
+    excludes=("gravity",),
+    at=at,
+)

@@ -1,0 +1,35 @@
+"""Friction of the pulley or eye over which a cable runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from stiffmap.model.description import Cable, MachineDescription
+from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.effects.sites import at_sites, led_cables
+from stiffmap.model.effects.types import EffectType, Parameter, Placed
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """The lead between winch and guide has another tension than the free length, and stretches as it asks."""
+
+    def change(e: Cable) -> Cable:
+        return replace(e, lead_tension=e.lead_tension * (1.0 - placed.values["share"]))
+
+    return change_sites(description, placed.legs, placed.element, led_cables, lambda e: (change(e),))  # type: ignore[arg-type]  # sites of cables
+
+
+EFFECT = EffectType(
+    kind="guide_friction",
+    precedence=75,
+    title="friction of a cable's guide",
+    doc=(
+        "The guide takes `share` of the free length's tension while that grows: the lead between winch and guide "
+        "carries, and stretches by, so much less. Negative: while it falls. e^(mu angle) of a rope over a drum that "
+        "stands still is a share of 1 - e^(-mu angle)."
+    ),
+    parameters=(Parameter("share", "1", -1.0, 1.0, 0.0, 0.05, "of the tension", plausible=(-0.3, 0.3)),),
+    places=at_sites(led_cables),
+    apply=apply,
+    moves="nothing",
+)

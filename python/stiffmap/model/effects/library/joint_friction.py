@@ -1,0 +1,67 @@
+"""Dry friction of a passive joint."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.description import Element, Joint, JointFriction, MachineDescription
+from stiffmap.model.description.tree import Elements
+from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.effects.library import friction
+from stiffmap.model.effects.library.drive_law import is_revolute
+from stiffmap.model.effects.sites import at_sites, free_joints
+from stiffmap.model.effects.types import EffectType, Option, Parameter, Placed
+
+FORCE = replace(friction.FORCE, doc="Coulomb level of a sliding joint")
+TORQUE = replace(friction.TORQUE, doc="Coulomb level about each axis of a joint that turns")
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """Friction on each joint of the place; none at the level 0."""
+    turns = is_revolute(description, placed.element)
+    if ("torque" in placed.values) != turns:
+        raise StiffmapError("give torque (N·m) where the joint turns and force (N) where it slides")
+    level = placed.values["torque" if turns else "force"]
+
+    def change(e: Element) -> Elements:
+        assert isinstance(e, Joint)
+        friction = JointFriction(level, placed.options["branch"]) if level > 0.0 else None
+        return (replace(e, friction=friction),)
+
+    return change_sites(description, placed.legs, placed.element, free_joints, change)
+
+
+def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
+    """Torque where the joint turns, force where it slides: the other is not to be fitted."""
+    turns = is_revolute(description, element)
+    return (replace(FORCE, fitted=not turns), replace(TORQUE, fitted=turns))
+
+
+EFFECT = EffectType(
+    kind="joint_friction",
+    precedence=250,
+    reverses=True,
+    title="dry friction of a passive joint",
+    doc=(
+        "Coulomb friction about each axis of a free passive joint, level L, against its motion q from the commanded "
+        "configuration: on the branch `loading` (from zero load) the joint resists with L against the motion that it "
+        "makes without friction; on `unloading` (from a larger load, friction fully reversed) L acts with it; "
+        "`loading_stuck` holds the joint at q = 0 until L is reached and resists with L beyond. Where a joint slips, "
+        "`loading` and `loading_stuck` agree; where it would not, `loading` pushes it back too far."
+    ),
+    parameters=(FORCE, TORQUE),
+    places=at_sites(free_joints),
+    apply=apply,
+    frame="the joint's axes",
+    options=(
+        Option(
+            "branch", ("loading_stuck", "loading", "unloading"), "how the load was reached", recorded=True
+        ),
+    ),
+    one_of=("force", "torque"),
+    excludes=("joint_friction",),
+    stage=20,
+    better_with=("branch",),
+    at=at,
+)

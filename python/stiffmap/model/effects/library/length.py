@@ -1,0 +1,48 @@
+"""Length of a link."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from stiffmap.model.description import Element, MachineDescription, Offset, Pose
+from stiffmap.model.description.tree import Elements
+from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.effects.sites import at_sites, lengths
+from stiffmap.model.effects.types import EffectType, Parameter, Placed
+
+
+def longer(e: Element, error: float = 0.0, strain: float = 0.0) -> Offset:
+    """An offset built longer along its own direction, by ``error`` (m) and by a share of its length."""
+    assert isinstance(e, Offset)
+    actual, nominal = e.actual or e.nominal, e.nominal.p
+    step = (error / np.linalg.norm(nominal) + strain) * nominal
+    return replace(e, actual=Pose.of(actual.p + step, actual.r))
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """Offsets along their own direction."""
+
+    def change(e: Element) -> Elements:
+        return (longer(e, placed.values["error"]),)
+
+    return change_sites(description, placed.legs, placed.element, lengths, change)
+
+
+EFFECT = EffectType(
+    kind="length",
+    precedence=130,
+    title="length of a link",
+    doc=(
+        "The link is built `error` longer than declared (both bars of a parallelogram alike); the "
+        "controller computes with the declared length. The link is named by its spring or by the offset "
+        "that is its length."
+    ),
+    parameters=(Parameter("error", "m", -0.1, 0.1, 0.0, 1e-4, "added to the declared length"),),
+    places=at_sites(lengths),
+    apply=apply,
+    pivot="the link's near end",
+    frame="direction of the link",
+    moves="all behind the link; nothing turns",
+)

@@ -1,0 +1,57 @@
+"""Rods of unequal length in a parallelogram."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from stiffmap.model.description import Block, Branch, MachineDescription, Spring
+from stiffmap.model.description.tree import Elements
+from stiffmap.model.effects.library.bars import change_branches, spread_blocks
+from stiffmap.model.effects.library.length import longer
+from stiffmap.model.effects.sites import at_sites, links
+from stiffmap.model.effects.types import EffectType, Parameter, Placed
+
+
+def rod_blocks(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Parallelograms whose bars have a length."""
+    found = spread_blocks(elements)
+    return {n: at for n, at in found.items() if all(_has_rods(elements[i]) for i in at)}
+
+
+def _has_rods(e: object) -> bool:
+    return isinstance(e, Block) and all(_rod(b) is not None for b in e.branches)
+
+
+def _rod(b: Branch) -> int | None:
+    found = [i for at in links(b.elements).values() for i in at]
+    springs = [e for e in b.elements if isinstance(e, Spring)]
+    return found[0] if len(found) == 1 and len(springs) == 1 else None
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """The first rod shorter by half of the difference, the second longer."""
+
+    def change(block: Block, b: Branch, share: float) -> Branch:
+        i = _rod(b)
+        assert i is not None  # the place has been checked
+        rod = longer(b.elements[i], share * placed.values["difference"])
+        return replace(b, elements=(*b.elements[:i], rod, *b.elements[i + 1 :]))
+
+    return change_branches(description, placed, change)
+
+
+EFFECT = EffectType(
+    kind="length_difference",
+    precedence=140,
+    title="rods of unequal length",
+    doc=(
+        "The second rod of a parallelogram is built longer by half of `difference`, the first one shorter by "
+        "half; their mean is as declared (its error is `length`)."
+    ),
+    parameters=(Parameter("difference", "m", -0.1, 0.1, 0.0, 1e-4, "second rod minus first rod"),),
+    places=at_sites(rod_blocks),
+    apply=apply,
+    pivot="near end of each rod",
+    frame="direction of the rods",
+    moves="all behind each rod; the block's end turns with the two rods",
+)

@@ -1,0 +1,54 @@
+"""Parallelism of the two pins at one end of a parallelogram."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from stiffmap.model.description import Block, Branch, Joint, MachineDescription, Pose
+from stiffmap.model.effects.edit import built, splice
+from stiffmap.model.effects.library.bars import change_branches, spread_blocks
+from stiffmap.model.effects.library.geometry import names_of, rotation_of, rotations
+from stiffmap.model.effects.sites import at_sites
+from stiffmap.model.effects.types import EffectType, Option, Parameter, Placed
+
+PARAMETERS: tuple[Parameter, ...] = rotations("angle of the second pin against the first")
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """Half of the angle on each pin; only the pins' directions change."""
+
+    def change(block: Block, b: Branch, share: float) -> Branch:
+        return _turned(b, placed, share)
+
+    return change_branches(description, placed, change)
+
+
+def _turned(b: Branch, placed: Placed, share: float) -> Branch:
+    pins = [i for i, e in enumerate(b.elements) if isinstance(e, Joint) and not e.actuated]
+    i = pins[0] if placed.options["end"] == "proximal" else pins[-1]
+    e = b.elements[i]
+    turn = Pose.of(rotation=rotation_of(placed, share))
+    name = f"{e.name}_parallelism"
+    piece = (built(name, turn), e, built(f"{name}_back", turn.inverse()))
+    return replace(b, elements=splice(b.elements, i, piece))
+
+
+EFFECT = EffectType(
+    kind="parallelogram_parallelism",
+    precedence=210,
+    title="parallelism of a parallelogram's pins",
+    doc=(
+        "The axes of the two pins at one `end` are not parallel: the second branch's pin is turned by half "
+        "of the angles, the first one's by minus half. The directions of the axes alone change."
+    ),
+    parameters=PARAMETERS,
+    places=at_sites(spread_blocks),
+    apply=apply,
+    pivot="centre of each pin",
+    frame="local axes before the pin",
+    moves="nothing: the bars stay where they are at home",
+    options=(Option("end", ("proximal", "distal"), "which pins"),),
+    vector=names_of(PARAMETERS),
+    excludes=("parallelogram_parallelism",),
+    stage=40,
+)

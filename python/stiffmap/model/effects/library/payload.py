@@ -1,0 +1,61 @@
+"""A workpiece or tool that the declaration leaves out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from stiffmap.model.description import Body, ExternalSpring, MachineDescription, Point
+from stiffmap.model.effects.edit import fresh
+from stiffmap.model.effects.library.gravity import DOWN
+from stiffmap.model.effects.sites import at
+from stiffmap.model.effects.types import EffectType, Parameter, Placed
+
+COM = tuple(
+    Parameter(
+        f"com_{a}", "m", -10.0, 10.0, None, 0.1, f"its centre from the TCP, {a}", default=0.0, fitted=False
+    )
+    for a in "xyz"
+)
+FAR = 1e9
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """A body where the machine has gravity, else a weight alone: the machine's own stays left out."""
+    com = tuple(placed.values[f"com_{a}"] for a in "xyz")
+    centre = (com[0], com[1], com[2])
+    name = fresh("payload", description.platform)
+    if description.gravity is not None:
+        body = Body(name, placed.values["mass"], centre)
+        return replace(description, platform=(*description.platform, body))
+    platform = (*description.platform, Point(name, centre))
+    weight = _weight(name, placed.values["mass"])
+    return replace(description, platform=platform, external_springs=(*description.external_springs, weight))
+
+
+def _weight(point: str, mass: float) -> ExternalSpring:
+    """A dead force: a spring of no length to an anchor so far that neither size nor direction change
+    (by 1e-9 per metre of motion)."""
+    down = np.array(DOWN) / np.linalg.norm(DOWN) * FAR
+    x, y, z = (float(v) for v in down)
+    return ExternalSpring(
+        f"weight_{point}", f"platform.{point}", (x, y, z), mass * float(np.linalg.norm(DOWN)) / FAR, 0.0
+    )
+
+
+EFFECT = EffectType(
+    kind="payload",
+    precedence=300,
+    title="load carried on the platform",
+    doc=(
+        "A mass on the platform that the declaration leaves out; it weighs along the machine's gravity. In a "
+        "machine without gravity it alone weighs, 9.81 m/s² along base -z."
+    ),
+    parameters=(Parameter("mass", "kg", 0.0, 1e5, 0.0, 1.0, "of the load"), *COM),
+    places=at("platform"),
+    apply=apply,
+    frame="platform axes (centre), base axes (weight)",
+    moves="with the platform",
+    stage=70,
+)

@@ -1,0 +1,18 @@
+"""A displacement sensor whose axes are turned."""
+
+from __future__ import annotations
+
+from stiffmap.model.effects.library.measurement import ANGLES, measured, of_coordinates, rotation, turned
+
+EFFECT = measured(
+    "sensor_axes",
+    "orientation of the displacement sensor",
+    "The sensor's axes are turned against the declared ones: reading = (Rx·Ry·Rz)^T displacement.",
+    "sensor",
+    ANGLES,
+    350,
+    frame="declared axes of the reading; about x, then the turned y, then the twice turned z",
+    reading=of_coordinates(lambda values, parameters: turned(values, rotation(parameters).T)),
+    hidden=lambda plan: plan.frame == "unknown",
+    certified=True,
+)

@@ -1,0 +1,42 @@
+"""Tilt of a guide or joint with all that it carries."""
+
+from __future__ import annotations
+
+from stiffmap.model.description import Element, Joint, MachineDescription
+from stiffmap.model.description.tree import Elements
+from stiffmap.model.effects.edit import built, change_sites
+from stiffmap.model.effects.library.geometry import about, home_position, names_of, rotation_of, rotations
+from stiffmap.model.effects.sites import at_sites, joints
+from stiffmap.model.effects.types import EffectType, Parameter, Placed
+
+PARAMETERS: tuple[Parameter, ...] = rotations("rotation")
+
+
+def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+    """A rotation about the joint's home position, before the joint."""
+
+    def change(e: Element) -> Elements:
+        assert isinstance(e, Joint)
+        return (built(f"{e.name}_tilt", about(home_position(e), rotation_of(placed))), e)
+
+    return change_sites(description, placed.legs, placed.element, joints, change)
+
+
+EFFECT = EffectType(
+    kind="tilt",
+    precedence=170,
+    title="tilt of a guide or joint with what it carries",
+    doc=(
+        "Guide tilt: the guide, its carriage and the joint axes that the carriage carries turn together "
+        "about the carriage's home position. The same for any joint about its own frame."
+    ),
+    parameters=PARAMETERS,
+    places=at_sites(joints),
+    apply=apply,
+    pivot="home position of the carriage; origin of a revolute joint",
+    frame="local axes before the joint; about x, then the turned y, then the twice turned z",
+    moves="the joint and all that it carries, up to the platform",
+    vector=names_of(PARAMETERS),
+    excludes=("tilt",),
+    stage=40,
+)

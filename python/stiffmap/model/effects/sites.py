@@ -1,0 +1,181 @@
+"""Where in a sequence an effect may act: names that address elements, and their indices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from stiffmap.model.description import (
+    Block,
+    Body,
+    Cable,
+    Element,
+    Joint,
+    MachineDescription,
+    Offset,
+    Point,
+    Spring,
+)
+from stiffmap.model.description.tree import Elements, sequences
+from stiffmap.model.effects.edit import Sites
+from stiffmap.model.effects.types import Place
+
+
+def _by_name(elements: Elements, match: Callable[[Element], bool]) -> dict[str, tuple[int, ...]]:
+    found: dict[str, tuple[int, ...]] = {}
+    for i, e in enumerate(elements):
+        if match(e):
+            found[e.name] = (*found.get(e.name, ()), i)
+    return found
+
+
+def drives(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Actuated joints."""
+    return _by_name(elements, lambda e: isinstance(e, Joint) and e.actuated)
+
+
+def elastic_drives(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Actuated joints with a compliance."""
+    return _by_name(elements, lambda e: isinstance(e, Joint) and e.actuated and e.law is not None)
+
+
+def elastic_directions(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Elastic joints, and single directions of link springs by names such as ``foot.k22``, where no other
+    direction is coupled to them."""
+    out = _by_name(elements, lambda e: isinstance(e, Joint) and e.law is not None)
+    for i in range(6):
+        for name, at in _by_name(elements, lambda e: _alone(e, i)).items():  # noqa: B023 - used at once
+            out[f"{name}.k{i + 1}{i + 1}"] = at
+    return out
+
+
+def _alone(e: Element, i: int) -> bool:
+    if not isinstance(e, Spring):
+        return False
+    m = e.compliance or e.stiffness
+    assert m is not None
+    return m[i][i] > 0.0 and not any(m[i][k] or m[k][i] for k in range(6) if k != i)
+
+
+def guides(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Actuated sliders."""
+    return _by_name(
+        elements,
+        lambda e: isinstance(e, Joint) and e.actuated and e.kind == "prismatic" and not isinstance(e, Cable),
+    )
+
+
+def cables(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Cables and belts."""
+    return _by_name(elements, lambda e: isinstance(e, Cable))
+
+
+def led_cables(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Cables with a lead between winch and guide."""
+    return _by_name(elements, lambda e: isinstance(e, Cable) and e.lead > 0.0)
+
+
+def free_joints(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Passive joints without a law."""
+    return _by_name(elements, lambda e: isinstance(e, Joint) and e.free)
+
+
+def passive_joints(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Passive joints."""
+    return _by_name(elements, lambda e: isinstance(e, Joint) and not e.actuated)
+
+
+def joints(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """All joints; a cable is none."""
+    return _by_name(elements, lambda e: isinstance(e, Joint) and not isinstance(e, Cable))
+
+
+def springs(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Link springs."""
+    return _by_name(elements, lambda e: isinstance(e, Spring))
+
+
+def bodies(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Bodies."""
+    return _by_name(elements, lambda e: isinstance(e, Body))
+
+
+def offsets(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Offsets that are longer than zero."""
+    return _by_name(elements, lambda e: isinstance(e, Offset) and bool(np.any(e.nominal.p)))
+
+
+def links(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Offsets that are the length of a link, under the name of the spring at the link's end."""
+    found: dict[str, tuple[int, ...]] = {}
+    for name, at in springs(elements).items():
+        lengths = tuple(i for k in at if (i := _offset_before(elements, k)) is not None)
+        found.update({name: lengths} if lengths else {})
+    return found
+
+
+def lengths(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Links, and offsets by their own names."""
+    return {**offsets(elements), **links(elements)}
+
+
+def blocks(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Parallel blocks of two branches."""
+    return _by_name(elements, lambda e: isinstance(e, Block) and len(e.branches) == 2)
+
+
+def _offset_before(elements: Elements, k: int) -> int | None:
+    i = k - 1
+    while i >= 0 and isinstance(elements[i], (Body, Point)):
+        i -= 1
+    before = elements[i] if i >= 0 else None
+    return i if isinstance(before, Offset) and np.any(before.nominal.p) else None
+
+
+def names(elements: Elements, sites: Sites) -> list[str]:
+    """Names that a leg has for these sites, in their order, once each."""
+    return list(dict.fromkeys(name for seq in sequences(elements) for name in sites(seq)))
+
+
+def found(
+    description: MachineDescription, legs: tuple[str, ...], element: str, sites: Sites
+) -> list[Element]:
+    """The elements that a name stands for in these legs; without legs in base and platform."""
+    trunk = (*description.base, *description.platform)
+    chains = [leg.elements for leg in description.legs if leg.name in legs] if legs else [trunk]
+    return [seq[i] for c in chains for seq in sequences(c) for i in sites(seq).get(element, ())]
+
+
+def places(description: MachineDescription, sites: Sites) -> list[Place]:
+    """Each name in each leg alone, then in all legs that have it; then those of base and platform."""
+    having: dict[str, list[str]] = {}
+    for leg in description.legs:
+        for name in names(leg.elements, sites):
+            having.setdefault(name, []).append(leg.name)
+    out: list[Place] = []
+    for name, legs in having.items():
+        out += [(name, (leg,)) for leg in legs]
+        out += [(name, tuple(legs))] if len(legs) > 1 else []
+    trunk = names((*description.base, *description.platform), sites)
+    return out + [(name, ()) for name in trunk if name not in having]
+
+
+def at_sites(sites: Sites) -> Callable[[MachineDescription], list[Place]]:
+    """`places` of these sites as a function of the machine."""
+    return lambda description: places(description, sites)
+
+
+def at(element: str) -> Callable[[MachineDescription], list[Place]]:
+    """One place without legs."""
+    return lambda description: [(element, ())]
+
+
+def per_leg(element: str) -> Callable[[MachineDescription], list[Place]]:
+    """A place that every leg has, such as its mount on the base."""
+
+    def find(description: MachineDescription) -> list[Place]:
+        legs = tuple(leg.name for leg in description.legs)
+        return [(element, (leg,)) for leg in legs] + ([(element, legs)] if len(legs) > 1 else [])
+
+    return find

@@ -1,0 +1,173 @@
+"""A validated file to the SI description of a machine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from stiffmap.common.units import LENGTH, NONE, Dimension, UnitSystem
+from stiffmap.common.yaml_text import Document
+from stiffmap.model.description import (
+    TASK,
+    AppliedEffect,
+    ExternalSpring,
+    MachineDescription,
+)
+from stiffmap.model.description.pose import Pose, Vector
+from stiffmap.model.description.tree import point_names
+from stiffmap.model.files.build_elements import build_elements, build_range
+from stiffmap.model.files.build_geometry import build_pose, build_vector
+from stiffmap.model.files.build_legs import build_leg
+from stiffmap.model.files.build_strokes import with_strokes
+from stiffmap.model.files.context import Context, Gathered
+from stiffmap.model.files.link_covariance import with_links
+from stiffmap.model.files.schema import MachineFile
+from stiffmap.model.files.schema.base import Number, suggestion
+from stiffmap.model.files.schema.geometry import Box
+from stiffmap.model.files.schema.machine import EffectModel, ExternalSpringModel
+
+GRAVITY_LIMIT = 1000.0  # m/s²; above it, the file gave mm/s²
+
+
+def build(
+    model: MachineFile, document: Document, file: str = "", folder: Path = Path()
+) -> MachineDescription:
+    """Description without its effects, which the caller applies; raises `FileError` with every problem."""
+    units = UnitSystem(**model.units.model_dump())
+    context = Context(file, document, folder, units, model.materials, Gathered())
+    tried = context.attempt
+    templates = {name: t for name, t in model.templates.items() if isinstance(t, list)}
+    legs = [tried(partial(build_leg, *leg, templates, context)) for leg in model.legs.items()]
+    springs = [
+        tried(partial(_external_spring, name, s, context.at("external_springs", name).inside(name)))
+        for name, s in model.external_springs.items()
+    ]
+    home = tried(partial(build_pose, model.home, context.at("home"), "home.")) or Pose()
+    description = MachineDescription(
+        task=tuple(c for c in TASK if c in model.task),
+        freedoms=tuple(c for c in TASK if c in model.freedoms),
+        name=model.name,
+        legs=tuple(leg for leg in legs if leg is not None),
+        base=build_elements(model.base, context.at("base").inside("base")),
+        platform=build_elements(model.platform, context.at("platform").inside("platform")),
+        home=home,
+        search_home=model.home is not None and model.home.solve,
+        workspace=tried(partial(_workspace, model.workspace, context.at("workspace"), model.task, home)),
+        gravity=tried(partial(_gravity, model.gravity, context.at("gravity"))),
+        external_springs=tuple(s for s in springs if s is not None),
+        modal_damping=tried(partial(_ratios, model.modal_damping, context.at("modal_damping"))) or (),
+        title=model.title,
+        source=model.source,
+        extra=tuple((key, _tuples(value)) for key, value in model.extra.items()),
+        units=units,
+    )
+    context.raise_problems()
+    gathered = context.gathered
+    description = with_strokes(description, gathered)
+    context.raise_problems()
+    _check_points(description, context.at("external_springs"))
+    return replace(
+        description,
+        uncertainty=tuple({**gathered.uncertainty, **model.uncertainty}.items()),
+        extra=with_links(description.extra, gathered.links, context),
+        notes=tuple({**gathered.notes, **model.notes}.items()),
+        sources=tuple({**gathered.sources, **model.sources}.items()),
+    )
+
+
+def _check_points(description: MachineDescription, context: Context) -> None:
+    known = point_names(description)
+    for spring in description.external_springs:
+        if spring.point not in known:
+            near = suggestion(spring.point, known)
+            there = ", ".join(known) or "none"
+            context.at(spring.name, "point").fail(f"no point '{spring.point}'{near}; there are: {there}")
+
+
+def _workspace(
+    box: Box | None, context: Context, task: Sequence[str], home: Pose
+) -> tuple[Vector, Vector] | None:
+    """The box; flat at home along an axis that it leaves out, which the tool is not commanded along."""
+    if box is None:
+        return None
+    ranges = []
+    for axis, at_home in zip("xyz", home.translation, strict=True):
+        given = getattr(box, axis)
+        if given is None and axis in task:
+            context.fail(
+                f"missing key '{axis}': the tool is commanded along {axis} (task), so the box needs [min, max]"
+            )
+        if given is None:
+            ranges.append((at_home, at_home))
+            continue
+        low, high = given
+        if low.value != high.value:
+            ranges.append(build_range(given, LENGTH, context, axis))
+        elif axis in task:
+            context.at(axis).fail(
+                f"{low.value} to {high.value} is no interval; where the tool does not move, give some room around it: "
+                f"[{float(low.value) - 1:g}, {float(high.value) + 1:g}]"
+            )
+        else:
+            ranges.append((context.si(low, LENGTH),) * 2)
+    (x0, x1), (y0, y1), (z0, z1) = ranges
+    return (x0, y0, z0), (x1, y1, z1)
+
+
+def _gravity(numbers: list[Number] | None, context: Context) -> Vector | None:
+    if numbers is None:
+        return None
+    gravity = build_vector(numbers, NONE, context, "gravity")
+    if max(abs(g) for g in gravity) > GRAVITY_LIMIT:
+        context.fail(f"gravity is in m/s^2 whatever the length unit; found {list(gravity)}")
+    return gravity
+
+
+def _ratios(given: Number | list[Number] | None, context: Context) -> tuple[float, ...]:
+    numbers = given if isinstance(given, list) else [] if given is None else [given]
+    ratios = tuple(context.si(n, NONE, f"modal_damping.{i + 1}") for i, n in enumerate(numbers))
+    if isinstance(given, list) and not ratios:
+        context.fail("expected at least one damping ratio; found an empty list")
+    for r in ratios:
+        if not 0.0 <= r < 1.0:
+            context.fail(f"expected damping ratios from 0 to below 1 (0.02 is 2 %); found {r:g}")
+    return ratios
+
+
+def _external_spring(name: str, model: ExternalSpringModel, context: Context) -> ExternalSpring:
+    context.note(model.note)
+    context.mark(model.source)
+    for key in ("stiffness", "length"):
+        if getattr(model, key).value < 0.0:
+            context.at(key).fail(f"must not be negative; found {getattr(model, key).value}")
+    return ExternalSpring(
+        name,
+        model.point,
+        build_vector(model.anchor, LENGTH, context, "anchor"),
+        context.si(model.stiffness, Dimension(length=-1, force=1), "stiffness"),
+        context.si(model.length, LENGTH, "length"),
+        model.tension_only,
+    )
+
+
+def build_effect(model: EffectModel) -> AppliedEffect:
+    """Record of an effect (already SI)."""
+    return AppliedEffect(
+        model.kind,
+        model.element,
+        tuple(model.legs),
+        tuple(model.parameters.items()),
+        tuple(model.options.items()),
+    )
+
+
+def _tuples(value: Any) -> Any:
+    """Lists as tuples: a description is immutable."""
+    if isinstance(value, list):
+        return tuple(_tuples(v) for v in value)
+    if isinstance(value, dict):
+        return tuple((k, _tuples(v)) for k, v in value.items())
+    return value

@@ -1,0 +1,66 @@
+"""Legs: a template or their own elements, between a frame in the base and the platform."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from stiffmap.model.description import Element, Leg, Offset, Pose
+from stiffmap.model.files.build_elements import build_elements
+from stiffmap.model.files.build_geometry import build_pose
+from stiffmap.model.files.context import Context, Gathered
+from stiffmap.model.files.leg_home import with_home
+from stiffmap.model.files.schema.base import suggestion
+from stiffmap.model.files.schema.elements import ElementModel
+from stiffmap.model.files.schema.machine import LegModel
+
+RESERVED = ("base", "platform")
+
+
+def build_leg(name: str, leg: LegModel, templates: dict[str, list[ElementModel]], context: Context) -> Leg:
+    """A leg placed in the base; raises `FileError`."""
+    here = context.at("legs", name).inside(name)
+    if name in RESERVED:
+        here.fail(f"'{name}' cannot be a leg's name: full names use it")
+    here.note(leg.note)
+    here.mark(leg.source)
+    problems = len(context.gathered.problems)
+    if leg.template is not None:
+        if leg.template not in templates:
+            known = list(templates)
+            near = suggestion(leg.template, known)
+            here.at("template").fail(
+                f"no template '{leg.template}'{near}; there are: {', '.join(known) or 'none'}"
+            )
+        template = replace(here, path=("templates", leg.template))
+        elements = build_elements(templates[leg.template], template)
+    else:
+        elements = build_elements(leg.elements or [], here.at("elements"))
+    if len(context.gathered.problems) > problems:
+        context.raise_problems()  # what follows refers to the elements
+    for joint, home in (leg.home or {}).items():
+        elements = with_home(elements, joint, home, here.at("home", joint).inside(joint))
+    return Leg(name, (*_frame(leg, here, elements), *elements, *_attach(leg, here, elements)))
+
+
+def _frame(leg: LegModel, context: Context, elements: tuple[Element, ...]) -> tuple[Element, ...]:
+    if leg.frame is None:
+        return ()
+    here = context.at("frame")
+    _refuse_taken("frame", elements, here)
+    return (Offset("frame", build_pose(leg.frame, here.inside("frame"))),)
+
+
+def _attach(leg: LegModel, context: Context, elements: tuple[Element, ...]) -> tuple[Element, ...]:
+    if leg.attach is None:
+        return ()
+    here = context.at("attach")
+    _refuse_taken("attach", elements, here)
+    if leg.attach != "base_axes":
+        return (Offset("attach", build_pose(leg.attach, here.inside("attach"))),)
+    turned = build_pose(leg.frame, replace(context, gathered=Gathered()).at("frame"))
+    return (Offset("attach", Pose(rotation=turned.inverse().rotation)),)
+
+
+def _refuse_taken(name: str, elements: tuple[Element, ...], context: Context) -> None:
+    if any(element.name == name for element in elements):
+        context.fail(f"the leg already has an element called '{name}', which is the name of this offset")

@@ -1,0 +1,97 @@
+"""Strokes of springs: built once all joints of the machine are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from stiffmap.common.units import ANGLE, LENGTH, Dimension
+from stiffmap.model.description import BeamStroke, Element, Joint, MachineDescription, Spring, TableStroke
+from stiffmap.model.description.tree import all_elements, edit
+from stiffmap.model.files.build_springs import build_matrix
+from stiffmap.model.files.context import Context, Gathered, StrokeUse
+from stiffmap.model.files.schema.base import suggestion
+
+
+def with_strokes(description: MachineDescription, gathered: Gathered) -> MachineDescription:
+    """The machine with the strokes that its file gives; problems are kept in ``gathered``."""
+    for use in gathered.strokes:
+        stroke = use.context.attempt(partial(_stroke, description, use))
+        if stroke is not None:
+            description = edit(description, use.full, partial(_with_stroke, stroke)) or description
+    return description
+
+
+def _with_stroke(stroke: BeamStroke | TableStroke, element: Element) -> Element | None:
+    return replace(element, stroke=stroke) if isinstance(element, Spring) else None
+
+
+def _stroke(description: MachineDescription, use: StrokeUse) -> BeamStroke | TableStroke:
+    model, context = use.model.stroke, use.context
+    assert model is not None
+    joint = stroke_joint(description, use.full, model.joint, context)
+    coordinate = LENGTH if joint.kind == "prismatic" else ANGLE
+    if model.table is None:
+        return _beam(use, joint, coordinate)
+    at = tuple(context.at("table", i, "at").si(row.at, coordinate) for i, row in enumerate(model.table))
+    for i in range(1, len(at)):
+        if at[i] <= at[i - 1]:
+            context.at("table", i, "at").fail("the coordinates of a table must rise")
+    quiet = replace(context, gathered=Gathered())  # uncertainties are those of the first row
+    rows = tuple(
+        build_matrix(row.compliance, "compliance", quiet.at("table", i, "compliance"))
+        for i, row in enumerate(model.table)
+    )
+    for end in ends(joint):
+        if not at[0] <= end <= at[-1]:
+            say = context.units.say
+            context.at("table").fail(
+                f"the table goes from {say(at[0], coordinate)} to {say(at[-1], coordinate)}, "
+                f"'{model.joint}' to {say(end, coordinate)}"
+            )
+    return TableStroke(model.joint, at, rows)
+
+
+def _beam(use: StrokeUse, joint: Joint, coordinate: Dimension) -> BeamStroke:
+    model, beam, context = use.model.stroke, use.model.beam, use.context
+    assert model is not None
+    length, along = model.length or (beam and beam.length), model.along or (beam and beam.along)
+    assert length and along  # the schema asks for them
+    per = Dimension(*(a - b for a, b in zip(LENGTH, coordinate, strict=True)))
+    out = BeamStroke(
+        model.joint,
+        length=context.si(length, LENGTH),
+        along="xyz".index(along[-1]),
+        at=0.0 if model.at is None else context.at("at").si(model.at, coordinate),
+        rate=1.0 if model.rate is None else context.at("rate").si(model.rate, per),
+    )
+    for end in ends(joint):
+        left = out.length + out.rate * (end - out.at)
+        if left <= 0.0:
+            say = context.units.say
+            context.fail(
+                f"with '{model.joint}' at {say(end, coordinate)} the beam would be {say(left, LENGTH)} long"
+            )
+    return out
+
+
+def ends(joint: Joint) -> tuple[float, ...]:
+    """Coordinates at which a stroke must be declared: home, and the ends of the range."""
+    return (*joint.home, *((joint.drive.range if joint.drive else None) or joint.limits or ()))
+
+
+def stroke_joint(description: MachineDescription, full: str, name: str, context: Context) -> Joint:
+    """The joint that a spring of this full name varies with; raises `FileError`."""
+    joints = {n: e for n, e in all_elements(description) if isinstance(e, Joint) and len(e.axes) == 1}
+    scope = full
+    while scope:
+        scope = scope.rpartition(".")[0]
+        found = joints.get(f"{scope}.{name}" if scope else name)
+        if found is not None:
+            return found
+    own = full.partition(".")[0]
+    near = [n.partition(".")[2] if n.partition(".")[0] == own else n for n in joints]
+    there = ", ".join(near) or "none"
+    raise context.at("joint").error(
+        f"no joint of one axis '{name}'{suggestion(name, near)}; there are: {there}"
+    )

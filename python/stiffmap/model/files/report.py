@@ -1,0 +1,94 @@
+"""Validation errors stated in one sentence: file, line, key, what was expected and what was found."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from stiffmap.common.errors import FileError, together
+from stiffmap.common.yaml_text import Document, KeyPath
+from stiffmap.model.files.schema.base import describe, suggestion
+from stiffmap.model.files.schema.elements import SORTS
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def validated(model: type[M], document: Document, file: str, expected: str) -> M:
+    """A file's content against a schema; raises `FileError` with every problem.
+
+    expected
+        What such a file is: ``a motion file is a mapping with name and line, circle or points``.
+    """
+    if not isinstance(document.data, dict):
+        raise FileError(f"{expected}; found {describe(document.data)}", file=file)
+    try:
+        return model.model_validate(document.data)
+    except ValidationError as error:
+        raise file_error(error, document, file) from error
+    except OverflowError as error:
+        raise FileError("a number is too large", file=file) from error
+
+
+def file_error(error: ValidationError, document: Document, file: str) -> FileError:
+    """All of pydantic's errors."""
+    return together([_one(e, document, file) for e in error.errors(include_url=False)])
+
+
+def _one(error: Any, document: Document, file: str) -> FileError:
+    missing = error["type"] == "missing"
+    path = _path(error["loc"], document.data, missing)
+    if missing:
+        path, message = path[:-1], f"missing key '{path[-1]}'"
+    else:
+        message = _message(error)
+    return FileError(
+        message, file=file, line=document.line(path) or (1 if document.lines else None), key=key_text(path)
+    )
+
+
+def key_text(path: KeyPath) -> str:
+    """``legs.x.elements[2].axis``."""
+    text = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in path)
+    return text.removeprefix(".")
+
+
+def _path(loc: tuple[Any, ...], data: Any, missing: bool) -> KeyPath:
+    """Location in the *file*: without the schema's own steps (union tags, forms of a matrix)."""
+    path: list[str | int] = []
+    for i, step in enumerate(loc):
+        last = i == len(loc) - 1
+        if isinstance(data, dict):
+            # an element's tag comes before its keys, and its name stands under a key of the same name
+            if step in SORTS and not last and "command_errors" not in path:
+                continue
+            if str(step) in data or (last and missing):
+                path.append(str(step))
+                data = data.get(str(step))
+        elif isinstance(data, list) and isinstance(step, int) and step < len(data):
+            path.append(step)
+            data = data[step]
+    return tuple(path)
+
+
+def _message(error: Any) -> str:
+    kind, found, context = error["type"], error["input"], error.get("ctx", {})
+    if kind == "finite_number":
+        return f"expected a finite number; found {found}"
+    if kind == "literal_error":
+        near = suggestion(str(found), _choices(context))
+        return f"expected {context['expected']}; found {describe(found)}{near}"
+    if kind == "string_pattern_mismatch":
+        return f"a name has letters, digits, '_' and '-' only; found {describe(found)}"
+    if kind in ("too_short", "too_long"):
+        wanted = context.get("min_length", context.get("max_length"))
+        return f"expected {wanted} entries; found {context['actual_length']}"
+    if kind.endswith("_type"):
+        sorts = {"list": "a list", "dict": "a mapping", "string": "text", "bool": "true or false"}
+        return f"expected {sorts.get(kind.removesuffix('_type'), 'a number')}; found {describe(found)}"
+    message: str = error["msg"]
+    return message.removeprefix("Value error, ")
+
+
+def _choices(context: dict[str, Any]) -> list[str]:
+    return [part.strip(" '") for part in str(context["expected"]).replace(" or ", ",").split(",")]

@@ -1,0 +1,271 @@
+"""Elements of a chain as a file writes them: each is a mapping whose first key says its sort."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag, create_model, model_validator
+from pydantic_core import PydanticCustomError
+
+from stiffmap.model.description import Cable, Drive, Joint
+from stiffmap.model.description.numbers import JointNumber, numbers_of
+from stiffmap.model.files.schema.base import FileModel, Name, Number, Numbers, Pair, Source, Vector3
+from stiffmap.model.files.schema.geometry import Axis, Frame
+from stiffmap.model.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix, Stroke
+
+SORTS = ("offset", "joint", "actuator", "spring", "body", "point", "block", "cable")
+AXES_OF = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 3}
+
+
+def _model(name: str, numbers: dict[str, JointNumber]) -> type[FileModel]:
+    """Keys of these numbers; those with a dot in their key in mappings of their own."""
+    keys: dict[str, Any] = {}
+    inner: dict[str, dict[str, JointNumber]] = {}
+    for key, n in numbers.items():
+        outer, _, rest = key.partition(".")
+        if rest:
+            inner.setdefault(outer, {})[rest] = n
+        else:
+            keys[key] = ((Pair if n.interval else Number) | None, Field(default=None, description=n.doc))
+    keys |= {k: (_model(k.capitalize(), v) | None, None) for k, v in inner.items()}
+    return create_model(name, __base__=FileModel, **keys)
+
+
+def _numbers(name: str, *, passive: bool, of: type = Joint) -> type[FileModel]:
+    """Keys of all declared numbers of a joint with a drive, or of a passive one."""
+    found = (*numbers_of(of), *(() if passive else numbers_of(Drive)))
+    return _model(name, {n.key: n for n in found if n.passive or not passive})
+
+
+if TYPE_CHECKING:  # the keys are made from the numbers that Joint and Drive declare
+
+    class PassiveNumbers(FileModel):
+        """Keys of the numbers of a passive joint."""
+
+    class DriveNumbers(FileModel):
+        """Keys of the numbers of a joint with a drive."""
+
+    class CableNumbers(FileModel):
+        """Keys of the numbers of a cable and its winch."""
+
+else:
+    PassiveNumbers, DriveNumbers, CableNumbers = (
+        _numbers("PassiveNumbers", passive=True),
+        _numbers("DriveNumbers", passive=False),
+        _numbers("CableNumbers", passive=False, of=Cable),
+    )
+
+
+class OffsetModel(Frame):
+    """Constant transform; ``actual`` is what the machine was built with, if not the nominal."""
+
+    offset: Name
+    actual: Frame | None = None
+    source: Source | None = None
+    note: str = ""
+
+
+class JointModel(PassiveNumbers):
+    """Passive joint; it turns or slides freely unless it has a stiffness or a law, for all axes or a list with
+    one per axis. ``rest`` is the coordinate at which these are free of force (left out: as at home)."""
+
+    joint: Name
+    kind: Literal["revolute", "prismatic", "universal", "spherical"]
+    axis: Axis | None = None
+    axes: list[Axis] | None = None
+    home: Number | Numbers | None = None
+    stiffness: Number | Numbers | None = None
+    compliance: Number | Numbers | None = None
+    law: LawModel | None = None
+    rest: Number | Numbers | None = None
+    source: Source | None = None
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _axes(self) -> JointModel:
+        needed = AXES_OF[self.kind]
+        given = [self.axis] if self.axis is not None else self.axes
+        if (self.axis is not None and self.axes is not None) or given is None or len(given) != needed:
+            raise PydanticCustomError(
+                "axes",
+                "a {kind} joint needs {what}",
+                {"kind": self.kind, "what": "one axis" if needed == 1 else f"axes: a list of {needed}"},
+            )
+        for key in ("home", "rest", "stiffness", "compliance"):
+            value = getattr(self, key)
+            whole = key in ("stiffness", "compliance")  # one number then holds for every axis
+            if isinstance(value, list) and len(value) != needed:
+                what = "one number" if needed == 1 else f"{needed} numbers"
+                raise PydanticCustomError("per_axis", "{key} needs {what}", {"key": key, "what": what})
+            if isinstance(value, Number) and needed != 1 and not whole:
+                raise PydanticCustomError(
+                    "per_axis", "{key} needs a list of {n} numbers", {"key": key, "n": needed}
+                )
+        one_of(self, ("stiffness", "compliance", "law"))
+        if self.rest is not None and self.stiffness is None and self.compliance is None and self.law is None:
+            raise PydanticCustomError("rest", "rest needs a stiffness, a compliance or a law")
+        return self
+
+
+class CommandErrorModel(FileModel):
+    """Error added to the commanded coordinate u: offset + slope*(u - reference) + amplitude*sin(...), and the
+    axis positioning error at u by ``knots``: [coordinate, error] by rising coordinate."""
+
+    offset: Number | None = None
+    slope: Number | None = None
+    amplitude: Number | None = None
+    period: Number | None = None
+    phase: Number | None = None
+    reference: Number | None = None
+    knots: list[Pair] | None = None
+
+
+class ActuatorModel(DriveNumbers):
+    """Actuated joint, one axis; give its stiffness, its compliance, a law, or ``rigid: true``."""
+
+    actuator: Name
+    kind: Literal["revolute", "prismatic"]
+    axis: Axis
+    home: Number | None = None
+    stiffness: Number | None = None
+    compliance: Number | None = None
+    law: LawModel | None = None
+    rigid: Literal[True] | None = None
+    command_errors: list[CommandErrorModel] | None = None
+    source: Source | None = None
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _one_law(self) -> ActuatorModel:
+        one_of(self, ("stiffness", "compliance", "law", "rigid"), required=True)
+        return self
+
+
+class CableModel(CableNumbers):
+    """Cable or belt from the current frame to an anchor in the base; its winch commands its free length. Give its
+    elasticity (EA), a stiffness, or both. ``force`` is the largest tension."""
+
+    cable: Name
+    anchor: Annotated[Vector3, Field(description="Where it enters its guide, base axes.")]
+    at: Annotated[Vector3 | None, Field(description="Where it is fixed, in the current frame.")] = None
+    guide: Annotated[Axis | None, Field(description="Axis about which the pulley turns, base axes.")] = None
+    command_errors: list[CommandErrorModel] | None = None
+    source: Source | None = None
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _yields(self) -> CableModel:
+        if getattr(self, "elasticity", None) is None and getattr(self, "stiffness", None) is None:
+            raise PydanticCustomError("cable", "a cable needs an elasticity (EA) or a stiffness")
+        return self
+
+
+class SpringModel(FileModel):
+    """Virtual spring of a link, at the place where its compliance holds."""
+
+    spring: Name
+    compliance: Matrix | None = None
+    stiffness: Matrix | None = None
+    beam: Beam | None = None
+    link: Annotated[str, Field(description="Identified link file, relative to this file.")] | None = None
+    laws: dict[Literal[DIRECTIONS], LawModel] | None = None  # type: ignore[valid-type]
+    rest: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = None
+    stroke: Stroke | None = None
+    loss_factor: Annotated[Number | None, Field(description="Structural loss factor.")] = None
+    source: Source | None = None
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _one_form(self) -> SpringModel:
+        table = self.stroke is not None and self.stroke.table is not None
+        one_of(self, ("compliance", "stiffness", "beam", "link"), required=not table)
+        also = [
+            k for k in ("compliance", "stiffness", "beam", "link", "laws") if getattr(self, k) is not None
+        ]
+        refused = also if table else [k for k in ("stiffness", "laws") if self.stroke and k in also]
+        if refused:
+            what = "a table" if table else "length and joint"
+            message = "a stroke by {what} does not go with {keys}"
+            raise PydanticCustomError("stroke", message, {"what": what, "keys": ", ".join(refused)})
+        if self.stroke is not None and not table and self.beam is None:
+            missing = [k for k in ("length", "along") if getattr(self.stroke, k) is None]
+            if missing:
+                raise PydanticCustomError(
+                    "stroke", "without a beam, a stroke needs {keys}", {"keys": " and ".join(missing)}
+                )
+        return self
+
+
+class BodyModel(FileModel):
+    """Rigid body that moves with the current frame; of a link with a section, mass, centre and inertia follow from it
+    where they are not given."""
+
+    body: Name
+    mass: Number | None = None
+    of: Annotated[Name | None, Field(description="Spring of the same sequence whose beam it is.")] = None
+    com: Vector3 | None = None
+    inertia: list[Number | Vector3] | None = None
+    source: Source | None = None
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _mass(self) -> BodyModel:
+        if self.mass is None and self.of is None:
+            raise PydanticCustomError("mass", "a body needs a mass, or of: the spring whose beam it is")
+        return self
+
+
+class PointModel(FileModel):
+    """Named point that moves with the current frame."""
+
+    point: Name
+    at: Vector3 | None = None
+    source: Source | None = None
+    note: str = ""
+
+
+class BlockModel(FileModel):
+    """Two or more branches between the same two frames."""
+
+    block: Name
+    branches: Annotated[dict[Name, list[ElementModel]], Field(min_length=2)]
+    source: Source | None = None
+    note: str = ""
+
+
+def one_of(model: FileModel, keys: tuple[str, ...], *, required: bool = False) -> None:
+    """Refuse two of ``keys`` together, and none of them where one is required."""
+    given = [k for k in keys if getattr(model, k) is not None]
+    if len(given) > 1 or (required and not given):
+        raise PydanticCustomError(
+            "one_of",
+            "give {how} of {keys}; found {found}",
+            {
+                "how": "exactly one" if required else "at most one",
+                "keys": ", ".join(keys),
+                "found": ", ".join(given) or "none",
+            },
+        )
+
+
+def _sort(data: Any) -> str | None:
+    found = [k for k in SORTS if (k in data if isinstance(data, dict) else hasattr(data, k))]
+    return found[0] if len(found) == 1 else None
+
+
+ElementModel = Annotated[
+    Annotated[OffsetModel, Tag("offset")]
+    | Annotated[JointModel, Tag("joint")]
+    | Annotated[ActuatorModel, Tag("actuator")]
+    | Annotated[SpringModel, Tag("spring")]
+    | Annotated[BodyModel, Tag("body")]
+    | Annotated[PointModel, Tag("point")]
+    | Annotated[BlockModel, Tag("block")]
+    | Annotated[CableModel, Tag("cable")],
+    Discriminator(
+        _sort,
+        custom_error_type="element",
+        custom_error_message="an element needs exactly one of the keys " + ", ".join(SORTS),
+    ),
+]
+BlockModel.model_rebuild()

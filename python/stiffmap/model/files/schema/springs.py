@@ -1,0 +1,207 @@
+"""Springs as a file writes them: matrices, beams, force laws."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from stiffmap.model.files.schema.base import FileModel, Name, Number, Pair, describe
+
+DIRECTIONS = ("tx", "ty", "tz", "rx", "ry", "rz")
+ENTRIES = tuple(f"k{i}{j}" for i in range(1, 7) for j in range(i, 7))
+DIAGONAL = tuple(f"k{i}{i}" for i in range(1, 7))
+
+_Six = Annotated[list[Number], Field(min_length=6, max_length=6)]
+
+
+class Matrix(FileModel):
+    """Symmetric 6x6 matrix, translations first.
+
+    Written as six diagonal terms ``[...]``, as six rows, or by entries ``{k11: ..., k26: ...}``:
+    all six diagonal terms, and those of the upper triangle that are not zero.
+    """
+
+    rows: Annotated[list[_Six], Field(min_length=6, max_length=6)] | None = None
+    diagonal: _Six | None = None
+    entries: dict[Literal[ENTRIES], Number] | None = None  # type: ignore[valid-type]
+
+    @classmethod
+    def as_mapping(cls, data: Any) -> Any:
+        """Rows, diagonal or entries under their key."""
+        if isinstance(data, list):
+            nested = bool(data) and isinstance(data[0], list)
+            return {"rows" if nested else "diagonal": data}
+        if isinstance(data, dict) and not set(data) <= {"rows", "diagonal", "entries"}:
+            return {"entries": _upper(data)}
+        if not isinstance(data, dict):
+            raise PydanticCustomError(
+                "matrix",
+                "expected six diagonal terms, six rows of six, or entries such as k11, k26; found {found}",
+                {"found": describe(data)},
+            )
+        return data
+
+
+def _upper(entries: dict[Any, Any]) -> dict[str, Any]:
+    """Entries by their upper-triangle names; a missing diagonal term is an error, not a zero."""
+    out: dict[str, Any] = {}
+    for key, value in entries.items():
+        name = str(key)
+        if name not in ENTRIES and name[:1] + name[:0:-1] in ENTRIES:
+            name = name[0] + name[:0:-1]
+        if name not in ENTRIES:
+            raise PydanticCustomError(
+                "unknown_key",
+                "unknown key '{key}'; entries are k11 ... k66, translations first",
+                {"key": key},
+            )
+        if name in out:
+            raise PydanticCustomError("twice", "entry {name} is given twice", {"name": name})
+        out[name] = value
+    missing = [k for k in DIAGONAL if k not in out]
+    if missing:
+        raise PydanticCustomError(
+            "missing_entries",
+            "missing diagonal entries {keys} (write 0 if meant)",
+            {"keys": ", ".join(missing)},
+        )
+    return out
+
+
+class Material(FileModel):
+    """Young's modulus ``E`` with the shear modulus ``G`` or Poisson's ratio ``nu``; ``density`` (mass/length³) where
+    masses follow from sections."""
+
+    E: Number
+    G: Number | None = None
+    nu: Number | None = None
+    density: Number | None = None
+
+    @model_validator(mode="after")
+    def _one_shear(self) -> Material:
+        if (self.G is None) == (self.nu is None):
+            raise PydanticCustomError("shear", "give exactly one of G and nu")
+        return self
+
+
+class Round(FileModel):
+    """Solid circular section."""
+
+    diameter: Number
+
+
+class Tube(FileModel):
+    """Circular tube."""
+
+    outer: Annotated[Number, Field(description="Outer diameter.")]
+    inner: Annotated[Number, Field(description="Inner diameter.")]
+
+
+class Rectangle(FileModel):
+    """Solid rectangle: width along the axis after the beam's (y of x, z of y, x of z), height along
+    the other."""
+
+    width: Number
+    height: Number
+
+
+class Hollow(FileModel):
+    """Thin-walled rectangular tube: outer width and height as for a rectangle."""
+
+    width: Number
+    height: Number
+    wall: Number
+
+
+class Beam(FileModel):
+    """Euler-Bernoulli cantilever; the spring sits at its far end.
+
+    A section (round, tube, rectangle, hollow) with a material, or the products EA, GJ and the two
+    bending stiffnesses about the axes across the beam (EIy and EIz of a beam along x).
+    """
+
+    length: Number
+    along: Literal["x", "y", "z", "-x", "-y", "-z"] = "x"
+    material: Material | Name | None = None
+    round: Round | None = None
+    tube: Tube | None = None
+    rectangle: Rectangle | None = None
+    hollow: Hollow | None = None
+    EA: Number | None = None
+    GJ: Number | None = None
+    EIx: Number | None = None
+    EIy: Number | None = None
+    EIz: Number | None = None
+
+    @property
+    def products(self) -> tuple[str, str, str, str]:
+        """Names of the four stiffness products of a beam along this axis."""
+        k = "xyz".index(self.along[-1])
+        return ("EA", "GJ", "EI" + "xyz"[(k + 1) % 3], "EI" + "xyz"[(k + 2) % 3])
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Beam:
+        sections = [k for k in ("round", "tube", "rectangle", "hollow") if getattr(self, k) is not None]
+        given = [k for k in ("EA", "GJ", "EIx", "EIy", "EIz") if getattr(self, k) is not None]
+        by_section = len(sections) == 1 and self.material is not None and not given
+        by_products = not sections and self.material is None and set(given) == set(self.products)
+        if not (by_section or by_products):
+            raise PydanticCustomError(
+                "beam",
+                "a beam along {along} needs one section (round, tube, rectangle or hollow) with a material, "
+                "or exactly {products}; found {found}",
+                {
+                    "along": self.along,
+                    "products": ", ".join(self.products),
+                    "found": ", ".join(sections + given + (["material"] if self.material else []))
+                    or "neither",
+                },
+            )
+        return self
+
+
+class LawModel(FileModel):
+    """Nonlinear law of one coordinate: force = stiffness*a + cubic*a^3, or a polyline of
+    [deflection, force] knots continued with slope ``stiffness``. Stiffnesses are per radian."""
+
+    stiffness: Number
+    cubic: Number | None = None
+    knots: list[Pair] | None = None
+
+    @model_validator(mode="after")
+    def _one_law(self) -> LawModel:
+        if self.cubic is not None and self.knots is not None:
+            raise PydanticCustomError("law", "cubic and knots do not combine")
+        return self
+
+
+class StrokeRow(FileModel):
+    """Compliance of a link where a joint is at a coordinate."""
+
+    at: Number
+    compliance: Matrix
+
+
+class Stroke(FileModel):
+    """How a link's compliance varies with the coordinate of ``joint``: as a beam that is ``length`` long at
+    coordinate ``at`` and grows by ``rate`` per unit of it (0: it does not), or as a ``table``, linear in between."""
+
+    joint: Annotated[str, Field(description="Name in the same sequence or one around it, or a full name.")]
+    at: Number | None = None
+    length: Annotated[Number | None, Field(description="Left out: that of the beam.")] = None
+    along: Annotated[
+        Literal["x", "y", "z", "-x", "-y", "-z"] | None, Field(description="Left out: that of the beam.")
+    ] = None
+    rate: Annotated[Number | None, Field(description="Left out: 1.")] = None
+    table: Annotated[list[StrokeRow] | None, Field(min_length=2)] = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Stroke:
+        also = [k for k in ("at", "length", "along", "rate") if getattr(self, k) is not None]
+        if self.table is not None and also:
+            raise PydanticCustomError(
+                "stroke", "a table takes no {keys} in addition", {"keys": ", ".join(also)}
+            )
+        return self

@@ -1,0 +1,106 @@
+"""The door of the identification: every input is checked once, here, and trusted inside."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import real_array
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.link.arrays import Bools, Floats
+
+AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+COLLINEAR = 1e-6  # second singular value of the centred nodes over the first
+RANK = 1e-9  # singular value of the column-scaled wrenches over the largest
+
+
+class Field(NamedTuple):
+    """Displacement field of a set of load cases: SI units, link axes."""
+
+    points: Floats  # (n, 3) m
+    displacements: Floats  # (cases, n, 3) m
+    wrenches: Floats  # (cases, 6) N, N·m at the reference point
+    reference: Floats  # (3,) m
+
+
+def checked_field(
+    points: ArrayLike, displacements: ArrayLike, wrenches: ArrayLike, reference: ArrayLike
+) -> Field:
+    """The four arrays as float64 after all checks of shape, finiteness and geometry.
+
+    Raises:
+        StiffmapError: wrong shape, NaN or infinity, fewer than three points, collinear points.
+    """
+    p = _finite("points", points, (None, 3), "(n, 3) in m")
+    check_points(p)
+    w = _finite("wrenches", wrenches, (None, 6), "(cases, 6) in N and N·m")
+    u = _finite("displacements", displacements, (len(w), len(p), 3), "(cases, n, 3) in m")
+    r = _finite("reference", reference, (3,), "(3,) in m")
+    return Field(p, u, w, r)
+
+
+def check_points(points: Floats) -> None:
+    """Refuse nodes that cannot show a rotation: fewer than three, or all on one line.
+
+    Raises:
+        StiffmapError: with the number of points, or with their spread along and across the line.
+    """
+    if len(points) < 3:
+        raise StiffmapError(f"points: expected at least 3 to fit a rigid-body motion, got {len(points)}")
+    if on_one_line(points):
+        spread = _spread(points)
+        raise StiffmapError(
+            "points: expected points that are not on one line (the turn about it cannot be seen), "
+            f"got a spread of {spread[0]:.3g} m along and {spread[1]:.1g} m across"
+        )
+
+
+def on_one_line(points: Floats) -> bool:
+    """Whether points (n, 3) m, three or more, show no turn about a line on which they all lie."""
+    spread = _spread(points)
+    return bool(spread[1] <= COLLINEAR * spread[0])
+
+
+def _spread(points: Floats) -> Floats:
+    return np.asarray(np.linalg.svd(points - points.mean(axis=0), compute_uv=False))
+
+
+def identifiable_columns(wrenches: Floats, *, partial: bool) -> Bools:
+    """Which of the six columns of the compliance the wrenches (cases, 6) determine, as (6,) bool.
+
+    Column j is determined when the unit wrench j is in the row space of the cases.
+
+    Raises:
+        StiffmapError: rank below six without ``partial``; names what cannot be identified.
+    """
+    scale = np.linalg.norm(wrenches, axis=0)
+    _, s, vt = np.linalg.svd(wrenches / np.where(scale > 0, scale, 1.0))
+    rank = int(np.sum(s > RANK * s.max(initial=0.0)))
+    null = vt[rank:]
+    seen: Bools = (np.linalg.norm(null, axis=0) < 1e-6) & (scale > 0)
+    if rank < 6 and not partial:
+        missing = ", ".join(a for a, ok in zip(AXES, seen, strict=True) if not ok)
+        raise StiffmapError(
+            f"wrenches: expected load cases of rank 6, got rank {rank} from {len(wrenches)} cases; "
+            f"the columns of {missing} cannot be identified (partial=True leaves NaN for them)"
+        )
+    if rank == 0:
+        raise StiffmapError("wrenches: expected at least one load case that is not zero")
+    return seen
+
+
+def _finite(name: str, value: ArrayLike, shape: tuple[int | None, ...], words: str) -> Floats:
+    a = real_array(value, name, f"an array of numbers, {words}")
+    fits = a.ndim == len(shape) and all(
+        want is None or want == got for want, got in zip(shape, a.shape, strict=True)
+    )
+    if not fits:
+        wanted = "(" + ", ".join("any" if s is None else str(s) for s in shape) + ")"
+        raise StiffmapError(f"{name}: expected shape {words}, here {wanted}, got {a.shape}")
+    if not np.all(np.isfinite(a)):
+        first = tuple(int(i) for i in np.argwhere(~np.isfinite(a))[0])
+        count = int((~np.isfinite(a)).sum())
+        raise StiffmapError(f"{name}: expected finite numbers, got {count} NaN or infinite, first at {first}")
+    return a

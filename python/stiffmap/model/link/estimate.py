@@ -1,0 +1,133 @@
+"""The numbers of an identified link, and what follows from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2, t
+
+from stiffmap.model.link.arrays import Bools, Floats, Ints
+from stiffmap.model.link.checks import Field
+from stiffmap.model.link.correlation import Correlation
+from stiffmap.model.link.noise import Noise
+from stiffmap.model.link.regression import Regression
+from stiffmap.model.link.rigidfit import RigidFit
+from stiffmap.model.link.transport import stiffness_covariance, transport_compliance
+from stiffmap.model.link.zeros import critical_multiple
+
+
+class Evidence(NamedTuple):
+    """All that the estimate is made from; kept so that it can be made again under other constraints."""
+
+    field: Field
+    kept: Bools  # (cases, n)
+    fits: tuple[RigidFit, ...]
+    noise: Noise
+    correlation: Correlation | None
+    twist_covariance: Floats  # (cases, 6, 6)
+    regression: Regression
+    columns: Bools  # (6,) columns of the compliance that the wrenches determine
+    method: str
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Spring of a link at its reference point, link axes, SI. Entries are row-major where flattened."""
+
+    compliance: Floats  # (6, 6) m/N, rad/(N·m), ...
+    covariance: Floats  # (36, 36) of the entries; rank 21 under symmetry
+    dof: Ints  # (cases,) 3 n - 6 of the nodes kept
+    sigma: Floats  # (cases,) m, noise of the field per case
+    insignificant: Bools  # (6, 6) zero within the test's level
+    level: float  # family-wise level of that test
+    outliers: Bools  # (cases, n)
+    raw: Floats  # (6, 6) before symmetry and zeros
+    raw_covariance: Floats  # (36, 36)
+    entry_dof: Floats  # (6, 6) degrees of freedom behind each standard error (Satterthwaite)
+    symmetric: bool
+    zeros_applied: bool
+    evidence: Evidence
+
+    @property
+    def reference(self) -> Floats:
+        """(3,) m, the point where the spring sits, link axes."""
+        return self.evidence.field.reference
+
+    @property
+    def stiffness(self) -> Floats:
+        """(6, 6) inverse of the compliance; NaN where the compliance is not fully identified."""
+        if np.isnan(self.compliance).any() or np.linalg.matrix_rank(_scaled(self.compliance)) < 6:
+            return np.full((6, 6), np.nan)
+        return np.asarray(np.linalg.inv(self.compliance))
+
+    @property
+    def standard_error(self) -> Floats:
+        """(6, 6) standard errors of the compliance entries."""
+        variance: Floats = np.maximum(np.diag(self.covariance), 0.0)
+        return np.asarray(np.sqrt(variance).reshape(6, 6), dtype=np.float64)
+
+    @property
+    def stiffness_covariance(self) -> Floats:
+        """(36, 36) covariance of the stiffness entries, first order."""
+        return stiffness_covariance(self.compliance, self.covariance)
+
+    @property
+    def tests(self) -> int:
+        """Distinct entries in the zero test: 21 under symmetry, else 36."""
+        return 21 if self.symmetric else 36
+
+    @property
+    def multiple(self) -> Floats:
+        """(6, 6) the k of the paper's "k sigma" that the level and the degrees of freedom give."""
+        return critical_multiple(self.level, self.tests, self.entry_dof)
+
+    @property
+    def residual(self) -> Floats:
+        """(cases, n, 3) m, displacement less the fitted rigid motion; NaN at outliers."""
+        out = np.full(self.evidence.field.displacements.shape, np.nan)
+        for k, fit in enumerate(self.evidence.fits):
+            out[k, self.evidence.kept[k]] = fit.residual
+        return out
+
+    @property
+    def asymmetry(self) -> float:
+        """Largest |raw - raw^T| over sqrt(C_ii C_jj), before symmetrisation."""
+        size = np.sqrt(np.abs(np.diag(self.raw)))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return float(np.nanmax(np.abs(self.raw - self.raw.T) / np.outer(size, size)))
+
+    @property
+    def symmetry_p_value(self) -> float:
+        """Chi-square p-value of "the raw matrix is symmetric" under its covariance; NaN when partial."""
+        if np.isnan(self.raw).any():
+            return float("nan")
+        D = np.array([np.eye(36)[6 * i + j] - np.eye(36)[6 * j + i] for i in range(6) for j in range(i)])
+        gap, V = D @ self.raw.ravel(), D @ self.raw_covariance @ D.T
+        size = np.sqrt(np.diag(V))
+        if not np.all(size > 0):
+            return float("nan")
+        return float(chi2.sf((gap / size) @ np.linalg.solve(V / np.outer(size, size), gap / size), 15))
+
+    @property
+    def case_p_value(self) -> float:
+        """Chi-square p-value of "the cases agree with one matrix"; NaN when none is repeated."""
+        r = self.evidence.regression
+        return float(chi2.sf(r.lack_of_fit, r.lack_dof)) if r.lack_dof else float("nan")
+
+    def interval(self, probability: float = 0.95) -> Floats:
+        """(6, 6, 2) confidence interval of each entry (not simultaneous)."""
+        half = t.isf((1 - probability) / 2, self.entry_dof) * self.standard_error
+        return np.stack([self.compliance - half, self.compliance + half], axis=-1)
+
+    def at(self, reference: Floats) -> tuple[Floats, Floats]:
+        """Compliance (6, 6) and covariance (36, 36) at another reference point (3,) m, same axes."""
+        shift = np.asarray(reference, dtype=float) - self.reference
+        return transport_compliance(self.compliance, self.covariance, shift)
+
+
+def _scaled(C: Floats) -> Floats:
+    size = np.sqrt(np.abs(np.diag(C)))
+    size = np.where(size > 0, size, 1.0)
+    return np.asarray(C / np.outer(size, size))

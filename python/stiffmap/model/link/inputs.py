@@ -1,0 +1,155 @@
+"""What the command line and part files say, in SI: materials, load cases, parametric parts."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import number_in
+from stiffmap.common.units import FORCES, MOMENTS, STRESSES, size_of
+from stiffmap.common.yaml_text import read
+from stiffmap.model.link.arrays import Floats
+from stiffmap.model.link.gmshmesh import UNITS
+from stiffmap.model.link.shapes import Bar, Foot, ForkBar, HollowBar
+from stiffmap.model.link.solve import Material
+
+# Handbook values for a first estimate; a measured modulus belongs in the part file.
+MATERIALS = {
+    "steel": (210e9, 0.30),
+    "stainless": (195e9, 0.30),
+    "aluminium": (70e9, 0.33),
+    "titanium": (110e9, 0.34),
+    "cast-iron": (110e9, 0.26),
+    "magnesium": (45e9, 0.35),
+}
+STRESS = {u: float(v) for u, v in STRESSES.items()}
+LOAD_UNITS = {u: size_of(u, FORCES, MOMENTS) for u in ("N", "kN", "N*m", "Nm", "N*mm", "Nmm")}
+UNIT_WRENCHES = np.diag([100.0, 100.0, 100.0, 10.0, 10.0, 10.0])  # linear solver: the size does not matter
+
+_BY_NAME: dict[str, type[BaseModel]] = {
+    "bar": Bar,
+    "hollow-bar": HollowBar,
+    "fork-bar": ForkBar,
+    "foot": Foot,
+}
+
+
+class _Units(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    length: Literal["mm", "m", "cm", "in", "inch"]
+    stress: Literal["Pa", "MPa", "GPa", "N/mm2"] = "MPa"
+
+
+class PartFile(BaseModel):
+    """A parametric link: ``units``, ``part`` (shape, lengths), ``material`` (name, or young and poisson)."""
+
+    model_config = ConfigDict(extra="forbid")
+    units: _Units
+    part: dict[str, Any]
+    material: str | dict[str, float] | None = None
+    name: str | None = None
+
+
+def read_material(text: str) -> Material:
+    """A name of :data:`MATERIALS`, or ``70GPa,0.33``.
+
+    Raises:
+        StiffmapError: neither; a modulus without unit; a Poisson ratio outside (-1, 0.5).
+    """
+    if text in MATERIALS:
+        return Material(*MATERIALS[text], text)
+    found = re.fullmatch(r"\s*([\d.eE+]+)\s*([A-Za-z/2]*)\s*,\s*(-?[\d.]+)\s*", text)
+    if not found:
+        raise StiffmapError(
+            f"material: expected one of {', '.join(MATERIALS)}, or like 70GPa,0.33; got {text!r}"
+        )
+    if found[2] not in STRESS:
+        raise StiffmapError(f"material: the modulus needs its unit, one of {', '.join(STRESS)}; got {text!r}")
+    return checked_material(float(found[1]) * STRESS[found[2]], float(found[3]), text)
+
+
+def checked_material(young: float, poisson: float, name: str) -> Material:
+    """The material, SI, if an elastic solid can have it."""
+    if not (young > 0 and np.isfinite(young)) or not -1 < poisson < 0.5:
+        raise StiffmapError(
+            f"material: expected a modulus > 0 and Poisson ratio in (-1, 0.5), got {young:g} Pa, {poisson:g}"
+        )
+    return Material(young, poisson, name)
+
+
+def read_part(path: str | Path) -> tuple[Any, Material | None, str]:
+    """Shape, material (None when the file names none) and name of a parametric part file (YAML).
+
+    Raises:
+        StiffmapError: no such file, not YAML, units missing, unknown shape or key, lengths that do not fit.
+    """
+    if not Path(path).exists():
+        raise StiffmapError(f"{path}: no such file")
+    data = read(Path(path)).data
+    if not isinstance(data, dict):
+        raise StiffmapError(f"{path}: expected the keys units, part, material; got {type(data).__name__}")
+    file = _validated(path, PartFile, data)
+    shape = file.part.get("shape")
+    if shape not in _BY_NAME:
+        raise StiffmapError(f"{path}: part.shape: expected one of {', '.join(_BY_NAME)}, got {shape!r}")
+    factor = UNITS[file.units.length]
+    lengths = {k: v * factor if isinstance(v, int | float) else v for k, v in file.part.items()}
+    made = _validated(path, _BY_NAME[shape], lengths)
+    return made, _part_material(path, file), file.name or Path(path).stem
+
+
+def read_cases(path: str | Path) -> Floats:
+    """(cases, 6) N, N·m from a CSV with the columns ``fx [N] ... mz [N*mm]``, each with its unit.
+
+    Raises:
+        StiffmapError: no such file, a column or unit missing, cells that are not numbers.
+    """
+    try:
+        lines = [s for s in Path(path).read_text(encoding="utf-8").splitlines() if s.strip() and s[0] != "#"]
+    except OSError:
+        raise StiffmapError(f"{path}: no such file") from None
+    columns = {}
+    for place, cell in enumerate(lines[0].split(",") if lines else []):
+        found = re.fullmatch(r"\s*([fm][xyz])\s*\[\s*([A-Za-z*]+)\s*\]\s*", cell, re.IGNORECASE)
+        if found and found[2] in LOAD_UNITS and ("m" in found[2]) == (found[1][0].lower() == "m"):
+            columns[found[1].lower()] = (place, LOAD_UNITS[found[2]])
+    wanted = [a + b for a in "fm" for b in "xyz"]
+    missing = [c for c in wanted if c not in columns]
+    if missing:
+        raise StiffmapError(
+            f"{path}: expected the columns 'fx [N]' to 'mz [N*mm]' with units, missing {missing}"
+        )
+    rows = []
+    for number, line in enumerate(lines[1:], 2):
+        cells = line.split(",")
+        try:
+            rows.append([number_in(cells[columns[c][0]]) * columns[c][1] for c in wanted])
+        except (ValueError, IndexError):
+            raise StiffmapError(f"{path}: row {number} does not hold numbers in all columns") from None
+    return np.array(rows).reshape(-1, 6)
+
+
+def _part_material(path: str | Path, file: PartFile) -> Material | None:
+    given = file.material
+    if given is None or isinstance(given, str):
+        return None if given is None else read_material(given)
+    if set(given) != {"young", "poisson"}:
+        raise StiffmapError(
+            f"{path}: material: expected young and poisson, got {', '.join(given) or 'nothing'}"
+        )
+    return checked_material(given["young"] * STRESS[file.units.stress], given["poisson"], "part file")
+
+
+def _validated(path: str | Path, model: type[BaseModel], data: dict[str, Any]) -> Any:
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(p) for p in first["loc"])
+        got = "" if first["type"] in {"missing", "value_error"} else f", got {first['input']!r}"
+        raise StiffmapError(f"{path}: {where + ': ' if where else ''}{first['msg']}{got}") from None

@@ -1,0 +1,127 @@
+"""The link file that a machine's ``spring: {link: file}`` names: YAML, SI, with covariance and provenance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.outputs import write_text
+from stiffmap.common.yaml_text import read
+from stiffmap.model.link.arrays import Floats
+
+SYMMETRY = 1e-6  # of sqrt(C_ii C_jj)
+LARGEST = 1e150
+UNITS = {"length": "m", "force": "N", "angle": "rad"}
+
+
+@dataclass(frozen=True)
+class LinkFile:
+    """What a machine needs of an identified link: SI, link axes."""
+
+    compliance: Floats  # (6, 6)
+    covariance: Floats  # (36, 36) row-major
+    reference: Floats  # (3,) m
+    provenance: dict[str, Any]
+    name: str = "link"
+
+    @property
+    def standard_error(self) -> Floats:
+        """(6, 6) standard errors of the entries."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).reshape(6, 6)
+
+
+def save_link(link: LinkFile, path: str | Path) -> None:
+    """Write the file; numbers keep all their digits, so it loads back equal.
+
+    Raises:
+        StiffmapError: the path cannot be written.
+    """
+    data = {
+        "kind": "stiffmap-link",
+        "name": link.name,
+        "units": UNITS,
+        "reference": link.reference.tolist(),
+        "compliance": link.compliance.tolist(),
+        "covariance": link.covariance.tolist(),
+        "provenance": link.provenance,
+    }
+    text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=10_000, allow_unicode=True)
+    write_text(path, text)
+
+
+def load_link(path: str | Path) -> LinkFile:
+    """Read a link file. ``covariance`` may be left out or replaced by ``standard_error`` (6, 6), independent.
+
+    Raises:
+        StiffmapError: no such file, not a link file, missing key or units, wrong shape, NaN, a compliance
+            that is not symmetric (with the size of the asymmetry) or not positive semidefinite.
+    """
+    data = _read(path)
+    if data.get("units") != UNITS:
+        raise StiffmapError(f"{path}: units: expected {UNITS}, got {data.get('units')}")
+    C = _array(path, data, "compliance", (6, 6))
+    _check_spring(path, C)
+    if "covariance" in data:
+        V = _array(path, data, "covariance", (36, 36))
+    elif "standard_error" in data:
+        V = np.diag(_variances(path, _array(path, data, "standard_error", (6, 6))))
+    else:
+        V = np.zeros((36, 36))
+    provenance = data.get("provenance") or {}
+    return LinkFile(C, V, _array(path, data, "reference", (3,)), provenance, str(data.get("name", "link")))
+
+
+def _read(path: str | Path) -> dict[str, Any]:
+    if not Path(path).exists():
+        raise StiffmapError(f"{path}: no such link file")
+    data = read(Path(path)).data
+    if not isinstance(data, dict) or data.get("kind") != "stiffmap-link":
+        raise StiffmapError(f"{path}: expected a link file (kind: stiffmap-link), made by `stiffmap link`")
+    return data
+
+
+def _array(path: str | Path, data: dict[str, Any], key: str, shape: tuple[int, ...]) -> Floats:
+    if key not in data:
+        raise StiffmapError(f"{path}: missing key {key!r}")
+    try:
+        a = np.array(data[key], dtype=float)
+    except (TypeError, ValueError):
+        raise StiffmapError(f"{path}: {key}: expected numbers of shape {shape}") from None
+    if a.shape != shape or not np.all(np.isfinite(a)):
+        raise StiffmapError(f"{path}: {key}: expected finite numbers of shape {shape}, got shape {a.shape}")
+    return a
+
+
+def _variances(path: str | Path, error: Floats) -> Floats:
+    largest = float(np.abs(error).max())
+    if largest > LARGEST:
+        raise StiffmapError(
+            f"{path}: standard_error: expected at most {LARGEST:g} (it is squared), got {largest:.3g}"
+        )
+    return np.asarray(error.ravel() ** 2)
+
+
+def _check_spring(path: str | Path, C: Floats) -> None:
+    d = np.diag(C)
+    if np.any(d < 0):
+        raise StiffmapError(
+            f"{path}: compliance: expected a diagonal that is not negative, got {d.min():.3g}"
+        )
+    size = np.where(d > 0, np.sqrt(d), 1.0)
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers of 1e308 have no finite ratio
+        scaled = C / np.outer(size, size)
+        gap = float(np.abs(scaled - scaled.T).max())
+    if not gap <= SYMMETRY:
+        raise StiffmapError(
+            f"{path}: compliance: expected a symmetric matrix, got |C - C^T| = {gap:.1e} of sqrt(Cii Cjj)"
+        )
+    lowest = float(np.linalg.eigvalsh(scaled / 2 + scaled.T / 2)[0])
+    if lowest < -1e-9:
+        raise StiffmapError(
+            f"{path}: compliance: expected no negative eigenvalue, got {lowest:.2g} (at a unit diagonal)"
+        )

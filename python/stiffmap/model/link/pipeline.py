@@ -1,0 +1,200 @@
+"""From a part to its spring: mesh, field, identification, and the uncertainty by source (docs/link.md §6)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.link.arrays import Floats, Ints
+from stiffmap.model.link.budget import Budget, shift_covariance
+from stiffmap.model.link.calculix import has_ccx, solve_ccx
+from stiffmap.model.link.identify import identify_link
+from stiffmap.model.link.linkfile import LinkFile
+from stiffmap.model.link.mesh import SolidMesh
+from stiffmap.model.link.refine import Refinement, richardson
+from stiffmap.model.link.result import Link
+from stiffmap.model.link.solve import Material, Setup, mean_motion, solve_skfem
+
+Solver = Literal["auto", "ccx", "skfem"]
+Support = Literal["bed", "soft"]
+COARSER = (2.0, 1.41)  # sizes of the refinement study over the finest
+COARSE_ENOUGH = 1.05
+FEWEST_PATCHES = 16  # a bootstrap over fewer says little
+
+
+@dataclass(frozen=True)
+class PartLink:
+    """An identified part: the spring of the finest mesh, its uncertainty by source, and the fields."""
+
+    link: Link
+    budget: Budget
+    refinement: Refinement | None
+    mesh: SolidMesh
+    nodes: Ints  # (n,) nodes of the loaded face in the mesh
+    displacements: Floats  # (cases, all nodes, 3) m
+    wrenches: Floats  # (cases, 6) N, N·m
+    solver: str
+    material: Material
+    setup: Setup
+
+    def file(self, name: str, provenance: dict[str, Any] | None = None) -> LinkFile:
+        """The link file: compliance, total covariance, and where both come from."""
+        source = {
+            "mesh": {
+                "nodes": len(self.mesh.nodes),
+                "elements": len(self.mesh.tets),
+                "type": "ten-node tetrahedron",
+                "size_m": self.mesh.size(),
+            },
+            "material": self.material._asdict(),
+            "solver": self.solver,
+            "boundary": {"fixed": self.setup.fixed, "loaded": self.setup.loaded, "head": self.setup.head,
+                         "support": self.setup.support},
+            "noise_m": self.link.sigma.tolist(),
+            "degrees_of_freedom": self.link.dof.tolist(),
+            "standard_error": {k: self.budget.standard_error(k).tolist() for k in self.budget.parts},
+        }  # fmt: skip
+        C = self.link.compliance
+        return LinkFile(
+            (C + C.T) / 2, self.budget.total, self.link.reference, source | (provenance or {}), name
+        )
+
+
+def link_from_part(
+    mesher: Callable[[float | None], SolidMesh],
+    material: Material,
+    setup: Setup,
+    wrenches: Floats,
+    *,
+    size: float | None = None,
+    solver: Solver = "auto",
+    study: bool = True,
+    other_support: Support = "bed",
+    refine: bool = True,
+) -> PartLink:
+    """Identify a part's spring from its own finite-element field.
+
+    Args:
+        mesher: makes the mesh for an edge length in m; None is its default.
+        material, setup: SI; wrenches: (cases, 6) N, N·m at ``setup.reference``.
+        size: edge length of the finest mesh in m.
+        solver: "auto" takes CalculiX where it is installed.
+        study: solve again with a rigid head and on another support, for the boundary's share of the error.
+        other_support: "bed" for a base on something as stiff as the part, "soft" where only the mean motion of
+            the fixed face is held, as by a pin in its hole.
+        refine: solve two coarser meshes, for the mesh's share.
+
+    Raises:
+        StiffmapError: see the solvers, the meshers and :func:`identify_link`.
+    """
+    chosen = chosen_solver(solver)
+    if other_support not in ("bed", "soft"):
+        raise StiffmapError(f"support: expected bed or soft, got {other_support!r}")
+    mesh = mesher(size)
+    solve = solve_ccx if chosen == "CalculiX" else solve_skfem
+    field = solve(mesh, material, setup, wrenches)
+    nodes = mesh.face_nodes(setup.loaded)
+    link = _identify(mesh, nodes, field, setup, wrenches)
+    parts = {
+        "fit": _fit_covariance(link, wrenches),
+        "region": _region_covariance(mesh, nodes, field, setup, wrenches, link),
+    }
+    refinement = _refined(mesher, mesh, material, setup, wrenches, solve, link) if refine else None
+    if refinement is not None:
+        shift = np.where(
+            refinement.estimate == link.compliance, refinement.error, refinement.estimate - link.compliance
+        )
+        parts["mesh"] = shift_covariance([shift])
+    if study:
+        others = (setup._replace(head="rigid"), setup._replace(support=other_support))
+        shifts = [
+            _identify(mesh, nodes, solve_skfem(mesh, material, s, wrenches), s, wrenches).compliance
+            - link.compliance
+            for s in others
+        ]
+        # Head and support are two questions: their shares add.
+        parts["boundary"] = np.sum([shift_covariance([s]) for s in shifts], axis=0)
+    return PartLink(link, Budget(parts), refinement, mesh, nodes, field, wrenches, chosen, material, setup)
+
+
+def chosen_solver(solver: Solver) -> str:
+    """ "CalculiX" or "scikit-fem": what "auto" means here."""
+    if solver not in ("auto", "ccx", "skfem"):
+        raise StiffmapError(f"solver: expected auto, ccx or skfem, got {solver!r}")
+    return "CalculiX" if solver == "ccx" or (solver == "auto" and has_ccx()) else "scikit-fem"
+
+
+def _identify(mesh: SolidMesh, nodes: Ints, field: Floats, setup: Setup, wrenches: Floats) -> Link:
+    return identify_link(mesh.nodes[nodes], field[:, nodes], wrenches, reference=setup.reference)
+
+
+def _fit_covariance(link: Link, wrenches: Floats) -> Floats:
+    """Error of the nodes' choice: block bootstrap over patches, and not below that of independent noise.
+
+    The correlation model of `identify_link` takes the residual for one draw of a random field. On a face that
+    deforms smoothly as a whole its length reaches the region, and then it overstates (docs/link.md §5).
+    """
+    e = link.evidence
+    if e.correlation is None or not e.correlation.correlated or e.kept.shape[1] < 3 * FEWEST_PATCHES:
+        return link.covariance
+    f = e.field
+    independent = identify_link(
+        f.points, f.displacements, wrenches, reference=f.reference, noise="independent"
+    )
+    V = link.bootstrap()
+    least = np.sqrt(np.diag(independent.covariance) / np.maximum(np.diag(V), 1e-300))
+    up = np.maximum(least, 1.0)
+    return np.asarray(V * np.outer(up, up))
+
+
+def _region_covariance(
+    mesh: SolidMesh, nodes: Ints, field: Floats, setup: Setup, wrenches: Floats, link: Link
+) -> Floats:
+    """Other sensible choices on the same field: corner nodes, the half near the reference, area weights."""
+    corners = np.unique(mesh.face(setup.loaded)[:, :3])
+    far = np.linalg.norm(mesh.nodes[nodes] - setup.reference, axis=1)
+    choices: Sequence[Ints] = (corners, nodes[far <= np.median(far)])
+    found = [
+        _identify(mesh, c, field, setup, wrenches).compliance for c in choices if _is_spread(mesh.nodes[c])
+    ]
+    motion = mean_motion(mesh, setup.loaded, setup.reference, field)
+    weighted = np.linalg.lstsq(wrenches, motion, rcond=None)[0].T
+    return shift_covariance([C - link.compliance for C in [*found, (weighted + weighted.T) / 2]])
+
+
+def _is_spread(points: Floats) -> bool:
+    s = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return len(points) > 8 and bool(s[1] > 0.05 * s[0])
+
+
+def _refined(
+    mesher: Callable[[float | None], SolidMesh],
+    finest: SolidMesh,
+    material: Material,
+    setup: Setup,
+    wrenches: Floats,
+    solve: Callable[[SolidMesh, Material, Setup, Floats], Floats],
+    link: Link,
+) -> Refinement:
+    meshes = [mesher(factor * finest.size()) for factor in COARSER]
+    # A thin part keeps its elements small whatever is asked: only meshes that came out coarser count.
+    distinct = [m for m in meshes if m.size() > COARSE_ENOUGH * finest.size()]
+    if len(distinct) == 2 and distinct[0].size() < COARSE_ENOUGH * distinct[1].size():
+        distinct = distinct[1:]
+    if not distinct:
+        raise StiffmapError(
+            f"refinement: elements of {1e3 * finest.size():.3g} mm are as large as the part allows; choose a "
+            "smaller --size, or --quick without the mesh's share of the uncertainty"
+        )
+    found = [
+        _identify(
+            m, m.face_nodes(setup.loaded), solve(m, material, setup, wrenches), setup, wrenches
+        ).compliance
+        for m in distinct
+    ]
+    sizes = np.array([m.size() for m in [*distinct, finest]])
+    return richardson(sizes, np.array([*found, link.compliance]))

@@ -1,0 +1,207 @@
+"""Displacement fields that users already have: CSV, CalculiX/Abaqus .dat, .frd, Ansys listings, VTK/VTU."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import number_in
+from stiffmap.model.link.arrays import Floats, Ints
+from stiffmap.model.link.gmshmesh import UNITS
+from stiffmap.model.link.optional import need
+
+Rows = tuple[Ints, Floats]
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
+_BRACKET = re.compile(r"^\s*([A-Za-z]\w*)\s*(?:[\[(]\s*([\w./µ]+)\s*[\])])?\s*$")
+
+
+def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
+    """Points (n, 3) m and displacements (cases, n, 3) m of a CSV with units in its header.
+
+    Columns ``node, x [mm], y [mm], z [mm]`` and then ``ux [mm], uy [mm], uz [mm]`` once per load case.
+
+    Raises:
+        StiffmapError: no such file, a column or its unit missing, cells that are not numbers.
+    """
+    lines = [line for line in _lines(path) if line.strip() and not line.lstrip().startswith("#")]
+    if len(lines) < 2:
+        raise StiffmapError(f"{path}: expected a header and rows, got {len(lines)} lines")
+    names, factor = _header(path, lines[0])
+    rows = []
+    for number, line in enumerate(lines[1:], 2):
+        try:
+            row = [number_in(cell) for cell in line.split(",")]
+        except ValueError:
+            raise StiffmapError(
+                f"{path}: row {number} has a cell that is not a number: {line.strip()[:60]}"
+            ) from None
+        if len(row) != len(names):
+            raise StiffmapError(f"{path}: row {number} has {len(row)} cells, the header {len(names)}")
+        rows.append(row)
+    table = np.array(rows) * factor
+    where = {
+        axis: [i for i, n in enumerate(names) if n == axis] for axis in ("x", "y", "z", "ux", "uy", "uz")
+    }
+    counts = {axis: len(i) for axis, i in where.items()}
+    cases = counts["ux"]
+    if any(counts[a] != 1 for a in "xyz") or cases == 0 or {counts["uy"], counts["uz"]} != {cases}:
+        raise StiffmapError(
+            f"{path}: expected x, y, z once and ux, uy, uz once per load case, got {', '.join(names)}"
+        )
+    points = table[:, [where[a][0] for a in "xyz"]]
+    fields = np.stack([table[:, where[a]].T for a in ("ux", "uy", "uz")], axis=-1)
+    return points, fields
+
+
+def read_dat(path: str | Path) -> Rows:
+    """Node numbers (n,) and displacements (cases, n, 3), in the deck's unit, of a CalculiX or Abaqus .dat."""
+    blocks = re.split(
+        r"^\s*displacements\s*\(.*$", "\n".join(_lines(path)), flags=re.MULTILINE | re.IGNORECASE
+    )[1:]
+    return _same_nodes(path, [_node_rows(block) for block in blocks])
+
+
+def read_ansys(path: str | Path) -> Rows:
+    """Node numbers and displacements, in the deck's unit, of Ansys PRNSOL listings (``NODE UX UY UZ``)."""
+    blocks = re.split(r"^\s*NODE\s+UX\s+UY\s+UZ.*$", "\n".join(_lines(path)), flags=re.MULTILINE)[1:]
+    # One load case may be printed in several pages; each page repeats the header, not the load step.
+    cases: list[dict[int, list[float]]] = []
+    for block in blocks:
+        rows = _node_rows(re.split(r"MAXIMUM ABSOLUTE|\*{5}", block)[0], columns=(4, 5))
+        if cases and not cases[-1].keys() & rows.keys():
+            cases[-1].update(rows)
+        else:
+            cases.append(rows)
+    return _same_nodes(path, cases)
+
+
+def read_frd(path: str | Path) -> tuple[Floats, Floats]:
+    """Coordinates (n, 3) and displacements (cases, n, 3), in the deck's unit, of a CalculiX .frd (ASCII)."""
+    nodes: dict[int, list[float]] = {}
+    cases: list[dict[int, list[float]]] = []
+    into: dict[int, list[float]] | None = None
+    for line in _lines(path):
+        key = line[:5].strip()
+        if line.startswith("    2C"):
+            into = nodes
+        elif line.startswith(" -4"):
+            into = None
+            if line[5:9] == "DISP":
+                cases.append({})
+                into = cases[-1]
+        elif key.startswith("-1") and into is not None:
+            try:
+                into[int(line[3:13])] = [number_in(line[13 + 12 * i : 25 + 12 * i]) for i in range(3)]
+            except ValueError:
+                raise StiffmapError(
+                    f"{path}: expected fixed columns of twelve characters, got {line.strip()[:60]}"
+                ) from None
+        elif line.startswith(" -3"):
+            into = None
+    numbers, fields = _same_nodes(path, cases)
+    missing = [i for i in numbers if int(i) not in nodes]
+    if missing:
+        raise StiffmapError(f"{path}: node {missing[0]} has a displacement and no coordinates")
+    return np.array([nodes[int(i)] for i in numbers]), fields
+
+
+def read_vtk(path: str | Path) -> tuple[Floats, Floats]:
+    """Points and displacements, in the file's unit, of a VTK/VTU: every (n, 3) point array is a case."""
+    meshio = need("meshio")
+    try:
+        mesh = meshio.read(path)
+    except (Exception, SystemExit) as error:
+        raise StiffmapError(f"{path}: meshio cannot read it ({' '.join(str(error).split())[:80]})") from None
+    fields = [
+        np.asarray(a, dtype=float) for _, a in sorted(mesh.point_data.items()) if np.shape(a)[1:] == (3,)
+    ]
+    if not fields:
+        raise StiffmapError(
+            f"{path}: expected point arrays with three components, got {sorted(mesh.point_data)}"
+        )
+    return np.asarray(mesh.points, dtype=float), np.array(fields)
+
+
+def read_field(
+    path: str | Path, unit: str | None = None, nodes: str | Path | None = None
+) -> tuple[Floats, Floats]:
+    """Points (n, 3) m and displacements (cases, n, 3) m of any of the formats, by suffix.
+
+    Args:
+        path: .csv (units in the header), .dat, .frd, .vtk, .vtu, or .lis/.txt from Ansys.
+        unit: length unit of a file that does not carry it.
+        nodes: coordinates for .dat and Ansys listings, which hold numbers only: rows "node x y z".
+
+    Raises:
+        StiffmapError: unknown suffix, unit missing, coordinates missing, no displacements.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == ".csv":
+        return read_csv_field(path)
+    known = {".dat", ".frd", ".vtk", ".vtu", ".lis", ".txt"}
+    if suffix not in known:
+        raise StiffmapError(f"{path}: expected .csv, {', '.join(sorted(known))}, got {suffix!r}")
+    if unit not in UNITS:
+        raise StiffmapError(f"{path}: this format has no units; give --unit, one of {', '.join(UNITS)}")
+    if suffix in {".frd", ".vtk", ".vtu"}:
+        points, fields = read_frd(path) if suffix == ".frd" else read_vtk(path)
+        return UNITS[unit] * points, UNITS[unit] * fields
+    numbers, fields = read_dat(path) if suffix == ".dat" else read_ansys(path)
+    if nodes is None:
+        raise StiffmapError(f"{path}: it holds node numbers only; give the coordinates with --nodes")
+    place = _node_rows("\n".join(_lines(nodes)).replace(",", " "))
+    absent = [int(i) for i in numbers if int(i) not in place]
+    if absent:
+        raise StiffmapError(f"{nodes}: no coordinates for node {absent[0]} ({len(absent)} missing)")
+    return UNITS[unit] * np.array([place[int(i)] for i in numbers]), UNITS[unit] * fields
+
+
+def _lines(path: str | Path) -> list[str]:
+    try:
+        return Path(path).read_text(errors="replace").splitlines()
+    except OSError:
+        raise StiffmapError(f"{path}: no such file") from None
+
+
+def _header(path: str | Path, line: str) -> tuple[list[str], Floats]:
+    names, factors = [], []
+    for cell in line.split(","):
+        found = _BRACKET.match(cell)
+        if not found:
+            raise StiffmapError(
+                f"{path}: expected a column name with its unit, like 'ux [mm]', got {cell.strip()!r}"
+            )
+        name, unit = found[1].lower(), found[2]
+        if name in {"x", "y", "z", "ux", "uy", "uz"} and unit not in UNITS:
+            raise StiffmapError(
+                f"{path}: column {name} needs its unit, one of {', '.join(UNITS)}: '{name} [mm]'"
+            )
+        names.append(name)
+        factors.append(UNITS.get(unit or "", 1.0))
+    return names, np.array(factors)
+
+
+def _node_rows(text: str, columns: tuple[int, ...] = (4,)) -> dict[int, list[float]]:
+    """Rows "node a b c": the first three numbers behind an integer. Columns may touch: -1.0E-03-2.0E-04."""
+    rows = {}
+    for line in text.splitlines():
+        head = re.match(r"\s*(\d+)\s(.*)", line)
+        cells = re.findall(_NUMBER, head[2]) if head else []
+        if head and len(cells) + 1 in columns and not re.search(r"[A-CF-Za-cf-z]", line):
+            rows[int(head[1])] = [number_in(c.replace("D", "E").replace("d", "e")) for c in cells[:3]]
+    return rows
+
+
+def _same_nodes(path: str | Path, cases: list[dict[int, list[float]]]) -> Rows:
+    if not cases or not cases[0]:
+        raise StiffmapError(f"{path}: expected nodal displacements, found none")
+    numbers = sorted(cases[0])
+    for k, case in enumerate(cases):
+        if sorted(case) != numbers:
+            raise StiffmapError(
+                f"{path}: load case {k + 1} has {len(case)} nodes, case 1 has {len(numbers)} or others"
+            )
+    return np.array(numbers, dtype=np.int64), np.array([[case[i] for i in numbers] for case in cases])

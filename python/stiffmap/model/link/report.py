@@ -1,0 +1,105 @@
+"""Text report of an identified link: the only place of the identification that knows millimetres."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.link.arrays import Floats
+from stiffmap.model.link.estimate import Estimate
+from stiffmap.model.link.plausibility import findings
+
+
+def unit_factor(length: str) -> Floats:
+    """(6, 6) factor from SI entries to mm/N, 1/N, rad/(N·mm) for "mm", ones for "m".
+
+    Raises:
+        StiffmapError: another unit.
+    """
+    if length not in {"m", "mm"}:
+        raise StiffmapError(f'length: expected "m" or "mm", got {length!r}')
+    per = np.repeat([1e3, 1.0] if length == "mm" else [1.0, 1.0], 3)
+    return np.outer(per, per) / (1e3 if length == "mm" else 1.0)
+
+
+def unit_name(i: int, j: int, length: str) -> str:
+    """Unit of entry (i, j), zero-based: for example ``mm/N``."""
+    if i < 3 and j < 3:
+        return f"{length}/N"
+    return f"rad/(N·{length})" if i >= 3 and j >= 3 else "1/N"
+
+
+def write_report(link: Estimate, length: str) -> str:
+    """See :meth:`stiffmap.model.link.Link.report`."""
+    return "\n".join([*_table(link, length), *_field_lines(link), *_matrix_lines(link)])
+
+
+def _table(link: Estimate, length: str) -> list[str]:
+    factor = unit_factor(length)
+    C, error = link.compliance * factor, link.standard_error * factor
+    zero = link.insignificant
+    diagonal = [(i, i) for i in range(6)]
+    pairs = diagonal + [
+        (i, j) for i in range(6) for j in range(6) if i != j and (i < j or not link.symmetric)
+    ]
+    lines = [f"{'entry':<6} {'value':>13} {'std. error':>11} {'rel.':>8}  unit"]
+    for i, j in pairs:
+        if zero[i, j] and i != j:
+            continue
+        with np.errstate(invalid="ignore", divide="ignore"):
+            relative = abs(error[i, j] / C[i, j])
+        mark = "  zero within the test" if zero[i, j] else ""
+        numbers = f"{C[i, j]:>13.5e} {error[i, j]:>11.1e} {relative:>8.1e}"
+        lines.append(f"k{i + 1}{j + 1:<4} {numbers}  {unit_name(i, j, length)}{mark}")
+    names = [f"k{i + 1}{j + 1}" for i, j in pairs if zero[i, j] and i != j]
+    k = float(np.nanmin(link.multiple))
+    lines.append(
+        f"zero within {k:.2f} standard errors (family-wise level {link.level:g} over {link.tests} entries): "
+        + (", ".join(names) or "none")
+        + ("; set to zero and re-estimated" if link.zeros_applied else "")
+    )
+    return lines
+
+
+def _field_lines(link: Estimate) -> list[str]:
+    e, noise = link.evidence, link.evidence.noise
+    size = np.sqrt(np.mean(np.sum(e.field.displacements**2, axis=2), axis=1))
+    place = np.array2string(link.reference, precision=6)
+    lines = [f"rigid-body residual, {e.kept.shape[1]} nodes, reference {place} m:"]
+    for k in range(len(size)):
+        gone = int(link.outliers[k].sum())
+        share = link.sigma[k] / size[k] if size[k] > 0 else np.nan
+        lines.append(
+            f"  case {k + 1}: sigma {link.sigma[k]:.2e} m ({share:.1e} of the displacement), "
+            f"{link.dof[k]} degrees of freedom, {gone} outliers"
+        )
+    kind = "pooled" if noise.pooled else "given" if not np.all(np.isfinite(noise.used_dof)) else "per case"
+    lines.append(f"noise: {kind} (homogeneity p = {noise.homogeneity:.2g})")
+    c = e.correlation
+    if c is None:
+        lines.append("independence of the noise: taken as given")
+    elif not c.correlated:
+        lines.append(f"independence of the noise: not rejected (p = {c.p_value:.2g})")
+    else:
+        lines.append(
+            f"independence of the noise: REJECTED (p = {c.p_value:.1g}); correlation length "
+            f"{1e3 * c.length:.3g} mm, {c.effective_nodes:.3g} effective nodes of {e.kept.shape[1]}, "
+            f"errors enlarged by {np.sqrt(c.inflation.mean()):.3g}; "
+            f"largest correlation between cases {c.repetition:.2f}"
+        )
+    return lines
+
+
+def _matrix_lines(link: Estimate) -> list[str]:
+    missing = ~np.isfinite(link.compliance)
+    lines = [
+        f"asymmetry before symmetrisation: {link.asymmetry:.2e} of sqrt(kii kjj) "
+        f"(p = {link.symmetry_p_value:.2g})",
+        *findings(link.compliance, link.covariance),
+    ]
+    if np.isfinite(link.case_p_value):
+        lines.append(f"agreement of the cases with one matrix: p = {link.case_p_value:.2g}")
+    if missing.any():
+        names = ", ".join(f"k{i + 1}{j + 1}" for i, j in np.argwhere(missing))
+        lines.append(f"not identified: {names}")
+    return lines

@@ -1,0 +1,247 @@
+"""Parametric links without CAD, made with gmsh's OpenCASCADE: bars, forks, a foot. Lengths in m.
+
+Every link runs from the face ``fixed`` at the origin; axes as in the machine files: a bar along x with its
+width along y and its height along z, a foot along -y.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from stiffmap.model.link.arrays import Floats
+from stiffmap.model.link.gmshmesh import Faces, mesh_model
+from stiffmap.model.link.mesh import SolidMesh
+
+Length = Field(gt=0)
+
+
+class _Shape(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    def reference(self) -> Floats:
+        """(3,) m, centre of the loaded face."""
+        raise NotImplementedError
+
+    def default_size(self) -> float:
+        """Target edge length in m."""
+        raise NotImplementedError
+
+    def build(self, gmsh: Any) -> Faces:
+        """Make the solid in mm; returns the surface tags by name."""
+        raise NotImplementedError
+
+    def mesh(self, size: float | None = None) -> SolidMesh:
+        """Quadratic tetrahedra with the faces ``fixed`` and ``loaded``."""
+        return mesh_model(self.build, size or self.default_size())
+
+
+class Bar(_Shape):
+    """Solid rectangular bar."""
+
+    shape: Literal["bar"] = "bar"
+    length: float = Length
+    width: float = Length
+    height: float = Length
+
+    def reference(self) -> Floats:
+        """(3,) m, centre of the end face."""
+        return np.array([self.length, 0.0, 0.0])
+
+    def default_size(self) -> float:
+        """Half the smaller side."""
+        return min(self.width, self.height) / 2
+
+    def build(self, gmsh: Any) -> Faces:
+        """One box."""
+        _box(gmsh, 0, self.length, self.width, self.height)
+        gmsh.model.occ.synchronize()
+        return _end_faces(gmsh, 0, 0.0, 1e3 * self.length)
+
+
+class HollowBar(Bar):
+    """Rectangular tube with a constant wall."""
+
+    shape: Literal["hollow-bar"] = "hollow-bar"  # type: ignore[assignment]
+    wall: float = Length
+
+    @model_validator(mode="after")
+    def _wall_fits(self) -> HollowBar:
+        if 2 * self.wall >= min(self.width, self.height):
+            raise ValueError(f"wall: expected less than half of the smaller side, got {self.wall}")
+        return self
+
+    def default_size(self) -> float:
+        """Three times the wall: one quadratic element through it."""
+        return 3 * self.wall
+
+    def build(self, gmsh: Any) -> Faces:
+        """Box less box."""
+        outer = _box(gmsh, 0, self.length, self.width, self.height)
+        hole = _box(gmsh, 0, self.length, self.width - 2 * self.wall, self.height - 2 * self.wall)
+        gmsh.model.occ.cut(outer, hole)
+        gmsh.model.occ.synchronize()
+        return _end_faces(gmsh, 0, 0.0, 1e3 * self.length)
+
+
+class ForkBar(_Shape):
+    """Tube (or solid bar, ``wall = 0``) with a fork at both ends; loads enter through the pin holes.
+
+    Two prongs, parallel to x-z and ``gap`` apart along y, carry a pin hole along y at ``length`` between the
+    axes. ``width`` and ``height`` are the tube's; the prongs are as high as the tube.
+    """
+
+    shape: Literal["fork-bar"] = "fork-bar"
+    length: float = Length
+    width: float = Length
+    height: float = Length
+    wall: float = Field(ge=0)
+    fork: float = Length  # from the pin axis to the end of the tube
+    prong: float = Length  # thickness of a prong
+    gap: float = Length  # between the prongs
+    hole: float = Length  # diameter
+
+    @model_validator(mode="after")
+    def _fits(self) -> ForkBar:
+        if self.hole >= self.height:
+            raise ValueError(f"hole: expected less than the height {self.height}, got {self.hole}")
+        if 2 * self.fork >= self.length:
+            raise ValueError(f"fork: expected less than half of the length {self.length}, got {self.fork}")
+        if self.wall and 2 * self.wall >= min(self.width, self.height):
+            raise ValueError(f"wall: expected less than half of the smaller side, got {self.wall}")
+        return self
+
+    def reference(self) -> Floats:
+        """(3,) m, middle of the far pin's axis."""
+        return np.array([self.length, 0.0, 0.0])
+
+    def default_size(self) -> float:
+        """Three times the thinnest part: one quadratic element through it."""
+        return 3 * min(self.prong, self.wall or self.prong)
+
+    def build(self, gmsh: Any) -> Faces:
+        """Tube, two end plates, four prongs, four pin holes."""
+        occ, mm = gmsh.model.occ, 1e3
+        x0, x1 = self.fork, self.length - self.fork
+        body = _box(gmsh, x0, x1, self.width, self.height)
+        if self.wall:
+            inner = _box(
+                gmsh,
+                x0 + self.prong,
+                x1 - self.prong,
+                self.width - 2 * self.wall,
+                self.height - 2 * self.wall,
+            )
+            body, _ = occ.cut(body, inner)
+        outside = self.gap + 2 * self.prong
+        prongs, holes = [], []
+        for axis, start, end in (
+            (0.0, -self.height / 2, x0),
+            (self.length, x1, self.length + self.height / 2),
+        ):
+            plate = self.prong if axis == 0.0 else -self.prong
+            edge = x0 if axis == 0.0 else x1
+            prongs += _box(gmsh, min(edge, edge + plate), max(edge, edge + plate), outside, self.height)
+            for side in (-1, 1):
+                y = side * (self.gap + self.prong) / 2
+                prongs += _box(gmsh, start, end, self.prong, self.height, y)
+                holes.append(
+                    (
+                        3,
+                        occ.addCylinder(
+                            mm * axis, mm * (y - self.prong), 0, 0, 2 * mm * self.prong, 0, mm * self.hole / 2
+                        ),
+                    )
+                )
+        solid, _ = occ.fuse(body, prongs)
+        occ.cut(solid, holes)
+        occ.synchronize()
+        found = _hole_faces(gmsh)
+        return {
+            "fixed": [t for t, x in found if x < 0.5 * mm * self.length],
+            "loaded": [t for t, x in found if x > 0.5 * mm * self.length],
+        }
+
+
+class Foot(_Shape):
+    """L-bracket: an upright of ``height`` along -y on a base plate that is bolted down (its whole underside).
+
+    The plate stands ``plate`` thick on y = 0 and reaches ``base`` along x; the loaded face is its end,
+    ``height`` below. ``depth`` is along z.
+    """
+
+    shape: Literal["foot"] = "foot"
+    height: float = Length
+    upright: float = Length  # thickness of the upright along x
+    depth: float = Length
+    base: float = Length  # length of the plate along x
+    plate: float = Length  # its thickness
+
+    @model_validator(mode="after")
+    def _fits(self) -> Foot:
+        if self.plate >= self.height or self.upright > self.base:
+            raise ValueError("foot: expected plate < height and upright <= base")
+        return self
+
+    def reference(self) -> Floats:
+        """(3,) m, centre of the upright's end."""
+        return np.array([0.0, -self.height, 0.0])
+
+    def default_size(self) -> float:
+        """Half the smallest of upright, depth and plate."""
+        return min(self.upright, self.depth, self.plate) / 2
+
+    def build(self, gmsh: Any) -> Faces:
+        """Two boxes; the upright is centred on x = 0, the plate starts at its back."""
+        occ, mm = gmsh.model.occ, 1e3
+        back = -mm * self.upright / 2
+        plate = occ.addBox(
+            back, -mm * self.plate, -mm * self.depth / 2, mm * self.base, mm * self.plate, mm * self.depth
+        )
+        upright = occ.addBox(
+            back,
+            -mm * self.height,
+            -mm * self.depth / 2,
+            mm * self.upright,
+            mm * self.height,
+            mm * self.depth,
+        )
+        occ.fuse([(3, plate)], [(3, upright)])
+        occ.synchronize()
+        return _end_faces(gmsh, 1, 0.0, -mm * self.height)
+
+
+Shape = Bar | HollowBar | ForkBar | Foot
+
+
+def _box(
+    gmsh: Any, x0: float, x1: float, width: float, height: float, y: float = 0.0
+) -> list[tuple[int, int]]:
+    """Box from x0 to x1, centred on (y, 0) in y and z; arguments in m, the model in mm."""
+    a = 1e3 * np.array([x0, y - width / 2, -height / 2, x1 - x0, width, height])
+    return [(3, gmsh.model.occ.addBox(*a))]
+
+
+def _end_faces(gmsh: Any, axis: int, fixed: float, loaded: float) -> Faces:
+    """Plane faces across an axis at two places, in mm; every other face keeps its number."""
+    names: Faces = {"fixed": [], "loaded": []}
+    for _, tag in gmsh.model.getEntities(2):
+        box = gmsh.model.getBoundingBox(2, tag)
+        low, high = box[axis], box[axis + 3]
+        flat = high - low < 1e-4
+        for name, place in (("fixed", fixed), ("loaded", loaded)):
+            if flat and abs(low - place) < 1e-3:
+                names[name].append(tag)
+    used = {t for tags in names.values() for t in tags}
+    return names | {f"face{t}": [t] for _, t in gmsh.model.getEntities(2) if t not in used}
+
+
+def _hole_faces(gmsh: Any) -> list[tuple[int, float]]:
+    """Cylindrical surfaces and the x of their centre in mm."""
+    return [
+        (t, float(gmsh.model.occ.getCenterOfMass(2, t)[0]))
+        for _, t in gmsh.model.getEntities(2)
+        if gmsh.model.getType(2, t) == "Cylinder"
+    ]

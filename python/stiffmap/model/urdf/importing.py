@@ -1,0 +1,162 @@
+"""From a URDF and its sidecar to the description of a machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike, fspath
+from pathlib import Path
+
+from stiffmap.common.errors import FileError
+from stiffmap.model.description import TASK, Leg, MachineDescription, Offset
+from stiffmap.model.files.schema.base import suggestion
+from stiffmap.model.urdf.chains import Chains, ball, end_pose, plain_name
+from stiffmap.model.urdf.model import UrdfJoint, UrdfModel
+from stiffmap.model.urdf.reader import read_urdf
+from stiffmap.model.urdf.sidecar import Sidecar, read_sidecar
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A description, and what to know of it."""
+
+    description: MachineDescription
+    left_out: tuple[str, ...]
+    """Links that lie on no way between base and tip."""
+    rigid: tuple[str, ...]
+    """Motors without a compliance."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A closed loop: a frame of the platform's body and the end of a further leg."""
+
+    on_platform: str
+    end: str
+    free_to_turn: bool
+
+
+def import_urdf(
+    urdf: str | PathLike[str], sidecar: str | PathLike[str] | None = None, *, meshes: bool = True
+) -> Imported:
+    """Machine description (SI) of a URDF file: a serial chain from the root link to the tip, or, with the
+    `closed_loop` of a sidecar, legs in parallel between one base and one platform.
+
+    Raises FileError, one line, for what cannot be used: coupled (mimic) joints, missing meshes (unless
+    `meshes` is False), unknown frames and joints, loops of another topology.
+    """
+    model = read_urdf(Path(urdf), meshes)
+    side = read_sidecar(None if sidecar is None else Path(sidecar))
+    file = str(urdf) if sidecar is None else fspath(sidecar)
+    _check_names(model, side, file)
+    tip = model.link(side.tip, "tip", file) if side.tip else _only_leaf(model, side, file)
+    motors = _motors(model, side, tip, file)
+    chains = Chains(model, side, motors)
+    legs, platform = _legs(model, side, chains, tip, file)
+    home = end_pose(legs[0].elements) @ end_pose(platform)
+    box = side.workspace
+    description = MachineDescription(
+        name=plain_name(model.name),
+        legs=legs,
+        platform=platform,
+        home=home,
+        task=TASK if side.task is None else tuple(c for c in TASK if c in side.task),
+        workspace=None if box is None else tuple(  # type: ignore[arg-type]
+            tuple(float(box[a][k]) for a in "xyz") for k in (0, 1)),  # type: ignore[index]
+        title=f"{model.name}, imported",
+        source=f"imported from {Path(urdf).name}" + (f" with {Path(file).name}" if sidecar else ""),
+    )  # fmt: skip
+    left_out = tuple(n for n in model.links if n not in chains.used and model.body_of(n) != model.root)
+    return Imported(description, left_out, tuple(sorted(motors - set(side.actuators))))
+
+
+def _check_names(model: UrdfModel, side: Sidecar, file: str) -> None:
+    joints = {j.name: j for j in model.above.values()}
+    given = {
+        "name_mot": side.name_mot,
+        "joint_name": side.joint_name,
+        "home": side.home,
+        "actuators": side.actuators,
+    }
+    for key, names in given.items():
+        for name in names:
+            if name not in joints:
+                near = suggestion(name, list(joints))
+                raise FileError(f"no joint '{name}' in {model.file}{near}", file=file, key=key)
+            if joints[name].kind == "fixed":
+                raise FileError(f"joint '{name}' is fixed", file=file, key=key)
+    for name in side.springs:
+        if name not in model.links:
+            near = suggestion(name, list(model.links))
+            raise FileError(f"no link '{name}' in {model.file}{near}", file=file, key="springs")
+
+
+def _only_leaf(model: UrdfModel, side: Sidecar, file: str) -> str:
+    """The tip where none is named: the platform of the loops, or the only leaf."""
+    if side.closed_loop:
+        return model.link(side.closed_loop[0][0], "closed_loop", file)
+    if len(model.leaves) != 1:
+        ends = ", ".join(model.leaves)
+        raise FileError(f"the tree has {len(model.leaves)} ends ({ends}); say in a sidecar "
+                        "which one is the tool, `tip: ...`", file=file)  # fmt: skip
+    return model.leaves[0]
+
+
+def _motors(model: UrdfModel, side: Sidecar, tip: str, file: str) -> set[str]:
+    if side.name_mot:
+        return set(side.name_mot)
+    if side.closed_loop:
+        raise FileError("a machine with closed loops has passive joints: name its motors, `name_mot: [...]`",
+                        file=file, key="name_mot")  # fmt: skip
+    return {j.name for j in model.way(tip) if j.kind != "fixed"}
+
+
+def _legs(
+    model: UrdfModel, side: Sidecar, chains: Chains, tip: str, file: str
+) -> tuple[tuple[Leg, ...], tuple[Offset, ...]]:
+    loops, body = _loops(model, side, tip, file)
+    if not loops:
+        return (Leg("arm", chains.sequence(model.way(tip), tip)),), ()
+    first = chains.sequence(model.way(body))
+    at = end_pose(first)
+    legs = [Leg(plain_name(body), first)]
+    for loop in loops:
+        way = model.way(loop.end)
+        _check_apart(model.way(body), way, loop, file)
+        elements = chains.sequence(way)
+        on_body = chains.between(body, loop.on_platform)
+        if loop.free_to_turn:
+            turned = end_pose(elements).r.T @ (at @ on_body).r
+            elements = (*elements, ball(plain_name(f"{loop.end}_ball"), turned))
+        name = plain_name(model.body_of(loop.end))
+        taken = [leg.name for leg in legs]
+        name = name if name not in taken else f"{name}_{len(legs) + 1}"
+        legs.append(Leg(name, (*elements, Offset("attach", on_body.inverse()))))
+    rest = model.way(tip)[len(model.way(body)) :]
+    return tuple(legs), chains.sequence(rest, tip)  # type: ignore[return-value]
+
+
+def _check_apart(one: list[UrdfJoint], other: list[UrdfJoint], loop: Loop, file: str) -> None:
+    shared = [j.name for j, k in zip(one, other, strict=False) if j is k and j.kind != "fixed"]
+    if shared:
+        raise FileError(f"the loop at '{loop.end}' does not reach the base: both sides hang on joint "
+                        f"'{shared[-1]}'; only legs between base and platform can be imported",
+                        file=file, key="closed_loop")  # fmt: skip
+
+
+def _loops(model: UrdfModel, side: Sidecar, tip: str, file: str) -> tuple[list[Loop], str]:
+    """Loops seen from the platform: the moving body that every loop closes upon and the tip hangs on."""
+    pairs = [tuple(model.link(f, "closed_loop", file) for f in pair) for pair in side.closed_loop]
+    if not pairs:
+        return [], tip
+    heads = {model.body_of(j.child) for j in model.way(tip)} | {model.body_of(tip)}
+    common = [b for b in heads if all(b in map(model.body_of, pair) for pair in pairs)]
+    if len(common) != 1 or common[0] == model.root:
+        raise FileError("the loops do not close upon one body that carries the tip; only legs in parallel "
+                        "between one base and one platform can be imported", file=file,
+                        key="closed_loop")  # fmt: skip
+    body = common[0]
+    out = []
+    for (a, b), kind in zip(pairs, side.type, strict=True):
+        on, end = (a, b) if model.body_of(a) == body else (b, a)
+        out.append(Loop(on, end, kind.lower() == "3d"))
+    return out, body

@@ -1,0 +1,70 @@
+"""A URDF as a tree of links and joints (SI)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from stiffmap.common.errors import FileError
+from stiffmap.model.description import Body, Pose
+from stiffmap.model.description.pose import Vector
+from stiffmap.model.files.schema.base import suggestion
+
+
+@dataclass(frozen=True)
+class UrdfJoint:
+    """A joint: its frame in the parent link's frame, then its motion."""
+
+    name: str
+    kind: str  # revolute, prismatic, fixed
+    parent: str
+    child: str
+    origin: Pose
+    axis: Vector = (1.0, 0.0, 0.0)
+    limits: tuple[float, float] | None = None
+    effort: float | None = None
+    velocity: float | None = None
+
+
+@dataclass(frozen=True)
+class UrdfModel:
+    """Links with their bodies (None: no mass), and the joint above each link but the root."""
+
+    file: str
+    name: str
+    links: dict[str, Body | None]
+    above: dict[str, UrdfJoint] = field(default_factory=dict)
+
+    @property
+    def root(self) -> str:
+        """The link without a joint above."""
+        return next(link for link in self.links if link not in self.above)
+
+    @property
+    def leaves(self) -> list[str]:
+        """Links that carry no other link."""
+        parents = {joint.parent for joint in self.above.values()}
+        return [link for link in self.links if link not in parents]
+
+    def way(self, link: str) -> list[UrdfJoint]:
+        """Joints from the root to a link."""
+        out: list[UrdfJoint] = []
+        while link in self.above:
+            out.append(self.above[link])
+            link = self.above[link].parent
+        return out[::-1]
+
+    def body_of(self, link: str) -> str:
+        """The first link of the rigid body that a link belongs to: fixed joints do not move."""
+        while link in self.above and self.above[link].kind == "fixed":
+            link = self.above[link].parent
+        return link
+
+    def link(self, name: str, what: str, file: str) -> str:
+        """The link that a frame name means: a link, or the link below a joint of that name."""
+        if name in self.links:
+            return name
+        for joint in self.above.values():
+            if joint.name == name:
+                return joint.child
+        known = [*self.links, *(j.name for j in self.above.values())]
+        raise FileError(f"no frame '{name}' in {self.file}{suggestion(name, known)}", file=file, key=what)

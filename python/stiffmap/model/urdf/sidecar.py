@@ -1,0 +1,76 @@
+"""The sidecar of a URDF: loops and motors as example-parallel-robots (Gepetto) writes them, elasticity."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from stiffmap.common.errors import FileError
+from stiffmap.common.yaml_text import read
+
+Numbers6 = Annotated[list[float], Field(min_length=6, max_length=6)]
+Matrix = Annotated[list[Numbers6], Field(min_length=6, max_length=6)]
+
+
+class Strict(BaseModel):
+    """Unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class Elasticity(Strict):
+    """Of a drive (N/m or N·m/rad, or its inverse), or `rigid`."""
+
+    stiffness: Annotated[float, Field(gt=0)] | None = None
+    compliance: Annotated[float, Field(gt=0)] | None = None
+
+
+class LinkSpring(Strict):
+    """Six diagonal terms or six rows (SI), translations first, at the link's end in the axes there."""
+
+    stiffness: Numbers6 | Matrix | None = None
+    compliance: Numbers6 | Matrix | None = None
+
+
+class Sidecar(Strict):
+    """What a URDF lacks (SI)."""
+
+    closed_loop: list[Annotated[list[str], Field(min_length=2, max_length=2)]] = Field(default_factory=list)
+    type: list[Literal["3d", "6d", "3D", "6D"]] = Field(default_factory=list)
+    name_mot: list[str] = Field(default_factory=list)
+    joint_name: list[str] = Field(default_factory=list)
+    joint_type: list[str] = Field(default_factory=list)
+    tip: str | None = None
+    home: dict[str, float] = Field(default_factory=dict)
+    actuators: dict[str, Elasticity] = Field(default_factory=dict)
+    springs: dict[str, LinkSpring] = Field(default_factory=dict)
+    task: list[Literal["x", "y", "z", "rx", "ry", "rz"]] | None = None
+    workspace: (
+        dict[Literal["x", "y", "z"], Annotated[list[float], Field(min_length=2, max_length=2)]] | None
+    ) = None
+
+
+def read_sidecar(path: Path | None) -> Sidecar:
+    """Checked sidecar; an empty one for None. FileError, one line."""
+    if path is None:
+        return Sidecar()
+    file = str(path)
+    try:
+        side = Sidecar.model_validate(read(path).data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise FileError(first["msg"], file=file, key=".".join(map(str, first["loc"]))) from None
+    for a, b in (("closed_loop", "type"), ("joint_name", "joint_type")):
+        if len(getattr(side, a)) != len(getattr(side, b)):
+            raise FileError(f"expected one entry per entry of {a} ({len(getattr(side, a))}), "
+                            f"found {len(getattr(side, b))}", file=file, key=b)  # fmt: skip
+    elastic: dict[str, Elasticity | LinkSpring] = {**side.actuators, **side.springs}
+    for name, given in elastic.items():
+        if (given.stiffness is None) == (given.compliance is None):
+            raise FileError("give exactly one of stiffness and compliance", file=file, key=name)
+    for name in side.joint_type:
+        if name.upper() != "SPHERICAL":
+            raise FileError(f"expected SPHERICAL, found '{name}'", file=file, key="joint_type")
+    return side

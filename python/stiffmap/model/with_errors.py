@@ -1,0 +1,158 @@
+"""A machine built with small errors: frames, lengths, zeros, compliances and masses moved at once.
+
+The controller's machine stays as declared: errors go into the ``actual`` pose of offsets and into the
+errors of commands, never into nominal geometry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.model.description import (
+    Block,
+    Body,
+    CommandError,
+    Element,
+    Joint,
+    MachineDescription,
+    Offset,
+    Pose,
+    Spring,
+)
+from stiffmap.model.effects import apply_records
+
+FRAME = ("x", "y", "z", "rx", "ry", "rz")
+END = "end"
+"""Name of the frame behind the last element of a leg, and of the tool."""
+Knots = tuple[tuple[float, float], ...]
+"""(coordinate, error) of a drive, m or rad, by rising coordinate."""
+Moves = Mapping[tuple[str, str], float]
+"""(full name of the element, what is moved) -> by how much, SI; compliances and masses relative."""
+Elements = tuple[Element, ...]
+
+
+def edited(
+    description: MachineDescription, moves: Moves, travel: Mapping[str, Knots] | None = None
+) -> MachineDescription:
+    """The machine built with these errors; effects that it has already are added again on top.
+
+    ``travel`` holds axis positioning errors of drives, by full name.
+    """
+    bare = description.declared or description
+    of: dict[str, dict[str, Any]] = {}
+    for (name, what), value in moves.items():
+        of.setdefault(name, {})[what] = of.get(name, {}).get(what, 0.0) + value
+    for name, knots in (travel or {}).items():
+        of.setdefault(name, {})["travel"] = knots
+    legs = tuple(replace(g, elements=_sequence(g.elements, g.name, of)) for g in bare.legs)
+    base = _sequence(bare.base, "base", of, end=False)
+    platform = _sequence(bare.platform, "platform", of)
+    built = replace(bare, legs=legs, base=base, platform=platform)
+    return apply_records(built, description.effects)
+
+
+def _sequence(
+    elements: Elements, path: str, of: Mapping[str, Mapping[str, Any]], end: bool = True
+) -> Elements:
+    out: list[Element] = []
+    for e in elements:
+        name = f"{path}.{e.name}"
+        if isinstance(e, Block):
+            branches = tuple(
+                replace(b, elements=_sequence(b.elements, f"{path}.{b.name}", of, end=False))
+                for b in e.branches
+            )
+            out.append(replace(e, branches=branches))
+            continue
+        change = of.get(name)
+        if change is None:
+            out.append(e)
+            continue
+        if isinstance(e, Joint) and any(k in change for k in FRAME):
+            out.append(Offset(f"{e.name}_frame", Pose(), _about(_pivot(e), _pose(change))))
+        out.append(_changed(e, change))
+    last = of.get(f"{path}.{END}")
+    if end and last is not None:
+        out.append(Offset(f"{path}_{END}", Pose(), _pose(last)))
+    return tuple(out)
+
+
+def _pose(change: Mapping[str, Any]) -> Pose:
+    t, r = (np.array([change.get(k, 0.0) for k in part]) for part in (FRAME[:3], FRAME[3:]))
+    return Pose.of(t, Rotation.from_rotvec(r).as_matrix())
+
+
+def _about(pivot: np.ndarray[tuple[int], np.dtype[np.float64]], pose: Pose) -> Pose:
+    return Pose.of(pivot - pose.r @ pivot + pose.p, pose.r)
+
+
+def _pivot(e: Element) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Where a sliding joint stands at home; the frame itself for all others."""
+    slides = isinstance(e, Joint) and e.kind == "prismatic"
+    return np.array(e.axes[0]) * e.home[0] if slides and isinstance(e, Joint) else np.zeros(3)
+
+
+def _changed(e: Element, change: Mapping[str, Any]) -> Element:
+    for what, by in change.items():
+        kinds, change_of = CHANGES.get(what, ((), None))
+        if change_of is not None and isinstance(e, kinds):  # a body may have its joint's name
+            e = change_of(e, by)
+    return e
+
+
+def _length(e: Element, by: float) -> Element:
+    assert isinstance(e, Offset)
+    now = e.actual or e.nominal
+    along = e.nominal.p / np.linalg.norm(e.nominal.p)
+    return replace(e, actual=Pose.of(now.p + by * along, now.r))
+
+
+def _zero(e: Element, by: float) -> Element:
+    assert isinstance(e, Joint)
+    return replace(e, command_errors=(*e.command_errors, CommandError(offset=by)))
+
+
+def _gain(e: Element, by: float) -> Element:
+    assert isinstance(e, Joint)
+    error = CommandError(slope=by, reference=e.home[0])
+    return replace(e, command_errors=(*e.command_errors, error))
+
+
+def _travel(e: Element, knots: Knots) -> Element:
+    assert isinstance(e, Joint)
+    return replace(e, command_errors=(*e.command_errors, CommandError(knots=knots)))
+
+
+def _compliance(e: Element, by: float) -> Element:
+    """Times exp(by): a spring stays a spring whatever a fit tries."""
+    factor = float(np.exp(by))
+    if isinstance(e, Joint):
+        assert e.law is not None
+        return replace(e, law=replace(e.law, stiffness=e.law.stiffness / factor))
+    assert isinstance(e, Spring)
+    if e.compliance is not None:
+        return replace(e, compliance=tuple(tuple(v * factor for v in row) for row in e.compliance))
+    assert e.stiffness is not None
+    return replace(e, stiffness=tuple(tuple(v / factor for v in row) for row in e.stiffness))
+
+
+def _mass(e: Element, by: float) -> Element:
+    assert isinstance(e, Body)
+    factor = float(np.exp(by))
+    inertia = tuple(tuple(v * factor for v in row) for row in e.inertia)
+    return replace(e, mass=e.mass * factor, inertia=inertia)  # type: ignore[arg-type]
+
+
+CHANGES: dict[str, tuple[tuple[type, ...], Callable[[Element, Any], Element]]] = {
+    "length": ((Offset,), _length),
+    "zero": ((Joint,), _zero),
+    "gain": ((Joint,), _gain),
+    "travel": ((Joint,), _travel),
+    "compliance": ((Joint, Spring), _compliance),
+    "mass": ((Body,), _mass),
+}

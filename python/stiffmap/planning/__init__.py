@@ -1,6 +1,0 @@
-"""Which rows to measure: designs that identify parameters, separate rivals, or make a map certain."""
-
-from stiffmap.planning.design import Design, design, follow
-from stiffmap.planning.estimate import Estimate, estimate
-
-__all__ = ["Design", "Estimate", "design", "estimate", "follow"]

@@ -1,0 +1,1 @@
+"""One question to the core: compile, close, solve, differentiate; `Machine` and `Solution`."""

@@ -1,0 +1,209 @@
+"""What a file that loads may still have wrong: freedoms, reach, and numbers that no workshop has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.units import FORCES, LENGTHS
+from stiffmap.common.yaml_text import read
+from stiffmap.model.description import Body, Cable, Joint, Spring
+from stiffmap.model.description.tree import all_elements
+from stiffmap.model.files.shipped import find
+from stiffmap.solve.compiled import Status
+from stiffmap.solve.free_motions import direction, free_motions
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.trial import tried
+
+TRIAL = 0.01
+"""Of the machine's length, how far from home reach is tried."""
+STEEL = 8000.0
+SOLID = (1e7, 2e12)
+"""Pa: from rubber to diamond."""
+NAMES = "xyz"
+
+
+def advice(machine: Machine, path: str | PathLike[str]) -> list[str]:
+    """Findings in sentences, the gravest first; empty where there is nothing to say."""
+    return [
+        *_freedoms(machine),
+        *_reach(machine),
+        *_limits(machine),
+        *_trial(machine),
+        *_numbers(machine, path),
+        *_rams(machine, path),
+    ]
+
+
+def _freedoms(machine: Machine) -> list[str]:
+    s = machine.solve(machine.description.home.p, np.zeros(6), method="reference")
+    if int(s.status) != Status.SINGULAR:
+        return []
+    ways = free_motions(machine, s.free_twists)
+    if not ways:
+        return [
+            "home: the pose leaves the configuration open (a folded or stretched leg); choose another home"
+        ]
+    return [
+        f"the platform can {'; '.join(ways)} although all drives stand still: a constraint is missing, "
+        "a pin too many, or a spring has a zero in its stiffness"
+    ]
+
+
+def _reach(machine: Machine) -> list[str]:
+    """Home and box against what can be reached."""
+    d, length = machine.description, machine.compiled.length
+    task = d.task or ("x", "y", "z")
+    moved = [i for i, a in enumerate(NAMES) if a in task]
+    steps = [s * TRIAL * length * np.eye(3)[i] for i in moved for s in (1, -1)]
+    out = []
+    lost = [k for k in steps if int(machine.solve(d.home.p + k, np.zeros(6)).status) == Status.UNREACHABLE]
+    both = [NAMES[i] for i in moved if sum(bool(k[i]) for k in lost) == 2]
+    if both:
+        out.append(
+            f"the machine cannot move along {', '.join(both)}: {len(machine.actuators)} drives, {len(d.task) or 6} "
+            "components commanded; name those that are, such as task: [x, y]"
+        )
+    elif lost:
+        towards = f"{'-' if lost[0].sum() < 0 else '+'}{direction(abs(lost[0]))}"
+        out.append(
+            f"home lies on the limit of its own reach: {1e3 * TRIAL * length:.3g} mm towards {towards} is "
+            "unreachable"
+        )
+    if d.workspace is None:
+        return out
+    low, high = machine.workspace
+    grid = [np.linspace(low[i], high[i], 3) if i in moved else [d.home.p[i]] for i in range(3)]
+    at = np.array(list(product(*grid)))
+    status = machine.solve(at, np.zeros(6)).status
+    missing = int((status == Status.UNREACHABLE).sum())
+    if missing and not out:
+        where = ", ".join(f"{1e3 * v:g}" for v in at[int(np.argmax(status == Status.UNREACHABLE))])
+        out.append(
+            f"{missing} of {len(at)} positions of the workspace cannot be reached, such as ({where}) mm"
+        )
+    return out
+
+
+def _limits(machine: Machine) -> Iterator[str]:
+    for name, e in all_elements(machine.description):
+        if not isinstance(e, Joint) or len(e.home) != 1:
+            continue
+        ends = (e.drive.range if e.drive else None) or e.limits
+        if ends is None:
+            continue
+        share = (e.home[0] - ends[0]) / (ends[1] - ends[0])
+        if not 0.01 <= share <= 0.99:
+            yield f"{name}: home lies {'outside' if not 0 <= share <= 1 else 'at the end'} of its range"
+
+
+def _trial(machine: Machine) -> list[str]:
+    trial = tried(machine)
+    description = machine.description
+    elements = [e for _, e in all_elements(description)]
+    elastic = any(
+        isinstance(e, (Spring, Cable)) or (isinstance(e, Joint) and e.law is not None) for e in elements
+    )
+    if trial.stiffness is not None or elastic or description.external_springs:
+        return trial.findings
+    return ["the machine is rigid: no spring and no drive yields, so nothing deflects"]
+
+
+def _numbers(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
+    heaviest = STEEL * machine.compiled.length**3
+    for name, e in all_elements(machine.description):
+        if isinstance(e, Body) and e.mass > heaviest:
+            yield f"{name}: {e.mass:g} kg is more than solid steel of the machine's size ({heaviest:.3g} kg)"
+    data = read(find(path)).data
+    units = data.get("units", {}) if isinstance(data, dict) else {}
+    if not {"length", "force"} <= set(units):
+        return
+    pascal = float(FORCES[units["force"]]) / float(LENGTHS[units["length"]]) ** 2
+    for key, part in _parts(data, ""):
+        modulus = _plain(part.get("E"))
+        if modulus is not None and not SOLID[0] <= pascal * modulus <= SOLID[1]:
+            unit = f"{units['force']}/{units['length']}²"
+            yield f"{key}.E = {modulus:g} {unit} is no solid (steel: {2.1e11 / pascal:.3g} {unit})"
+    for key, sequence in _sequences(data, ""):
+        yield from _long_beams(key, sequence)
+
+
+def _long_beams(key: str, sequence: list[Any]) -> Iterator[str]:
+    """Beams that are much longer than the offset before them."""
+    span = None
+    for e in sequence:
+        if not isinstance(e, dict):
+            continue
+        if "offset" in e and isinstance(e.get("translation"), list):
+            numbers = [_plain(v) for v in e["translation"]]
+            span = None if None in numbers else float(np.linalg.norm(np.array(numbers, dtype=float)))
+        beam = e.get("beam")
+        length = _plain(beam.get("length")) if isinstance(beam, dict) else None
+        if length is not None and span and length > 1.5 * span:
+            yield f"{key}: the beam of '{e.get('spring')}' is {length:g} long, the offset before it spans {span:g}"
+
+
+def _rams(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
+    """Beams of constant length that slide along themselves, where no passive joint keeps them from bending."""
+    description = machine.description
+    if any(isinstance(e, Joint) and not e.actuated for _, e in all_elements(description)):
+        return
+    for key, sequence in _sequences(read(find(path)).data, ""):
+        slide: tuple[str, Floats] | None = None
+        for e in sequence:
+            if e.get("kind") == "prismatic":
+                axis = _along(e.get("axis"))
+                slide = None if axis is None else (str(e.get("actuator")), axis)
+            beam = e.get("beam")
+            if not isinstance(beam, dict) or slide is None or "stroke" in e:
+                continue
+            ram = _along(beam.get("along", "x"))
+            if ram is not None and abs(ram @ slide[1]) > 0.99:
+                yield (
+                    f"{key}: '{slide[0]}' slides along the beam of '{e.get('spring')}', whose length stays "
+                    f"{_plain(beam.get('length')):g}: if it is a ram or column that gets longer, write "
+                    f"stroke: {{joint: {slide[0]}}}; if not, with rate: 0"
+                )
+
+
+def _along(value: Any) -> Floats | None:
+    """Unit vector of an axis as a file writes it."""
+    if isinstance(value, str) and value.strip("-") in tuple(NAMES):
+        named: Floats = np.eye(3)[NAMES.index(value[-1])]
+        return -named if value.startswith("-") else named
+    numbers = [_plain(v) for v in value] if isinstance(value, list) else []
+    if len(numbers) != 3 or None in numbers:
+        return None
+    vector: Floats = np.array(numbers, dtype=float)
+    size = float(np.linalg.norm(vector))
+    unit: Floats = vector / (size or 1.0)
+    return unit if size else None
+
+
+def _plain(value: Any) -> float | None:
+    value = value.get("value") if isinstance(value, dict) else value
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+def _parts(data: Any, key: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    if isinstance(data, dict):
+        yield key, data
+    for name, value in (
+        data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    ):
+        yield from _parts(value, f"{key}.{name}".strip("."))
+
+
+def _sequences(data: Any, key: str) -> Iterator[tuple[str, list[Any]]]:
+    for name, value in (
+        data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    ):
+        inner = f"{key}.{name}".strip(".")
+        if isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
+            yield inner, value
+        yield from _sequences(value, inner)

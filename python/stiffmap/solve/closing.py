@@ -1,0 +1,80 @@
+"""Closure of compiled machines, springs at rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing
+from stiffmap.common.rotations import as_rotations
+from stiffmap.common.short import short_repr
+from stiffmap.solve.branches import Start, start_coordinates
+from stiffmap.solve.compiled import CompiledMachine
+from stiffmap.solve.results import OverPoses
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class Kinematics(OverPoses):
+    """Configurations of a batch of poses; NaN where the status is UNREACHABLE."""
+
+    actuators: Floats
+    """(..., actuators) m or rad, in the order of `Machine.actuators`."""
+    position: Floats
+    """(..., 3) m, TCP."""
+    rotation: Floats
+    """(..., 3, 3)."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+    coordinates: Floats
+    """(..., coordinates) all coordinates, springs at zero."""
+
+    def __array__(self, dtype: object = None, copy: bool | None = None) -> Floats:
+        return np.asarray(self.actuators, dtype=dtype)  # type: ignore[call-overload, no-any-return]
+
+
+def close_poses(
+    machine: CompiledMachine,
+    position: ArrayLike,
+    rotation: ArrayLike | None,
+    start: Start | None,
+    threads: int | None,
+) -> Kinematics:
+    """See `stiffmap.inverse_kinematics`."""
+    p = trailing(position, (3,), "position", "positions (m)")
+    r = machine.home_rotation if rotation is None else rotation
+    r = as_rotations(trailing(r, (3, 3), "rotation", "rotation matrices"))
+    x = None if start is None else start_coordinates(machine, start)
+    shape = batch(p.shape[:-1], r.shape[:-2], *(() if x is None else (x.shape[:-1],)))
+    from_x = None if x is None else rows(x, shape, x.shape[-1:])
+    out = machine.close_poses(rows(p, shape, (3,)), rows(r, shape, (3, 3)), thread_count(threads), from_x)
+    return _kinematics(machine, out, shape)
+
+
+def close_actuators(
+    machine: CompiledMachine, actuators: ArrayLike, start: Start | None, threads: int | None
+) -> Kinematics:
+    """See `stiffmap.forward_kinematics`."""
+    n = len(machine.names.actuators)
+    a = trailing(actuators, (n,), "actuators", f"{n} actuator coordinates")
+    x = None if start is None else start_coordinates(machine, start)
+    shape = batch(a.shape[:-1], *(() if x is None else (x.shape[:-1],)))
+    from_x = None if x is None else rows(x, shape, x.shape[-1:])
+    out = machine.close_actuators(rows(a, shape, (n,)), thread_count(threads), from_x)
+    return _kinematics(machine, out, shape)
+
+
+def _kinematics(machine: CompiledMachine, out: tuple[Floats, ...], shape: tuple[int, ...]) -> Kinematics:
+    x, p, r, status, flags = out
+    names = machine.names
+    index = [names.joints[a] for a in names.actuators]
+    return Kinematics(
+        actuators=x[:, index].reshape((*shape, len(index))),
+        position=p.reshape((*shape, 3)),
+        rotation=r.reshape((*shape, 3, 3)),
+        status=status.reshape(shape),  # type: ignore[arg-type]
+        flags=flags.reshape(shape),  # type: ignore[arg-type]
+        coordinates=x.reshape((*shape, x.shape[1])),
+    )

@@ -1,0 +1,369 @@
+"""A machine as the C++ core holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap import _core
+from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.description import MachineDescription
+from stiffmap.model.home import Gap
+from stiffmap.solve.compiled.lowering import build_mechanism, home_gaps
+from stiffmap.solve.compiled.names import Names, names_of
+
+
+class CompiledMachine:
+    """The compiled mechanism of a description, its kernel plan, and every call on them.
+
+    Calls take C-contiguous arrays with one leading axis of poses, SI, base axes; the public functions broadcast
+    and check before they call. Immutable; may be shared by threads.
+    """
+
+    def __init__(
+        self, description: MachineDescription, start_nodes: int = 8, like: CompiledMachine | None = None
+    ) -> None:
+        self.description = description
+        self._start_nodes = start_nodes
+        self._mechanism: _core.Mechanism = build_mechanism(description, like._mechanism if like else None)
+
+    @cached_property
+    def names(self) -> Names:
+        """Names of everything in the mechanism."""
+        return names_of(self._mechanism)
+
+    @cached_property
+    def home_rotation(self) -> Floats:
+        """(3, 3) orientation of the tcp at home."""
+        return self.description.home.r
+
+    def home_gaps(self) -> list[Gap]:
+        """Gap of every leg and of every branch of a block at the declared home coordinates."""
+        return home_gaps(self.description)
+
+    @cached_property
+    def spun_balls(self) -> dict[str, tuple[Floats, Floats]]:
+        """Ball joints next to a rod that spins, with axes of their own (docs/theory.md C8): (3, 3) rotation at home, (3, 3)
+        axes (rows) in the frame behind it, where the coordinates are zero. Counted from the axes of `charted`."""
+        return {
+            self.names.coordinates[first].rpartition(".")[0]: (
+                np.array(turn).reshape(3, 3),
+                np.array(axes).reshape(3, 3).T,
+            )
+            for first, turn, axes in self._mechanism.spun_balls
+        }
+
+    @cached_property
+    def _plan(self) -> _core.FastPlan:
+        box = self.description.workspace
+        low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))
+        try:
+            _core.kernel_level()
+        except ValueError as error:  # the environment asks for instructions that there are not
+            raise StiffmapError(str(error)) from None
+        return _core.FastPlan(self._mechanism, np.array(low), np.array(high), self._start_nodes)
+
+    @cached_property
+    def _one(self) -> _core.OneCall:
+        return _core.OneCall(self._mechanism, self._plan, self.home_rotation, self.gravity())
+
+    @property
+    def not_fast(self) -> str:
+        """What the machine lacks for the fast path; empty if nothing."""
+        return self._plan.missing
+
+    @property
+    def length(self) -> float:
+        """Characteristic length, m."""
+        return self._mechanism.length
+
+    @property
+    def stiffness(self) -> float:
+        """Characteristic stiffness, N/m."""
+        return self._mechanism.stiffness
+
+    @cached_property
+    def nodes(self) -> tuple[tuple[int, int], ...]:
+        """Parent and coordinate of each frame; -1: none."""
+        return tuple(self._mechanism.nodes)
+
+    @cached_property
+    def loops(self) -> tuple[tuple[str, str, int, int], ...]:
+        """Block, branch, and the two frames that each loop closes."""
+        return tuple(self._mechanism.loops)
+
+    def gravity(self, given: ArrayLike | None = None) -> Floats:
+        """(3,) m/s², base axes; the machine file's where nothing is given. StiffmapError for bad numbers."""
+        if given is None:
+            return np.array(self.description.gravity or (0.0, 0.0, 0.0))
+        g = real_array(given, "gravity", "3 finite numbers (m/s², base axes)")
+        if g.shape != (3,) or not np.isfinite(g).all():
+            raise StiffmapError(f"gravity: expected 3 finite numbers (m/s², base axes), got {given!r}")
+        return g
+
+    def solve_one(self, position: Any, wrench: Any) -> _core.OneAnswer | None:
+        """One pose under one wrench at the tcp by the kernels; None for inputs that are not plain numbers."""
+        return self._one.solve(position, wrench)
+
+    def solve(
+        self,
+        position: Floats,
+        rotation: Floats,
+        wrench: Floats,
+        *,
+        load_points: Sequence[str],
+        load_types: Sequence[str],
+        read_points: Sequence[str],
+        gravity: Floats,
+        fast: bool,
+        load_steps: int,
+        threads: int,
+        stiffness: bool,
+        variants: Sequence[CompiledMachine] = (),
+        closed: Floats | None = None,
+    ) -> _core.Answer:
+        """Equilibria of (n, 3) positions, (n or 1, 3, 3) rotations and (n or 1, load points, 6) wrenches.
+
+        closed: (n, coordinates) already closed at these poses, NaN out of reach; None: found by closure.
+        """
+        return self._mechanism.solve(
+            self._plan if fast else None,  # type: ignore[arg-type]  # None: reference path
+            position,
+            rotation,
+            wrench,
+            load_points,
+            [LOAD_TYPES[t] for t in load_types],
+            read_points,
+            gravity,
+            load_steps,
+            threads,
+            stiffness,
+            [v._plan for v in variants],
+            closed,
+        )
+
+    def close_poses(
+        self, position: Floats, rotation: Floats, threads: int, start: Floats | None = None
+    ) -> tuple[Any, ...]:
+        """Coordinates, position, rotation, status and flags of (n, 3) positions and (n, 3, 3) rotations.
+
+        start: (n, coordinates) on the assembly branch that is meant; None: that of home.
+        """
+        return self._mechanism.closure(self._plan, position, rotation, True, threads, start)
+
+    def close_actuators(
+        self, actuators: Floats, threads: int, start: Floats | None = None
+    ) -> tuple[Any, ...]:
+        """The same of (n, actuators) actuator coordinates, continued from home or from `start`."""
+        none = np.zeros((0, 3, 3))
+        return self._mechanism.closure(None, actuators, none, False, threads, start)  # type: ignore[arg-type]
+
+    def point_positions(self, point: str, coordinates: Floats) -> Floats:
+        """(n, 3) m, base axes, of a named point at (n, coordinates), nominal geometry."""
+        return self._mechanism.point_positions(point, coordinates)
+
+    def home_coordinates(self) -> Floats:
+        """(coordinates,) at home."""
+        return np.asarray(self._mechanism.home_coordinates())
+
+    def impose(
+        self,
+        position: Floats,
+        rotation: Floats,
+        displacement: Floats,
+        *,
+        point: str,
+        gravity: Floats,
+        threads: int,
+    ) -> dict[str, Any]:
+        """Arrays by name: what keeps `point` at (n, 6) displacements from its commanded poses."""
+        return _core.clamp(self._mechanism, position, rotation, displacement, point, gravity, threads)
+
+    def reactions(
+        self, position: Floats, rotation: Floats, wrench: Floats, *, point: str, gravity: Floats, threads: int
+    ) -> Floats:
+        """(n, coordinates) N or N·m of every spring, drive and locked coordinate, reference path."""
+        (force,) = _core.reactions(self._mechanism, position, rotation, wrench, point, gravity, threads)
+        return np.asarray(force)
+
+    def path(
+        self,
+        position: Floats,
+        rotation: Floats,
+        direction: Floats,
+        *,
+        point: str,
+        gravity: Floats,
+        control: str,
+        limit: float,
+        steps: int,
+        cross: int,
+    ) -> tuple[Any, ...]:
+        """Flags, the path of equilibria and the branch that crosses it: (end, points, critical points) each."""
+        how = PATH_CONTROLS.index(control)
+        return _core.path(
+            self._mechanism, position, rotation, direction, point, gravity, how, limit, steps, cross
+        )
+
+    @cached_property
+    def drives(self) -> tuple[int, ...]:
+        """Index of each actuator's coordinate."""
+        return tuple(i for _, i in self._mechanism.actuators)
+
+    @cached_property
+    def bodies(self) -> tuple[tuple[str, int, float], ...]:
+        """Name, frame and mass (kg) of each body."""
+        return tuple(self._mechanism.bodies)
+
+    @cached_property
+    def limits(self) -> tuple[tuple[float, float], ...]:
+        """Lowest and highest value of each coordinate; 1e300 where there is no limit."""
+        return tuple(self._mechanism.limits)
+
+    def rates(
+        self,
+        position: Floats,
+        rotation: Floats,
+        start: Floats | None,
+        *,
+        weights: Floats,
+        patient: bool,
+        only: bool,
+        threads: int,
+    ) -> dict[str, Any]:
+        """Arrays by name: closed coordinates and the drives' Jacobian of (n, 3) positions.
+
+        weights: (drives,) of what drives that outnumber the freedoms share (theory D10); (0,): their own.
+
+        start: (n, coordinates) near the answer, NaN where none is known. Not patient: a pose that straight
+        continuation from home does not reach is out of reach. Only: so is one that its start does not lead to.
+        """
+        begin = np.zeros((0, len(self.names.coordinates))) if start is None else start
+        return self._mechanism.kinematics(position, rotation, begin, weights, False, patient, only, threads)
+
+    @property
+    def not_enclosed(self) -> str:
+        """Why cells of positions cannot be enclosed; empty if they can."""
+        return self._mechanism.not_enclosed
+
+    def enclose(
+        self,
+        centre: Floats,
+        half: Floats,
+        axes: Floats,
+        rotation: Floats,
+        *,
+        start: Floats | None = None,
+        slopes: int,
+        watched: Sequence[int],
+        threads: int,
+    ) -> dict[str, Any]:
+        """Arrays by name: what holds over the cells (n, 3) centre, half lengths along the columns of axes (3, 3).
+
+        start: (n, coordinates) near those of the centres, NaN where none is known. slopes: 3 columns
+        (translations) or 6 (twists) of the coordinates' slopes. watched: frames whose motion is bounded.
+        """
+        begin = np.zeros((0, len(self.names.coordinates))) if start is None else start
+        return self._mechanism.enclose(
+            centre, half, np.ascontiguousarray(axes), rotation, begin, slopes, list(watched), threads
+        )
+
+    def dynamics(
+        self,
+        inertias: Floats,
+        coordinates: Floats,
+        twist: Floats,
+        twist_rate: Floats,
+        wrench: Floats,
+        gravity: Floats,
+        *,
+        rates: Floats,
+        accelerations: Floats,
+        weights: Floats,
+        threads: int,
+    ) -> dict[str, Any]:
+        """Arrays by name: inverse dynamics at (n, coordinates) that are closed, motions of the tcp (n, 6).
+
+        rates, accelerations: (n, drives) where the tcp's motion leaves some open; (0, drives): it decides them.
+        """
+        return self._mechanism.dynamics(
+            inertias, coordinates, twist, twist_rate, wrench, gravity, rates, accelerations, weights, threads
+        )
+
+    @property
+    def redundancy(self) -> int:
+        """Motions of the drives that a commanded pose leaves open."""
+        return int(self._mechanism.redundancy)
+
+    def modes(
+        self,
+        inertias: Floats,
+        position: Floats,
+        rotation: Floats,
+        wrench: Floats,
+        gravity: Floats,
+        count: int,
+        threads: int,
+    ) -> dict[str, Any]:
+        """Arrays by name: squares of the lowest angular frequencies and their shapes."""
+        return self._mechanism.modes(inertias, position, rotation, wrench, gravity, count, threads)
+
+    def tip_modes(
+        self,
+        inertias: Floats,
+        viscous: Floats,
+        loss: Floats,
+        position: Floats,
+        rotation: Floats,
+        wrench: Floats,
+        *,
+        gravity: Floats,
+        closed: Floats,
+        point: str,
+        count: int,
+        threads: int,
+    ) -> dict[str, Any]:
+        """Arrays by name: the lowest modes at a point, damping between them, the flexibility of all others."""
+        return self._mechanism.tip_modes(
+            inertias, viscous, loss, position, rotation, wrench, gravity, closed, point, count, threads
+        )
+
+    def frames(self, coordinates: Floats) -> tuple[Floats, Floats]:
+        """(nodes, 3) m and (nodes, 3, 3): all frames at given coordinates, nominal geometry."""
+        position, rotation = self._mechanism.frames(coordinates)
+        return position, rotation
+
+
+LOAD_TYPES = {"dead": 0, "follower": 1, "semitangential": 2}
+PATH_CONTROLS = ("force", "displacement", "arc")
+Answer = _core.Answer | _core.OneAnswer
+"""Arrays of a call, with one leading axis of poses."""
+
+
+def kernel_levels() -> list[str]:
+    """Instruction sets that this CPU can run, the widest last."""
+    return list(_core.kernel_levels())
+
+
+def multipliers(
+    frequency: Floats,
+    ratio: Floats,
+    mass: Floats,
+    way: Floats,
+    rest: Floats,
+    chips: Floats,
+    period: Floats,
+    depth: Floats,
+    threads: int,
+) -> Floats:
+    """(periods, depths) size of the largest multiplier of a tooth period.
+
+    (modes,) rad/s, ratio, kg and (modes, 3) unit vectors; (3, 3) m/N that follows at once; (intervals, 3, 2) N/m² means of the
+    chip's force; (periods,) s; (depths,) m.
+    """
+    return np.asarray(_core.multipliers(frequency, ratio, mass, way, rest, chips, period, depth, threads))

@@ -1,0 +1,15 @@
+"""Derivatives of an equilibrium and its stiffness with respect to parameters, pose and load (docs/effects.md)."""
+
+from stiffmap.solve.derivatives.differentiate import differentiate
+from stiffmap.solve.derivatives.prepared import Prepared, prepare
+from stiffmap.solve.derivatives.requests import EffectRequest, Request, Requests, read_requests
+
+__all__ = [
+    "EffectRequest",
+    "Prepared",
+    "Request",
+    "Requests",
+    "differentiate",
+    "prepare",
+    "read_requests",
+]

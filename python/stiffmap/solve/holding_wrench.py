@@ -1,0 +1,110 @@
+"""The inverse problem, equation (10) of the paper: from an imposed displacement to wrenches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.rotations import as_rotations
+from stiffmap.common.short import short_repr
+from stiffmap.solve.compiled import CompiledMachine, Status
+from stiffmap.solve.results import OverPoses
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class HoldingWrench(OverPoses):
+    """A batch of poses with a point of the machine held; SI, base axes, moments about the point.
+
+    Failed poses hold NaN and their status.
+    """
+
+    wrench: Floats
+    """(..., 6) that holds the machine there: what a dead load at the point would have to be.
+    Components that rigid parts leave open are NaN (flag RIGID_DIRECTION), and so are the legs' then."""
+    leg_wrench: Floats
+    """(..., legs, 6) leg on platform, about the point."""
+    stiffness: Floats
+    """(..., 6, 6) small extra twist to small extra dead wrench; also where the platform is singular."""
+    leg_stiffness: Floats
+    """(..., legs, 6, 6) small extra twist of the point to minus the change of the leg's wrench. The
+    first leg's is what the others leave of the whole, so it contains external springs at the platform."""
+    actuator_effort: Floats
+    """(..., actuators) N or N·m."""
+    coordinates: Floats
+    """(..., coordinates)."""
+    status: NDArray[np.uint8]
+    """(...) of `Status`, with the point held."""
+    force_status: NDArray[np.uint8]
+    """(...) of `Status` if the wrench acted and nothing held the point: SINGULAR or UNSTABLE is where
+    `Machine.solve` has no answer."""
+    flags: NDArray[np.uint32]
+    """(...) bits of `Flag`."""
+    point: str
+    legs: tuple[str, ...]
+    actuators: tuple[str, ...]
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """(...) where the status is CONVERGED."""
+        return np.asarray(self.status == Status.CONVERGED)
+
+
+def holding_wrench(
+    machine: CompiledMachine,
+    position: ArrayLike,
+    displacement: ArrayLike,
+    *,
+    rotation: ArrayLike | None = None,
+    point: str = "tcp",
+    gravity: ArrayLike | None = None,
+    threads: int | None = None,
+) -> HoldingWrench:
+    """Wrenches and stiffness of a machine whose `point` is held off its commanded pose.
+
+    Parameters
+    ----------
+    position
+        (..., 3) m, commanded TCP, base axes.
+    displacement
+        (..., 6) m, rad: of the point from where the command puts it; rotation as a rotation vector.
+    rotation
+        (..., 3, 3), commanded orientation; None: as at home.
+    point
+        Named point that is held; a free one is not touched.
+    gravity
+        (3,) m/s², base axes; None: what the machine file says.
+
+    Notes
+    -----
+    Loaded equilibrium, not stiffness times displacement. A displacement that rigid parts forbid is
+    NOT_CONVERGED.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
+    """
+    p = trailing(position, (3,), "position", "positions (m)")
+    d = trailing(displacement, (6,), "displacement", "displacements [dx dy dz rx ry rz] (m, rad)")
+    r = trailing(
+        machine.home_rotation if rotation is None else rotation, (3, 3), "rotation", "rotation matrices"
+    )
+    r = as_rotations(r)
+    if point not in machine.names.points:
+        raise StiffmapError(f"point: expected one of {', '.join(machine.names.points)}, got {point!r}")
+    shape = batch(p.shape[:-1], d.shape[:-1], r.shape[:-2])
+    out = machine.impose(
+        rows(p, shape, (3,)),
+        rows(r, shape, (3, 3)),
+        rows(d, shape, (6,)),
+        point=point,
+        gravity=machine.gravity(gravity),
+        threads=thread_count(threads),
+    )
+    arrays = {name: values.reshape(shape + values.shape[1:]) for name, values in out.items()}
+    return HoldingWrench(**arrays, point=point, legs=machine.names.legs, actuators=machine.names.actuators)

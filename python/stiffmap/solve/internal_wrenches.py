@@ -1,0 +1,121 @@
+"""Internal wrenches: what geometric errors and preload do inside a machine that carries nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.common.broadcasting import Floats, real_array, rows, thread_count
+from stiffmap.common.deprecation import warn_renamed
+from stiffmap.common.short import short_repr
+from stiffmap.model.description.tree import joints
+from stiffmap.model.files.load import Source
+from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.solve.results import OverPoses
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class InternalWrenches(OverPoses):
+    """Wrenches inside a machine, leading batch axes (...); NaN for failed poses, with their status."""
+
+    springs: dict[str, Floats]
+    """Full name of each link spring -> (..., 6) N, N·m in the spring's axes: force and moment that
+    the elastic part carries, positive where they stretch (or turn) it forwards."""
+    joints: dict[str, Floats]
+    """Full name of each drive and elastic joint -> (...) N or N·m along its coordinate."""
+    legs: dict[str, Floats]
+    """Leg -> (..., 6) N, N·m: leg on platform, about `point`, base axes."""
+    displacement: Floats
+    """(..., 6) m, rad: of the point against the commanded pose."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+    point: str
+
+    def largest(self) -> tuple[str, float]:
+        """The spring with the largest force, and that force (N)."""
+        sizes = {n: float(np.nanmax(np.linalg.norm(w[..., :3], axis=-1))) for n, w in self.springs.items()}
+        name = max(sizes, key=lambda n: sizes[n])
+        return name, sizes[name]
+
+
+@takes_machine
+def assembly_wrenches(
+    machine: Machine,
+    position: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    point: str = "tcp",
+    gravity: ArrayLike | None = None,
+    threads: int | None = None,
+) -> InternalWrenches:
+    """Internal wrenches at commanded poses, by default under the gravity of the machine file alone.
+
+    They come from `actual` geometry that differs from the nominal one where legs are over-constrained
+    (assembly), and from springs with a `rest` deflection (preload). Statically determinate legs
+    carry none.
+
+    position (..., 3) m; wrench (..., 6) at `point`, None: none; gravity (3,) m/s², None: what the
+    machine file says. Raises StiffmapError for bad input.
+    """
+    s = machine.solve(
+        position,
+        wrench,
+        rotation=rotation,
+        point=point,
+        gravity=gravity,
+        threads=threads,
+        method="reference",
+    )
+    shape = s.status.shape
+    load = np.zeros(6) if wrench is None else real_array(wrench, "wrench")
+    turned = machine.compiled.home_rotation if rotation is None else real_array(rotation, "rotation")
+    force = machine.compiled.reactions(
+        rows(real_array(position, "position"), shape, (3,)),
+        rows(turned, shape, (3, 3)),
+        rows(load, shape, (6,)),
+        point=point,
+        gravity=machine.compiled.gravity(gravity),
+        threads=thread_count(threads),
+    )
+    force = force.reshape((*shape, force.shape[-1]))
+    elastic = {n: i for n, i in s.joint_index.items() if n in machine.actuators or _has_law(machine, n)}
+    return InternalWrenches(
+        springs={n: force[..., i : i + 6] for n, i in s.spring_index.items()},
+        joints={n: force[..., i] for n, i in elastic.items()},
+        legs={leg: s.leg_wrench[..., i, :] for i, leg in enumerate(machine.legs)},
+        displacement=s.displacement,
+        status=s.status,
+        flags=s.flags,
+        point=point,
+    )
+
+
+def _has_law(machine: Machine, name: str) -> bool:
+    return any(
+        any(j.laws) and (name == n or name.rpartition(".")[0] == n)
+        for n, j in joints(machine.description).items()
+    )
+
+
+def assembly_stress(
+    machine: Machine | Source,
+    position: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    point: str = "tcp",
+    gravity: ArrayLike | None = (0.0, 0.0, 0.0),
+    threads: int | None = None,
+) -> InternalWrenches:
+    """Deprecated name of `assembly_wrenches`, without gravity by default: (..., 3) m, (..., 6) N, N·m.
+
+    Raises StiffmapError for bad input.
+    """
+    warn_renamed("assembly_stress()", "assembly_wrenches(gravity=)")
+    return assembly_wrenches(
+        machine, position, wrench=wrench, rotation=rotation, point=point, gravity=gravity, threads=threads
+    )

@@ -1,0 +1,77 @@
+"""Degrees of freedom of a machine at a configuration, counted from its closure equations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import null_space
+from scipy.spatial.transform import Rotation
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.solve.compiled import Role
+from stiffmap.solve.machine import Machine
+
+STEP = 1e-6
+RANK = 1e-6
+"""Relative size below which a singular value counts as zero; central differences err by about 1e-9."""
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """Counts with the drives free to move and all springs rigid."""
+
+    joints: int
+    """Elementary joint coordinates."""
+    equations: int
+    """Closure equations: six for each loop."""
+    independent: int
+    """Rank of the closure equations."""
+    platform: int
+    """Independent motions of the platform."""
+
+    @property
+    def total(self) -> int:
+        """Degrees of freedom of the whole mechanism."""
+        return self.joints - self.independent
+
+    @property
+    def internal(self) -> int:
+        """Motions that leave the platform in place."""
+        return self.total - self.platform
+
+    @property
+    def overconstraint(self) -> int:
+        """Closure equations that follow from the others."""
+        return self.equations - self.independent
+
+
+def mobility(machine: Machine, coordinates: Floats) -> Mobility:
+    """Counts at coordinates that close all loops."""
+    core = machine.compiled
+    free = [i for i, role in enumerate(core.names.roles) if role != Role.SPRING]
+    loops = [(primary, end) for _, _, primary, end in core.loops]
+    columns = [_rates(machine, coordinates, i, loops) for i in free]
+    closure = np.array([c for c, _ in columns]).T.reshape(6 * len(loops), len(free))
+    tip = np.array([t for _, t in columns]).T
+    motions = null_space(closure, rcond=RANK) if loops else np.eye(len(free))
+    platform = rank(tip @ motions, tip)
+    return Mobility(len(free), 6 * len(loops), rank(closure, closure), platform)
+
+
+def rank(matrix: Floats, scale: Floats) -> int:
+    """Number of singular values that count relative to the largest one of another matrix."""
+    if 0 in matrix.shape:
+        return 0
+    largest = float(np.linalg.svd(scale, compute_uv=False)[0])
+    return int((np.linalg.svd(matrix, compute_uv=False) > RANK * largest).sum())
+
+
+def _rates(machine: Machine, x: Floats, index: int, loops: list[tuple[int, int]]) -> tuple[Floats, Floats]:
+    """Rates of the gaps of all loops and of the platform's frame with one coordinate."""
+    shift = np.zeros_like(x)
+    shift[index] = STEP
+    (p1, r1), (p0, r0) = (machine.compiled.frames(x + s) for s in (shift, -shift))
+    twist = np.concatenate([p1 - p0, Rotation.from_matrix(r1 @ np.swapaxes(r0, 1, 2)).as_rotvec()], axis=1)
+    twist /= 2 * STEP
+    return np.array([twist[end] - twist[primary] for primary, end in loops]).ravel(), twist[-1]

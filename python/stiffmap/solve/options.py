@@ -1,0 +1,132 @@
+"""How poses are solved: the options that `Machine.solve`, maps, experiments and commands pass on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from inspect import Parameter, signature
+from typing import Any, ParamSpec, TypedDict, TypeVar, get_type_hints
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap.solve.branches import Start
+
+
+@dataclass(frozen=True, eq=False)
+class SolveOptions:
+    """Everything about a solution but the machine, its poses and the wrench."""
+
+    point: str = "tcp"
+    """Named point where the wrench acts and displacement, stiffness and compliance are."""
+    rotation: ArrayLike | None = None
+    """(..., 3, 3), commanded orientation; None: as at home."""
+    wrenches: Mapping[str, ArrayLike] = field(default_factory=dict)
+    """More wrenches: point name -> (..., 6) N, N·m."""
+    load_type: str | Mapping[str, str] = "dead"
+    """How wrenches follow their bodies: dead, follower or semitangential; a mapping says it by point."""
+    read_points: Sequence[str] = ()
+    """Further points whose displacement is wanted."""
+    gravity: ArrayLike | None = None
+    """(3,) m/s², base axes; None: what the machine file says."""
+    method: str = "fast"
+    """``fast`` or ``reference``."""
+    load_steps: int | str = "auto"
+    """``auto`` (adaptive continuation) or the number of equal steps."""
+    stiffness: bool = True
+    """False: displacements, status, flags and iterations only."""
+    start: Start | None = None
+    """Joint coordinates that name the assembly mode: docs/conventions.md. None: that of home."""
+    threads: int | None = None
+    """None: all cores that this process may use."""
+
+    def keywords(self) -> dict[str, Any]:
+        """All fields, as keywords of `Machine.solve`."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+    def as_plain(self) -> dict[str, Any]:
+        """What of the shared options changes numbers, as JSON data; threads do not."""
+        plain = {k: getattr(self, k) for k in ("point", "load_type", "method", "load_steps")}
+        for name in ("rotation", "gravity"):
+            value = getattr(self, name)
+            plain[name] = None if value is None else np.asarray(value, dtype=float).tolist()
+        if self.start is not None:
+            mapping = isinstance(self.start, Mapping)
+            plain["start"] = (
+                {k: np.asarray(v, dtype=float).tolist() for k, v in self.start.items()}  # type: ignore[union-attr]
+                if mapping
+                else np.asarray(self.start, dtype=float).tolist()
+            )
+        return plain
+
+
+class LoadingKeywords(TypedDict, total=False):
+    """Fields of `SolveOptions` that one pose, a map, a polar diagram and a sweep share."""
+
+    point: str
+    rotation: ArrayLike | None
+    gravity: ArrayLike | None
+    load_type: str | Mapping[str, str]
+    method: str
+    load_steps: int | str
+    start: Start | None
+    threads: int | None
+
+
+class SolveKeywords(LoadingKeywords, total=False):
+    """All fields of `SolveOptions`, as keywords of `Machine.solve`."""
+
+    wrenches: Mapping[str, ArrayLike] | None
+    read_points: Sequence[str]
+    stiffness: bool
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def spelled_out(keywords: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Let `help` and editors show the keywords (a TypedDict of fields of `SolveOptions`) that a function takes as ``**given``.
+
+    What is called stays the function itself; a call pays nothing.
+    """
+    defaults = SolveOptions()
+    hints = SolveOptions.__annotations__
+
+    def show(function: Callable[P, R]) -> Callable[P, R]:
+        own = signature(function)
+        shown = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
+        names = (n for n in SolveOptions.__dataclass_fields__ if n in get_type_hints(keywords))
+        more = (
+            Parameter(n, Parameter.KEYWORD_ONLY, default=_default(defaults, n), annotation=hints[n])
+            for n in names
+        )
+        named = [p for p in more if p.name not in own.parameters]
+        function.__signature__ = own.replace(parameters=[*shown, *named])  # type: ignore[attr-defined]
+        return function
+
+    return show
+
+
+def keywords_of(other: Callable[..., Any]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Let `help` and editors show the keywords of another function, to which this one hands its ``**call`` on."""
+    more = [p for p in signature(other).parameters.values() if p.kind is Parameter.KEYWORD_ONLY]
+
+    def show(function: Callable[P, R]) -> Callable[P, R]:
+        own = signature(function)
+        shown = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
+        named = [p for p in more if p.name not in own.parameters]
+        function.__signature__ = own.replace(parameters=[*shown, *named])  # type: ignore[attr-defined]
+        return function
+
+    return show
+
+
+def _default(defaults: SolveOptions, name: str) -> Any:
+    return None if name == "wrenches" else getattr(defaults, name)
+
+
+def merged(options: SolveOptions | None, given: SolveKeywords | LoadingKeywords) -> SolveOptions:
+    """The options with some fields as given; TypeError for a keyword that is none."""
+    known: dict[str, Any] = {k: v for k, v in given.items() if not (k == "wrenches" and v is None)}
+    return SolveOptions(**known) if options is None else replace(options, **known)

@@ -1,0 +1,76 @@
+"""A machine of other dimensions, closed anew: on the assembly branch that the machine has now."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from stiffmap.common.errors import HomeError
+from stiffmap.model.addresses import known_values, with_values
+from stiffmap.model.addresses.places import single_addresses
+from stiffmap.model.description import MachineDescription, tree
+from stiffmap.model.description.elements import Element, Joint
+from stiffmap.model.effects import apply_records
+from stiffmap.solve.compiled import CompiledMachine
+from stiffmap.solve.home_changes import home_changes
+
+SMALLEST_STEP = 1 / 256
+
+
+def redesigned(description: MachineDescription, values: Mapping[str, float]) -> MachineDescription:
+    """The description with other numbers (SI) at these addresses, its effects added again.
+
+    Where the home coordinates do not close the new machine, they are followed there: the numbers go over in small steps, each
+    closed from the one before it, so that the machine stays on its assembly branch.
+    StiffmapError for an unknown address or a bad value; HomeError where the numbers reach no machine that closes.
+    """
+    declared = description.declared or description
+    target = with_values(declared, values)
+    try:
+        CompiledMachine(target)
+    except HomeError as problem:
+        target = _followed(declared, values, problem)
+    return apply_records(target, description.effects) if description.effects else target
+
+
+def _followed(
+    start: MachineDescription, values: Mapping[str, float], problem: HomeError
+) -> MachineDescription:
+    ends = {one: float(v) for address, v in values.items() for one in single_addresses(start, address)}
+    begins = {one: known_values(start, one)[0] for one in ends}
+    at, step, now = 0.0, 0.5, start
+    while at < 1.0:
+        share = min(1.0, at + step)
+        between = {k: v if share == 1.0 else begins[k] + share * (v - begins[k]) for k, v in ends.items()}
+        try:
+            tried = with_values(now, between)
+            now = closed(tried, CompiledMachine(tried))
+        except HomeError:
+            step /= 2
+            if step < SMALLEST_STEP:
+                raise HomeError(
+                    f"{problem}; followed from the machine's present numbers, it closes up to "
+                    f"{100 * at:.0f} % of the change"
+                ) from None
+            continue
+        at = share
+    return now
+
+
+def closed(description: MachineDescription, machine: CompiledMachine) -> MachineDescription:
+    """The description with the home coordinates that close it."""
+    for change in home_changes(machine):
+        name, _, index = change.name.rpartition(".")
+        for full, e in tree.all_elements(description):
+            core = tree.core_name(full)
+            if not isinstance(e, Joint) or not (core == change.name or (core == name and index.isdigit())):
+                continue
+            i = 0 if core == change.name else int(index) - 1
+
+            def put(element: Element, i: int = i, value: float = change.closed) -> Element | None:
+                if not isinstance(element, Joint):
+                    return None
+                return replace(element, home=(*element.home[:i], value, *element.home[i + 1 :]))
+
+            description = tree.edit(description, full, put) or description
+    return description

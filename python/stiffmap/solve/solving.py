@@ -1,0 +1,175 @@
+"""From the arguments of `Machine.solve` to the compiled core and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.common.broadcasting import (
+    Floats,
+    batch,
+    rows,
+    rows_or_one,
+    thread_count,
+    trailing,
+    whole_number,
+    wrench_array,
+)
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.rotations import as_rotations
+from stiffmap.solve.closing import Kinematics, close_actuators, close_poses
+from stiffmap.solve.compiled import CompiledMachine
+from stiffmap.solve.compiled.machine import LOAD_TYPES
+from stiffmap.solve.options import SolveOptions
+from stiffmap.solve.solution import Solution
+
+METHODS = ("fast", "reference")
+
+
+@dataclass(frozen=True, eq=False)
+class Call:
+    """Poses, a wrench, and how to solve them, as they were given."""
+
+    position: ArrayLike
+    wrench: ArrayLike | None = None
+    options: SolveOptions = field(default_factory=SolveOptions)
+
+    def only(self, chosen: NDArray[np.bool_]) -> Call:
+        """The poses of a batch (...) that are `chosen` (...), as a list of poses."""
+
+        def cut(values: ArrayLike, tail: int) -> Floats:
+            a = np.asarray(values, dtype=float)
+            return np.broadcast_to(a, chosen.shape + a.shape[a.ndim - tail :])[chosen]
+
+        o = self.options
+        options = replace(
+            o,
+            rotation=None if o.rotation is None else cut(o.rotation, 2),
+            wrenches={n: cut(w, 1) for n, w in o.wrenches.items()},
+            start={n: cut(v, 0) for n, v in o.start.items()}
+            if isinstance(o.start, Mapping)
+            else None
+            if o.start is None
+            else cut(o.start, 1),
+        )
+        return Call(cut(self.position, 1), None if self.wrench is None else cut(self.wrench, 1), options)
+
+
+def solve_call(
+    machine: CompiledMachine, call: Call, variants: Sequence[CompiledMachine] = ()
+) -> tuple[Solution, Floats]:
+    """The answer, and the displacements (..., variants, 6) of machines with a parameter moved.
+
+    These are NaN where the reference path was taken. StiffmapError for bad input.
+    """
+    o = call.options
+    p, w, r, extra = _arrays(machine, call)
+    if o.start is None:
+        return _solve(machine, o, (p, w, r, extra), variants, None)
+    unloaded = close_poses(machine, p, r, o.start, o.threads)
+    shape = unloaded.status.shape
+    p, r = np.broadcast_to(p, (*shape, 3)), np.broadcast_to(r, (*shape, 3, 3))
+    return _solve(machine, o, (p, w, r, extra), variants, unloaded)
+
+
+def solve_joints(machine: CompiledMachine, actuators: ArrayLike, call: Call) -> Solution:
+    """The answer at actuator coordinates (..., actuators): see `Machine.solve_joints`."""
+    o = call.options
+    if o.rotation is not None:
+        raise StiffmapError("rotation: expected none, since the actuators decide it, got one")
+    unloaded = close_actuators(machine, actuators, o.start, o.threads)
+    lost = np.isnan(unloaded.rotation).any((-2, -1), keepdims=True)
+    r = np.where(lost, machine.home_rotation, unloaded.rotation)
+    _, w, _, extra = _arrays(machine, replace(call, position=np.zeros(3)))
+    return _solve(machine, o, (unloaded.position, w, r, extra), (), unloaded)[0]
+
+
+def _solve(
+    machine: CompiledMachine,
+    o: SolveOptions,
+    arrays: tuple[Floats, Floats, Floats, dict[str, Floats]],
+    variants: Sequence[CompiledMachine],
+    unloaded: Kinematics | None,
+) -> tuple[Solution, Floats]:
+    """At coordinates that are closed already where `unloaded` holds them."""
+    p, w, r, extra = arrays
+    shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2], *(v.shape[:-1] for v in extra.values()))
+    if o.method not in METHODS:
+        raise StiffmapError(f"method: expected 'fast' or 'reference', got {o.method!r}")
+    loaded = [o.point, *extra]
+    types = load_types(o, loaded)
+    read = reading_points(machine, o, loaded)
+    answer = machine.solve(
+        rows(p, shape, (3,)),
+        rows_or_one(r, shape, (3, 3)),
+        _stacked([w, *extra.values()], shape),
+        load_points=loaded,
+        load_types=types,
+        read_points=read,
+        gravity=machine.gravity(o.gravity),
+        fast=o.method == "fast",
+        load_steps=step_count(o.load_steps),
+        threads=thread_count(o.threads),
+        stiffness=o.stiffness,
+        variants=variants,
+        closed=None
+        if unloaded is None
+        else rows(unloaded.coordinates, shape, unloaded.coordinates.shape[-1:]),
+    )
+    if unloaded is not None:
+        flags = answer.flags  # also how sure the branch is
+        flags |= rows(unloaded.flags, shape, ())  # type: ignore[arg-type]
+    order = (0, *(read.index(n) for n in o.read_points))
+    solution = Solution(answer, shape, machine.names, o.point, order, unloaded=unloaded)
+    return solution, answer.variants.reshape((*shape, len(variants), 6) if variants else (0,))
+
+
+def _stacked(wrenches: Sequence[Floats], shape: tuple[int, ...]) -> Floats:
+    """(n or 1, loads, 6) of all load points."""
+    if all(w.ndim == 1 for w in wrenches):
+        return np.array([wrenches])
+    if len(wrenches) == 1:
+        return rows(wrenches[0], shape, (6,))[:, None]
+    return np.stack([rows(w, shape, (6,)) for w in wrenches], axis=1)
+
+
+def _arrays(machine: CompiledMachine, call: Call) -> tuple[Floats, Floats, Floats, dict[str, Floats]]:
+    p = trailing(call.position, (3,), "position", "positions (m)")
+    w = wrench_array(call.wrench)
+    r = machine.home_rotation
+    if call.options.rotation is not None:
+        r = trailing(call.options.rotation, (3, 3), "rotation", "rotation matrices")
+        r = as_rotations(r)
+    extra = {n: wrench_array(v, f"wrenches[{n!r}]") for n, v in call.options.wrenches.items()}
+    return p, w, r, extra
+
+
+def load_types(options: SolveOptions, loaded: Sequence[str]) -> list[str]:
+    """How the wrench at each loaded point follows its body; StiffmapError for an unknown word or point."""
+    kinds = options.load_type
+    given = {options.point: kinds} if isinstance(kinds, str) else dict(kinds)
+    for name, kind in given.items():
+        if kind not in LOAD_TYPES:
+            raise StiffmapError(f"load_type: expected one of {', '.join(LOAD_TYPES)}, got {kind!r}")
+        if name not in loaded:
+            raise StiffmapError(f"load_type: no wrench acts at {name!r}, only at {', '.join(loaded)}")
+    return [given.get(name, "dead") for name in loaded]
+
+
+def reading_points(machine: CompiledMachine, options: SolveOptions, loaded: Sequence[str]) -> list[str]:
+    """Points to read, each once, that of the wrench first; StiffmapError for one that does not exist."""
+    there = machine.names.points
+    for name in (*loaded, *options.read_points):
+        if name not in there:
+            raise StiffmapError(f"point: expected one of {', '.join(there)}, got {name!r}")
+    return list(dict.fromkeys((options.point, *options.read_points)))
+
+
+def step_count(load_steps: int | str) -> int:
+    """Number of equal load steps; 0: adaptive."""
+    if load_steps == "auto":
+        return 0
+    return whole_number(load_steps, "load_steps", 1, what="'auto' or a positive number")

@@ -1,0 +1,25 @@
+"""A machine from a URDF file."""
+
+from __future__ import annotations
+
+from os import PathLike
+
+from stiffmap.model.urdf.importing import import_urdf as description_of
+from stiffmap.solve.machine import Machine
+
+
+def import_urdf(
+    urdf: str | PathLike[str], sidecar: str | PathLike[str] | None = None, *, meshes: bool = True
+) -> Machine:
+    """Machine (SI) of a URDF file: a serial chain from the root link to the tip, or legs in parallel with a sidecar.
+
+    urdf
+        The URDF file.
+    sidecar
+        YAML file with what a URDF lacks: closed loops, motors, compliances, workspace. None: all motors are rigid.
+    meshes
+        False: meshes are not looked for.
+
+    `stiffmap.model.urdf.import_urdf` returns the description and what was left out. Raises FileError, one line, for what cannot be used.
+    """
+    return Machine(description_of(urdf, sidecar, meshes=meshes).description)

@@ -1,5 +1,0 @@
-"""How a pose ended (`Status`), and what else is to be known of it (`Flag`)."""
-
-from stiffmap.compiled.status import Flag, Status
-
-__all__ = ["Flag", "Status"]

@@ -1,8 +1,0 @@
-"""Tap tests: measured frequencies, damping and mode directions, and the effect that explains them (docs/vibration.md)."""
-
-from stiffmap.taps.explain import TapDiagnosis, explain_taps
-from stiffmap.taps.plan import where_to_tap
-from stiffmap.taps.predict import predict_taps
-from stiffmap.taps.table import TapTest, load_taps
-
-__all__ = ["TapDiagnosis", "TapTest", "explain_taps", "load_taps", "predict_taps", "where_to_tap"]

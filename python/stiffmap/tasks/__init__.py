@@ -1,6 +1,0 @@
-"""Many independent tasks: here, in processes, or on a dask cluster. One room for all that takes minutes (docs/big_maps.md)."""
-
-from stiffmap.tasks.cluster import client_of
-from stiffmap.tasks.workers import Workers, workers
-
-__all__ = ["Workers", "client_of", "workers"]

@@ -1,0 +1,160 @@
+"""The root of the command line: finds the command, runs it, turns errors into one line."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from inspect import getdoc
+from typing import Annotated, Any
+
+import typer
+
+from stiffmap.common.errors import FileErrors, MissingPartError, StiffmapError
+from stiffmap.ui.cli.commands import COMMANDS, Command
+from stiffmap.ui.cli.streams import plain_streams
+from stiffmap.ui.cli.vectors import joined
+
+BAD_INPUT = 2
+DEFECT = 70
+INTERRUPTED = 130
+TRACEBACK = "STIFFMAP_TRACEBACK"
+
+HELP = """How far is a loaded machine pushed off its commanded position?
+
+Lengths in mm, forces in N, angles in deg. Every command has [bold]--help[/bold] with
+examples and [bold]--json[/bold]. Exit codes: 0 done, 1 done with findings, 2 bad input or a system that refuses (no space,
+no memory), 70 a defect of stiffmap, 130 interrupted.
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run ``stiffmap`` (default: with the process's arguments); returns the exit code."""
+    given = joined(sys.argv[1:] if arguments is None else arguments)
+    try:
+        with plain_streams():
+            build_app(given)(args=given, prog_name="stiffmap")
+    except StiffmapError as error:
+        for problem in error.problems if isinstance(error, FileErrors) else (error,):
+            print(f"stiffmap: {one_line(problem)}", file=sys.stderr)
+        return BAD_INPUT
+    except (KeyboardInterrupt, typer.Abort):
+        return INTERRUPTED
+    except MemoryError as error:
+        print(f"stiffmap: out of memory{f': {one_line(error)}' if str(error) else ''}", file=sys.stderr)
+        return BAD_INPUT
+    except OSError as error:
+        print(f"stiffmap: {_refusal(error)}", file=sys.stderr)
+        return BAD_INPUT
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
+    except Exception as error:
+        if os.environ.get(TRACEBACK):
+            raise
+        print(f"stiffmap: {_defect(error)}", file=sys.stderr)
+        return DEFECT
+    return 0
+
+
+def _refusal(error: OSError) -> str:
+    """What the system refused, of which file."""
+    what = error.strerror or one_line(error)
+    return what if error.filename is None else f"{os.fsdecode(error.filename)}: {what}"
+
+
+def _defect(error: Exception) -> str:
+    at = traceback.extract_tb(error.__traceback__)[-1]
+    place = "/".join(at.filename.replace("\\", "/").split("/")[-2:])
+    what = f"{type(error).__name__} in {place}, line {at.lineno}: {one_line(error)}"
+    return f"a defect of stiffmap, not of your files: {what}. Please report it with the output under {TRACEBACK}=1."
+
+
+def one_line(error: Exception) -> str:
+    """The message without line breaks."""
+    return " ".join(str(error).split())
+
+
+def build_app(arguments: Sequence[str]) -> typer.Typer:
+    """App in which only the command that ``arguments`` name is imported; the others are their summaries."""
+    wanted = next((a for a in _without_effects(arguments) if not a.startswith("-")), None)
+    app = typer.Typer(
+        help=flowed(HELP),
+        no_args_is_help=True,
+        add_completion=False,
+        rich_markup_mode="rich",
+        pretty_exceptions_enable=False,
+    )
+    app.callback()(_root)
+    for command in COMMANDS:
+        if command.exists():
+            function = load(command) if command.name == wanted else _summary(command)
+            app.command(command.name, help=flowed(getdoc(function) or ""))(function)
+    return app
+
+
+def flowed(text: str) -> str:
+    """Paragraphs without the source's line breaks: the terminal breaks them at its own width."""
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
+
+
+def load(command: Command) -> Callable[..., Any]:
+    """Import a command's function; raises `MissingPartError` for what is not installed."""
+    try:
+        function: Callable[..., Any] = getattr(import_module(command.module), command.function)
+    except ModuleNotFoundError as error:
+        missing = error.name or command.module
+        if missing.split(".")[0] == "stiffmap":
+            advice = "which this installation of stiffmap lacks"
+        else:
+            advice = "which is not installed: pip install 'stiffmap[all]'"
+        raise MissingPartError(f"'stiffmap {command.name}' needs {missing}, {advice}") from error
+    return function
+
+
+def _summary(command: Command) -> Callable[[], None]:
+    def summary() -> None:
+        """Stands for a command that is not asked for."""
+
+    summary.__doc__ = command.summary
+    return summary
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            print(f"stiffmap {version('stiffmap')}")
+        except PackageNotFoundError:
+            print("stiffmap (not installed: version unknown)")
+        raise typer.Exit
+
+
+def _without_effects(arguments: Sequence[str]) -> list[str]:
+    """The arguments less the files of ``--effects-from``."""
+    return [a for before, a in zip(["", *arguments], arguments, strict=False) if before != "--effects-from"]
+
+
+def _register(files: list[str]) -> None:
+    if files:
+        from stiffmap.model.effects import load_effects
+
+        for file in files:
+            load_effects(file)
+
+
+def _root(
+    effects_from: Annotated[
+        list[str],
+        typer.Option(metavar="FILE", help="Python file that defines a kind of effect; may be repeated."),
+    ] = [],  # noqa: B006 - typer never changes it
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    _register(effects_from)
+
+
+_root.__doc__ = HELP

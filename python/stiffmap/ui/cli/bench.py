@@ -1,0 +1,126 @@
+"""``stiffmap bench``."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from statistics import median
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import numpy as np
+import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+if TYPE_CHECKING:
+    from stiffmap import Machine
+
+MACHINES = ("tripteron", "orthoglide-revised")
+FORCE = 300.0  # N, along z
+GRID, REFERENCE_GRID, MANY = 14, 4, 40  # poses along each side of the workspace
+
+
+class Line(NamedTuple):
+    """One measured case: median of the rounds, microseconds per pose or a ratio."""
+
+    case: str
+    value: float
+    unit: str
+
+
+def bench(
+    rounds: Annotated[int, typer.Option(help="Measurements of each case; the median is shown.")] = 7,
+    as_json: JsonOption = False,
+) -> None:
+    """Speed of this installation on this computer, in less than a minute.
+
+    Times per pose with all answers (displacement, stiffness, efforts, leg wrenches) on one thread, cases in
+    turn. Close other programs first. The environment variable STIFFMAP_ISA chooses the instruction set.
+
+    Examples:
+
+      [cyan]stiffmap bench[/cyan]
+
+      [cyan]STIFFMAP_ISA=base stiffmap bench --json[/cyan]
+    """
+    from stiffmap import load_machine
+    from stiffmap.solve.compiled import kernel_levels
+
+    if rounds < 1:
+        raise StiffmapError(f"rounds: expected a positive number, got {rounds}")
+    level = os.environ.get("STIFFMAP_ISA") or kernel_levels()[-1]
+    lines = [line for name in MACHINES for line in machine_lines(load_machine(name), rounds)]
+    lines += thread_lines(load_machine(MACHINES[1]), rounds)
+    if as_json:
+        print_json({"instruction_set": level, "rounds": rounds, "cases": [line._asdict() for line in lines]})
+        return
+    table = Table(box=box.SIMPLE_HEAD, title=f"instruction set {level}, median of {rounds}")
+    table.add_column("case")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    for line in lines:
+        table.add_row(line.case, f"{line.value:.3g}", line.unit)
+    Console(highlight=False).print(table)
+
+
+def machine_lines(machine: Machine, rounds: int) -> list[Line]:
+    """Unloaded, loaded, reference path and a call on one pose."""
+    wrench = np.array([0, 0, FORCE, 0, 0, 0])
+    many, few, one = grid(machine, GRID), grid(machine, REFERENCE_GRID), grid(machine, 1)
+    t = in_turn(
+        {
+            "unloaded": lambda: machine.solve(many, threads=1),
+            "loaded": lambda: machine.solve(many, wrench, threads=1),
+            "reference": lambda: machine.solve(few, wrench, method="reference", threads=1),
+            "one": lambda: machine.solve(one, threads=1),
+        },
+        rounds,
+    )
+    loaded, reference = t["loaded"] / len(many), t["reference"] / len(few)
+    return [
+        Line(f"{machine.name}, stiffness without load", 1e6 * t["unloaded"] / len(many), "µs/pose"),
+        Line(f"{machine.name}, equilibrium and stiffness at {FORCE:g} N", 1e6 * loaded, "µs/pose"),
+        Line(f"{machine.name}, the same by the reference path", 1e6 * reference, "µs/pose"),
+        Line(f"{machine.name}, reference path / fast path", reference / loaded, "times"),
+        Line(f"{machine.name}, one call on one pose", 1e6 * t["one"], "µs"),
+    ]
+
+
+def thread_lines(machine: Machine, rounds: int) -> list[Line]:
+    """All cores against one."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    poses, wrench = grid(machine, MANY), np.array([0, 0, FORCE, 0, 0, 0])
+    t = in_turn(
+        {
+            "one": lambda: machine.solve(poses, wrench, threads=1),
+            "all": lambda: machine.solve(poses, wrench, threads=cores),
+        },
+        rounds,
+    )
+    return [Line(f"{machine.name}, {cores} threads against one", t["one"] / t["all"], "times")]
+
+
+def grid(machine: Machine, n: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """(n^3, 3) m: 1/18 of the workspace away from its faces."""
+    low, high = machine.workspace
+    share = np.linspace(1 / 18, 17 / 18, n) if n > 1 else np.array([0.5])
+    s = np.stack(np.meshgrid(share, share, share, indexing="ij"), -1).reshape(-1, 3)
+    return np.asarray(low + s * (high - low))
+
+
+def in_turn(works: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+    """Median seconds of each work; all of them once per round, so that a disturbance meets them all."""
+    times: dict[str, list[float]] = {name: [] for name in works}
+    for work in works.values():
+        work()
+    for _ in range(rounds):
+        for name, work in works.items():
+            start = time.perf_counter()
+            work()
+            times[name].append(time.perf_counter() - start)
+    return {name: median(t) for name, t in times.items()}

@@ -1,0 +1,78 @@
+"""``stiffmap calibrate``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from stiffmap.common.outputs import make_folder, write_rows, write_text
+from stiffmap.common.outputs.option import written
+from stiffmap.identification.calibration import Calibration, Tolerances, calibrate
+from stiffmap.identification.calibration.travel import Travel
+from stiffmap.ui.cli.output import JsonOption
+
+
+def calibrate_command(
+    machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
+    data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
+    output: Annotated[Path | None, written(help="Folder for calibration.json and table.txt.")] = None,
+    tolerance: Annotated[
+        float, typer.Option(min=1e-3, help="Factor on the default standard uncertainties of the machine.")
+    ] = 1.0,
+    exclude: Annotated[
+        list[str] | None, typer.Option(help="Group that is known to be right; may be repeated.")
+    ] = None,
+    budget: Annotated[
+        float | None, typer.Option(min=0.1, help="Seconds after which the best so far is given.")
+    ] = None,
+    rows: Annotated[int, typer.Option(help="Unknowns to list.")] = 20,
+    seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
+    threads: Annotated[int | None, typer.Option(help="Threads; default: all cores.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """All uncertain numbers of a machine from readings at once, and which of them the readings can determine.
+
+    Exit codes: 0 as declared or within tolerance, 1 beyond tolerance or unattributed, 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap calibrate ur10 experiments/tracker -o result[/cyan]
+
+      [cyan]stiffmap calibrate linear-delta experiments/heights --exclude gains --tolerance 2[/cyan]
+    """
+    result = calibrate(
+        machine,
+        data,
+        tolerances=Tolerances().scaled(tolerance),
+        exclude=exclude or (),
+        time_limit=budget,
+        seed=seed,
+        threads=threads,
+    )
+    if output is not None:
+        write(result, output)
+    print(result.to_json() if as_json else "\n".join([*result.lines(), "", *result.table(rows)]))
+    if result.verdict not in ("as declared", "adjusted within tolerance"):
+        raise typer.Exit(1)
+
+
+def write(result: Calibration, folder: Path) -> None:
+    """All files of a calibration; raises `FileError` where the folder cannot be written."""
+    write_text(make_folder(folder) / "calibration.json", result.to_json())
+    write_text(folder / "table.txt", "\n".join([*result.lines(), "", *result.table()]) + "\n")
+    if result.travel:
+        write_rows(folder / "travel.csv", *profiles(result.travel))
+    result.machine.save(folder / "machine.yaml")
+
+
+def profiles(travel: Travel) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of the errors along the drives' travel, in mm and degrees."""
+    out = []
+    for p in travel.profiles:
+        factor, unit = (1e3, "mm") if p.unit == "m" else (180.0 / math.pi, "deg")
+        for values in zip(p.at, p.error, p.sigma, strict=True):
+            out.append([p.drive, *(f"{factor * v:.6g}" for v in values), unit])
+    return ["drive", "coordinate", "error", "sigma", "unit"], out

@@ -1,0 +1,91 @@
+"""``stiffmap diagnose``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from stiffmap.common.outputs import make_folder, write_picture, write_text
+from stiffmap.common.outputs.option import written
+from stiffmap.identification.calibration import Tolerances
+from stiffmap.identification.diagnosis import Diagnosis, diagnose
+from stiffmap.identification.diagnosis.report.sentences import next_step
+from stiffmap.ui.cli.output import JsonOption
+
+
+def diagnose_command(
+    machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
+    data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
+    output: Annotated[Path | None, written(help="Folder for report and files.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of folds and simulated noise.")] = 0,
+    threads: Annotated[int | None, typer.Option(help="Threads; default: all cores.")] = None,
+    exclude: Annotated[
+        list[str] | None, typer.Option(help="Kind of effect or group of numbers known not to be; repeatable.")
+    ] = None,
+    budget: Annotated[
+        float | None, typer.Option(min=0.1, help="Seconds after which the best so far is given.")
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option(min=1e-3, help="Factor on the default standard uncertainties of the machine.")
+    ] = 1.0,
+    date: Annotated[str | None, typer.Option(help="Date that the report bears, as you write it.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler whose workers do the bootstrap.")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing of what is being tried.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Which physical effect a machine lacks, where it sits, how large it is, and how sure that is.
+
+    With -o: diagnosis.json (SI), report.html (all inside), machine.yaml (corrected), pictures.
+    Ctrl-C ends the search: what was found by then is the answer.
+    Exit codes: 0 verdict none, 1 verdict with findings, 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap diagnose orthoglide-revised experiments/servo -o result[/cyan]
+
+      [cyan]stiffmap diagnose my.yaml dial_gauges --date 2025-03-14 -o result[/cyan]
+
+      [cyan]stiffmap diagnose ur10 tracker --exclude sensor_gain --budget 60[/cyan]
+    """
+    silent = quiet or as_json or not sys.stderr.isatty()
+    result = diagnose(
+        machine,
+        data,
+        seed=seed,
+        threads=threads,
+        exclude=exclude or (),
+        time_limit=budget,
+        scheduler=scheduler,
+        tolerances=Tolerances().scaled(tolerance),
+        progress=None if silent else _say,
+    )
+    if output is not None:
+        write(result, output, date, [p for p in (Path(machine), Path(data)) if p.exists()])
+    print(result.to_json() if as_json else result)
+    if not as_json:
+        print(f"next: {next_step(result)}")
+        if output is not None:
+            print(f"wrote {output}: start with report.html")
+    if result.verdict != "none":
+        raise typer.Exit(1)
+
+
+def _say(what: str) -> None:
+    print(f"trying: {what}", file=sys.stderr)
+
+
+def write(result: Diagnosis, folder: Path, date: str | None = None, inputs: Sequence[Path] = ()) -> None:
+    """All files of a diagnosis; raises `FileError` where the folder cannot be written."""
+    from stiffmap.ui.report.diagnosis.pictures import figures
+
+    write_text(make_folder(folder) / "diagnosis.json", result.to_json())
+    result.machine.save(folder / "machine.yaml")
+    for name, figure in figures(result).items():
+        write_picture(folder / f"{name}.png", figure, dpi=130)
+    result.report(folder / "report.html", date=date, inputs=inputs)

@@ -1,0 +1,97 @@
+"""``stiffmap effects``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+if TYPE_CHECKING:
+    from stiffmap.model.effects import EffectType
+    from stiffmap.solve.machine import Machine
+
+
+def effects(
+    kind: Annotated[
+        str | None,
+        typer.Argument(
+            help="One kind: its definition and parameters; or a word for it, such as backlash, Spiel, sag; "
+            "or a machine: the effects and their places on it."
+        ),
+    ] = None,
+    on: Annotated[str | None, typer.Option(help="Machine: the elements and legs where each can be.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """List the effects that a machine can have beyond what is declared, for --effect and with_effect.
+
+    Examples:
+
+      [cyan]stiffmap effects[/cyan]
+
+      [cyan]stiffmap effects friction[/cyan]
+
+      [cyan]stiffmap effects backlash[/cyan]
+
+      [cyan]stiffmap effects straightness --on orthoglide-revised[/cyan]
+    """
+    from stiffmap.model.effects import get, kinds
+    from stiffmap.model.effects.synonyms import found_by
+    from stiffmap.model.files.shipped import machine_names
+    from stiffmap.solve.machine import load_machine
+
+    if kind and not on and kind not in kinds() and kind in machine_names():
+        kind, on = None, kind
+    machine = load_machine(on) if on else None
+    if kind and kind not in kinds() and (meant := found_by(kind, kinds())):
+        chosen = [get(k) for k in meant]
+    else:
+        chosen = [get(kind)] if kind else [get(k) for k in kinds()]
+    if as_json:
+        print_json([_plain(e, machine) for e in chosen])
+        return
+    console = Console(highlight=False)
+    for effect in chosen:
+        names = ", ".join(f"{p.name} ({p.unit})" if p.unit != "1" else p.name for p in effect.parameters)
+        console.print(f"[bold]{effect.kind}[/bold]  {escape(effect.title)}: {escape(names)}")
+        if machine is not None:
+            console.print(f"    on {escape(', '.join(_where(effect, machine)) or 'nothing of this machine')}")
+    if kind:
+        _definition(console, chosen[0])
+
+
+def _where(effect: EffectType, machine: Machine) -> list[str]:
+    """``actuator (x, y, z)``: each element with the legs that have it."""
+    legs: dict[str, list[str]] = {}
+    for element, at in effect.places(machine.description):
+        known = legs.setdefault(element, [])
+        known.extend(leg for leg in at if leg not in known)
+    return [f"{element} ({', '.join(at)})" if at else element for element, at in legs.items()]
+
+
+def _definition(console: Console, effect: EffectType) -> None:
+    console.print(escape(effect.doc))
+    console.print(escape(f"pivot: {effect.pivot}; frame: {effect.frame}; moves: {effect.moves}"))
+    for option in effect.options:
+        choices = ", ".join(option.choices)
+        console.print(escape(f"option {option.name}: {choices} (the first by default); {option.doc}"))
+    for p in effect.parameters:
+        unit = f"{p.unit}, {p.angular} where it turns" if p.angular else p.unit
+        null = "" if p.null is None else f"; none at {p.null:g}"
+        console.print(escape(f"  {p.name} [{unit}] {p.lower:g} … {p.upper:g}{null}: {p.doc}"))
+
+
+def _plain(effect: EffectType, machine: Machine | None) -> dict[str, Any]:
+    keys = ("name", "unit", "angular", "lower", "upper", "null", "default", "doc")
+    out: dict[str, Any] = {"kind": effect.kind, "title": effect.title, "definition": effect.doc}
+    out |= {"pivot": effect.pivot, "frame": effect.frame, "moves": effect.moves}
+    out["parameters"] = [{k: getattr(p, k) for k in keys} for p in effect.parameters]
+    out["options"] = {o.name: list(o.choices) for o in effect.options}
+    out["measurement"] = effect.measurement
+    if machine is not None:
+        places = effect.places(machine.description)
+        out["places"] = [{"element": element, "legs": list(legs)} for element, legs in places]
+    return out

@@ -1,0 +1,160 @@
+"""``stiffmap efforts``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+import xarray as xr
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from stiffmap.common.outputs import make_folder
+from stiffmap.common.plain import plain
+from stiffmap.ui.cli.inputs import (
+    EffectsOption,
+    FolderOption,
+    GravityOption,
+    MachineArgument,
+    ThreadsOption,
+    finish,
+    gravity,
+    machine_with,
+)
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+
+def efforts(
+    machine: MachineArgument,
+    trajectory: Annotated[
+        Path,
+        typer.Argument(help="Motion of the tool: CSV or YAML, numbers with units; or a shipped one: trim."),
+    ],
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            help="s, from rest to rest along the path; default: the file's, else as fast as the drives can."
+        ),
+    ] = None,
+    feed: Annotated[
+        float | None, typer.Option(help="mm/min along the path all the way, in place of a duration.")
+    ] = None,
+    friction: Annotated[bool, typer.Option(help="Coulomb and viscous friction of the drives.")] = True,
+    effect: EffectsOption = None,
+    gravity_: GravityOption = None,
+    output: FolderOption = None,
+    threads: ThreadsOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Efforts, speeds and powers of the drives along a motion of the tool: inverse dynamics of the closed machine.
+
+    A CSV table has columns such as x [mm], y [mm], z [mm]; with t [s] a motion over time, with feed [mm/min] a path at this
+    speed, without either a path; fx [N], fy [N], fz [N] act on the tool and may vary. A YAML file describes a line, a
+    circle or points.
+
+    With -o: the data (NetCDF) and a picture.
+
+    Exit codes: 0 done, 1 a drive exceeds its declared effort, speed or range, 2 bad input (a motion out of
+    reach or through a singularity says where and when).
+
+    Examples:
+
+      [cyan]stiffmap efforts orthoglide-revised trim -o results[/cyan]
+
+      [cyan]stiffmap efforts orthoglide-revised cut.yaml --gravity 0,0,-9.81[/cyan]
+
+      [cyan]stiffmap efforts ur10 path.csv --feed 3000 --gravity 0,0,-9.81[/cyan]
+
+      [cyan]stiffmap efforts ur10 path.csv --duration 2 --gravity 0,0,-9.81 --json[/cyan]
+    """
+    from stiffmap.workspace.performance import drive_efforts, load_motion
+
+    m = machine_with(machine, effect)
+    g = gravity(gravity_)
+    run = load_motion(trajectory).trajectory(
+        m, duration=duration, gravity=g, feed=None if feed is None else feed * 1e-3 / 60
+    )
+    found = drive_efforts(m, run, gravity=g, friction=friction, threads=threads)
+    files = write(found, make_folder(output)) if output else []
+    if as_json:
+        names = (
+            "peak_effort",
+            "rms_effort",
+            "effort_margin",
+            "peak_speed",
+            "speed_margin",
+            "peak_power",
+            "range_margin",
+        )
+        print_json(
+            plain(
+                {
+                    "machine": m.name,
+                    "time": float(run.time[-1]),
+                    "drives": [str(d) for d in found.drive.values],
+                }
+                | {n: found[n].values for n in names}
+                | {"files": files}
+            )
+        )
+    else:
+        console = Console(highlight=False)
+        console.print(as_table(found))
+        if files:
+            console.print(f"wrote {', '.join(files)}", soft_wrap=True)
+    finish(bool(exceeded(found).any()))
+
+
+def exceeded(found: xr.Dataset) -> np.ndarray:
+    """(drives,) whether a declared limit is exceeded."""
+    margins = [found[n].values for n in ("effort_margin", "speed_margin", "range_margin")]
+    return np.asarray(np.nanmin([np.where(np.isnan(m), np.inf, m) for m in margins], axis=0) < -1e-9)
+
+
+def write(found: xr.Dataset, output: Path) -> list[str]:
+    """Data and picture."""
+    from stiffmap.ui.pictures.efforts import efforts_figure
+    from stiffmap.ui.plot import save
+    from stiffmap.workspace.maps.files import write_dataset
+
+    data = write_dataset(found, output / "efforts.nc")
+    return [str(data), str(save(efforts_figure(found), output / "efforts.png"))]
+
+
+def as_table(found: xr.Dataset) -> Table:
+    """A row per drive."""
+    span = float(found.time[-1] - found.time[0])
+    turns = found.attrs["revolute"]
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        title=f"{found.attrs['machine']}: {span:.4g} s; peaks; share of the declared limit",
+    )
+    heads = ("drive", "unit", "effort", "share", "rms", "speed", "share", "power, W", "limit")
+    for head in heads:
+        table.add_column(
+            head, no_wrap=True, justify="left" if head in ("drive", "unit", "limit") else "right"
+        )
+    over = exceeded(found)
+    for i, drive in enumerate(found.drive.values):
+        at = found.isel(drive=i)
+        table.add_row(
+            str(drive),
+            "N·m, rad/s" if turns[i] else "N, m/s",
+            f"{float(at.peak_effort):.4g}",
+            _share(at.peak_effort, at.effort_margin),
+            f"{float(at.rms_effort):.4g}",
+            f"{float(at.peak_speed):.4g}",
+            _share(at.peak_speed, at.speed_margin),
+            f"{float(at.peak_power):.4g}",
+            "[red]over[/red]" if over[i] else "",
+        )
+    return table
+
+
+def _share(peak: xr.DataArray, margin: xr.DataArray) -> str:
+    limit = float(peak + margin)
+    return f"{100 * float(peak) / limit:.0f} %" if limit > 0 else "–"

@@ -1,0 +1,261 @@
+"""``stiffmap experiment``: from a spreadsheet to an experiment folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.number_text import number_in
+from stiffmap.common.outputs.option import written
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+if TYPE_CHECKING:
+    from stiffmap.experiment import Experiment
+    from stiffmap.experiment.spreadsheet.convert import Imported
+
+
+RECORDED = {"operator", "instrument", "certificate", "date", "temperature", "notes", "source", "sha256"}
+
+
+def experiment(
+    action: Annotated[str, typer.Argument(help="new: make a folder from a spreadsheet.")],
+    file: Annotated[
+        Path, typer.Argument(help="Spreadsheet: .xlsx, .csv, .txt (any separator and decimal sign).")
+    ],
+    output: Annotated[Path, written(help="Folder of the experiment.")],
+    machine: Annotated[
+        str | None, typer.Option(help="Declared machine: shipped name or machine file; or give --dh.")
+    ] = None,
+    dh: Annotated[
+        Path | None,
+        typer.Option(
+            "--dh",
+            help="Instead: table of Denavit and Hartenberg of a serial arm, of which machine.yaml is made.",
+        ),
+    ] = None,
+    dh_convention: Annotated[
+        str,
+        typer.Option(
+            "--dh-convention", help="standard, or modified (Craig: a and alpha of the link before)."
+        ),
+    ] = "standard",
+    difference: Annotated[
+        str,
+        typer.Option(help="What differences in the file are: actual-minus-target or target-minus-actual."),
+    ] = "actual-minus-target",
+    quantity: Annotated[
+        str | None,
+        typer.Option(
+            help="deflection (loaded minus unloaded) or position (measured minus commanded). "
+            "[default: the instrument's, else deflection]"
+        ),
+    ] = None,
+    instrument: Annotated[
+        str | None,
+        typer.Option(
+            help="What wrote the file: tracker, dial-gauges, ball-bar, iso-9283, or a mapping file."
+        ),
+    ] = None,
+    mapped: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map", help="What a column is, e.g. dx='Uhr 1 [µm]'; repeats: dx='Uhr 1|Uhr 2'; repeatable."
+        ),
+    ] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(help="Unit of a column without one, e.g. dx=um; length=mm, joints=deg: of all of them."),
+    ] = None,
+    constant: Annotated[
+        list[str] | None, typer.Option("--set", help="What is the same in all rows, mm and N, e.g. z=0.")
+    ] = None,
+    noise: Annotated[
+        list[str] | None, typer.Option(help="One standard deviation of a reading in its unit, e.g. dx=2.")
+    ] = None,
+    sheet: Annotated[
+        str | None, typer.Option(help="Sheet of the workbook. [default: the first that fits]")
+    ] = None,
+    record: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="For the report: operator, instrument, certificate, date, temperature or notes, e.g. operator=Miller."
+        ),
+    ] = None,
+    dialogue: Annotated[
+        bool, typer.Option("--dialogue", help="Ask what cannot be guessed, and remember the answers.")
+    ] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing experiment.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Make an experiment of a spreadsheet: columns, units and repeats are understood and described in words.
+
+    Units stand in brackets in the header. The header may come after other lines; n/a, - and empty cells were not
+    read; further columns go to notes.csv. Exit codes: 0 done, 2 bad input, or a question that --map answers.
+
+    Examples:
+
+      [cyan]stiffmap experiment new readings.xlsx --machine five-bar -o readings[/cyan]
+
+      [cyan]stiffmap experiment new points.csv --instrument tracker --machine hexapod --noise dx=0.01 -o points[/cyan]
+
+      [cyan]stiffmap experiment new joints.csv --dh arm_dh.csv --unit joints=deg --noise dx=0.03 -o arm_readings[/cyan]
+
+      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue --noise dx=1 -o asked[/cyan]
+
+      [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
+    """
+    from stiffmap.common.fingerprints import file_digest
+    from stiffmap.experiment.spreadsheet.dh import LEG, arm, read_dh
+    from stiffmap.experiment.spreadsheet.dialogue import Answers
+    from stiffmap.experiment.spreadsheet.folder import make_experiment
+    from stiffmap.experiment.spreadsheet.instrument import load_instrument
+    from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, drives_of
+    from stiffmap.experiment.spreadsheet.reading import Reading, read_and_ask
+    from stiffmap.experiment.spreadsheet.sheet import read_sheet
+    from stiffmap.solve.machine import Machine, load_machine
+
+    if action != "new":
+        raise StiffmapError(f"experiment: expected 'new', got '{action}'")
+    wrote = None if instrument is None else load_instrument(instrument)
+    quantity = quantity or (wrote.quantity if wrote else "deflection")
+    if quantity not in ("deflection", "position"):
+        raise StiffmapError(f"--quantity: expected deflection or position, got '{quantity}'")
+    if difference not in DIFFERENCES:
+        raise StiffmapError(f"--difference: expected {' or '.join(DIFFERENCES)}, got '{difference}'")
+    if (machine is None) == (dh is None):
+        raise StiffmapError("experiment: give either --machine or --dh")
+    if (output / "experiment.yaml").exists() and not overwrite:
+        raise FileError("exists already; use --overwrite to replace it", file=str(output / "experiment.yaml"))
+    given = Answers(
+        {k: v.split("|") for k, v in pairs(mapped, "map").items()},
+        pairs(unit, "unit"),
+        _numbers(constant, "set"),
+        _numbers(noise, "noise"),
+    )
+    ask = _prompt if dialogue else None
+    rows = None if dh is None else read_dh(read_sheet(dh), given.units)
+    drives = {f"{LEG}.{r.name}": r.slides for r in rows} if rows else drives_of(load_machine(str(machine)))
+    read = Reading(wrote, drives, difference)
+    table, found, answers, told, joints = read_and_ask(file, sheet, read, given, ask)
+    if rows is not None and joints is None:
+        raise StiffmapError(f"{file}: no column commands a joint; the arm has {', '.join(drives)}")
+    quantity = "position" if joints and joints.head else quantity
+    machine = machine or str(output / "machine.yaml")
+    title = f"from {table.file.replace(str(file), file.name)}"
+    kept = {"source": file.name, "sha256": file_digest(file), **pairs(record, "record")}
+    wrong = sorted(set(kept) - RECORDED)
+    if wrong:
+        raise StiffmapError(f"--record: expected one of {', '.join(sorted(RECORDED))}; got '{wrong[0]}'")
+    made = make_experiment(found, table, output, machine, quantity, answers.noise, title, kept)
+    if rows is not None and joints is not None and dh is not None:
+        Machine(arm(rows, dh_convention, output.name, f"from {dh.name}", joints.middle())).save(machine)
+    if as_json:
+        print_json({"folder": str(output), "rows": len(made), "repeats": found.repeats,
+                    "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units})  # fmt: skip
+        return
+    for line in (*told, *(f"left out: {text}" for text in table.aside)):
+        Console(highlight=False, soft_wrap=True).print(escape(line))
+    tell(found, table.header, made, machine, output, joints.columns if joints else {})
+
+
+def _prompt(text: str) -> str:
+    try:
+        return input(f"{text} ")
+    except EOFError:
+        raise StiffmapError(
+            "--dialogue: a question is left and nobody answers; say it by --map, --unit or --set"
+        ) from None
+
+
+def tell(
+    found: Imported,
+    header: Sequence[str],
+    made: Experiment,
+    machine: str,
+    output: Path,
+    commands: Mapping[str, tuple[str, str]],
+) -> None:
+    """What each column was taken for, the first rows, and what to do next."""
+    console = Console(highlight=False, soft_wrap=True)
+    for c in found.columns:
+        if c.meaning in commands:
+            console.print(f"'{escape(header[c.index])}': command of {', '.join(commands[c.meaning])}")
+            continue
+        told = f"repeat {c.repeat} of {c.meaning}" if c.repeat else c.meaning
+        where = (
+            "kept in notes.csv"
+            if c.meaning == "note"
+            else f"{told}, {found.units.get(c.meaning, 'no unit')}"
+            + (
+                f" ({escape(c.unit) or 'one'} of the sheet: {found.factors[c.meaning]:.9g} {found.units[c.meaning]})"
+                if c.meaning in found.factors
+                else ""
+            )
+        )
+        console.print(f"'{escape(header[c.index])}': {where}")
+    for name, value in found.constants.items():
+        console.print(f"{name} = {value:g} in every row")
+    if commands:
+        _show_cells(console, found)
+    else:
+        _show(console, made)
+    poses = int(made.groups.max()) + 1
+    console.print(
+        f"{output}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
+    )
+    if not (made.sigma[made.read] > 0).all():
+        console.print("no noise is declared: repeats must show it (five or more), or say --noise dx=…")
+    console.print(
+        f"next: [cyan]stiffmap residual {escape(machine)} {escape(str(output))}[/cyan]", soft_wrap=True
+    )
+
+
+def _show(console: Console, made: object) -> None:
+    from stiffmap.experiment.notebook import experiment_rows
+
+    head, rows = experiment_rows(made)
+    table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood", padding=(0, 1, 0, 0))
+    for name in head:
+        table.add_column(name, justify="right")
+    for row in rows:
+        table.add_row(*row)
+    console.print(table)
+
+
+def _show_cells(console: Console, found: Imported) -> None:
+    """The first rows as they were written."""
+    table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood")
+    for name in found.header:
+        table.add_column(name, justify="right")
+    for row in islice(iter(found.rows), 3):
+        table.add_row(*(f"{c:.7g}" if isinstance(c, float) else str(c) for c in row))
+    console.print(table)
+
+
+def pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
+    out = {}
+    for text in given or []:
+        key, equals, value = text.partition("=")
+        if not equals or not value:
+            raise StiffmapError(f"--{name}: expected NAME=VALUE, such as dx=…; got '{text}'")
+        out[key.strip()] = value.strip()
+    return out
+
+
+def _numbers(given: Sequence[str] | None, name: str) -> dict[str, float]:
+    out = {}
+    for key, text in pairs(given, name).items():
+        try:
+            out[key] = number_in(text)
+        except ValueError:
+            raise StiffmapError(f"--{name}: expected a number, such as {key}=0; got '{text}'") from None
+    return out

@@ -1,0 +1,94 @@
+"""``stiffmap import``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from stiffmap.common.errors import FileError
+from stiffmap.common.outputs.option import written
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+if TYPE_CHECKING:
+    from stiffmap.model.urdf import Imported
+
+TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm")
+
+
+def import_urdf(
+    urdf: Annotated[
+        Path, typer.Argument(help="URDF file, or a table of Denavit and Hartenberg (.csv, .txt, .xlsx).")
+    ],
+    sidecar: Annotated[
+        Path | None, typer.Option(help="YAML with what a URDF lacks: loops, motors, compliances.")
+    ] = None,
+    output: Annotated[Path | None, written(help="Machine file to write. [default: NAME.yaml]")] = None,
+    dh_convention: Annotated[
+        str,
+        typer.Option(
+            "--dh-convention", help="standard, or modified (Craig: a and alpha of the link before)."
+        ),
+    ] = "standard",
+    unit: Annotated[
+        list[str] | None, typer.Option(help="Unit of a column of the table without one, e.g. a=mm.")
+    ] = None,
+    without_meshes: Annotated[bool, typer.Option("--without-meshes", help="Do not look for meshes.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing file.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Machine file from a URDF: its tree to a tool as a serial machine, with a sidecar also closed loops; or from a table
+    of Denavit and Hartenberg: a serial arm with rigid joints, whose compliances can be written into the file.
+
+    Exit codes: 0 done, 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap import arm.urdf -o arm.yaml[/cyan]
+
+      [cyan]stiffmap import arm_dh.csv --dh-convention modified -o craig.yaml[/cyan]
+
+      [cyan]stiffmap import delta.urdf --sidecar robot.yaml --without-meshes[/cyan]
+    """
+    from stiffmap.model.urdf import import_urdf as read
+    from stiffmap.solve.machine import Machine
+
+    if urdf.suffix.lower() in TABLES:
+        found = _of_table(urdf, dh_convention, unit)
+    else:
+        found = read(urdf, sidecar, meshes=not without_meshes)
+    machine = Machine(found.description)
+    file = output or urdf.with_name(f"{machine.name}.yaml")
+    if file.exists() and not overwrite:
+        raise FileError("exists already; use --overwrite to replace it", file=str(file))
+    machine.save(file)
+    if as_json:
+        print_json({"file": str(file), "name": machine.name, "legs": list(machine.legs),
+                    "actuators": list(machine.actuators), "left_out": list(found.left_out),
+                    "rigid": list(found.rigid)})  # fmt: skip
+        return
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(
+        f"wrote {escape(str(file))}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"
+    )
+    if found.left_out:
+        console.print(f"[yellow]left out[/yellow] (not on the way to the tip): {', '.join(found.left_out)}")
+    if found.rigid:
+        console.print(f"[yellow]rigid[/yellow] (no compliance in the sidecar): {', '.join(found.rigid)}")
+
+
+def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
+    """The arm of a table of Denavit and Hartenberg."""
+    from stiffmap.experiment.spreadsheet.dh import arm, read_dh
+    from stiffmap.experiment.spreadsheet.sheet import read_sheet
+    from stiffmap.model.urdf import Imported
+    from stiffmap.ui.cli.experiment import pairs
+
+    name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
+    rows = read_dh(read_sheet(file), pairs(unit, "unit"))
+    description = arm(rows, convention, name, f"from {file.name}")
+    return Imported(description, (), tuple(r.name for r in rows))

@@ -1,0 +1,117 @@
+"""Options that several commands share: mm, N, N·mm and deg become SI here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import number_in
+from stiffmap.common.outputs.option import written
+
+if TYPE_CHECKING:
+    from stiffmap.solve.machine import Machine
+
+MM = 1e-3
+
+MachineArgument = Annotated[str, typer.Argument(help="Shipped name (stiffmap machines) or machine file.")]
+EffectsOption = Annotated[
+    list[str] | None,
+    typer.Option("--effect", help="Add an effect, e.g. 'dead_zone actuator y half_width=12um'; repeatable."),
+]
+GravityOption = Annotated[
+    str | None,
+    typer.Option(
+        "--gravity", help="Gravity in m/s², base axes, e.g. 0,0,-9.81; default: the machine file's."
+    ),
+]
+ForceOption = Annotated[
+    str,
+    typer.Option(
+        help="Force on the tool in N: a vector in base axes, such as 300,0,0, or a size, such as 300, "
+        "whose directions are searched."
+    ),
+]
+MethodOption = Annotated[str, typer.Option(help="fast or reference.")]
+ThreadsOption = Annotated[int | None, typer.Option(help="Threads; default: all cores.")]
+ToleranceOption = Annotated[float, typer.Option(help="Tolerated deflection, mm.")]
+PlaneOption = Annotated[str, typer.Option(help="Plane in which the force turns: xy, xz or yz.")]
+FolderOption = Annotated[Path | None, written(help="Folder for files and pictures.")]
+RotationOption = Annotated[
+    str | None,
+    typer.Option(
+        "--rotation", help="Commanded orientation as a rotation vector in deg, base axes, e.g. 0,0,30."
+    ),
+]
+
+
+def numbers(text: str, name: str, count: int | None = None) -> Floats:
+    """Finite numbers, separated by commas or blanks."""
+    expected = "numbers" if count is None else f"{count} numbers"
+    try:
+        out = np.array([number_in(part) for part in text.replace(",", " ").split()])
+    except ValueError:
+        raise StiffmapError(
+            f"--{name}: expected {expected} without units, such as 100,0,-50; got '{text}'"
+        ) from None
+    if (count is not None and out.size != count) or not out.size:
+        raise StiffmapError(f"--{name}: expected {expected} separated by commas, got '{text}'")
+    if not np.isfinite(out).all():
+        raise StiffmapError(f"--{name}: expected finite numbers, got '{text}'")
+    return out
+
+
+def position(text: str | None, machine: Machine, name: str = "at") -> Floats:
+    """A TCP position given in mm, in m; the home position where none is given."""
+    return machine.description.home.p if text is None else MM * numbers(text, name, 3)
+
+
+def rotation(text: str | None) -> Any:
+    """A rotation matrix from a rotation vector in deg, or None."""
+    if text is None:
+        return None
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(numbers(text, "rotation", 3), degrees=True).as_matrix()
+
+
+def gravity(text: str | None) -> Any:
+    """Gravity as given, or None."""
+    return None if text is None else numbers(text, "gravity", 3)
+
+
+def force_given(text: str) -> tuple[float, Floats | None]:
+    """``300``: a size in N, in any direction. ``300,0,0``: a vector in N, base axes, with its size."""
+    given = numbers(text, "force")
+    if given.size not in (1, 3):
+        raise StiffmapError(
+            f"--force: expected a size, such as 300, or a vector, such as 300,0,0; got '{text}'"
+        )
+    if given.size == 1 and given[0] <= 0:
+        raise StiffmapError(f"--force: a size is a positive number (a direction takes three); got '{text}'")
+    return float(np.linalg.norm(given)), given if given.size == 3 else None
+
+
+def machine_with(name: str, effects: Sequence[str] | None) -> Machine:
+    """A machine with effects added."""
+    from stiffmap.solve.machine import Machine, load_machine
+
+    machine = load_machine(name)
+    if not effects:
+        return machine
+    from stiffmap.model.effects import apply_records, parse_effect
+
+    return Machine(
+        apply_records(machine.description, [parse_effect(text, machine.description) for text in effects])
+    )
+
+
+def finish(found: bool) -> None:
+    """Exit with 1 where there is something to find."""
+    if found:
+        raise typer.Exit(1)

@@ -1,0 +1,203 @@
+"""``stiffmap lobes``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.outputs import make_folder
+from stiffmap.common.plain import plain
+from stiffmap.ui.cli.inputs import (
+    MM,
+    EffectsOption,
+    FolderOption,
+    GravityOption,
+    MachineArgument,
+    RotationOption,
+    ThreadsOption,
+    finish,
+    gravity,
+    machine_with,
+    numbers,
+    position,
+    rotation,
+)
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from stiffmap.machining.process import Process
+
+RPM = 60 / (2 * np.pi)
+
+
+def lobes(
+    machine: MachineArgument,
+    process: Annotated[str, typer.Option(help="Process file, or a shipped name: slot.")],
+    at: Annotated[
+        list[str] | None,
+        typer.Option(help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]"),
+    ] = None,
+    feed: Annotated[str, typer.Option(help="Direction of the feed, base axes.")] = "1,0,0",
+    tool: Annotated[
+        str, typer.Option(help="Direction from the tool's tip to its holder, base axes.")
+    ] = "0,0,1",
+    rotation_: RotationOption = None,
+    speeds: Annotated[
+        str | None, typer.Option(help="Lowest and highest speed, rpm, e.g. 2000,12000.")
+    ] = None,
+    depth: Annotated[float | None, typer.Option(help="Top of the diagram, mm.")] = None,
+    points: Annotated[str, typer.Option(help="Number of speeds and of depths.")] = "120,80",
+    damping: Annotated[
+        str | None,
+        typer.Option(help="Damping ratios of the modes in %, e.g. 2 or 3,1.5; default: the machine file's."),
+    ] = None,
+    mode: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A mode of spindle and tool besides: Hz, damping in %, modal mass in kg, direction x or y of the cut, e.g. "
+            "1243,6.2,0.048,x; repeatable."
+        ),
+    ] = None,
+    method: Annotated[str, typer.Option(help="semi-discretization or 'zero order'.")] = "semi-discretization",
+    effect: EffectsOption = None,
+    gravity_: GravityOption = None,
+    output: FolderOption = None,
+    threads: ThreadsOption = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler whose workers take the speeds.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Stability lobes: at which speed of the spindle what depth of cut does not chatter.
+
+    The modes are the machine's at the pose, and those of spindle and tool that are given. Depths and speeds are those of the
+    process where nothing else is said. With -o: diagrams (PNG) and data (NetCDF).
+
+    Exit codes: 0 the process is stable at all poses, 1 it chatters at one, 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap lobes ur10 --process slot --at -800,-100,250 -o results[/cyan]
+
+      [cyan]stiffmap lobes examples/taps/kr210.yaml --process examples/taps/cut.yaml --speeds 2000,12000 --damping 3[/cyan]
+
+      [cyan]stiffmap lobes linear-delta --process slot --mode 1243,6.2,0.048,x --mode 1747,2.9,0.1,y --json[/cyan]
+    """
+    from stiffmap.machining.process import load_process
+
+    m = machine_with(machine, effect)
+    p = load_process(process)
+    many = int(numbers(points, "points", 2)[0]), int(numbers(points, "points", 2)[1])
+    if min(many) < 2:
+        raise StiffmapError(f"--points: expected two numbers from 2 on, got '{points}'")
+    ends = None if speeds is None else numbers(speeds, "speeds", 2)
+    if ends is not None and not 0 < ends[0] < ends[1]:
+        raise StiffmapError(f"--speeds: expected a lowest and a highest speed in rpm, got '{speeds}'")
+    if depth is not None and not depth > 0:
+        raise StiffmapError(f"--depth: expected a depth above zero in mm, got {depth:g}")
+    given: dict[str, Any] = {
+        "speeds": None if ends is None else np.linspace(ends[0], ends[1], many[0]) / RPM,
+        "depths": None if depth is None else MM * np.linspace(0, depth, many[1] + 1)[1:],
+        "feed": numbers(feed, "feed", 3), "tool": numbers(tool, "tool", 3), "also": _modes(mode), "method": method,
+        "rotation": rotation(rotation_), "gravity": gravity(gravity_), "threads": threads,
+        "scheduler": scheduler,
+        "damping": None if damping is None else numbers(damping, "damping") / 100,
+    }  # fmt: skip
+    answers = [_one(m, p, text, given, output, i) for i, text in enumerate(at or [None])]
+    if as_json:
+        print_json(plain({"machine": m.name, "process": p.name, "poses": answers}))
+    else:
+        for a in answers:
+            _say(a)
+    finish(not all(a["stable"] for a in answers))
+
+
+def _one(
+    machine: Any, p: Process, at: str | None, given: dict[str, Any], output: Path | None, i: int
+) -> dict[str, Any]:
+    """Answer of one pose; files where there is a folder."""
+    from stiffmap.machining.chatter import stability_lobes
+
+    place = position(at, machine)
+    ds = stability_lobes(machine, p, place, **given)
+    limit, a = _at_process(ds, p), ds.attrs
+    out: dict[str, Any] = {
+        "at_mm": (place / MM).tolist(), "modes": a["modes"], "damping": a["damping"],
+        "least_limit_mm": a["least"] / MM, "chatter_frequency_Hz": a["frequency"],
+        "least_on_diagram_mm": float(ds.limit.min()) / MM,
+        "least_at_rpm": float(ds.speed.values[int(ds.limit.values.argmin())]) * RPM,
+        "coupling_limit_mm": a["coupling"] / MM,
+        "process": {"speed_rpm": p.spindle * RPM, "depth_mm": p.cut.axial / MM, "limit_mm": limit / MM,
+            "multiplier": a["at_process"],
+        },
+        "stable": a["at_process"] < 1,
+        "stable_speeds": [{"speed_rpm": s * RPM, "limit_mm": d / MM} for s, d in a["stable_speeds"]],
+    }  # fmt: skip
+    if output is not None:
+        out["files"] = _write(ds, p, machine.name, place, make_folder(output), i)
+    return out
+
+
+def _at_process(ds: xr.Dataset, p: Process) -> float:
+    """m: limit at the process's speed, between the speeds of the diagram; NaN outside of it, infinite above its top."""
+    s, v = ds.speed.values, np.minimum(ds.limit.values, ds.depth.values[-1])
+    if not s[0] <= p.spindle <= s[-1]:
+        return float("nan")
+    found = float(np.interp(p.spindle, s, v))
+    return float("inf") if found >= ds.depth.values[-1] else found
+
+
+def _modes(given: list[str] | None) -> list[tuple[float, float, float, str]]:
+    out = []
+    for text in given or []:
+        parts = [t.strip() for t in text.split(",")]
+        if len(parts) != 4:
+            raise StiffmapError(
+                f"--mode: expected Hz, damping in %, modal mass in kg, direction, e.g. 1243,6.2,0.048,x; got '{text}'"
+            )
+        f, ratio, mass = numbers(",".join(parts[:3]), "mode", 3)
+        out.append((float(f), float(ratio) / 100, float(mass), parts[3]))
+    return out
+
+
+def _write(ds: xr.Dataset, p: Process, name: str, place: Any, folder: Path, i: int) -> list[str]:
+    from stiffmap.ui.plot.style import save
+    from stiffmap.ui.plot.vibration import lobes_figure
+    from stiffmap.workspace.maps.files import write_dataset
+
+    where = ", ".join(f"{v / MM:g}" for v in place)
+    stem = "lobes" if i == 0 else f"lobes_{i + 1}"
+    picture, data = folder / f"{stem}.png", folder / f"{stem}.nc"
+    save(lobes_figure(ds, f"{name} at ({where}) mm: {p.name}", p.spindle, p.cut.axial), picture)
+    ds = ds.copy()
+    ds.attrs["stable_speeds"] = np.ravel(ds.attrs["stable_speeds"])
+    write_dataset(ds, data)
+    return [str(picture), str(data)]
+
+
+def _say(a: dict[str, Any]) -> None:
+    p, where = a["process"], ", ".join(f"{v:g}" for v in a["at_mm"])
+    limit = p["limit_mm"]
+    word = "stable" if a["stable"] else "chatters"
+    verdict = f"{word}: {p['depth_mm']:.4g} mm at {p['speed_rpm']:.0f} rpm (multiplier {p['multiplier']:.3f})"
+    if np.isfinite(limit):
+        verdict += f"; from {limit:.4g} mm on it chatters"
+    print(f"at ({where}) mm: {verdict}")
+    if np.isfinite(a["least_on_diagram_mm"]):
+        print(f"  least limit {a['least_on_diagram_mm']:.4g} mm, at {a['least_at_rpm']:.0f} rpm")
+    print(
+        f"  zero order, any speed: {a['least_limit_mm']:.4g} mm ({a['chatter_frequency_Hz']:.1f} Hz); without regeneration modes "
+        f"couple from {a['coupling_limit_mm']:.4g} mm on"
+    )
+    if a["stable_speeds"]:
+        pockets = ", ".join(f"{s['speed_rpm']:.0f} rpm ({s['limit_mm']:.4g} mm)" for s in a["stable_speeds"])
+        print(f"  deepest between lobes: {pockets}")
+    print(f"  {a['modes']} modes; damping {a['damping']}")
+    for f in a.get("files", []):
+        print(f"  wrote {f}")

@@ -1,0 +1,185 @@
+"""``stiffmap map``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from stiffmap.common.outputs import make_folder
+from stiffmap.common.plain import plain
+from stiffmap.solve.machine import Machine
+from stiffmap.ui.cli.inputs import (
+    MM,
+    EffectsOption,
+    ForceOption,
+    GravityOption,
+    MachineArgument,
+    MethodOption,
+    PlaneOption,
+    ThreadsOption,
+    ToleranceOption,
+    finish,
+    gravity,
+    machine_with,
+)
+from stiffmap.ui.cli.map_big import print_estimate, print_statistics
+from stiffmap.ui.cli.map_files import Wanted, write_files
+from stiffmap.ui.cli.map_inputs import cases, grid, named_formats
+from stiffmap.ui.cli.map_options import (
+    ComplianceOption,
+    DirectionsOption,
+    EstimateOption,
+    FormatsOption,
+    OutputOption,
+    OwnScalesOption,
+    PicturesOption,
+    PointsOption,
+    ResumeOption,
+    SchedulerOption,
+    StatisticsOption,
+    TablesOption,
+    ToolpathOption,
+    UncertaintyOption,
+    XOption,
+    YOption,
+    ZarrOption,
+    ZOption,
+)
+from stiffmap.ui.cli.map_summary import as_table, beyond, failures, summary
+from stiffmap.ui.cli.map_uncertainty import print_uncertainty, uncertainty_data
+from stiffmap.ui.cli.map_worst import in_words, worst_pose
+from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.statuses import failed_in_words
+
+
+def map_command(
+    machine: MachineArgument,
+    output: OutputOption = Path("stiffmap-map"),
+    z: ZOption = None,
+    y: YOption = None,
+    x: XOption = None,
+    points: PointsOption = 101,
+    force: ForceOption = "300",
+    toolpath: ToolpathOption = None,
+    plane: PlaneOption = "xy",
+    tolerance: ToleranceOption = 0.25,
+    directions: DirectionsOption = 4,
+    effect: EffectsOption = None,
+    gravity_: GravityOption = None,
+    compliance: ComplianceOption = False,
+    uncertainty: UncertaintyOption = False,
+    zarr: ZarrOption = False,
+    resume: ResumeOption = False,
+    pictures: PicturesOption = True,
+    formats: FormatsOption = "png",
+    tables: TablesOption = None,
+    own_scales: OwnScalesOption = False,
+    estimate: EstimateOption = False,
+    statistics: StatisticsOption = False,
+    scheduler: SchedulerOption = None,
+    method: MethodOption = "fast",
+    threads: ThreadsOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Error maps of z-planes: how far a force in the plane pushes the tool off its commanded position.
+
+    The default is the paper's Figure 7: 300 N, z = -200, 0 and 300 mm over the whole xy workspace,
+    deflection in the plane. The paper does not say where its force points: mapped are the worst
+    direction at every position, the best one, Fx and Fy. A force that is given as a vector is mapped
+    next to the worst and the best direction of its size.
+
+    Coordinates that a machine's task does not command are left at home: a planar machine has one plane.
+
+    Exit codes: 0 done, 1 some poses failed (they hold NaN and their status), 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap map orthoglide-revised -o results[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --force 200,0,-100 --points 41 -o results[/cyan]
+
+      [cyan]stiffmap map my_machine.yaml --uncertainty --points 21[/cyan]
+
+      [cyan]stiffmap map tripteron --force 100 --points 41 --z 300 --z 500[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --y 0 --plane xz --points 41 --format svg[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --gravity 0,0,-9.81 --tolerance 0.1 --json[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --points 21 --table csv,xlsx -o results[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --points 2001 --estimate[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --points 51 --statistics[/cyan]
+
+      [cyan]stiffmap map orthoglide-revised --toolpath trim -o results[/cyan]
+    """
+    kinds = named_formats(formats, "--format", ("png", "svg", "pdf")) if pictures else []
+    sheets = named_formats(tables, "--table", ("csv", "xlsx")) if tables else []
+    m = machine_with(machine, effect)
+    if toolpath is not None:
+        from stiffmap.ui.cli.map_toolpath import map_toolpath
+
+        how = {"gravity": gravity(gravity_), "method": method, "threads": threads}
+        map_toolpath(m, toolpath, force, how, output, kinds, as_json)
+        return
+    call: dict[str, Any] = {
+        **grid(m, {"x": x, "y": y, "z": z}, points),
+        "wrench": cases(plane, force),
+        "plane": plane,
+        "directions": directions,
+        "tolerance": MM * tolerance,
+        "gravity": gravity(gravity_),
+        "compliance": compliance,
+        "uncertainty": uncertainty,
+        "method": method,
+        "threads": threads,
+    }
+    if estimate:
+        print_estimate(m, call, as_json)
+    elif statistics:
+        print_statistics(m, call, plane, scheduler, as_json)
+    else:
+        target = make_folder(output) / ("map.zarr" if zarr else "map.nc")
+        how = {
+            "scheduler": scheduler,
+            "progress": False if as_json else None,
+            "out": target,
+            "resume": resume,
+        }
+        wanted = Wanted(output, plane, tolerance, kinds, sheets, own_scales, uncertainty)
+        _map(m, call, how, wanted, as_json)
+
+
+def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wanted, as_json: bool) -> None:
+    """Compute, write, print; ends the command."""
+    import stiffmap
+
+    ds = stiffmap.error_map(machine, **call, **how)
+    rows, failed = summary(ds, wanted.plane, MM * wanted.tolerance), failures(ds)
+    worst = worst_pose(machine, ds, call["gravity"])
+    table = as_table(ds, rows, wanted.plane, wanted.tolerance)
+    files = [how["out"], *write_files(machine, ds, wanted, table, worst, failed, call["gravity"])]
+    band = uncertainty_data(ds, wanted.plane) if wanted.uncertainty else None
+    far = beyond(ds)
+    if as_json:
+        data: dict[str, Any] = {"machine": machine.name, "rows": rows, "failed": failed}
+        data |= {"files": list(map(str, files)), "worst_pose": worst}
+        data |= {} if far is None else {"beyond_calibration": far}
+        print_json(plain(data if band is None else data | {"uncertainty": band}))
+    else:
+        console = Console(highlight=False)
+        console.print(table)
+        if band is not None:
+            print_uncertainty(console, band, wanted.plane)
+        if worst is not None:
+            console.print(in_words(worst), soft_wrap=True)
+        if far is not None:
+            told = f"{100 * far['share']:.3g} % of it beyond what the machine was calibrated by ({far['calibrated_by']})"
+            console.print(f"[yellow]{told}[/yellow]" if far["share"] else told, soft_wrap=True)
+        for line in failed_in_words(failed):
+            console.print(f"[yellow]{line}[/yellow]", soft_wrap=True)
+        console.print(f"wrote {', '.join(map(str, files))}", soft_wrap=True)
+    finish(bool(failed))

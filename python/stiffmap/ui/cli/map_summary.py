@@ -1,0 +1,77 @@
+"""The numbers of an error map in a few rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from rich import box
+from rich.table import Table
+
+from stiffmap.ui.cli.statuses import failed
+from stiffmap.workspace.maps.variables import BEYOND
+
+
+def across(ds: xr.Dataset) -> str:
+    """The axis whose values are the planes: the one with the fewest, z before y before x."""
+    return min(("z", "y", "x"), key=lambda a: ds.sizes[a])
+
+
+def summary(ds: xr.Dataset, plane: str, tolerance: float) -> list[dict[str, Any]]:
+    """Per plane and reading of the force's direction: least, median, largest deflection in the plane of
+    the force (m), or in space of a force that is not in it, share of the poses within the tolerance; failed poses do not count as within."""
+    ds, axis = ds.load(), across(ds)
+    readings = {w: ds[f"{w}_deflection_{plane}"] for w in ("worst", "best")}
+    readings |= {str(c): ds[name_of(ds, plane, c)].sel(case=c) for c in ds.case.values}
+    return [
+        {axis: float(at), "force": name} | _row(values.sel({axis: at}).values, tolerance)
+        for at in ds[axis].values
+        for name, values in readings.items()
+    ]
+
+
+def name_of(ds: xr.Dataset, plane: str, case: object) -> str:
+    """The deflection that a case is judged by: in the plane where its force lies in it, else in space."""
+    wrench = ds.wrench.sel(case=case)
+    outside = [v for n, v in zip(wrench.wrench_component.values, wrench.values, strict=True)
+               if str(n)[0] == "f" and str(n)[1] not in plane]  # fmt: skip
+    return "deflection" if any(outside) else f"deflection_{plane}"
+
+
+def _row(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]], tolerance: float) -> dict[str, float]:
+    good = values[np.isfinite(values)]
+    least, median, most = (good.min(), np.median(good), good.max()) if good.size else (np.nan,) * 3
+    share = float((good <= tolerance).sum() / values.size)
+    return {"min": float(least), "median": float(median), "max": float(most), "share_within": share}
+
+
+def failures(ds: xr.Dataset) -> dict[str, int]:
+    """Number of poses per status in which some load or direction failed."""
+    return failed(np.maximum(ds.direction_status.values, ds.status.max("case").values))
+
+
+def beyond(ds: xr.Dataset) -> dict[str, Any] | None:
+    """Share of the map (poses and loads) beyond what a calibrated machine was calibrated by; None: it was not."""
+    if BEYOND not in ds:
+        return None
+    return {"share": float(ds[BEYOND].mean()), "calibrated_by": str(ds[BEYOND].attrs["calibrated_by"])}
+
+
+def as_table(ds: xr.Dataset, rows: list[dict[str, Any]], plane: str, tolerance: float) -> Table:
+    """For the terminal, mm."""
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        title=f"{ds.attrs['machine']}: deflection in the {plane} plane, mm, under "
+        f"{ds.attrs['turning_force_N']:g} N",
+    )
+    axis = across(ds)
+    for head in (f"{axis}, mm", "force", "min", "median", "max", f"within {tolerance:g} mm"):
+        table.add_column(head, justify="left" if head == "force" else "right")
+    for r in rows:
+        sizes = (f"{1e3 * r[k]:.3f}" if np.isfinite(r[k]) else "–" for k in ("min", "median", "max"))
+        name = f"{r['force']} direction" if r["force"] in ("worst", "best") else r["force"]
+        if r["force"] in ds.case and name_of(ds, plane, r["force"]) == "deflection":
+            name = f"{name}, |d| in space"
+        table.add_row(f"{1e3 * r[axis]:g}", name, *sizes, f"{100 * r['share_within']:.1f} %")
+    return table

@@ -1,0 +1,110 @@
+"""``stiffmap map --toolpath``: deflection along a path of the tool."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from rich.console import Console
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.outputs import make_folder, write_rows
+from stiffmap.common.plain import plain
+from stiffmap.solve.machine import Machine
+from stiffmap.ui.cli.inputs import MM, finish, force_given
+from stiffmap.ui.cli.output import print_json
+from stiffmap.ui.plot.style import BLACK, CYCLE, headline, legend_below, new_figure, paper_style
+
+
+def map_toolpath(
+    m: Machine,
+    toolpath: str,
+    force: str,
+    how: dict[str, Any],
+    output: Path,
+    pictures: list[str],
+    as_json: bool,
+) -> None:
+    """Solve along the path, print the worst place, write table, data and pictures."""
+    from stiffmap.ui.plot import save
+    from stiffmap.workspace.maps.files import write_dataset
+    from stiffmap.workspace.performance import load_motion
+
+    position, given = load_motion(toolpath).places()
+    load = given if given.any() else _load(m, position, force, how)
+    wrench = np.hstack([load, np.zeros_like(load)])
+    s = m.solve(position, wrench, **how)
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
+    ds = s.to_xarray(("way",), {"way": ("way", way, {"units": "m"})})
+    ds = ds.assign(position=(("way", "axis"), position), force=(("way", "axis"), load))
+    folder = make_folder(output)
+    files = [str(write_dataset(ds, folder / "toolpath.nc")), str(_table(ds, folder / "toolpath.csv"))]
+    files += [str(save(toolpath_figure(ds, m.name), folder / f"toolpath.{kind}")) for kind in pictures]
+    failed = int((~s.ok).sum())
+    sizes = ds.deflection.values
+    worst = int(np.nanargmax(sizes)) if np.isfinite(sizes).any() else None
+    if as_json:
+        at = (
+            None
+            if worst is None
+            else {"way": way[worst], "position": position[worst], "deflection": sizes[worst]}
+        )
+        print_json(
+            plain({"machine": m.name, "poses": len(way), "failed": failed, "worst": at, "files": files})
+        )
+    else:
+        console = Console(highlight=False)
+        if worst is None:
+            console.print(f"{m.name}: no pose of the path converged")
+        else:
+            place = ", ".join(f"{v / MM:.4g}" for v in position[worst])
+            console.print(
+                f"{m.name}: largest deflection along the path {1e6 * sizes[worst]:.1f} µm at ({place}) mm, "
+                f"{way[worst] / MM:.4g} mm from its start"
+            )
+        if failed:
+            console.print(f"{failed} of {len(way)} poses failed: {s.count()}")
+        console.print(f"wrote {', '.join(files)}", soft_wrap=True)
+    finish(failed > 0)
+
+
+def _load(m: Machine, position: Floats, force: str, how: dict[str, Any]) -> Floats:
+    """(n, 3) N: the vector given; of a size, in the direction that pushes the tool furthest at each pose."""
+    size, vector = force_given(force)
+    if vector is not None:
+        return np.broadcast_to(vector, position.shape)
+    c = m.solve(position, None, **how).compliance[:, :3, :3]
+    right = np.linalg.svd(np.nan_to_num(c))[2]
+    return np.asarray(size * right[:, 0])
+
+
+def _table(ds: xr.Dataset, path: Path) -> Path:
+    """A row per point."""
+    head = ["way [mm]", "x [mm]", "y [mm]", "z [mm]", "fx [N]", "fy [N]", "fz [N]",
+            "dx [mm]", "dy [mm]", "dz [mm]", "deflection [mm]"]  # fmt: skip
+    columns = np.column_stack([
+        ds.way.values / MM, ds.position.values / MM, ds.force.values,
+        ds.displacement.values[:, :3] / MM, ds.deflection.values / MM,
+    ])  # fmt: skip
+    write_rows(path, head, (list(map(repr, row)) for row in columns.tolist()))
+    return path
+
+
+def toolpath_figure(ds: xr.Dataset, name: str) -> Figure:
+    """Deflection and its components over the way."""
+    with paper_style():
+        figure = new_figure(6.4, 3.4)
+        ax: Any = figure.subplots()
+        way = ds.way.values / MM
+        ax.plot(way, 1e6 * ds.deflection.values, color=BLACK, lw=1.6, label="|d|")
+        for i, axis in enumerate("xyz"):
+            if np.nanmax(np.abs(ds.displacement.values[:, i]), initial=0.0) > 1e-12:
+                ax.plot(way, 1e6 * ds.displacement.values[:, i], color=CYCLE[i], lw=1.0, label=f"d{axis}")
+        ax.set(xlabel="way along the path, mm", ylabel="deflection, µm")
+        ax.grid(color="0.9", lw=0.5)
+        headline(figure, f"{name}: deflection along the toolpath")
+        legend_below(figure, ax.get_legend_handles_labels()[0])
+    return figure

@@ -1,0 +1,82 @@
+"""``stiffmap monitor``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.json_text import parse_json
+from stiffmap.common.plain import plain
+from stiffmap.experiment import load_experiment
+from stiffmap.experiment.calls import placed
+from stiffmap.identification.planning.budget import budgets
+from stiffmap.identification.planning.monitor import compare
+from stiffmap.model.description import AppliedEffect
+from stiffmap.solve.machine import Machine, load_machine
+from stiffmap.ui.cli.inputs import EffectsOption
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+
+def monitor(
+    machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
+    before: Annotated[str, typer.Argument(help="Experiment folder: the machine as it was, or one specimen.")],
+    after: Annotated[str, typer.Argument(help="Experiment folder: the machine now, or another specimen.")],
+    effect: EffectsOption = None,
+    diagnosis: Annotated[
+        Path | None, typer.Option(help="diagnosis.json of the last diagnosis: its effects are followed.")
+    ] = None,
+    budget: Annotated[bool, typer.Option(help="Print the uncertainty budget of every number now.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """What changed since the last diagnosis; or whether two specimens of a type share their numbers.
+
+    The same effects are fitted to both experiments, each on its own. Exit codes: 0 nothing changed, 1 something
+    did, 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap monitor orthoglide-revised january june --effect 'dead_zone actuator y half_width=10um'[/cyan]
+
+      [cyan]stiffmap monitor orthoglide-revised january june --diagnosis january/diagnosis.json --budget[/cyan]
+    """
+    m = load_machine(machine)
+    terms = [placed(m, text) for text in effect or []] + (_of(m, diagnosis) if diagnosis else [])
+    if not terms:
+        raise StiffmapError("monitor: name what to follow, by --effect or --diagnosis")
+    found = compare(m, load_experiment(before), load_experiment(after), terms)
+    if as_json:
+        print_json(plain({"common": found.common, "p": found.p, "changes": [vars(c) for c in found.changes]}))
+    else:
+        print(found)
+        if budget:
+            print(*budgets(m, load_experiment(after), found.second), sep="\n")
+    if not found.common:
+        raise typer.Exit(1)
+
+
+def _of(m: Machine, path: Path) -> list[AppliedEffect]:
+    """Effects that a diagnosis named."""
+    try:
+        data: Any = parse_json(path.read_text(encoding="utf-8"))
+        effects = data["effects"]
+        terms = [
+            AppliedEffect(
+                e["kind"],
+                e["element"],
+                tuple(e["legs"]),
+                tuple((n, float(v[0])) for n, v in e["parameters"].items()),
+            )
+            for e in effects
+        ]
+    except OSError as error:
+        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError):
+        raise FileError(
+            "expected a diagnosis as `stiffmap diagnose --json` writes it", file=str(path)
+        ) from None
+    if not terms:
+        raise FileError("the diagnosis names no effect that could be followed", file=str(path))
+    return terms

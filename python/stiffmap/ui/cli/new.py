@@ -1,0 +1,101 @@
+"""``stiffmap new``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.outputs import write_text
+from stiffmap.model.files.starter import starter_text
+from stiffmap.solve.starters import CLASSES, OPTIONS, class_of, machine_text
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+
+def _dimension(key: str) -> Any:
+    return typer.Option(f"--{key}", help=f"{OPTIONS[key]}.", rich_help_panel="Dimensions (with --from)")
+
+
+Length = float | None
+
+
+def new(
+    file: Annotated[
+        Path | None, typer.Argument(help="File to write; its stem becomes the machine's name.")
+    ] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            "--from", metavar="CLASS", help="Start from a machine of this class; --list names them."
+        ),
+    ] = None,
+    listed: Annotated[bool, typer.Option("--list", help="List the classes and their dimensions.")] = False,
+    radius: Annotated[Length, _dimension("radius")] = None,
+    platform: Annotated[Length, _dimension("platform")] = None,
+    arm: Annotated[Length, _dimension("arm")] = None,
+    forearm: Annotated[Length, _dimension("forearm")] = None,
+    rod: Annotated[Length, _dimension("rod")] = None,
+    height: Annotated[Length, _dimension("height")] = None,
+    stroke: Annotated[Length, _dimension("stroke")] = None,
+    reach: Annotated[Length, _dimension("reach")] = None,
+    tube: Annotated[Length, _dimension("tube")] = None,
+    wall: Annotated[Length, _dimension("wall")] = None,
+    drive: Annotated[Length, _dimension("drive")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing file.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Start a machine file: a template in which every key is explained, or a machine of a common class.
+
+    With --from, the file is complete: geometry, steel tubes, drives, masses and a workspace within reach.
+
+    Examples:
+
+      [cyan]stiffmap new my_machine.yaml[/cyan]
+
+      [cyan]stiffmap new --from 3-rrr my_3rrr.yaml --radius 300 --arm 180 --forearm 200[/cyan]
+
+      [cyan]stiffmap new --from hexapod my_hexapod.yaml --radius 400 --height 600[/cyan]
+
+      [cyan]stiffmap new --list[/cyan]
+    """
+    dimensions = {"radius": radius, "platform": platform, "arm": arm, "forearm": forearm, "rod": rod, "height": height,
+                  "stroke": stroke, "reach": reach, "tube": tube, "wall": wall, "drive": drive}  # fmt: skip
+    if listed:
+        _list(as_json)
+        return
+    if file is None:
+        raise StiffmapError("new: expected a file to write, such as my_machine.yaml (or --list)")
+    if kind is None and (given := [k for k, v in dimensions.items() if v is not None]):
+        raise StiffmapError(f"--{given[0]}: only with --from; the classes are {', '.join(CLASSES)}")
+    if file.exists() and not overwrite:
+        raise FileError("exists already; use --overwrite to replace it", file=str(file))
+    name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
+    write_text(file, starter_text(name) if kind is None else machine_text(kind, name, dimensions))
+    if as_json:
+        more = {} if kind is None else {"class": kind, "dimensions": class_of(kind).values(dimensions)}
+        print_json({"file": str(file), "name": name, **more})
+        return
+    console = Console(highlight=False, soft_wrap=True)
+    text = escape(str(file))
+    if kind is None:
+        console.print(f"wrote {text}; edit it, then: [cyan]stiffmap check {text}[/cyan]")
+    else:
+        used = ", ".join(f"{k} {v:g}" for k, v in class_of(kind).values(dimensions).items())
+        console.print(f"wrote {text}: {kind} with {used} (mm; drive in N/µm or kN·m/rad)")
+        console.print(
+            f"look at it: [cyan]stiffmap show {text}[/cyan]; map it: [cyan]stiffmap map {text}[/cyan]"
+        )
+
+
+def _list(as_json: bool) -> None:
+    if as_json:
+        print_json({n: {"title": c.title, "dimensions": dict(c.defaults)} for n, c in CLASSES.items()})
+        return
+    for name, c in CLASSES.items():
+        print(f"{name:<13}{c.title}\n{'':13}" + " ".join(f"--{k} {v:g}" for k, v in c.defaults.items()))
+    print("lengths in mm; --drive in N/µm where drives slide, in kN·m/rad where they turn")

@@ -1,0 +1,189 @@
+"""``stiffmap optimize``."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.outputs import make_folder
+from stiffmap.common.outputs.option import written
+from stiffmap.common.plain import plain
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+if TYPE_CHECKING:
+    from stiffmap.ui.report.design import Chosen, Report
+    from stiffmap.workspace.design import ParetoSet
+
+
+def optimize(
+    design: Annotated[str, typer.Argument(help="Design file, or a shipped one by name: redesign.")],
+    output: Annotated[Path, written(help="Folder for results; resumed from there.")] = Path("design"),
+    generations: Annotated[int | None, typer.Option(help="Generations; default: the file's.")] = None,
+    processes: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler whose workers judge the designs.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Machines that are best under several measures at once: a Pareto set, and chosen designs as machine files.
+
+    Seeded. Killed at any moment, the same command goes on where it was. The folder gets the set
+    (NetCDF), pictures, and a machine file for the best of each objective and for a compromise, which
+    are measured again in full.
+
+    Exit codes: 0 done, 1 a chosen design misses a requirement when measured in full, 2 bad input or
+    no design meets all constraints.
+
+    Examples:
+
+      [cyan]stiffmap optimize redesign -o results/redesign[/cyan]
+
+      [cyan]stiffmap optimize my_design.yaml --generations 5 --json[/cyan]
+
+      [cyan]stiffmap optimize redesign --scheduler tcp://HOST:8786 -o results/redesign[/cyan]
+    """
+    from stiffmap.ui.cli.inputs import finish
+    from stiffmap.ui.report.design import measured
+    from stiffmap.workspace.design import load_design
+    from stiffmap.workspace.design import optimize as search
+
+    console = Console(stderr=True, highlight=False)
+    begun = time.monotonic()
+
+    def tell(generation: int, count: int, volume: float, good: int) -> None:
+        console.print(f"generation {generation}: {count} designs, {good} feasible, hypervolume {volume:.4f}")
+
+    problem = load_design(design)
+    place = make_folder(output)
+    found = search(
+        problem,
+        folder=place,
+        generations=generations,
+        processes=processes,
+        progress=tell,
+        scheduler=scheduler,
+    )
+    report = measured(found, place)
+    tables = report.tables
+    files = write(found, place, report)
+    console.print(f"{found.evaluated} designs in {time.monotonic() - begun:.0f} s")
+    if as_json:
+        print_json(
+            plain(
+                {
+                    "design": problem.model.name,
+                    "evaluated": found.evaluated,
+                    "front": len(found.x),
+                    "chosen": {k: t.as_plain() for k, t in tables.items()},
+                    "refined": {k: refined(c) for k, c in report.chosen.items()},
+                    "files": files,
+                }
+            )
+        )
+    else:
+        out = Console(highlight=False)
+        out.print(as_table(found, report))
+        for line in remarks(report):
+            out.print(f"[dim]{line}[/dim]", soft_wrap=True)
+        out.print(
+            f"wrote {', '.join(files)} and the machine files {', '.join(f'{k}.yaml' for k in report.chosen)}",
+            soft_wrap=True,
+        )
+    finish(not all(c.table.passed for c in report.chosen.values()))
+
+
+def write(found: ParetoSet, place: Path, report: Report) -> list[str]:
+    """The set and its pictures."""
+    from stiffmap.ui.pictures.design import beside_figure, front_figure, parallel_figure, progress_figure
+    from stiffmap.ui.pictures.paths import path_measures_figure
+    from stiffmap.ui.plot import save
+    from stiffmap.workspace.maps.files import write_dataset
+
+    data = write_dataset(found.dataset, place / "pareto.nc")
+    figures = {"fronts": front_figure, "parallel": parallel_figure, "progress": progress_figure}
+    saved = [str(save(make(found), place / f"{name}.png")) for name, make in figures.items()]
+    with suppress(StiffmapError):  # no measure with a map is asked for
+        saved.append(str(save(beside_figure(report.tables), place / "beside.png")))
+    with suppress(StiffmapError):  # no toolpath
+        saved.append(str(save(path_measures_figure(report.tables), place / "toolpath.png")))
+    return [str(data), *saved]
+
+
+NOTHING = 1e-9
+"""Of a measure: a standard deviation that is round-off."""
+
+
+def as_table(found: ParetoSet, report: Report) -> Table:
+    """Measures of the reference machines and of the chosen designs, with the standard deviations that tolerances give."""
+    out = Table(
+        box=box.SIMPLE,
+        padding=(0, 0, 0, 1),
+        pad_edge=False,
+        title=f"{found.design.model.name}: measured in full, ± by tolerances",
+    )
+    out.add_column("measure", no_wrap=True)
+    tables = report.tables
+    for name in tables:
+        out.add_column(name, justify="right", overflow="fold")
+    for i, row in enumerate(next(iter(tables.values())).rows):
+        m = row.measure
+        cells = []
+        for name, t in tables.items():
+            r = t.rows[i]
+            mark = {"pass": "[green]", "fail": "[red]"}.get(r.verdict, "")
+            text = "–" if r.reason else f"{m.factor * r.found.worst:.4g}"
+            robust = report.chosen[name].robust if name in report.chosen else None
+            spread = robust.first_order.get(m.name, 0.0) if robust is not None else 0.0
+            if spread > NOTHING * abs(r.found.worst):
+                text += f" ± {m.factor * spread:.2g}"
+            cells.append(f"{mark}{text}[/]" if mark else text)
+        out.add_row(f"{m.name} {m.shown}".strip(), *cells)
+    if any(c.robust is not None for c in report.chosen.values()):
+        shares = [c.robust for c in report.chosen.values()]
+        out.add_row(
+            "meets all (drawn) %",
+            *[""] * len(report.beside),
+            *("" if r is None else f"{100 * r.meets:.0f}" for r in shares),
+        )
+    return out
+
+
+def remarks(report: Report) -> list[str]:
+    """What refinement gained, and how random machines differ from first order."""
+    from stiffmap.workspace.performance.registry import get_measure
+
+    out = []
+    for name, c in report.chosen.items():
+        gains = [
+            f"{n} {get_measure(n).factor * c.found.values[n]:.4g} → {get_measure(n).factor * c.judged.values[n]:.4g}"
+            for n in c.found.values
+            if abs(c.judged.values[n] - c.found.values[n]) > 1e-4 * abs(c.found.values[n])
+        ]
+        out.append(f"{name}, refined by gradients: {', '.join(gains) or 'nothing better nearby'}")
+        if c.robust is not None:
+            pairs = [
+                f"{n} {get_measure(n).factor * c.robust.first_order[n]:.2g} ({get_measure(n).factor * s:.2g} drawn)"
+                for n, s in c.robust.drawn.items()
+                if s > NOTHING * abs(c.judged.values[n])
+            ]
+            out.append(
+                f"{name}, standard deviations by {len(c.robust.places)} tolerances: {', '.join(pairs)}"
+            )
+    return out
+
+
+def refined(c: Chosen) -> dict[str, Any]:
+    """A chosen design as plain data, SI."""
+    out: dict[str, Any] = {"found": c.found.values, "refined": c.judged.values, "x": c.x.tolist()}
+    if c.robust is not None:
+        out["deviation"] = {"first_order": c.robust.first_order, "drawn": c.robust.drawn}
+        out["meets"] = c.robust.meets
+    return out

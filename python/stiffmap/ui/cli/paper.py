@@ -1,0 +1,71 @@
+"""``stiffmap paper``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from stiffmap.common.outputs import make_folder, write_text
+from stiffmap.common.outputs.option import written
+from stiffmap.common.plain import plain
+from stiffmap.ui.cli.inputs import ThreadsOption
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+if TYPE_CHECKING:
+    from stiffmap.ui.paper import Results, Statement
+
+
+def paper(
+    output: Annotated[Path | None, written(help="Folder for figures and tables.")] = None,
+    points: Annotated[int, typer.Option(help="Positions along x and y of the error maps.")] = 101,
+    figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 7 (with -o).")] = True,
+    threads: ThreadsOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Reproduce the paper's application: Figures 5a–h, 6, 7 and every quantitative statement of §5.2 and §5.3.
+
+    Each statement has the paper's words and number, our number and a verdict: agrees, differs because …, or cannot be
+    checked because …; agreement with a number that our model took from the paper is marked as such. With -o: the figures (PNG) and the table (CSV, Markdown).
+
+    Exit codes: 0 done (whatever the verdicts), 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap paper -o results[/cyan]
+
+      [cyan]stiffmap paper --json[/cyan]
+
+      [cyan]stiffmap paper --points 31 --no-figures -o results[/cyan]
+    """
+    from stiffmap.ui.paper import all_statements, compute
+    from stiffmap.ui.paper.table import as_plain, as_rich, count, count_text
+
+    target = make_folder(output) if output else None
+    results = compute(points, threads=threads, progress=False if as_json else None)
+    statements = all_statements(results)
+    files = [str(f) for f in write(results, statements, target, figures)] if target else []
+    if as_json:
+        print_json(plain({"statements": as_plain(statements), "count": count(statements), "files": files}))
+        return
+    console = Console(highlight=False)
+    console.print(as_rich(statements))
+    console.print(count_text(statements))
+    console.print(
+        "The paper prints no numbers of the curves in Figures 5 to 7; the numbers above are those of its text and Table 1."
+    )
+    if files:
+        console.print(f"wrote {', '.join(files)}", soft_wrap=True)
+
+
+def write(results: Results, statements: list[Statement], target: Path, figures: bool) -> list[Path]:
+    """Figures and tables."""
+    from stiffmap.ui.paper.figures import save_all
+    from stiffmap.ui.paper.table import as_csv, as_markdown
+
+    out = save_all(results, target) if figures else []
+    for name, text in (("statements.csv", as_csv(statements)), ("statements.md", as_markdown(statements))):
+        out.append(write_text(target / name, text))
+    return out

@@ -1,0 +1,171 @@
+"""``stiffmap plan``."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import with_uncertainty
+from stiffmap.common.outputs import write_rows
+from stiffmap.common.outputs.option import written
+from stiffmap.common.plain import plain
+from stiffmap.experiment import simulate
+from stiffmap.experiment.calls import placed
+from stiffmap.experiment.files.save import plan_columns
+from stiffmap.identification.planning import Design, Estimate, design, follow
+from stiffmap.identification.planning.estimate import fitted
+from stiffmap.model.description import AppliedEffect
+from stiffmap.solve.machine import Machine, load_machine
+from stiffmap.ui.cli.inputs import numbers
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+MM = 1e-3
+
+
+def plan(
+    machine: Annotated[str, typer.Argument(help="Machine: shipped name or machine file.")],
+    identify: Annotated[
+        list[str],
+        typer.Option(
+            "--identify", help="Effect whose numbers are to be identified, at the value given; repeatable."
+        ),
+    ],
+    output: Annotated[Path | None, written(help="CSV file of the rows chosen.")] = None,
+    rival: Annotated[
+        list[str] | None, typer.Option("--rival", help="Explanation to separate from; repeatable.")
+    ] = None,
+    for_map: Annotated[
+        bool, typer.Option("--map", help="Make the map at the workpiece certain instead of the numbers.")
+    ] = False,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(help="Point of the workpiece, mm, as 100,0,50; repeatable (with --map)."),
+    ] = None,
+    rows: Annotated[int, typer.Option(help="Rows to measure.")] = 12,
+    quantity: Annotated[str, typer.Option(help="deflection or position.")] = "deflection",
+    poses: Annotated[int, typer.Option(help="Candidate poses, at random in the workspace.")] = 60,
+    force: Annotated[float, typer.Option(help="Size of the forces, N.")] = 400.0,
+    read: Annotated[str, typer.Option(help="Axes read, of dx,dy,dz,rx,ry,rz.")] = "dx,dy,dz",
+    noise: Annotated[float | None, typer.Option(help="One standard deviation of a reading, mm.")] = None,
+    frame: Annotated[str, typer.Option(help="Instrument's frame: known, offset_unknown, unknown.")] = "known",
+    tool: Annotated[str, typer.Option(help="Point on the tool: known or offset_unknown.")] = "known",
+    until: Annotated[
+        float | None,
+        typer.Option(
+            help="On a twin: go on in batches of --rows until every u is this share of a typical size."
+        ),
+    ] = None,
+    twin: Annotated[
+        list[str] | None, typer.Option("--twin", help="What the twin really has; default: --identify.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of candidates and of the twin's noise.")] = 0,
+    as_json: JsonOption = False,
+) -> None:
+    """Which poses, loads and readings are most informative, before the instrument is booked.
+
+    Identifies numbers (D-optimal), separates two explanations (--rival, T-optimal) or makes a map certain (--map).
+    Rows are within reach and within the drives' range; the same number of random rows is shown for comparison.
+
+    Examples:
+
+      [cyan]stiffmap plan orthoglide-revised --identify 'compliance actuator x scale=1' --rows 8 -o plan.csv[/cyan]
+
+      [cyan]stiffmap plan ur10 --identify 'zero_offset elbow error=1mrad' --quantity position --frame unknown[/cyan]
+
+      [cyan]stiffmap plan orthoglide-revised --identify 'dead_zone actuator y half_width=10um' --rival 'compliance actuator y scale=1.2'[/cyan]
+
+      [cyan]stiffmap plan orthoglide-revised --identify 'compliance actuator scale=1' --until 0.05 --twin 'compliance actuator scale=1.4'[/cyan]
+    """
+    m = load_machine(machine)
+    terms = [placed(m, text) for text in identify]
+    if rival and for_map:
+        raise StiffmapError("--map and --rival exclude each other")
+    aim = "separate" if rival else "map" if for_map else "identify"
+    options: dict[str, Any] = {
+        "quantity": quantity, "poses": poses, "force": force, "axes": tuple(read.split(",")), "frame": frame,
+        "tool": tool, "noise": None if noise is None else MM * noise, "seed": seed,
+    }  # fmt: skip
+    if until is not None:
+        _sequential(m, terms, twin, until, rows, options, as_json)
+        return
+    workpiece = np.array([MM * numbers(t, "at", 3) for t in at]) if at else None
+    found = design(
+        m, terms, rows=rows, aim=aim, rival=[placed(m, t) for t in rival or []], at=workpiece, **options
+    )
+    if output is not None:
+        _write(found, output)
+    if as_json:
+        print_json(_plain(found))
+    else:
+        print("\n".join(_lines(found)))
+
+
+def _sequential(
+    m: Machine,
+    terms: list[AppliedEffect],
+    twin: list[str] | None,
+    until: float,
+    rows: int,
+    options: dict[str, Any],
+    as_json: bool,
+) -> None:
+    """Plan, simulate, fit, again; prints each step."""
+    truth = [placed(m, t) for t in twin] if twin else terms
+    seeds = itertools.count(options["seed"])
+    steps = follow(
+        m, terms, lambda e: simulate(m, e, truth, seed=next(seeds)), until=until, batch=rows, **options
+    )
+    last = steps[-1][1]
+    scale = np.array([p.scale for _, p in fitted(m.description, tuple(terms))])
+    met = bool((last.sigma * last.misfit / scale).max() <= until)
+    if as_json:
+        print_json(plain({"met": met, "steps": [{"rows": n, "parameters": _numbers(e)} for n, e in steps]}))
+        return
+    for count, e in steps:
+        each = zip(e.names, e.values, e.sigma * e.misfit, e.units, strict=True)
+        print(f"{count} rows: " + ", ".join(f"{n} {with_uncertainty(v, u)} {s}" for n, v, u, s in each))
+    print(f"stopped: every u is at most {until:g} of a typical size" if met else "stopped: rows used up")
+
+
+def _numbers(e: Estimate) -> list[dict[str, object]]:
+    """Values and uncertainties of a step, SI."""
+    each = zip(e.names, e.units, e.values, e.sigma * e.misfit, strict=True)
+    return [{"name": n, "unit": s, "value": v, "u": u} for n, s, v, u in each]
+
+
+def _write(found: Design, path: Path) -> None:
+    columns = plan_columns(found.experiment)
+    write_rows(path, list(columns), zip(*columns.values(), strict=True))
+
+
+def _plain(d: Design) -> dict[str, object]:
+    out: dict[str, object] = plain(
+        {
+            "aim": d.aim,
+            "rows": len(d.experiment),
+            "parameters": [
+                {"name": n, "unit": u, "u": s, "u_random": r}
+                for n, u, s, r in zip(d.names, d.units, d.sigma, d.random_sigma, strict=True)
+            ],
+            "value": d.value,
+            "value_random": d.random_value,
+        }
+    )
+    return out
+
+
+def _lines(d: Design) -> list[str]:
+    out = [f"{len(d.experiment)} rows chosen; for comparison the median of 20 random plans of the same size"]
+    if d.aim == "separate":
+        out.append(f"  the rivals differ by {d.value:.1f} standard deviations (random {d.random_value:.1f})")
+        return out
+    for n, u, s, r in zip(d.names, d.units, d.sigma, d.random_sigma, strict=True):
+        out.append(f"  {n}: u = {s:.3g} {u} (random {r:.3g})")
+    if d.aim == "map":
+        out.append(f"  map: u = {1e3 * d.value:.3g} mm rms (random {1e3 * d.random_value:.3g})")
+    return out

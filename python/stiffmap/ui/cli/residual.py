@@ -1,0 +1,153 @@
+"""``stiffmap residual``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from scipy.spatial.transform import Rotation
+
+from stiffmap.common.outputs import make_folder, write_picture, write_text
+from stiffmap.common.plain import plain
+from stiffmap.experiment import Experiment, Residual, load_experiment
+from stiffmap.experiment import residual as compute
+from stiffmap.experiment.calls import placed
+from stiffmap.experiment.channels import Channel
+from stiffmap.identification.calibration.validity import beyond
+from stiffmap.solve.machine import load_machine
+from stiffmap.ui.cli.inputs import EffectsOption, FolderOption, ThreadsOption
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+
+def residual(
+    machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
+    data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
+    rows: Annotated[int, typer.Option(help="Number of worst rows to print.")] = 5,
+    effect: EffectsOption = None,
+    output: FolderOption = None,
+    threads: ThreadsOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Prediction for every reading: rms, per axis, worst rows, noise floor, lack of fit, model-free checks.
+
+    With -o: residual.csv (mm, rad), residual.json (SI) and pictures. Exit codes: 0 the readings are as
+    predicted, 1 they are not (p-value below 1e-3), 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap residual orthoglide-revised experiments/servo[/cyan]
+
+      [cyan]stiffmap residual orthoglide-revised experiments/servo --rows 20 -o result[/cyan]
+
+      [cyan]stiffmap residual orthoglide-revised experiments/servo --effect 'compliance actuator z scale=2.1'[/cyan]
+    """
+    declared = load_machine(machine)
+    terms = [placed(declared, text) for text in effect or []]
+    result = compute(declared, load_experiment(data), terms, threads=threads)
+    if output is not None:
+        _write(result, rows, output)
+    far = beyond(declared, result.experiment)
+    if as_json:
+        print_json(
+            as_plain(result, rows) | ({} if far is None else {"rows_beyond_calibration": int(far.sum())})
+        )
+    else:
+        told = (
+            []
+            if far is None
+            else [f"  beyond what the machine was calibrated by: {int(far.sum())} of {len(far)} rows"]
+        )
+        print("\n".join([*lines(result, rows), *told]))
+    if result.lack_of_fit < 1e-3:
+        raise typer.Exit(1)
+
+
+def _write(r: Residual, rows: int, output: Path) -> None:
+    import json
+
+    from stiffmap.experiment.comparison.table import write_table
+    from stiffmap.ui.pictures.experiment import figures
+
+    place = make_folder(output)
+    write_table(r, place / "residual.csv")
+    write_text(place / "residual.json", json.dumps(as_plain(r, rows), indent=2))
+    for name, figure in figures(r).items():
+        write_picture(place / f"{name}.png", figure, dpi=130)
+
+
+def as_plain(r: Residual, rows: int) -> dict[str, Any]:
+    """JSON data, SI."""
+    e = r.experiment
+    out = {
+        "experiment": e.name,
+        "quantity": e.quantity,
+        "units": "SI (m, rad), base axes",
+        "summary": vars(r.summary),
+        "noise_floor": {
+            c.name: f for c, f in zip(e.channels, r.noise.floor, strict=True) if c.name in e.axes
+        },
+        "limitations": r.limitations,
+        "lack_of_fit": r.lack_of_fit,
+        "nuisances": r.nuisances,
+        "poses_off": r.groups_off,
+        "set_aside": [e.ids[i] for i in r.set_aside.nonzero()[0]],
+        "worst": [{"id": i, "channel": c, "residual": v} for i, c, v in r.worst(rows)],
+        "checks": [vars(c) for c in r.checks],
+    }
+    found: dict[str, Any] = plain(out)
+    return found
+
+
+def lines(r: Residual, rows: int) -> list[str]:
+    """The residual in words."""
+    s, e = r.summary, r.experiment
+    units = {c.name: c for c in e.channels}
+    aside = [e.ids[i] for i in r.set_aside.nonzero()[0]]
+    out = [f"{e.name}: {s.n} readings of {e.quantity} in {len(e)} rows; reading minus prediction"]
+    if np.isfinite(s.rms):
+        out.append(f"  all lengths: rms {_mm(s.rms)}, 95 % {_mm(s.p95)}, largest {_mm(s.max)}")
+    if s.rotation_rms is not None:
+        out.append(f"  all angles: rms {1e3 * s.rotation_rms:.4f} mrad")
+    out += [f"  found: {line}" for line in _registered(e)]
+    out += [
+        f"  {a}: rms {_shown(units[a], v)}, noise floor {_shown(units[a], _floor(r, a))}"
+        for a, v in s.per_axis.items()
+    ]
+    out.append(f"  rms / noise floor {s.ratio:.2f}; p-value of this residual {_p_value(r.lack_of_fit)}")
+    out += [f"  unknown frames and zeros fitted: {r.nuisances}"] if r.nuisances else []
+    out.append(f"  poses beyond noise: {r.groups_off} of {int(e.groups.max()) + 1}")
+    out.append(f"  outliers (rows): {', '.join(aside) or 'none'}")
+    for c in r.checks:
+        told = f"rms/noise {c.rms:.2f}, p = {_p_value(c.p)}" if c.contrasts else c.note
+        out.append(f"  {c.name} ({c.meaning}): {told}")
+    worst = [f"{i} ({a} {_shown(units[a], v)})" for i, a, v in r.worst(rows)]
+    out.append(f"  worst rows: {', '.join(worst) or 'none'}")
+    return out + [f"  limit: {text}" for text in r.limitations]
+
+
+def _registered(e: Experiment) -> list[str]:
+    """Where instruments stand and targets sit, in words."""
+    out = []
+    for name, turn, shift in e.registration:
+        angles = np.degrees(Rotation.from_matrix(turn).as_rotvec())
+        at = ", ".join(f"{1e3 * v:.3f}" for v in shift)
+        out.append(f"{name} at ({at}) mm, rotation vector ({', '.join(f'{a:.4f}' for a in angles)}) deg")
+    return out
+
+
+def _p_value(p: float) -> str:
+    return f"{p:.2g}" if p > 1e-99 else "below 1e-99"
+
+
+def _floor(r: Residual, name: str) -> float:
+    return float(r.noise.floor[[c.name for c in r.experiment.channels].index(name)])
+
+
+def _shown(channel: Channel, value: float) -> str:
+    return _mm(value) if channel.unit == "m" else f"{1e3 * value:.4f} mrad"
+
+
+def _mm(value: float) -> str:
+    return f"{1e3 * value:.4f} mm"

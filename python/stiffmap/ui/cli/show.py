@@ -1,0 +1,212 @@
+"""``stiffmap show``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.tree import Tree
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.outputs.option import written
+from stiffmap.common.plain import plain
+from stiffmap.model.description import Block, Body, Element, Joint, Offset, Point, Spring
+from stiffmap.model.effects import effect_text
+from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.mobility import Mobility, mobility
+from stiffmap.solve.status import Status
+from stiffmap.ui.cli.inputs import (
+    EffectsOption,
+    MachineArgument,
+    RotationOption,
+    machine_with,
+    numbers,
+    position,
+    rotation,
+)
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+
+def show(
+    machine: MachineArgument,
+    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    turned: RotationOption = None,
+    output: Annotated[Path | None, written(help="Picture to write. [default: MACHINE.png]")] = None,
+    effect: EffectsOption = None,
+    load: Annotated[
+        str | None,
+        typer.Option(help="Force on the tool in N, e.g. 300,0,0: draw the machine deformed by it."),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        written("--page", help="With --load: also write a page (HTML) in which the machine turns."),
+    ] = None,
+    view: Annotated[
+        str | None,
+        typer.Option(help="Elevation and azimuth of the view, deg. [default: 22,35; flat: from above]"),
+    ] = None,
+    picture: Annotated[bool, typer.Option(help="Draw the machine.")] = True,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw a machine in 3-D at a pose and print what it is made of.
+
+    Elements from base to platform, as built with its effects; the effects; degrees of freedom, over-constraint (closure equations that follow
+    from the others) and free spins, counted at the pose.
+
+    With --load: the shape without load (dashed), under it (enlarged), and the share of each spring and drive
+    in the deflection of the tool.
+
+    Examples:
+
+      [cyan]stiffmap show orthoglide-revised[/cyan]
+
+      [cyan]stiffmap show tripteron --at 300,400,500 -o tripteron.png --view 15,-60[/cyan]
+
+      [cyan]stiffmap show orthoglide-revised --at -200,-200,-200 --load 300,0,0 --page loaded.html[/cyan]
+    """
+    m = machine_with(machine, effect)
+    p, r = position(at, m), rotation(turned)
+    k = inverse_kinematics(m, p, r)
+    if int(k.status) != Status.CONVERGED:
+        raise StiffmapError(f"{m.name} cannot take this pose: {Status(int(k.status)).name.lower()}")
+    counts = mobility(m, k.coordinates)
+    wrench = None if load is None else np.r_[numbers(load, "load", 3), np.zeros(3)]
+    file = _draw(m, p, r, output or Path(f"{m.name}.png"), view, wrench) if picture else None
+    if page is not None:
+        from stiffmap.ui.report.page import write_page
+
+        if wrench is None:
+            raise StiffmapError("--page: needs --load, the force under which the machine is drawn")
+        write_page(m, page, p, wrench, rotation=r)
+    if wrench is not None:
+        _show_load(m, p, r, wrench, file, page, as_json)
+    elif as_json:
+        print_json(as_plain(m, counts, file))
+    else:
+        show_text(Console(highlight=False, soft_wrap=True), m, counts, file)
+
+
+def _draw(m: Machine, p: Any, r: Any, path: Path, view: str | None, wrench: Any) -> Path:
+    from stiffmap.ui.plot import loaded_figure, machine_figure, save
+
+    angles = None if view is None else numbers(view, "view", 2)
+    looks = None if angles is None else (float(angles[0]), float(angles[1]))
+    if wrench is not None:
+        return save(loaded_figure(m, p, wrench, rotation=r, view=looks), path)
+    return save(machine_figure(m, p, rotation=r, view=looks), path)
+
+
+def _show_load(
+    m: Machine, p: Any, r: Any, wrench: Any, file: Path | None, page: Path | None, as_json: bool
+) -> None:
+    """The budget of the deflection, and the files written."""
+    from stiffmap.solve.budget import deflection_budget
+
+    budget = deflection_budget(m, p, wrench, rotation=r)
+    files = [str(f) for f in (file, page) if f is not None]
+    if as_json:
+        shares = {n: {"share": s, "displacement": c} for n, c, s in budget.ranked()}
+        found = {"machine": m.name, "wrench": wrench, "displacement": budget.displacement, "elements": shares}
+        print_json(plain(found | {"second_order": budget.rest_share, "files": files}))
+        return
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(escape(str(budget)))
+    if files:
+        console.print(f"wrote {escape(', '.join(files))}")
+
+
+def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:
+    """JSON data."""
+    return plain(
+        {
+            "machine": m.name,
+            "legs": {leg.name: [describe(e) for e in leg.elements] for leg in m.description.legs},
+            "base": [describe(e) for e in m.description.base],
+            "platform": [describe(e) for e in m.description.platform],
+            "effects": [effect_text(r, m.description) for r in m.description.effects],
+            "actuators": list(m.actuators),
+            "points": list(m.points),
+            "degrees_of_freedom": counts.total,
+            "platform_freedom": counts.platform,
+            "internal_freedom": counts.internal,
+            "over_constraint": counts.overconstraint,
+            "closure_equations": counts.equations,
+            "joint_coordinates": counts.joints,
+            "free_spins": list(m.free_spins),
+            "picture": None if file is None else str(file),
+        }
+    )
+
+
+def show_text(console: Console, m: Machine, counts: Mobility, file: Path | None) -> None:
+    """For the terminal."""
+    d = m.description
+    tree = Tree(f"[bold]{m.name}[/bold]  {escape(d.title)}")
+    for name, elements in _sequences(m):
+        branch = tree.add(name)
+        for e in elements:
+            _grow(branch, e)
+    console.print(tree)
+    for r in d.effects:
+        console.print(f"effect: {escape(effect_text(r, d))}")
+    console.print(f"platform: {counts.platform} degrees of freedom, {len(m.actuators)} actuators")
+    console.print(
+        f"mechanism: {counts.joints} joint coordinates, {counts.equations} closure equations of rank "
+        f"{counts.independent}: {counts.total} degrees of freedom, {counts.internal} of them internal"
+    )
+    console.print(f"over-constraint: {counts.overconstraint}")
+    console.print(f"free spins: {', '.join(m.free_spins) or 'none'}")
+    if file is not None:
+        console.print(f"wrote {escape(str(file))}")
+
+
+def _sequences(m: Machine) -> Iterator[tuple[str, tuple[Element, ...]]]:
+    d = m.description
+    yield from ((n, e) for n, e in (("base", d.base),) if e)
+    yield from ((f"leg {leg.name}", leg.elements) for leg in d.legs)
+    yield from ((n, e) for n, e in (("platform", d.platform),) if e)
+
+
+def _grow(tree: Tree, e: Element) -> None:
+    node = tree.add(escape(describe(e)))
+    for branch in e.branches if isinstance(e, Block) else ():
+        inner = node.add(f"branch {branch.name}")
+        for part in branch.elements:
+            _grow(inner, part)
+
+
+def describe(e: Element) -> str:
+    """An element in a few words, mm and kg."""
+    match e:
+        case Offset():
+            return f"{e.name}: offset ({', '.join(f'{1e3 * v:g}' for v in e.nominal.translation)}) mm"
+        case Joint():
+            return f"{e.name}: {_joint(e)}"
+        case Spring():
+            varies = f", varies with {e.stroke.joint}" if e.stroke else ""
+            return f"{e.name}: link spring, by {'compliance' if e.compliance is not None else 'stiffness'}{varies}"
+        case Body():
+            return f"{e.name}: body of {e.mass:g} kg"
+        case Point():
+            return f"{e.name}: point"
+        case Block():
+            return f"{e.name}: parallel block of {len(e.branches)} branches"
+
+
+def _joint(e: Joint) -> str:
+    if not e.actuated:
+        return f"passive {e.kind} joint" + ("" if e.free else " with a spring")
+    if e.law is None:
+        return f"{e.kind} actuator, rigid"
+    unit, scale = ("mm/N", 1e3) if e.kind == "prismatic" else ("rad/(N m)", 1.0)
+    return (
+        f"{e.kind} actuator, {scale / e.law.stiffness:.3g} {unit}"
+        if e.law.stiffness
+        else f"{e.kind} actuator"
+    )

@@ -1,0 +1,174 @@
+"""``stiffmap solve``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.outputs.option import written
+from stiffmap.common.plain import plain
+from stiffmap.solve.free_motions import free_motions
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.solution import Solution
+from stiffmap.solve.status import Flag, Status
+from stiffmap.ui.cli.inputs import (
+    MM,
+    EffectsOption,
+    ForceOption,
+    GravityOption,
+    MachineArgument,
+    MethodOption,
+    RotationOption,
+    finish,
+    force_given,
+    gravity,
+    machine_with,
+    numbers,
+    position,
+    rotation,
+)
+from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.solve_table import force_vector, is_file_name, solve_table
+from stiffmap.ui.cli.statuses import MEANINGS
+
+SCALE = np.array([1e3] * 3 + [1.0] * 3)
+"""m to mm, rad stays: a compliance then is in mm/N, rad/N, mm/(N mm), rad/(N mm)."""
+
+
+def solve(
+    machine: MachineArgument,
+    at: Annotated[
+        str | None,
+        typer.Option(help="Commanded TCP in mm, e.g. 0,0,300, or a CSV file of poses. [default: home]"),
+    ] = None,
+    output: Annotated[Path | None, written(help="With a file of poses: CSV of the answers.")] = None,
+    force: ForceOption = "0,0,0",
+    moment: Annotated[str, typer.Option(help="Moment about the point in N mm, base axes.")] = "0,0,0",
+    turned: RotationOption = None,
+    point: Annotated[str, typer.Option(help="Named point where the wrench acts.")] = "tcp",
+    effect: EffectsOption = None,
+    gravity_: GravityOption = None,
+    method: MethodOption = "fast",
+    as_json: JsonOption = False,
+) -> None:
+    """Deflection and compliance at one pose under one wrench.
+
+    A force that is given by its size alone acts in the direction in space that pushes the tool furthest.
+
+    A file of poses has columns such as x [mm], y [mm], z [mm], rx [deg] …, fx [N] …, mx [N*m] …, one pose a row; --force acts
+    where it has no load.
+
+    Exit codes: 0 converged, 1 any other status, 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap solve orthoglide-revised --at -200,-200,-200 --force 300,0,0[/cyan]
+
+      [cyan]stiffmap solve orthoglide-revised --at -200 -200 -200 --force 300[/cyan]
+
+      [cyan]stiffmap solve tripteron --at 300,400,500 --force 0,0,100 --json[/cyan]
+
+      [cyan]stiffmap solve orthoglide-revised --force 0,0,-50 --moment 0,2000,0 --gravity 0,0,-9.81[/cyan]
+
+      [cyan]stiffmap solve orthoglide-revised --at poses.csv --force 0,0,-100 -o answers.csv[/cyan]
+    """
+    m = machine_with(machine, effect)
+    how: dict[str, Any] = {
+        "rotation": rotation(turned),
+        "point": point,
+        "gravity": gravity(gravity_),
+        "method": method,
+    }
+    if at is not None and (is_file_name(at)):
+        load = np.r_[force_vector(force), MM * numbers(moment, "moment", 3)]
+        finish(not solve_table(m, Path(at), load, how, output, as_json))
+        return
+    if output is not None:
+        raise StiffmapError("--output: only with a file of poses (--at poses.csv)")
+    size, vector = force_given(force)
+    if vector is None:
+        from stiffmap.solve.worst_force import worst_force
+
+        acting = worst_force(m, position(at, m), size, **how)
+    else:
+        acting = vector
+    load = np.r_[acting, MM * numbers(moment, "moment", 3)]
+    s = m.solve(position(at, m), load, **how)
+    if as_json:
+        print_json(as_plain(m.name, s, load) | {"reason": reason(m, s, position(at, m), how["rotation"])})
+    else:
+        console = Console(highlight=False)
+        if vector is None:
+            told = ", ".join(f"{v:.1f}" for v in acting)
+            console.print(f"{size:g} N in the direction that pushes furthest: force ({told}) N")
+        show(console, s)
+        if why := reason(m, s, position(at, m), how["rotation"]):
+            console.print(f"reason: {why}", soft_wrap=True)
+        if int(s.status) == Status.SINGULAR and (ways := free_motions(m, s.free_twists)):
+            console.print(f"free: the platform can {'; '.join(ways)}", soft_wrap=True)
+    finish(int(s.status) != Status.CONVERGED)
+
+
+def as_plain(name: str, s: Solution, load: Any) -> Any:
+    """A solution as JSON data (SI)."""
+    return plain(
+        {
+            "machine": name,
+            "point": s.point,
+            "wrench": load,
+            "status": Status(int(s.status)).name,
+            "flags": [f.name for f in Flag(int(s.flags))],
+            "displacement": s.displacement,
+            "stiffness": s.stiffness,
+            "compliance": s.compliance,
+            "actuator_effort": dict(zip(s.actuators, s.actuator_effort.tolist(), strict=True)),
+            "leg_wrench": dict(zip(s.legs, s.leg_wrench.tolist(), strict=True)),
+            "joint_coordinates": s.joint_coordinates,
+            "spring_deflection": s.spring_deflection,
+            "indeterminate": list(s.indeterminate),
+        }
+    )
+
+
+def show(console: Console, s: Solution) -> None:
+    """For the terminal: mm, deg, N."""
+    flags = ", ".join(str(f.name) for f in Flag(int(s.flags)))
+    console.print(f"status {Status(int(s.status)).name.lower()}" + (f"; flags {flags}" if flags else ""))
+    d = s.displacement
+    if np.isfinite(d).all():
+        shift = ", ".join(f"{v:.6f}" for v in 1e3 * d[:3])
+        console.print(f"displacement of {s.point}: ({shift}) mm, norm {1e3 * np.linalg.norm(d[:3]):.6f} mm")
+        console.print(f"rotation: ({', '.join(f'{v:.6f}' for v in np.rad2deg(d[3:]))}) deg")
+    for name, effort in zip(s.actuators, s.actuator_effort, strict=True):
+        if np.isfinite(effort):
+            console.print(f"drive {name}: {effort:.4f} (N, or N m for a revolute one)")
+    if np.isfinite(s.compliance).any():
+        scaled = s.compliance * np.outer(SCALE, SCALE) / 1e3
+        console.print(_matrix("loaded compliance: mm and rad per N and N mm", scaled))
+
+
+def reason(m: Machine, s: Solution, at: Any, turned: Any) -> str | None:
+    """Why a pose has no answer, in words; None where it has one."""
+    if int(s.status) == Status.CONVERGED:
+        return None
+    if int(s.status) != Status.UNREACHABLE:
+        return MEANINGS[Status(int(s.status)).name]
+    from stiffmap.solve.unreachable import why_unreachable
+
+    return why_unreachable(m, m.description.home.p if at is None else at, turned)
+
+
+def _matrix(title: str, values: Any) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, title=title, padding=0, pad_edge=False, collapse_padding=True)
+    for head in ("", "fx", "fy", "fz", "mx", "my", "mz"):
+        table.add_column(head, justify="right")
+    for name, row in zip(("dx", "dy", "dz", "rx", "ry", "rz"), values, strict=True):
+        table.add_row(name, *(f"{v:11.3e}" for v in row))
+    return table

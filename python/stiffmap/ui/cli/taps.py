@@ -1,0 +1,129 @@
+"""``stiffmap taps``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.outputs import make_folder
+from stiffmap.common.plain import plain
+from stiffmap.ui.cli.inputs import EffectsOption, FolderOption, MachineArgument, finish, machine_with
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+if TYPE_CHECKING:
+    from stiffmap.identification.taps import TapDiagnosis, TapTest
+
+
+def taps(
+    machine: MachineArgument,
+    table: Annotated[
+        Path,
+        typer.Argument(
+            help="CSV: x_mm, y_mm, z_mm, frequency_Hz; u_Hz, damping_percent, dir_x, dir_y, dir_z."
+        ),
+    ],
+    statics: Annotated[
+        Path | None, typer.Option(help="Experiment folder of the same machine, explained together.")
+    ] = None,
+    only: Annotated[str | None, typer.Option(help="Kinds of effects to try, separated by commas.")] = None,
+    mass_u: Annotated[float, typer.Option(help="Standard uncertainty of masses that declare none, %.")] = 5.0,
+    effect: EffectsOption = None,
+    output: FolderOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Which effect explains the natural frequencies that tap tests found.
+
+    Modes are paired by the direction in which the tool moves and by frequency. With -o: the corrected machine
+    (corrected.yaml), a table and a picture of the frequency response before and after.
+
+    Exit codes: 0 nothing is missing, 1 an effect was named or the readings do not fit, 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv -o result[/cyan]
+
+      [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance --json[/cyan]
+    """
+    from stiffmap.experiment import load_experiment
+    from stiffmap.identification.taps import explain_taps, load_taps
+
+    if not 0 < mass_u < 100:
+        raise StiffmapError(f"--mass-u: expected an uncertainty above 0 and below 100 %, got {mass_u:g}")
+    m = machine_with(machine, effect)
+    measured = load_taps(table)
+    found = explain_taps(
+        m, measured, None if statics is None else load_experiment(statics), default_u=mass_u / 100,
+        only=None if only is None else [k.strip() for k in only.split(",")],
+    )  # fmt: skip
+    rows = compared(m, measured, found)
+    files = write(m, measured, found, make_folder(output)) if output else []
+    if as_json:
+        print_json(plain({"machine": m.name, **as_plain(found), "modes": rows, "files": files}))
+    else:
+        print(found.sentence)
+        for r in rows:
+            after = "" if r["after_Hz"] is None else f", after {r['after_Hz']:.2f}"
+            mac = "" if r["mac"] is None or np.isnan(r["mac"]) else f", MAC {r['mac']:.2f}"
+            print(f"  {r['measured_Hz']:8.2f} Hz measured, {r['before_Hz']:8.2f} before{after}{mac}")
+        for f in files:
+            print(f"wrote {f}")
+    finish(bool(found.alike) or not found.sentence.startswith("Nothing"))
+
+
+def as_plain(found: TapDiagnosis) -> dict[str, Any]:
+    """Data of an answer."""
+    return {
+        "sentence": found.sentence, "chi2_before": found.before, "readings": found.readings,
+        "named": None if found.named is None else found.named.candidate,
+        "candidates": [
+            {
+                "candidate": e.candidate, "parameters": e.parameters, "u": e.u, "chi2": e.chi2, "statics": e.statics,
+                "taps": e.taps, "disagreement": e.disagreement,
+            }
+            for e in found.alike
+        ],
+    }  # fmt: skip
+
+
+def compared(machine: Any, measured: TapTest, found: TapDiagnosis) -> list[dict[str, Any]]:
+    """A row per mode: measured, before and after."""
+    from stiffmap.identification.taps import predict_taps
+
+    before = predict_taps(machine, measured)
+    real = found.alike[0].machine if found.alike else None
+    after = None if real is None else predict_taps(real, measured)
+    return [
+        {
+            "at_mm": (1e3 * measured.position[i]).tolist(), "measured_Hz": float(measured.frequency[i]),
+            "before_Hz": float(before.frequency[i]), "after_Hz": None if after is None else float(after.frequency[i]),
+            "mac": float(before.mac[i] if after is None else after.mac[i]),
+        }
+        for i in range(len(measured))
+    ]  # fmt: skip
+
+
+def write(machine: Any, measured: TapTest, found: TapDiagnosis, folder: Path) -> list[str]:
+    """Corrected machine and responses before and after."""
+    from stiffmap.ui.plot.style import save
+    from stiffmap.ui.plot.vibration import response_figure
+    from stiffmap.workspace.vibration import frequency_response
+
+    f = np.geomspace(0.3 * measured.frequency.min(), 2 * measured.frequency.max(), 600)
+    at = measured.position[0]
+    many = {"before": frequency_response(machine, at, f)}
+    out = []
+    real = found.named.machine if found.named else None
+    if real is not None:
+        many["after"] = frequency_response(real, at, f)
+        p = found.named.place.term(list(found.named.parameters.values()))  # type: ignore[union-attr]
+        if found.named.place.kind != "payload":  # type: ignore[union-attr]
+            given = dict(p.parameters)
+            saved = machine.with_effect(p.kind, element=p.element, legs=list(p.legs) or None, **given)
+            saved.save(folder / "corrected.yaml")
+            out.append(str(folder / "corrected.yaml"))
+    save(response_figure(many), folder / "response.png")
+    return [*out, str(folder / "response.png")]

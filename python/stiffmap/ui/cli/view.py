@@ -1,0 +1,193 @@
+"""``stiffmap view``."""
+
+from __future__ import annotations
+
+import webbrowser
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import number_in
+from stiffmap.common.outputs.option import written
+from stiffmap.ui.cli.inputs import MM, EffectsOption, GravityOption, MachineArgument, machine_with, numbers
+from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.view.quantities import QUANTITIES
+
+LOCAL = "127.0.0.1"
+
+
+def view(
+    machine: MachineArgument,
+    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    rotation: Annotated[
+        str | None,
+        typer.Option(help="Commanded orientation, rotation vector in deg, base axes, e.g. 0,0,30."),
+    ] = None,
+    force: Annotated[str, typer.Option(help="Force on the tool in N.")] = "0,0,-300",
+    moment: Annotated[str, typer.Option(help="Moment on the tool in N·m.")] = "0,0,0",
+    gravity: GravityOption = None,
+    effect: EffectsOption = None,
+    plane: Annotated[
+        str | None,
+        typer.Option(help="Axis across which the plane lies (x, y, z), or the normal of a free one."),
+    ] = None,
+    quantity: Annotated[
+        str, typer.Option(help=f"What the colours show: {', '.join(QUANTITIES)}.")
+    ] = "deflection",
+    tolerance: Annotated[float, typer.Option(help="Tolerated deflection, mm.")] = 0.25,
+    frequency: Annotated[float, typer.Option(help="Of the dynamic stiffness, Hz.")] = 0.0,
+    magnify: Annotated[
+        float | None, typer.Option(help="Magnification of the deflected machine. [default: a round one]")
+    ] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="A number of the machine, ADDRESS=VALUE in SI, e.g. x.foot/beam.EIx=4000; repeatable.",
+        ),
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(help="All coordinates (m, rad) that name an assembly mode, as the view writes them."),
+    ] = None,
+    link: Annotated[
+        str | None, typer.Option(help="State of a link that the view gave; goes before the options.")
+    ] = None,
+    experiment: Annotated[
+        Path | None, typer.Option(help="Folder of an experiment: its rows and residuals.")
+    ] = None,
+    diagnosis: Annotated[
+        Path | None,
+        typer.Option(help="Folder of a diagnosis: what it named is lit on its element."),
+    ] = None,
+    path: Annotated[
+        str | None, typer.Option(help="Toolpath (G-code, CL, CSV, or an outline): wanted, cut, compensated.")
+    ] = None,
+    html: Annotated[Path | None, written("--html", help="Write the scene as one page and end.")] = None,
+    picture: Annotated[
+        Path | None, written("--picture", help="Write a picture (PNG, SVG, PDF) and end.")
+    ] = None,
+    port: Annotated[int | None, typer.Option(help="Port. [default: a free one from 8080 on]")] = None,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; beyond this computer a token is asked for.")
+    ] = LOCAL,
+    browser: Annotated[bool, typer.Option(help="Open the browser.")] = True,
+    as_json: JsonOption = False,
+) -> None:
+    """Look at a machine and its map live in a browser: drag the tool, turn the force, change a number.
+
+    Needs the extra [view] (pip install 'stiffmap[view]'). Serves on this computer only until it is interrupted
+    (Ctrl-C). A machine file is read again whenever it is edited.
+
+    With --html or --picture: writes the file and ends; the page opens without a network.
+
+    Examples:
+
+      [cyan]stiffmap view orthoglide-revised[/cyan]
+
+      [cyan]stiffmap view orthoglide-revised --at 280,280,280 --force 300,0,0 --quantity worst[/cyan]
+
+      [cyan]stiffmap view hexapod --plane x --html hexapod.html[/cyan]
+
+      [cyan]stiffmap view orthoglide-revised --experiment experiments/servo --diagnosis result[/cyan]
+
+      [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIx=4000 --no-browser --port 8090[/cyan]
+    """
+    from stiffmap.ui.view.optional import need_viser
+
+    need_viser()
+    model = _model(machine, effect, link, at=at, rotation=rotation, force=force, moment=moment, gravity=gravity,
+                   plane=plane, quantity=quantity, tolerance=tolerance, frequency=frequency, magnify=magnify,
+                   changes=changes, start=start)  # fmt: skip
+    from stiffmap.ui.view.open import data_of
+
+    data = data_of(model.declared, experiment, diagnosis, path)
+    if html is not None or picture is not None:
+        _write(model, data, html, picture, as_json)
+        return
+    _serve(model, data, host, port, browser, as_json)
+
+
+def _model(machine: str, effect: list[str] | None, link: str | None, **given: Any) -> Any:
+    from stiffmap.ui.view.model import Model
+    from stiffmap.ui.view.state import from_permalink
+
+    m = machine_with(machine, effect)
+    file = Path(machine) if Path(machine).is_file() and not effect else None
+    if link is not None:
+        name, state = from_permalink(link.rpartition("state=")[2])
+        if name not in (machine, m.name):
+            raise StiffmapError(f"--link: is of the machine {name}, not of {machine}")
+        return Model(m, state, file=file)
+    from stiffmap.ui.view import model_of
+
+    return model_of(m, **_state(given), file=file)
+
+
+def _state(g: dict[str, Any]) -> dict[str, Any]:
+    """Fields of the state (SI) from the texts of the options."""
+    out: dict[str, Any] = {
+        "force": tuple(numbers(g["force"], "force", 3)),
+        "moment": tuple(numbers(g["moment"], "moment", 3)),
+        "quantity": g["quantity"],
+        "tolerance": MM * g["tolerance"],
+        "frequency": g["frequency"],
+        "magnification": g["magnify"],
+    }
+    if g["at"] is not None:
+        out["position"] = tuple(MM * numbers(g["at"], "at", 3))
+    if g["rotation"] is not None:
+        out["rotation"] = tuple(np.deg2rad(numbers(g["rotation"], "rotation", 3)))
+    if g["gravity"] is not None:
+        out["gravity"] = tuple(numbers(g["gravity"], "gravity", 3))
+    if g["start"] is not None:
+        out["start"] = tuple(numbers(g["start"], "start"))
+    if g["plane"] in ("x", "y", "z"):
+        out["plane"] = g["plane"]
+    elif g["plane"] is not None:
+        out |= {"plane": "free", "normal": tuple(numbers(g["plane"], "plane", 3))}
+    if g["changes"]:
+        out["changes"] = dict(_change(text) for text in g["changes"])
+    return out
+
+
+def _change(text: str) -> tuple[str, float]:
+    address, equals, value = text.rpartition("=")
+    try:
+        if equals and address:
+            return address, number_in(value)
+    except ValueError:
+        pass
+    raise StiffmapError(f"--set: expected ADDRESS=VALUE, such as x.foot/beam.EIx=4000; got '{text}'")
+
+
+def _write(model: Any, data: Any, html: Path | None, picture: Path | None, as_json: bool) -> None:
+    from stiffmap.ui.view.page import write_page
+    from stiffmap.ui.view.picture import write_view_picture
+
+    files = [] if html is None else [write_page(model.moment, html, data)]
+    files += [] if picture is None else [write_view_picture(model.moment, picture)]
+    if as_json:
+        print_json({"machine": model.declared.name, "files": [str(f) for f in files]})
+    else:
+        Console(highlight=False).print(f"wrote {escape(', '.join(map(str, files)))}", soft_wrap=True)
+
+
+def _serve(model: Any, data: Any, host: str, port: int | None, browser: bool, as_json: bool) -> None:
+    from stiffmap.ui.view.open import View
+
+    opened = View(model, host, port, data)
+    if as_json:
+        print_json({"machine": model.declared.name, "url": opened.url})
+    else:
+        console = Console(highlight=False)
+        console.print(f"{escape(model.declared.name)}: {escape(opened.url)}", soft_wrap=True)
+        console.print("Ctrl-C ends it", soft_wrap=True)
+    if browser:
+        webbrowser.open(opened.url)
+    opened.wait()

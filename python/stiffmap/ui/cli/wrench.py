@@ -1,0 +1,85 @@
+"""``stiffmap wrench``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from stiffmap.common.plain import plain
+from stiffmap.solve.status import Flag, Status
+from stiffmap.ui.cli.inputs import (
+    MM,
+    EffectsOption,
+    GravityOption,
+    MachineArgument,
+    RotationOption,
+    finish,
+    gravity,
+    machine_with,
+    numbers,
+    position,
+    rotation,
+)
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+
+def wrench(
+    machine: MachineArgument,
+    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    by: Annotated[str, typer.Option(help="Imposed translation of the point in mm, base axes.")] = "0,0,0",
+    turn: Annotated[str, typer.Option(help="Imposed rotation vector in deg, base axes.")] = "0,0,0",
+    turned: RotationOption = None,
+    point: Annotated[str, typer.Option(help="Named point that is held.")] = "tcp",
+    effect: EffectsOption = None,
+    gravity_: GravityOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Wrench that holds a machine at a displacement from its commanded pose, whole and per leg.
+
+    Exit codes: 0 converged, 1 any other status, 2 bad input.
+
+    Examples:
+
+      [cyan]stiffmap wrench orthoglide-revised --at 0,0,200 --by 0.1,0,0[/cyan]
+
+      [cyan]stiffmap wrench hexapod --by 0,0,-0.2 --turn 0,0.01,0 --json[/cyan]
+    """
+    m = machine_with(machine, effect)
+    displacement = np.r_[MM * numbers(by, "by", 3), np.deg2rad(numbers(turn, "turn", 3))]
+    held = m.wrench(
+        position(at, m), displacement, rotation=rotation(turned), point=point, gravity=gravity(gravity_)
+    )
+    legs = dict(zip(held.legs, held.leg_wrench, strict=True))
+    if as_json:
+        print_json(
+            plain(
+                {
+                    "machine": m.name,
+                    "point": point,
+                    "displacement": displacement,
+                    "status": Status(int(held.status)).name,
+                    "status_without_clamp": Status(int(held.force_status)).name,
+                    "flags": [f.name for f in Flag(int(held.flags))],
+                    "wrench": held.wrench,
+                    "leg_wrench": legs,
+                    "stiffness": held.stiffness,
+                    "leg_stiffness": dict(zip(held.legs, held.leg_stiffness, strict=True)),
+                    "actuator_effort": dict(zip(held.actuators, held.actuator_effort, strict=True)),
+                }
+            )
+        )
+    else:
+        console = Console(highlight=False)
+        free = Status(int(held.force_status)).name.lower()
+        console.print(f"status {Status(int(held.status)).name.lower()}; without the clamp: {free}")
+        for name, w in {
+            "whole machine": held.wrench,
+            **{f"leg {n} on platform": w for n, w in legs.items()},
+        }.items():
+            force = ", ".join(f"{v:.4f}" for v in w[:3])
+            moment = ", ".join(f"{v:.4f}" for v in w[3:])
+            console.print(f"{name}: force ({force}) N, moment about {point} ({moment}) N m", soft_wrap=True)
+    finish(int(held.status) != Status.CONVERGED)

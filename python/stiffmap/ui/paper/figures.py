@@ -1,0 +1,62 @@
+"""Figures 5, 6 and 7 in the paper's arrangement."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from stiffmap.ui.paper.results import FORCE, TOLERANCE, Results
+from stiffmap.ui.plot.ellipses import draw_ellipse
+from stiffmap.ui.plot.error_maps import map_figure
+from stiffmap.ui.plot.polars import draw_polar, position_text
+from stiffmap.ui.plot.style import MM, headline, legend_below, new_figure, panel, paper_style, save
+from stiffmap.ui.plot.sweeps import sweep_figure
+
+
+def figure_5(results: Results) -> Figure:
+    """(a)-(d) size of the deflection against the force's direction; (e)-(h) ellipses of deflections."""
+    many = list(results.polars.values())
+    with paper_style():
+        figure = new_figure(10.4, 5.7)
+        for i, pol in enumerate(many):
+            top: Any = figure.add_subplot(2, 4, i + 1, projection="polar")
+            draw_polar(top, pol, "deflection_xy", TOLERANCE)
+            top.set_title(f"{panel(i)} {position_text(pol)}")
+            bottom = figure.add_subplot(2, 4, i + 5)
+            draw_ellipse(bottom, pol, "xy", TOLERANCE)
+            bottom.set_title(panel(i + 4), loc="left")
+        headline(figure, f"Figure 5. Deflection in the xy plane, mm, under a force of {FORCE:g} N")
+        legend_below(figure, bottom.get_legend_handles_labels()[0])
+    return figure
+
+
+def figure_6(results: Results) -> Figure:
+    """Force against deflection at the four points."""
+    figure = sweep_figure(list(results.sweeps.values()), tolerance=TOLERANCE)
+    headline(figure, "Figure 6. Deflection against force at the four points")
+    return figure
+
+
+def figure_7(results: Results, variable: str = "worst_deflection_xy", case: str | None = None) -> Figure:
+    """Error maps of the three planes."""
+    return map_figure(results.maps, variable, case=case, tolerance=TOLERANCE)
+
+
+def save_all(results: Results, folder: Path, dpi: int = 150) -> list[Path]:
+    """Write every figure as PNG; Figure 7 in four readings, since the paper does not state its force."""
+    worst = float(results.maps.worst_deflection_xy.max()) * MM
+    figures = {
+        "figure5": figure_5(results),
+        "figure6": figure_6(results),
+        "figure7-worst": figure_7(results),
+        "figure7-best": figure_7(results, "best_deflection_xy"),
+        "figure7-Fx": figure_7(results, "deflection_xy", "Fx"),
+        "figure7-Fy": figure_7(results, "deflection_xy", "Fy"),
+    }
+    headline(
+        figures["figure7-worst"],
+        f"Figure 7. {FORCE:g} N in the worst direction of the plane, up to {worst:.2f} mm",
+    )
+    return [save(figure, folder / f"{name}.png", dpi) for name, figure in figures.items()]

@@ -1,0 +1,77 @@
+"""Everything that the figures and the statements are made of, computed once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from stiffmap.solve.machine import Machine, load_machine
+from stiffmap.workspace.maps import error_map, polar, sweep
+
+POINTS = {
+    "isotropic": (0.0, 0.0, 0.0),
+    "near corner": (-0.2, -0.2, -0.2),
+    "far corner": (0.3, 0.3, 0.3),
+    "asymmetric": (-0.2, 0.3, 0.0),
+}
+"""The four work points of §5.3, m."""
+PLANES = (-0.2, 0.0, 0.3)
+"""z of the error maps, m."""
+FORCE = 300.0
+TOLERANCE = 0.25e-3
+LARGEST_FORCE = 1000.0
+FX, FY = [FORCE, 0.0, 0, 0, 0, 0], [0.0, FORCE, 0, 0, 0, 0]
+
+
+@dataclass(frozen=True)
+class Results:
+    """Polar diagrams, limits and sweeps at the four points, and the error maps."""
+
+    revised: Machine
+    original: Machine
+    polars: dict[str, xr.Dataset]
+    points: dict[str, xr.Dataset]
+    """Map of one pose each: limits, extremes, Fx and Fy."""
+    sweeps: dict[str, dict[str, xr.Dataset]]
+    """Point -> direction of the force -> sweep."""
+    maps: xr.Dataset
+
+
+def compute(count: int = 101, *, threads: int | None = None, progress: bool | None = None) -> Results:
+    """Results with error maps of count x count positions per plane."""
+    revised, original = load_machine("orthoglide-revised"), load_machine("orthoglide-original")
+    cases = {"Fx": FX, "Fy": FY}
+    x, y = (np.linspace(revised.workspace[0, i], revised.workspace[1, i], count) for i in (0, 1))
+    points = {
+        name: error_map(
+            revised,
+            x=p[0],
+            y=p[1],
+            z=p[2],
+            wrench=cases,
+            tolerance=TOLERANCE,
+            threads=threads,
+            progress=False,
+        )
+        for name, p in POINTS.items()
+    }
+    return Results(
+        revised=revised,
+        original=original,
+        polars={n: polar(revised, p, FORCE, threads=threads) for n, p in POINTS.items()},
+        points={n: d.squeeze(("z", "y", "x")) for n, d in points.items()},
+        sweeps={n: sweeps_at(revised, p, points[n]) for n, p in POINTS.items()},
+        maps=error_map(
+            revised, x=x, y=y, z=PLANES, wrench=cases, tolerance=TOLERANCE, threads=threads, progress=progress
+        ),
+    )
+
+
+def sweeps_at(machine: Machine, position: tuple[float, ...], at: xr.Dataset) -> dict[str, xr.Dataset]:
+    """Sweeps from 0 to 1000 N along x, y, and the weakest and strongest direction at 300 N."""
+    worst, best = at.worst_direction_xy.item(), at.best_direction_xy.item()
+    forces = np.linspace(0.0, LARGEST_FORCE, 41)
+    angles = {"Fx": 0.0, "Fy": np.pi / 2, "worst direction": worst, "best direction": best}
+    return {n: sweep(machine, position, [np.cos(a), np.sin(a), 0.0], forces) for n, a in angles.items()}

@@ -1,0 +1,1 @@
+"""Pictures of results: functions that return a matplotlib Figure."""

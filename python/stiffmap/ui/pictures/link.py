@@ -1,0 +1,136 @@
+"""A picture per link: deformed part, residual of the rigid fit, compliance with error bars. Plots in mm."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+from stiffmap.common.outputs import write_picture
+from stiffmap.model.link.arrays import Floats, Ints
+from stiffmap.model.link.pipeline import PartLink
+from stiffmap.model.link.report import unit_factor, unit_name
+from stiffmap.model.link.result import Link
+
+matplotlib.use("Agg", force=False)
+BLUE, GREY = "#0072B2", "#999999"
+MOST_TRIANGLES = 6000
+
+
+def draw_part_link(part: PartLink, path: str | Path) -> None:
+    """Write a PNG: a row of deformed shapes, a row of residual fields, the table with error bars."""
+    from matplotlib import pyplot as plt
+
+    cases = min(len(part.wrenches), 6)
+    figure = plt.figure(figsize=(17, 13), layout="constrained")
+    rows: Any = figure.subfigures(3, 1, height_ratios=(1.0, 0.9, 1.5))
+    shapes, residuals, table = rows
+    triangles = boundary_triangles(part.mesh.tets)
+    for k in range(cases):
+        _draw_shape(shapes.add_subplot(1, cases, k + 1, projection="3d"), part, triangles, k)
+    _draw_residuals(residuals, part.link, cases)
+    _draw_entries(table.add_subplot(), part.link, part.budget.standard_error())
+    _save(figure, path)
+
+
+def draw_link(link: Link, path: str | Path) -> None:
+    """Write a PNG of a link identified from a given field: residual fields and the table."""
+    from matplotlib import pyplot as plt
+
+    figure = plt.figure(figsize=(17, 9), layout="constrained")
+    rows: Any = figure.subfigures(2, 1, height_ratios=(0.9, 1.5))
+    residuals, table = rows
+    _draw_residuals(residuals, link, min(len(link.sigma), 6))
+    _draw_entries(table.add_subplot(), link, link.standard_error)
+    _save(figure, path)
+
+
+def boundary_triangles(tets: Ints) -> Ints:
+    """(triangles, 3) corner nodes of the faces that belong to one tetrahedron only."""
+    every = np.concatenate([tets[:, [0, 1, 2]], tets[:, [0, 1, 3]], tets[:, [0, 2, 3]], tets[:, [1, 2, 3]]])
+    _, first, count = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(every[first[count == 1]])
+
+
+def _draw_residuals(figure: Any, link: Link, cases: int) -> None:
+    """One panel per load case: residual vectors on the face, seen along its flattest direction."""
+    field, residual = link.evidence.field, link.residual
+    normal = int(np.argmin(np.ptp(field.points, axis=0)))
+    a, b = (i for i in range(3) if i != normal)
+    x, y = 1e3 * field.points[:, a], 1e3 * field.points[:, b]
+    for k in range(cases):
+        axes = figure.add_subplot(1, cases, k + 1)
+        size = 1e6 * np.linalg.norm(residual[k], axis=1)
+        dots = axes.scatter(x, y, c=size, s=12, cmap="cividis")
+        axes.quiver(x, y, residual[k, :, a], residual[k, :, b], angles="xy", width=0.005)
+        out = link.outliers[k]
+        axes.plot(x[out], y[out], "x", color="#D55E00", label="outlier")
+        figure.colorbar(dots, ax=axes, label="residual, µm", location="bottom")
+        axes.set(title=f"case {k + 1}", xlabel=f"{'xyz'[a]}, mm", aspect="equal")
+        if k == 0:
+            axes.set_ylabel(f"{'xyz'[b]}, mm")
+
+
+def _draw_shape(axes: Any, part: PartLink, triangles: Ints, case: int) -> None:
+    Poly3DCollection = import_module("mpl_toolkits.mplot3d.art3d").Poly3DCollection
+
+    step = max(1, len(triangles) // MOST_TRIANGLES)
+    p, u = part.mesh.nodes, part.displacements[case]
+    extent = np.ptp(p, axis=0).max()
+    scale = 0.15 * extent / max(float(np.abs(u).max()), 1e-300)
+    for nodes, colour, alpha in ((p, GREY, 0.25), (p + scale * u, BLUE, 0.8)):
+        axes.add_collection3d(
+            Poly3DCollection(1e3 * nodes[triangles[::step]], facecolor=colour, alpha=alpha, lw=0)
+        )
+    low, size = 1e3 * p.min(axis=0), np.maximum(1e3 * np.ptp(p, axis=0), 300 * extent)
+    middle = low + 1e3 * np.ptp(p, axis=0) / 2
+    for axis, centre, width in zip("xyz", middle, size, strict=True):
+        getattr(axes, f"set_{axis}lim")(centre - 0.55 * width, centre + 0.55 * width)
+        getattr(axes, f"set_{axis}label")(f"{axis}, mm", fontsize=7, labelpad=-3)
+    axes.set_box_aspect(size, zoom=0.8)  # room for the labels
+    axes.tick_params(labelsize=6)
+    for axis, width in zip("xyz", size, strict=True):  # labels of a thin side would overlap
+        axes.locator_params(axis=axis, nbins=4 if width > 0.5 * size.max() else 2)
+    axes.set_title(
+        f"case {case + 1}: {wrench_words(part.wrenches[case])}\n(displacement × {scale:.0f})", fontsize=9
+    )
+
+
+def wrench_words(wrench: Floats) -> str:
+    """For example ``Fx = 100 N``; only what is not zero."""
+    names = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+    units = ("N",) * 3 + ("N·m",) * 3
+    parts = [f"{n} = {w:g} {u}" for n, u, w in zip(names, units, wrench, strict=True) if w]
+    return ", ".join(parts) or "no load"
+
+
+def _draw_entries(axes: Any, link: Link, error: Floats) -> None:
+    """Entries over sqrt(kii kjj) with 95 % bars; the diagonal's values and units in the labels."""
+    C, factor = link.compliance, unit_factor("mm")
+    size = np.sqrt(np.abs(np.outer(np.diag(C), np.diag(C))))
+    pairs = [(i, i) for i in range(6)] + [(i, j) for i in range(6) for j in range(i + 1, 6)]
+    labels, y = [], np.arange(len(pairs))[::-1]
+    value = np.array([C[i, j] / size[i, j] for i, j in pairs])
+    bar = np.array([1.96 * error[i, j] / size[i, j] for i, j in pairs])
+    zero = np.array([bool(link.insignificant[i, j]) for i, j in pairs])
+    for (i, j), is_zero in zip(pairs, zero, strict=True):
+        number = f"{C[i, j] * factor[i, j]:.3e} ± {error[i, j] * factor[i, j]:.0e} {unit_name(i, j, 'mm')}"
+        labels.append(f"k{i + 1}{j + 1} = {number}" + ("  (zero within the test)" if is_zero else ""))
+    for chosen, colour in ((~zero, BLUE), (zero, GREY)):
+        axes.errorbar(value[chosen], y[chosen], xerr=bar[chosen], fmt="o", color=colour, capsize=3)
+    axes.axvline(0, color="black", lw=0.6)
+    axes.set_yticks(y, labels, fontsize=8, family="monospace")
+    axes.set_xlabel("entry / sqrt(kii kjj), with 95 % interval (± in the labels: one standard uncertainty)")
+    axes.grid(axis="x", alpha=0.3)
+
+
+def _save(figure: Any, path: str | Path) -> None:
+    from matplotlib import pyplot as plt
+
+    try:
+        write_picture(path, figure, dpi=110)
+    finally:
+        plt.close(figure)

@@ -1,0 +1,230 @@
+"""Pictures of the measures: Figure 1 of the paper, maps, the table against its requirements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from itertools import product
+from typing import Any, cast
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.machine import Machine
+from stiffmap.ui.pictures.box import box_figure
+from stiffmap.ui.pictures.modes import mode_figure, mode_frames
+from stiffmap.ui.pictures.paths import ALONG, path_measures_figure, path_rows
+from stiffmap.ui.pictures.workspace import workspace_figure
+from stiffmap.ui.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, headline, new_figure, paper_style
+from stiffmap.workspace.performance.box.box import LargestBox
+from stiffmap.workspace.performance.box.box_map import box_map, levels
+from stiffmap.workspace.performance.box.workspace import Workspace
+from stiffmap.workspace.performance.registry import Measure
+from stiffmap.workspace.performance.table import MeasuresTable, Row
+
+
+def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy") -> Figure:
+    """Figure 1a-c of the paper at one pose: images of the sphere and the cube of drive rates, hexagon."""
+    from stiffmap.workspace.performance.motion.velocity import velocity_section, velocity_transmission
+
+    p = np.asarray(position, dtype=float)
+    v = velocity_transmission(machine, p)
+    j = v.jacobian[:3]
+    if not np.isfinite(j).all():
+        raise StiffmapError(f"{machine.name}: no Jacobian at {p.tolist()} m (status {int(v.status)})")
+    with paper_style():
+        figure = new_figure(11.0, 4.2)
+        axes: list[Any] = [figure.add_subplot(1, 3, i, projection="3d" if i < 3 else None) for i in (1, 2, 3)]
+        _ellipsoid(axes[0], j)
+        axes[0].set_title(f"(a) sphere: {v.sphere_min:.3g} … {v.sphere_max:.3g}", y=0.95)
+        _parallelepiped(axes[1], j)
+        axes[1].set_title(f"(b) cube: {v.cube_min:.3g} … {v.cube_max:.3g}", y=0.95)
+        for a in axes[:2]:
+            a.set_xlabel("$v_x$")
+            a.set_ylabel("$v_y$")
+            a.set_zlabel("$v_z$", labelpad=-1)
+            a.tick_params(labelsize=7, pad=0)
+            a.set_box_aspect(None, zoom=0.9)  # the layout does not know labels in space
+        h = velocity_section(machine, p, plane=plane)
+        _hexagon(axes[2], h.vertices, float(h.inner), float(h.outer))
+        axes[2].set_title(f"(c) {plane} plane: {float(h.inner):.3g} … {float(h.outer):.3g}")
+        axes[2].set_xlabel(f"$v_{plane[0]}$ per drive speed")
+        axes[2].set_ylabel(f"$v_{plane[1]}$ per drive speed")
+        where = ", ".join(f"{MM * x:.0f}" for x in p)
+        headline(figure, f"{machine.name} at ({where}) mm: velocity transmission")
+    return figure
+
+
+def _ellipsoid(axes, j: Floats) -> None:  # type: ignore[no-untyped-def]
+    u, s, _ = np.linalg.svd(j, full_matrices=False)
+    a, b = np.meshgrid(np.linspace(0, 2 * np.pi, 49), np.linspace(0, np.pi, 25))
+    ball = np.stack([np.cos(a) * np.sin(b), np.sin(a) * np.sin(b), np.cos(b)])[: len(s)]
+    x, y, z = np.einsum("ik,kab->iab", u * s, ball)
+    axes.plot_surface(x, y, z, color=SKY, alpha=0.35, linewidth=0)
+    axes.plot_wireframe(x, y, z, rstride=6, cstride=6, color=BLUE, linewidth=0.4)
+
+
+def _parallelepiped(axes, j: Floats) -> None:  # type: ignore[no-untyped-def]
+    n = j.shape[1]
+    if n > 6:
+        return
+    corners = {c: j @ np.array(c) for c in product((-1.0, 1.0), repeat=n)}
+    for c, p in corners.items():
+        for i in range(n):
+            if c[i] < 0:
+                q = corners[(*c[:i], 1.0, *c[i + 1 :])]
+                axes.plot(*np.stack([p, q]).T, color=BLUE, linewidth=1.0 if n == 3 else 0.3)
+
+
+def _hexagon(axes, vertices: Floats, inner: float, outer: float) -> None:  # type: ignore[no-untyped-def]
+    turn = np.linspace(0, 2 * np.pi, 181)
+    closed = np.concatenate([vertices, vertices[:1]])
+    axes.fill(*closed.T, color=SKY, alpha=0.35)
+    axes.plot(*closed.T, color=BLUE)
+    axes.plot(inner * np.cos(turn), inner * np.sin(turn), "--", color=VERMILLION, label="every direction")
+    axes.plot(outer * np.cos(turn), outer * np.sin(turn), ":", color=VERMILLION, label="best direction")
+    axes.set_aspect("equal")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, frameon=False)
+
+
+def measure_figures(table: MeasuresTable) -> dict[str, Figure]:
+    """Name -> figure: the table against its requirements, a map on three planes of each measure that has one, Figure 1 and modes at the worst poses."""
+    out = {"requirements": requirement_figure(table)} if table.requirements.bounds else {}
+    for row in table.rows:
+        if row.measure.name not in ALONG and box_map(row) is not None:
+            out[f"map-{row.measure.name}"] = map_figure(table, row)
+    rows = {r.measure.name: r for r in table.rows}
+    space = rows.get("workspace")
+    if space is not None and space.found.worst > 0:
+        out["map-workspace"] = workspace_figure(
+            table.machine, cast(Workspace, space.found.extra["workspace"])
+        )
+    box = rows.get("largest_box")
+    if box is not None and box.found.worst > 0:
+        with suppress(StiffmapError):  # a line
+            out["largest-box"] = box_figure(table.machine, cast(LargestBox, box.found.extra["box"]))
+    if path_rows(table):
+        out["toolpath"] = path_measures_figure({table.machine.name: table})
+    last = rows.get("transmission_max")
+    if last is not None and last.found.worst_at is not None and np.isfinite(last.found.worst):
+        out["transmission"] = transmission_figure(table.machine, last.found.worst_at, table.case.plane)
+    slow = _slowest(table)
+    if slow is not None:
+        out["modes"] = mode_figure(table.machine, slow, gravity=table.case.gravity)
+    return out
+
+
+def moving_modes(table: MeasuresTable) -> Iterator[Figure]:
+    """Frames of the modes at the pose of the lowest frequency, where there is one."""
+    slow = _slowest(table)
+    if slow is not None:
+        yield from mode_frames(table.machine, slow, gravity=table.case.gravity)
+
+
+def _slowest(table: MeasuresTable) -> Floats | None:
+    row = next((r for r in table.rows if r.measure.name == "frequency"), None)
+    return row.found.worst_at if row is not None and np.isfinite(row.found.worst) else None
+
+
+CAPTIONS = {
+    "requirements": "Each requirement: the worst value over its bound. The line at 1 is the bound.",
+    "transmission": "Velocities of the tool at the worst pose for drive rates within a sphere (a), within a cube (b), and in the "
+    "plane (c).",
+    "map-workspace": "Sections of the workspace through its middle, and what it ends by.",
+    "largest-box": "The largest box in sections through its corner that comes nearest to a limit, and what ends the workspace "
+    "about it.",
+    "toolpath": "Along the toolpath: compliance in the direction of its force, shares of the drives' declared efforts.",
+    "modes": "Natural modes at the pose of the lowest frequency, swinging.",
+}
+
+
+def caption(name: str) -> str:
+    """What a figure of `measure_figures` shows, in a sentence."""
+    mapped = name.removeprefix("map-").replace("_", " ")
+    return CAPTIONS.get(name) or f"Map of {mapped} over the box: lowest, middle and highest plane."
+
+
+def requirement_figure(table: MeasuresTable) -> Figure:
+    """Each requirement as a bar: worst value over the bound, the line at 1 is the bound."""
+    rows = [r for r in table.rows if r.bound is not None]
+    with paper_style():
+        figure = new_figure(6.4, 0.6 + 0.42 * len(rows))
+        axes = figure.add_subplot()
+        for i, r in enumerate(rows):
+            share = _share(r)
+            good = r.verdict == "pass"
+            axes.barh(i, share if np.isfinite(share) else 0.0, color=BLUE if good else VERMILLION, height=0.6)
+            text = f"{r.measure.factor * r.found.worst:.4g} {r.measure.shown} – {r.verdict}"
+            axes.text(max(share if np.isfinite(share) else 0.0, 1.0) * 1.02, i, text, va="center")
+        axes.axvline(1.0, color="black", linewidth=1)
+        axes.set_yticks(range(len(rows)), [_bound_text(r) for r in rows])
+        axes.invert_yaxis()
+        axes.set_xlim(0, 1.45 * max([1.0, *(s for s in map(_share, rows) if np.isfinite(s))]))
+        axes.set_xlabel("worst value over the bound (line: the bound)")
+        axes.set_title(f"{table.machine.name} against {table.requirements.name}")
+    return figure
+
+
+def _share(r: Row) -> float:
+    assert r.bound is not None
+    limit = r.bound.at_least if r.bound.at_least is not None else r.bound.at_most
+    return float(r.found.worst / limit) if limit else float("nan")
+
+
+def _bound_text(r: Row) -> str:
+    assert r.bound is not None
+    least = r.bound.at_least is not None
+    limit = r.bound.at_least if least else r.bound.at_most
+    assert limit is not None
+    return (
+        f"{r.measure.name} {'≥' if least else '≤'} {r.measure.factor * limit:.4g} {r.measure.shown}".rstrip()
+    )
+
+
+def map_figure(table: MeasuresTable, row: Row) -> Figure:
+    """A measure on the lowest, middle and highest z-plane of the box."""
+    over = box_map(row)
+    assert over is not None
+    x, y, z, grid = over
+    planes = sorted({0, len(z) // 2, len(z) - 1})
+    with paper_style():
+        figure = new_figure(3.0 * len(planes) + 0.8, 3.2)
+        axes = figure.subplots(1, len(planes), squeeze=False)[0]
+        steps = levels(grid)
+        for a, k in zip(axes, planes, strict=True):
+            _plane(a, row.measure, row, x, y, grid[:, :, k], steps)
+            a.set_title(f"z = {MM * z[k]:.0f} mm")
+        drawn = next((a.collections[0] for a in axes if a.collections), None)
+        if drawn is not None:
+            figure.colorbar(drawn, ax=list(axes), label=row.measure.shown or row.measure.name)
+        figure.suptitle(
+            f"{table.machine.name}: {row.measure.title}"
+            + (f" {row.found.note}" if "under" in row.found.note else "")
+        )
+    return figure
+
+
+def _plane(axes, measure: Measure, row: Row, x: Floats, y: Floats, values: Floats, steps: Floats) -> None:  # type: ignore[no-untyped-def]
+    if not np.isfinite(values).any():
+        axes.text(0.5, 0.5, "no value in this plane", transform=axes.transAxes, ha="center", va="center")
+    elif len(x) > 1 and len(y) > 1:
+        axes.contourf(MM * x, MM * y, values.T, levels=steps, cmap=COLOURS, extend="both")
+        bound = row.bound
+        limit = None if bound is None else bound.at_least if bound.at_least is not None else bound.at_most
+        inside = limit is not None and np.nanmin(values) < measure.factor * limit < np.nanmax(values)
+        if inside and limit is not None:
+            axes.contour(MM * x, MM * y, values.T, levels=[measure.factor * limit], colors=[VERMILLION])
+            told = f"required: {measure.factor * limit:.4g} {measure.shown}".rstrip()
+            axes.plot([], [], color=VERMILLION, label=told)
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.24), frameon=False, fontsize="small")
+    else:
+        line = values.ravel()
+        axes.scatter(
+            *np.meshgrid(MM * x, MM * y, indexing="ij"), c=line, cmap=COLOURS, vmin=steps[0], vmax=steps[-1]
+        )
+    axes.set_xlabel("x, mm")
+    axes.set_ylabel("y, mm")
+    axes.set_aspect("equal")

@@ -1,0 +1,142 @@
+"""Pictures of a job: the part's outline, the error over the path, the path on the machine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.machining.milling.job import Milled
+from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.ui.plot.machines import draw_skeleton, look_from
+from stiffmap.ui.plot.skeleton import skeleton
+from stiffmap.ui.plot.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREEN,
+    MM,
+    TOLERANCE,
+    headline,
+    legend_below,
+    length_unit,
+    new_figure,
+    paper_style,
+)  # fmt: skip
+
+SHARE = 0.08
+"""Of the outline's size, that the largest error takes as it is drawn."""
+ROUND = (1, 2, 5)
+
+
+def magnification(size: float, largest: float) -> float:
+    """A round number by which errors are drawn larger."""
+    if not largest > 0:
+        return 1.0
+    wanted = SHARE * size / largest
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(max(power * max(r for r in ROUND if r * power <= wanted * 1.0001), 1.0))
+
+
+def outline_figure(found: Milled) -> Figure:
+    """The wanted wall, as it is cut and as the compensated program cuts it; errors magnified as stated, mm, axes of the part."""
+    job, ds = found.job, found.dataset
+    side = found.job.process.tool.diameter / 2
+    off = _back(job.off, found)
+    wall = job.points.position - side * off
+    before, after = ds.error_normal.values, ds.error_normal_after.values
+    size = float(np.ptp(wall[:, :2], axis=0).max())
+    factor = magnification(size, float(np.nanmax(np.abs(before), initial=0.0)))
+    unit, scale = length_unit(float(np.nanmax(np.abs(before), initial=0.0)))
+    with paper_style():
+        figure = new_figure(6.4, 4.8)
+        ax: Any = figure.subplots()
+        ax.plot(*(MM * wall[:, :2].T), color=BLACK, lw=1.0, label="wanted")
+        cut = MM * (wall + factor * before[:, None] * off)[:, :2]
+        ax.plot(*cut.T, color="0.7", lw=0.8, label="as it is cut")
+        lines = LineCollection(
+            [cut[k : k + 2] for k in range(len(cut) - 1)],
+            array=scale * np.abs(before[1:]),
+            cmap=COLOURS,
+            linewidths=2.2,
+        )
+        ax.add_collection(lines)
+        compensated = MM * (wall + factor * after[:, None] * off)[:, :2]
+        ax.plot(*compensated.T, color=GREEN, lw=1.0, ls="--", label="compensated")
+        figure.colorbar(lines, ax=ax, shrink=0.7, label=f"size of the error across the wall, {unit}")
+        ax.set_aspect("equal")
+        ax.autoscale_view()
+        ax.set(xlabel="x of the part, mm", ylabel="y of the part, mm")
+        headline(figure, f"Wall of the part; errors drawn {factor:g} times larger")
+        legend_below(figure, ax.get_legend_handles_labels()[0])
+    return figure
+
+
+def _back(vectors: Floats, found: Milled) -> Floats:
+    return np.asarray(vectors @ found.job.place.rotation)
+
+
+def error_figure(ds: xr.Dataset) -> Figure:
+    """Errors across the wall over the way along the path; below, those of the compensated program in their own scale."""
+    way = MM * ds.way.values
+    unit, scale = length_unit(float(np.nanmax(np.abs(ds.error_normal.values), initial=0.0)))
+    with paper_style():
+        figure = new_figure(6.4, 5.0)
+        top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+        top.plot(way, scale * ds.error_normal, color=BLUE, label="as it is cut")
+        top.plot(way, scale * ds.error_normal_after, color=GREEN, ls="--", label="compensated")
+        if "true_error_normal" in ds:
+            top.plot(
+                way, scale * ds.true_error_normal, color=BLUE, ls=":", label="true machine, as it is cut"
+            )
+            top.plot(
+                way,
+                scale * ds.true_error_normal_after,
+                color=GREEN,
+                ls=":",
+                label="true machine, compensated",
+            )
+        tolerance = ds.attrs.get("tolerance")
+        if tolerance is not None:
+            for sign in (-1, 1):
+                top.axhline(scale * sign * tolerance, color=TOLERANCE, lw=0.8, label="tolerance")
+        top.axhline(0, color="0.7", lw=0.6, zorder=0)
+        top.set_ylabel(f"error across the wall, {unit}\n(positive: material stays)")
+        band = "error_normal_after_low" in ds
+        shown = ds.error_normal_after_high if band else ds.error_normal_after
+        fine, small = length_unit(float(np.nanmax(np.abs(shown.values), initial=0.0)))
+        bottom.plot(way, small * ds.error_normal_after, color=GREEN, ls="--")
+        if band:
+            bottom.fill_between(
+                way, small * ds.error_normal_after_low, small * ds.error_normal_after_high, color=GREEN, alpha=0.25,
+                label="force 80 to 120 %",
+            )  # fmt: skip
+        bottom.axhline(0, color="0.7", lw=0.6, zorder=0)
+        bottom.set(xlabel="way along the path, mm", ylabel=f"compensated, {fine}")
+        handles = [*top.get_legend_handles_labels()[0], *bottom.get_legend_handles_labels()[0]]
+        headline(figure, f"{ds.attrs['machine']}, {ds.attrs['path']}, {ds.attrs['process']}")
+        legend_below(figure, handles)
+    return figure
+
+
+def machine_path_figure(found: Milled) -> Figure:
+    """The path on the machine, which stands where the error is largest."""
+    job, ds = found.job, found.dataset
+    worst = int(np.nanargmax(np.abs(np.nan_to_num(ds.error_normal.values))))
+    k = inverse_kinematics(job.machine, job.position[worst], job.rotation[worst])
+    shape = skeleton(job.machine, k.coordinates)
+    with paper_style():
+        figure = new_figure(5.6, 5.2)
+        ax: Any = figure.add_subplot(projection="3d")
+        draw_skeleton(ax, shape, job.machine.legs)
+        ax.plot(*(MM * job.position.T), color=BLACK, lw=1.6, label="path")
+        ax.set_aspect("equal")
+        look_from(ax, shape, None)
+        ax.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
+        headline(figure, f"{job.machine.name}: the tool where the error is largest")
+        legend_below(figure, ax.get_legend_handles_labels()[0], most=4)
+    return figure

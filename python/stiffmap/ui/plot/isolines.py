@@ -1,0 +1,56 @@
+"""Lines of equal deflection, and what lies beyond the tolerance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib import patheffects
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from stiffmap.ui.plot.planes import Planes
+from stiffmap.ui.plot.style import MM, TOLERANCE
+
+FEWEST = 5
+"""Positions along each axis below which isolines would say more than was computed."""
+
+
+def halo(width: float, colour: str) -> list[patheffects.AbstractPathEffect]:
+    """An outline that keeps a line visible on any colour."""
+    return [patheffects.withStroke(linewidth=width, foreground=colour)]
+
+
+def draw_isolines(ax: Axes, plane: xr.DataArray, how: Planes, factor: float, norm: Normalize) -> None:
+    """Some thin labelled lines of equal deflection, on a grid that is fine enough."""
+    v = factor * plane.values
+    if min(v.shape) < FEWEST or not np.isfinite(v).any() or norm.vmin is None or norm.vmax is None:
+        return
+    inside = [t for t in MaxNLocator(6).tick_values(norm.vmin, norm.vmax) if np.nanmin(v) < t < np.nanmax(v)]
+    if not inside:
+        return
+    x, y = MM * plane[how.right].values, MM * plane[how.up].values
+    lines = ax.contour(x, y, v, levels=inside, colors="white", linewidths=0.5, alpha=0.8)
+    for text in ax.clabel(lines, fontsize=6, fmt="%g"):
+        text.set_path_effects(halo(1.2, "#444444"))
+
+
+def draw_tolerance(ax: Axes, x: Any, y: Any, v: Any, level: float, words: str) -> dict[str, Any]:
+    """Outline and dots of what lies beyond the tolerance (unit of v); the legend's entries."""
+    finite = v[np.isfinite(v)]
+    if min(v.shape) < 2 or finite.size == 0 or not finite.max() > level:
+        return {}
+    look: dict[str, Any] = {"hatch": "..", "facecolor": "none", "edgecolor": TOLERANCE, "linewidth": 0}
+    beyond = ax.contourf(x, y, v, levels=[level, finite.max()], colors="none", hatches=[".."], extend="max")
+    beyond.set_edgecolor(TOLERANCE)
+    beyond.set_linewidth(0)
+    entries: dict[str, Any] = {"beyond": Patch(label=f"beyond {words}", **look)}
+    if finite.min() < level:
+        lines = ax.contour(x, y, v, levels=[level], colors=TOLERANCE, linewidths=1.6)
+        lines.set_path_effects(halo(3, "white"))
+        entries["tolerance"] = Line2D([], [], color=TOLERANCE, label=f"tolerance {words}")
+    return entries

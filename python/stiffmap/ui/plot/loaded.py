@@ -1,0 +1,168 @@
+"""A machine under load: its shape without it (grey), with it (enlarged), and where the deflection comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.budget import DeflectionBudget, deflection_budget
+from stiffmap.solve.compiled import Status
+from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.ui.plot.machines import draw_skeleton
+from stiffmap.ui.plot.scene import draw_arrow, finish, on, scene_axes
+from stiffmap.ui.plot.skeleton import Skeleton, skeleton
+from stiffmap.ui.plot.style import BLUE, MM, ORANGE, headline, legend_below, new_figure, paper_style
+
+SHOWN = 0.08
+"""Of the machine's extent, how far the tool moves in the picture."""
+MOST_BARS = 10
+FAINT = 5e-4  # share of an element that is not worth a bar
+FORCE = "#C1121F"
+
+
+@dataclass(frozen=True)
+class LoadedShape:
+    """The machine at rest and under load, with the factor that makes the difference visible."""
+
+    rest: Skeleton
+    loaded: Skeleton
+    factor: float
+    displacement: Floats
+    force: Floats
+
+    def enlarged(self, factor: float | None = None) -> Skeleton:
+        """The loaded shape with every frame's translation times the factor."""
+        k = self.factor if factor is None else factor
+
+        def mix(a: Floats, b: Floats) -> Floats:
+            return np.asarray(a + k * (b - a))
+
+        return Skeleton(
+            [(n, mix(a, b)) for (n, a), (_, b) in zip(self.rest.links, self.loaded.links, strict=True)],
+            self.rest.guides,
+            mix(self.rest.actuators, self.loaded.actuators),
+            mix(self.rest.passive, self.loaded.passive),
+            mix(self.rest.tcp, self.loaded.tcp),
+            mix(self.rest.platform, self.loaded.platform),
+            self.rest.ends,
+        )
+
+    @property
+    def extent(self) -> float:
+        """Diagonal of what is drawn, m."""
+        points = np.concatenate(
+            [ends for _, ends in (*self.rest.links, *self.rest.guides)] or [np.zeros((1, 3))]
+        )
+        return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def loaded_shape(
+    machine: Machine,
+    position: ArrayLike | None,
+    wrench: ArrayLike,
+    *,
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+) -> LoadedShape:
+    """Shapes at a pose (m): without load and gravity, and under a wrench (N, N·m at the TCP) and gravity (m/s²,
+    None: the machine file's).
+
+    Raises StiffmapError where one of them is no stable equilibrium.
+    """
+    p = machine.description.home.p if position is None else real_array(position, "position")
+    load = real_array(wrench, "wrench")
+    free = machine.solve(p, np.zeros(6), rotation=rotation, gravity=np.zeros(3))
+    under = machine.solve(p, load, rotation=rotation, gravity=gravity)
+    status = max(int(free.status), int(under.status))
+    if status != Status.CONVERGED:
+        where = ", ".join(f"{MM * v:g}" for v in p)
+        raise StiffmapError(
+            f"{machine.name} cannot be drawn under load at ({where}) mm: {Status(status).name.lower()}"
+        )
+    rest, loaded = (skeleton(machine, s.coordinates, shortest=-1.0) for s in (free, under))
+    d = np.asarray(under.displacement - free.displacement)
+    shape = LoadedShape(rest, loaded, 1.0, d, load[:3])
+    return LoadedShape(
+        rest, loaded, round_factor(SHOWN * shape.extent, float(np.linalg.norm(d[:3]))), d, load[:3]
+    )
+
+
+def round_factor(wanted: float, size: float) -> float:
+    """1, 2 or 5 times a power of ten, near wanted over size."""
+    if size <= 0 or wanted <= 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(wanted / size))
+    return float(max(s for s in (1.0, 2.0, 5.0) if s * power <= wanted / size) * power)
+
+
+@takes_machine
+def loaded_figure(
+    machine: Machine,
+    position: ArrayLike | None = None,
+    wrench: ArrayLike = (0.0, 0.0, -300.0, 0.0, 0.0, 0.0),
+    *,
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    view: tuple[float, float] | None = None,
+) -> Figure:
+    """The machine deformed by a wrench (N, N·m) and gravity (m/s², None: the machine file's), and the share of each
+    element in the tool's deflection."""
+    shape = loaded_shape(machine, position, wrench, rotation=rotation, gravity=gravity)
+    budget = deflection_budget(machine, position, wrench, rotation=rotation, gravity=gravity)
+    with paper_style():
+        figure = new_figure(10.4, 5.0)
+        grid = figure.add_gridspec(1, 2, width_ratios=(1.3, 1.0))
+        left, right = grid[0, 0], grid[0, 1]
+        ax: Any = scene_axes(figure, shape.rest, view, left)
+        draw_loaded(ax, shape, machine.legs, view)
+        draw_budget(figure.add_subplot(right), budget)
+        where = ", ".join(f"{MM * v:g}" for v in budget.position)
+        force = ", ".join(f"{v:g}" for v in budget.wrench[:3])
+        headline(figure, f"{machine.name} at ({where}) mm under ({force}) N: the tool moves "
+                         f"{1e6 * np.linalg.norm(shape.displacement[:3]):.1f} µm (drawn × {shape.factor:g})")  # fmt: skip
+        legend_below(figure, ax.get_legend_handles_labels()[0])
+    return figure
+
+
+def draw_loaded(
+    ax: Any, shape: LoadedShape, legs: tuple[str, ...], view: tuple[float, float] | None = None
+) -> None:
+    """Ghost, enlarged shape, arrow of the force."""
+    label: str | None = "without load"
+    for _, ends in shape.rest.links:
+        ax.plot(*on(ax, ends), color="0.72", lw=1.4, ls="--", zorder=1, label=label)
+        label = None
+    moved = shape.enlarged()
+    draw_skeleton(ax, moved, legs)
+    size = float(np.linalg.norm(shape.force))
+    if size > 0:
+        arrow = 0.16 * shape.extent * shape.force / size
+        tail = moved.tcp - arrow
+        draw_arrow(ax, tail, arrow, color=FORCE, label=f"force {size:g} N")
+    finish(ax, shape.rest, view)
+
+
+def draw_budget(ax: Any, budget: DeflectionBudget) -> None:
+    """A bar per element, in the direction in which the tool moves."""
+    size = 1e6 * float(np.linalg.norm(budget.displacement[:3]))
+    ranked = [(n, size * s, s) for n, _, s in budget.ranked()]
+    shown = min(MOST_BARS, sum(abs(s) > FAINT for _, _, s in ranked))
+    rest = sum(s for _, _, s in ranked[shown:])
+    if len(ranked) > shown + 1:
+        ranked = [*ranked[:shown], (f"{len(ranked) - shown} others", size * rest, rest)]
+    at = np.arange(len(ranked))
+    values = [v for _, v, _ in ranked]
+    ax.barh(at, values, color=[BLUE if v >= 0 else ORANGE for v in values])
+    for i, (_, v, s) in enumerate(ranked):
+        ax.text(max(v, 0), i, f" {v:z.1f} µm, {100 * s:z.0f} %", va="center", fontsize=7)
+    ax.set_yticks(at, [n for n, _, _ in ranked])
+    ax.invert_yaxis()
+    ax.set_xlim(min(0.0, 1.15 * min(values, default=0)), 1.45 * max(max(values, default=1), 1e-9))
+    ax.axvline(0, color="0.3", lw=0.6)
+    ax.set(xlabel="part of the tool's deflection, µm", title="where the deflection comes from")

@@ -1,0 +1,105 @@
+"""A load path with its critical points, and a buckling mode."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.status import Status
+from stiffmap.ui.plot.machines import draw_skeleton, look_from
+from stiffmap.ui.plot.polars import position_text
+from stiffmap.ui.plot.skeleton import Skeleton, skeleton
+from stiffmap.ui.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, legend_below, new_figure, paper_style
+
+MARKS = {"limit": "^", "bifurcation": "X"}
+HALO = "#f5c9b0"
+SHARE = 0.25  # of the machine's length, of the largest motion of a drawn mode
+
+
+def path_figure(path: xr.Dataset) -> Figure:
+    """Force (N) against displacement along it (mm) of a `sweep` with a limit; unstable parts dashed, a
+    crossing branch in another colour."""
+    if not path.attrs.get("end"):
+        raise StiffmapError("path: expected a sweep with a limit, got one of single forces")
+    with paper_style():
+        figure = new_figure(4.6, 3.4)
+        ax: Any = figure.subplots()
+        for number, colour, name in ((0, BLUE, ""), (1, GREEN, "crossing branch, ")):
+            _draw_branch(ax, path.isel(step=path.branch.values == number), colour, name)
+        for kind, mark in MARKS.items():
+            here = path.critical_kind.values == kind
+            if here.any():
+                ax.plot(MM * path.critical_deflection[here], path.critical_force[here], mark,
+                        color=BLACK, ms=6, ls="", label=f"{kind} point")  # fmt: skip
+        ax.axhline(0, color="0.7", lw=0.6, zorder=0)
+        ax.set(xlabel="displacement along the force, mm", ylabel="force, N")
+        ax.set_title(f"{path.attrs['machine']}, {position_text(path)}")
+        legend_below(figure, ax.get_legend_handles_labels()[0], most=2)
+    return figure
+
+
+def _draw_branch(ax: Any, branch: xr.Dataset, colour: str, name: str) -> None:
+    """One branch, by stability."""
+    if branch.sizes["step"] < 2:
+        return
+    x, y = MM * branch.deflection_along.values, branch.force.values
+    stable = branch.status.values == Status.CONVERGED
+    ax.plot(x, np.where(stable, y, np.nan), color=colour, label=f"{name}stable")
+    if not stable.all():
+        ax.plot(x, _joined(y, ~stable), color=VERMILLION, ls="--", label=f"{name}unstable")
+
+
+def _joined(values: Any, where: Any) -> Any:
+    """Values where wanted and at the neighbours of wanted points, so that lines join."""
+    near = where.copy()
+    near[1:] |= where[:-1]
+    near[:-1] |= where[1:]
+    return np.where(near, values, np.nan)
+
+
+def mode_figure(
+    machine: Machine, path: xr.Dataset, index: int = 0, *, view: tuple[float, float] | None = None
+) -> Figure:
+    """A critical point of a path: the machine there (grey) and moved along the mode, largely enlarged."""
+    count = path.sizes.get("critical", 0)
+    if not 0 <= index < count:
+        raise StiffmapError(f"index: the path has {count} critical points, got {index}")
+    at = path.critical_coordinates.values[index]
+    moved = at + SHARE * machine.compiled.length * path.mode.values[index]
+    leg, joint = str(path.mode_leg.values[index]), str(path.mode_joint.values[index])
+    with paper_style():
+        figure = new_figure(5.2, 4.8)
+        ax: Any = figure.add_subplot(projection="3d")
+        for _, ends in skeleton(machine, at).links:
+            ax.plot(*(MM * ends.T), color="0.7", lw=1.5, zorder=1)
+        shape = skeleton(machine, moved)
+        draw_skeleton(ax, shape, machine.legs)
+        _mark(ax, machine, shape, moved, leg, joint)
+        ax.set_aspect("equal")
+        look_from(ax, shape, view)
+        ax.set_title(
+            f"{machine.name}: {path.critical_kind.values[index]} point at "
+            f"{float(path.critical_force[index]):.4g} N\nmode enlarged: "
+            + (f"leg {leg}, " if leg else "") + f"most in {joint}", fontsize=9,
+        )  # fmt: skip
+        legend_below(figure, ax.get_legend_handles_labels()[0], most=4)
+    return figure
+
+
+def _mark(ax: Any, machine: Machine, shape: Skeleton, moved: Floats, leg: str, joint: str) -> None:
+    """A halo behind the leg of the mode, a ring about what moves most."""
+    for of, ends in shape.links:
+        if of == leg:
+            ax.plot(*(MM * ends.T), color=HALO, lw=7, alpha=0.6, solid_capstyle="round", zorder=0)
+    core = machine.compiled
+    index = core.names.coordinates.index(joint)
+    node = next(i for i, (_, c) in enumerate(core.nodes) if c == index)
+    at = core.frames(moved)[0][node]
+    ax.scatter(*(MM * at), s=190, facecolor="none", edgecolor=VERMILLION, linewidth=1.8, label="moves most",
+               depthshade=False)  # fmt: skip

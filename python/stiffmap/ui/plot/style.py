@@ -1,0 +1,99 @@
+"""What all pictures share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+import matplotlib
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from stiffmap.common.outputs import write_picture
+
+MM = 1e3
+# Okabe and Ito's palette: eight colours that the common colour blindnesses keep apart.
+BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION, BLACK = (
+    "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000",
+)  # fmt: skip
+CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
+TOLERANCE = VERMILLION
+COLOURS = "cividis"
+
+SETTINGS: dict[str, Any] = {
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 9,
+    "legend.fontsize": 8,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "axes.linewidth": 0.6,
+    "hatch.linewidth": 0.6,
+    "legend.frameon": False,
+}
+
+
+@contextmanager
+def paper_style() -> Iterator[None]:
+    """Settings of a picture while it is drawn; the caller's own settings come back."""
+    with matplotlib.rc_context(dict[Any, Any](SETTINGS)):
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure (inches) that belongs to no window system."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+EDGE = 0.98
+"""Share of a picture's width that a title or a legend may take."""
+
+
+def _renderer(figure: Figure) -> Any:
+    canvas: Any = FigureCanvasAgg(figure)
+    return canvas.get_renderer()
+
+
+def headline(figure: Figure, text: str, size: float = 10) -> None:
+    """Title of the whole picture, broken into lines where it is wider than the picture."""
+    artist = figure.suptitle(text, fontsize=size)
+    renderer = _renderer(figure)
+    for columns in range(len(text), 15, -1):
+        if artist.get_window_extent(renderer).width <= EDGE * figure.bbox.width:
+            return
+        artist.set_text("\n".join(fill(line, columns) for line in text.splitlines()))
+
+
+def legend_below(figure: Figure, handles: Sequence[Any], most: int = 7) -> None:
+    """Legend under the picture, in as many columns as its width allows."""
+    entries = {str(h.get_label()): h for h in handles}
+    renderer = _renderer(figure)
+    for columns in range(min(len(entries), most), 0, -1):
+        legend = figure.legend(handles=list(entries.values()), loc="outside lower center", ncols=columns)
+        if columns == 1 or legend.get_window_extent(renderer).width <= EDGE * figure.bbox.width:
+            return
+        legend.remove()
+
+
+def length_unit(largest: float) -> tuple[str, float]:
+    """Unit and factor in which a deflection of this size (m) reads well: no 0.0xx mm."""
+    return ("µm", 1e6) if largest < 0.0995e-3 else ("mm", 1e3)
+
+
+def panel(index: int) -> str:
+    """(a), (b), (c) …"""
+    return f"({chr(ord('a') + index)})"
+
+
+def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> Path:
+    """Write a picture in the format that the file's name says.
+
+    Raises FileError where the file cannot be written, StiffmapError for an unknown format.
+    """
+    with paper_style():
+        return write_picture(path, figure, dpi)

@@ -1,0 +1,98 @@
+"""Pictures of vibration: stability lobes, frequency responses, waterfalls along a path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from stiffmap.ui.plot.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    CYCLE,
+    DASHES,
+    MM,
+    VERMILLION,
+    headline,
+    legend_below,
+    new_figure,
+    paper_style,
+)
+
+RPM = 60 / (2 * np.pi)
+MICRO = 1e6
+
+
+def lobes_figure(
+    lobes: xr.Dataset, title: str, speed: float | None = None, depth: float | None = None
+) -> Figure:
+    """Stable depth (mm) over the speed of the spindle (rpm); the cut of the process as a point."""
+    with paper_style():
+        figure = new_figure(6.0, 4.0)
+        ax = figure.add_subplot()
+        s, d = RPM * lobes.speed.values, MM * lobes.depth.values
+        if "multiplier" in lobes:
+            mu = np.clip(lobes.multiplier.values.T, 0, 2)
+            filled = ax.pcolormesh(
+                s, d, mu, cmap=COLOURS + "_r", vmin=0.5, vmax=1.5, shading="nearest", rasterized=True
+            )
+            bar = figure.colorbar(filled, ax=ax, extend="both")
+            bar.set_label("largest multiplier of a tooth period")
+            if mu.min() < 1 < mu.max():
+                ax.contour(s, d, mu, levels=[1.0], colors=[BLACK], linewidths=1.4)
+            ax.plot([], [], color=BLACK, lw=1.4, label="border, semi-discretization")
+        zero = np.where(np.isfinite(lobes.limit_zero_order), MM * lobes.limit_zero_order, np.nan)
+        ax.plot(s, zero, color=VERMILLION, ls="--", lw=1, label="border, zero order")
+        if speed is not None and depth is not None:
+            ax.plot(RPM * speed, MM * depth, "o", mfc="white", mec=BLUE, mew=1.5, label="the process")
+        ax.margins(0)
+        ax.set_xlim(s[0], s[-1])
+        ax.set_ylim(0, d[-1])
+        ax.set_xlabel("speed of the spindle, rpm")
+        ax.set_ylabel("depth along the tool, mm")
+        headline(figure, title)
+        legend_below(figure, ax.get_legend_handles_labels()[0])
+    return figure
+
+
+def response_figure(responses: Mapping[str, xr.DataArray], axes: str = "xyz") -> Figure:
+    """Size of the receptances (µm/N) along base axes over the frequency, a panel for each axis."""
+    with paper_style():
+        figure = new_figure(2.5 * len(axes) + 0.5, 3.0)
+        panels = figure.subplots(1, len(axes), squeeze=False, sharey=True)[0]
+        for ax, axis in zip(panels, axes, strict=True):
+            for i, (label, H) in enumerate(responses.items()):
+                own = np.abs(H.sel(response=axis, force=f"f{axis}"))
+                ax.semilogy(
+                    H.frequency,
+                    MICRO * own,
+                    color=CYCLE[i % len(CYCLE)],
+                    ls=DASHES[i % len(DASHES)],
+                    label=label,
+                )
+            ax.set_title(f"along {axis}")
+            ax.set_xlabel("frequency, Hz")
+        panels[0].set_ylabel("receptance, µm/N")
+        headline(figure, "Frequency response at the tool")
+        if len(responses) > 1:
+            legend_below(figure, panels[0].get_legend_handles_labels()[0])
+    return figure
+
+
+def waterfall_figure(way: np.ndarray, responses: xr.DataArray, axis: str = "y") -> Figure:
+    """Size of a receptance (µm/N) along one base axis over the way along a path (m) and the frequency."""
+    own = MICRO * np.abs(responses.sel(response=axis, force=f"f{axis}").values)
+    with paper_style():
+        figure = new_figure(5.4, 3.4)
+        ax = figure.add_subplot()
+        filled = ax.pcolormesh(
+            responses.frequency, MM * way, np.log10(own), cmap=COLOURS, shading="nearest", rasterized=True
+        )
+        figure.colorbar(filled, ax=ax).set_label(f"log10 of the receptance along {axis}, µm/N")
+        ax.set_xlabel("frequency, Hz")
+        ax.set_ylabel("way along the path, mm")
+        headline(figure, f"Frequency response along the path, {axis}")
+    return figure

@@ -1,0 +1,229 @@
+"""A diagnosis as one self-contained HTML file: the answer, the evidence, pictures inside, nothing from the network."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.fingerprints import digest
+from stiffmap.common.outputs import write_text
+from stiffmap.experiment.noise.checks import Check
+from stiffmap.identification.diagnosis.decision.patterns import Pattern
+from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Findings
+from stiffmap.identification.diagnosis.report.sentences import alias_words, interval, next_step, opening
+from stiffmap.identification.diagnosis.report.wording import effect_text, five_lines, separation_text
+from stiffmap.identification.diagnosis.slips.slip import Slip
+from stiffmap.model.description.tree import joints
+from stiffmap.model.effects import registry
+from stiffmap.solve.budget import deflection_budget
+from stiffmap.ui.report.diagnosis.shop import in_axis_units, in_shop_units, in_shop_words, p_text, spoken
+
+SHOWN = 12
+"""Detectable effects above the fold."""
+FIRST, FOLDED = ("place", "before_after"), ("residual_others",)
+"""Pictures of the first page, and those that are folded."""
+PARTS = 8
+"""Elements in the table of shares."""
+
+
+def write_report(
+    d: Findings,
+    path: str | PathLike[str],
+    *,
+    date: str | None = None,
+    inputs: Iterable[str | PathLike[str]] = (),
+) -> None:
+    """Write the file; raises `FileError` where it cannot be written."""
+    write_text(path, html(d, date=date, inputs=inputs))
+
+
+def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLike[str]] = ()) -> str:
+    """The report as text."""
+    from stiffmap.ui.report.diagnosis.pictures import CAPTIONS, figures
+    from stiffmap.ui.report.pictures import inline
+    from stiffmap.ui.report.provenance import provenance
+    from stiffmap.ui.report.templates import render
+
+    pictures = {n: {"caption": CAPTIONS[n], "data": inline(f)} for n, f in figures(d).items()}
+    return render(
+        "diagnosis.html",
+        machine=d.declared.name,
+        experiment=d.experiment.name,
+        rows=len(d.experiment),
+        quantity=d.experiment.quantity,
+        axes=", ".join(d.experiment.axes),
+        opening=opening(d),
+        next=next_step(d),
+        lines=[in_shop_words(line) for line in five_lines(d)[1:]],  # the headline has the verdict
+        effects=[_effect(e) for e in d.effects],
+        rivals=[
+            ("; ".join(map(effect_text, other)), separation_text(s))
+            for other, s in zip(d.alternatives, d.separations, strict=True)
+        ],
+        first=[pictures[n] for n in FIRST if n in pictures],
+        pictures=[p for n, p in pictures.items() if n not in (*FIRST, *FOLDED)],
+        folded=[pictures[n] for n in FOLDED if n in pictures],
+        record=record(d, date, inputs),
+        slips=[_slip(s) for s in d.slips],
+        budget=_budget(d),
+        sizes=[
+            (n, *(f"{1e6 * v:.2f}" for v in (s.rms, s.p95, s.max)), f"{s.ratio:.3f}", s.n)
+            for n, s in (("before", d.before), ("after", d.after))
+        ],
+        per_axis=[
+            (a, in_axis_units(a, d.before.per_axis[a]), in_axis_units(a, v))
+            for a, v in d.after.per_axis.items()
+        ],
+        folds=_folds(d),
+        noise=_noise(d),
+        fit=f"Lack of fit: p-value {p_text(d.noise.lack_of_fit_before)} before, "
+        f"{p_text(d.noise.lack_of_fit_after)} after. "
+        f"Outliers listed (rows): {', '.join(d.outliers) or 'none'}.",
+        checks=_checks(d.checks_before, d.checks_after),
+        left=[(p.axis, p.what, p.detail, _at(p), f"{p.p:.2g}") for p in d.unexplained[:12]],
+        empirical=d.unexplained
+        and d.empirical
+        and f"would bring held-out readings from {1e6 * d.empirical.before:.2f} µ{d.before.size[1]} to "
+        f"{1e6 * d.empirical.after:.2f} µ{d.before.size[1]} rms.",
+        seen=_seen(d),
+        shown=SHOWN,
+        unseen=[spoken(u) for u in d.unobservable],
+        limits=[in_shop_words(v) for v in d.limitations],
+        provenance=provenance(date, d.seed, inputs, _digests(d)),
+    )
+
+
+def record(
+    d: Findings, date: str | None, inputs: Iterable[str | PathLike[str]] = ()
+) -> list[tuple[str, str]]:
+    """What the first page says of how the readings were taken; a blank is for the pen."""
+    told = dict(d.experiment.record)
+    source = (
+        f"{told['source']}, sha256 {told['sha256'][:16]}"
+        if {"source", "sha256"} <= set(told)
+        else told.get("source", "")
+    )
+    t = d.experiment.temperature
+    measured = "" if t is None or not np.isfinite(t).any() else f"{np.nanmin(t):.1f} to {np.nanmax(t):.1f}"
+    rows = [
+        ("operator", told.get("operator", "")),
+        (
+            "instrument, certificate",
+            ", ".join(filter(None, (told.get("instrument"), told.get("certificate")))),
+        ),
+        ("date of the readings", told.get("date", date or "")),
+        ("temperature", told.get("temperature", measured)),
+        ("source file", source or ", ".join(p.name for p in map(Path, inputs))),
+        ("notes", told.get("notes", "")),
+    ]
+    return rows
+
+
+def _slip(s: Slip) -> dict[str, Any]:
+    return {"check": s.check, "seen": s.seen, "also": s.also, "evidence": s.evidence, "undone": s.undone}
+
+
+def _effect(e: Effect) -> dict[str, Any]:
+    legs = f", leg {', '.join(e.legs)}" if e.legs else ""
+    return {
+        "name": f"{registry.get(e.kind).title}: {in_shop_words(e.element)}{legs}",
+        "rows": [(n.replace("_", " "), *interval(*v)) for n, v in e.parameters.items()],
+        "same": "; ".join(alias_words(a) for a in e.aliases),
+        "definition": in_shop_words(e.definition),
+        "evidence": f"Chi-square falls by {e.evidence['delta_chi2']:.0f}; p-value over the whole search "
+        f"{p_text(e.evidence['p_global'])}.",
+    }
+
+
+def _budget(d: Findings) -> dict[str, Any] | None:
+    """Shares of the corrected machine's deflection at the worst pose of the map in the pictures; None where it has play without load."""
+    from stiffmap.ui.report.diagnosis.pictures import worst_pose
+
+    worst = worst_pose(d) if d.effects else None
+    if worst is None:
+        return None
+    p, force = worst
+    try:
+        found = deflection_budget(d.machine, p, force)
+    except StiffmapError:  # a machine in play has no stiffness to share out
+        return None
+    whole = 1e6 * float(np.linalg.norm(found.displacement[:3]))
+    return {
+        "at": ", ".join(f"{1e3 * v:.0f}" for v in p),
+        "force": ", ".join(f"{v:.0f}" for v in force[:3]),
+        "size": whole,
+        "rows": [(in_shop_words(n), whole * s, 100 * s) for n, _, s in found.ranked()[:PARTS]],
+    }
+
+
+def _folds(d: Findings) -> str:
+    if d.held_out is None:
+        return "Not held out."
+    chosen = ", ".join(f"{k} in {v}" for k, v in d.held_out.chosen.items())
+    return f"{d.held_out.folds} folds by {d.held_out.by}; chosen in the folds: {chosen or 'nothing'}."
+
+
+def _noise(d: Findings) -> list[tuple[str, ...]]:
+    n = d.noise
+    return [
+        (a, *(in_axis_units(a, v[a]) for v in (n.floor, n.repeats, n.declared)), _or_none(n.consistency[a]))
+        for a in n.floor
+    ]
+
+
+def _or_none(value: float) -> str:
+    return f"{value:.2g}" if np.isfinite(value) else "–"
+
+
+def _checks(before: Sequence[Check], after: Sequence[Check]) -> list[tuple[object, ...]]:
+    return [
+        (b.name, b.meaning, b.contrasts, *(("-",) * 4 if not b.contrasts else _pair(b, a)))
+        for b, a in zip(before, after, strict=True)
+    ]
+
+
+def _pair(b: Check, a: Check) -> tuple[str, str, str, str]:
+    return (f"{b.rms:.2f}", f"{b.p:.2g}", f"{a.rms:.2f}", f"{a.p:.2g}")
+
+
+def _at(p: Pattern) -> str:
+    if p.position is None:
+        return ""
+    where = ", ".join(f"{1e3 * v:.0f}" for v in p.position)
+    return f"({where}) mm: {in_axis_units(p.axis, p.size)} rms"
+
+
+def _seen(d: Findings) -> list[tuple[str, str, str]]:
+    """What could have been found, the easiest first."""
+    turning = {n for n, j in joints(d.declared.description).items() if j.kind != "prismatic"}
+    return [row for _, row in sorted((_one_seen(x, turning) for x in d.detectable), key=lambda pair: pair[0])]
+
+
+def _one_seen(x: Detectability, turning: set[str]) -> tuple[float, tuple[str, str, str]]:
+    numbers = {p.name: p for p in registry.get(x.kind).parameters}
+    turns = any(f"{leg}.{x.element}" in turning for leg in x.legs) or x.element in turning
+    sizes, ease = [], float("inf")
+    for name, value in x.sizes.items():
+        if value is None:
+            continue
+        p = numbers[name]
+        sizes.append(
+            f"{name.replace('_', ' ')} {in_shop_units(value, p.angular if turns and p.angular else p.unit)}"
+        )
+        ease = min(ease, abs(value) / p.scale)
+    legs = f" of {', '.join(x.legs)}" if x.legs else ""
+    return ease, (registry.get(x.kind).title, f"{in_shop_words(x.element)}{legs}", ", ".join(sizes))
+
+
+def _digests(d: Findings) -> dict[str, str]:
+    """Of the machine and the readings as they were used."""
+    e = d.experiment
+    return {
+        f"machine {d.declared.name}, as loaded": digest(d.declared.description),
+        f"readings of {e.name}, SI": digest(e.position, e.wrench, e.reading, e.sigma),
+    }

@@ -1,0 +1,239 @@
+"""Figures of a diagnosis, each with its units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment.experiment import WRENCH, Floats
+from stiffmap.identification.diagnosis.report.findings import Findings
+from stiffmap.identification.diagnosis.report.wording import noise_size
+from stiffmap.solve.machine import Machine
+from stiffmap.ui.plot.loaded import loaded_figure
+from stiffmap.ui.report.diagnosis.drawn import AFTER, BEFORE, MM, UM, kept, pose_means
+from stiffmap.ui.report.diagnosis.place import place_figure
+from stiffmap.ui.report.diagnosis.trends import trending, trends
+from stiffmap.ui.report.diagnosis.vectors import vectors
+
+CAPTIONS = {
+    "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the machine of your file and "
+    "with the corrected one; both enlarged alike.",
+    "place": "The machine at home. Red: what is named; where nothing of the machine is, the tool is marked.",
+    "before_after": "What the machine of your file and the corrected one leave of the readings, rms: of those that no fit saw, unless "
+    "the title says otherwise.",
+    "residual_trends": "Residual of every reading against what drives it.",
+    "residual_others": "Residual of every reading against what drives nothing here.",
+    "residual_histogram": "Residuals over the noise floor. With the right machine they follow the dashed line.",
+    "loops": "Reading over load in the order of time, each set-up from its own zero: what was measured, and what the machine of your file "
+    "and the corrected one show.",
+    "maps": "Error of the tool over a plane of the workspace: the machine of your file, the corrected one, and what the finding changes.",
+    "loaded": "The corrected machine where it deflects most in that plane: without load (dashed), under it (enlarged), and the part "
+    "of each spring and drive.",
+    "unexplained": "What no effect explains, over the workspace, and the empirical field that would remove it.",
+}
+
+
+def figures(d: Findings) -> dict[str, Figure]:
+    """All figures by the names of their files. One that cannot be drawn says so in its place: the answer does not depend on
+    its pictures."""
+    return {name: drawn(make, d) for name, make in _wanted(d).items()}
+
+
+def _wanted(d: Findings) -> dict[str, Callable[[Findings], Figure]]:
+    made: dict[str, Callable[[Findings], Figure]] = {"place": place_figure, "before_after": before_after}
+    if d.experiment.axis_read[:3].any():
+        made["residual_vectors"] = vectors
+    driven, others = trending(d)
+    if driven:
+        made["residual_trends"] = lambda d: trends(d, driven)
+    if others:
+        made["residual_others"] = lambda d: trends(d, others)
+    made["residual_histogram"] = histogram
+    if d.experiment.load_direction is not None:
+        made["loops"] = loops
+    if d.effects and d.declared.description.workspace is not None:
+        made["maps"] = maps
+        if d.experiment.wrench[:, :3].any():
+            made["loaded"] = loaded
+    if d.unexplained and d.empirical and d.experiment.groups.max() > 0:
+        made["unexplained"] = left
+    return made
+
+
+def drawn(make: Callable[[Findings], Figure], d: Findings) -> Figure:
+    """A figure, or one that says why it is not drawn."""
+    try:
+        return make(d)
+    except Exception as problem:
+        figure = Figure(figsize=(7, 1.2), layout="constrained")
+        figure.text(0.5, 0.5, f"not drawn: {problem}"[:300], ha="center", va="center", wrap=True, fontsize=9)
+        return figure
+
+
+def loaded(d: Findings) -> Figure:
+    """The corrected machine under the load where it deflects most."""
+    worst = worst_pose(d)
+    if worst is None:
+        raise StiffmapError("no pose of the plane of the maps has an equilibrium under load")
+    return loaded_figure(d.machine, *worst)
+
+
+def loops(d: Findings) -> Figure:
+    """Readings over the load that runs up and down, of the channel that moves most in noise floors."""
+    e = d.experiment
+    load = int(np.argmax(np.ptp(e.wrench, axis=0)))
+    size = [
+        np.nanstd(e.reading[:, i]) / d.noise.floor[c.name] if read else -1.0
+        for i, (c, read) in enumerate(zip(e.channels, e.axis_read, strict=True))
+    ]
+    channel = int(np.argmax(np.array(size)))
+    scale, unit = (MM, "mm") if e.channels[channel].unit == "m" else (1e3, "mrad")
+    told = (("as declared", d.residual_before, BEFORE), ("corrected", d.residual_after, AFTER))
+    figure = Figure(figsize=(9, 5), layout="constrained")
+    ax = figure.subplots()
+    assert e.order is not None
+    for k, run in enumerate(np.unique(e.runs)):
+        here = np.flatnonzero(e.runs == run)
+        here = here[np.argsort(e.order[here], kind="stable")]
+        zero = float(np.nanmean(e.reading[here, channel]))
+        x, y = e.wrench[here, load], (e.reading[here, channel] - zero) * scale
+        ax.plot(x, y, ".", ms=3, color="0.4", label=None if k else "measured")
+        for name, values, colour in told:
+            shown = y - values[here, channel] * scale
+            ax.plot(x, shown, lw=1.0, color=colour, label=None if k else name)
+    ax.set(
+        xlabel=f"{WRENCH[load]}, {'N' if load < 3 else 'N·m'}", ylabel=f"{e.channels[channel].name}, {unit}"
+    )
+    ax.legend()
+    return figure
+
+
+def left(d: Findings) -> Figure:
+    """What is left of the worst axis over the workspace, and the empirical field that would remove it."""
+    assert d.empirical is not None
+    names = [c.name for c in d.experiment.channels]
+    seen = [n for n, read in zip(names, d.experiment.axis_read, strict=True) if read]
+    named = [p.axis for p in d.unexplained if p.axis in seen]
+    axis = names.index(named[0] if named else seen[0])
+    figure = Figure(figsize=(11, 6.4), layout="constrained")
+    at = pose_means(d.experiment, d.experiment.position) * MM
+    shown = [
+        pose_means(d.experiment, kept(d, v))[:, axis] * UM for v in (d.residual_after, d.empirical.field)
+    ]
+    top = max(float(np.nanmax(np.abs(v))) for v in shown)
+    titles = (f"left in {names[axis]}, mean of each pose", "empirical field, from the other poses")
+    grid = figure.subplots(2, 3)
+    for row, (title, values) in enumerate(zip(titles, shown, strict=True)):
+        for column, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
+            ax = grid[row, column]
+            dots = ax.scatter(at[:, a], at[:, b], c=values, cmap="coolwarm", vmin=-top, vmax=top, s=36)
+            ax.set(xlabel=f"{'xyz'[a]}, mm", ylabel=f"{'xyz'[b]}, mm", title=title if column == 1 else "")
+        figure.colorbar(dots, ax=list(grid[row]), label=f"{names[axis]}, µm")
+    return figure
+
+
+def before_after(d: Findings) -> Figure:
+    """Rms of what both machines leave of readings that no fit saw, and the noise."""
+    unit = d.before.size[1]
+    values = [UM * d.before.size[0], UM * d.after.size[0], UM * noise_size(d)]
+    figure = Figure(figsize=(4.6, 2.4), layout="constrained")
+    ax = figure.subplots()
+    bars = ax.barh(["your file", "corrected", "noise"], values, color=[BEFORE, AFTER, "0.7"])
+    ax.bar_label(bars, [f"{v:#.3g} µ{unit}".replace(". ", " ") for v in values], padding=3)
+    ax.invert_yaxis()
+    ax.set_xlim(0, 1.3 * max(values))
+    ax.set(xlabel=f"left of {d.after.n} readings, rms, µ{unit}")
+    if d.held_out is None:
+        ax.set_title("not held out: the fit saw these readings", fontsize=9)
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    return figure
+
+
+def histogram(d: Findings) -> Figure:
+    """Residuals over the noise floor, with the normal distribution that noise alone would give."""
+    figure = Figure(figsize=(6, 3.4), layout="constrained")
+    ax = figure.subplots()
+    floor = np.array([d.noise.floor.get(c.name, np.nan) for c in d.experiment.channels])
+    both = [(kept(d, r) / floor) for r in (d.residual_before, d.residual_after)]
+    width = min(12.0, max(4.0, float(np.nanpercentile(np.abs(both[0]), 99))))
+    bins = np.linspace(-width, width, 61)
+    for z, colour, label in zip(both, (BEFORE, AFTER), ("before", "after"), strict=True):
+        ax.hist(
+            np.clip(z[np.isfinite(z)], bins[0], bins[-1]),
+            bins.tolist(),
+            density=True,
+            histtype="step",
+            color=colour,
+            label=label,
+            lw=1.5,
+        )
+    ax.plot(bins, np.exp(-(bins**2) / 2) / np.sqrt(2 * np.pi), color="0.4", ls="--", label="noise alone")
+    ax.set(xlabel="residual / noise floor (standard deviations)", ylabel="density")
+    ax.legend()
+    return figure
+
+
+def maps(d: Findings) -> Figure:
+    """Error over a z-plane: the file's machine, the corrected machine, and what changes."""
+    x, y, force, one, other = plane_errors(d)
+    if not np.isfinite(one).any() or not np.isfinite(other).any():
+        raise StiffmapError("no pose of the plane of the maps has an equilibrium under this force")
+    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    axes = figure.subplots(1, 3)
+    top = float(np.nanmax([np.nanmax(np.linalg.norm(v, axis=-1)) for v in (one, other)])) * MM
+    titles = ("machine of the file", "corrected machine", "difference of the two")
+    for ax, title, v in zip(axes, titles, (one, other, other - one), strict=True):
+        size = np.linalg.norm(v, axis=-1) * MM
+        limit = {} if title.startswith("difference") else {"vmin": 0.0, "vmax": top}
+        shade = ax.pcolormesh(x * MM, y * MM, size, shading="nearest", cmap="viridis", **limit)
+        figure.colorbar(shade, ax=ax, label="|error|, mm")
+        ax.set(title=title, xlabel="x, mm", ylabel="y, mm", aspect="equal")
+    load = "no force" if not force.any() else "force (" + ", ".join(f"{f:.0f}" for f in force[:3]) + ") N"
+    figure.suptitle(f"Error of the TCP over the plane z = {_middle(d.declared)[2] * MM:.0f} mm, {load}")
+    return figure
+
+
+def worst_pose(d: Findings) -> tuple[Floats, Floats] | None:
+    """Position (3,) m in the plane of the maps where the corrected machine deflects most, and the wrench (6,) N, N·m.
+
+    None without a force or a workspace, or where no pose of the plane has an answer.
+    """
+    if d.declared.description.workspace is None:
+        return None
+    x, y, force, _, errors = plane_errors(d)
+    size = np.linalg.norm(errors, axis=-1)
+    if not force.any() or not np.isfinite(size).any():
+        return None
+    row, column = np.unravel_index(int(np.nanargmax(size)), size.shape)
+    return np.array([x[column], y[row], _middle(d.declared)[2]]), force
+
+
+def plane_errors(d: Findings, count: int = 25) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """x, y (count), the force (6,), and errors (count, count, 3) m before and after."""
+    low, high = d.declared.workspace
+    x, y = np.linspace(low[0], high[0], count), np.linspace(low[1], high[1], count)
+    gx, gy = np.meshgrid(x, y)
+    position = np.stack([gx, gy, np.full_like(gx, _middle(d.declared)[2])], axis=-1)
+    one, other, force = _worst_force(d, position)
+    return x, y, force, one, other
+
+
+def _worst_force(d: Findings, position: Floats) -> tuple[Floats, Floats, Floats]:
+    """Of the forces used, along x, y or z, the one under which the machines differ most."""
+    size = float(np.abs(d.experiment.wrench[:, :3]).max())
+    tried = [np.append(size * axis, np.zeros(3)) for axis in np.eye(3)] if size > 0 else [np.zeros(6)]
+    pairs = [(_errors(d.declared, position, w), _errors(d.machine, position, w), w) for w in tried]
+    return max(pairs, key=lambda p: float(np.max(np.abs(np.nan_to_num(p[1] - p[0])))))
+
+
+def _errors(machine: Machine, position: Floats, wrench: Floats) -> Floats:
+    solution = machine.solve(position, wrench)
+    return np.where(solution.ok[..., None], solution.displacement[..., :3], np.nan)
+
+
+def _middle(machine: Machine) -> Floats:
+    return np.asarray(machine.workspace.mean(axis=0))

@@ -1,0 +1,220 @@
+"""The page of a job: the verdict first, then numbers, pictures and where they come from."""
+
+from __future__ import annotations
+
+import hashlib
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from stiffmap.common.outputs import make_folder, write_rows, write_text
+from stiffmap.machining.milling.job import Milled
+from stiffmap.machining.milling.limits import outside
+from stiffmap.machining.milling.placement import Placements
+from stiffmap.machining.milling.stability import PathStability
+from stiffmap.machining.milling.verdict import sizes, verdict
+from stiffmap.machining.process import cutting_force
+from stiffmap.machining.process.force import force_uncertainty
+from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.solve.status import Status
+from stiffmap.ui.pictures.milling import error_figure, machine_path_figure, outline_figure
+from stiffmap.ui.plot.style import save
+from stiffmap.ui.report.sheet import Sheet, write_sheet
+from stiffmap.workspace.maps.files import write_dataset
+
+PICTURES = ("outline", "error", "machine")
+
+
+def summary(found: Milled) -> dict[str, object]:
+    """Numbers of a job for JSON; mm, N, s."""
+    ds, job = found.dataset, found.job
+    force = np.linalg.norm(ds.force.values, axis=1)
+    out: dict[str, object] = {
+        "machine": job.machine.name,
+        "process": job.process.name,
+        "path": job.path.name,
+        "at_mm": [float(1e3 * v) for v in job.place.at],
+        "turn_deg": float(np.degrees(job.place.turn)),
+        "points": len(job),
+        "length_mm": float(1e3 * job.points.way[-1]),
+        "time_s": float(np.sum(np.diff(job.points.way) / job.feed[1:])),
+        "verdict": verdict(ds),
+        "stability": _stability(found),
+        "statuses": {
+            s.name: int((ds.status.values == s).sum()) for s in Status if (ds.status.values == s).any()
+        },
+        "error_normal_mm": sizes(ds.error_normal),
+        "error_normal_after_mm": sizes(ds.error_normal_after),
+        "error_along_mm": sizes(ds.error_along),
+        "error_axial_mm": sizes(ds.error_axial),
+        "mirror_leaves_mm": sizes(ds.mirror_left),
+        "command_left_mm": float(1e3 * np.nanmax(ds.command_left.values, initial=0.0)),
+        "loop_gain": {"least": float(np.nanmin(ds.gain)), "largest": float(np.nanmax(ds.gain))},
+        "force_N": {"least": float(np.nanmin(force)), "largest": float(np.nanmax(force))},
+        "tolerance_mm": None if job.process.tolerance is None else 1e3 * job.process.tolerance,
+        "taper_mm": sizes(ds.taper),
+        "beyond_limits": {k: int(v.sum()) for k, v in outside(ds, job.machine).items()},
+        "warnings": [{"name": w.name, "points": int(w.points.sum()), "text": w.text} for w in found.warnings],
+        "moves_written": found.program.pieces,
+        "notes": [*job.path.notes, *([job.process.note] if job.process.note else [])],
+    }
+    if "error_normal_after_low" in ds:
+        out["error_normal_after_band_mm"] = {
+            "force 80 %": sizes(ds.error_normal_after_low), "force 120 %": sizes(ds.error_normal_after_high),
+        }  # fmt: skip
+    if "error_normal_passes" in ds:
+        out["error_normal_passes_mm"] = [sizes(p) for p in ds.error_normal_passes]
+    if "true_error_normal" in ds:
+        out["true_error_normal_mm"] = sizes(ds.true_error_normal)
+        out["true_error_normal_after_mm"] = sizes(ds.true_error_normal_after)
+    if found.feeds is not None:
+        f = found.feeds
+        out["feeds"] = {"time_s": f.time, "before_s": f.before, "held": bool(f.held.all())}
+    waves = ds.ripple.values
+    if np.isfinite(waves).any() and waves.any():
+        out["ripple_mm"] = float(1e3 * np.nanmax(waves))
+    return out
+
+
+def placement_summary(found: Placements) -> dict[str, object]:
+    """Numbers of a search for the placement; mm, deg."""
+    fits = found.largest[np.isfinite(found.largest)]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.abs(found.naive_along) / np.abs(found.best_along)
+    return {
+        "at_mm": [float(1e3 * v) for v in found.best.at],
+        "turn_deg": float(np.degrees(found.best.turn)),
+        "largest_error_mm": 1e3 * found.best_error,
+        "naive_at_mm": [float(1e3 * v) for v in found.naive.at],
+        "naive_error_mm": 1e3 * found.naive_error,
+        "naive_over_best": found.gain,
+        "naive_over_best_along": {
+            "median": float(np.median(ratio)),
+            "share_over_3": float((ratio > 3).mean()),
+        },
+        "worst_over_best": float(fits.max() / found.best_error),
+        "more_than_3_times_the_best": found.three_times,
+        "worst_error_mm": float(1e3 * fits.max()),
+        "tried": len(found.largest),
+        "in_reach": found.reachable,
+        "limited_by": found.limits,
+    }
+
+
+def _stability(found: Milled) -> dict[str, object]:
+    """What is said of chatter; rpm."""
+    s, spindle = found.stability, found.job.process.spindle
+    if not isinstance(s, PathStability):
+        return {"sentence": s}
+    return {
+        "sentence": s.sentence(spindle), "largest_multiplier": float(s.multiplier.max()), "unstable_places": s.unstable,
+        "places": len(s.way), "stable_speeds_rpm": [float(60 * v / (2 * np.pi)) for v in s.offered],
+        "damping": s.damping,
+    }  # fmt: skip
+
+
+def write_report(found: Milled, folder: str | PathLike[str]) -> dict[str, str]:
+    """Write report.html, its pictures, the compensated program and part.nc into a folder; names of the files. Raises FileError."""
+    target = Path(folder)
+    made = {"report": "report.html", "program": f"compensated{found.program.suffix}", "data": "part.nc"}
+    make_folder(target)
+    write_text(target / made["program"], found.program.text)
+    ds = found.dataset.copy()
+    ds.attrs = {k: v if v else "" for k, v in ds.attrs.items()}
+    write_dataset(ds, target / made["data"])
+    if found.job.angle is not None:
+        made["drives"] = "drives.csv"
+        write_rows(target / made["drives"], *_drives(found))
+    pictures = _pictures(found)
+    for name, figure in zip(PICTURES, pictures.values(), strict=True):
+        made[name] = f"{name}.png"
+        save(figure, target / made[name])
+    write_sheet(target / made["report"], _sheet(found), pictures, _digests(found))
+    return made
+
+
+def _drives(found: Milled) -> tuple[list[str], list[list[str]]]:
+    """Names and rows: what an arm's drives stand at along the compensated path, and the turn about the tool."""
+    job, machine = found.job, found.job.machine
+    at = inverse_kinematics(machine, found.command, job.rotation).actuators
+    prismatic = [machine.compiled.names.is_prismatic(a) for a in machine.actuators]
+    scale = np.where(prismatic, 1e3, 180 / np.pi)
+    units = ["mm" if p else "deg" for p in prismatic]
+    names = ["way_mm", "turn_deg", *(f"{a}_{u}" for a, u in zip(machine.actuators, units, strict=True))]
+    assert job.angle is not None
+    columns = np.hstack([1e3 * job.points.way[:, None], np.degrees(job.angle)[:, None], at * scale])
+    return names, [[f"{v:.9g}" for v in row] for row in columns]
+
+
+def _pictures(found: Milled) -> dict[str, Figure]:
+    return {
+        "The wall of the part, wanted and cut.": outline_figure(found),
+        "Error across the wall along the path.": error_figure(found.dataset),
+        "The path on the machine.": machine_path_figure(found),
+    }
+
+
+def _digests(found: Milled) -> dict[str, str]:
+    return {
+        "machine": hashlib.sha256(repr(found.job.machine.description).encode()).hexdigest(),
+        "process": hashlib.sha256(repr(found.job.process).encode()).hexdigest(),
+        "compensated program": hashlib.sha256(found.program.text.encode()).hexdigest(),
+    }
+
+
+def _sheet(found: Milled) -> Sheet:
+    job, s = found.job, summary(found)
+    force, u = cutting_force(job.process), force_uncertainty(job.process)
+    mean = ", ".join(f"{v:.1f} ± {e:.1f}" for v, e in zip(force.mean, u, strict=True))
+    p = job.process
+    lines = [
+        f"{job.path.name} on {job.machine.name}: {s['length_mm']:.0f} mm of cut, {s['time_s']:.1f} s, part at "
+        f"({', '.join(f'{v:.1f}' for v in s['at_mm'])}) mm, turned by {s['turn_deg']:.1f} deg.",  # type: ignore[attr-defined]
+        f"Process {p.name}: {p.cut.side} cut, {1e3 * p.cut.axial:g} mm deep, {60 * p.feed:.3g} m/min; mean force {mean} N along the "
+        f"feed, to its left, along the tool; {force.power:.0f} W at the spindle.",
+        f"Error across the wall: positive where material stays on the part. Loop gain kp/k up to {abs(s['loop_gain']['largest']) if abs(s['loop_gain']['largest']) < 1e-9 else s['loop_gain']['largest']:.3g}: "  # type: ignore[index]
+        f"one mirrored program would leave {s['mirror_leaves_mm']['largest']:.4f} mm.",  # type: ignore[index]
+        f"The compensated program has {found.program.pieces} cutting moves; it was read back and simulated with the force "
+        "evaluated anew at the true distance from the wall.",
+    ]
+    lines += [w.text for w in found.warnings]
+    if found.feeds is not None:
+        lines.append(
+            f"Feed of each move chosen: {found.feeds.time:.1f} s of cutting instead of {found.feeds.before:.1f} s; "
+            + (
+                "the error stays within the tolerance."
+                if found.feeds.held.all()
+                else f"{int((~found.feeds.held).sum())} moves are beyond the tolerance at any feed."
+            )
+        )
+    if not any(w.name == "chatter" for w in found.warnings):
+        lines.append(str(s["stability"]["sentence"]))  # type: ignore[index]
+    lines += [f"Note: {n}" for n in s["notes"]]  # type: ignore[attr-defined]
+    rows = [
+        [label, f"{s[key]['rms']:.5f}", f"{s[key]['largest']:.5f}"]  # type: ignore[index]
+        for label, key in (
+            ("across the wall, as it is", "error_normal_mm"), ("across the wall, compensated", "error_normal_after_mm"),
+            ("across the wall, mirrored once", "mirror_leaves_mm"), ("along the path, as it is", "error_along_mm"),
+            ("along the tool, as it is", "error_axial_mm"), ("true machine, as it is", "true_error_normal_mm"),
+            ("true machine, compensated", "true_error_normal_after_mm"),
+        ) if key in s
+    ]  # fmt: skip
+    for label, key in (
+        ("force 80 %, compensated", "force 80 %"),
+        ("force 120 %, compensated", "force 120 %"),
+    ):
+        band = s.get("error_normal_after_band_mm")
+        if isinstance(band, dict):
+            rows.append([label, f"{band[key]['rms']:.5f}", f"{band[key]['largest']:.5f}"])
+    for k, one in enumerate(s.get("error_normal_passes_mm", []), 1):  # type: ignore[arg-type, var-annotated]
+        rows.append([f"after pass {k}", f"{one['rms']:.5f}", f"{one['largest']:.5f}"])
+    return Sheet(
+        f"Milling: {job.path.name}",
+        verdict(found.dataset),
+        lines,
+        ["error", "rms, mm", "largest, mm"],
+        rows,
+        (2, 3),
+    )

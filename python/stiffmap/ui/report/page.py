@@ -1,0 +1,66 @@
+"""A page with the loaded machine that turns under the mouse; one file, no server, no network."""
+
+from __future__ import annotations
+
+import json
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from stiffmap.common.outputs import write_text
+from stiffmap.solve.budget import deflection_budget
+from stiffmap.solve.machine import Machine
+from stiffmap.ui.plot.loaded import LoadedShape, loaded_shape
+from stiffmap.ui.plot.style import BLACK, CYCLE
+
+
+def write_page(
+    machine: Machine,
+    path: str | PathLike[str],
+    position: ArrayLike | None = None,
+    wrench: ArrayLike = (0.0, 0.0, -300.0, 0.0, 0.0, 0.0),
+    *,
+    rotation: ArrayLike | None = None,
+) -> Path:
+    """Write the page; raises FileError where it cannot be written, StiffmapError for a failed pose."""
+    shape = loaded_shape(machine, position, wrench, rotation=rotation)
+    budget = deflection_budget(machine, position, wrench, rotation=rotation)
+    from stiffmap.ui.report.templates import render
+
+    size = sum(v * v for v in shape.displacement[:3]) ** 0.5
+    text = render(
+        "machine.html",
+        name=machine.name,
+        title=machine.description.title,
+        position=[1e3 * v for v in budget.position],
+        force=list(budget.wrench[:3]),
+        size=1e6 * size,
+        factor=shape.factor,
+        budget=[(n, 1e6 * size * s, 100 * s) for n, _, s in budget.ranked()],
+        data=json.dumps(scene(shape, machine.legs)),
+    )
+    return write_text(path, text)
+
+
+def scene(shape: LoadedShape, legs: tuple[str, ...]) -> dict[str, Any]:
+    """Lines and points at rest and under load (mm), for the page's script."""
+    colours = {leg: CYCLE[i % len(CYCLE)] for i, leg in enumerate(legs)} | {"": BLACK}
+    links = [
+        {"leg": leg, "colour": colours[leg], "rest": _mm(a), "loaded": _mm(b)}
+        for (leg, a), (_, b) in zip(shape.rest.links, shape.loaded.links, strict=True)
+    ]
+    return {
+        "links": links,
+        "guides": [_mm(ends) for _, ends in shape.rest.guides],
+        "actuators": {"rest": _mm(shape.rest.actuators), "loaded": _mm(shape.loaded.actuators)},
+        "passive": {"rest": _mm(shape.rest.passive), "loaded": _mm(shape.loaded.passive)},
+        "tcp": {"rest": _mm(shape.rest.tcp[None]), "loaded": _mm(shape.loaded.tcp[None])},
+        "force": list(map(float, shape.force)),
+        "factor": shape.factor,
+    }
+
+
+def _mm(points: Any) -> list[list[float]]:
+    return [[float(f"{1e3 * v:.7g}") for v in p] for p in points]

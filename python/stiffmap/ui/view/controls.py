@@ -1,0 +1,292 @@
+"""The panel next to the scene: every control changes the model, and shows what the model says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.ui.view.changes import addresses, units
+from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.outputs import Outputs
+from stiffmap.ui.view.place import first_plane, moves, rotation_of, turns
+from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.state import PLANES
+
+MOST_FORCE, MOST_GRAVITY, DECADE = 5000.0, 20.0, 1.0
+HOME = "as at home"
+NONE = "none"
+TITLES = {q.title: name for name, q in QUANTITIES.items()}
+
+
+class Controls:
+    """Builds the panel; `show` puts the state's numbers into it."""
+
+    def __init__(self, viewer: Any) -> None:
+        self.viewer, gui = viewer, viewer.server.gui
+        gui.configure_theme(
+            control_layout="collapsible", control_width="large", show_logo=False, show_share_button=False
+        )
+        self._modes: dict[str, tuple[float, ...] | None] = {HOME: None}
+        moment = viewer.model.moment
+        self._status = gui.add_html("")
+        self._bar = gui.add_html("")
+        self.probe = gui.add_text("Probe", "click a point of the plane", disabled=True)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Tool and load"):
+            self._tool(gui, moment)
+        with tabs.add_tab("Map"):
+            self._map(gui, moment)
+        with tabs.add_tab("Why"):
+            self._why_tab(gui)
+        with tabs.add_tab("Numbers"):
+            self._numbers(gui, moment)
+        with tabs.add_tab("Out"):
+            self.outputs = Outputs(viewer, gui)
+        self._shown: dict[int, Any] = {}
+        self.map_on, self.hold, self.isolines, self.cloud = True, False, True, False
+        self.surface, self.lit = NONE, ""
+
+    # -- building -----------------------------------------------------------------------------------------------
+
+    def _tool(self, gui: Any, moment: Moment) -> None:
+        self._position = gui.add_vector3(
+            "Tool, mm", (0, 0, 0), step=1.0, hint="commanded position in base axes"
+        )
+        self._typed(self._position, lambda m, v: m.put(position=tuple(1e-3 * np.array(v))))
+        self._turn = gui.add_vector3(
+            "Rotation, deg", (0, 0, 0), step=1.0, hint="rotation vector of the commanded orientation",
+            visible=any(turns(moment.machine)),
+        )  # fmt: skip
+        self._typed(self._turn, lambda m, v: m.put(rotation=tuple(np.deg2rad(v))))
+        self._force = gui.add_vector3("Force, N", (0, 0, 0), step=10.0, hint="on the tool, base axes")
+        self._typed(self._force, lambda m, v: m.put(force=tuple(v)))
+        self._size = gui.add_slider("Size of the force, N", 0.0, MOST_FORCE, 10.0, 0.0)
+        self._typed(self._size, _sized, keep=False)
+        self._around = gui.add_slider("Force around z, deg", -180.0, 180.0, 1.0, 0.0)
+        self._typed(self._around, _turned, keep=False)
+        self._moment = gui.add_vector3("Moment, N·m", (0, 0, 0), step=1.0)
+        self._typed(self._moment, lambda m, v: m.put(moment=tuple(v)))
+        self._gravity = gui.add_slider("Gravity downwards, m/s²", 0.0, MOST_GRAVITY, 0.01, 0.0)
+        self._typed(self._gravity, lambda m, v: m.put(gravity=(0.0, 0.0, -float(v)), keep=False), keep=False)
+        self._factor = gui.add_number(
+            "Magnification", 1.0, min=0.0, hint="of the deflected machine; 0 hides it"
+        )
+        self._typed(self._factor, lambda m, v: m.put(magnification=float(v)))
+        self._pressed(gui.add_button("Round magnification"), lambda m: m.put(magnification=None))
+        self._mode = gui.add_dropdown(
+            "Assembly mode", (HOME,), hint="ways in which the machine takes this pose"
+        )
+        self._typed(self._mode, lambda m, v: m.put(start=self._modes.get(v)))
+        gui.add_button("Search assembly modes").on_click(lambda _: self._search())
+        self._pressed(gui.add_button("Undo"), lambda m: m.undo())
+        self._pressed(gui.add_button("Reset"), lambda m: m.reset())
+        gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl").on_trigger(
+            lambda _: self.viewer.act(lambda m: m.undo())
+        )
+        gui.add_command("Reset the view").on_trigger(lambda _: self.viewer.act(lambda m: m.reset()))
+
+    def _map(self, gui: Any, moment: Moment) -> None:
+        box = gui.add_checkbox("Map", True)
+        box.on_update(lambda e: self._set("map_on", e))
+        self._quantity = gui.add_dropdown(
+            "Colour", tuple(TITLES), initial_value=QUANTITIES["deflection"].title
+        )
+        self._typed(self._quantity, lambda m, v: m.put(quantity=TITLES[v]))
+        self._plane = gui.add_dropdown("Plane across", PLANES, initial_value=first_plane(moment.machine))
+        self._typed(self._plane, lambda m, v: m.put(plane=v))
+        self._normal = gui.add_vector3("Normal of a free plane", (0.0, 0.0, 1.0), step=0.05)
+        self._typed(self._normal, lambda m, v: m.put(normal=tuple(v), plane="free"))
+        self._tolerance = gui.add_number("Tolerance, µm", 250.0, min=0.001)
+        self._typed(self._tolerance, lambda m, v: m.put(tolerance=1e-6 * float(v)))
+        self._frequency = gui.add_number("Frequency, Hz", 0.0, min=0.0, hint="of the dynamic stiffness")
+        self._typed(self._frequency, lambda m, v: m.put(frequency=float(v)))
+        for label, name, on in (
+            ("Isolines", "isolines", True),
+            ("Hold the scale", "hold", False),
+            ("Whole box as points", "cloud", False),
+        ):
+            gui.add_checkbox(label, on).on_update(lambda e, name=name: self._set(name, e))
+        surface = gui.add_dropdown("At the tool", (NONE, "polar diagram", "ellipsoid"), initial_value=NONE)
+        surface.on_update(lambda e: self._set("surface", e))
+        self._surface_text = gui.add_html("")
+        fixed = [a for a, free in zip("xyz", moves(moment.machine), strict=True) if not free]
+        if fixed:
+            gui.add_html(
+                f'<div style="padding:.3em .6em">{", ".join(fixed)}: not commanded in this machine; the colours do not '
+                "change along it</div>"
+            )
+
+    def _why_tab(self, gui: Any) -> None:
+        self._light = gui.add_dropdown("Light an element", (NONE,))
+        self._light.on_update(lambda e: self._set("lit", e))
+        self._why = gui.add_html("")
+        number = gui.add_slider("Mode", 1, 6, 1, 1)
+
+        def changed(event: Any) -> None:
+            self.viewer.swing.mode = int(event.target.value) - 1
+            self.viewer.worker.ask()
+
+        number.on_update(changed)
+
+        gui.add_checkbox("Mode moves", False).on_update(
+            lambda e: self.viewer.swing.play(bool(e.target.value))
+        )
+
+    def _numbers(self, gui: Any, moment: Moment) -> None:
+        self._all, self._units = addresses(moment.machine.description), units(moment.machine.description)
+        names = tuple(self._all)
+        self._find = gui.add_text("Find", "", hint="part of an address")
+        self._address = gui.add_dropdown("Number", names, initial_value=names[0])
+        self._value = gui.add_number("Value, SI", 0.0)
+        self._scale = gui.add_slider("Power of ten on the file's value", -DECADE, DECADE, 0.01, 0.0)
+        self._typed(self._value, lambda m, v: m.change(self._address.value, float(v)))
+        self._typed(
+            self._scale,
+            lambda m, v: m.change(
+                self._address.value, self._all[self._address.value] * 10 ** float(v), keep=False
+            ),
+            keep=False,
+        )
+        self._pressed(gui.add_button("As in the file"), lambda m: m.change(self._address.value, None))
+        self._pressed(gui.add_button("All as in the file"), lambda m: m.put(changes=()))
+        self._changed = gui.add_text("Changed", "nothing", multiline=True, disabled=True)
+
+        def changed(event: Any) -> None:
+            if event.client_id is not None:
+                found = tuple(a for a in self._all if event.target.value.lower() in a.lower())
+                self._address.options = found or names
+
+        self._find.on_update(changed)
+
+        self._address.on_update(lambda e: self.viewer.worker.ask())
+
+    # -- plumbing -----------------------------------------------------------------------------------------------
+
+    def _typed(self, handle: Any, deed: Callable[[Any, Any], object], keep: bool = True) -> None:
+        """A control whose value goes to the model; what the program itself writes into it does not."""
+
+        def changed(event: Any) -> None:
+            if event.client_id is None:
+                return
+            if not keep:
+                self.viewer.model.history.mark()
+            self.viewer.act(lambda m: deed(m, event.target.value))
+
+        handle.on_update(changed)
+
+    def _pressed(self, handle: Any, deed: Callable[[Any], object]) -> None:
+        handle.on_click(lambda _: self.viewer.act(deed))
+
+    def _set(self, name: str, event: Any) -> None:
+        if event.client_id is not None:
+            value = event.target.value
+            setattr(self, name, "" if name == "lit" and value == NONE else value)
+            self.viewer.redraw()
+
+    def _search(self) -> None:
+        try:
+            found = self.viewer.now().assembly_modes()
+        except StiffmapError as problem:
+            self.viewer.error = str(problem)
+            return
+        self._modes = {HOME: None} | {f"mode {i + 1}": x for i, x in enumerate(found[1:], 1)}
+        self._mode.options = tuple(self._modes)
+        self.viewer.worker.ask()
+
+    # -- what the model says ------------------------------------------------------------------------------------
+
+    def say(self, html: str) -> None:
+        """The line on top."""
+        self._write(self._status, "content", html)
+
+    def bar(self, html: str) -> None:
+        """The colour bar."""
+        self._write(self._bar, "content", html)
+
+    def why(self, html: str, surface: str) -> None:
+        """The panels, and what the size of the surface at the tool means."""
+        self._write(self._why, "content", html)
+        self._write(self._surface_text, "content", f'<div style="padding:.3em .6em">{surface}</div>')
+
+    def elements(self, names: Sequence[str]) -> None:
+        """What may be lit, by rank."""
+        options = (NONE, *names)
+        if tuple(self._light.options) != options:
+            chosen = self._light.value
+            self._light.options = options
+            self._light.value = chosen if chosen in options else NONE
+
+    def show(self, moment: Moment) -> None:
+        """The state's numbers in all controls."""
+        m, s = moment.machine, moment.state
+        turn = Rotation.from_matrix(rotation_of(m, s)).as_rotvec()
+        size = float(np.linalg.norm(s.force))
+        gravity = m.compiled.gravity(s.gravity)
+        self._write(self._position, "value", _round(1e3 * np.array(s.position)))
+        self._write(self._turn, "value", _round(np.rad2deg(turn)))
+        self._write(self._force, "value", _round(s.force))
+        self._write(self._moment, "value", _round(s.moment))
+        self._write(self._size, "value", min(size, MOST_FORCE))
+        self._write(self._around, "value", round(float(np.rad2deg(np.arctan2(s.force[1], s.force[0]))), 3))
+        self._write(self._gravity, "value", min(max(-float(gravity[2]), 0.0), MOST_GRAVITY))
+        if self.viewer._solution is not None:
+            self._write(
+                self._factor, "value", moment.magnification(self.viewer.scene.rest, self.viewer._solution)
+            )
+        self._write(self._quantity, "value", QUANTITIES[s.quantity].title)
+        self._write(self._plane, "value", s.plane)
+        self._write(self._normal, "value", _round(s.normal))
+        self._write(self._tolerance, "value", round(1e6 * s.tolerance, 6))
+        self._write(self._frequency, "value", s.frequency)
+        chosen = next((n for n, x in self._modes.items() if x == s.start), HOME)
+        self._write(self._mode, "value", chosen)
+        address = self._address.value
+        given = dict(s.changes)
+        plain = self._all.get(address, 0.0)
+        now = given.get(address, plain)
+        self._write(self._value, "value", now)
+        power = float(np.log10(now / plain)) if plain and now / plain > 0 else 0.0
+        self._write(self._scale, "value", round(float(np.clip(power, -DECADE, DECADE)), 2))
+        lines = [
+            f"{a} = {v:.6g} {self._units.get(a, 'SI')}"
+            + (f", file: {self._all[a]:.6g}" if a in self._all else "")
+            for a, v in given.items()
+        ]
+        self._write(self._changed, "value", "\n".join(lines) or "nothing")
+        self.outputs.show(moment)
+
+    def renew(self, moment: Moment) -> None:
+        """The machine's file has changed."""
+        self._all, self._units = addresses(moment.machine.description), units(moment.machine.description)
+        self._address.options = tuple(self._all)
+
+    def _write(self, handle: Any, field: str, value: Any) -> None:
+        """Only what differs is sent."""
+        if getattr(handle, field) != value:
+            setattr(handle, field, value)
+
+
+def _round(values: Any) -> tuple[float, float, float]:
+    x, y, z = (round(float(v), 6) + 0.0 for v in values)
+    return x, y, z
+
+
+def _sized(model: Any, size: Any) -> object:
+    f = np.array(model.state.force)
+    length = float(np.linalg.norm(f))
+    unit = f / length if length else np.array([0.0, 0.0, -1.0])
+    return model.put(force=tuple(float(v) for v in float(size) * unit), keep=False)
+
+
+def _turned(model: Any, angle: Any) -> object:
+    """The force turned about z; one along z lies down first."""
+    x, y, z = model.state.force
+    flat = float(np.hypot(x, y))
+    if flat < 1e-9:
+        flat, z = abs(z), 0.0
+    a = np.deg2rad(float(angle))
+    return model.put(force=(float(flat * np.cos(a)), float(flat * np.sin(a)), z), keep=False)

@@ -1,0 +1,191 @@
+"""Measured rows, a diagnosis and tool paths in the scene; what is magnified says by how much."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.experiment import Experiment
+from stiffmap.experiment.comparison.residual import residual
+from stiffmap.solve.machine import Machine
+from stiffmap.ui.plot.loaded import round_factor
+from stiffmap.ui.plot.style import BLUE, GREEN, VERMILLION
+from stiffmap.ui.view.diagnosed import Findings
+from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.place import orientation
+from stiffmap.ui.view.scene import Scene
+
+DRAWN = 0.06
+"""Of the machine's extent, the longest arrow and the widest ribbon."""
+MOST_POINTS = 400
+"""Of a path that are solved."""
+BEFORE, NOW, NAMED = VERMILLION, BLUE, "#E8279B"
+"""Residuals of the machine as opened, with what was changed in the view, and with what a diagnosis named."""
+Arrows = tuple[Floats, Floats]
+"""Places (n, 3) m and what is drawn there (n, 3) m."""
+
+
+class Data:
+    """What is drawn next to the machine: rows of an experiment, what a diagnosis named, a path of the tool (n, 3) m."""
+
+    def __init__(
+        self,
+        experiment: Experiment | None = None,
+        path: Floats | None = None,
+        diagnosis: Findings | None = None,
+        opened: Machine | None = None,
+    ) -> None:
+        """opened: the machine whose residuals come before; None: the first that is drawn."""
+        self.experiment, self.path = experiment, None if path is None else thinned(path)
+        self.diagnosis, self.opened = diagnosis, opened
+        self._before: Arrows | None = None
+        self._named: Arrows | None = None
+        self._drawn: tuple[Machine, Scene] | None = None
+        self._said: dict[str, str] = {}
+
+    def __call__(self, scene: Scene, moment: Moment) -> None:
+        """Draw into a scene."""
+        if self.experiment is not None:
+            self._rows(scene, moment)
+        if self.diagnosis is not None:
+            self._effects(scene, moment, self.diagnosis)
+        if self.path is not None:
+            self._ribbon(scene, moment, self.path)
+
+    @property
+    def html(self) -> str:
+        """What the colours mean and how large they are drawn, for the panel."""
+        return "".join(f'<p style="margin:.4em 0"><b>{k}</b>: {v}</p>' for k, v in self._said.items())
+
+    def _rows(self, scene: Scene, moment: Moment) -> None:
+        if self._drawn == (moment.machine, scene):
+            return
+        e = self.experiment
+        assert e is not None
+        now = residual_arrows(moment.machine, e)
+        if self._before is None:
+            self._before = now if self.opened is None else residual_arrows(self.opened, e)
+        before = self._before
+        if self.diagnosis is not None and self._named is None:
+            self._named = residual_arrows(self.diagnosis.machine, e)
+        self._drawn = (moment.machine, scene)
+        places = before[0]
+        if not len(places):
+            self._said["Experiment"] = f"{escape(e.name)} reads no displacement of the tool along an axis"
+            return
+        factor = round_factor(DRAWN * scene.extent, float(np.linalg.norm(before[1], axis=1).max()))
+        sets = [("before", BEFORE, "red", "as opened", before)]
+        sets += [] if same(now, before) else [("now", NOW, "blue", "as changed here", now)]
+        sets += (
+            [] if self._named is None else [("diagnosed", NAMED, "pink", "with the diagnosis", self._named)]
+        )
+        for name in ("before", "now", "diagnosed"):
+            scene.lines(f"/rows/{name}", np.zeros((0, 2, 3)), BEFORE, 1.0)
+        words = []
+        for name, colour, said, which, (at, arrows) in sets:
+            pieces = np.stack([at, at + factor * arrows], axis=1)
+            scene.lines(f"/rows/{name}", pieces, colour, 0.004 * scene.extent)
+            words.append(f"{said} {which} {1e6 * rms(arrows):.3g} µm rms")
+        text = f"{len(places)} rows, residuals (measured less predicted) × {factor:g}: {', '.join(words)}"
+        self._said["Experiment"] = f"{escape(e.name)}, {text}"
+        scene.points("/rows/places", places, "#444444")
+
+    def _effects(self, scene: Scene, moment: Moment, found: Findings) -> None:
+        scene.diagnosed = list(dict.fromkeys(i for e in found.effects for i in e.links(moment.machine)))
+        named = "; ".join(escape(e.text) for e in found.effects) or "no effect is named"
+        self._said["Diagnosis (pink)"] = f"{escape(found.verdict)}: {named}"
+        for i, e in enumerate(found.effects):
+            links = e.links(moment.machine)
+            if links:
+                middle = scene.rest.links[links[0]].mean(axis=0)
+                scene.api.add_label(f"/diagnosis/{i}", f"{e.kind} of {e.element}", position=tuple(middle))
+
+    def _ribbon(self, scene: Scene, moment: Moment, path: Floats) -> None:
+        wanted, cut, corrected, factor = path_errors(moment, path, DRAWN * scene.extent)
+        for name, colour, line in (
+            ("wanted", GREEN, wanted),
+            ("cut", VERMILLION, cut),
+            ("compensated", BLUE, corrected),
+        ):
+            pieces = np.stack([line[:-1], line[1:]], axis=1)
+            good = np.isfinite(pieces).all(axis=(1, 2))
+            scene.lines(f"/path/{name}", pieces[good], colour, 0.003 * scene.extent)
+        vertices, faces = ribbon(wanted, cut)
+        scene.mesh("/path/ribbon", vertices, faces, VERMILLION)
+        off = [1e6 * largest(line - wanted) / factor for line in (cut, corrected)]
+        failed = int((~np.isfinite(cut).all(axis=1)).sum())
+        more = f"; {failed} of {len(path)} points have no equilibrium" if failed else ""
+        self._said["Path"] = (
+            f"errors × {factor:g}: wanted green, as cut red (most {off[0]:.3g} µm), "
+            f"compensated by one mirror step blue (most {off[1]:.3g} µm){more}"
+        )
+
+
+def same(a: Arrows, b: Arrows) -> bool:
+    """Whether two sets of arrows are equal."""
+    return np.array_equal(a[0], b[0]) and np.array_equal(a[1], b[1])
+
+
+def rms(arrows: Floats) -> float:
+    """Root mean square length (m)."""
+    return float(np.sqrt(np.mean(np.sum(arrows**2, axis=1))))
+
+
+def largest(arrows: Floats) -> float:
+    """Greatest length; 0 where none is finite."""
+    return float(np.nanmax(np.linalg.norm(arrows, axis=1), initial=0.0))
+
+
+def ribbon(one: Floats, other: Floats) -> tuple[Floats, NDArray[np.uint32]]:
+    """Vertices (2n, 3) and triangles (m, 3) between two lines (n, 3), where both are finite."""
+    n = len(one)
+    i = np.arange(n - 1)
+    good = np.asarray(np.isfinite(np.hstack([one, other])).all(axis=1))
+    i = i[good[:-1] & good[1:]]
+    faces = np.concatenate([np.stack(t, axis=1) for t in ((i, i + 1, n + i), (i + 1, n + i + 1, n + i))])
+    return np.nan_to_num(np.concatenate([one, other])), faces.astype(np.uint32)
+
+
+def thinned(path: Floats) -> Floats:
+    """At most some hundred points of a path."""
+    p = np.asarray(path, dtype=float).reshape(-1, 3)
+    return np.asarray(p[:: max(1, -(-len(p) // MOST_POINTS))])
+
+
+def residual_arrows(machine: Machine, experiment: Experiment) -> tuple[Floats, Floats]:
+    """Places (n, 3) m of the rows that read a displacement along an axis, and their residuals (n, 3) m; 0 where an
+    axis is not read."""
+    r = residual(machine, experiment)
+    values = np.zeros((len(r.values), 3))
+    for i, c in enumerate(r.experiment.channels):
+        for axis, name in enumerate(("dx", "dy", "dz")):
+            if c.name == name:
+                values[:, axis] = r.values[:, i]
+    read = np.isfinite(values).any(axis=1)
+    return np.asarray(r.experiment.position[read]), np.nan_to_num(values[read])
+
+
+def path_errors(moment: Moment, path: Floats, size: float) -> tuple[Floats, Floats, Floats, float]:
+    """The path that is wanted, as cut under the state's load, and after one mirror step, errors times a round factor.
+
+    The mirror step commands the path less its deflection; what is left is solved there.
+    """
+    s, m = moment.state, moment.machine
+
+    def off(at: Floats) -> Floats:
+        solution = m.solve(
+            at, s.wrench, rotation=orientation(s), gravity=s.gravity, start=s.start_array, stiffness=False
+        )
+        return np.asarray(solution.displacement[:, :3])
+
+    cut = off(path)
+    command = path - cut
+    good = np.isfinite(command).all(axis=1)
+    left = np.full_like(path, np.nan)
+    left[good] = off(command[good]) + command[good] - path[good]
+    most = float(np.nanmax(np.linalg.norm(cut, axis=1), initial=0.0))
+    factor = round_factor(size, most)
+    return path, path + factor * cut, path + factor * left, factor

@@ -1,0 +1,98 @@
+"""A machine in a state: everything that is drawn and said of it. Immutable, so that it may be worked out while a hand goes on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.budget import DeflectionBudget, deflection_budget
+from stiffmap.solve.compiled import Status
+from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.solution import Solution
+from stiffmap.ui.plot.loaded import SHOWN, round_factor
+from stiffmap.ui.view.drawing import Drawing, drawing
+from stiffmap.ui.view.place import box_of, orientation
+from stiffmap.ui.view.plane import FINE, PlaneMap, plane_map
+from stiffmap.ui.view.state import State
+
+BRANCHES_TRIED, ALIKE = 96, 1e-4
+"""Starts of the search for assembly modes; rad or m by which two of them differ."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The machine with its changed numbers, and the state."""
+
+    machine: Machine
+    state: State
+
+    def solve(self) -> Solution:
+        """The tool's pose under the load."""
+        s = self.state
+        return self.machine.solve(
+            s.position, s.wrench, rotation=orientation(s), gravity=s.gravity, start=s.start_array, threads=1
+        )
+
+    def plane(self, count: int = FINE) -> PlaneMap:
+        """The plane through the tool."""
+        return plane_map(self.machine, self.state, count)
+
+    def rest(self) -> Drawing:
+        """The machine at its pose, springs at rest."""
+        m, s = self.machine, self.state
+        k = inverse_kinematics(m, s.position, orientation(s), start=s.start_array, threads=1)
+        return drawing(m, k.coordinates)
+
+    def loaded(self, solution: Solution) -> Drawing | None:
+        """The machine under the load; None where there is no equilibrium."""
+        return drawing(self.machine, solution.coordinates) if bool(solution.ok) else None
+
+    def magnification(self, rest: Drawing, solution: Solution) -> float:
+        """Of the deflected machine: as the state says, else a round factor."""
+        if self.state.magnification is not None:
+            return self.state.magnification
+        d = float(np.linalg.norm(np.nan_to_num(solution.displacement[:3])))
+        return round_factor(SHOWN * rest.extent, d)
+
+    def shares(self) -> DeflectionBudget:
+        """Where the deflection comes from; StiffmapError where there is no equilibrium or another assembly mode."""
+        s = self.state
+        if s.start is not None:
+            raise StiffmapError("shares of the deflection are known in the assembly mode of home only")
+        return deflection_budget(
+            self.machine, s.position, s.wrench, rotation=orientation(s), gravity=s.gravity
+        )
+
+    def assembly_modes(self, seed: int = 0) -> list[tuple[float, ...]]:
+        """All coordinates of the ways to take this pose that a search from random joints finds, that of home first."""
+        m, s = self.machine, self.state
+        names = m.compiled.names
+        home = m.compiled.home_coordinates()
+        rng = np.random.default_rng(seed)
+        starts = np.tile(home, (BRANCHES_TRIED, 1))
+        for name, i in names.joints.items():
+            spread = 0.5 * m.compiled.length if names.is_prismatic(name) else np.pi
+            starts[1:, i] += rng.uniform(-spread, spread, BRANCHES_TRIED - 1)
+        k = inverse_kinematics(m, s.position, orientation(s), start=starts)
+        found: list[Floats] = []
+        drives = [names.joints[a] for a in names.actuators]
+        angular = np.array([not names.is_prismatic(a) for a in names.actuators])
+        for x in k.coordinates[np.asarray(k.status) == Status.CONVERGED]:
+            off = [_difference(x[drives], y[drives], angular) for y in found]
+            if all(o > ALIKE for o in off):
+                found.append(x)
+        return [tuple(map(float, x)) for x in found]
+
+    def box(self) -> tuple[Floats, Floats]:
+        """Lowest and highest corner, m."""
+        return box_of(self.machine)
+
+
+def _difference(a: Floats, b: Floats, angular: Floats) -> float:
+    d = a - b
+    turned = np.where(angular, (d + np.pi) % (2 * np.pi) - np.pi, d)
+    return float(np.abs(turned).max(initial=0.0))

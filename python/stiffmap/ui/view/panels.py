@@ -1,0 +1,170 @@
+"""What is said next to the scene, as HTML: every text of a file or a person is escaped here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from stiffmap.solve.budget import DeflectionBudget
+from stiffmap.solve.solution import Solution
+from stiffmap.solve.status import Status
+from stiffmap.ui.view.colours import STATUS_COLOURS, table
+from stiffmap.ui.view.isolines import levels, tolerance_level
+from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.plane import PlaneMap
+from stiffmap.ui.view.probe import probe
+from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.surfaces import principal
+from stiffmap.workspace.performance.motion.scaling import drive_table
+
+MOST_SHARES = 9
+BLUE, ORANGE, RED = "#0072B2", "#E69F00", "#B00020"
+Row = tuple[str, float, str, str]
+"""Label, length of the bar (-1 … 1), colour, text."""
+
+
+def status_line(moment: Moment, solution: Solution, message: str, error: str) -> str:
+    """Where the tool is, how far it moves, what is wrong; a live region for screen readers."""
+    s = moment.state
+    at = ", ".join(f"{1e3 * v:.1f}" for v in s.position)
+    if bool(solution.ok):
+        d = 1e6 * solution.displacement[:3]
+        said = f"the tool moves <b>{np.linalg.norm(d):.2f} µm</b> ({', '.join(f'{v:.2f}' for v in d)})"
+    else:
+        said = f"<b>{escape(Status(int(solution.status)).name.lower())}</b>: no equilibrium"
+    lines = [f"{escape(moment.machine.name)} at ({at}) mm: {said}"]
+    lines += [f'<span style="color:{ORANGE}">{escape(message)}</span>'] if message else []
+    for line in error.splitlines():
+        lines.append(f'<span role="alert" style="color:{RED}">{escape(line)}</span>')
+    return f'<div role="status" aria-live="polite" style="padding:.3em .6em">{"<br/>".join(lines)}</div>'
+
+
+def colour_bar(found: PlaneMap, limits: tuple[float, float], tolerance: float) -> str:
+    """An SVG with the scale, its round values (those of the isolines) and the tolerance."""
+    q = QUANTITIES[found.quantity]
+    if found.quantity == "status":
+        marks = "".join(
+            f'<span style="background:rgb{c};display:inline-block;width:1em">&nbsp;</span> '
+            f"{escape(k.name.lower().replace('_', ' '))} "
+            for k, c in STATUS_COLOURS.items()
+        )
+        return f'<div style="padding:.3em .6em" aria-label="status of the poses">{marks}</div>'
+    low, high = limits
+    stops = "".join(
+        f'<stop offset="{i / 15:.4f}" stop-color="rgb({r},{g},{b})"/>'
+        for i, (r, g, b) in enumerate(table()[:: 255 // 15])
+    )
+
+    def at(v: float) -> float:
+        return 10 + 280 * (v - low) / (high - low)
+
+    ticks = "".join(
+        f'<line x1="{at(v):.1f}" x2="{at(v):.1f}" y1="18" y2="36" stroke="white" stroke-width=".8"/>'
+        f'<text x="{at(v):.1f}" y="48" font-size="10" text-anchor="middle" fill="currentColor">{v:.5g}</text>'
+        for v in levels(limits)
+    )
+    level = tolerance_level(found.quantity, tolerance)
+    if level is not None and low < level < high:
+        ticks += f'<line x1="{at(level):.1f}" x2="{at(level):.1f}" y1="14" y2="40" stroke="#D55E00" stroke-width="2.5"/>'
+    words = f"{q.title}, {q.unit}"
+    failed = int(found.failed.sum())
+    which = "1 pose" if failed == 1 else f"{failed} poses"
+    note = f'<div style="font-size:85%">hatched: {which} without an equilibrium</div>' if failed else ""
+    text = f"{low:.4g} to {high:.4g} {q.unit}"
+    return (
+        f'<svg viewBox="0 0 300 54" width="100%" role="img" aria-label="{escape(words)}: {escape(text)}">'
+        f'<defs><linearGradient id="scale">{stops}</linearGradient></defs>'
+        f'<text x="10" y="12" font-size="11" fill="currentColor">{escape(words)}</text>'
+        f'<rect x="10" y="18" width="280" height="18" fill="url(#scale)"/>{ticks}</svg>{note}'
+    )
+
+
+def bars(title: str, rows: Sequence[Row]) -> str:
+    """A table with a bar in each row."""
+    out = "".join(
+        f'<tr><td style="white-space:nowrap">{escape(label)}</td><td style="width:35%"><div style="'
+        f'width:{100 * min(abs(size), 1.0):.1f}%;background:{colour};height:.8em"></div></td>'
+        f'<td style="text-align:right;white-space:nowrap">{escape(text)}</td></tr>'
+        for label, size, colour, text in rows
+    )
+    return (
+        f'<table style="width:100%;font-size:85%;padding:0 .8em 0 .4em"><caption style="text-align:left"><b>{escape(title)}</b>'
+        f"</caption>{out}</table>"
+    )
+
+
+def shares_panel(budget: DeflectionBudget, lit: str = "") -> str:
+    """Where the deflection comes from."""
+    ranked = budget.ranked()
+    biggest = max((abs(s) for _, _, s in ranked), default=1.0) or 1.0
+    size = 1e6 * float(np.linalg.norm(budget.displacement[:3]))
+    rows: list[Row] = [
+        (
+            f"▶ {n}" if n == lit else n,
+            s / biggest,
+            BLUE if s >= 0 else ORANGE,
+            f"{size * s:z.2f} µm, {100 * s:z.0f} %",
+        )
+        for n, _, s in ranked[:MOST_SHARES]
+    ]
+    others = sum(s for _, _, s in ranked[MOST_SHARES:])
+    if len(ranked) > MOST_SHARES:
+        rows.append((f"{len(ranked) - MOST_SHARES} others", others / biggest, BLUE, f"{100 * others:z.0f} %"))
+    return bars(f"where the {size:.2f} µm come from", rows)
+
+
+def compliance_panel(solution: Solution) -> str:
+    """Principal compliances of the tool and their directions."""
+    c = solution.compliance[:3, :3]
+    if not np.isfinite(c).all():
+        return bars("compliance of the tool: none, there is no equilibrium", [])
+    values, directions = principal(c)
+    rows: list[Row] = [
+        (
+            f"({', '.join(f'{x:z.2f}' for x in d)})",
+            v / values[0] if values[0] else 0.0,
+            BLUE,
+            f"{1e6 * v:.4g} µm/N",
+        )
+        for v, d in zip(values, directions, strict=True)
+    ]
+    return bars("principal directions of the tool's compliance", rows)
+
+
+def efforts_panel(moment: Moment, solution: Solution) -> str:
+    """What the drives hold, against what they can."""
+    m = moment.machine
+    names = m.compiled.names
+    most = [np.nan if d.force is None else d.force for d in drive_table(m)]
+    rows: list[Row] = []
+    largest = float(np.nanmax(np.abs(solution.actuator_effort), initial=1e-300))
+    for name, effort, limit in zip(m.actuators, solution.actuator_effort, most, strict=True):
+        unit = "N" if names.is_prismatic(name) else "N·m"
+        if np.isfinite(limit) and limit > 0:
+            part = effort / limit
+            rows.append((name, part, RED if abs(part) > 1 else BLUE, f"{effort:z.1f} of {limit:g} {unit}"))
+        else:
+            rows.append((name, effort / largest, BLUE, f"{effort:z.1f} {unit}, no limit declared"))
+    return bars("efforts of the drives", rows)
+
+
+def frequencies_panel(frequency: Sequence[float], shown: int) -> str:
+    """The lowest modes."""
+    finite = [f for f in frequency if np.isfinite(f)]
+    top = max(finite, default=1.0)
+    rows: list[Row] = [
+        (f"▶ mode {i + 1}" if i == shown else f"mode {i + 1}", f / top, BLUE, f"{f:.4g} Hz")
+        for i, f in enumerate(finite)
+    ]
+    return bars("natural frequencies, drives held", rows)
+
+
+def probe_text(moment: Moment, point: Sequence[float]) -> str:
+    """What the chosen quantity is at a point of the plane, solved there."""
+    value, status = probe(moment, point)
+    q = QUANTITIES[moment.state.quantity]
+    at = ", ".join(f"{1e3 * v:.1f}" for v in point)
+    said = f"{value * q.factor:.5g} {q.unit}".strip() if np.isfinite(value) else status.name.lower()
+    return f"probe at ({at}) mm: {said}"

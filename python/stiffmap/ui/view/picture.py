@@ -1,0 +1,104 @@
+"""The view as a picture on paper: the machine with its plane, the colour bar, and the shares."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.ui.plot import save
+from stiffmap.ui.plot.loaded import FORCE, draw_budget
+from stiffmap.ui.plot.style import (
+    BLACK,
+    COLOURS,
+    CYCLE,
+    MM,
+    ORANGE,
+    TOLERANCE,
+    headline,
+    new_figure,
+    paper_style,
+)
+from stiffmap.ui.view.colours import plane_image
+from stiffmap.ui.view.isolines import isolines, tolerance_lines
+from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.plane import PlaneMap
+from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.scene import ARROW, box_edges
+
+SHOWN = 51
+"""Poses along each edge of the plane in a picture."""
+
+
+def write_view_picture(moment: Moment, path: str | PathLike[str]) -> Path:
+    """PNG, SVG or PDF by the name of the file; raises FileError, StiffmapError for another format."""
+    return save(view_figure(moment), path)
+
+
+def view_figure(moment: Moment) -> Figure:
+    """Machine, deflected ghost, plane with isolines, and where the deflection comes from."""
+    solution, rest, found = moment.solve(), moment.rest(), moment.plane(SHOWN)
+    q, limits, s = QUANTITIES[moment.state.quantity], found.range, moment.state
+    with paper_style():
+        figure = new_figure(9.6, 5.2)
+        ax: Any = figure.add_subplot(1, 2, 1, projection="3d")
+        names = moment.machine.legs
+        colours = {leg: CYCLE[i % len(CYCLE)] for i, leg in enumerate(names)} | {"": BLACK}
+        low, high = moment.box()
+        _lines(ax, box_edges(low, high), "0.7", 0.7)
+        _plane(ax, found, limits)
+        _lines(ax, isolines(found, limits), "white", 0.5)
+        _lines(ax, tolerance_lines(found, s.tolerance), TOLERANCE, 1.5)
+        _lines(ax, rest.guides, "0.75", 4)
+        for leg, ends in zip(rest.legs, rest.links, strict=True):
+            ax.plot(*(MM * ends.T), color=colours[leg], lw=1.6)
+        loaded, factor = moment.loaded(solution), moment.magnification(rest, solution)
+        if loaded is not None and factor:
+            _lines(ax, rest.enlarged(loaded, factor), ORANGE, 1.0)
+        size = float(np.linalg.norm(s.force))
+        if size:
+            arrow = ARROW * rest.extent * np.array(s.force) / size
+            ax.quiver(*(MM * (rest.tcp - arrow)), *(MM * arrow), color=FORCE, lw=2, arrow_length_ratio=0.3)
+        ax.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
+        ax.set_aspect("equal")
+        ax.view_init(22, -50)
+        if s.quantity != "status":
+            bar = ScalarMappable(Normalize(*limits), COLOURS)
+            figure.colorbar(bar, ax=ax, label=f"{q.title}, {q.unit}", shrink=0.6, location="bottom", pad=0.08)
+        _shares(figure.add_subplot(1, 2, 2), moment)
+        at = ", ".join(f"{MM * v:.4g}" for v in s.position)
+        force = ", ".join(f"{v:.4g}" for v in s.force)
+        d = 1e6 * float(np.linalg.norm(solution.displacement[:3]))
+        headline(figure, f"{moment.machine.name} at ({at}) mm under ({force}) N: the tool moves {d:.1f} µm "
+                         f"(orange: × {factor:g})")  # fmt: skip
+    return figure
+
+
+def _lines(ax: Any, pieces: Any, colour: str, width: float) -> None:
+    if len(pieces):
+        ax.add_collection3d(Line3DCollection(MM * pieces, colors=colour, linewidths=width))
+
+
+def _plane(ax: Any, found: PlaneMap, limits: tuple[float, float]) -> None:
+    p = MM * found.frame.poses(found.count)
+    step = plane_image(found, limits)
+    colours = step[:: len(step) // found.count, :: len(step) // found.count] / 255.0
+    ax.plot_surface(
+        p[..., 0], p[..., 1], p[..., 2], facecolors=colours, rcount=found.count, ccount=found.count, shade=False,
+        antialiased=False, linewidth=0,
+    )  # fmt: skip
+
+
+def _shares(ax: Any, moment: Moment) -> None:
+    try:
+        draw_budget(ax, moment.shares())
+    except StiffmapError as problem:
+        ax.text(0.5, 0.5, str(problem), ha="center", wrap=True)
+        ax.axis("off")

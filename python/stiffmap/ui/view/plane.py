@@ -1,0 +1,148 @@
+"""The plane through the tool: where its poses lie, and what is found at them."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.solve.compiled import Status
+from stiffmap.solve.machine import Machine
+from stiffmap.ui.view.dynamics import dynamic_stiffness, lowest_frequency
+from stiffmap.ui.view.place import drawn_box, orientation
+from stiffmap.ui.view.quantities import QUANTITIES, Load, Mask
+from stiffmap.ui.view.state import State
+
+FINE, COARSE, DEAR = 101, 51, 15
+"""Poses along each edge: at rest, while something is dragged, and of quantities that need modes."""
+INSIDE = 1e-9
+"""Of the box, how far outside it a pose may lie by round-off."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A rectangle in the plane: its centre, its two edges (unit vectors) and their lengths, m."""
+
+    centre: Floats
+    u: Floats
+    v: Floats
+    width: float
+    height: float
+
+    @property
+    def normal(self) -> Floats:
+        """(3,) unit vector."""
+        return np.asarray(np.cross(self.u, self.v))
+
+    def poses(self, count: int) -> Floats:
+        """(count, count, 3) m, rows along v."""
+        a, b = (np.linspace(-0.5, 0.5, count) * size for size in (self.width, self.height))
+        return np.asarray(self.centre + b[:, None, None] * self.v + a[None, :, None] * self.u)
+
+    def coordinates(self, point: Floats) -> tuple[float, float]:
+        """Along u and v from the centre, m."""
+        d = np.asarray(point) - self.centre
+        return float(d @ self.u), float(d @ self.v)
+
+
+def plane_frame(machine: Machine, state: State) -> Frame:
+    """The rectangle across the workspace box that holds the tool."""
+    low, high = drawn_box(machine)
+    p = np.array(state.position)
+    if state.plane == "free":
+        n = np.array(state.normal) / np.linalg.norm(state.normal)
+        other = np.eye(3)[int(np.argmin(np.abs(n)))]
+        u = np.cross(other, n)
+        u /= np.linalg.norm(u)
+        v = np.cross(n, u)
+        corners = np.array([[(low, high)[c >> i & 1][i] for i in range(3)] for c in range(8)]) - p
+        along = np.stack([corners @ u, corners @ v])
+        lowest, highest = along.min(axis=1), along.max(axis=1)
+        middle = (lowest + highest) / 2
+        width, height = highest - lowest
+        return Frame(p + middle[0] * u + middle[1] * v, u, v, float(width), float(height))
+    axis = "xyz".index(state.plane)
+    right, up = (i for i in range(3) if i != axis)
+    centre = (low + high) / 2
+    centre[axis] = p[axis]
+    e = np.eye(3)
+    return Frame(centre, e[right], e[up], float(high[right] - low[right]), float(high[up] - low[up]))
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneMap:
+    """Values in a plane, SI; NaN where there is none, and why in `status`."""
+
+    frame: Frame
+    quantity: str
+    values: Floats
+    """(count, count), rows along v."""
+    status: Floats
+    """(count, count) of `Status`."""
+    outside: Mask
+    """(count, count), outside the workspace box."""
+    seconds: float
+    """Time of the solution."""
+
+    @property
+    def count(self) -> int:
+        """Poses along an edge."""
+        return len(self.values)
+
+    @cached_property
+    def shown(self) -> Floats:
+        """Values in the unit of the screen."""
+        return np.asarray(self.values * QUANTITIES[self.quantity].factor)
+
+    @property
+    def failed(self) -> Mask:
+        """(count, count), inside the box and without an equilibrium."""
+        return np.asarray((self.status != Status.CONVERGED) & ~self.outside)
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Lowest and highest value in the unit of the screen; (0, 1) where there is none."""
+        good = self.shown[np.isfinite(self.shown)]
+        if not good.size:
+            return 0.0, 1.0
+        low, high = float(good.min()), float(good.max())
+        if high - low <= 1e-9 * max(abs(high), abs(low)):
+            return low - max(1e-3 * abs(low), 1e-12), high + max(1e-3 * abs(high), 1e-12)
+        return low, high
+
+    def between(self, point: Floats) -> float:
+        """Bilinear value (unit of the screen) at a point of the plane; NaN outside."""
+        f = self.frame
+        grids = tuple(np.linspace(-0.5, 0.5, self.count) * s for s in (f.height, f.width))
+        a, b = f.coordinates(point)
+        look = RegularGridInterpolator(grids, self.shown, bounds_error=False)
+        return float(look((b, a)))
+
+
+def plane_map(machine: Machine, state: State, count: int = FINE, *, threads: int | None = None) -> PlaneMap:
+    """Solve the poses of the plane; outside the box they are solved as well and hidden."""
+    begun = time.perf_counter()
+    frame = plane_frame(machine, state)
+    quantity = QUANTITIES[state.quantity]
+    if quantity.of is None:
+        count = min(count, DEAR)
+    p = frame.poses(count)
+    low, high = drawn_box(machine)
+    slack = INSIDE * (high - low)
+    outside = np.asarray(((p < low - slack) | (p > high + slack)).any(axis=-1))
+    if quantity.of is None:
+        make = lowest_frequency if state.quantity == "frequency" else dynamic_stiffness
+        values, status = make(machine, state, p, threads)
+    else:
+        s = machine.solve(
+            p, state.wrench, rotation=orientation(state), gravity=state.gravity,
+            start=state.start_array, stiffness=quantity.stiffness, threads=threads,
+        )  # fmt: skip
+        values = quantity.of(s, Load(np.array(state.force), state.tolerance))
+        status = np.asarray(s.status, dtype=float)
+    values = np.where(outside, np.nan, values)
+    return PlaneMap(frame, state.quantity, values, status, outside, time.perf_counter() - begun)

@@ -1,0 +1,109 @@
+"""What the plane shows: one number per pose, from the answers of `Machine.solve`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.solve.solution import Solution
+
+
+@dataclass(frozen=True)
+class Load:
+    """What else a quantity depends on."""
+
+    force: Floats
+    """(3,) N."""
+    tolerance: float
+    """m."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A name, its unit on the screen, and how it is read off a solution."""
+
+    title: str
+    unit: str
+    factor: float
+    """From SI to the unit."""
+    of: Callable[[Solution, Load], Floats] | None
+    """None: needs the modes of the machine, many times dearer than a solution."""
+    stiffness: bool = False
+    """Whether the compliance is needed."""
+    low_is_bad: bool = False
+
+
+def deflection(s: Solution, load: Load) -> Floats:
+    """(...) m, of the tool against its command, under the load and gravity."""
+    return np.asarray(np.linalg.norm(s.displacement[..., :3], axis=-1))
+
+
+def worst_deflection(s: Solution, load: Load) -> Floats:
+    """(...) m: a further force of this size in its worst direction, to first order at the loaded pose."""
+    return np.asarray(np.linalg.norm(load.force) * greatest(s.compliance[..., :3, :3]))
+
+
+def weakest_stiffness(s: Solution, load: Load) -> Floats:
+    """(...) N/m of the softest direction."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / greatest(s.compliance[..., :3, :3]))
+
+
+def margin(s: Solution, load: Load) -> Floats:
+    """(...) m, of the tolerance that the deflection leaves."""
+    return np.asarray(load.tolerance - deflection(s, load))
+
+
+def status(s: Solution, load: Load) -> Floats:
+    """(...) `Status` as a number."""
+    return np.asarray(s.status, dtype=float)
+
+
+def greatest(c: Floats) -> Floats:
+    """(...) greatest singular value of matrices (..., 3, 3), NaN where one is not finite."""
+    bad = np.asarray(~np.isfinite(c).all(axis=(-1, -2)))
+    square = np.swapaxes(c, -1, -2) @ c
+    scale = np.abs(square).max(axis=(-1, -2))
+    safe = np.where(bad | (scale == 0), 1.0, scale)
+    values = _largest_eigenvalue(np.where(bad[..., None, None], 0.0, square) / safe[..., None, None])
+    out = np.sqrt(np.maximum(values * np.where(scale == 0, 0.0, safe), 0.0))
+    return np.asarray(np.where(bad, np.nan, out))
+
+
+def _largest_eigenvalue(a: Floats) -> Floats:
+    """(...) of symmetric matrices (..., 3, 3), by the closed form with the cosine of a third of an angle."""
+    mean = np.trace(a, axis1=-2, axis2=-1) / 3
+    b = a - mean[..., None, None] * np.eye(3)
+    p = np.sqrt((b * b).sum(axis=(-1, -2)) / 6)
+    safe = np.where(p > 0, p, 1.0)
+    b = b / safe[..., None, None]
+    half_det = (
+        b[..., 0, 0] * (b[..., 1, 1] * b[..., 2, 2] - b[..., 1, 2] * b[..., 2, 1])
+        - b[..., 0, 1] * (b[..., 1, 0] * b[..., 2, 2] - b[..., 1, 2] * b[..., 2, 0])
+        + b[..., 0, 2] * (b[..., 1, 0] * b[..., 2, 1] - b[..., 1, 1] * b[..., 2, 0])
+    ) / 2
+    return np.asarray(mean + 2 * p * np.cos(np.arccos(np.clip(half_det, -1.0, 1.0)) / 3))
+
+
+QUANTITIES: dict[str, Quantity] = {
+    "deflection": Quantity("deflection under this load", "µm", 1e6, deflection),
+    "worst": Quantity(
+        "worst deflection by a force of this size", "µm", 1e6, worst_deflection, stiffness=True
+    ),
+    "stiffness": Quantity(
+        "stiffness of the softest direction", "N/µm", 1e-6, weakest_stiffness, stiffness=True, low_is_bad=True
+    ),
+    "margin": Quantity("margin to the tolerance", "µm", 1e6, margin, low_is_bad=True),
+    "status": Quantity("status", "", 1.0, status),
+    "frequency": Quantity("lowest natural frequency", "Hz", 1.0, None, low_is_bad=True),
+    "dynamic": Quantity(
+        "dynamic stiffness of the softest direction", "N/µm", 1e-6, None, stiffness=True, low_is_bad=True
+    ),
+}
+"""By the word that names it in a state."""
+
+Mask = NDArray[np.bool_]

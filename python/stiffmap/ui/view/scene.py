@@ -1,0 +1,270 @@
+"""The scene in the browser: handles of viser, and what is sent to them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from scipy.spatial.transform import Rotation
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.solve.solution import Solution
+from stiffmap.ui.plot.loaded import FORCE
+from stiffmap.ui.plot.style import BLACK, CYCLE, ORANGE, TOLERANCE
+from stiffmap.ui.view.colours import plane_image
+from stiffmap.ui.view.drawing import Drawing, thicknesses
+from stiffmap.ui.view.isolines import isolines, tolerance_lines
+from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.place import moves, rotation_of, turns
+from stiffmap.ui.view.plane import PlaneMap
+from stiffmap.ui.view.surfaces import ellipsoid, polar_surface, sphere
+
+ARROW = 0.16
+"""Of the extent, length of the arrow of the force."""
+SURFACE = 0.12
+"""The same, of the surface at the tool."""
+GHOST, LIT, DIAGNOSED = ORANGE, "#FFD400", "#E8279B"
+GREY, DARK = "#BBBBBB", "#666666"
+NOTHING = np.zeros((1, 2, 3))
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """0 to 255."""
+    r, g, b = (round(255 * v) for v in to_rgb(colour))
+    return r, g, b
+
+
+def quaternion(rotation: Floats) -> tuple[float, float, float, float]:
+    """w, x, y, z of a matrix (3, 3)."""
+    x, y, z, w = (float(v) for v in Rotation.from_matrix(rotation).as_quat())
+    return w, x, y, z
+
+
+class Scene:
+    """Draws moments; the nodes are made once and then only changed."""
+
+    def __init__(self, api: Any, moment: Moment) -> None:
+        self.api = api
+        self.rest = rest = moment.rest()
+        self.extent = rest.extent
+        self._lines: dict[str, Any] = {}
+        self._image: Any = None
+        self._frame_size = (0.0, 0.0)
+        self.lit: list[int] = []
+        self.diagnosed: list[int] = []
+        """Links on which an element that was chosen, or that a diagnosis named, is lit."""
+        self._groups = _groups(moment, rest)
+        api.set_up_direction("+z")
+        api.world_axes.visible = False
+        api.add_frame("/axes", axes_length=0.08 * self.extent, axes_radius=0.002 * self.extent)
+        self._points = api.add_point_cloud(
+            "/joints/passive", rest.passive, rgb("#FFFFFF"), point_size=0.008 * self.extent, point_shape="circle",
+            precision="float32", visible=len(rest.passive) > 0,
+        )  # fmt: skip
+        self._drives = api.add_point_cloud(
+            "/joints/drives", rest.actuators, rgb(BLACK), point_size=0.014 * self.extent, point_shape="square",
+            precision="float32", visible=len(rest.actuators) > 0,
+        )  # fmt: skip
+        self._arrow: Any = None
+        self._plate: Any = None
+        self._surface: Any = None
+        low, high = moment.box()
+        self.lines("/box", box_edges(low, high), GREY, 1.5, "screen")
+        if len(rest.guides):
+            self.lines("/travel", rest.guides, GREY, 0.006 * self.extent)
+        self.gizmo = api.add_transform_controls(
+            "/tool", scale=0.14 * self.extent, active_axes=_active(moment), disable_rotations=not any(turns(moment.machine)),
+            disable_sliders=not all(moves(moment.machine)), depth_test=False, position=tuple(rest.tcp),
+        )  # fmt: skip
+
+        self.force_handle = api.add_transform_controls(
+            "/force_handle", scale=0.06 * self.extent, disable_rotations=True, depth_test=False,
+        )  # fmt: skip
+
+    def lines(self, name: str, points: Floats, colour: str, thick: float, units: str = "world") -> None:
+        """Pieces of lines (n, 2, 3); none hide the node."""
+        there = self._lines.get(name)
+        shown = len(points) > 0
+        p = np.asarray(points if shown else NOTHING, np.float32)
+        if there is None or there.points.shape != p.shape:
+            self._lines[name] = self.api.add_line_segments(
+                name, p, rgb(colour), thickness=thick, thickness_units=units, visible=shown
+            )
+            return
+        there.points = p
+        if there.visible != shown:
+            there.visible = shown
+
+    def points(self, name: str, places: Floats, colour: str) -> None:
+        """Places (n, 3) as dots."""
+        self.api.add_point_cloud(
+            name, np.asarray(places, np.float32), rgb(colour), point_size=0.005 * self.extent,
+            point_shape="circle", precision="float32",
+        )  # fmt: skip
+
+    def mesh(self, name: str, vertices: Floats, faces: Any, colour: str) -> Any:
+        """A surface seen from both sides; without triangles it is hidden. Its handle."""
+        shown = len(faces) > 0
+        return self.api.add_mesh_simple(
+            name, np.asarray(vertices, np.float32), faces if shown else np.zeros((1, 3), np.uint32),
+            color=rgb(colour), opacity=0.4, side="double", cast_shadow=False, visible=shown,
+        )  # fmt: skip
+
+    def machine(self, moment: Moment, rest: Drawing, loaded: Drawing | None, factor: float) -> None:
+        """Links, joints, the deflected ghost and the tool."""
+        self.rest = rest
+        for name, colour, thick, chosen in self._groups:
+            self.lines(name, rest.links[chosen], colour, thick)
+        self._points.points = (
+            np.asarray(rest.passive, np.float32) if len(rest.passive) else np.zeros((1, 3), np.float32)
+        )
+        self._drives.points = (
+            np.asarray(rest.actuators, np.float32) if len(rest.actuators) else np.zeros((1, 3), np.float32)
+        )
+        if len(rest.plate):
+            middle = np.concatenate([rest.plate, rest.plate.mean(axis=0)[None]])
+            n = len(rest.plate)
+            fan = np.array([[i, (i + 1) % n, n] for i in range(n)], np.uint32)
+            if self._plate is None:
+                self._plate = self.mesh("/platform", middle, fan, DARK)
+            self._plate.vertices = np.asarray(middle, np.float32)
+        moved = NOTHING[:0] if loaded is None or factor == 0 else rest.enlarged(loaded, factor)
+        self.lines("/ghost", moved, GHOST, 0.004 * self.extent)
+        named = rest.links[self.diagnosed] if self.diagnosed else NOTHING[:0]
+        self.lines("/diagnosis/element", named, DIAGNOSED, 0.025 * self.extent)
+        self.lines("/lit", rest.links[self.lit] if self.lit else NOTHING[:0], LIT, 0.03 * self.extent)
+
+    def tool(self, moment: Moment) -> None:
+        """The gizmo at the tool of the state."""
+        self.gizmo.position = moment.state.position
+        self.gizmo.wxyz = quaternion(rotation_of(moment.machine, moment.state))
+
+    @property
+    def arrow_length(self) -> float:
+        """Of a force that is not being dragged, m."""
+        return ARROW * self.extent
+
+    def force(self, moment: Moment, pulled: float = 0.0) -> None:
+        """The arrow that ends at the tool; one that is dragged from a size `pulled` (N) is as long as it is pulled."""
+        f = np.array(moment.state.force)
+        size = float(np.linalg.norm(f))
+        tip = np.array(moment.state.position)
+        tail = tip - (self.arrow_length / (pulled or size) * f if size else 0.0)
+        if not pulled:
+            self.force_handle.position = tuple(tail if size else tip + (0.0, 0.0, self.arrow_length))
+        points = np.array([[tail, tip]], np.float32)
+        if self._arrow is None:
+            e = self.extent
+            self._arrow = self.api.add_arrows(
+                "/force",
+                points,
+                rgb(FORCE),
+                shaft_radius=0.005 * e,
+                head_radius=0.013 * e,
+                head_length=0.035 * e,
+            )
+        self._arrow.points = points
+        self._arrow.visible = size > 0
+
+    def plane(self, found: PlaneMap, limits: tuple[float, float], tolerance: float, lines: bool) -> None:
+        """The coloured plane, and lines of equal value on it."""
+        image, f = plane_image(found, limits), found.frame
+        stretch = found.count / (found.count - 1)  # nodes are the centres of pixels
+        size = (f.width * stretch, f.height * stretch)
+        if self._image is None or size != self._frame_size:
+            self._image = self.api.add_image("/map", image, *size, format="png", cast_shadow=False)
+            self._frame_size = size
+        else:
+            self._image.image = image
+        self._image.position = tuple(f.centre)
+        self._image.wxyz = quaternion(np.stack([f.u, f.v, f.normal], axis=1))
+        self._image.visible = True
+        flat = isolines(found, limits) if lines else NOTHING[:0]
+        lift = 5e-4 * self.extent * f.normal
+        both = np.concatenate([flat + lift, flat - lift]) if len(flat) else flat
+        self.lines("/isolines", both, "#FFFFFF", 1.2, "screen")
+        edge = tolerance_lines(found, tolerance)
+        both = np.concatenate([edge + lift, edge - lift]) if len(edge) else edge
+        self.lines("/tolerance", both, TOLERANCE, 3.5, "screen")
+
+    def no_plane(self) -> None:
+        """Hide the map."""
+        if self._image is not None:
+            self._image.visible = False
+        for name in ("/isolines", "/tolerance"):
+            if name in self._lines:
+                self._lines[name].visible = False
+
+    def surface(self, moment: Moment, solution: Solution, kind: str) -> str:
+        """The polar diagram or the ellipsoid at the tool; what its size means, in words."""
+        c = solution.compliance[:3, :3]
+        if kind == "none" or not np.isfinite(c).all():
+            if self._surface is not None:
+                self._surface.visible = False
+            return ""
+        make = ellipsoid if kind == "ellipsoid" else polar_surface
+        around, most = make(c, SURFACE * self.extent)
+        points = np.asarray(around + np.array(moment.state.position), np.float32)
+        if self._surface is None:
+            self._surface = self.api.add_mesh_simple(
+                "/surface",
+                points,
+                sphere()[1],
+                color=rgb("#56B4E9"),
+                opacity=0.45,
+                side="double",
+                cast_shadow=False,
+            )
+        self._surface.vertices = points
+        self._surface.visible = True
+        return f"longest radius: {1e6 * most:.4g} µm/N"
+
+    def cloud(self, points: Floats, colours: Any) -> None:
+        """Coloured points over the whole box; none hide them."""
+        shown = len(points) > 0
+        self.api.add_point_cloud(
+            "/cloud", points if shown else np.zeros((1, 3)), colours if shown else rgb(GREY),
+            point_size=0.012 * self.extent, point_shape="circle", precision="float32", visible=shown,
+        )  # fmt: skip
+
+    def marker(self, point: Floats, text: str) -> None:
+        """What the probe says, at its place."""
+        self.api.add_icosphere("/probe", 0.006 * self.extent, rgb(FORCE), position=tuple(point))
+        self.api.add_label("/probe/label", text, anchor="bottom-left")
+
+
+def _groups(moment: Moment, rest: Drawing) -> list[tuple[str, str, float, list[int]]]:
+    """Node, colour, thickness and links of each set of links that look alike."""
+    thick = thicknesses(moment.machine, rest)
+    names = moment.machine.legs
+    colours = {leg: CYCLE[i % len(CYCLE)] for i, leg in enumerate(names)} | {"": DARK}
+    sets: dict[tuple[str, float], list[int]] = {}
+    lengths = np.linalg.norm(rest.links[:, 1] - rest.links[:, 0], axis=1) if len(rest.links) else []
+    for i, leg in enumerate(rest.legs):
+        if lengths[i] > 1e-9:
+            sets.setdefault((leg, round(float(thick[i]), 5)), []).append(i)
+    return [(f"/links/{k}", colours[leg], t, found) for k, ((leg, t), found) in enumerate(sets.items())]
+
+
+def _active(moment: Moment) -> tuple[bool, bool, bool]:
+    """Handles of the gizmo: the axes that are commanded (all, where it may only be turned)."""
+    free = moves(moment.machine)
+    return free if any(free) else (True, True, True)
+
+
+def box_edges(low: Floats, high: Floats) -> Floats:
+    """(12, 2, 3) edges of a box."""
+    corners = np.array([[(low, high)[c >> i & 1][i] for i in range(3)] for c in range(8)])
+    return np.array([[corners[c], corners[c | 1 << i]] for c in range(8) for i in range(3) if not c >> i & 1])
+
+
+def look_at_machine(server: Any, rest: Drawing, extent: float) -> None:
+    """The first look: from the front right, from above where all lies in a plane of constant height."""
+    points = np.concatenate([rest.links.reshape(-1, 3), rest.tcp[None]])
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    is_flat = float(np.ptp(points[:, 2])) < 1e-3
+    direction = np.array([0.02, -0.05, 1.0] if is_flat else [0.75, -0.9, 0.6])
+    server.initial_camera.look_at = tuple(middle)
+    server.initial_camera.position = tuple(middle + 0.8 * extent * direction / np.linalg.norm(direction))
+    server.initial_camera.up = (0.0, 0.0, 1.0)

@@ -1,0 +1,139 @@
+"""The server of a view: on this computer only unless asked, then with a token; other pages' scripts are refused."""
+
+from __future__ import annotations
+
+import contextlib
+import hmac
+import io
+import logging
+import secrets
+import socket
+from collections.abc import Callable, Iterator
+from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.ui.view.names import named
+from stiffmap.ui.view.optional import need_viser
+
+HERE = "127.0.0.1"
+LOCAL = (HERE, "localhost", "::1")
+FIRST_PORT, TRIED_PORTS = 8080, 100
+COOKIE = "stiffmap_view"
+
+
+class Guard:
+    """Decides about every request before the server sees it."""
+
+    def __init__(self, host: str, on_link: Callable[[str], None] | None = None) -> None:
+        self.host = host
+        self.token = "" if host in LOCAL else secrets.token_urlsafe(24)
+        self.on_link = on_link
+
+    def refusal(self, path: str, headers: Any) -> str:
+        """Why a request is refused; empty if it is not."""
+        name = urlsplit(f"//{headers.get('Host', '')}").hostname or ""
+        if self.host in LOCAL and name not in LOCAL:
+            return "this view is for programs on its own computer"
+        origin = headers.get("Origin")
+        if origin and urlsplit(origin).netloc != headers.get("Host", ""):
+            return "another page may not steer this view"
+        if self.token and not (self._same(self.asked(path, "token")) or self._same(_cookie(headers))):
+            return "open the address with the token that stiffmap view printed"
+        return ""
+
+    def _same(self, given: str) -> bool:
+        return hmac.compare_digest(given.encode(), self.token.encode())
+
+    def asked(self, path: str, name: str) -> str:
+        """The value of a query in a path; empty where there is none."""
+        return parse_qs(urlsplit(path).query).get(name, [""])[0]
+
+    def wrapped(self, process: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+        """The server's own answers behind the guard."""
+        from websockets.datastructures import Headers
+        from websockets.http11 import Response
+
+        def answer(connection: Any, request: Any) -> Any:
+            why = self.refusal(request.path, request.headers)
+            if why:
+                body = f"403: {why}\n".encode()
+                head = {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))}
+                return Response(HTTPStatus.FORBIDDEN, "Forbidden", Headers(**head), body)
+            link = self.asked(request.path, "state")
+            if link and self.on_link is not None and request.headers.get("Upgrade") != "websocket":
+                self.on_link(link)
+            out = process(connection, request)
+            if out is not None and out.headers.get("Content-Type", "").startswith("text/html"):
+                out.body = named(out.body, out.headers.get("Content-Encoding") == "gzip")
+                del out.headers["Content-Length"]
+                out.headers["Content-Length"] = str(len(out.body))
+            if out is not None and self.token:
+                out.headers["Set-Cookie"] = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+            return out
+
+        return answer
+
+
+def _cookie(headers: Any) -> str:
+    try:
+        kept = SimpleCookie(headers.get("Cookie", ""))
+    except CookieError:
+        return ""
+    return kept[COOKIE].value if COOKIE in kept else ""
+
+
+def start_server(host: str, port: int | None, guard: Guard, label: str) -> Any:
+    """A viser server behind a guard; StiffmapError where the port or the address cannot be used."""
+    viser = need_viser()
+    chosen = free_port(host, port)
+    with _guarded(guard), silent():
+        server = viser.ViserServer(host=host, port=chosen, label=label, verbose=False)
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
+    return server
+
+
+@contextlib.contextmanager
+def silent() -> Iterator[None]:
+    """viser prints its own addresses and farewell; the command prints the one that counts."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        yield
+
+
+@contextlib.contextmanager
+def _guarded(guard: Guard) -> Iterator[None]:
+    """While a server starts, what it hands to websockets as its answers is put behind the guard.
+
+    viser has no hook for requests of its own, so the function that it calls is replaced for that moment.
+    """
+    import websockets.asyncio.server as module
+
+    plain = module.serve
+
+    def serve(*args: Any, **given: Any) -> Any:
+        given["process_request"] = guard.wrapped(given["process_request"])
+        return plain(*args, **given)
+
+    module.serve = serve  # type: ignore[assignment, misc]
+    try:
+        yield
+    finally:
+        module.serve = plain  # type: ignore[misc]
+
+
+def free_port(host: str, port: int | None) -> int:
+    """The port asked for, or the first free one from 8080 on."""
+    for p in range(FIRST_PORT, FIRST_PORT + TRIED_PORTS) if port is None else (port,):
+        if not 0 <= p <= 65535:
+            raise StiffmapError(f"--port: expected 0 to 65535, got {p}")
+        try:
+            with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as s:
+                s.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                s.bind((host, p))
+                return int(s.getsockname()[1])
+        except OSError as problem:
+            if port is not None or isinstance(problem, socket.gaierror):
+                raise StiffmapError(f"cannot listen on {host}, port {p}: {problem.strerror}") from None
+    raise StiffmapError(f"no port from {FIRST_PORT} to {FIRST_PORT + TRIED_PORTS - 1} is free; give --port")

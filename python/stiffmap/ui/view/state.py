@@ -1,0 +1,201 @@
+"""What is on the screen, as plain numbers: SI, base axes. A permalink and an undo are copies of it."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import math
+import zlib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.ui.view.quantities import QUANTITIES
+
+PLANES = ("x", "y", "z", "free")
+MOST_LINK, MOST_TEXT = 16_000, 200_000
+"""Characters of a permalink, and of what it says."""
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class State:
+    """Pose, load, plane and what is changed in the machine; `position` alone has no default."""
+
+    position: Vector
+    """m, commanded TCP."""
+    rotation: Vector | None = None
+    """Rotation vector (rad) of the commanded orientation; None: as at home."""
+    force: Vector = (0.0, 0.0, -300.0)
+    """N on the tool."""
+    moment: Vector = (0.0, 0.0, 0.0)
+    """N·m on the tool."""
+    gravity: Vector | None = None
+    """m/s²; None: what the machine file says."""
+    plane: str = "z"
+    """Axis across which the plane through the tool lies, or ``free``."""
+    normal: Vector = (0.0, 0.0, 1.0)
+    """Of a free plane."""
+    quantity: str = "deflection"
+    tolerance: float = 0.25e-3
+    """m, tolerated deflection."""
+    magnification: float | None = None
+    """Of the deflected machine; None: a round one that shows it well."""
+    frequency: float = 0.0
+    """Hz, of the dynamic stiffness."""
+    start: tuple[float, ...] | None = None
+    """All coordinates that name an assembly mode; None: that of home."""
+    changes: tuple[tuple[str, float], ...] = ()
+    """Address of a number of the machine -> its value (SI)."""
+
+    @property
+    def wrench(self) -> tuple[float, ...]:
+        """(6,) N, N·m on the tool."""
+        return (*self.force, *self.moment)
+
+    @property
+    def start_array(self) -> Floats | None:
+        """(coordinates,) of the assembly mode; None: home's."""
+        return None if self.start is None else np.array(self.start)
+
+
+def as_plain(state: State) -> dict[str, Any]:
+    """JSON data, without what is as by default."""
+    default = State(state.position)
+    plain = asdict(state)
+    return {k: v for k, v in plain.items() if k == "position" or v != getattr(default, k)}
+
+
+def from_plain(data: Any) -> State:
+    """The state that JSON data say; StiffmapError naming the key for anything else."""
+    if not isinstance(data, Mapping):
+        raise StiffmapError(f"view: expected a mapping of the state, got {type(data).__name__}")
+    known = {f.name for f in fields(State)}
+    unknown = [k for k in data if k not in known]
+    if unknown:
+        raise StiffmapError(f"view: unknown key {unknown[0]!r}; expected {', '.join(sorted(known))}")
+    if "position" not in data:
+        raise StiffmapError("view: expected a position")
+    return checked(State(**{k: _value(k, v) for k, v in data.items()}))
+
+
+def checked(state: State) -> State:
+    """The state itself; StiffmapError naming what in it cannot be."""
+    for name in ("position", "rotation", "force", "moment", "gravity", "normal"):
+        value = getattr(state, name)
+        if value is not None and (len(value) != 3 or not all(map(math.isfinite, value))):
+            raise StiffmapError(f"{name}: expected 3 finite numbers, got {list(value)}")
+    if state.plane not in PLANES:
+        raise StiffmapError(f"plane: expected one of {', '.join(PLANES)}, got {state.plane!r}")
+    if not any(state.normal):
+        raise StiffmapError("normal: expected a direction, got (0, 0, 0)")
+    if state.quantity not in QUANTITIES:
+        raise StiffmapError(f"quantity: expected one of {', '.join(QUANTITIES)}, got {state.quantity!r}")
+    if not (math.isfinite(state.tolerance) and state.tolerance > 0):
+        raise StiffmapError(f"tolerance: expected a positive number, got {state.tolerance}")
+    if state.magnification is not None and not (
+        math.isfinite(state.magnification) and state.magnification >= 0
+    ):
+        raise StiffmapError(f"magnification: expected 0 or more, got {state.magnification}")
+    if not (math.isfinite(state.frequency) and state.frequency >= 0):
+        raise StiffmapError(f"frequency: expected 0 or more, got {state.frequency}")
+    return state
+
+
+def _value(name: str, value: Any) -> Any:
+    if name in ("plane", "quantity"):
+        if not isinstance(value, str):
+            raise StiffmapError(f"{name}: expected a word, got {value!r}")
+        return value
+    if name in ("tolerance", "magnification", "frequency"):
+        return None if value is None and name == "magnification" else _number(name, value)
+    if name == "changes":
+        pairs = value.items() if isinstance(value, Mapping) else value
+        try:
+            return tuple((str(a), _number(str(a), v)) for a, v in pairs)
+        except (TypeError, ValueError) as problem:
+            if isinstance(problem, StiffmapError):
+                raise
+            raise StiffmapError("changes: expected pairs of an address and a number") from None
+    if value is None and name in ("rotation", "gravity", "start"):
+        return None
+    if not isinstance(value, list | tuple):
+        raise StiffmapError(f"{name}: expected a list of numbers, got {value!r}")
+    return tuple(_number(name, v) for v in value)
+
+
+def _number(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise StiffmapError(f"{name}: expected finite numbers, got {value!r}")
+    return float(value)
+
+
+def permalink(machine: str, state: State) -> str:
+    """Machine and state as one word of letters, digits, - and _."""
+    text = json.dumps({"machine": machine, **as_plain(state)}, separators=(",", ":"))
+    return base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
+
+
+def from_permalink(word: str) -> tuple[str, State]:
+    """Machine and state of a permalink; StiffmapError for a damaged one."""
+    try:
+        if len(word) > MOST_LINK:
+            raise ValueError
+        packed = base64.b64decode(word + "=" * (-len(word) % 4), altchars=b"-_", validate=True)
+        reader = zlib.decompressobj()
+        text = reader.decompress(packed, MOST_TEXT)
+        if reader.unconsumed_tail or not reader.eof:
+            raise ValueError
+        data = json.loads(text)
+        machine = data.pop("machine")
+    except (ValueError, binascii.Error, zlib.error, KeyError, AttributeError, RecursionError):
+        raise StiffmapError("the link is damaged: copy it whole from the view") from None
+    return str(machine), from_plain(data)
+
+
+class History:
+    """States that were on the screen; the last one is."""
+
+    def __init__(self, first: State, most: int = 200) -> None:
+        self.first, self._most = first, most
+        self._past: list[State] = []
+        self.now = first
+
+    def put(self, state: State, *, keep: bool = True) -> None:
+        """A new state; without `keep` it replaces the present one, as while something is dragged."""
+        if state == self.now:
+            return
+        if keep:
+            self._past = [*self._past, self.now][-self._most :]
+        self.now = state
+
+    def mark(self) -> None:
+        """What comes next can be undone to here, such as the end of a drag."""
+        if not self._past or self._past[-1] != self.now:
+            self._past = [*self._past, self.now][-self._most :]
+
+    def undo(self) -> State:
+        """Back to the last state that differs."""
+        while self._past:
+            self.now, before = self._past.pop(), self.now
+            if self.now != before:
+                break
+        return self.now
+
+    def reset(self) -> State:
+        """As at the start; an undo leads back."""
+        self.put(self.first)
+        return self.now
+
+
+def with_change(state: State, address: str, value: float | None) -> State:
+    """A number of the machine changed; None: as in the file."""
+    others = {a: v for a, v in state.changes if a != address}
+    if value is not None:
+        others[address] = value
+    return replace(state, changes=tuple(others.items()))

@@ -1,0 +1,319 @@
+"""A view that is served: the model, the scene, the panels, and a worker that keeps them together."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.solution import Solution
+from stiffmap.ui.view.animation import Swing
+from stiffmap.ui.view.box_cloud import box_cloud
+from stiffmap.ui.view.colours import colours_of
+from stiffmap.ui.view.controls import Controls
+from stiffmap.ui.view.data import Data
+from stiffmap.ui.view.drawing import element_links
+from stiffmap.ui.view.model import Model
+from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.panels import (
+    colour_bar,
+    compliance_panel,
+    efforts_panel,
+    frequencies_panel,
+    probe_text,
+    shares_panel,
+    status_line,
+)
+from stiffmap.ui.view.place import rotation_of
+from stiffmap.ui.view.plane import COARSE, FINE, PlaneMap
+from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.scene import Scene, look_at_machine
+from stiffmap.ui.view.state import State
+from stiffmap.ui.view.worker import Worker
+
+BUDGET = 0.018
+"""s, of the plane while something is dragged; fewer poses are solved where they would take longer."""
+COUNTS = (FINE, COARSE, 35, 25, 17, 11)
+
+
+class Viewer:
+    """Everything behind one address; all browsers that open it see the same."""
+
+    def __init__(self, model: Model, server: Any, data: Data | None = None) -> None:
+        self.model, self.server, self._data = model, server, data
+        self.lock = threading.RLock()
+        self.error = ""
+        self._per_pose = 3e-6
+        self._plane: PlaneMap | None = None
+        self._plane_key: object = None
+        self._held: tuple[float, float] | None = None
+        self._solution: Solution | None = None
+        self._probe: np.ndarray[Any, Any] | None = None
+        self._cloud_key: object = None
+        self._renewed = False
+        self.dragging, self.pulling = False, 0.0
+        """Whether the tool is in a hand; N of the force when its arrow was taken, 0 when it is not."""
+        self.scene = Scene(server.scene, model.moment)
+        self.controls = Controls(self)
+        self.swing = Swing(self)
+        self.worker = Worker([self.quick, self.fine, self.panels, self.cloud], self._fail)
+        self._hands()
+
+        def clicked(event: Any) -> None:
+            self.probe_along(np.array(event.ray_origin), np.array(event.ray_direction))
+
+        server.scene.on_click()(clicked)
+
+        def left(client: Any) -> None:
+            self.dragging, self.pulling = False, 0.0  # a tab that is closed in the middle of a drag
+
+        server.on_client_disconnect(left)
+
+        if data is not None:
+            data(self.scene, model.moment)
+        look_at_machine(server, self.scene.rest, self.scene.extent)
+        self.worker.ask()
+
+    # -- what hands do ------------------------------------------------------------------------------------------
+
+    def act(self, deed: Callable[[Model], object]) -> bool:
+        """Change the model; what it refuses is shown and nothing has changed then."""
+        with self.lock:
+            try:
+                deed(self.model)
+                self.error = ""
+            except StiffmapError as problem:
+                self.error = str(problem)
+        self.worker.ask()
+        return not self.error
+
+    def _hands(self) -> None:
+        gizmo = self.scene.gizmo
+
+        def changed(event: Any) -> None:
+            if event.phase == "start":
+                with self.lock:
+                    self.dragging = True
+                    self.model.history.mark()
+            self.drag(np.array(gizmo.position), np.array(gizmo.wxyz))
+            if event.phase == "end":
+                self.dragging = False
+                self.worker.ask()
+
+        gizmo.on_update(changed)
+        handle = self.scene.force_handle
+
+        def pulled(event: Any) -> None:
+            if event.phase == "start":
+                with self.lock:
+                    self.pulling = max(float(np.linalg.norm(self.model.state.force)), 1.0)
+                    self.model.history.mark()
+            self.pull(np.array(handle.position))
+            if event.phase == "end":
+                self.pulling = 0.0
+                self.worker.ask()
+
+        handle.on_update(pulled)
+
+    def pull(self, tail: Any) -> None:
+        """The tail of the arrow was moved (m): the force points from there to the tool, as much larger as the arrow is longer."""
+        with self.lock:
+            size = self.pulling or max(float(np.linalg.norm(self.model.state.force)), 1.0)
+            way = (np.array(self.model.state.position) - tail) / self.scene.arrow_length
+            self.act(lambda m: m.put(force=tuple(float(v) for v in size * way), keep=False))
+
+    def drag(self, position: Any, wxyz: Any) -> None:
+        """The gizmo was moved (m, quaternion)."""
+        from scipy.spatial.transform import Rotation
+
+        with self.lock:
+            turned = Rotation.from_quat(np.roll(wxyz, -1)).as_matrix()
+            now = rotation_of(self.model.machine, self.model.state)
+            same = np.abs(turned - now).max() < 1e-9
+            self.act(lambda m: m.drag(position, None if same else turned))
+
+    def probe_along(self, origin: Any, direction: Any) -> None:
+        """Solve where a ray meets the plane."""
+        from stiffmap.ui.view.probe import under_ray
+
+        if self._plane is None:
+            return
+        point = under_ray(self._plane.frame, origin, direction)
+        if point is not None:
+            self.probe_at(point)
+
+    def probe_at(self, point: Any) -> None:
+        """Solve at a point (m) and show the number."""
+        with self.lock:
+            moment = self.model.moment
+        self._probe = np.array(point)
+        text = probe_text(moment, [float(v) for v in point])
+        self.scene.marker(self._probe, text)
+        self.controls.probe.value = text
+
+    # -- what is drawn, the quick part first --------------------------------------------------------------------
+
+    def now(self) -> Moment:
+        """What is on the screen."""
+        with self.lock:
+            return self.model.moment
+
+    def quick(self) -> None:
+        """The machine and a plane with as many poses as the time allows."""
+        if self._renewed:
+            self._renewed = False
+            self._new_scene()
+        moment = self.now()
+        s = moment.solve()
+        rest = moment.rest()
+        loaded = moment.loaded(s)
+        self._solution = s
+        found = self._map(moment, self._count())
+        with self.server.atomic():
+            factor = moment.magnification(rest, s)
+            self.scene.machine(moment, rest, loaded, factor)
+            self.scene.force(moment, self.pulling)
+            if not self.dragging:
+                self.scene.tool(moment)
+            if found is not None:
+                self._show(found, moment.state)
+            self.controls.say(status_line(moment, s, self.model.message, self.error))
+        self.server.flush()
+
+    def fine(self) -> None:
+        """The plane with all poses, and the panel's numbers as they are now."""
+        moment = self.now()
+        self.controls.show(moment)
+        if self.controls.map_on and (self._plane is None or self._plane.count < FINE):
+            if QUANTITIES[moment.state.quantity].of is None and self._plane is not None:
+                return
+            found = moment.plane(FINE)
+            self._learn(found)
+            self._plane = found
+            with self.server.atomic():
+                self._show(found, moment.state)
+        if self._probe is not None:
+            self.probe_at(self._probe)
+
+    def _count(self) -> int:
+        return next((n for n in COUNTS if n * n * self._per_pose <= BUDGET), COUNTS[-1])
+
+    def _learn(self, found: PlaneMap) -> None:
+        if QUANTITIES[found.quantity].of is not None:
+            self._per_pose = 0.5 * self._per_pose + 0.5 * found.seconds / found.count**2
+
+    def _map(self, moment: Moment, count: int) -> PlaneMap | None:
+        """A new map of the plane; None where it would be the one that is shown."""
+        if not self.controls.map_on:
+            self._plane_key = self._plane = None
+            self.scene.no_plane()
+            return None
+        key = map_key(moment)
+        if key == self._plane_key:
+            return None
+        found = moment.plane(count)
+        self._learn(found)
+        self._plane, self._plane_key = found, key
+        return found
+
+    def _show(self, found: PlaneMap, state: State) -> None:
+        if not self.controls.hold or self._held is None or found.quantity != self._held_quantity:
+            self._held, self._held_quantity = found.range, found.quantity
+        self.scene.plane(found, self._held, state.tolerance, self.controls.isolines)
+        self.controls.bar(colour_bar(found, self._held, state.tolerance))
+
+    _held_quantity = ""
+
+    def redraw(self) -> None:
+        """The plane is to be drawn again though the machine is the same."""
+        self._plane_key = None
+        self.worker.ask()
+
+    def panels(self) -> None:
+        """Where the deflection comes from, compliance, efforts, frequencies."""
+        moment, s = self.now(), self._solution
+        assert s is not None
+        parts = []
+        lit = self.controls.lit
+        try:
+            budget = moment.shares()
+            self.controls.elements([n for n, _, _ in budget.ranked()])
+            parts.append(shares_panel(budget, lit))
+        except StiffmapError as problem:
+            parts.append(status_line(moment, s, "", str(problem)))
+        parts += [compliance_panel(s), efforts_panel(moment, s)]
+        w = self.swing.frequencies(moment)
+        if w is not None:
+            parts.append(frequencies_panel(w.frequency.tolist(), self.swing.mode))
+        if self._data is not None:
+            self._data(self.scene, moment)
+            parts.insert(0, self._data.html)
+        self.scene.lit = element_links(moment.machine, lit) if lit else []
+        self.controls.why("".join(parts), self.scene.surface(moment, s, self.controls.surface))
+        if self._solution is s:
+            self.scene.machine(
+                moment, self.scene.rest, moment.loaded(s), moment.magnification(self.scene.rest, s)
+            )
+
+    def cloud(self) -> None:
+        """The quantity over the whole box."""
+        moment = self.now()
+        key = (map_key(moment, anywhere=True), self.controls.cloud)
+        if key == self._cloud_key:
+            return
+        self._cloud_key = key
+        points, values = box_cloud(moment) if self.controls.cloud else (np.zeros((0, 3)), np.zeros(0))
+        limits = self._held or (0.0, 1.0)
+        self.scene.cloud(points, colours_of(values, *limits))
+
+    def data_again(self) -> Data | None:
+        """The same data for another scene, such as that of a page."""
+        d = self._data
+        return None if d is None else Data(d.experiment, d.path, d.diagnosis, d.opened)
+
+    def _fail(self, problem: Exception) -> None:
+        self.error = (
+            str(problem) if isinstance(problem, StiffmapError) else f"{type(problem).__name__}: {problem}"
+        )
+        s = self._solution
+        if s is not None:
+            self.controls.say(status_line(self.now(), s, "", self.error))
+
+    def renew(self) -> None:
+        """The machine's file has changed: its own scene and addresses, made by the thread that draws."""
+        self._renewed = True
+        self.redraw()
+
+    def _new_scene(self) -> None:
+        moment = self.now()
+        self.server.scene.reset()
+        self.scene = Scene(self.server.scene, moment)
+        self._hands()
+        self.controls.renew(moment)
+        self._plane_key = self._cloud_key = None
+
+    def close(self) -> None:
+        """End the threads and the server."""
+        from stiffmap.ui.view.serving import silent
+
+        self.swing.stop()
+        self.worker.stop()
+        with silent():
+            self.server.stop()
+            time.sleep(0.01)
+
+
+def map_key(moment: Moment, *, anywhere: bool = False) -> object:
+    """What the colours of a plane (or, `anywhere`, of the box) depend on."""
+    s = moment.state
+    along = s.position if s.plane == "free" else s.position["xyz".index(s.plane)]
+    place = () if anywhere else (along, s.plane, s.normal if s.plane == "free" else None)
+    idle = [s.position[i] for i, a in enumerate("xyz") if a not in moment.machine.description.task]
+    return (
+        id(moment.machine), place, tuple(idle), s.rotation, s.wrench, s.gravity, s.quantity, s.frequency, s.start,
+        s.tolerance,
+    )  # fmt: skip

@@ -1,5 +1,0 @@
-"""URDF files, with a sidecar for what they cannot say, as machines."""
-
-from stiffmap.urdf.importing import Imported, import_urdf
-
-__all__ = ["Imported", "import_urdf"]

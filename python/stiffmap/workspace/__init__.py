@@ -1,0 +1,1 @@
+"""What a machine does over its workspace: maps, sweeps, measures, modes, design."""

@@ -1,0 +1,162 @@
+"""Machines whose numbers change, made quickly: only the elements that hold such a number are built again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.units import LENGTH
+from stiffmap.common.yaml_text import Document
+from stiffmap.model.description import Block, Branch, Element, MachineDescription
+from stiffmap.model.description.pose import Vector
+from stiffmap.model.files.build_elements import build_element
+from stiffmap.model.files.context import Context, Gathered
+from stiffmap.model.files.load import describe_document, validate
+from stiffmap.model.files.schema.elements import ElementModel
+from stiffmap.workspace.design.places import indices, unshared
+
+Address = tuple[str | int, ...]
+_MODEL: TypeAdapter[Any] = TypeAdapter(ElementModel)
+
+
+class Editor:
+    """Descriptions of one machine file with other numbers at given places.
+
+    Places in elements of templates (or of legs without one) and in the workspace are edited in a description
+    that was built once. `can` is False where a place lies elsewhere, or where the file has what ties
+    elements together (effects, link files, strokes, bodies of links, homes per leg): the whole file is then to be built.
+    Uncertainties and notes stay those of the file.
+    """
+
+    def __init__(self, document: Document, file: str, places: list[str]) -> None:
+        self.document, self.file, self.places = document, file, places
+        self.can = True
+        try:
+            self._prepare()
+        except (StiffmapError, ValidationError, LookupError, TypeError):
+            self.can = False
+
+    def _prepare(self) -> None:
+        data = self.document.data
+        text = str(data)
+        if data.get("effects") or "stroke" in text or "link:" in text or "'of':" in text:
+            raise LookupError("tied together")
+        model = validate(self.document, self.file)
+        self.base: MachineDescription = describe_document(self.document, self.file, Path(self.file).parent)
+        self.context = Context(
+            self.file, self.document, Path(self.file).parent, self.base.units, model.materials, Gathered()
+        )
+        self.elements: dict[tuple[str, Address], list[tuple[str, Any]]] = {}
+        self.space: list[tuple[str, Any]] = []
+        for place in self.places:
+            path = indices(data, place)
+            if path[0] == "workspace" and len(path) == 3:
+                self.space.append((place, path[1:]))
+                continue
+            sequence, inner = self._split(path)
+            self.elements.setdefault((sequence, inner[: _depth(inner)]), []).append((place, inner))
+
+    def _split(self, path: Address) -> tuple[str, Address]:
+        """Which sequence (``templates.leg``) a path of keys is in, and the way inside it."""
+        kind, name = path[0], str(path[1])
+        if kind == "templates" and isinstance(path[2], int):
+            legs = [leg for leg in self.document.data["legs"].values() if leg.get("template") == name]
+            if any("home" in leg for leg in legs):
+                raise LookupError("homes per leg")
+            return f"templates.{name}", path[2:]
+        if kind == "legs" and path[2] == "elements" and "home" not in self.document.data["legs"][name]:
+            return f"legs.{name}", path[3:]
+        raise LookupError("a place outside elements and workspace")
+
+    def description(self, values: dict[str, float]) -> MachineDescription:
+        """The machine with these numbers (place: value in the file's units); StiffmapError where it cannot be."""
+        built: dict[str, dict[Address, Element]] = {}
+        known: dict[str, Element] = {}
+        for (sequence, address), places in self.elements.items():
+            raw = unshared(self._raw(sequence, address))
+            for place, inner in places:
+                _set(raw, inner[len(address) :], values[place])
+            key = repr(raw)
+            if key not in known:
+                known[key] = self._element(raw, sequence, address)
+            built.setdefault(sequence, {})[address] = known[key]
+        legs = []
+        for leg, model in zip(self.base.legs, self.document.data["legs"].values(), strict=True):
+            name = f"templates.{model['template']}" if "template" in model else f"legs.{leg.name}"
+            first = 1 if "frame" in model else 0
+            edits = built.get(name)
+            legs.append(leg if edits is None else replace(leg, elements=_put(leg.elements, edits, first)))
+        return replace(self.base, legs=tuple(legs), workspace=self._workspace(values))
+
+    def _raw(self, sequence: str, address: Address) -> Any:
+        kind, _, name = sequence.partition(".")
+        at = self.document.data[kind][name]
+        at = at["elements"] if kind == "legs" else at
+        for key in address:
+            at = at[key]
+        return at
+
+    def _element(self, raw: Any, sequence: str, address: Address) -> Element:
+        kind, _, name = sequence.partition(".")
+        here = self.context.at(kind, name, *(("elements",) if kind == "legs" else ()), *address)
+        try:
+            return build_element(_MODEL.validate_python(raw), here)
+        except ValidationError as error:
+            here.fail(str(error.errors()[0]["msg"]))
+
+    def _workspace(self, values: dict[str, float]) -> tuple[Vector, Vector] | None:
+        space = self.base.workspace
+        if not self.space or space is None:
+            return space
+        corners = [list(corner) for corner in space]
+        for place, (axis, end) in self.space:
+            corners[int(end)]["xyz".index(axis)] = self.context.units.to_si(values[place], LENGTH)
+        low, high = corners
+        if any(a >= b for a, b in zip(low, high, strict=True)):
+            self.context.at("workspace").fail(f"expected lowest below highest, got {low} and {high} m")
+        return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+
+
+def _depth(inner: Address) -> int:
+    """Length of the way to the innermost element: number, then ``branches``, name, number, and so on."""
+    depth = 1
+    while len(inner) > depth + 2 and inner[depth] == "branches":
+        depth += 3
+    return depth
+
+
+def _set(raw: Any, path: Address, value: float) -> None:
+    for key in path[:-1]:
+        raw = raw[key]
+    last = path[-1]
+    if isinstance(raw[last], dict) and "value" in raw[last]:
+        raw[last]["value"] = value
+    else:
+        raw[last] = value
+
+
+def _put(elements: tuple[Element, ...], edits: dict[Address, Element], first: int) -> tuple[Element, ...]:
+    """The sequence with elements at their addresses, which count from `first`."""
+    out = list(elements)
+    inside: dict[int, dict[str, dict[Address, Element]]] = {}
+    for address, element in edits.items():
+        i = int(address[0])
+        if len(address) == 1:
+            out[first + i] = element
+        else:
+            inside.setdefault(i, {}).setdefault(str(address[2]), {})[address[3:]] = element
+    for i, branches in inside.items():
+        block = out[first + i]
+        assert isinstance(block, Block)
+        out[first + i] = replace(
+            block,
+            branches=tuple(
+                Branch(b.name, _put(b.elements, branches[b.name], 0)) if b.name in branches else b
+                for b in block.branches
+            ),
+        )
+    return tuple(out)

@@ -1,0 +1,227 @@
+"""A design problem: ``DESIGN.yaml`` read, checked, and turned into machines (docs/design.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.yaml_text import Document, read
+from stiffmap.model.files.load import describe_document
+from stiffmap.model.files.report import validated
+from stiffmap.model.files.schema.base import FileModel, Name
+from stiffmap.model.files.shipped import find
+from stiffmap.solve.machine import Machine
+from stiffmap.workspace.design.editing import Editor
+from stiffmap.workspace.design.expressions import evaluate
+from stiffmap.workspace.design.places import put, unshared
+from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion, near_or_shipped
+from stiffmap.workspace.performance.quantities import quantity
+from stiffmap.workspace.performance.registry import all_measures, get_measure
+from stiffmap.workspace.performance.requirements import Bound, Requirements, load_requirements
+
+START_NODES = 3
+"""Of a machine that is asked for a few hundred poses once."""
+
+
+class VariableModel(FileModel):
+    """A design variable: bounds, or one of a catalogue's rows."""
+
+    low: float | int | None = None
+    high: float | int | None = None
+    note: str = ""
+
+
+class SearchModel(FileModel):
+    """How to search."""
+
+    method: str = "nsga2"
+    population: int = Field(default=40, ge=4)
+    generations: int = Field(default=30, ge=1)
+    seed: int = 1
+    nodes: int = Field(default=7, ge=2)
+
+
+class BoundModel(FileModel):
+    """One or both bounds of a measure, with units."""
+
+    at_least: str | float | int | None = None
+    at_most: str | float | int | None = None
+
+
+class DesignFile(FileModel):
+    """The keys of a design file."""
+
+    name: Name
+    title: str = ""
+    machine: str
+    requirements: str | None = None
+    toolpath: str | None = None
+    beside: list[str] = Field(default_factory=list)
+    variables: dict[str, VariableModel] = Field(default_factory=dict)
+    catalogues: dict[str, list[dict[str, float | int | str]]] = Field(default_factory=dict)
+    constants: dict[str, float | int] = Field(default_factory=dict)
+    derived: dict[str, str | float | int] = Field(default_factory=dict)
+    numbers: dict[str, str | float | int] = Field(min_length=1)
+    objectives: list[str] = Field(min_length=1)
+    constraints: dict[str, BoundModel] = Field(default_factory=dict)
+    search: SearchModel = SearchModel()
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A design problem, checked. Variables first, then one row number per catalogue."""
+
+    file: str
+    model: DesignFile
+    document: Document
+    """Of the machine file whose numbers change."""
+    machine_file: str
+    requirements: Requirements
+    constraints: tuple[tuple[str, Bound], ...]
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of variables, then of catalogues."""
+        return (*self.model.variables, *self.model.catalogues)
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Lowest and highest value of each; of a catalogue, from 0 to its number of rows."""
+        rows = [(v.low, v.high) for v in self.model.variables.values()]
+        rows += [(0, len(c) - 1e-9) for c in self.model.catalogues.values()]
+        low, high = np.array(rows, dtype=float).T
+        return low, high
+
+    def names(self, x: Floats) -> dict[str, float]:
+        """Every name that expressions may use, for a vector of variables."""
+        out = {k: float(v) for k, v in self.model.constants.items()}
+        count = len(self.model.variables)
+        out.update(zip(self.model.variables, map(float, x[:count]), strict=True))
+        for name, row in zip(self.model.catalogues, x[count:], strict=True):
+            chosen = self.model.catalogues[name][int(row)]
+            out.update({f"{name}_{k}": float(v) for k, v in chosen.items() if not isinstance(v, str)})
+        for name, text in self.model.derived.items():
+            out[name] = evaluate(text, out)
+        return out
+
+    def data(self, x: Floats) -> Any:
+        """The machine file's data with the design's numbers."""
+        data = unshared(self.document.data)
+        names = self.names(x)
+        for place, text in self.model.numbers.items():
+            put(data, place, evaluate(text, names))
+        return data
+
+    def quick_machine(self, x: Floats) -> Machine:
+        """As `machine`, several times as quick; uncertainties and notes are those of the machine file."""
+        if not self._editor.can:
+            return self.machine(x)
+        names = self.names(x)
+        values = {place: evaluate(text, names) for place, text in self.model.numbers.items()}
+        return Machine(self._editor.description(values), start_nodes=START_NODES)
+
+    @cached_property
+    def toolpath(self) -> Motion | None:
+        """The task's own path, for measures along it."""
+        return None if self.requirements.toolpath is None else load_motion(self.requirements.toolpath)
+
+    @cached_property
+    def _editor(self) -> Editor:
+        document = Document(unshared(self.document.data), self.document.lines)
+        return Editor(document, self.machine_file, list(self.model.numbers))
+
+    def machine(self, x: Floats) -> Machine:
+        """The machine of a vector of variables; StiffmapError where it cannot be."""
+        document = Document(self.data(x), self.document.lines)
+        return Machine(describe_document(document, self.machine_file, Path(self.machine_file).parent))
+
+
+def load_design(path: str | PathLike[str]) -> Design:
+    """A design problem from a file, or a shipped one by name (``redesign``).
+
+    Raises FileError naming file, line, key, what was expected and what was found.
+    """
+    given = Path(path)
+    if not given.is_file():
+        shipped = Path(__file__).with_name(given.name if given.suffix else f"{given.name}.yaml")
+        if len(given.parts) > 1 or not shipped.is_file():
+            raise FileError("no such design file", file=str(given))
+        given = shipped
+    document, file = read(given), str(given)
+    expected = "a design file is a mapping with name, machine, variables, numbers, objectives"
+    model = validated(DesignFile, document, file, expected)
+
+    def fail(message: str, *keys: str) -> FileError:
+        return FileError(message, file=file, line=document.line(keys), key=".".join(keys))
+
+    for name, v in model.variables.items():
+        if v.low is None or v.high is None:
+            raise fail("give low and high", "variables", name)
+        if not v.low < v.high:
+            raise fail(f"low ({v.low}) must be below high ({v.high})", "variables", name)
+    if not model.variables and not model.catalogues:
+        raise fail("give variables or catalogues", "variables")
+    for name, rows in model.catalogues.items():
+        if not rows:
+            raise fail("the catalogue is empty", "catalogues", name)
+    known = {m.name for m in all_measures()}
+    for i, name in enumerate(model.objectives):
+        if name not in known:
+            raise fail(
+                f"unknown objective '{name}' (number {i + 1}); known: {', '.join(sorted(known))}",
+                "objectives",
+            )
+    beside = given.parent / model.machine
+    machine = beside if beside.is_file() else find(model.machine)
+    task = Requirements()
+    if model.requirements is not None:
+        near = given.parent / model.requirements
+        task = load_requirements(near if near.is_file() else model.requirements)
+    for name in model.beside:
+        if not (given.parent / name).is_file():
+            find(name)
+    if model.toolpath is not None:
+        task = replace(task, toolpath=near_or_shipped(model.toolpath, given.parent))
+    if task.toolpath is not None:
+        load_motion(task.toolpath)  # a mistake in it is reported before the search
+    try:
+        own = tuple((n, _bound(n, b, known)) for n, b in model.constraints.items())
+    except StiffmapError as error:
+        raise fail(str(error), "constraints") from None
+    design = Design(file, model, read(machine), str(machine), task, (*task.bounds, *own))
+    _try(design, fail)
+    return design
+
+
+def _bound(name: str, model: BoundModel, known: Sequence[str] | set[str]) -> Bound:
+    if name not in known:
+        raise StiffmapError(f"unknown measure '{name}'; known: {', '.join(sorted(known))}")
+    unit = get_measure(name).unit
+    least, most = (None if v is None else quantity(v, unit) for v in (model.at_least, model.at_most))
+    if least is not None and most is not None and least > most:
+        raise StiffmapError(f"{name}: at_least ({model.at_least}) is above at_most ({model.at_most})")
+    return Bound(least, most)
+
+
+def _try(design: Design, fail: Any) -> None:
+    """Every expression and place is tried once, in the middle of the bounds."""
+    low, high = design.bounds
+    try:
+        names = design.names((low + high) / 2)
+    except StiffmapError as error:
+        raise fail(str(error), "derived") from None
+    data = unshared(design.document.data)
+    for place, text in design.model.numbers.items():
+        try:
+            put(data, place, evaluate(text, names))
+        except StiffmapError as error:
+            raise fail(str(error), "numbers", place) from None

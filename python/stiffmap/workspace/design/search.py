@@ -1,0 +1,228 @@
+"""Search for the Pareto set: NSGA-II or NSGA-III of pymoo over processes (docs/design.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiffmap.common.broadcasting import Floats, thread_count, whole_number
+from stiffmap.common.errors import MissingPartError, StiffmapError
+from stiffmap.common.outputs import make_folder, only_job
+from stiffmap.common.tasks import workers
+from stiffmap.workspace.design.judging import IMPOSSIBLE, Judged, judge
+from stiffmap.workspace.design.problem import Design, load_design
+from stiffmap.workspace.design.store import Evaluations
+from stiffmap.workspace.performance.registry import get_measure
+
+
+@dataclass(frozen=True, eq=False)
+class ParetoSet:
+    """Designs that no other one betters in everything."""
+
+    design: Design
+    x: Floats
+    """(n, variables)."""
+    judged: tuple[Judged, ...]
+    history: tuple[tuple[int, int, float], ...]
+    """Generation, designs evaluated so far, hypervolume (of objectives scaled to the first generation's)."""
+    evaluated: int
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """Dimensions (design, variable), (design, measure), (design, constraint); SI, worst values."""
+        names = list(self.judged[0].values)
+        return xr.Dataset(
+            {
+                "x": (("design", "variable"), self.x),
+                "value": (
+                    ("design", "measure"),
+                    np.array([[j.values[n] for n in names] for j in self.judged]),
+                ),
+                "violation": (("design", "constraint"), np.array([j.violations for j in self.judged])),
+            },
+            coords={
+                "variable": list(self.design.variables),
+                "measure": names,
+                "constraint": [n for n, _ in self.design.constraints],
+            },
+            attrs={
+                "design": self.design.model.name,
+                "seed": self.design.model.search.seed,
+                "evaluated": self.evaluated,
+            },
+        )
+
+    def chosen(self) -> dict[str, int]:
+        """The best of each objective, and the one nearest to all of them at once."""
+        f = np.array([j.objectives for j in self.judged])
+        out = {f"best-{n}": int(np.argmin(f[:, i])) for i, n in enumerate(self.design.model.objectives)}
+        span = np.ptp(f, axis=0)
+        out["compromise"] = int(
+            np.argmin(np.linalg.norm((f - f.min(axis=0)) / np.where(span > 0, span, 1), axis=1))
+        )
+        return out
+
+
+Progress = Callable[[int, int, float, int], None]
+
+
+def optimize(
+    design: Design | str | PathLike[str],
+    *,
+    folder: str | PathLike[str] | None = None,
+    generations: int | None = None,
+    processes: int | None = None,
+    progress: Progress | None = None,
+    scheduler: Any = None,
+) -> ParetoSet:
+    """Pareto set of a design problem; the same for the same seed, on any number of processes or machines.
+
+    folder
+        Where evaluations are kept: a search that was killed goes on from there.
+    generations
+        None: as the file says.
+    processes
+        None: all cores.
+    progress
+        Called after each generation with its number, evaluations, hypervolume, feasible designs.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers judge the designs of a generation. What a
+        lost worker had is judged again.
+
+    Raises StiffmapError where no design meets all constraints: which one is missed, by how much at least.
+    """
+    problem = design if isinstance(design, Design) else load_design(design)
+    place = None if folder is None else Path(folder)
+    with nullcontext() if place is None else only_job(make_folder(place)):
+        return _searched(problem, place, generations, processes, progress, scheduler)
+
+
+def _searched(
+    problem: Design,
+    place: Path | None,
+    generations: int | None,
+    processes: int | None,
+    progress: Progress | None,
+    scheduler: Any,
+) -> ParetoSet:
+    kept = Evaluations(problem, None if place is None else place / "evaluations.jsonl")
+    count = problem.model.search.generations
+    if generations is not None:
+        count = whole_number(generations, "generations", 1)
+    algorithm = _algorithm(problem, count)
+    history: list[tuple[int, int, float]] = []
+    seen: list[Floats] = []
+    measure: Any = None
+    with workers(judge, problem, scheduler=scheduler, processes=thread_count(processes)) as judges:
+        while algorithm.has_next():
+            asked = algorithm.ask()
+            x = np.ascontiguousarray(asked.get("X"), dtype=float)
+            todo = kept.missing(x)
+            kept.add(x[todo], judges.in_order(list(x[todo])))
+            judged = [kept.get(row) for row in x]
+            asked.set("F", np.array([j.objectives for j in judged]))
+            if problem.constraints:
+                asked.set("G", np.array([j.violations for j in judged]))
+            algorithm.tell(infills=asked)
+            seen.extend(x)
+            measure = measure or _hypervolume([kept.get(r) for r in seen])
+            good = [kept.get(r) for r in seen if feasible(kept.get(r))]
+            volume = float(measure(np.array([j.objectives for j in good]))) if good and measure else 0.0
+            history.append((len(history) + 1, len(seen), volume))
+            if progress is not None:
+                progress(len(history), len(seen), volume, len(good))
+    return _front(problem, np.unique(np.array(seen), axis=0), kept, history, len(seen))
+
+
+def feasible(judged: Judged) -> bool:
+    """Whether every constraint holds."""
+    return bool((judged.violations <= 0).all() and (judged.objectives < IMPOSSIBLE).all())
+
+
+def _front(
+    problem: Design, x: Floats, kept: Evaluations, history: list[tuple[int, int, float]], count: int
+) -> ParetoSet:
+    good = [row for row in x if feasible(kept.get(row))]
+    if not good:
+        raise StiffmapError(_shortfall(problem, [kept.get(row) for row in x]))
+    f = np.array([kept.get(row).objectives for row in good])
+    no_worse, somewhere = (f[None] <= f[:, None]).all(axis=2), (f[None] < f[:, None]).any(axis=2)
+    better = np.asarray(no_worse & somewhere)
+    keep = ~better.any(axis=1)
+    order = np.argsort(f[keep, 0], kind="stable")
+    rows = np.array(good)[keep][order]
+    return ParetoSet(problem, rows, tuple(kept.get(r) for r in rows), tuple(history), count)
+
+
+def _shortfall(problem: Design, judged: list[Judged]) -> str:
+    """Which constraint the least bad design misses, and by how much."""
+    built = [j for j in judged if not j.reason]
+    if not built:
+        return f"{problem.file}: no design can be built, for example: {judged[0].reason}"
+    nearest = min(built, key=lambda j: float(np.maximum(j.violations, 0).sum()))
+    parts = []
+    for (name, bound), v in zip(problem.constraints, nearest.violations, strict=True):
+        if v > 0:
+            m = get_measure(name)
+            sides = [
+                f"≥ {m.factor * bound.at_least:.4g}" if bound.at_least is not None else "",
+                f"≤ {m.factor * bound.at_most:.4g}" if bound.at_most is not None else "",
+            ]
+            parts.append(
+                f"{name} is {m.factor * nearest.values[name]:.4g} {m.shown} where {' '.join(s for s in sides if s)} is required ({100 * v:.1f} % off)"
+            )
+    return f"{problem.file}: none of {len(judged)} designs meets all constraints; the nearest one misses: {'; '.join(parts)}"
+
+
+def _hypervolume(judged: list[Judged]) -> Any:
+    """Measure with the first generation's feasible designs as scale, or None while there are none."""
+    from pymoo.indicators.hv import HV
+
+    f = np.array([j.objectives for j in judged if feasible(j)])
+    if len(f) < 2:
+        return None
+    low, high = f.min(axis=0), f.max(axis=0)
+    span = np.where(high > low, high - low, 1.0)
+    indicator = HV(ref_point=np.full(f.shape[1], 1.1))
+    return lambda values: indicator((values - low) / span)
+
+
+def _algorithm(problem: Design, generations: int) -> Any:
+    try:
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.algorithms.moo.nsga3 import NSGA3
+        from pymoo.core.problem import Problem
+        from pymoo.util.ref_dirs import get_reference_directions
+    except ModuleNotFoundError as error:
+        raise MissingPartError(
+            f"design needs {error.name}, which is not installed: pip install 'stiffmap[design]'"
+        ) from error
+    search, low_high = problem.model.search, problem.bounds
+    goals = len(problem.model.objectives)
+    task = Problem(
+        n_var=len(problem.variables),
+        n_obj=goals,
+        n_ieq_constr=len(problem.constraints),
+        xl=low_high[0],
+        xu=low_high[1],
+    )
+    if search.method == "nsga2":
+        algorithm = NSGA2(pop_size=search.population)
+    elif search.method == "nsga3":
+        algorithm = NSGA3(
+            ref_dirs=get_reference_directions("energy", goals, search.population, seed=search.seed),
+            pop_size=search.population,
+        )
+    else:
+        raise StiffmapError(
+            f"{problem.file}: search.method: expected nsga2 or nsga3, found '{search.method}'"
+        )
+    algorithm.setup(task, termination=("n_gen", generations), seed=search.seed, verbose=False)
+    return algorithm

@@ -1,0 +1,207 @@
+"""`stiffmap.error_map`."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import whole_number
+from stiffmap.common.errors import FileError
+from stiffmap.common.outputs import needs_space, only_job
+from stiffmap.solve.compiled import Status
+from stiffmap.solve.machine import Machine, hint_metres, takes_machine
+from stiffmap.workspace.maps.block import solve_block
+from stiffmap.workspace.maps.cluster import on_cluster
+from stiffmap.workspace.maps.files import is_zarr, partial_folder, read_dataset, write_dataset
+from stiffmap.workspace.maps.plan import MapPlan
+from stiffmap.workspace.maps.progress import track
+from stiffmap.workspace.maps.request import map_plan
+from stiffmap.workspace.maps.store import Store, folder_store, memory_store
+from stiffmap.workspace.maps.tiles import POSES_AT_ONCE, Tiles, blocks_of, solve_rows, tiles_of
+from stiffmap.workspace.maps.zarr_map import open_zarr_map
+
+
+@takes_machine
+def error_map(
+    machine: Machine,
+    *,
+    x: ArrayLike | None = None,
+    y: ArrayLike | None = None,
+    z: ArrayLike | None = None,
+    wrench: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    cases: Sequence[str] | None = None,
+    plane: str | None = "xy",
+    force: float | None = None,
+    directions: int = 4,
+    tolerance: float = 0.25e-3,
+    compliance: bool = False,
+    uncertainty: bool = False,
+    point: str = "tcp",
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    load_type: str = "dead",
+    method: str = "fast",
+    load_steps: int | str = "auto",
+    threads: int | None = None,
+    chunk: int | None = None,
+    progress: bool | None = None,
+    out: str | PathLike[str] | None = None,
+    resume: bool = False,
+    scheduler: Any = None,
+) -> xr.Dataset:
+    """How far the machine is pushed off its commanded position, over a grid of positions.
+
+    Parameters
+    ----------
+    x, y, z
+        Commanded TCP positions, m, base axes: one number or an axis of numbers each. None: over the machine's
+        workspace (51 positions along an axis, three planes of z; a coordinate that is not commanded stays at home).
+    wrench
+        (6,) N, N·m at `point`; (cases, 6) or a mapping name -> (6,) for several load cases, which
+        adds the dimension ``case``.
+    cases
+        Names of the load cases.
+    plane
+        ``xy``, ``xz`` or ``yz``: pure forces are turned in this plane to find its weakest and its
+        strongest direction. None: leave that out (half of the variables, a tenth of the work).
+    force
+        Magnitude of the turning force, N; None: that of the wrench's force, the largest of the cases.
+    directions
+        Number of equally spaced directions solved before the extremes are searched, 3 or more. 4
+        suffices where the machine is nearly linear; take 16 or more with play or hard stops.
+    tolerance
+        Deflection (m) that defines the force limit.
+    compliance
+        Whether to keep the loaded compliance, (…, 6, 6).
+    uncertainty
+        Add standard deviations, from the covariance of identified links and the uncertainties ``u`` in
+        the machine file, to first order: displacement_std, deflection_std and deflection_xy_std per load
+        case, worst_deflection_std and worst_deflection_xy_std, and variance_share (…, parameter), the
+        share of each number in the variance of the deflection (`stiffmap.uncertainty_ranking`).
+    point, rotation, gravity, load_type, method, load_steps, threads
+        As in `Machine.solve`; `rotation` is one (3, 3) matrix for the whole map.
+    chunk
+        Poses solved at once; memory in addition to the result grows with it, no number depends on it.
+    progress
+        Show a progress bar on standard error; None: where that is a terminal.
+    out
+        Also write the map there: NetCDF, or Zarr where the name ends in ``.zarr``. It then grows on
+        the disk, not in memory, and the Dataset that is returned reads it when used. Zarr is written once, in
+        chunks that can be read while the rest is missing; it is the form for maps of more than 10^7 poses.
+    resume
+        Take up what an interrupted run of the same call left next to `out`.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers solve the map, tile by tile
+        (docs/big_maps.md). No number depends on it.
+
+    Returns
+    -------
+    Dataset with dimensions (z, y, x[, case]): displacement (…, component), deflection (norm of the
+    TCP's translation), deflection_xy (in the plane), status, flags; over the force directions of the
+    plane (z, y, x): worst_deflection, worst_direction, best_deflection, best_direction, force_limit,
+    each of the whole translation and, with the suffix ``_xy``, in the plane; direction_status, the
+    highest status among the directions. SI units; unreachable, unstable and not converged poses hold
+    NaN and their status. Attributes say what was computed, of what machine and how.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
+    FileError
+        Where `out` cannot be written.
+    """
+    plan = map_plan(
+        machine, x=x, y=y, z=z, wrench=wrench, cases=cases, plane=plane, force=force, directions=directions,
+        tolerance=tolerance, compliance=compliance, uncertainty=uncertainty, point=point, rotation=rotation,
+        gravity=gravity, load_type=load_type, method=method, load_steps=load_steps, threads=threads,
+    )  # fmt: skip
+    solver = (
+        partial(solve_here, poses=at_once(chunk))
+        if scheduler is None
+        else partial(on_cluster, scheduler=scheduler)
+    )
+    if out is None:
+        store = memory_store(plan)
+        fill(plan, store, chunk, progress) if scheduler is None else _fill(plan, store, solver, progress)
+        ds = plan.dataset(store.arrays)
+        hint_metres(machine, np.r_[plan.x, plan.y, plan.z], bool((ds.status == Status.UNREACHABLE).all()))
+        return ds
+    target = Path(out)
+    with only_job(target):
+        if is_zarr(target):
+            _to_zarr(plan, target, resume, solver, progress)
+        else:
+            _to_netcdf(plan, target, resume, chunk, progress, None if scheduler is None else solver)
+    return read_dataset(target)
+
+
+Solver = Callable[[MapPlan, Tiles, Sequence[int]], Iterator[tuple[int, dict[str, Any]]]]
+"""From tiles that are missing to tiles that are solved, in any order."""
+
+
+def fill(plan: MapPlan, store: Store, chunk: int | None, progress: bool | None) -> None:
+    """Solve the rows that are not done, block by block."""
+    blocks = blocks_of(slice(0, plan.rows), plan.x.size, at_once(chunk))
+    try:
+        for rows in track(blocks, len(blocks), "map", progress):
+            if not store.done[rows].all():
+                store.put(rows, solve_block(plan, rows))
+    finally:
+        store.flush()
+
+
+def at_once(chunk: int | None) -> int:
+    """Poses solved at once."""
+    return POSES_AT_ONCE if chunk is None else whole_number(chunk, "chunk", 1)
+
+
+def _fill(plan: MapPlan, store: Store, solver: Solver, progress: bool | None) -> None:
+    """Solve the tiles that are not done."""
+    tiles = tiles_of(plan)
+    missing = [i for i in range(tiles.count) if not store.done[tiles.rows_of(i)].all()]
+    try:
+        for index, values in track(solver(plan, tiles, missing), len(missing), "map", progress):
+            store.put(tiles.rows_of(index), values)
+    finally:
+        store.flush()
+
+
+def _to_netcdf(
+    plan: MapPlan, out: Path, resume: bool, chunk: int | None, progress: bool | None, solver: Solver | None
+) -> None:
+    folder = partial_folder(out)
+    try:
+        store = folder_store(plan, folder, resume)
+    except OSError as error:
+        raise FileError(
+            f"cannot be written: {error.strerror or error}; a map of {plan.rows * plan.x.size} poses",
+            file=str(out),
+        ) from error
+    needs_space(out, sum(a.nbytes for a in store.arrays.values()), "the finished map")
+    fill(plan, store, chunk, progress) if solver is None else _fill(plan, store, solver, progress)
+    write_dataset(plan.dataset(store.arrays), out)
+    shutil.rmtree(folder)
+
+
+def _to_zarr(plan: MapPlan, out: Path, resume: bool, solver: Solver, progress: bool | None) -> None:
+    with open_zarr_map(plan, partial_folder(out), resume) as store:
+        missing = [i for i in range(store.tiles.count) if not store.done[i]]
+        for index, values in track(solver(plan, store.tiles, missing), len(missing), "map", progress):
+            store.put(index, values)
+        store.finish(out)
+
+
+def solve_here(
+    plan: MapPlan, tiles: Tiles, indices: Sequence[int], poses: int
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Solved tiles, in order."""
+    for i in indices:
+        yield i, solve_rows(plan, tiles.rows_of(i), poses)

@@ -1,0 +1,106 @@
+"""Inputs of maps, polar diagrams and sweeps, refused at the door."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats, real_array, real_number, trailing, wrench_array
+from stiffmap.common.errors import StiffmapError
+
+PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+
+def axis(values: ArrayLike, name: str) -> Floats:
+    """One axis of a grid (m): finite numbers, none twice, at least one."""
+    out = _numbers(values, name)
+    if len(np.unique(out)) != out.size:
+        raise StiffmapError(f"{name}: expected different numbers, got one of them twice")
+    return out
+
+
+def force_list(values: ArrayLike) -> Floats:
+    """Force magnitudes (N) of a sweep; a negative one acts against the direction."""
+    return _numbers(values, "forces")
+
+
+def _numbers(values: ArrayLike, name: str) -> Floats:
+    out = np.atleast_1d(real_array(values, name))
+    if out.ndim != 1:
+        raise StiffmapError(f"{name}: expected one axis of numbers, got shape {out.shape}")
+    if out.size == 0:
+        raise StiffmapError(f"{name}: expected at least one number, got an empty grid")
+    if not np.isfinite(out).all():
+        raise StiffmapError(f"{name}: expected finite numbers, got {out[~np.isfinite(out)][0]} "
+                            f"at index {int(np.argmin(np.isfinite(out)))}")  # fmt: skip
+    return out
+
+
+def place(position: ArrayLike) -> Floats:
+    """One finite TCP position (3,), m."""
+    out = trailing(position, (3,), "position", "a position (m)")
+    if out.shape != (3,):
+        raise StiffmapError(f"position: expected one position of shape (3,), got shape {out.shape}")
+    if not np.isfinite(out).all():
+        raise StiffmapError(f"position: expected finite numbers, got {out.tolist()}")
+    return out
+
+
+def unit(direction: ArrayLike) -> Floats:
+    """Direction (3,) as a unit vector."""
+    out = trailing(direction, (3,), "direction", "a direction")
+    length = float(np.linalg.norm(out))
+    if out.shape != (3,) or not np.isfinite(length) or length == 0:
+        raise StiffmapError(
+            f"direction: expected one vector of 3 finite numbers, not all 0, got {out.tolist()}"
+        )
+    return np.asarray(out / length)
+
+
+def plane_axes(plane: str) -> tuple[int, int]:
+    """Indices of the two base axes of a plane."""
+    if plane not in PLANES:
+        raise StiffmapError(f"plane: expected one of {', '.join(PLANES)}, got {plane!r}")
+    return PLANES[plane]
+
+
+def magnitude(value: float, name: str, unit_name: str) -> float:
+    """A positive finite number."""
+    out = real_number(value, name, f"a positive number ({unit_name})")
+    if not np.isfinite(out) or out <= 0:
+        raise StiffmapError(f"{name}: expected a positive number ({unit_name}), got {value!r}")
+    return out
+
+
+def wrench_cases(
+    wrench: ArrayLike | Mapping[str, ArrayLike] | None, cases: tuple[str, ...] | None
+) -> tuple[Floats, tuple[str, ...] | None]:
+    """Wrenches (cases, 6) and their names; the names are None for a single, unnamed wrench."""
+    if isinstance(wrench, Mapping):
+        if not wrench:
+            raise StiffmapError("wrench: expected at least one case, got an empty mapping")
+        return np.stack([wrench_array(w, f"wrench[{n!r}]") for n, w in wrench.items()]), tuple(
+            map(str, wrench)
+        )
+    out = wrench_array(wrench)
+    if out.ndim == 1:
+        return out[None], cases
+    if out.ndim != 2 or len(out) == 0:
+        raise StiffmapError(f"wrench: expected shape (6,) or (cases, 6), got {out.shape}")
+    names = cases or tuple(str(i) for i in range(len(out)))
+    if len(names) != len(out) or len(set(names)) != len(names):
+        raise StiffmapError(f"cases: expected {len(out)} different names, got {list(names)}")
+    return out, names
+
+
+def plane_force(wrenches: Floats, force: float | None) -> float:
+    """Magnitude (N) of the forces that turn in the plane: as given, else the largest of the cases."""
+    if force is not None:
+        return magnitude(force, "force", "N")
+    largest = float(np.linalg.norm(wrenches[:, :3], axis=1).max())
+    if largest == 0:
+        raise StiffmapError("force: the wrench holds no force whose direction could turn; "
+                            "give force= (N), or plane=None to leave the directions out")  # fmt: skip
+    return largest

@@ -1,0 +1,95 @@
+"""`stiffmap.polar`."""
+
+from __future__ import annotations
+
+from typing import Any, Unpack
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats, whole_number
+from stiffmap.common.deprecation import warn_renamed
+from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
+from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.solve.options import LoadingKeywords, SolveOptions, spelled_out
+from stiffmap.workspace.maps.direction_sweep import DirectionSweep, direction, direction_sweep_of, even_angles
+from stiffmap.workspace.maps.extremes import find_extreme
+from stiffmap.workspace.maps.fixed_order_sums import norm
+from stiffmap.workspace.maps.inputs import magnitude, place, plane_axes
+from stiffmap.workspace.maps.loading import Loading, without_failed
+from stiffmap.workspace.maps.provenance import describe
+
+
+@takes_machine
+@spelled_out(LoadingKeywords)
+def polar(
+    machine: Machine,
+    position: ArrayLike,
+    force: float = 300.0,
+    plane: str = "xy",
+    *,
+    directions: int = 72,
+    options: SolveOptions | None = None,
+    **given: Unpack[LoadingKeywords],
+) -> xr.Dataset:
+    """Deflection against the direction of a pure force in a plane, at one position.
+
+    position (3,) m; force N; `directions` equally spaced directions from the plane's first axis
+    towards its second, each a loaded equilibrium. Other keywords as in `Machine.solve`; `options` is deprecated.
+
+    Returns a Dataset with dimension ``angle`` (rad): displacement, deflection, deflection_xy, status,
+    flags, and the scalars worst_deflection, worst_direction, best_deflection, best_direction (whole
+    translation; with ``_xy`` in the plane) searched between the directions. Failed directions hold NaN
+    and their status. Raises StiffmapError for bad input.
+    """
+    if options is not None:
+        warn_renamed("options=", "its fields as keywords")
+    loading = Loading(machine, options, **given)
+    p, axes = place(position), plane_axes(plane)
+    force = magnitude(force, "force", "N")
+    if (directions := whole_number(directions, "directions", 1)) < 3:
+        raise StiffmapError(f"directions: expected 3 or more, got {directions}")
+    angle = even_angles(directions)
+    wrench = np.concatenate([force * direction(angle, axes), np.zeros((directions, 3))], axis=1)
+    s = loading.solve(p[None, None], wrench[None])
+    swept = direction_sweep_of(s, angle[None], np.full((1, directions), force), axes)
+    d, status = without_failed(s.displacement, s.status)[0], s.status[0]
+    data = {
+        "displacement": (
+            ("angle", "component"),
+            d,
+            meaning(TWIST_UNITS, "displacement of the reference point"),
+        ),
+        "deflection": ("angle", norm(d[:, :3]), meaning("m", "norm of the translation")),
+        f"deflection_{plane}": ("angle", norm(d[:, axes]), meaning("m", f"norm in the {plane} plane")),
+        "status": ("angle", status, status_attrs("the equilibrium")),
+        "flags": ("angle", s.flags[0], flag_attrs()),
+    } | _extremes(loading, p[None], force, plane, swept)
+    coords = {
+        "angle": (
+            "angle",
+            angle,
+            meaning("rad", f"direction of the force, from {plane[0]} towards {plane[1]}"),
+        ),
+        "component": ("component", np.array(COMPONENTS)),
+        "position": ("axis", p, meaning("m", "commanded tcp")),
+        "axis": ("axis", np.array(["x", "y", "z"])),
+        "force": ((), force, meaning("N", "magnitude of the force")),
+    }
+    call = {"function": "polar", "position": p, "force": force, "plane": plane, "directions": directions}
+    return xr.Dataset(data, coords, describe(loading, "polar diagram", call))
+
+
+def _extremes(
+    loading: Loading, position: Floats, force: float, plane: str, swept: DirectionSweep
+) -> dict[str, Any]:
+    axes, out = plane_axes(plane), {}
+    for suffix, parts in (("", (0, 1, 2)), (f"_{plane}", axes)):
+        for word, size, sign in (("worst", "largest", 1), ("best", "smallest", -1)):
+            e = find_extreme(loading, position, force, axes, swept, parts, sign)
+            what = f"{size} deflection over the force directions of the {plane} plane"
+            out[f"{word}_deflection{suffix}"] = ((), e.value[0], meaning("m", what))
+            out[f"{word}_direction{suffix}"] = ((), e.angle[0], meaning("rad", "direction of that force"))
+    return out

@@ -1,0 +1,192 @@
+"""`stiffmap.map_statistics`: the figures of a map that is never stored."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import partial
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.labels import meaning, status_attrs
+from stiffmap.solve.machine import Machine, as_machine
+from stiffmap.solve.options import keywords_of
+from stiffmap.solve.status import Status
+from stiffmap.workspace.maps.cluster import on_cluster
+from stiffmap.workspace.maps.grid_map import at_once, solve_here
+from stiffmap.workspace.maps.histogram import RELATIVE_WIDTH, Histogram
+from stiffmap.workspace.maps.plan import MapPlan
+from stiffmap.workspace.maps.progress import track
+from stiffmap.workspace.maps.request import map_plan
+from stiffmap.workspace.maps.tiles import Tiles, tiles_of
+from stiffmap.workspace.maps.variables import Variable
+
+NODE = ("x", "y", "z")
+DEFLECTION = re.compile(r"(worst_|best_)?deflection(_xy|_xz|_yz)?")
+
+
+@keywords_of(map_plan)
+def map_statistics(
+    machine: Machine | str | PathLike[str],
+    *,
+    percentiles: Sequence[float] = (50, 95, 99),
+    chunk: int | None = None,
+    progress: bool | None = None,
+    scheduler: Any = None,
+    **call: Any,
+) -> xr.Dataset:
+    """Worst values, percentiles and shares within the tolerance of a map, without storing the map.
+
+    Parameters
+    ----------
+    percentiles
+        In per cent, of the converged poses.
+    chunk, progress, scheduler
+        As in `error_map`; no number depends on them.
+    call
+        The other arguments of `error_map`: x, y, z, wrench, plane, tolerance, gravity ...
+
+    Returns
+    -------
+    Dataset with dimensions (z[, case]); for each deflection of `error_map` (m): NAME_max with NAME_max_position
+    (…, node: x, y, z of the first such pose, m), NAME_within (share of the plane's area within the tolerance,
+    failed poses count as outside), NAME_percentile (percentile, z[, case]) and NAME_percentile_map
+    (percentile[, case]), NAME_column_max (y, x[, case], the worst of all z); status_count (z[, case], status).
+    Maxima, shares and counts are exact; a percentile is at most 0.2 % above the exact one, never below it.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
+    """
+    wanted = real_array(percentiles, "percentiles")
+    if wanted.ndim != 1 or wanted.size == 0 or not ((wanted >= 0) & (wanted <= 100)).all():
+        raise StiffmapError(f"percentiles: expected numbers from 0 to 100, got {list(percentiles)}")
+    plan = map_plan(as_machine(machine), **call)
+    tiles = tiles_of(plan)
+    solver = (
+        partial(solve_here, poses=at_once(chunk))
+        if scheduler is None
+        else partial(on_cluster, scheduler=scheduler)
+    )
+    every = range(tiles.count)
+    found = {v.name: _Deflection(plan, tiles, v) for v in plan.variables if DEFLECTION.fullmatch(v.name)}
+    counts = np.zeros((plan.z.size, len(plan.wrenches), len(Status)), dtype=np.int64)
+    for index, values in track(solver(plan, tiles, every), tiles.count, "map", progress):
+        for name, one in found.items():
+            one.add(index, values[name])
+        plane, _ = tiles.place(index)
+        status = values["status"].reshape(-1, len(plan.wrenches))
+        counts[plane] += np.stack([(status == s).sum(0) for s in Status], axis=-1)
+    out: dict[str, Any] = {}
+    for name, one in found.items():
+        out |= one.variables(name, wanted)
+    case = () if plan.cases is None else ("case",)
+    out["status_count"] = (
+        ("z", *case, "status"),
+        counts if case else counts[:, 0],
+        meaning("1", "poses of each status"),
+    )
+    coords = {k: v for k, v in plan.coords.items() if k not in ("component", "parameter")}
+    coords |= {"node": ("node", np.array(NODE)), "percentile": ("percentile", wanted)}
+    coords["status"] = ("status", np.array([int(s) for s in Status], dtype=np.uint8), status_attrs("poses"))
+    bound = f"at most {100 * RELATIVE_WIDTH:.2g} % above the exact value, never below it"
+    return xr.Dataset(out, coords, plan.attrs | {"tolerance_m": plan.tolerance, "percentile_bound": bound})
+
+
+class _Deflection:
+    """What is kept of one deflection while the tiles pass by, in any order."""
+
+    def __init__(self, plan: MapPlan, tiles: Tiles, variable: Variable) -> None:
+        nz, ny, nx = plan.shape
+        self.plan, self.tiles, self.case = plan, tiles, variable.dims
+        self.cases = cases = len(plan.wrenches) if variable.dims else 1
+        self.most = np.full((nz, cases), np.nan)
+        self.place = np.zeros((nz, cases), dtype=np.int64)
+        self.column = np.full((ny, nx, cases), np.nan)
+        self.within = np.zeros((nz, ny, cases))
+        self.histograms = [[Histogram() for _ in range(cases)] for _ in range(nz)]
+
+    def add(self, index: int, values: Floats) -> None:
+        """Values (rows, x[, case]) of a tile."""
+        plane, y = self.tiles.place(index)
+        a = values.reshape(y.stop - y.start, self.plan.x.size, self.cases)
+        self.column[y] = np.fmax(self.column[y], a)
+        widths = cells(self.plan.x)
+        self.within[plane, y] = ((a <= self.plan.tolerance) * widths[:, None]).sum(1)
+        for c in range(self.cases):
+            flat = a[..., c].ravel()
+            self.histograms[plane][c].add(flat)
+            if np.isnan(flat).all():
+                continue
+            here = int(np.nanargmax(flat))
+            old, new = (
+                (self.most[plane, c], self.place[plane, c]),
+                (flat[here], y.start * self.plan.x.size + here),
+            )
+            if not old[0] >= new[0] or (old[0] == new[0] and new[1] < old[1]):
+                self.most[plane, c], self.place[plane, c] = new
+
+    def variables(self, name: str, percentiles: Floats) -> dict[str, Any]:
+        """Variables of the Dataset."""
+        p = self.plan
+        case = self.case
+
+        def cut(values: Any) -> Any:
+            return values if case else values[..., 0]
+
+        iy, ix = np.divmod(self.place, p.x.size)
+        nodes = np.stack([p.x[ix], p.y[iy], np.broadcast_to(p.z[:, None], ix.shape)], axis=-1)
+        nodes = np.where(np.isnan(self.most)[..., None], np.nan, nodes)
+        heights = cells(p.y)
+        share = (self.within * heights[:, None]).sum(1) / (heights.sum() * cells(p.x).sum())
+        # A bin's upper edge may lie beyond the largest value.
+        each = np.array([[h.percentiles(percentiles) for h in row] for row in self.histograms])
+        each = np.fmin(each, self.most[..., None])
+        total = [Histogram.joined([row[c] for row in self.histograms]) for c in range(self.cases)]
+        both = np.fmin([h.percentiles(percentiles) for h in total], np.fmax.reduce(self.most)[:, None])
+        of = f"of {name}"
+        return {
+            f"{name}_max": (("z", *case), cut(self.most), meaning("m", f"largest value {of}")),
+            f"{name}_max_position": (
+                ("z", *case, "node"),
+                nodes if case else nodes[:, 0],
+                meaning("m", f"pose of the largest value {of}"),
+            ),
+            f"{name}_within": (
+                ("z", *case),
+                cut(share),
+                meaning("1", f"share of the area {of} within tolerance_m"),
+            ),
+            f"{name}_percentile": (
+                ("percentile", "z", *case),
+                cut(np.moveaxis(each, -1, 0)),
+                meaning("m", f"percentiles {of}"),
+            ),
+            f"{name}_percentile_map": (
+                ("percentile", *case),
+                cut(np.moveaxis(both, -1, 0)),
+                meaning("m", f"percentiles {of} over the whole map"),
+            ),
+            f"{name}_column_max": (
+                ("y", "x", *case),
+                cut(self.column),
+                meaning("m", f"largest value {of} over z"),
+            ),
+        }
+
+
+def cells(axis: Floats) -> Floats:
+    """Width of the cell around each node of an axis; equal where the axis has one node."""
+    if axis.size == 1:
+        return np.ones(1)
+    order = np.argsort(axis)
+    half = np.diff(axis[order]) / 2
+    width = np.empty(axis.size)
+    width[order] = np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half])
+    return width

@@ -1,0 +1,106 @@
+"""The one Dataset of sweeps: single forces, and paths with their critical points."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.solve.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
+from stiffmap.workspace.maps.critical import critical_variables
+from stiffmap.workspace.maps.fixed_order_sums import norm
+from stiffmap.workspace.maps.loading import Loading
+from stiffmap.workspace.maps.provenance import describe
+
+BRANCH = meaning("1", "0: from the unloaded machine; 1: the branch that crosses it")
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibria:
+    """What a sweep found, n steps; SI."""
+
+    force: Floats
+    """(n,) N along the direction."""
+    displacement: Floats
+    """(n, 6)."""
+    along: Floats
+    """(n,) m, translation along the force."""
+    compliance_along: Floats
+    """(n,) m/N; NaN where it was not computed."""
+    unstable_modes: Floats
+    """(n,); NaN where they were not counted."""
+    status: NDArray[Any]
+    flags: NDArray[Any]
+    branch: NDArray[np.intp]
+
+    def variables(self) -> dict[str, Any]:
+        """Variables over ``step``."""
+        d = self.displacement
+        twist = meaning(TWIST_UNITS, "displacement of the reference point")
+        return {
+            "displacement": (("step", "component"), d, twist),
+            "deflection": ("step", norm(d[:, :3]), meaning("m", "norm of the translation")),
+            "deflection_xy": (
+                "step",
+                norm(d[:, :2]),
+                meaning("m", "norm of the translation in the xy plane"),
+            ),
+            "deflection_along": ("step", self.along, meaning("m", "translation along the force")),
+            "compliance_along": (
+                "step",
+                self.compliance_along,
+                meaning("m/N", "loaded compliance along the force; NaN on a path"),
+            ),
+            "unstable_modes": (
+                "step",
+                self.unstable_modes,
+                meaning("1", "directions in which the energy falls; NaN for single forces"),
+            ),
+            "status": ("step", self.status, status_attrs("the equilibrium")),
+            "flags": ("step", self.flags, flag_attrs()),
+            "branch": ("step", self.branch, BRANCH),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What is said of a path and of the branch that crosses it; nothing for single forces."""
+
+    end: str = ""
+    crossing_end: str = ""
+    critical: tuple[dict[str, Any], ...] = ()
+    crossing_critical: tuple[dict[str, Any], ...] = ()
+
+
+def sweep_dataset(
+    loading: Loading, title: str, call: dict[str, Any], found: Equilibria, followed: Followed
+) -> xr.Dataset:
+    """The Dataset that `sweep` describes; `call` holds position and direction."""
+    every = [*followed.critical, *followed.crossing_critical]
+    modes, coordinate = critical_variables(loading.machine, every)
+    number = np.repeat([0, 1], [len(followed.critical), len(followed.crossing_critical)])
+    modes["critical_branch"] = ("critical", number, BRANCH)
+    coords = coordinate | {
+        "force": ("step", found.force, meaning("N", "force along the direction")),
+        "component": ("component", np.array(COMPONENTS)),
+        "axis": ("axis", np.array(["x", "y", "z"])),
+        "position": ("axis", call["position"], meaning("m", "commanded tcp")),
+        "direction": ("axis", call["direction"], meaning("1", "direction of the force, base axes")),
+    }
+    attrs = describe(loading, title, {"function": "sweep", **call}) | {
+        "failed_poses": "NaN, with their status; unstable ones kept",
+        "end": followed.end,
+        "crossing_end": followed.crossing_end,
+        "critical_points": json.dumps([_summary(c) for c in followed.critical]),
+    }
+    return xr.Dataset(found.variables() | modes, coords, attrs)
+
+
+def _summary(c: dict[str, Any]) -> dict[str, Any]:
+    kind = "limit" if c["limit"] else "bifurcation"
+    return {"kind": kind, "force": c["load"], "deflection_along": c["along"]}

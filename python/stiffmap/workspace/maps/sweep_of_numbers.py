@@ -1,0 +1,170 @@
+"""`stiffmap.design_sweep`: a machine with other numbers, many of them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import trailing
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.addresses import known_values
+from stiffmap.solve.compiled import Status
+from stiffmap.solve.labels import (
+    COMPLIANCE_UNITS,
+    COMPONENTS,
+    TWIST_UNITS,
+    WRENCH,
+    batch_dims,
+    meaning,
+    status_attrs,
+)
+from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.workspace.maps.inputs import axis
+from stiffmap.workspace.maps.progress import track
+
+KEPT = ("displacement", "deflection", "compliance", "status")
+Evaluate = Callable[[Machine], Mapping[str, float] | float]
+
+
+@takes_machine
+def design_sweep(
+    machine: Machine,
+    numbers: Mapping[str, ArrayLike],
+    *,
+    position: ArrayLike | None = None,
+    wrench: ArrayLike | None = None,
+    evaluate: Evaluate | None = None,
+    rotation: ArrayLike | None = None,
+    point: str = "tcp",
+    gravity: ArrayLike | None = None,
+    method: str = "fast",
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> xr.Dataset:
+    """How far the machine yields, over any numbers of its design.
+
+    Parameters
+    ----------
+    numbers
+        Address -> axis of values (SI), as `Machine.with_numbers` takes them: ``{"bar/length": [0.3, 0.4]}``. Several addresses
+        make a grid. `Machine.numbers` lists addresses.
+    position, rotation
+        Commanded poses (..., 3) m and (..., 3, 3), base axes; None: home.
+    wrench
+        (..., 6) N, N·m at `point`; None: none.
+    evaluate
+        What else is wanted of each machine: a function from a `Machine` to a number, or to a mapping name -> number.
+    point, gravity, method, threads
+        As in `Machine.solve`.
+    progress
+        Show a progress bar on standard error; None: where that is a terminal.
+
+    Returns
+    -------
+    Dataset with one dimension per address (the slash written as a dot, `bar.length`, which files can hold; the address is in its
+    attribute ``address``), then those of the poses (``pose``): displacement (…, component) m and rad, deflection (norm of the
+    translation, m), compliance (…, component, wrench_component), status; and what `evaluate` returned. A
+    machine that cannot be closed with its numbers holds NaN, status UNREACHABLE, and the reason in ``problem``.
+
+    Raises StiffmapError for bad input: an address that the machine has not names the nearest.
+    """
+    if not isinstance(numbers, Mapping) or not numbers:
+        raise StiffmapError("numbers: expected a mapping address -> values with at least one address")
+    axes = {address: axis(values, address) for address, values in numbers.items()}
+    for address in axes:
+        known_values(machine.description.declared or machine.description, address)
+    dims = {address: address.replace("/", ".") for address in axes}
+    given = (
+        machine.description.home.p
+        if position is None
+        else trailing(position, (3,), "position", "positions (m)")
+    )
+    options = {"rotation": rotation, "point": point, "gravity": gravity, "method": method, "threads": threads}
+    cells: dict[tuple[int, ...], dict[str, Any]] = {}
+    problems: dict[tuple[int, ...], str] = {}
+    every = list(itertools.product(*(range(a.size) for a in axes.values())))
+    for index in track(every, len(every), "designs", progress):
+        values = {name: float(a[i]) for (name, a), i in zip(axes.items(), index, strict=True)}
+        try:
+            made = machine.with_numbers(values)
+        except StiffmapError as problem:
+            problems[index] = str(problem)
+            continue
+        here = made.description.home.p if position is None else given
+        s = made.solve(here, wrench, **options)  # type: ignore[arg-type]
+        answer: dict[str, Any] = {
+            "displacement": s.displacement,
+            "compliance": s.compliance,
+            "status": s.status,
+        }
+        answer["deflection"] = np.linalg.norm(answer["displacement"][..., :3], axis=-1)
+        cells[index] = {**answer, **_evaluated(evaluate, made)}
+    if not cells:
+        raise StiffmapError(
+            f"numbers: no machine can be made of them; the first: {next(iter(problems.values()))}"
+        )
+    return _dataset(machine, axes, dims, cells, problems)
+
+
+def _evaluated(evaluate: Evaluate | None, machine: Machine) -> dict[str, Any]:
+    if evaluate is None:
+        return {}
+    found = evaluate(machine)
+    more = dict(found) if isinstance(found, Mapping) else {"value": found}
+    if taken := sorted(set(more) & {*KEPT, "problem"}):
+        raise StiffmapError(f"evaluate: the name '{taken[0]}' is taken; name the result otherwise")
+    return {name: np.asarray(value, dtype=float) for name, value in more.items()}
+
+
+def _dataset(
+    machine: Machine,
+    axes: Mapping[str, Any],
+    dims: Mapping[str, str],
+    cells: Mapping[tuple[int, ...], dict[str, Any]],
+    problems: Mapping[tuple[int, ...], str],
+) -> xr.Dataset:
+    shape = tuple(a.size for a in axes.values())
+    outer = tuple(dims.values())
+    first = next(iter(cells.values()))
+    poses = batch_dims(first["status"].ndim)
+    tails: dict[str, Sequence[str]] = {
+        "displacement": (*poses, "component"),
+        "deflection": poses,
+        "compliance": (*poses, "component", "wrench_component"),
+        "status": poses,
+    }
+    units = {"displacement": TWIST_UNITS, "deflection": "m", "compliance": COMPLIANCE_UNITS}
+    data: dict[str, Any] = {}
+    for name, sample in first.items():
+        fill = int(Status.UNREACHABLE) if name == "status" else np.nan
+        values = np.full(shape + sample.shape, fill, dtype=sample.dtype)
+        for index, cell in cells.items():
+            values[index] = cell[name]
+        attrs = status_attrs("the pose") if name == "status" else meaning(units.get(name, ""), name)
+        tail = tails.get(name, tuple(f"{name}_{i}" for i in range(sample.ndim)))
+        data[name] = ((*outer, *tail), values, attrs)
+    words = np.full(shape, "", dtype=object)
+    for index, text in problems.items():
+        words[index] = text
+    data["problem"] = (
+        outer,
+        words.astype(str),
+        meaning("", "why there is no such machine; empty where there is"),
+    )
+    table = {str(a): str(u) for a, u in machine.numbers()["unit"].items()}
+    coords = {dims[a]: (dims[a], v, {"address": a, "units": _unit(table, a)}) for a, v in axes.items()}
+    labels = {"component": list(COMPONENTS), "wrench_component": list(WRENCH)}
+    return xr.Dataset(data, coords={**coords, **labels}, attrs={"machine": machine.name})
+
+
+def _unit(units: Mapping[str, str], address: str) -> str:
+    """Unit of an address that is listed, or of the listed ones that end alike; empty where none is."""
+    if address.endswith("/length"):
+        return "m"
+    found = [u for a, u in units.items() if a == address or a.endswith("." + address.removeprefix("*."))]
+    return found[0] if found else ""

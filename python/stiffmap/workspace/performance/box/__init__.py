@@ -1,0 +1,1 @@
+"""Boxes and volumes of the workspace in which every requirement holds."""

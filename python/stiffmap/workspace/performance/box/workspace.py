@@ -1,0 +1,245 @@
+"""Volume of the workspace: poses that close and keep every limit, counted in random cells (docs/measures.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from stiffmap.common.broadcasting import Floats, random_numbers, real_array
+from stiffmap.common.deprecation import renamed
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.rotations import as_rotations
+from stiffmap.common.short import short_repr
+from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.workspace.performance.box.cells import halved
+from stiffmap.workspace.performance.box.inside import Inside, Judged
+from stiffmap.workspace.performance.box.proof import Judge, judge_on
+from stiffmap.workspace.performance.limits.limits import Bounds
+
+CELLS = {3: 24, 2: 120, 1: 1000}
+"""Along each edge, by the number of axes."""
+FIRST = {3: 7, 2: 20, 1: 50}
+"""The same while the workspace's extent is looked for."""
+GROWN = 4
+"""Most times that a region is made larger because the workspace reaches its border."""
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class Workspace:
+    """Volume, and where it ends."""
+
+    volume: float
+    """m³; of a machine that moves in a plane m², along a line m."""
+    error: float
+    """Standard error of `volume`, from the two poses of every cell: in two of three cases it is nearer."""
+    dimension: int
+    """3, 2 or 1: over how many axes `volume` is taken."""
+    proven: float
+    """Lower bound: cells proven by enclosures; NaN where it was not asked for or cannot be had."""
+    box: Floats
+    """(2, 3) m, lowest and highest corner of the poses that were found inside."""
+    region: Floats
+    """(2, 3) m, where poses were drawn."""
+    cut: bool
+    """Whether the workspace reaches the region's border, so that there may be more of it outside."""
+    limited_by: tuple[tuple[str, float], ...]
+    """What ends it: limit, and the share of the poses next to the border that break it; the largest first."""
+    drawn: Judged = field(repr=False)
+    """All poses drawn."""
+    ask: Inside = field(repr=False)
+    """Judges more poses."""
+
+    def at(self, position: ArrayLike) -> Judged:
+        """Poses (n, 3) m judged likewise, each begun at the nearest one drawn."""
+        return self.ask(real_array(position, "position").reshape(-1, 3), self.drawn)
+
+
+@renamed(factors="norm")
+@takes_machine
+def workspace_volume(
+    machine: Machine,
+    *,
+    transmission: tuple[float, float] | None = None,
+    norm: str = "sphere",
+    length: float | None = None,
+    ranges: bool = True,
+    joints: bool = True,
+    singularity: float | None = 1e-3,
+    clearance: float | None = None,
+    deflection: tuple[float, str | None, float] | None = None,
+    rotation: ArrayLike | None = None,
+    region: ArrayLike | None = None,
+    cells: int | None = None,
+    prove: int = 0,
+    seed: int = 0,
+    threads: int | None = None,
+    scheduler: Any = None,
+) -> Workspace:
+    """Volume of all positions that the machine comes to in one orientation, with its sampling error.
+
+    Poses are closed one from the other, from the middle of the machine's workspace outwards.
+
+    Parameters
+    ----------
+    transmission, norm, length, ranges, joints, clearance, deflection, rotation
+        Limits that a pose must keep, as in `largest_box`.
+    singularity
+        Least distance from singularities (measure ``singularity``: type 1, type 2, constraint; 0 to 1). Poses
+        beyond a singularity, as seen from home, do not count. None: not asked for.
+    region
+        (2, 3) m, where poses are drawn; None: about all that is found, begun with three times the workspace.
+    cells
+        Along each edge of the region: two poses are drawn at random in each, and their differences give the error.
+        None: 24 in space, 120 in a plane, 1000 along a line.
+    prove
+        Cells at most that are asked for a proof of all of their poses; their volume is a lower bound.
+    seed
+        Of the random poses.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers prove the cells, with the same answer.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
+    """
+    if singularity is not None and not 0 <= singularity < 1:
+        raise StiffmapError(f"singularity: expected a distance from 0 to 1, got {singularity!r}")
+    if cells is not None and cells < 2:
+        raise StiffmapError(f"cells: expected 2 or more along each edge, got {cells!r}")
+    given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
+    bounds = Bounds(
+        machine, given, transmission, norm, length, ranges, joints, clearance, deflection, threads
+    )
+    ask = Inside(bounds, singularity)
+    rng = random_numbers(seed)
+    axes = [i for i, name in enumerate("xyz") if name in machine.description.task]
+    if not axes:
+        raise StiffmapError(
+            f"{machine.name}: the task has no position, so there is no workspace of positions"
+        )
+    cells = cells or CELLS[len(axes)]
+    low, high = _begun(machine, region, axes)
+    grown = 0 if region is not None else GROWN
+    if region is None:
+        low, high, grown = _extent(ask, low, high, axes, rng)
+    while True:
+        drawn = _draw(ask, low, high, axes, cells, rng)
+        if not drawn.touched.any() or grown == 0:
+            break
+        grown -= 1
+        step = (high - low) / 4
+        low, high = low - step * drawn.touched[0], high + step * drawn.touched[1]
+    cell = float(np.prod((high - low)[axes] / cells))
+    pairs = drawn.judged.inside.reshape(-1, 2)
+    kept = drawn.judged.position[drawn.judged.inside]
+    box = np.stack([kept.min(axis=0), kept.max(axis=0)]) if len(kept) else np.full((2, 3), np.nan)
+    with judge_on(bounds, scheduler) as judge:
+        proven = _proven(judge, bounds.unproven, drawn, low, high, axes, cells, prove)
+    return Workspace(
+        volume=cell * float(pairs.mean(axis=1).sum()),
+        error=cell * float(np.sqrt((pairs[:, 0] != pairs[:, 1]).sum() / 4)),
+        dimension=len(axes), proven=proven, box=box,
+        region=np.stack([low, high]), cut=bool(drawn.touched.any()), limited_by=_limiting(drawn),
+        drawn=drawn.judged, ask=ask,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    judged: Judged
+    touched: NDArray[np.bool_]
+    """(2, 3) at which end of each axis a cell of the region's border holds a pose inside."""
+
+
+def _begun(machine: Machine, region: ArrayLike | None, axes: list[int]) -> tuple[Floats, Floats]:
+    low, high = machine.workspace
+    if region is not None:
+        out = real_array(region, "region")
+        if out.shape != (2, 3) or not (np.isfinite(out).all() and (out[1] > out[0])[axes].all()):
+            raise StiffmapError(f"region: expected lowest and highest corner (2, 3) in m, got {region!r}")
+        return out[0], out[1]
+    centre, half = (low + high) / 2, (high - low) / 2
+    moves = np.isin(np.arange(3), axes)
+    half = np.where(half == 0, half.max(), half)
+    return centre - 3 * half * moves, centre + 3 * half * moves
+
+
+def _extent(
+    ask: Inside, low: Floats, high: Floats, axes: list[int], rng: np.random.Generator
+) -> tuple[Floats, Floats, int]:
+    """A region about all that is found, and how many times it may still grow."""
+    for left in range(GROWN, -1, -1):
+        drawn = _draw(ask, low, high, axes, FIRST[len(axes)], rng)
+        if not drawn.judged.inside.any() or not drawn.touched.any() or left == 0:
+            break
+        step = (high - low) / 2
+        low, high = low - step * drawn.touched[0], high + step * drawn.touched[1]
+    if drawn.judged.inside.any():
+        kept, step = drawn.judged.position[drawn.judged.inside], (high - low) / FIRST[len(axes)]
+        low, high = np.maximum(kept.min(axis=0) - step, low), np.minimum(kept.max(axis=0) + step, high)
+    return low, high, left
+
+
+def _draw(
+    ask: Inside, low: Floats, high: Floats, axes: list[int], cells: int, rng: np.random.Generator
+) -> _Drawn:
+    """Two random poses in each of cells^axes cells, neighbours in memory."""
+    grid = np.stack(np.meshgrid(*[np.arange(cells)] * len(axes), indexing="ij"), axis=-1)
+    corner = np.repeat(grid.reshape(-1, len(axes)), 2, axis=0)
+    p = np.tile((low + high) / 2, (len(corner), 1))
+    p[:, axes] = low[axes] + (corner + rng.random(corner.shape)) * ((high - low)[axes] / cells)
+    judged = ask(p)
+    inside = judged.inside
+    touched = np.zeros((2, 3), dtype=bool)
+    for i, axis in enumerate(axes):
+        touched[0, axis] = inside[corner[:, i] == 0].any()
+        touched[1, axis] = inside[corner[:, i] == cells - 1].any()
+    return _Drawn(judged, touched)
+
+
+def _limiting(drawn: _Drawn) -> tuple[tuple[str, float], ...]:
+    """What the poses break that are outside but have one inside for a neighbour."""
+    if not drawn.judged.inside.any() or drawn.judged.inside.all():
+        return ()
+    step = np.median(cKDTree(drawn.judged.position).query(drawn.judged.position, 2)[0][:, 1])
+    far = cKDTree(drawn.judged.position[drawn.judged.inside]).query(drawn.judged.position)[0]
+    border = ~drawn.judged.inside & (far < 2 * step)
+    if not border.any():
+        return ()
+    shares = {name: float(bad[border].mean()) for name, bad in drawn.judged.causes().items()}
+    found = [(name, share) for name, share in shares.items() if share > 0]
+    return tuple(sorted(found, key=lambda f: -f[1]))
+
+
+def _proven(
+    judge: Judge,
+    unproven: str,
+    drawn: _Drawn,
+    low: Floats,
+    high: Floats,
+    axes: list[int],
+    cells: int,
+    work: int,
+) -> float:
+    """Volume of the cells (halved where that decides) every pose of which was proven to keep the limits."""
+    if work <= 0 or unproven or len(axes) != 3:
+        return float("nan")
+    step = (high - low) / cells
+    number = np.flatnonzero(drawn.judged.inside.reshape(-1, 2).all(axis=1))
+    corner = np.stack(np.unravel_index(number, (cells,) * 3), axis=1)
+    a = low + corner * step
+    b, total, left = a + step, 0.0, work
+    while len(a) and left > 0:
+        a, b = a[:left], b[:left]
+        left -= len(a)
+        found = judge((a + b) / 2, (b - a) / 2, np.eye(3))
+        total += float(np.prod(b - a, axis=1)[found.inside].sum())
+        open_ = ~found.inside & ~found.broken
+        a, b = halved(a[open_], b[open_], found.bend[open_])
+    return total

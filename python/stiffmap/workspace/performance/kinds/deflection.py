@@ -1,0 +1,70 @@
+"""Deflection of the loaded machine in a plane, force in its worst direction there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.solve.status import Status
+from stiffmap.workspace.maps.inputs import plane_axes
+from stiffmap.workspace.performance.limits.deflection import TURNS, worst_deflection
+from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
+
+SHARE = 0.8
+"""Of the largest deflection by the unloaded compliance: nodes above it are loaded at once."""
+MARGIN = 1.1
+"""On the largest ratio seen of loaded to unloaded: nodes that may exceed the worst by it are loaded too."""
+
+
+def compute(case: Case) -> Found:
+    """Over the box: a coarse grid of equilibria, then a search about its worst node."""
+    if case.quick:
+        return quick(case)
+    d = worst_deflection(
+        case.machine, box=np.stack([case.low, case.high]), force=case.force, plane=case.plane,
+        nodes=case.coarse, turns=TURNS, rotation=case.rotation, gravity=case.gravity, threads=case.threads,
+    )  # fmt: skip
+    found = over_poses(d.positions, d.values, "low", f"under {case.force:.4g} N", direction=d.direction)
+    return Found(**{**found.__dict__, "worst": d.value, "worst_at": d.position})
+
+
+def quick(case: Case) -> Found:
+    """At the nodes, each force along the direction in which the unloaded machine is weakest: the loaded
+    equilibrium wherever the unloaded compliance does not rule out that it is the worst."""
+    axes = list(plane_axes(case.plane))
+    c = case.still.compliance[:, :3, :3]
+    if not (case.still.status == Status.CONVERGED).all():
+        return over_poses(case.positions, np.where(case.still.status == Status.CONVERGED, 0.0, np.nan), "low")
+    value, vector = weakest(c[:, axes][:, :, axes])
+    linear = case.force * value
+    loaded = np.full(len(linear), np.nan)
+    ratio = 1.0
+    for _ in range(len(linear)):
+        worst = np.nanmax(loaded, initial=0.0)
+        todo = np.isnan(loaded) & (linear * ratio * MARGIN >= max(worst, SHARE * linear.max()))
+        if not todo.any():
+            break
+        wrench = np.zeros((int(todo.sum()), 6))
+        wrench[:, axes] = case.force * vector[todo]
+        s = case.machine.solve(
+            case.positions[todo], wrench, rotation=case.rotation, gravity=case.gravity, stiffness=False,
+            threads=case.threads,
+        )  # fmt: skip
+        d = np.linalg.norm(s.displacement[:, axes], axis=1)
+        if not (s.status == Status.CONVERGED).all():
+            return over_poses(case.positions[todo], np.where(s.status == Status.CONVERGED, d, np.nan), "low")
+        loaded[todo] = d
+        ratio = max(ratio, float((d / linear[todo]).max()))
+    some = np.isfinite(loaded)
+    return over_poses(case.positions[some], loaded[some], "low", f"under {case.force:.4g} N")
+
+
+def weakest(block: Floats) -> tuple[Floats, Floats]:
+    """(n,) largest singular value of (n, 2, 2) and (n, 2) the direction that it magnifies."""
+    a, b, c = (np.einsum("ni,ni->n", block[:, :, i], block[:, :, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
+    angle = np.arctan2(2 * b, a - c) / 2
+    vector = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.linalg.norm((block @ vector[..., None])[..., 0], axis=1), vector
+
+
+MEASURE = Measure("deflection", "deflection in the plane", "m", "low", compute, "mm", 1e3, order=30)

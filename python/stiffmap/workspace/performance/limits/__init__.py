@@ -1,0 +1,1 @@
+"""What a requirement asks of one pose."""

@@ -1,0 +1,205 @@
+"""Largest deflection of the loaded machine over directions and over a box, a path or a list of poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.short import short_repr
+from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.solve.status import Status
+from stiffmap.workspace.maps.inputs import plane_axes
+from stiffmap.workspace.performance.poses import box_nodes, read_box
+
+TURNS = 12
+REFINEMENTS = 4
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class WorstDeflection:
+    """The largest deflection that was found, and the one at each pose asked for."""
+
+    value: float
+    """m; NaN where any pose failed."""
+    position: Floats
+    """(3,) m, where."""
+    direction: Floats
+    """(3,) unit vector of the force, base axes."""
+    values: Floats
+    """(n,) m at each pose."""
+    positions: Floats
+    """(n, 3) m."""
+    directions: Floats
+    """(n, 3)."""
+    status: NDArray[np.uint8]
+    """(n,) highest status among the directions of a pose."""
+    force: float
+    plane: str | None
+    linear: bool
+
+
+@takes_machine
+def worst_deflection(
+    machine: Machine,
+    position: ArrayLike | None = None,
+    *,
+    box: ArrayLike | None = None,
+    force: float,
+    plane: str | None = "xy",
+    direction: ArrayLike | None = None,
+    nodes: int = 7,
+    refine: bool = True,
+    turns: int = TURNS,
+    linear: bool = False,
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    threads: int | None = None,
+) -> WorstDeflection:
+    """Largest deflection of the TCP under a force that may point anywhere in a plane or in space.
+
+    Parameters
+    ----------
+    position
+        (n, 3) m, poses or a path; None: a grid of `nodes` per axis over the box.
+    box
+        (2, 3) m, lowest and highest corner; None: the machine's workspace.
+    force
+        Size, N.
+    plane
+        ``xy``, ``xz``, ``yz``: directions of the force and components of the deflection that count;
+        None: all of space.
+    direction
+        (3,) or (n, 3): the force's direction, where it is known (along a toolpath); deflections in
+        `plane` (None: in space) count.
+    refine
+        Search between the nodes of the box about the worst one.
+    turns
+        Most improvements of the direction at each pose; 0: the unloaded compliance's weakest one is taken.
+    linear
+        Unloaded compliance times force, by superposition. Otherwise the equilibrium under each force.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input, never for a pose.
+    """
+    if not (np.isfinite(force) and force > 0):
+        raise StiffmapError(f"force: expected a positive size in N, got {force!r}")
+    axes = (0, 1, 2) if plane is None else plane_axes(plane)
+    ask = _Ask(machine, force, axes, direction, linear, rotation, gravity, threads, turns)
+    if position is not None:
+        p = real_array(position, "position").reshape(-1, 3)
+        return _result(ask, p, *ask.at(p), plane)
+    low, high = read_box(machine, box)
+    p = box_nodes(low, high, nodes)
+    out = _result(ask, p, *ask.at(p), plane)
+    return _refined(ask, out, low, high, nodes) if refine and direction is None else out
+
+
+@dataclass(frozen=True, eq=False)
+class _Ask:
+    machine: Machine
+    force: float
+    axes: tuple[int, ...]
+    direction: ArrayLike | None
+    linear: bool
+    rotation: ArrayLike | None
+    gravity: ArrayLike | None
+    threads: int | None
+    turns: int
+
+    def solve(self, p: Floats, unit: Floats | None, stiffness: bool):  # type: ignore[no-untyped-def]
+        wrench = np.zeros((len(p), 6))
+        if unit is not None:
+            wrench[:, :3] = self.force * unit
+        return self.machine.solve(
+            p, wrench, rotation=self.rotation, gravity=self.gravity, stiffness=stiffness, threads=self.threads
+        )
+
+    def at(self, p: Floats) -> tuple[Floats, Floats, NDArray[np.uint8]]:
+        """Largest deflections, their directions and the status at poses (n, 3)."""
+        axes = list(self.axes)
+        start = self.solve(p, None, stiffness=True)
+        c = start.compliance[:, :3, :3]
+        rest = start.displacement[:, :3]
+        if self.direction is not None:
+            unit = np.broadcast_to(real_array(self.direction, "direction"), p.shape)
+            unit = unit / np.linalg.norm(unit, axis=1, keepdims=True)
+            return self._loaded(p, unit, c, rest, start.status)
+        block = np.nan_to_num(c[:, axes][:, :, axes])
+        *_, vh = np.linalg.svd(block)
+        unit = np.zeros((len(p), 3))
+        unit[:, axes] = vh[:, 0]
+        value, way, status = self._loaded(p, unit, c, rest, start.status)
+        if self.turns == 0:
+            return value, way, status
+        other = self._loaded(p, -unit, c, rest, start.status)
+        flip = other[0] > value
+        value, way = np.where(flip, other[0], value), np.where(flip[:, None], -unit, way)
+        status = np.maximum(status, other[2])
+        return (value, way, status) if self.linear else self._turned(p, value, way, status)
+
+    def _loaded(
+        self, p: Floats, unit: Floats, c: Floats, rest: Floats, status: NDArray[np.uint8]
+    ) -> tuple[Floats, Floats, NDArray[np.uint8]]:
+        if self.linear:
+            d = rest + self.force * (c @ unit[..., None])[..., 0]
+        else:
+            s = self.solve(p, unit, stiffness=False)
+            d, status = s.displacement[:, :3], np.maximum(status, s.status)
+        return np.linalg.norm(d[:, list(self.axes)], axis=1), unit, status
+
+    def _turned(
+        self, p: Floats, value: Floats, unit: Floats, status: NDArray[np.uint8]
+    ) -> tuple[Floats, Floats, NDArray[np.uint8]]:
+        """Turns each force to where the loaded compliance says that the deflection grows."""
+        axes = list(self.axes)
+        for _ in range(self.turns):
+            s = self.solve(p, unit, stiffness=True)
+            d = s.displacement[:, axes]
+            grow = (np.swapaxes(s.compliance[:, axes][:, :, axes], 1, 2) @ d[..., None])[..., 0]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                grow = grow / np.linalg.norm(grow, axis=1, keepdims=True)
+            turned = unit.copy()
+            turned[:, axes] = np.where(np.isfinite(grow), grow, unit[:, axes])
+            far = np.linalg.norm(turned - unit, axis=1)
+            now, _, state = self._loaded(p, turned, s.compliance, d, s.status)
+            better = now > value
+            value, unit = np.where(better, now, value), np.where(better[:, None], turned, unit)
+            status = np.maximum(status, state)
+            if not (better & (far > 1e-5)).any():
+                break
+        return value, unit, status
+
+
+def _result(
+    ask: _Ask, p: Floats, value: Floats, unit: Floats, status: NDArray[np.uint8], plane: str | None
+) -> WorstDeflection:
+    good = (status == Status.CONVERGED) & np.isfinite(value)
+    value = np.where(good, value, np.nan)
+    i = int(np.nanargmax(value)) if good.any() else 0
+    worst = float(value[i]) if good.all() else float("nan")
+    where = p[i] if good.all() else p[int(np.argmin(good))]
+    return WorstDeflection(worst, where, unit[i], value, p, unit, status, ask.force, plane, ask.linear)
+
+
+def _refined(ask: _Ask, out: WorstDeflection, low: Floats, high: Floats, nodes: int) -> WorstDeflection:
+    if not np.isfinite(out.value):
+        return out
+    best, at, unit = out.value, out.position, out.direction
+    h = (high - low) / (nodes - 1)
+    around = np.array([(a, b, c) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (-1, 0, 1)], dtype=float)
+    for _ in range(REFINEMENTS):
+        h = h / 2
+        p = np.unique(np.clip(at + around * h, low, high), axis=0)
+        value, way, status = ask.at(p)
+        value = np.where(status == Status.CONVERGED, value, -np.inf)
+        i = int(np.argmax(value))
+        if value[i] > best:
+            best, at, unit = float(value[i]), p[i], way[i]
+    return WorstDeflection(**{**out.__dict__, "value": best, "position": at, "direction": unit})

@@ -1,0 +1,195 @@
+"""What keeps a pose inside the workspace."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.description.machine import TASK
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.status import Status
+from stiffmap.workspace.performance.limits.bars import Bars
+from stiffmap.workspace.performance.limits.limit import UNLIMITED, Limit
+from stiffmap.workspace.performance.limits.matrix_limits import rows, spectral, vertices
+from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics, kernel_starts
+from stiffmap.workspace.performance.motion.scaling import characteristic_length, weighted
+from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
+
+KNOWN = 4000
+"""Closed poses that are kept as starts, about."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What a workspace asks of a pose; see `stiffmap.workspace.performance.largest_box`."""
+
+    machine: Machine
+    rotation: Floats | None = None
+    transmission: tuple[float, float] | None = None
+    factors: str = "sphere"
+    length: float | None = None
+    ranges: bool = True
+    joints: bool = True
+    clearance: float | None = None
+    deflection: tuple[float, str | None, float] | None = None
+    """N, plane, m: force in its worst direction there, and the largest deflection."""
+    threads: int | None = None
+    counter: list[int] = field(default_factory=lambda: [0])
+    known: list[tuple[Floats, Floats]] = field(default_factory=list)
+    """Positions and coordinates of poses that were closed, as starts for others: none or one entry."""
+
+    def __post_init__(self) -> None:
+        if self.transmission is not None:
+            low, high = self.transmission
+            if not 0 <= low < high:
+                raise StiffmapError(
+                    f"transmission: expected (lowest, highest) with 0 <= lowest < highest, got ({low}, {high})"
+                )
+        if self.factors not in ("sphere", "cube"):
+            raise StiffmapError(
+                f"norm: expected 'sphere' (singular values) or 'cube' (each drive within its limit), got {self.factors!r}"
+            )
+        if self.clearance is not None and not self.clearance > 0:
+            raise StiffmapError(f"clearance: expected a positive distance in m, got {self.clearance!r}")
+        if self.deflection is not None and not (self.deflection[0] > 0 and self.deflection[2] > 0):
+            raise StiffmapError(
+                f"deflection: expected (force in N, plane, most in m), both positive, got {self.deflection!r}"
+            )
+
+    @cached_property
+    def bars(self) -> Bars:
+        """Straight members whose clearance counts."""
+        return Bars(self.machine)
+
+    @cached_property
+    def unproven(self) -> str:
+        """Empty where cells can be proven, else why their nodes must do."""
+        compiled, drives = self.machine.compiled, len(self.machine.actuators)
+        if self.deflection is not None:
+            return "a deflection has no bound between poses"
+        if compiled.not_enclosed:
+            return compiled.not_enclosed
+        if self.transmission is not None and (drives not in (3, 6) or self.machine.description.task != TASK):
+            return "drives and commanded motions are not as many"
+        return ""
+
+    def at(self, position: Floats) -> tuple[NDArray[np.bool_], list[Limit]]:
+        """Which poses (n, 3) close, and the limits there."""
+        k = self.closed(position)
+        return k.status == Status.CONVERGED, self.limits_of(k, position)
+
+    def limits_of(self, k: DriveKinematics, position: Floats) -> list[Limit]:
+        """The limits at poses (n, 3) whose kinematics are at hand."""
+        closed = k.status == Status.CONVERGED
+        limits: list[Limit] = []
+        if self.transmission is not None:
+            limits.extend(self._factors(k, closed))
+        limits.extend(self.intervals(k.coordinates))
+        if self.clearance is not None:
+            limits.append(self._clearance(k))
+        if self.deflection is not None:
+            limits.append(self._deflection(position, closed))
+        return limits
+
+    def closed(self, position: Floats) -> DriveKinematics:
+        """Kinematics at poses, begun at the kernels' answer, else at the nearest pose that was closed before."""
+        self.counter[0] += len(position)
+        start = kernel_starts(self.machine, position, self.rotation, self.threads)
+        far = np.ones(len(position), dtype=bool) if start is None else np.isnan(start[:, 0])
+        if self.known and far.any():
+            there, coordinates = self.known[0]
+            start = np.empty((len(position), coordinates.shape[1])) if start is None else start
+            start[far] = coordinates[cKDTree(there).query(position[far])[1]]
+        k = drive_kinematics(
+            self.machine, position, self.rotation, start=start, patient=False, threads=self.threads
+        )
+        good = k.status == Status.CONVERGED
+        if good.any() and (not self.known or len(self.known[0][0]) < KNOWN):
+            new, there = position[good], k.coordinates[good]
+            if self.known:
+                new = np.concatenate([self.known[0][0], new])
+                there = np.concatenate([self.known[0][1], there])
+            self.known[:] = [(new, there)]
+        return k
+
+    def inside(self, position: Floats) -> NDArray[np.bool_]:
+        """Which poses (n, 3) close and keep all limits."""
+        closed, limits = self.at(position)
+        good = closed.copy()
+        for limit in limits:
+            good &= limit.value <= limit.most
+        return good
+
+    def _factors(self, k: DriveKinematics, closed: NDArray[np.bool_]) -> list[Limit]:
+        assert self.transmission is not None
+        j = weighted(self.machine, k.jacobian, self.size, "all")
+        low, high = self.transmission
+        out = []
+        if self.factors == "cube":
+            if np.isfinite(high):
+                out.append(vertices("cube factor above", j, high, closed))
+            if low > 0:
+                out.append(rows("cube factor below", inverse_rows(j), 1 / low, closed))
+            return out
+        if np.isfinite(high):
+            out.append(spectral("transmission above", j, high, closed))
+        if low > 0:
+            out.append(spectral("transmission below", inverse_rows(j), 1 / low, closed))
+        return out
+
+    @cached_property
+    def size(self) -> float:
+        """Characteristic length, m."""
+        return characteristic_length(self.machine, self.length)
+
+    @cached_property
+    def intervals_wanted(self) -> list[tuple[int, str, float, float]]:
+        """Index, name, least and most of each coordinate that counts."""
+        return _coordinate_limits(self.machine, self.ranges, self.joints)
+
+    def intervals(self, x: Floats) -> list[Limit]:
+        """Ranges of drives and limits of joints at coordinates (n, coordinates)."""
+        out = []
+        for index, name, low, high in self.intervals_wanted:
+            for sign, most in ((1.0, high), (-1.0, -low)):
+                if abs(most) < UNLIMITED:
+                    value = sign * x[:, index]
+                    out.append(Limit(name, value, most, value[:, None], np.ones((len(x), 1))))
+        return out
+
+    def _clearance(self, k: DriveKinematics) -> Limit:
+        assert self.clearance is not None
+        value = -self.bars.least_distance(k.coordinates)
+        return Limit("clearance of bars", value, -self.clearance, value[:, None], np.ones((len(value), 1)))
+
+    def _deflection(self, position: Floats, closed: NDArray[np.bool_]) -> Limit:
+        from stiffmap.workspace.performance.limits.deflection import worst_deflection
+
+        assert self.deflection is not None
+        force, plane, most = self.deflection
+        value = np.full(len(position), np.inf)
+        if closed.any():
+            d = worst_deflection(
+                self.machine, position[closed], force=force, plane=plane, turns=0, rotation=self.rotation,
+                threads=self.threads,
+            )  # fmt: skip
+            value[closed] = np.where(np.isfinite(d.values), d.values, np.inf)
+        return Limit("deflection", value, most, value[:, None], np.ones((len(value), 1)))
+
+
+def _coordinate_limits(machine: Machine, ranges: bool, joints: bool) -> list[tuple[int, str, float, float]]:
+    compiled = machine.compiled
+    drives = set(compiled.drives)
+    out = []
+    for i, (low, high) in enumerate(compiled.limits):
+        wanted = ranges if i in drives else joints
+        if wanted and (abs(low) < UNLIMITED or abs(high) < UNLIMITED):
+            kind = "range of" if i in drives else "joint limit of"
+            out.append((i, f"{kind} {compiled.names.coordinates[i]}", low, high))
+    return out

@@ -1,0 +1,1 @@
+"""Drives and the tool in motion: transmission, inertia, efforts, paths, natural frequencies."""

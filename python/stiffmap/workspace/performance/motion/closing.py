@@ -1,0 +1,109 @@
+"""Drive Jacobian and joint coordinates over arrays of poses, springs at rest (docs/theory.md D1-D3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.rotations import as_rotations
+from stiffmap.solve.machine import Machine
+from stiffmap.workspace.performance.motion.sharing import drive_weights
+
+CHUNK = 16_384
+"""Poses that are solved at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveKinematics:
+    """First-order kinematics of the rigid machine; NaN where the pose is UNREACHABLE or SINGULAR."""
+
+    jacobian: Floats
+    """(..., 6, drives): TCP twist (base axes) per unit rate of each drive."""
+    coordinates: Floats
+    """(..., coordinates) all coordinates, springs at zero."""
+    actuators: Floats
+    """(..., drives) m or rad."""
+    position: Floats
+    """(..., 3) m, TCP; where the task leaves a component open, the closure's answer."""
+    rotation: Floats
+    """(..., 3, 3)."""
+    free_twist: Floats
+    """(..., 6) with all drives held, the motion of the platform at a SINGULAR pose; else NaN."""
+    sharing: Floats
+    """(..., drives, drives) takes any rates to the nearest that go together, transposed the efforts that a motion needs
+    to the drives' shares; the identity unless drives outnumber the freedoms."""
+    together: NDArray[np.int32]
+    """(...) dimension of the rates of drives that go together."""
+    pivot: Floats
+    """(...) smallest relative pivot of the loops' elimination: 0 at a pose where passive joints lose rank."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+
+
+def drive_kinematics(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    start: ArrayLike | None = None,
+    patient: bool = True,
+    only_start: bool = False,
+    sharing: str = "least_norm",
+    threads: int | None = None,
+) -> DriveKinematics:
+    """Jacobian from the drives to the TCP at commanded poses (..., 3) m, rotation (..., 3, 3).
+
+    Any machine: passive rates follow from all loops by rank-revealing elimination. `start`
+    (..., coordinates): coordinates near the answer; None: continued from the pose before. `patient`: False
+    takes a pose that straight continuation from home does not reach as UNREACHABLE, without the slow
+    second attempt. `only_start`: coordinates of a neighbouring pose, which each pose continues; one that
+    they do not lead to is UNREACHABLE. `sharing`: see `drive_weights`. Raises StiffmapError for bad input, never for a pose.
+    """
+    p = trailing(position, (3,), "position", "positions (m)")
+    r = trailing(
+        machine.description.home.r if rotation is None else rotation,
+        (3, 3),
+        "rotation",
+        "rotation matrices",
+    )
+    if rotation is not None:
+        r = as_rotations(r)
+    if not machine.actuators:
+        raise StiffmapError(f"{machine.name}: no actuator, so there are no drive rates")
+    shape = batch(p.shape[:-1], r.shape[:-2])
+    flat_p, flat_r = rows(p, shape, (3,)), rows(r, shape, (3, 3))
+    compiled, size = machine.compiled, len(machine.compiled.names.coordinates)
+    begin: Floats | None = None
+    if start is not None:
+        begin = rows(trailing(start, (size,), "start", "coordinates"), shape, (size,))
+    if only_start and begin is None:
+        raise StiffmapError("only_start: needs start, coordinates of neighbouring poses")
+    out = compiled.rates(
+        flat_p, flat_r, begin, weights=drive_weights(machine, sharing), patient=patient, only=only_start,
+        threads=thread_count(threads),
+    )  # fmt: skip
+    drives = list(compiled.drives)
+    shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items() if k != "rates"}
+    return DriveKinematics(actuators=shaped["coordinates"][..., drives], **shaped)
+
+
+def kernel_starts(
+    machine: Machine, position: Floats, rotation: ArrayLike | None, threads: int | None
+) -> Floats | None:
+    """(n, coordinates) of the unloaded equilibria at (n, 3) m as starts on home's branch, NaN: none.
+
+    Several times as quick as closing without a start. None: not for this machine.
+    """
+    if machine.fast:
+        return None
+    out = np.empty((len(position), len(machine.compiled.names.coordinates)))
+    for begin in range(0, len(position), CHUNK):
+        part = slice(begin, begin + CHUNK)
+        out[part] = machine.solve(
+            position[part], rotation=rotation, gravity=np.zeros(3), threads=threads
+        ).coordinates
+    return out

@@ -1,0 +1,225 @@
+"""Efforts of the drives along a trajectory, equation (4) of the paper (docs/theory.md D4-D6)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.description.elements import Drive
+from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
+from stiffmap.workspace.performance.motion.inertia import (
+    motion_friction,
+    need_masses,
+    rest_efforts,
+    rigid_dynamics,
+)
+from stiffmap.workspace.performance.motion.refusal import place_text, refuse_failed
+from stiffmap.workspace.performance.motion.scaling import drive_table, drive_values, revolute_drives
+from stiffmap.workspace.performance.motion.tensions import (
+    as_tensions,
+    farthest,
+    held,
+    in_cables,
+    inertia_columns,
+    radius,
+)
+from stiffmap.workspace.performance.motion.timing import quickest
+from stiffmap.workspace.performance.motion.trajectory import Path, Trajectory
+from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
+
+IMPOSSIBLE = 1e-6
+"""Relative part of a motion that the machine cannot do: above it, the trajectory is refused."""
+
+
+@takes_machine
+def drive_efforts(
+    machine: Machine,
+    trajectory: Trajectory,
+    *,
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    friction: bool = True,
+    sharing: str = "least_norm",
+    threads: int | None = None,
+) -> xr.Dataset:
+    """What each drive exerts along a motion of the tool: effort, power, speed, their peaks and rms.
+
+    Newton and Euler for every body of the closed machine, projected on the drives; Coulomb and viscous
+    friction of the drives, springs of passive joints and external springs, `Trajectory.force` on the
+    tool. gravity (3,) m/s²; None: what the machine file says. sharing: of drives that outnumber the freedoms,
+    ``least_norm`` or ``stiffness`` (docs/measures.md). The joints of a redundant machine are those nearest to home.
+    Efforts of winches are minus the tensions of their cables, none of which pushes.
+
+    Returns a Dataset over (time, drive): effort, rate, acceleration, coordinate, power, friction; over
+    time: kinetic, potential (J); over drive: peak_effort, rms_effort, peak_speed, peak_power,
+    effort_margin, speed_margin (limit minus peak) and range_margin (distance from the nearer end of the
+    range), NaN where none is declared. SI units.
+
+    Raises StiffmapError where masses are missing (names the bodies) and where the path leaves the
+    reach or meets a singularity (says where and when).
+    """
+    need_masses(machine, "inverse dynamics")
+    h = in_cables(machine, "inverse dynamics")
+    t = trajectory
+    k = drive_kinematics(machine, t.position, rotation, sharing=sharing, threads=threads)
+    refuse_failed(machine, k, t.time, t.position)
+    zero = np.zeros_like(t.position)
+    out = rigid_dynamics(
+        machine, k.coordinates, np.hstack([t.velocity, zero]), np.hstack([t.acceleration, zero]),
+        np.hstack([t.force, zero]), gravity, threads, sharing=sharing,
+    )  # fmt: skip
+    bad = ~(out["misfit"] < IMPOSSIBLE)
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise StiffmapError(
+            f"{machine.name}: the trajectory asks for a motion that the machine cannot do at "
+            f"{place_text(t.position[i])}, t = {t.time[i]:.4g} s (its drives leave {out['misfit'][i]:.1e} of it open)"
+        )
+    if h is not None:
+        out["effort"] = as_tensions(machine, h, k, out["effort"], h.most, sharing)
+        slack = np.isnan(out["effort"]).any(axis=-1)
+        if slack.any():
+            i = int(np.argmax(slack))
+            raise StiffmapError(
+                f"{machine.name}: no tensions between 0 and the largest ones hold the motion at "
+                f"{place_text(t.position[i])}, t = {t.time[i]:.4g} s"
+            )
+    friction_effort = motion_friction(machine, out["rate"]) if friction else np.zeros_like(out["rate"])
+    return _dataset(machine, t, k, out, friction_effort)
+
+
+def _dataset(
+    machine: Machine, t: Trajectory, k: DriveKinematics, out: dict[str, Floats], friction_effort: Floats
+) -> xr.Dataset:
+    effort = out["effort"] + friction_effort
+    power = effort * out["rate"]
+    span = t.time[-1] - t.time[0]
+    drives = drive_table(machine)
+    most = {
+        f: np.array([np.nan if getattr(d, f) is None else getattr(d, f) for d in drives])
+        for f in ("force", "speed")
+    }
+    over = ("time", "drive")
+    return xr.Dataset(
+        {
+            "effort": (over, effort, {"units": "N or N m"}),
+            "friction": (over, friction_effort, {"units": "N or N m"}),
+            "rate": (over, out["rate"], {"units": "m/s or rad/s"}),
+            "acceleration": (over, out["acceleration"]),
+            "coordinate": (over, k.actuators, {"units": "m or rad"}),
+            "power": (over, power, {"units": "W"}),
+            "kinetic": ("time", out["kinetic"], {"units": "J"}),
+            "potential": ("time", out["potential"], {"units": "J"}),
+            "peak_effort": ("drive", np.abs(effort).max(axis=0)),
+            "rms_effort": ("drive", np.sqrt(np.trapezoid(effort**2, t.time, axis=0) / span)),
+            "peak_speed": ("drive", np.abs(out["rate"]).max(axis=0)),
+            "peak_power": ("drive", np.abs(power).max(axis=0)),
+            "effort_margin": ("drive", most["force"] - np.abs(effort).max(axis=0)),
+            "speed_margin": ("drive", most["speed"] - np.abs(out["rate"]).max(axis=0)),
+            "range_margin": ("drive", _room(drives, k.actuators)),
+        },
+        coords={"time": t.time, "drive": list(machine.actuators)},
+        attrs={"machine": machine.name, "revolute": revolute_drives(machine).astype(int).tolist()},
+    )
+
+
+def _room(drives: Sequence[Drive], coordinates: Floats) -> Floats:
+    """(drives,) least distance from the ends of the declared range; NaN where none is declared."""
+    ends = np.array([d.range or (np.nan, np.nan) for d in drives])
+    return np.asarray(np.minimum(coordinates - ends[:, 0], ends[:, 1] - coordinates).min(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class PeakAcceleration:
+    """Accelerations of the TCP that the drives reach from rest, at poses (...)."""
+
+    smallest: Floats
+    """(...) m/s², reached in every direction."""
+    largest: Floats
+    """(...) m/s², in the best direction: the farthest vertex."""
+
+
+def peak_acceleration(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    efforts: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    threads: int | None = None,
+) -> PeakAcceleration:
+    """Largest acceleration of the tool in any direction, from rest, orientation kept, at poses (..., 3) m.
+
+    efforts: limits of the drives, N or N·m (one or one each); None: the machine file's. Gravity counts
+    against them. StiffmapError where masses are missing.
+    """
+    need_masses(machine, "acceleration")
+    k = drive_kinematics(machine, position, rotation, threads=threads)
+    return acceleration_of(machine, k, efforts=efforts, gravity=gravity)
+
+
+def acceleration_of(
+    machine: Machine,
+    k: DriveKinematics,
+    *,
+    efforts: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+) -> PeakAcceleration:
+    """The same from kinematics that are at hand."""
+    most = drive_values(machine, "force", efforts, "N or N·m")
+    shape, n = k.status.shape, len(most)
+    if (h := in_cables(machine, "acceleration")) is not None:
+        found = held(machine, h, k, inertia_columns(h, k.rotation), most, gravity)
+        return PeakAcceleration(radius(found), farthest(found))
+    bias = rest_efforts(machine, k, gravity=gravity, velocity=None)
+    flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
+    zero = np.zeros((len(flat), 6))
+    mass = rigid_dynamics(machine, flat, zero, zero, zero, np.zeros(3))["mass"].reshape((*shape, n, n))
+    needed = mass @ inverse_rows(k.jacobian)[..., :3]  # effort per acceleration of the TCP
+    free = most - np.abs(bias)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        least = np.maximum((free / np.linalg.norm(needed, axis=-1)).min(axis=-1), 0.0)
+    return PeakAcceleration(least, _farthest(needed, most, bias))
+
+
+def _farthest(needed: Floats, most: Floats, bias: Floats) -> Floats:
+    """Largest |a| with |needed a + bias| <= most: a vertex, where three drives are at their limits."""
+    from itertools import combinations, product
+
+    best = np.zeros(needed.shape[:-2])
+    for chosen in combinations(range(len(most)), min(3, len(most))):
+        rows = needed[..., chosen, :]
+        inverse = np.linalg.pinv(np.nan_to_num(rows))
+        for signs in product((1.0, -1.0), repeat=len(chosen)):
+            a = (inverse @ (np.array(signs) * most[list(chosen)] - bias[..., chosen])[..., None])[..., 0]
+            held = np.abs((needed @ a[..., None])[..., 0] + bias) <= most * (1 + 1e-9)
+            best = np.where(held.all(axis=-1), np.maximum(best, np.linalg.norm(a, axis=-1)), best)
+    return np.where(np.isfinite(needed).all(axis=(-2, -1)), best, np.nan)
+
+
+def fastest(
+    machine: Machine,
+    path: Path,
+    *,
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    speed: float = np.inf,
+    force: ArrayLike = (0.0, 0.0, 0.0),
+    threads: int | None = None,
+) -> Trajectory:
+    """The quickest run along a path, from rest to rest, within the drives' speeds and efforts.
+
+    Efforts are affine in the path's acceleration and squared speed; the largest squared speed at each
+    sample follows from one pass backward and one forward (time-optimal path parametrisation by
+    reachability). Friction is charged at the sense of the motion, its viscous part at the drive's
+    highest speed so that the limits hold. `speed`: m/s along the path; `force` (3,) N on the tool.
+    """
+    need_masses(machine, "a time-optimal trajectory")
+    return quickest(machine, path, rotation, gravity, speed, real_array(force, "force"), threads)

@@ -1,0 +1,74 @@
+"""Natural frequencies of the elastic machine, its drives held (docs/theory.md D7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing, wrench_array
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.rotations import as_rotations
+from stiffmap.common.short import short_repr
+from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.solve.results import OverPoses
+from stiffmap.workspace.performance.motion.inertia import inertias, need_masses
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class NaturalFrequencies(OverPoses):
+    """Undamped modes at poses (...), lowest first; NaN beyond the last one and where the pose failed."""
+
+    frequency: Floats
+    """(..., modes) Hz."""
+    shape: Floats
+    """(..., modes, coordinates) m, rad: change of all coordinates, of unit modal mass (1 kg·m²)."""
+    coordinates: Floats
+    """(..., coordinates) at the equilibrium about which the machine vibrates."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+
+    def __array__(self, dtype: object = None, copy: bool | None = None) -> Floats:
+        return np.asarray(self.frequency, dtype=dtype)  # type: ignore[call-overload, no-any-return]
+
+
+@takes_machine
+def natural_frequencies(
+    machine: Machine,
+    position: ArrayLike,
+    wrench: ArrayLike | None = None,
+    *,
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    modes: int = 6,
+    threads: int | None = None,
+) -> NaturalFrequencies:
+    """Frequencies (Hz) and mode shapes at commanded poses (..., 3) m, drives held.
+
+    Mass matrix over all elastic coordinates, passive joints following, against the exact tangent at
+    the loaded equilibrium: `wrench` (..., 6) N, N·m dead at the TCP and `gravity` (3,) m/s² (None: what
+    the machine file says) change the stiffness. Bodies are rigid, as the machine file declares
+    them. A dead moment makes the tangent unsymmetric: complex frequencies are flutter, status UNSTABLE.
+    Raises StiffmapError for bad input (a machine without masses), never for a pose.
+    """
+    need_masses(machine, "a natural frequency")
+    if modes < 1:
+        raise StiffmapError(f"modes: expected 1 or more, got {modes}")
+    p = trailing(position, (3,), "position", "positions (m)")
+    w = wrench_array(wrench)
+    r = machine.compiled.home_rotation
+    if rotation is not None:
+        r = trailing(rotation, (3, 3), "rotation", "rotation matrices")
+        r = as_rotations(r)
+    shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2])
+    out = machine.compiled.modes(
+        inertias(machine), rows(p, shape, (3,)), rows(r, shape, (3, 3)), rows(w, shape, (6,)),
+        machine.compiled.gravity(gravity), modes, thread_count(threads),
+    )  # fmt: skip
+    shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items()}
+    return NaturalFrequencies(
+        frequency=np.sqrt(shaped.pop("square")) / (2 * np.pi),
+        **shaped,
+    )

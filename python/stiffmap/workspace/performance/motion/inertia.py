@@ -1,0 +1,160 @@
+"""Masses of a machine, and the efforts that they ask of the drives (docs/theory.md D4-D6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats, real_array, thread_count
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.description import Body
+from stiffmap.model.description.tree import all_elements, joints
+from stiffmap.solve.compiled.names import Role
+from stiffmap.solve.machine import Machine
+from stiffmap.workspace.performance.motion.closing import DriveKinematics
+from stiffmap.workspace.performance.motion.scaling import drive_table
+from stiffmap.workspace.performance.motion.sharing import drive_weights, followed
+
+
+@dataclass(frozen=True)
+class BodyMass:
+    """A body of the machine."""
+
+    name: str
+    mass: float
+    moves: bool
+    """False: it stands on the base in every pose."""
+
+
+def body_masses(machine: Machine) -> list[BodyMass]:
+    """All bodies, in the order of the file."""
+    compiled = machine.compiled
+    nodes = compiled.nodes
+
+    def moves(node: int) -> bool:
+        while node > 0:
+            parent, coordinate = nodes[node]
+            if coordinate >= 0 and compiled.names.roles[coordinate] != Role.SPRING:
+                return True
+            node = parent
+        return False
+
+    return [BodyMass(name, mass, moves(node)) for name, node, mass in compiled.bodies]
+
+
+def total_mass(machine: Machine) -> float:
+    """kg, all bodies that the machine file declares."""
+    return float(sum(b.mass for b in body_masses(machine)))
+
+
+def moving_mass(machine: Machine) -> float:
+    """kg, bodies that drives or passive joints move."""
+    return float(sum(b.mass for b in body_masses(machine) if b.moves))
+
+
+def inertias(machine: Machine) -> Floats:
+    """(bodies, 3, 3) kg·m² about the centres of mass, in the bodies' axes and the core's order."""
+    found = {n: e for n, e in all_elements(machine.description) if isinstance(e, Body)}
+    names = [name for name, _, _ in machine.compiled.bodies]
+    bodies = [found.get(n) or found[f"base.{n}"] if f"base.{n}" in found else found.get(n) for n in names]
+    if any(b is None for b in bodies):  # names of base and platform elements carry no prefix in the core
+        bodies = [e for _, e in all_elements(machine.description) if isinstance(e, Body)]
+    return np.array([b.inertia for b in bodies if b is not None], dtype=float).reshape(-1, 3, 3)
+
+
+def need_masses(machine: Machine, what: str) -> None:
+    """StiffmapError that names the bodies without mass, or says that there are none."""
+    bodies = body_masses(machine)
+    if not bodies:
+        raise StiffmapError(
+            f"{machine.name}: {what} needs masses, and the machine file declares no body; "
+            f"add 'body' elements to the legs {', '.join(machine.legs)} and the platform"
+        )
+    empty = [b.name for b in bodies if b.mass <= 0]
+    if empty:
+        raise StiffmapError(
+            f"{machine.name}: {what} needs masses; these bodies have none: {', '.join(empty)}"
+        )
+
+
+SLOW = 1e-4
+"""Of a drive's declared speed: below, Coulomb friction falls with the rate to zero, so that a drive that hardly moves has no friction
+of either sign."""
+
+
+def motion_friction(machine: Machine, rates: Floats) -> Floats:
+    """(..., drives) friction of the drives along a motion: as `friction_efforts`, but continuous through rest.
+
+    Where a drive declares no speed, its own largest rate along the motion, and that of the fastest drive of its kind, stand in.
+    """
+    drives = drive_table(machine)
+    named = joints(machine.description)
+    kinds = [named[name].kind == "prismatic" for name in machine.actuators]
+    own = np.abs(rates).reshape(-1, rates.shape[-1]).max(axis=0, initial=0.0)
+    fastest = np.array([max(v for v, other in zip(own, kinds, strict=True) if other == k) for k in kinds])
+    limit = SLOW * np.array([d.speed if d.speed else f for d, f in zip(drives, fastest, strict=True)])
+    coulomb = np.array([d.coulomb_friction or 0.0 for d in drives])
+    viscous = np.array([d.viscous_friction or 0.0 for d in drives])
+    share = np.clip(rates / np.where(limit > 0.0, limit, 1.0), -1.0, 1.0)
+    return np.asarray(coulomb * share + viscous * rates)
+
+
+def friction_efforts(machine: Machine, rates: Floats) -> Floats:
+    """(..., drives) Coulomb and viscous friction of the drives against their rates."""
+    drives = drive_table(machine)
+    coulomb = np.array([d.coulomb_friction or 0.0 for d in drives])
+    viscous = np.array([d.viscous_friction or 0.0 for d in drives])
+    return np.asarray(coulomb * np.sign(rates) + viscous * rates)
+
+
+def rigid_dynamics(
+    machine: Machine,
+    coordinates: Floats,
+    twist: Floats,
+    twist_rate: Floats,
+    wrench: Floats,
+    gravity: ArrayLike | None,
+    threads: int | None = None,
+    *,
+    sharing: str = "least_norm",
+) -> dict[str, Floats]:
+    """The core's inverse dynamics at closed coordinates (n, coordinates) and tip motions (n, 6); see `drive_weights`."""
+    rates = accelerations = np.zeros((0, len(machine.actuators)))
+    if machine.compiled.redundancy and (np.any(twist) or np.any(twist_rate)):
+        rates, accelerations = followed(machine, coordinates, twist, twist_rate, threads)
+    out: dict[str, Floats] = machine.compiled.dynamics(
+        inertias(machine), np.ascontiguousarray(coordinates), np.ascontiguousarray(twist),
+        np.ascontiguousarray(twist_rate), np.ascontiguousarray(wrench), machine.compiled.gravity(gravity),
+        rates=rates, accelerations=accelerations, weights=drive_weights(machine, sharing),
+        threads=thread_count(threads),
+    )  # fmt: skip
+    return out
+
+
+def rest_efforts(
+    machine: Machine,
+    k: DriveKinematics,
+    *,
+    gravity: ArrayLike | None,
+    velocity: ArrayLike | None,
+    sharing: str = "least_norm",
+) -> Floats:
+    """(..., drives) efforts at rest under gravity, or at a constant velocity with friction."""
+    shape, drives = k.status.shape, k.actuators.shape[-1]
+    g = machine.compiled.gravity(gravity)
+    if velocity is None and not g.any():
+        return np.zeros((*shape, drives))
+    if velocity is not None or g.any():
+        need_masses(machine, "gravity" if velocity is None else "motion")
+    flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
+    twist = np.zeros((len(flat), 6))
+    if velocity is not None:
+        twist[:, :3] = np.broadcast_to(real_array(velocity, "velocity"), (*shape, 3)).reshape(-1, 3)
+    zero = np.zeros_like(twist)
+    out = rigid_dynamics(machine, flat, twist, zero, zero, g, sharing=sharing)
+    effort = out["effort"]
+    if velocity is not None:
+        effort = effort + friction_efforts(machine, out["rate"])
+    return effort.reshape((*shape, drives))

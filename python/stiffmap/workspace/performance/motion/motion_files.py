@@ -1,0 +1,241 @@
+"""Motions as files: a table over time or along a path (CSV), or a described path (YAML), every number with its unit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from os import PathLike
+from pathlib import Path as FilePath
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field
+from scipy.interpolate import make_interp_spline
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.pose_tables import read_pose_table
+from stiffmap.common.yaml_text import Document, read
+from stiffmap.model.files.report import validated
+from stiffmap.model.files.schema.base import FileModel, Name
+from stiffmap.solve.machine import Machine
+from stiffmap.workspace.performance.motion.trajectory import (
+    Path,
+    Trajectory,
+    at_feed,
+    circle,
+    line,
+    through,
+    timed,
+)
+from stiffmap.workspace.performance.quantities import quantity_in
+
+Written = str | float | int
+LEAST_ROWS = 6
+"""Of a table over time: its spline of degree 5 wants that many."""
+
+
+class LineModel(FileModel):
+    """Straight path."""
+
+    start: list[Written] = Field(min_length=3, max_length=3)
+    end: list[Written] = Field(min_length=3, max_length=3)
+
+
+class CircleModel(FileModel):
+    """One turn."""
+
+    centre: list[Written] = Field(min_length=3, max_length=3)
+    radius: Written
+    plane: Literal["xy", "xz", "yz"] = "xy"
+
+
+class MotionFile(FileModel):
+    """The keys of a motion file: one of line, circle, points; a duration, or as fast as the drives can."""
+
+    name: Name
+    line: LineModel | None = None
+    circle: CircleModel | None = None
+    points: list[list[Written]] | None = None
+    samples: int = Field(default=401, ge=5)
+    duration: Written | None = None
+    speed: Written | None = None
+    force: list[Written] = Field(default=["0 N", "0 N", "0 N"], min_length=3, max_length=3)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What a motion file says, SI: a trajectory that is timed already, or a path and how to run it."""
+
+    name: str
+    path: Path | None
+    timed: Trajectory | None
+    duration: float | None
+    """s, from rest to rest; None: as fast as the drives can."""
+    speed: float
+    """m/s, most along the path when it is run as fast as the drives can."""
+    force: Floats
+    """(3,) N on the tool, or (n, 3) along the path."""
+    feed: float | None = None
+    """m/s along the path, all the way; None: as `duration` and `speed` say."""
+
+    def places(self) -> tuple[Floats, Floats]:
+        """Positions (n, 3) m along the path and the force (n, 3) N on the tool there."""
+        if self.timed is not None:
+            return self.timed.position, self.timed.force
+        assert self.path is not None
+        return self.path.position, np.broadcast_to(self.force, self.path.position.shape)
+
+    def trajectory(
+        self,
+        machine: Machine,
+        *,
+        duration: float | None = None,
+        gravity: ArrayLike | None = None,
+        feed: float | None = None,
+    ) -> Trajectory:
+        """The motion over time; `duration` (s) or `feed` (m/s, all the way) in place of the file's. StiffmapError where it cannot be run."""
+        from stiffmap.workspace.performance.motion.efforts import fastest
+
+        if self.path is None:
+            assert self.timed is not None
+            if duration is not None or feed is not None:
+                word = "duration" if feed is None else "feed"
+                raise StiffmapError(f"{self.name}: the table has times, so no {word} can be given")
+            return self.timed
+        span = self.duration if duration is None else duration
+        if span is not None:
+            return _with_force(timed(self.path, span), self)
+        if (speed := self.feed if feed is None else feed) is not None:
+            return _with_force(at_feed(self.path, speed), self)
+        run = fastest(machine, self.path, gravity=gravity, speed=self.speed, force=self.force)
+        return _with_force(run, self)
+
+
+def _with_force(run: Trajectory, motion: Motion) -> Trajectory:
+    """The run with the motion's force, of the place where it is."""
+    if motion.force.ndim == 1:
+        return run.with_force(motion.force)
+    assert motion.path is not None
+    way, own = _way(run.position), _way(motion.path.position)
+    return run.with_force(_between(way / way[-1], own / own[-1], motion.force))
+
+
+def load_motion(file: str | PathLike[str]) -> Motion:
+    """A motion of the tool from a CSV or YAML file, or a shipped one by name: ``trim`` (docs/measures.md).
+
+    CSV (`stiffmap.common.pose_tables`): columns ``x [mm]``, ``y [mm]``, ``z [mm]``, perhaps ``fx [N]`` …, which may vary; with ``t [s]`` a
+    motion over time, with ``feed [mm/min]`` a path at this speed, without either a path. YAML: ``line``, ``circle`` or ``points``, ``duration`` or ``speed``, ``force``.
+    Raises FileError naming file, line, what was expected and what was found.
+    """
+    place = _place(FilePath(file))
+    if place.suffix.lower() in (".yaml", ".yml"):
+        document = read(place)
+        return _described(document, str(place))
+    return _table(place)
+
+
+SHIPPED = FilePath(__file__).with_name("motions")
+
+
+def _place(given: FilePath) -> FilePath:
+    """The file itself, or the shipped one of that name."""
+    shipped = SHIPPED / (given.name if given.suffix else f"{given.name}.yaml")
+    return shipped if not given.is_file() and len(given.parts) == 1 and shipped.is_file() else given
+
+
+def near_or_shipped(name: str, folder: FilePath) -> str:
+    """What a file in this folder calls its motion: one next to it, else as `load_motion` finds it."""
+    near = folder / name
+    return str(near) if near.is_file() or not _place(FilePath(name)).is_file() else name
+
+
+def _described(document: Document, file: str) -> Motion:
+    expected = "a motion file is a mapping with name and line, circle or points"
+    m = validated(MotionFile, document, file, expected)
+    si = partial(quantity_in, document, file)
+
+    def row(values: Sequence[Any], unit: str, *keys: str | int) -> list[float]:
+        return [si(v, unit, *keys, i) for i, v in enumerate(values)]
+
+    given = [k for k in ("line", "circle", "points") if getattr(m, k) is not None]
+    if len(given) != 1:
+        found = " and ".join(given) or "none"
+        raise FileError(f"expected one of line, circle, points; found {found}", file=file)
+    if m.duration is not None and m.speed is not None:
+        raise FileError("give duration or speed, not both", file=file, line=document.line(("speed",)))
+    try:
+        if m.line is not None:
+            start, end = row(m.line.start, "m", "line", "start"), row(m.line.end, "m", "line", "end")
+            path = line(start, end, m.samples)
+        elif m.circle is not None:
+            centre = row(m.circle.centre, "m", "circle", "centre")
+            radius = si(m.circle.radius, "m", "circle", "radius")
+            path = circle(centre, radius, m.circle.plane, m.samples)
+        else:
+            path = through([row(p, "m", "points", i) for i, p in enumerate(m.points or [])], m.samples)
+    except FileError:
+        raise
+    except (StiffmapError, ValueError) as error:
+        raise FileError(str(error), file=file, line=document.line((given[0],)), key=given[0]) from None
+    span = None if m.duration is None else si(m.duration, "s", "duration")
+    speed = np.inf if m.speed is None else si(m.speed, "m/s", "speed")
+    for name, value in (("duration", span), ("speed", speed)):
+        if value is not None and not value > 0:
+            raise FileError(f"expected a positive {name}", file=file, line=document.line((name,)), key=name)
+    return Motion(m.name, path, None, span, speed, np.array(row(m.force, "N", "force")))
+
+
+def _table(place: FilePath) -> Motion:
+    table = read_pose_table(place)
+    file, p, f = table.file, table.position, table.wrench[:, :3]
+    feed = table.columns.get("feed")
+    if "t" not in table.columns:
+        if len(p) < 2:
+            raise FileError(f"expected two or more rows, found {len(p)}", file=file)
+        if feed is not None and not (feed > 0).all():
+            line = table.lines[int(np.argmax(~(feed > 0)))]
+            raise FileError("expected a feed above zero", file=file, line=line, key="feed")
+        path = _through(p, file)
+        along = _way(p) / _way(p)[-1]
+        force = f[0] if not np.ptp(f, axis=0).any() else _between(path.s, along, f)
+        if feed is None:
+            return Motion(place.stem, path, None, None, np.inf, force)
+        if np.ptp(feed) > 1e-9 * feed[0]:
+            raise FileError(
+                "expected one feed for the whole path (or times, a column t [s])", file=file, key="feed"
+            )
+        return Motion(place.stem, path, None, None, np.inf, force, feed=float(feed[0]))
+    t = table.columns["t"]
+    if feed is not None:
+        raise FileError("give times or a feed, not both", file=file, line=1)
+    if len(t) < LEAST_ROWS:
+        raise FileError(f"a motion over time needs {LEAST_ROWS} or more rows, found {len(t)}", file=file)
+    back = np.flatnonzero(np.diff(t) <= 0)
+    if len(back):
+        i = int(back[0])
+        raise FileError(
+            f"times must increase; {t[i + 1]:g} s follows {t[i]:g} s", file=file, line=table.lines[i + 1]
+        )
+    spline = make_interp_spline(t, p, k=5)
+    motion = Trajectory(t, p, spline(t, 1), spline(t, 2), f)
+    return Motion(place.stem, None, motion, None, np.inf, np.zeros(3))
+
+
+def _way(points: Floats) -> Floats:
+    """(n,) m along the chords."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def _between(s: Floats, at: Floats, values: Floats) -> Floats:
+    """(n, 3) values given at some places of a path, straight between them."""
+    return np.stack([np.interp(s, at, v) for v in values.T], axis=1)
+
+
+def _through(points: Floats, file: str) -> Path:
+    try:
+        return through(points)
+    except StiffmapError as error:
+        raise FileError(str(error), file=file) from None

@@ -1,0 +1,124 @@
+"""What cables hold, since they pull and never push: forces and motions within their largest tensions (theory B7)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import HalfspaceIntersection
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.machine import Machine
+from stiffmap.workspace.cables.distribution import nearest, scaled
+from stiffmap.workspace.cables.structure import Hanging, hanging, lines, matrix, weight
+from stiffmap.workspace.performance.motion.closing import DriveKinematics
+from stiffmap.workspace.performance.motion.sharing import drive_weights, facets
+from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
+
+Held = tuple[Floats, Floats, Floats]
+"""Rows (..., f, c), limits (..., f), offsets (..., f): what is held is all v with |rows v + offsets| <= limits."""
+
+
+def in_cables(machine: Machine, what: str) -> Hanging | None:
+    """The platform of a machine in cables alone; None where there are no cables.
+
+    StiffmapError for a machine with both cables and legs, of which `what` is not known.
+    """
+    if not machine.compiled.names.cables:
+        return None
+    if machine.description.legs:
+        raise StiffmapError(
+            f"{machine.name}: {what} is not known of a machine with both cables and legs, only of one that hangs in cables alone"
+        )
+    return hanging(machine)
+
+
+def held(
+    machine: Machine, h: Hanging, k: DriveKinematics, columns: Floats, most: Floats, gravity: ArrayLike | None
+) -> Held:
+    """Coordinates v of a wrench, columns (..., 6, c) times v, that tensions from 0 to `most` (cables,) N hold at poses
+    next to the weight. The tensions' wrenches fill a zonotope, whose facets are the rows."""
+    if len(most) < len(h.rows):
+        raise StiffmapError(
+            f"{machine.name}: {len(most)} cables for {len(h.rows)} freedoms hold no force in every direction"
+        )
+    a = matrix(*lines(h, k.position, k.rotation))
+    load = weight(h, k.rotation, machine.compiled.gravity(gravity))
+    size = np.where(np.arange(6) < 3, 1.0, 1.0 / h.length)
+    a, load = scaled(h, a, load)
+    wanted = (np.broadcast_to(columns, (*a.shape[:-2], *columns.shape[-2:])) * size[:, None])[
+        ..., list(h.rows), :
+    ]
+    normals, distance = facets(a * (most / 2), len(h.rows))
+    offset = np.einsum("...fr,...r->...f", normals, load + (a * (most / 2)).sum(axis=-1))
+    bounded = ~np.isinf(distance)
+    rows = np.where(bounded[..., None], normals @ wanted, 0.0)
+    return rows, np.where(bounded, distance, 1.0), np.where(bounded, offset, 0.0)
+
+
+def pushes(h: Hanging) -> Floats:
+    """(6, 3) wrenches at the tcp of unit forces on it."""
+    return np.vstack([np.eye(3), np.zeros((3, 3))])
+
+
+def inertia_columns(h: Hanging, rotation: Floats) -> Floats:
+    """(..., 6, 3) wrenches at the tcp that unit accelerations ask for, orientation kept."""
+    x, y, z = np.moveaxis(np.einsum("...ij,j->...i", rotation, h.com), -1, 0)
+    zero = np.zeros_like(x)
+    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape((*x.shape, 3, 3))
+    linear = np.broadcast_to(np.eye(3), skew.shape)
+    return np.asarray(h.mass * np.concatenate([linear, skew], axis=-2))
+
+
+def radius(found: Held) -> Floats:
+    """(...) of the largest ball about 0 of what is held; 0 where nothing is."""
+    rows, most, offset = found
+    norms = np.linalg.norm(rows, axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        room = most - np.abs(offset)
+        reach = np.where(norms > 1e-12, room / norms, np.where(room >= 0, np.inf, 0.0))
+    bad = ~np.isfinite(rows).all(axis=(-2, -1))
+    return np.where(bad, np.nan, np.maximum(reach.min(axis=-1), 0.0))
+
+
+def farthest(found: Held) -> Floats:
+    """(...) the largest |v| of what is held, 0 where 0 is not inside."""
+    rows, most, offset = found
+    shape = rows.shape[:-2]
+    out = np.zeros(int(np.prod(shape, dtype=int)))
+    inside = radius(found).reshape(-1)
+    r, m, o = (v.reshape(len(out), *v.shape[len(shape) :]) for v in (rows, most, offset))
+    for i in range(len(out)):
+        if not inside[i] > 0:
+            out[i] = inside[i]
+            continue
+        feel = np.linalg.norm(r[i], axis=1) > 1e-12
+        _, size, axes = np.linalg.svd(r[i][feel])
+        inner = (
+            r[i][feel] @ axes[: int((size > 1e-9 * size[0]).sum())].T
+        )  # a guide holds the other directions
+        sides = [np.column_stack([s * inner, s * o[i][feel] - m[i][feel]]) for s in (1.0, -1.0)]
+        corners = HalfspaceIntersection(np.vstack(sides), np.zeros(inner.shape[1])).intersections
+        out[i] = np.linalg.norm(corners, axis=1).max()
+    return out.reshape(shape)
+
+
+def as_tensions(
+    machine: Machine, h: Hanging, k: DriveKinematics, effort: Floats, most: Floats, sharing: str
+) -> Floats:
+    """(..., cables) efforts of winches, minus the tensions, that do to the platform what these efforts do; of all tensions
+    from 0 to `most` those of the least sum of squares (`stiffness`: of squares over the cables' stiffness at home).
+    NaN where there are none."""
+    back = inverse_rows(k.jacobian)
+    asked = np.einsum("...nr,...n->...r", back, effort)
+    a, b = scaled(h, matrix(*lines(h, k.position, k.rotation)), asked)
+    weights = drive_weights(machine, sharing)
+    root = np.sqrt(weights) if weights.size else np.ones(len(most))
+    shape = b.shape[:-1]
+    bad = ~np.isfinite(b).all(axis=-1).reshape(-1)
+    flat_a = np.nan_to_num((a * root).reshape(-1, *a.shape[-2:]))
+    flat_b = np.nan_to_num(b.reshape(-1, b.shape[-1]))
+    none = np.zeros(len(most))
+    t, ok, _ = nearest(flat_a, flat_b, none, most / root, none)
+    t = np.where((ok & ~bad)[:, None], t * root, np.nan)
+    return np.asarray(-t.reshape(*shape, len(most)))

@@ -1,0 +1,201 @@
+"""Velocity transmission of §3.1: sphere, cube and hexagon of Figure 1 (docs/measures.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.short import short_repr
+from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.solve.results import OverPoses
+from stiffmap.workspace.maps.inputs import plane_axes
+from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
+from stiffmap.workspace.performance.motion.polygons import Polygon, section_polygon
+from stiffmap.workspace.performance.motion.scaling import (
+    characteristic_length,
+    drive_values,
+    mixes_units,
+    weighted,
+)
+from stiffmap.workspace.performance.motion.sharing import facets, motions
+from stiffmap.workspace.performance.motion.zonotopes import (
+    farthest_vertex,
+    inscribed_sphere,
+    inverse_rows,
+    rows_limit,
+)
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class VelocityTransmission(OverPoses):
+    """Transmission factors at poses (...); NaN where the pose failed, and its status."""
+
+    sphere_min: Floats
+    """(...) smallest singular value of the weighted Jacobian."""
+    sphere_max: Floats
+    """(...) largest singular value."""
+    cube_min: Floats
+    """(...) largest speed that the machine reaches in every direction (the other components of its
+    own motion held at zero), each drive within its limit."""
+    cube_max: Floats
+    """(...) largest speed in any direction, each drive within its limit: the farthest vertex."""
+    condition: Floats
+    """(...) sphere_max / sphere_min."""
+    dexterity: Floats
+    """(...) 1 / condition."""
+    manipulability: Floats
+    """(...) product of the singular values."""
+    jacobian: Floats
+    """(..., 6, drives) as it is, SI."""
+    length: float
+    """m, characteristic length: rotations (of the platform and of drives) count as this arc."""
+    limits: Floats
+    """(drives,) limit of each drive's rate that the cube uses."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+
+
+@takes_machine
+def velocity_transmission(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    length: float | None = None,
+    limits: ArrayLike | str = "unit",
+    part: str = "all",
+    threads: int | None = None,
+) -> VelocityTransmission:
+    """How fast the tool moves per speed of the drives, at poses (..., 3) m.
+
+    Parameters
+    ----------
+    position, rotation
+        (..., 3) m and (..., 3, 3); None: orientation as at home.
+    length
+        Characteristic length, m, where units mix; None: the machine's own. It changes every factor of a
+        machine whose platform or drives turn, and nothing else.
+    limits
+        ``unit``: each drive within one unit of speed, so that all factors compare; ``declared``: the
+        speeds of the machine file, so that the cube's factors are speeds (m/s); or numbers.
+    part
+        ``all`` components of the twist, or its ``translation`` or ``rotation`` alone.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input, never for a pose.
+    """
+    k = drive_kinematics(machine, position, rotation, threads=threads)
+    return transmission_of(machine, k, length=length, limits=limits, part=part)
+
+
+def transmission_of(
+    machine: Machine,
+    k: DriveKinematics,
+    *,
+    length: float | None = None,
+    limits: ArrayLike | str = "unit",
+    part: str = "all",
+    inverse: Floats | None = None,
+) -> VelocityTransmission:
+    """The same from kinematics that are at hand, and perhaps the inverse (..., drives, 6) of their Jacobian."""
+    unit = isinstance(limits, str) and limits == "unit"
+    given = np.ones(()) if unit else None if isinstance(limits, str) and limits == "declared" else limits
+    speeds = drive_values(machine, "speed", given, "m/s or rad/s")
+    size = characteristic_length(machine, length)
+    j = weighted(machine, k.jacobian, size, part)
+    driven = j * (speeds if not unit else 1.0)
+    s, low = of_motions(machine, k, singular_values(j))
+    high = s[..., 0]
+    if part == "all" and machine.compiled.redundancy:
+        rank = int((np.isfinite(s) & (s > 0)).sum(axis=-1).max(initial=1))
+        slowest = facets(driven, rank)[1].min(axis=-1)
+    elif part == "all":
+        same = inverse is not None and not mixes_units(machine) and _translates(k.jacobian)
+        slowest = rows_limit(inverse if same and inverse is not None else inverse_rows(j), speeds)
+    else:
+        slowest = inscribed_sphere(driven) if part == "translation" else rows_limit(inverse_rows(j), speeds)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return VelocityTransmission(
+            sphere_min=low, sphere_max=high, cube_min=slowest, cube_max=farthest_vertex(driven),
+            condition=high / low, dexterity=low / high, manipulability=np.nanprod(s, axis=-1) + 0 * high,
+            jacobian=k.jacobian, length=size, limits=speeds, status=k.status, flags=k.flags,
+        )  # fmt: skip
+
+
+def of_motions(machine: Machine, k: DriveKinematics, values: Floats) -> tuple[Floats, Floats]:
+    """Singular values (..., n), those beyond the tool's motions NaN, and the last one that counts.
+
+    Drives that go together, or that leave the tool where it is, have none of their own.
+    """
+    redundancy, drives = machine.compiled.redundancy, k.jacobian.shape[-1]
+    if not redundancy and not (k.together < drives).any():
+        return values, values[..., -1]
+    count = motions(k.together, values, redundancy)
+    last = np.take_along_axis(values, np.maximum(count - 1, 0)[..., None], axis=-1)[..., 0]
+    return np.where(np.arange(values.shape[-1]) < count[..., None], values, np.nan), last
+
+
+def _translates(jacobian: Floats) -> bool:
+    """Whether the platform turns nowhere, so that weights of rotations change nothing."""
+    turning, moving = (np.abs(jacobian[..., rows, :]) for rows in (slice(3, 6), slice(3)))
+    return bool(np.nanmax(turning, initial=0.0) <= 1e-13 * np.nanmax(moving, initial=0.0))
+
+
+def singular_values(j: Floats) -> Floats:
+    """(..., min(rows, drives)) largest first; NaN rows where the matrix is NaN."""
+    out = np.full((*j.shape[:-2], min(j.shape[-2:])), np.nan)
+    ok = np.isfinite(j).all(axis=(-2, -1))
+    if j.shape[-1] <= j.shape[-2]:  # the small symmetric problem is several times quicker
+        gram = np.swapaxes(j[ok], -1, -2) @ j[ok]
+        values = np.linalg.eigvalsh(gram)[..., ::-1]
+        out[ok] = np.sqrt(np.maximum(values, 0.0))
+        poor = ok & (out[..., -1] < 1e-5 * out[..., 0])  # squaring lost their digits
+        if poor.any():
+            out[poor] = np.linalg.svd(j[poor], compute_uv=False)
+        return out
+    out[ok] = np.linalg.svd(j[ok], compute_uv=False)
+    return out
+
+
+@takes_machine
+def velocity_section(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    plane: str = "xy",
+    limits: ArrayLike | str = "unit",
+    threads: int | None = None,
+) -> Polygon:
+    """Velocities that the TCP reaches in a plane, all other components of its twist zero (Figure 1c).
+
+    The polygon's vertices (..., 2 drives, 2), inner radius (the speed reached in every direction) and
+    outer radius; m/s with ``limits="declared"`` or numbers, else per unit speed of the drives.
+    """
+    k = drive_kinematics(machine, position, rotation, threads=threads)
+    return velocity_polygon(machine, k, plane=plane, limits=limits)
+
+
+def velocity_polygon(
+    machine: Machine, k: DriveKinematics, *, plane: str = "xy", limits: ArrayLike | str = "unit"
+) -> Polygon:
+    """The same from kinematics that are at hand."""
+    unit = isinstance(limits, str) and limits == "unit"
+    given = np.ones(()) if unit else None if isinstance(limits, str) and limits == "declared" else limits
+    speeds = drive_values(machine, "speed", given, "m/s or rad/s")
+    j = weighted(machine, k.jacobian, 1.0, "all")
+    axes = list(plane_axes(plane))
+    if machine.compiled.redundancy:
+        s = of_motions(machine, k, singular_values(j))[0]
+        rank = int((np.isfinite(s) & (s > 0)).sum(axis=-1).max(initial=1))
+        normals, distance = facets(k.jacobian * speeds, rank)
+        bounded = np.isfinite(distance)
+        rows = np.where(bounded[..., None], normals, 0.0)
+        return section_polygon(rows[..., axes], np.where(bounded, distance, 1.0), k.status)
+    return section_polygon(inverse_rows(j)[..., axes], speeds, k.status)

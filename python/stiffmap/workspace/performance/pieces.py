@@ -1,0 +1,129 @@
+"""Links in pieces: the mass of a uniform bar along its length, and its spring with it (docs/measures.md)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.description import Body, Offset, Pose, Spring
+from stiffmap.model.description.elements import Element
+from stiffmap.model.description.tree import Elements, edit_sequences
+from stiffmap.solve.machine import Machine, takes_machine
+
+LIKE = 1e-6
+"""Relative difference up to which a spring is that of a uniform beam, and a mass is in its middle."""
+
+
+@takes_machine
+def in_pieces(machine: Machine, pieces: int) -> Machine:
+    """The machine with the mass of every uniform bar on `pieces` places along it, with as much of its spring each.
+
+    A uniform bar is an offset along one axis, the spring of an Euler-Bernoulli beam of that length behind it,
+    and a body in the middle between. Statics stay as they are (up to the order of rotations of a spring),
+    frequencies tend to those of the continuous bar with the square of the number. The last piece keeps the
+    names. Other links stay one mass and one spring. Raises StiffmapError where there is no such bar.
+    """
+    if isinstance(pieces, bool) or not isinstance(pieces, int | np.integer) or pieces < 1:
+        raise StiffmapError(f"pieces: expected a number from 1 on, got {pieces!r}")
+    found: list[str] = []
+
+    def divide(elements: Elements) -> Elements:
+        return _divided(elements, int(pieces), found)
+
+    d = machine.description
+    legs = tuple(replace(leg, elements=edit_sequences(leg.elements, divide)) for leg in d.legs)
+    base, platform = edit_sequences(d.base, divide), edit_sequences(d.platform, divide)
+    if not found:
+        raise StiffmapError(
+            f"{machine.name}: no uniform bar (offset, body in its middle, spring of a beam of that length)"
+        )
+    return Machine(replace(d, legs=legs, base=base, platform=platform))
+
+
+def _divided(elements: Elements, count: int, found: list[str]) -> Elements:
+    out, i = list[Element](), 0
+    while i < len(elements):
+        bar = _bar(elements, i)
+        if bar is None:
+            out.append(elements[i])
+            i += 1
+            continue
+        used, offset, body, spring = bar
+        found.append(spring.name)
+        out.extend(_pieces(offset, body, spring, count))
+        i += used
+    return tuple(out)
+
+
+def _bar(elements: Elements, i: int) -> tuple[int, Offset, Body, Spring] | None:
+    """Number of elements, offset, body (centre as seen from the root) and spring of a bar that starts at `i`."""
+    row = elements[i : i + 3]
+    if len(row) < 3 or not isinstance(row[2], Spring):
+        return None
+    offset, body, share = row[0], row[1], -0.5
+    if isinstance(row[0], Body):
+        offset, body, share = row[1], row[0], 0.5
+    if not isinstance(offset, Offset) or not isinstance(body, Body) or offset.actual is not None:
+        return None
+    way = np.asarray(offset.nominal.p, dtype=float)
+    length = float(np.linalg.norm(way))
+    straight = np.count_nonzero(way) == 1 and np.array_equal(offset.nominal.r, np.eye(3))
+    middle = np.linalg.norm(np.array(body.com) - share * way) <= LIKE * length
+    if not (straight and middle and _is_beam(row[2], way)):
+        return None
+    return 3, offset, body, row[2]
+
+
+def _is_beam(spring: Spring, way: Floats) -> bool:
+    if spring.compliance is None or spring.laws or any(spring.rest) or spring.stroke is not None:
+        return False
+    c = np.asarray(spring.compliance, dtype=float)
+    pattern = _beam(way, np.diag(c)[3:], float(c[np.argmax(np.abs(way)), np.argmax(np.abs(way))]))
+    size = np.sqrt(np.outer(np.diag(c), np.diag(c)))
+    return bool((np.abs(c - pattern) <= LIKE * size).all())
+
+
+def _beam(way: Floats, turning: Floats, stretching: float) -> Floats:
+    """(6, 6) cantilever along `way` from its compliances about the three axes and along it."""
+    length, a = float(np.linalg.norm(way)), int(np.argmax(np.abs(way)))
+    b, c, sign = (a + 1) % 3, (a + 2) % 3, float(np.sign(way[a]))
+    out = np.zeros((6, 6))
+    out[a, a] = stretching
+    out[3:, 3:] = np.diag(turning)
+    out[b, b], out[c, c] = length**2 / 3 * turning[c], length**2 / 3 * turning[b]
+    out[b, 3 + c] = out[3 + c, b] = sign * length / 2 * turning[c]
+    out[c, 3 + b] = out[3 + b, c] = -sign * length / 2 * turning[b]
+    return out
+
+
+def _pieces(offset: Offset, body: Body, spring: Spring, count: int) -> list[Element]:
+    way = np.asarray(offset.nominal.p, dtype=float)
+    c, a = np.asarray(spring.compliance, dtype=float), int(np.argmax(np.abs(way)))
+    step = way / count
+    small = _beam(step, np.diag(c)[3:] / count, float(c[a, a]) / count)
+    length = float(np.linalg.norm(way))
+    move = replace(offset.nominal, translation=tuple(step.tolist()))
+    inertia = np.array(body.inertia, dtype=float)
+    spread = body.mass * length**2 / 12 * (1 - 1 / count**2)  # what the places along the bar make up for
+    for axis in ((a + 1) % 3, (a + 2) % 3):
+        inertia[axis, axis] = max(inertia[axis, axis] - spread, 0.0)
+    rows = Pose.of(rotation=inertia / count).rotation
+    springs = tuple(map(tuple, small.tolist()))
+    out: list[Element] = []
+    for k in range(1, count + 1):
+        end = "" if k == count else f"_{k}"
+        out += [
+            replace(offset, name=offset.name + end, nominal=move),
+            replace(
+                body,
+                name=body.name + end,
+                mass=body.mass / count,
+                com=tuple((-step / 2).tolist()),
+                inertia=rows,
+            ),
+            replace(spring, name=spring.name + end, compliance=springs),
+        ]
+    return out

@@ -1,0 +1,39 @@
+"""Numbers with units in requirement and design files: ``60 m/min``, ``0.25 mm``, ``12 Hz``."""
+
+from __future__ import annotations
+
+import re
+
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.value_units import read_value
+from stiffmap.common.yaml_text import Document
+from stiffmap.model.files.report import key_text
+
+_RATE = re.compile(r"^(.*?)/min$")
+
+
+def quantity(value: object, unit: str) -> float:
+    """SI value of a text such as ``60 m/min`` that must have the dimension of `unit`.
+
+    A bare number is an error unless `unit` is empty: units are obligatory. Raises StiffmapError.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise StiffmapError(f"expected a number with a unit ({unit or 'none'}), found {value!r}")
+    text = str(value).strip()
+    if not unit:
+        return read_value(text, "1")
+    if unit == "Hz":
+        if not text.endswith("Hz"):
+            raise StiffmapError(f"the unit is missing or wrong: expected such as 12 Hz, found {text!r}")
+        return read_value(text.removesuffix("Hz").strip(), "1")
+    if match := _RATE.match(text):
+        return read_value(f"{match[1]}/s", unit) / 60
+    return read_value(text, unit)
+
+
+def quantity_in(document: Document, file: str, value: object, unit: str, *keys: str | int) -> float:
+    """`quantity` of a number that stands in a file under these keys; raises `FileError` with its line."""
+    try:
+        return quantity(value, unit)
+    except StiffmapError as error:
+        raise FileError(str(error), file=file, line=document.line(keys), key=key_text(keys)) from None

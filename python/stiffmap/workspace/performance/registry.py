@@ -1,0 +1,192 @@
+"""The measures that exist: each is one file in `stiffmap.workspace.performance.kinds`, found by being there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.solution import Solution
+from stiffmap.workspace.performance import kinds
+from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics, kernel_starts
+from stiffmap.workspace.performance.motion.motion_files import Motion
+from stiffmap.workspace.performance.motion.velocity import VelocityTransmission, transmission_of
+from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
+from stiffmap.workspace.performance.poses import box_nodes
+
+
+@dataclass(eq=False)
+class Case:
+    """What measures are asked about: a machine, a box of poses, a force. Kinematics are shared."""
+
+    machine: Machine
+    low: Floats
+    high: Floats
+    force: float = 100.0
+    plane: str = "xy"
+    transmission: tuple[float, float] = (0.5, 2.0)
+    proportions: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    nodes: int = 51
+    coarse: int = 7
+    gap: float = 1e-4
+    quick: bool = False
+    """Searching among designs: nodes only where a proof or a search would follow."""
+    length: float | None = None
+    gravity: Floats | None = None
+    rotation: Floats | None = None
+    threads: int | None = None
+    toolpath: Motion | None = None
+    """The task's own path and force, for measures along it."""
+    clearance: float | None = None
+    """m, least distance between members of different legs in the workspace; None: not asked for."""
+    deflection: float | None = None
+    """m, largest deflection under `force` in `plane` in the workspace; None: not asked for."""
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """The limits that a pose of the workspace keeps in addition to ranges of drives and joints, as `largest_box` takes it."""
+        bound = None if self.deflection is None else (self.force, self.plane, self.deflection)
+        return {
+            "transmission": self.transmission, "length": self.length, "clearance": self.clearance,
+            "deflection": bound, "rotation": self.rotation, "threads": self.threads,
+        }  # fmt: skip
+
+    @property
+    def motion(self) -> Motion:
+        """The toolpath; StiffmapError where there is none."""
+        if self.toolpath is None:
+            raise StiffmapError("needs a toolpath: give toolpath in the requirements, or toolpath=")
+        return self.toolpath
+
+    def path(self, most: int) -> tuple[Floats, Floats]:
+        """Positions (n, 3) m and forces (n, 3) N along the toolpath, `most` samples or a few more.
+
+        StiffmapError where there is no toolpath.
+        """
+        position, force = self.motion.places()
+        step = max(1, len(position) // most)
+        return position[::step], force[::step]
+
+    @cached_property
+    def positions(self) -> Floats:
+        """(nodes³, 3) m."""
+        return box_nodes(self.low, self.high, self.nodes)
+
+    @cached_property
+    def coarse_positions(self) -> Floats:
+        """(coarse³, 3) m, for measures that cost more."""
+        return box_nodes(self.low, self.high, self.coarse)
+
+    @cached_property
+    def kinematics(self) -> DriveKinematics:
+        """At `positions`."""
+        if self.quick:
+            start = None if self.machine.fast else self.still.coordinates
+        else:
+            start = kernel_starts(self.machine, self.positions, self.rotation, self.threads)
+        return drive_kinematics(
+            self.machine, self.positions, self.rotation, start=start, threads=self.threads
+        )
+
+    @cached_property
+    def still(self) -> Solution:
+        """Unloaded equilibria with their compliance at `positions`, no gravity."""
+        return self.machine.solve(
+            self.positions, rotation=self.rotation, gravity=np.zeros(3), threads=self.threads
+        )
+
+    @cached_property
+    def factors(self) -> VelocityTransmission:
+        """Velocity transmission at `positions`."""
+        return transmission_of(self.machine, self.kinematics, length=self.length, inverse=self.inverse)
+
+    @cached_property
+    def inverse(self) -> Floats:
+        """(nodes³, drives, 6) rates of the drives per twist of the tool, at `positions`."""
+        return inverse_rows(self.kinematics.jacobian)
+
+    @cached_property
+    def coarse_kinematics(self) -> DriveKinematics:
+        """At `coarse_positions`."""
+        return drive_kinematics(self.machine, self.coarse_positions, self.rotation, threads=self.threads)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A measure of one machine: its decisive values, and the map where there is one."""
+
+    worst: float
+    worst_at: Floats | None = None
+    best: float = float("nan")
+    best_at: Floats | None = None
+    note: str = ""
+    positions: Floats | None = None
+    values: Floats | None = None
+    extra: dict[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One measure of §3: SI `unit`, and its unit and factor in print."""
+
+    name: str
+    title: str
+    unit: str
+    better: str
+    """``high`` or ``low``: which values are good."""
+    compute: Callable[[Case], Found]
+    shown: str = ""
+    factor: float = 1.0
+    order: int = 50
+    apart: bool = False
+    """Whether it asks the case for numbers only, nothing that measures share, so that it may run in parallel."""
+
+
+def over_poses(positions: Floats, values: Floats, better: str, note: str = "", **extra: object) -> Found:
+    """Worst and best pose of a map; a failed pose (NaN) makes the worst NaN and is said to be so."""
+    good = np.isfinite(values)
+    if not good.any():
+        return Found(
+            float("nan"),
+            note=note or "no pose of the box is within reach",
+            positions=positions,
+            values=values,
+        )
+    sign = 1.0 if better == "high" else -1.0
+    score = np.where(good, sign * values, -np.inf)
+    best = int(np.argmax(score))
+    if good.all():
+        worst = int(np.argmin(score))
+        at, value = positions[worst], float(values[worst])
+    else:
+        first = int(np.argmin(good))
+        at, value = positions[first], float("nan")
+        note = note or f"{int((~good).sum())} of {len(good)} poses fail"
+    return Found(value, at, float(values[best]), positions[best], note, positions, values, dict(extra))
+
+
+@lru_cache
+def all_measures() -> tuple[Measure, ...]:
+    """Every measure, in the order of the table."""
+    found = [
+        import_module(f"{kinds.__name__}.{m.name}").MEASURE
+        for m in iter_modules(kinds.__path__)
+        if not m.name.startswith("_")
+    ]
+    return tuple(sorted(found, key=lambda m: (m.order, m.name)))
+
+
+def get_measure(name: str) -> Measure:
+    """By name; StiffmapError lists those that exist."""
+    for m in all_measures():
+        if m.name == name:
+            return m
+    raise StiffmapError(f"unknown measure '{name}'; known: {', '.join(m.name for m in all_measures())}")

@@ -1,0 +1,173 @@
+"""What a task asks of a machine: ``trimming.yaml`` (docs/measures.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from os import PathLike
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from stiffmap.common.deprecation import renamed
+from stiffmap.common.errors import FileError
+from stiffmap.common.short import short_repr
+from stiffmap.common.yaml_text import Document, read
+from stiffmap.model.files.report import validated
+from stiffmap.model.files.schema.base import FileModel, Name
+from stiffmap.workspace.performance.motion.motion_files import near_or_shipped
+from stiffmap.workspace.performance.quantities import quantity_in
+from stiffmap.workspace.performance.registry import all_measures, get_measure
+
+Written = str | float | int
+
+
+class BoxModel(FileModel):
+    """Edges of the box in which the machine works, with units."""
+
+    x: Written
+    y: Written
+    z: Written
+
+
+class BoundModel(FileModel):
+    """One or both bounds of a measure, with units."""
+
+    at_least: Written | None = None
+    at_most: Written | None = None
+
+
+class LimitsModel(FileModel):
+    """What poses of the workspace and of the largest box keep, with units."""
+
+    clearance: Written | None = None
+    deflection: Written | None = None
+
+
+class RequirementsFile(FileModel):
+    """The keys of a requirements file."""
+
+    name: Name
+    title: str = ""
+    source: str = ""
+    box: BoxModel | None = None
+    plane: Literal["xy", "xz", "yz"] = "xy"
+    force: Written | None = None
+    toolpath: str | None = None
+    limits: LimitsModel = LimitsModel()
+    requirements: dict[str, BoundModel] = Field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A requirement on one measure, SI."""
+
+    at_least: float | None = None
+    at_most: float | None = None
+
+    def margin(self, value: float) -> float:
+        """How far inside the value is (negative: outside), in its own unit."""
+        sides = []
+        if self.at_least is not None:
+            sides.append(value - self.at_least)
+        if self.at_most is not None:
+            sides.append(self.at_most - value)
+        return min(sides)
+
+
+@short_repr
+@dataclass(frozen=True)
+class Requirements:
+    """A task: the box, the force on the tool and the bounds, SI."""
+
+    name: str = "none"
+    title: str = ""
+    source: str = ""
+    box: tuple[float, float, float] | None = None
+    plane: str = "xy"
+    force: float | None = None
+    bounds: tuple[tuple[str, Bound], ...] = ()
+    toolpath: str | None = None
+    """Motion file of the task."""
+    clearance: float | None = None
+    """m, least distance between members of different legs in the workspace."""
+    deflection: float | None = None
+    """m, largest deflection under the force in the workspace."""
+
+    def bound(self, measure: str) -> Bound | None:
+        """The bound on a measure, if there is one."""
+        return dict(self.bounds).get(measure)
+
+
+@renamed(name_or_path="source")
+def load_requirements(source: str | PathLike[str]) -> Requirements:
+    """Requirements from a file, or the shipped ones by name (``trimming``).
+
+    Raises FileError naming file, line, key, what was expected and what was found.
+    """
+    path = Path(source)
+    shipped = Path(__file__).with_name(path.name if path.suffix else f"{path.name}.yaml")
+    if not path.is_file():
+        if not shipped.is_file() or len(path.parts) > 1:
+            known = ", ".join(sorted(p.stem for p in Path(__file__).parent.glob("*.yaml")))
+            raise FileError(
+                f"no such requirements file, and none of that name is shipped (these are: {known})",
+                file=str(path),
+            )
+        path = shipped
+    document = read(path)
+    return requirements_of(document, str(path))
+
+
+def requirements_of(document: Document, file: str) -> Requirements:
+    """Schema, then units."""
+    expected = "a requirements file is a mapping with name, box, force and requirements"
+    model = validated(RequirementsFile, document, file, expected)
+    si = partial(quantity_in, document, file)
+    bounds = []
+    known = {m.name for m in all_measures()}
+    for name, given in model.requirements.items():
+        path = ("requirements", name)
+        if name not in known:
+            raise FileError(
+                f"unknown measure '{name}'; known: {', '.join(sorted(known))}",
+                file=file, line=document.line(path), key=".".join(path),
+            )  # fmt: skip
+        unit = get_measure(name).unit
+        sides = {
+            side: None if value is None else si(value, unit, *path, side)
+            for side, value in (("at_least", given.at_least), ("at_most", given.at_most))
+        }
+        bound = Bound(**sides)
+        if bound.at_least is None and bound.at_most is None:
+            raise FileError(
+                "give at_least or at_most", file=file, line=document.line(path), key=".".join(path)
+            )
+        if bound.at_least is not None and bound.at_most is not None and bound.at_least > bound.at_most:
+            raise FileError(
+                f"at_least ({given.at_least}) is above at_most ({given.at_most})",
+                file=file, line=document.line(path), key=".".join(path),
+            )  # fmt: skip
+        bounds.append((name, bound))
+    box = None
+    if model.box is not None:
+        box = (
+            si(model.box.x, "m", "box", "x"),
+            si(model.box.y, "m", "box", "y"),
+            si(model.box.z, "m", "box", "z"),
+        )
+    force = None if model.force is None else si(model.force, "N", "force")
+    toolpath = None if model.toolpath is None else near_or_shipped(model.toolpath, Path(file).parent)
+    limits: dict[str, float | None] = {}
+    for name, value in (("clearance", model.limits.clearance), ("deflection", model.limits.deflection)):
+        length = None if value is None else si(value, "m", "limits", name)
+        limits[name] = length
+        if length is not None and length <= 0:
+            raise FileError(
+                f"expected a positive length, found {value}",
+                file=file, line=document.line(("limits", name)), key=f"limits.{name}",
+            )  # fmt: skip
+    return Requirements(
+        model.name, model.title, model.source, box, model.plane, force, tuple(bounds), toolpath, **limits
+    )

@@ -1,0 +1,262 @@
+"""All measures of a machine in one table, next to what a task requires (docs/measures.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats, real_array, thread_count
+from stiffmap.common.deprecation import renamed
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.short import short_repr
+from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.solve.status import Status
+from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion
+from stiffmap.workspace.performance.poses import box_nodes, read_box
+from stiffmap.workspace.performance.registry import Case, Found, Measure, all_measures, get_measure
+from stiffmap.workspace.performance.requirements import Bound, Requirements, load_requirements
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One measure: SI values, the poses that decide, the requirement and the verdict."""
+
+    measure: Measure
+    found: Found
+    bound: Bound | None
+    reason: str = ""
+    """Why there is no value."""
+
+    @property
+    def margin(self) -> float:
+        """How far inside its requirement the worst value is, SI; NaN without a requirement or a value."""
+        if self.bound is None or not np.isfinite(self.found.worst):
+            return float("nan")
+        return self.bound.margin(self.found.worst)
+
+    @property
+    def verdict(self) -> str:
+        """``pass``, ``fail`` (also where a pose failed), ``unknown`` (no value to be had), or empty."""
+        if self.bound is None:
+            return ""
+        if self.reason:
+            return "unknown"
+        return "pass" if self.margin >= 0 else "fail"
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class MeasuresTable:
+    """All measures of a machine over a box."""
+
+    machine: Machine
+    case: Case
+    requirements: Requirements
+    rows: tuple[Row, ...]
+    notes: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Row:
+        for row in self.rows:
+            if row.measure.name == name:
+                return row
+        raise KeyError(name)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every requirement holds."""
+        return all(row.verdict in ("", "pass") for row in self.rows)
+
+    def as_plain(self) -> dict[str, Any]:
+        """The table as plain data, SI; numbers that are not finite stay so."""
+        return {
+            "machine": self.machine.name,
+            "box": [self.case.low.tolist(), self.case.high.tolist()],
+            "force": self.case.force,
+            "plane": self.case.plane,
+            "requirements": self.requirements.name,
+            "passed": self.passed,
+            "notes": list(self.notes),
+            "measures": [
+                {
+                    "name": r.measure.name,
+                    "title": r.measure.title,
+                    "unit": r.measure.unit,
+                    "worst": r.found.worst,
+                    "worst_at": None if r.found.worst_at is None else list(r.found.worst_at),
+                    "best": r.found.best,
+                    "best_at": None if r.found.best_at is None else list(r.found.best_at),
+                    "at_least": r.bound.at_least if r.bound else None,
+                    "at_most": r.bound.at_most if r.bound else None,
+                    "margin": r.margin,
+                    "verdict": r.verdict,
+                    "note": r.reason or r.found.note,
+                }
+                for r in self.rows
+            ],
+        }
+
+
+@renamed(gap="box_tolerance")
+@takes_machine
+def measures(
+    machine: Machine,
+    *,
+    box: ArrayLike | None = None,
+    force: float | None = None,
+    plane: str | None = None,
+    requirements: Requirements | str | PathLike[str] | None = None,
+    only: Sequence[str] | None = None,
+    nodes: int = 51,
+    coarse: int = 7,
+    length: float | None = None,
+    gravity: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    box_tolerance: float = 1e-4,
+    toolpath: Motion | str | PathLike[str] | None = None,
+    clearance: float | None = None,
+    deflection: float | None = None,
+    threads: int | None = None,
+) -> MeasuresTable:
+    """Table of all measures of §3: worst and best pose, requirement, margin, pass or fail.
+
+    Parameters
+    ----------
+    box
+        (2, 3) m, poses that are judged. None: the requirement's box about the centre of the machine's
+        workspace if all of it is within reach, else the workspace itself (the notes say which).
+    force
+        N on the tool for deflections; None: the requirement's, else 100 N.
+    plane
+        Plane of velocities, forces and deflections; None: the requirement's, else ``xy``.
+    requirements
+        A file (`load_requirements`), a shipped name, or `Requirements`; None: none.
+    only
+        Names of measures; None: all.
+    nodes, coarse
+        Nodes along each edge of the box for kinematic measures, and for those that cost more.
+    length
+        Characteristic length, m, where units mix; None: the machine's own.
+    box_tolerance
+        m between the bounds of the largest box.
+    toolpath
+        A motion file (`load_motion`) for measures along the task's own path; None: the requirement's.
+    clearance, deflection
+        m, what poses of the workspace and of the largest box keep: least distance between members of different
+        legs, largest deflection under `force` in `plane`; None: the requirement's, else not asked for.
+
+    Raises
+    ------
+    StiffmapError
+        For bad input.
+
+    Notes
+    -----
+    A measure that the machine lacks the data for says so in its row.
+    """
+    task = (
+        requirements
+        if isinstance(requirements, Requirements)
+        else Requirements()
+        if requirements is None
+        else load_requirements(requirements)
+    )
+    chosen = all_measures() if only is None else tuple(get_measure(n) for n in only)
+    low, high, notes = _box(machine, box, task)
+    size = force if force is not None else task.force if task.force is not None else 100.0
+    edges = np.array(task.box) if task.box else np.ones(3)
+    lowest, largest = task.bound("transmission_min"), task.bound("transmission_max")
+    case = Case(
+        machine, low, high, size, plane or task.plane,
+        transmission=(
+            lowest.at_least if lowest and lowest.at_least is not None else 0.5,
+            largest.at_most if largest and largest.at_most is not None else 2.0,
+        ),
+        proportions=(1.0, float(edges[1] / edges[0]), float(edges[2] / edges[0])), nodes=nodes, coarse=coarse, gap=box_tolerance,
+        length=length, gravity=None if gravity is None else real_array(gravity, "gravity"),
+        rotation=None if rotation is None else real_array(rotation, "rotation"), threads=threads,
+        toolpath=_motion(toolpath or task.toolpath),
+        clearance=_positive("clearance", task.clearance if clearance is None else clearance),
+        deflection=_positive("deflection", task.deflection if deflection is None else deflection),
+    )  # fmt: skip
+    return MeasuresTable(machine, case, task, _rows(chosen, case, task), notes)
+
+
+def _rows(chosen: Sequence[Measure], case: Case, task: Requirements) -> tuple[Row, ...]:
+    """In the order given; measures of their own run in parallel to those that share kinematics."""
+    machine = case.machine
+    beside = [m for m in chosen if m.apart] if thread_count(case.threads) > 1 else []
+    _ = machine.fast, machine.compiled.not_enclosed  # made once, before two threads ask for it
+    with ThreadPoolExecutor(1) as pool:
+        later = {m.name: pool.submit(_row, m, case, task.bound(m.name)) for m in beside}
+        rows = {m.name: _row(m, case, task.bound(m.name)) for m in chosen if m.name not in later}
+        rows |= {name: found.result() for name, found in later.items()}
+    return tuple(rows[m.name] for m in chosen)
+
+
+def _positive(name: str, value: float | None) -> float | None:
+    if value is not None and not (np.isfinite(value) and value > 0):
+        raise StiffmapError(f"{name}: expected a positive length in m, got {value!r}")
+    return value
+
+
+def _motion(given: Motion | str | PathLike[str] | None) -> Motion | None:
+    return given if given is None or isinstance(given, Motion) else load_motion(given)
+
+
+def _row(measure: Measure, case: Case, bound: Bound | None) -> Row:
+    try:
+        return Row(measure, measure.compute(case), bound)
+    except StiffmapError as error:
+        return Row(measure, Found(float("nan")), bound, str(error))
+
+
+def _box(
+    machine: Machine, box: ArrayLike | None, task: Requirements
+) -> tuple[Floats, Floats, tuple[str, ...]]:
+    if box is not None or task.box is None:
+        low, high = read_box(machine, box)
+        outside = _reach(machine, low, high, "the box")
+        if outside and not outside.some:
+            raise StiffmapError(f"{outside.told}: the workspace of {machine.name} is elsewhere")
+        return low, high, outside.notes
+    low, high = read_box(machine, None)
+    half = np.array(task.box) / 2
+    wanted = ((low + high) / 2 - half, (low + high) / 2 + half)
+    outside = _reach(machine, *wanted, "the required box about the centre of the workspace")
+    if not outside:
+        return (*wanted, ())
+    return low, high, (*outside.notes, "measures are over the machine's own workspace instead")
+
+
+@dataclass(frozen=True)
+class _Outside:
+    """Nodes of a box out of reach: what is said of them, and whether some are within it."""
+
+    told: str = ""
+    some: bool = True
+
+    def __bool__(self) -> bool:
+        return bool(self.told)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return (self.told,) if self.told else ()
+
+
+def _reach(machine: Machine, low: Floats, high: Floats, what: str) -> _Outside:
+    from stiffmap.workspace.performance.motion.closing import drive_kinematics
+
+    p = box_nodes(low, high, 5)
+    status = drive_kinematics(machine, p, patient=False).status
+    bad = status != Status.CONVERGED
+    if not bad.any():
+        return _Outside()
+    first = "({:.1f}, {:.1f}, {:.1f}) mm".format(*(1e3 * p[int(np.argmax(bad))]))
+    told = f"{what} is not within reach: {int(bad.sum())} of {len(p)} nodes, for example {first}"
+    return _Outside(told, not bad.all())

@@ -1,0 +1,6 @@
+"""Vibration: damping, modes at the tool, frequency responses, tools coupled by receptance, files of measured responses."""
+
+from stiffmap.workspace.vibration.modes import TipModes, tip_modes
+from stiffmap.workspace.vibration.response import frequency_response
+
+__all__ = ["TipModes", "frequency_response", "tip_modes"]

@@ -1,0 +1,164 @@
+"""Files of frequency responses: CSV, and universal files (UFF58) through pyuff."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import FileError, MissingPartError
+from stiffmap.workspace.vibration.poles import Complex
+
+UNITS = {"m/N": 1.0, "um/N": 1e-6, "µm/N": 1e-6, "mm/N": 1e-3}
+KINDS = {"m/N": 0, "um/N": 0, "µm/N": 0, "mm/N": 0, "m/s/N": 1, "m/s2/N": 2, "m/s²/N": 2, "g/N": 2}
+HEAD = "frequency_Hz, real_UNIT, imag_UNIT and, where there is one, coherence"
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredResponse:
+    """One measured response, as a receptance."""
+
+    name: str
+    frequency: Floats
+    """(frequencies,) Hz, rising."""
+    receptance: Complex
+    """(frequencies,) m/N."""
+    coherence: Floats
+    """(frequencies,) 0 to 1; NaN where none was measured."""
+    response: str = ""
+    """Where and along what it was measured, as the file says: point and direction such as 3 +z."""
+    reference: str = ""
+    """The same of the hammer."""
+
+    def variance(self, averages: int = 1) -> Floats:
+        """(frequencies,) relative variance of the size, from the coherence of so many averages (Bendat and Piersol)."""
+        c = np.clip(self.coherence, 1e-6, 1.0)
+        return np.asarray((1 - c) / (2 * averages * c))
+
+
+def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
+    """All responses of a file: .csv, or .uff, .unv (data sets 58).
+
+    Raises FileError naming file, row and what was expected: frequencies that do not rise, a coherence outside 0 to 1, units.
+    """
+    p = Path(path)
+    if not p.is_file():
+        raise FileError("no such file of frequency responses", file=str(path))
+    found = [_csv(p)] if p.suffix.lower() == ".csv" else _universal(p)
+    for one in found:
+        _check(one, str(path))
+    return found
+
+
+def _csv(path: Path) -> MeasuredResponse:
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        rows = [r for r in csv.reader(file) if r and not r[0].lstrip().startswith("#")]
+    if len(rows) < 3:
+        raise FileError("expected a head and two rows or more", file=str(path))
+    head = [h.strip() for h in rows[0]]
+    unit = head[1].partition("_")[2] if len(head) > 1 else ""
+    if head[0] != "frequency_Hz" or len(head) not in (3, 4) or unit not in KINDS:
+        raise FileError(
+            f"expected the columns {HEAD}, UNIT one of {', '.join(KINDS)}; found {', '.join(head)}",
+            file=str(path),
+        )
+    if not (head[1].startswith("real_") and head[2] == f"imag_{unit}" and head[3:] in ([], ["coherence"])):
+        raise FileError(f"expected the columns {HEAD}; found {', '.join(head)}", file=str(path), line=1)
+    values = np.empty((len(rows) - 1, len(head)))
+    for i, row in enumerate(rows[1:]):
+        try:
+            values[i] = [float(v) for v in row]
+        except ValueError:
+            raise FileError(
+                f"expected {len(head)} numbers; found {', '.join(row)}", file=str(path), line=i + 2
+            ) from None
+    f = values[:, 0]
+    coherence = values[:, 3] if len(head) == 4 else np.full(len(f), np.nan)
+    scale = UNITS.get(unit, 9.80665 if unit == "g/N" else 1.0)
+    complex_ = np.asarray(scale * (values[:, 1] + 1j * values[:, 2]), complex)
+    return MeasuredResponse(path.stem, f, _receptance(f, complex_, KINDS[unit]), coherence)
+
+
+def _receptance(frequency: Floats, values: Complex, derivatives: int) -> Complex:
+    if not derivatives:
+        return values
+    w = 2j * np.pi * frequency
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(w == 0, np.nan, values / w**derivatives))
+
+
+MOTIONS = {8: 0, 11: 1, 12: 2}
+"""Of universal files: displacement, velocity, acceleration."""
+WAYS = {0: "", 1: "+x", -1: "-x", 2: "+y", -2: "-y", 3: "+z", -3: "-z", 4: "+rx", 5: "+ry", 6: "+rz", -4: "-rx", -5: "-ry", -6: "-rz"}  # fmt: skip
+RESPONSE, COHERENCE = 4, 6
+
+
+def _universal(path: Path) -> list[MeasuredResponse]:
+    try:
+        import pyuff  # type: ignore[import-untyped]
+    except ImportError:
+        raise MissingPartError(
+            "universal files need the package pyuff; install it with: pip install 'stiffmap[vibration]'"
+        ) from None
+    try:
+        sets = pyuff.UFF(str(path)).read_sets()
+    except Exception as problem:  # the reader raises whatever its parsing meets
+        raise FileError(f"expected a universal file with data sets 58; {problem}", file=str(path)) from None
+    sets = [s for s in (sets if isinstance(sets, list) else [sets]) if s.get("type") == 58]
+    responses = [s for s in sets if s["func_type"] == RESPONSE]
+    if not responses:
+        raise FileError("no frequency response (data set 58, function type 4) in it", file=str(path))
+    coherence = {_ends(s): np.real(s["data"]) for s in sets if s["func_type"] == COHERENCE}
+    out = []
+    for s in responses:
+        kind = int(s.get("ordinate_spec_data_type", 0))
+        if kind not in MOTIONS:
+            raise FileError(
+                f"response {s.get('id1', '')}: expected displacement, velocity or acceleration (types 8, 11, 12) by "
+                f"force; found type {kind}", file=str(path)
+            )  # fmt: skip
+        f = np.asarray(s["x"], dtype=float)
+        response, reference = _ends(s)
+        out.append(
+            MeasuredResponse(
+                str(s.get("id1", path.stem)), f, _receptance(f, np.asarray(s["data"], complex), MOTIONS[kind]),
+                np.asarray(coherence.get((response, reference), np.full(len(f), np.nan)), dtype=float),
+                response, reference,
+            )
+        )  # fmt: skip
+    return out
+
+
+def _ends(s: dict[str, object]) -> tuple[str, str]:
+    def end(prefix: str) -> str:
+        return f"{s.get(prefix + '_node', 0)} {WAYS.get(int(s.get(prefix + '_dir', 0)), '')}".strip()  # type: ignore[call-overload]
+
+    return end("rsp"), end("ref")
+
+
+def _check(one: MeasuredResponse, file: str) -> None:
+    f, c = one.frequency, one.coherence
+    where = f"response {one.name}" if one.name else "response"
+    if not np.isfinite(f).all() or f[0] < 0:
+        raise FileError(f"{where}: expected finite frequencies (Hz) from 0 on", file=file)
+    fall = np.flatnonzero(np.diff(f) <= 0)
+    if fall.size:
+        k = int(fall[0])
+        raise FileError(
+            f"{where}: expected rising frequencies; point {k + 2} has {f[k + 1]:g} Hz after {f[k]:g} Hz",
+            file=file,
+        )
+    bad = np.flatnonzero(np.isfinite(c) & ((c < 0) | (c > 1 + 1e-9)))
+    if bad.size:
+        k = int(bad[0])
+        raise FileError(f"{where}: expected a coherence from 0 to 1; point {k + 1} has {c[k]:g}", file=file)
+    known = c[np.isfinite(c)]
+    if known.size > 2 and (known >= 1).all():
+        raise FileError(
+            f"{where}: the coherence is 1 at every frequency, as that of one hit without averages is; it is no measure of "
+            "noise: leave the column out, or average several hits", file=file
+        )  # fmt: skip

@@ -1,0 +1,156 @@
+"""What vibrates at the tool at many poses: modes of unit stiffness, and the flexibility of all others (docs/theory.md V1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffmap.common.broadcasting import (
+    Floats,
+    batch,
+    rows,
+    thread_count,
+    trailing,
+    whole_number,
+    wrench_array,
+)
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.rotations import as_rotations
+from stiffmap.solve.machine import Machine
+from stiffmap.workspace.performance.motion.inertia import inertias, need_masses
+from stiffmap.workspace.vibration.damping import Damping, damping_of
+
+SYMMETRIC = 1e-9
+"""Part of a tangent that is not symmetric, relative, up to which it is round-off."""
+
+
+@dataclass(frozen=True, eq=False)
+class TipModes:
+    """Modes at a point of the machine, poses (n), lowest frequency first; NaN where the pose failed."""
+
+    shape: tuple[int, ...]
+    """Batch axes of the poses."""
+    square: Floats
+    """(n, modes) s²: 1/w² of each; 0 of a damper without mass."""
+    tip: Floats
+    """(n, 6, modes) motion of the point, modes scaled to unit stiffness (1 N m of twice the energy)."""
+    viscous: Floats
+    """(n, modes, modes) s."""
+    loss: Floats
+    """(n, modes, modes)."""
+    rest: Floats
+    """(n, 6, 6) m/N and the like: static flexibility of all that has no mass or is not kept."""
+    unsymmetric: Floats
+    """(n,) of the tangent, relative."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+    damping: Damping
+
+    @property
+    def frequency(self) -> Floats:
+        """(n, modes) Hz, undamped; infinite without mass."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(1 / (2 * np.pi * np.sqrt(self.square)))
+
+    @property
+    def proportional(self) -> bool:
+        """Whether no damping couples two modes: the modes are then real."""
+        far = ~np.eye(self.square.shape[1], dtype=bool)
+        return not (np.nan_to_num(self.viscous)[:, far].any() or np.nan_to_num(self.loss).any())
+
+    @property
+    def ratio(self) -> Floats:
+        """(n, modes) damping ratio of each mode alone, the loss factor by half."""
+        c = np.einsum("nkk->nk", self.viscous)
+        eta = np.einsum("nkk->nk", self.loss)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.where(self.square > 0, c / (2 * np.sqrt(self.square)), 0.0) + eta / 2)
+
+
+def tip_modes(
+    machine: Machine,
+    position: ArrayLike,
+    wrench: ArrayLike | None = None,
+    *,
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    point: str = "tcp",
+    damping: ArrayLike | None = None,
+    modes: int | None = None,
+    symmetrise: bool = False,
+    threads: int | None = None,
+) -> TipModes:
+    """Modes at commanded poses about the loaded equilibrium; arguments as of `frequency_response`."""
+    need_masses(machine, "a frequency response")
+    compiled = machine.compiled
+    if point not in machine.points:
+        raise StiffmapError(
+            f"point: no point '{point}' on {machine.name}; there are: {', '.join(machine.points)}"
+        )
+    declared = damping_of(machine, damping)
+    p = trailing(position, (3,), "position", "positions (m)")
+    w = wrench_array(wrench)
+    r = compiled.home_rotation
+    if rotation is not None:
+        r = as_rotations(trailing(rotation, (3, 3), "rotation", "rotation matrices"))
+    shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2])
+    poses, turns, loads = rows(p, shape, (3,)), rows(r, shape, (3, 3)), rows(w, shape, (6,))
+    cores = thread_count(threads)
+    out = compiled.tip_modes(
+        inertias(machine), declared.viscous, declared.loss, poses, turns, loads,
+        gravity=compiled.gravity(gravity), closed=compiled.close_poses(poses, turns, cores)[0], point=point,
+        count=_count(machine, declared, modes), threads=cores,
+    )  # fmt: skip
+    _symmetric(machine, out["unsymmetric"], symmetrise)
+    static = machine.solve(poses, loads, rotation=turns, point=point, gravity=gravity, threads=threads)
+    _statically(out, np.where(static.ok[:, None, None], static.compliance, np.nan))
+    most = int(np.isfinite(out["square"]).sum(axis=1).max(initial=0))
+    square = out["square"][:, :most]
+    viscous = out["viscous"][:, :most, :most].copy()
+    kept = np.arange(most)
+    viscous[:, kept, kept] += 2 * declared.of_modes(most) * np.sqrt(square)
+    found = TipModes(
+        shape, square, out["tip"][:, :, :most], viscous, out["loss"][:, :most, :most], out["rest"],
+        out["unsymmetric"], out["status"], out["flags"], declared,
+    )  # fmt: skip
+    return _padded(found)
+
+
+def _count(machine: Machine, damping: Damping, modes: int | None) -> int:
+    """Modes to keep: all that have mass or a damper, or the number that is asked for."""
+    size = len(machine.compiled.names.coordinates)
+    if modes is not None:
+        return min(size, whole_number(modes, "modes", 1))
+    damped = int(np.count_nonzero((damping.viscous > 0) | (damping.loss > 0)))
+    return max(1, min(size, 6 * len(machine.compiled.bodies) + damped))
+
+
+def _symmetric(machine: Machine, unsymmetric: Floats, symmetrise: bool) -> None:
+    worst = float(np.nanmax(unsymmetric, initial=0.0))
+    if worst > SYMMETRIC and not symmetrise:
+        raise StiffmapError(
+            f"{machine.name}: a dead moment makes the tangent unsymmetric (by {worst:.2g} of its size), and a "
+            "frequency response by modes needs a symmetric one; give symmetrise=True to take its symmetric part, "
+            "or leave the moment out"
+        )
+
+
+def _statically(out: dict[str, Any], compliance: Floats) -> None:
+    """What is not in the modes is the loaded compliance without theirs: the same number at 0 Hz as in statics."""
+    b = np.nan_to_num(out["tip"])
+    rest = compliance - b @ b.transpose(0, 2, 1)
+    take = np.isfinite(rest).all(axis=(1, 2)) & (out["unsymmetric"] <= SYMMETRIC)
+    out["rest"][take] = rest[take]
+
+
+def _padded(found: TipModes) -> TipModes:
+    """Modes beyond a pose's own are nothing, not unknown, so that sums over modes hold at every pose that has an answer."""
+    ok = np.isfinite(found.rest[:, 0, 0])
+    for a in (found.square, found.tip, found.viscous, found.loss):
+        part = a[ok]
+        part[~np.isfinite(part)] = 0.0
+        a[ok] = part
+    return found

@@ -1,0 +1,96 @@
+"""What instruments write, through the mapping files that ship."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment.spreadsheet.instrument import instrument_names, load_instrument
+from stiffmap.ui.cli import main
+
+TRACKER = """Point ID;X Nominal;Y Nominal;Z Nominal;X [mm];Y [mm];Z [mm];Temp
+A1;0,0;400,0;0,0;0,012;399,980;0,004;20,1
+A2;50,0;420,0;0,0;50,031;419,991;-0,002;20,2
+"""
+GAUGES = """nr,x,y,z,Fx,gauge x,gauge y [mm]
+1,0,400,0,50,351,0.012
+2,0,400,0,-50,-349,-0.011
+"""
+BALL_BAR = """angle,radial
+0,1.5
+90,-2.0
+180,0.25
+"""
+CYCLES = """pose,cycle,x cmd,y cmd,z cmd,x,y,z
+P1,1,0,400,0,0.010,400.002,0
+P1,2,0,400,0,0.012,400.001,0
+P2,1,50,420,0,50.003,419.990,0
+P2,2,50,420,0,50.005,419.992,0
+"""
+
+
+def made(tmp_path: Path, instrument: str, text: str, *more: str) -> sm.Experiment:
+    (tmp_path / "file.csv").write_text(text, encoding="utf-8")
+    call = [
+        "experiment",
+        "new",
+        str(tmp_path / "file.csv"),
+        "--machine",
+        "five-bar",
+        "--instrument",
+        instrument,
+    ]
+    assert main([*call, "-o", str(tmp_path / "out"), *more]) == 0
+    return sm.load_experiment(tmp_path / "out")
+
+
+def test_a_tracker_lists_points(tmp_path: Path) -> None:
+    e = made(tmp_path, "tracker", TRACKER, "--noise", "dx=0.01", "--noise", "dy=0.01", "--noise", "dz=0.01")
+    assert e.quantity == "position"
+    np.testing.assert_allclose(e.position, [[0, 0.4, 0], [0.05, 0.42, 0]])
+    np.testing.assert_allclose(e.reading[:, :3], 1e-6 * np.array([[12, -20, 4], [31, -9, -2]]), atol=1e-12)
+    assert e.ids == ("A1", "A2")
+
+
+def test_dial_gauges(tmp_path: Path) -> None:
+    e = made(tmp_path, "dial-gauges", GAUGES, "--noise", "dx=2", "--noise", "dy=0.002")
+    assert e.quantity == "deflection"
+    np.testing.assert_allclose(e.reading[:, :2], [[351e-6, 12e-6], [-349e-6, -11e-6]])
+    np.testing.assert_allclose(e.wrench[:, 0], [50, -50])
+
+
+def test_a_ball_bar_is_a_distance_from_its_centre(tmp_path: Path) -> None:
+    circle = [
+        f"--set={k}={v}" for k, v in {"centre_x": 0, "centre_y": 420, "centre_z": 0, "radius": 50}.items()
+    ]
+    e = made(tmp_path, "ball-bar", BALL_BAR, *circle, "--noise", "dd=0.0005")
+    np.testing.assert_allclose(e.position, [[0.05, 0.42, 0], [0, 0.47, 0], [-0.05, 0.42, 0]], atol=1e-15)
+    assert e.other is not None
+    np.testing.assert_allclose(e.other, np.tile([0, 0.42, 0], (3, 1)))
+    column = [c.name for c in e.channels].index("dd")
+    np.testing.assert_allclose(e.reading[:, column], [1.5e-6, -2e-6, 0.25e-6])
+
+
+def test_cycles_of_iso_9283_are_repeats(tmp_path: Path) -> None:
+    e = made(tmp_path, "iso-9283", CYCLES)
+    np.testing.assert_allclose(e.reading[:, 0], [10e-6, 12e-6, 3e-6, 5e-6], atol=1e-12)
+    assert int(e.groups.max()) + 1 == 2
+
+
+def test_every_mapping_file_loads_and_bad_ones_are_named(tmp_path: Path) -> None:
+    assert instrument_names() == ["ball-bar", "dial-gauges", "iso-9283", "tracker"]
+    for name in instrument_names():
+        assert load_instrument(name).title
+    with pytest.raises(StiffmapError, match="expected ball-bar"):
+        load_instrument("sextant")
+    (tmp_path / "own.yaml").write_text("title: t\nquantity: position\ncolumns: {x: '('}\n", encoding="utf-8")
+    with pytest.raises(StiffmapError, match=r"columns\.x: no regular expression"):
+        load_instrument(str(tmp_path / "own.yaml"))
+    (tmp_path / "f.csv").write_text(BALL_BAR, encoding="utf-8")
+    call = ["experiment", "new", str(tmp_path / "f.csv"), "--machine", "five-bar", "-o", str(tmp_path / "o")]
+    assert main([*call, "--instrument", "ball-bar"]) == 2  # no radius
+    assert main([*call, "--instrument", "tracker"]) == 2  # not a tracker's file

@@ -1,0 +1,190 @@
+"""Tables of Denavit and Hartenberg, and tables of commanded joints: one command to machine and experiment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.experiment import Predictor
+from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.ui.cli import main
+
+UR10 = (
+    ("base", 0.0, 127.3, 0.0, 90.0),
+    ("shoulder", 0.0, 0.0, -612.0, 0.0),
+    ("elbow", 0.0, 0.0, -572.3, 0.0),
+    ("wrist_1", 0.0, 163.941, 0.0, 90.0),
+    ("wrist_2", 0.0, 115.7, 0.0, -90.0),
+    ("wrist_3", 0.0, 92.2, 0.0, 0.0),
+)
+
+
+def table(rows: object = UR10) -> str:
+    lines = [",".join(map(str, r)) for r in rows]  # type: ignore[attr-defined]
+    return "\n".join(["joint,theta [deg],d [mm],a [mm],alpha [deg]", *lines]) + "\n"
+
+
+def turn_z(t: float, d: float) -> np.ndarray:
+    c, s = np.cos(t), np.sin(t)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, d], [0, 0, 0, 1.0]])
+
+
+def turn_x(t: float, a: float) -> np.ndarray:
+    c, s = np.cos(t), np.sin(t)
+    return np.array([[1, 0, 0, a], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
+
+
+def write(folder: Path, name: str, text: str) -> str:
+    (folder / name).write_text(text, encoding="utf-8")
+    return str(folder / name)
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_an_arm_stands_where_its_table_says(
+    convention: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Against products of screws written out here; the third joint slides, the fourth has an offset."""
+    rng = np.random.default_rng(3)
+    rows = [
+        ("a", 0, 200, 30, 90, "R"), ("b", 20, 0, 400, 0, "R"), ("c", 0, 100, 0, -90, "P"),
+        ("d", -35, 50, 10, 90, "R"), ("e", 0, 0, 0, -90, "R"), ("f", 0, 80, 0, 0, "R"),
+    ]  # fmt: skip
+    text = "joint,theta [deg],d [mm],a [mm],alpha [deg],type\n" + "\n".join(
+        ",".join(map(str, r)) for r in rows
+    )
+    file = write(tmp_path, "arm.csv", text)
+    out = tmp_path / "arm.yaml"
+    assert main(["import", file, "--dh-convention", convention, "-o", str(out)]) == 0
+    assert "6 actuators" in capsys.readouterr().out
+    machine = sm.load_machine(out)
+    for q in rng.uniform(-0.6, 0.6, (5, 6)):
+        real = sm.forward_kinematics(machine, q)
+        at = np.eye(4)
+        for (_, theta, d, a, alpha, kind), v in zip(rows, q, strict=True):
+            own = turn_z(np.radians(theta) + v * (kind == "R"), d / 1e3 + v * (kind == "P"))
+            link = turn_x(np.radians(alpha), a / 1e3)
+            at = at @ own @ link if convention == "standard" else at @ link @ own
+        assert real.position == pytest.approx(at[:3, 3], abs=1e-12)
+        assert real.rotation == pytest.approx(at[:3, :3], abs=1e-12)
+    jacobian_is_regular = np.linalg.cond(sm.jacobian(machine)) if hasattr(sm, "jacobian") else 1.0
+    assert jacobian_is_regular < 1e4
+
+
+def session(tmp_path: Path) -> tuple[str, str, np.ndarray]:
+    """Joints, targets and target minus actual of a reflector somewhere on the flange, in a tracker's own frame."""
+    q = np.radians([0, -60, 90, -120, -90, 0]) + np.random.default_rng(5).uniform(-0.7, 0.7, (25, 6))
+    spot = np.array([0.02, -0.05, 0.11, 1.0])
+    place = np.zeros((25, 3))
+    for i, angles in enumerate(q + [0, 0, 2e-4, 0, 0, 0]):  # the elbow stands further than it is told
+        at = np.eye(4)
+        for (_, _, d, a, alpha), v in zip(UR10, angles, strict=True):
+            at = at @ turn_z(v, d / 1e3) @ turn_x(np.radians(alpha), a / 1e3)
+        place[i] = (at @ spot)[:3]
+    frame = turn_z(0.7, 0.4) @ turn_x(0.05, -2.0)
+    actual = 1e3 * (place @ frame[:3, :3].T + frame[:3, 3])
+    target = np.round(actual + 1.5)
+    head = [*(f"joint_{i}" for i in range(1, 7)), *"XYZ", "x_dif", "y_dif", "z_dif"]
+    body = np.hstack([np.degrees(q), target, target - actual])
+    text = ",".join(head) + "\n" + "\n".join(",".join(f"{v:.10g}" for v in row) for row in body)
+    return write(tmp_path, "poses.csv", text), write(tmp_path, "dh.csv", table()), q
+
+
+UNITS = ("--unit", "length=mm", "--noise", "dx=0.01", "--noise", "dy=0.01", "--noise", "dz=0.01")
+
+
+def left(machine: sm.Machine, folder: Path) -> float:
+    p = Predictor(machine, sm.load_experiment(folder))
+    e, base = p.experiment, p()
+    rest = e.reading - base
+    rest = rest - nuisance_part(Problem.of(e, e.sigma, base), rest)
+    return float(np.sqrt(np.nanmean(rest[:, :3] ** 2)))
+
+
+def test_one_command_makes_machine_and_experiment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    poses, dh, q = session(tmp_path)
+    out = tmp_path / "tracker"
+    arguments = ["experiment", "new", poses, "--dh", dh, "-o", str(out), *UNITS]
+    assert main([*arguments, "--difference", "target-minus-actual"]) == 0
+    told = capsys.readouterr().out
+    assert "'joint_2': command of arm.shoulder, deg" in told and "taken as degrees" in told
+    assert "places are targets less differences" in told
+    e = sm.load_experiment(out)
+    assert (e.quantity, e.frame, e.tool) == ("position", "unknown", "unknown")
+    assert e.command == pytest.approx(q, abs=1e-9)
+    machine = sm.load_machine(out / "machine.yaml")
+    assert left(machine, out) > 1e-5
+    assert left(machine.with_effect("zero_offset", element="elbow", error=2e-4), out) < 1e-6
+    assert main([*arguments, "--overwrite"]) == 0  # the other sign is another machine
+    assert left(machine.with_effect("zero_offset", element="elbow", error=2e-4), out) > 5e-4
+
+
+def test_columns_go_by_name_by_number_or_as_they_are_mapped(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    values = ",".join(map(str, [0, -60, 90, -120, -90, 0, 0.01, 0.02, -0.01]))
+    readings = "dx [mm],dy [mm],dz [mm]"
+    named = "base [deg],arm.shoulder [deg],Elbow [deg],wrist_1 [deg],wrist_2 [deg],wrist_3 [deg]"
+    numbered = ",".join(f"q{i} [deg]" for i in range(1, 7))
+    strange = "m1 [deg],m2 [deg],m3 [deg],m4 [deg],m5 [deg],m6 [deg]"
+    short = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
+    mapped = [x for i, n in enumerate(short, 1) for x in ("--map", f"{'arm.' * (i % 2)}{n}=m{i}")]
+    for k, (head, more) in enumerate(((named, []), (numbered, []), (strange, mapped))):
+        file = write(tmp_path, f"{k}.csv", f"{head},{readings}\n{values}\n")
+        out = tmp_path / str(k)
+        code = main(
+            ["experiment", "new", file, "--machine", "ur10", "--quantity", "position", "-o", str(out), *more]
+        )
+        assert code == 0, capsys.readouterr().err
+        e = sm.load_experiment(out)
+        assert e.command is not None
+        assert e.command[0] == pytest.approx(np.radians([0, -60, 90, -120, -90, 0]))
+        assert e.reading[0, :3] == pytest.approx([1e-5, 2e-5, -1e-5])
+        Predictor(sm.load_machine("ur10"), e)()  # the folder is a valid one
+
+
+@pytest.mark.parametrize(
+    ("head", "more", "asked"),
+    [
+        ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],dx [mm]", [], "which column commands arm.wrist_3? Say --map"),
+        ("q1,q2,q3,q4,q5,q6,dx [mm]", [], "(arm.base) has no unit of angles"),
+        ("q1,q2,q3,q4,q5,q6,dx [mm]", ["--unit", "joints=mm"], "has no unit of angles"),
+        ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],x,y,z", [], "if an instrument read them, say --map px='x'"),
+        ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],dx [mm]", ["--map", "arm.wrist=q6"], "no drive 'arm.wrist'"),
+        ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],dx [mm]", ["--difference", "both"], "--difference: expected"),
+    ],
+)  # fmt: skip
+def test_what_is_not_clear_is_asked(
+    head: str, more: list[str], asked: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = write(tmp_path, "t.csv", head + "\n" + ",".join(["1"] * (head.count(",") + 1)) + "\n")
+    assert main(["experiment", "new", file, "--machine", "ur10", "-o", str(tmp_path / "e"), *more]) == 2
+    assert asked in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    ("text", "asked"),
+    [
+        ("joint,theta [deg],d [mm],a [mm]\n1,0,0,0\n", "no column is alpha"),
+        ("theta [deg],d,a [mm],alpha [deg]\n0,0,0,0\n", "say --unit d=mm"),
+        ("name,theta [deg],d [mm],a [mm],alpha [deg]\nj,0,1,0,0\nj,0,1,0,90\n", "joints of the same name"),
+    ],
+)
+def test_tables_of_joints_that_lack_something(
+    text: str, asked: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["import", write(tmp_path, "dh.csv", text), "-o", str(tmp_path / "a.yaml")]) == 2
+    assert asked in " ".join(capsys.readouterr().err.split())
+    poses, _, _ = session(tmp_path)
+    assert main(["experiment", "new", poses, "-o", str(tmp_path / "e")]) == 2
+    assert "either --machine or --dh" in capsys.readouterr().err
+
+
+def test_gauges_that_say_target_minus_actual(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = write(tmp_path, "t.csv", "x [mm],y [mm],z [mm],dx 1 [um],dx 2 [um]\n0,416,0,5,7\n")
+    arguments = ["experiment", "new", file, "--machine", "five-bar", "--quantity", "position"]
+    assert main([*arguments, "-o", str(tmp_path / "e"), "--difference", "target-minus-actual"]) == 0
+    assert "less dx" in capsys.readouterr().out
+    assert sm.load_experiment(tmp_path / "e").reading[:, 0] == pytest.approx([-5e-6, -7e-6])

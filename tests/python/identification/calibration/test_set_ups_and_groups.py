@@ -1,0 +1,120 @@
+"""Zeros set anew in each set-up, and groups whose standard uncertainties are too small."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.experiment import Experiment, Predictor, random_plan
+from stiffmap.experiment.virtual.plans import with_distances
+from stiffmap.identification.calibration import Calibrator, calibrate, unknowns
+from stiffmap.identification.calibration.homing import own_part, zeros_anew
+from stiffmap.identification.calibration.model import predicted
+from stiffmap.identification.calibration.statistics import Sums
+from stiffmap.identification.calibration.width import widened
+
+
+def sessions(size: float) -> tuple[sm.Machine, Experiment]:
+    """Three set-ups of an Orthoglide, each with zeros of its own, `size` standard uncertainties."""
+    machine = sm.load_machine("orthoglide-revised")
+    plan = random_plan(machine, "position", poses=36, seed=4)
+    names = tuple("abc"[int(g) % 3] for g in plan.groups)
+    plan = replace(plan, setup=names)
+    predictor = Predictor(machine, plan)
+    zeros = [u for u in unknowns(machine.description, plan) if u.group == "zeros"]
+    rng = np.random.default_rng(1)
+    reading = np.zeros_like(plan.reading)
+    for name in "abc":
+        here = np.array(names) == name
+        reading[here] = predicted(predictor, zeros, size * rng.standard_normal(len(zeros)))[here]
+    noise = np.nan_to_num(plan.sigma) * rng.standard_normal(reading.shape)
+    return machine, plan.with_readings(reading + noise)
+
+
+def test_zeros_of_each_set_up_are_found_where_they_differ() -> None:
+    machine, data = sessions(1.0)
+    c = calibrate(machine, data)
+    own = [r for r in c.rows if "in set-up" in r.name]
+    assert len(own) == 9
+    assert c.rms_after < 1.2 * c.noise
+    assert c.held_out is not None and c.held_out.after < 1.3 * c.noise < 0.3 * c.held_out.before
+    assert c.verdict == "adjusted within tolerance"
+
+
+def test_a_machine_that_is_not_homed_anew_has_one_set_of_zeros() -> None:
+    machine, data = sessions(0.0)
+    assert not any("in set-up" in r.name for r in calibrate(machine, data).rows)
+
+
+def test_columns_of_a_set_up_are_those_of_the_zero_in_its_rows() -> None:
+    machine, data = sessions(0.0)
+    found = Calibrator.of(Predictor(machine, data), unknowns(machine.description, data))
+    e = found.predictor.experiment
+    more = zeros_anew(found.sensitivity, e)
+    assert more is not None
+    for i, u in enumerate(more.unknowns):
+        if u.setup:
+            up, down = (predicted(found.predictor, [u], np.array([h])) for h in (0.1, -0.1))
+            expected = np.nan_to_num(up - down) / 0.2
+            assert np.nan_to_num(more.columns[..., i]) == pytest.approx(expected, rel=1e-5, abs=1e-11)
+    assert zeros_anew(found.sensitivity, replace(e, setup=())) is None
+
+
+def test_own_part_is_least_squares_with_the_prior() -> None:
+    machine, data = sessions(0.0)
+    u = replace(unknowns(machine.description, data)[0], setup="a")
+    columns, residual = np.array([[2.0], [0.0], [2.0]]), np.array([3.0, 5.0, 1.0])
+    test = np.array([True, False, True])
+    # (2·3 + 2·1) / (1 + 8)
+    assert own_part((u,), columns, residual, test) == pytest.approx([16 / 9, 0.0, 16 / 9])
+
+
+def drawn_sums(truth: list[float], twin: bool = False) -> Sums:
+    rng = np.random.default_rng(0)
+    columns = rng.standard_normal((200, 6)) * 5.0
+    if twin:
+        columns[:, 3:] = columns[:, :3] + 0.001 * rng.standard_normal((200, 3))
+    return Sums.of(columns, columns @ np.array(truth) + rng.standard_normal(200))
+
+
+MEMBERS = {"first": [0, 1, 2], "second": [3, 4, 5]}
+
+
+def test_a_group_that_is_off_as_a_whole_is_widened() -> None:
+    found, factor = widened(drawn_sums([9.0, -7.0, 8.0, 0.5, -1.0, 0.3]), MEMBERS, ())
+    (one,) = found
+    assert (one.group, one.rivals) == ("first", ())
+    assert factor.tolist() == [10.0] * 3 + [1.0] * 3
+
+
+def test_groups_that_look_the_same_are_rivals() -> None:
+    found, _ = widened(drawn_sums([9.0, -7.0, 8.0, 0.0, 0.0, 0.0], twin=True), MEMBERS, ())
+    assert {found[0].group, *found[0].rivals} == {"first", "second"}
+
+
+def test_a_group_within_its_uncertainties_is_left() -> None:
+    found, factor = widened(drawn_sums([1.0, -1.2, 0.8, 0.5, -1.0, 0.3]), MEMBERS, ())
+    assert found == () and (factor == 1.0).all()
+    assert widened(drawn_sums([9.0, -7.0, 8.0, 0.5, -1.0, 0.3]), MEMBERS, ("first",))[0] == ()
+
+
+def test_a_set_up_without_distances_is_predicted_by_its_own_rows() -> None:
+    """Heights in both set-ups, distances in one: rows of a set-up are predicted by themselves."""
+    machine = sm.load_machine("linear-delta")
+    plan = with_distances(random_plan(machine, "position", poses=8, repeats=1), 1e-5)
+    first = np.arange(len(plan)) < len(plan) // 2
+    dd = [c.name for c in plan.channels].index("dd")
+    assert plan.other is not None
+    reading = plan.reading.copy()
+    reading[~first, dd] = np.nan
+    reading[~first, 0] = 0.0
+    other = np.where(first[:, None], plan.other, np.nan)
+    whole = Predictor(machine, replace(plan, other=other, reading=reading))
+    part = Predictor(machine, replace(plan, other=other, reading=reading))
+    assert np.isfinite(whole()[first, dd]).all()
+    part.experiment = part.experiment.rows(~first)
+    part._memory.clear()
+    assert np.isnan(part()[:, dd]).all()

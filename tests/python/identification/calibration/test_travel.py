@@ -1,0 +1,112 @@
+"""Errors along the drives' travel, found in what a calibrated arm leaves."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.experiment import Experiment, Predictor, random_plan
+from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.virtual.plans import plan_of_joints
+from stiffmap.identification.calibration import Calibration, calibrate
+from stiffmap.identification.calibration.travel import apart, hats
+from stiffmap.ui.cli.calibrate import write
+
+POSES = 250
+AMPLITUDE, PERIOD = 3e-4, 0.5
+RIPPLE = {"amplitude": AMPLITUDE, "period": PERIOD, "phase": 0.4}
+
+
+def arm() -> tuple[sm.Machine, Experiment, Floats]:
+    """An arm commanded by its joints, positions read, and the shoulder's coordinate."""
+    machine = sm.load_machine("ur10")
+    rng = np.random.default_rng(7)
+    joints = np.radians([0, -60, 90, -120, -90, 0]) + rng.uniform(-0.7, 0.7, (POSES, 6))
+    plan = replace(plan_of_joints(machine, joints, noise=1e-5), frame="unknown")
+    return machine, plan, joints[:, 1]
+
+
+def read(plan: Experiment, exact: Floats, more: float = 0.0) -> Experiment:
+    """With noise, and an error of the model (m) that every pose has for itself."""
+    rng = np.random.default_rng(1)
+    size = np.nan_to_num(np.hypot(plan.sigma, more))
+    return plan.with_readings(exact + size * rng.standard_normal(exact.shape))
+
+
+@pytest.fixture(scope="module")
+def rippled() -> tuple[Calibration, Floats]:
+    machine, plan, shoulder = arm()
+    off = machine.with_effect("periodic_error", element="shoulder", **RIPPLE)
+    return calibrate(machine, read(plan, Predictor(off, plan)())), shoulder
+
+
+def test_a_wave_of_a_gear_is_told_along_its_drive(rippled: tuple[Calibration, Floats]) -> None:
+    c, _ = rippled
+    assert c.travel is not None
+    assert c.travel.share > 0.9
+    assert max(c.travel.profiles, key=lambda p: p.share).drive == "arm.shoulder"
+    assert c.travel.after < 0.3 * c.travel.before < c.travel.before
+    assert "left along the drives' travel" in str(c)
+
+
+def test_the_profile_is_the_wave(rippled: tuple[Calibration, Floats]) -> None:
+    c, shoulder = rippled
+    assert c.travel is not None
+    (found,) = (p for p in c.travel.profiles if p.drive == "arm.shoulder")
+    at = np.linspace(np.quantile(shoulder, 0.05), np.quantile(shoulder, 0.95), 200)
+    told = np.interp(at, found.at, found.error)
+    home = np.radians(-60)
+    true = AMPLITUDE * np.sin(2 * np.pi * (at - home) / PERIOD + RIPPLE["phase"])
+    line = np.column_stack([np.ones_like(at), at])  # zero and gain are the calibration's
+    left = [v - line @ np.linalg.lstsq(line, v, rcond=None)[0] for v in (told, true)]
+    assert np.corrcoef(left[0], left[1])[0, 1] > 0.95
+    assert np.std(left[0]) == pytest.approx(np.std(left[1]), rel=0.15)
+
+
+def test_files_have_the_profiles(rippled: tuple[Calibration, Floats], tmp_path: Path) -> None:
+    c, _ = rippled
+    write(c, tmp_path)
+    lines = (tmp_path / "travel.csv").read_text().splitlines()
+    assert lines[0] == "drive,coordinate,error,sigma,unit"
+    assert any(line.startswith("arm.shoulder,") and line.endswith(",deg") for line in lines)
+    assert json.loads((tmp_path / "calibration.json").read_text())["travel"]["share"] > 0.9
+
+
+def test_errors_that_follow_no_drive_make_no_profile() -> None:
+    machine, plan, _ = arm()
+    assert calibrate(machine, read(plan, Predictor(machine, plan)(), more=1e-4)).travel is None
+    assert calibrate(machine, read(plan, Predictor(machine, plan)())).travel is None
+
+
+def test_knots_that_round_off_alone_keeps_apart_are_one() -> None:
+    assert apart(np.array([0.5, 0.1, 0.1 + 1e-16, 0.1 + 1e-13, 0.5])) == pytest.approx([0.1, 0.5])
+
+
+def test_hats_are_straight_between_knots() -> None:
+    x = np.array([-1.0, 0.0, 0.25, 1.0, 3.0, 9.0])
+    made = hats(x, np.array([0.0, 1.0, 3.0]))
+    assert made @ [0.0, 2.0, 4.0] == pytest.approx([0.0, 0.0, 0.5, 2.0, 4.0, 4.0])
+    assert made.sum(axis=1) == pytest.approx(np.ones(6))
+
+
+def test_drives_of_the_platform_have_a_travel_too() -> None:
+    """Those of the hybrid's wrist have no leg: their coordinates go by another name than their elements."""
+    machine = sm.load_machine("hybrid")
+    built = machine.with_effect("periodic_error", element="a", amplitude=3e-4, period=0.7, phase=0.2)
+    plan = random_plan(machine, "position", poses=30, repeats=1, seed=2)
+    far = built.with_effect(
+        "periodic_error", element="carriage", legs=["b"], amplitude=6e-5, period=0.05, phase=0.2
+    )
+    c = sm.calibrate(machine, plan.with_readings(Predictor(far, plan)()))
+    assert c.verdict == "unattributed"
+    assert set(c.validity.drives) == {"a.carriage", "b.carriage", "c.carriage", "a", "b"}
+    assert "a 0 deg" in str(c.validity)
+    assert c.unseen is not None
+    worse = replace(c, unseen=replace(c.unseen, after=1.1 * c.unseen.before))
+    warned = [any("do not use it" in line for line in x.lines()) for x in (c, worse)]
+    assert warned == [c.unseen.after > c.unseen.before, True]

@@ -1,0 +1,104 @@
+"""Effects on top of a calibration: twins whose every number is drawn from its uncertainty."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.experiment import Experiment, Predictor, random_plan
+from stiffmap.experiment.comparison.prediction_error import left_by
+from stiffmap.experiment.noise.level import noise_of
+from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.identification.calibration import unknowns
+from stiffmap.identification.calibration.model import predicted
+from stiffmap.model.description import AppliedEffect
+from stiffmap.ui.cli.diagnose import write
+
+LEAD = AppliedEffect("lead_error", "carriage", ("a",), (("slope", 5e-3),))
+
+
+def twin(
+    seed: int, *effects: AppliedEffect, rough: float = 0.0, poses: int | None = None
+) -> tuple[sm.Machine, Experiment]:
+    """Readings of a delta that is off everywhere, with effects and a pattern (m) that no model holds; with `poses` the same
+    delta read at so many others."""
+    machine = sm.load_machine("linear-delta")
+    plan = random_plan(machine, "position", poses=poses or 40, seed=seed + 1000 * bool(poses))
+    p = Predictor(machine, plan)
+    wanted = unknowns(machine.description, p.experiment)
+    rng = np.random.default_rng(seed)
+    exact = predicted(p, wanted, rng.standard_normal(len(wanted))) + p(effects) - p()
+    exact[:, 2] += rough * np.sin(plan.position[:, 0] / 0.011) * np.cos(plan.position[:, 1] / 0.009)
+    return machine, plan.with_readings(exact + np.nan_to_num(plan.sigma) * rng.standard_normal(exact.shape))
+
+
+def test_no_cause_is_invented_where_every_number_is_a_little_off() -> None:
+    machine, data = twin(2)
+    d = sm.diagnose(machine, data)
+    assert d.verdict == "none" and not d.effects
+    assert d.calibration is not None and d.calibration.verdict == "adjusted within tolerance"
+    assert d.after.rms < 1.3 * d.noise.rms < 0.1 * d.before.rms
+
+
+@pytest.mark.slow
+def test_a_cause_is_named_beside_small_errors_and_a_rest() -> None:
+    machine, data = twin(5, LEAD, rough=8e-5)
+    d = sm.diagnose(machine, data)
+    assert d.verdict == "effects+unattributed"
+    assert [(e.kind, e.legs) for e in d.effects] == [("lead_error", ("a",))]
+    assert any(line.startswith("explained:") for line in d.lines())
+
+
+@pytest.mark.slow
+def test_the_file_does_on_new_readings_what_the_headline_says(tmp_path: Path) -> None:
+    machine, data = twin(5, LEAD)
+    d = sm.diagnose(machine, data)
+    assert [e.kind for e in d.effects] == ["lead_error"] and d.calibration is not None
+    write(d, tmp_path)
+    file = sm.load_machine(tmp_path / "machine.yaml")
+    assert not (tmp_path / "calibrated.yaml").exists()
+    _, fresh = twin(5, LEAD, poses=200)
+    after = left_by(file, fresh)[1]
+    assert after.rms == pytest.approx(d.after.rms, rel=0.15)
+    # the effect alone, on the declared numbers, is not the machine
+    bare = machine.with_effect(
+        "lead_error", element="carriage", legs=["a"], slope=d.effects[0].parameters["slope"][0]
+    )
+    assert left_by(bare, fresh)[1].rms > 3.0 * after.rms
+
+
+@pytest.mark.slow
+def test_a_rest_alone_names_nothing() -> None:
+    machine, data = twin(6, rough=8e-5)
+    d = sm.diagnose(machine, data)
+    assert d.verdict == "unattributed" and not d.effects
+
+
+def test_uncertain_numbers_widen_the_covariance() -> None:
+    """White residuals have the Mahalanobis length of I + AAᵀ, written out."""
+    machine, data = twin(3)
+    columns = np.random.default_rng(1).standard_normal((*data.reading.shape, 4)) * 1e-5
+    columns[..., 3] = 0.0
+    sigma = noise_of(data).sigma
+    base = Predictor(machine, data)()
+    problem = Problem.of(data, sigma, base, None, columns)
+    a, r = problem.exact.white(columns), problem.exact.residual(base)
+    expected = float(r @ np.linalg.solve(np.eye(len(r)) + a @ a.T, r))
+    white = problem.residual(base)
+    assert float(white @ white) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_budget_gives_the_best_so_far() -> None:
+    machine, data = twin(2)
+    d = sm.diagnose(machine, data, time_limit=1e-3)
+    assert d.stopped
+    assert "stopped early" in d.lines()[-1]
+
+
+def test_an_unknown_exclusion_is_refused() -> None:
+    machine, data = twin(2)
+    with pytest.raises(sm.StiffmapError, match="no effect 'wings'"):
+        sm.diagnose(machine, data, exclude=["wings"])

@@ -1,0 +1,218 @@
+"""Chatter against published and exact numbers (docs/theory.md V4 to V6)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import stiffmap as sm
+from stiffmap.machining.chatter.coupling import coupling_depth, mode_coupling
+from stiffmap.machining.chatter.cut import chips, milling_process
+from stiffmap.machining.chatter.floquet import multiplier_map
+from stiffmap.machining.chatter.lobes import border, pockets
+from stiffmap.machining.chatter.modes import mode_rows
+from stiffmap.machining.chatter.zero_order import oriented_limit
+from stiffmap.solve.compiled import multipliers
+
+ONE = [(922.0, 0.011, 0.03993, "x")]
+ZERO = {"Kac": "0 N/mm2", "Kte": "0 N/mm", "Kre": "0 N/mm", "Kae": "0 N/mm"}
+TWO = [*ONE, (922.0, 0.011, 0.03993, "y")]
+
+
+def process(radial=10.0, side="climb", diameter=10.0, Kt=600.0, Kr=200.0, axial=1.0):
+    return {
+        "name": "cut", "tool": {"diameter": f"{diameter} mm", "teeth": 2}, "spindle": "5000 rpm",
+        "feed": "0.1 mm/tooth", "cut": {"side": side, "radial": f"{radial} mm", "axial": f"{axial} mm"},
+        "law": {"end_mill": {"Ktc": f"{Kt} N/mm2", "Krc": f"{Kr} N/mm2", **ZERO}},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("depth", "limit"), [(0.2e-3, 0.81974), (0.5e-3, 1.07398), (1.0e-3, 1.40647)])
+def test_one_mode_tends_to_the_published_multiplier_with_order_two(depth, limit):
+    k = np.array([80, 160, 320, 640])
+    mu = [sm.floquet_multiplier(ONE, process(), "5000 rpm", depth, intervals=int(n)) for n in k]
+    off = limit - np.array(mu)
+    np.testing.assert_allclose(mu[3] + (mu[3] - mu[2]) / 3, limit, atol=1.2e-5)
+    assert off[0] / off[1] == pytest.approx(4, rel=0.05) and off[1] / off[2] == pytest.approx(4, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("share", "rpm", "depth", "mu"),
+    [(0.05, 15e3, 1e-3, 0.956), (0.1, 10e3, 1e-3, 1.0038), (0.5, 5e3, 0.5e-3, 1.991)],
+)
+def test_two_modes_at_low_immersion(share, rpm, depth, mu):
+    found = sm.floquet_multiplier(TWO, process(10 * share), rpm * np.pi / 30, depth, intervals=80)
+    assert found == pytest.approx(mu, abs=6e-4)
+
+
+def test_borders_of_the_delay_oscillator_are_exact():
+    """x'' + d x = b x(t - 2 pi): a constant chip law makes it of one mode; borders b = (-1)^n (d - n²/4).
+
+    The force a H (x - x(t - T)) with H = -1, mass 1: x'' + (w² + a) x = a x(t - T), so d = w² + a, b = a.
+    """
+    chip = np.zeros((400, 3, 2))
+    chip[:, 0, 0] = -1.0
+
+    def size(d, b):
+        one = np.ones(1)
+        w = np.sqrt(d - b) * one
+        return float(
+            multipliers(w, 0 * one, one, np.eye(3)[:1], np.zeros((3, 3)), chip, 2 * np.pi * one, b * one, 1)[
+                0, 0
+            ]
+        )
+
+    for n, d in ((0, 0.1), (1, 0.6), (2, 1.15), (3, 2.0), (4, 4.1)):
+        b = (-1) ** n * (d - n**2 / 4)
+        if not 0 < abs(b) < d:
+            continue
+        inside, outside = size(d, 0.97 * b), size(d, 1.03 * b)
+        near = size(d, b)
+        assert near == pytest.approx(1, abs=2e-4), (n, d)
+        assert (inside - 1) * (outside - 1) < 1e-8 or max(inside, outside) > 1 + 1e-4
+
+
+RESIDUES = {
+    0: ((452.77, 0.123718, 9.202966e-5 - 1.862195e-4j), (1448.53, 0.01651, -4.181562e-5 - 3.043618e-4j)),
+    1: ((516.17, 0.0243, -2.3929e-6 - 1.721539e-4j), (1407.64, 0.0324, 4.055052e-5 - 3.618808e-4j)),
+}
+
+
+def published_receptance():
+    f = np.linspace(100, 3000, 20001)
+    s = 2j * np.pi * f
+    G = np.zeros((len(f), 6, 6), complex)
+    for axis, modes in RESIDUES.items():
+        for hertz, ratio, residue in modes:
+            w = 2 * np.pi * hertz
+            pole = -ratio * w + 1j * w * np.sqrt(1 - ratio**2)
+            G[:, axis, axis] += residue / (s - pole) + np.conj(residue) / (s - np.conj(pole))
+    return xr.DataArray(G, dims=("frequency", "response", "force"), coords={"frequency": f})
+
+
+@pytest.mark.parametrize(
+    ("side", "radial", "limit"),
+    [("climb", 15.875, 1.015), ("conventional", 15.875, 1.564), ("slot", 31.75, 0.504)],
+)
+def test_zero_order_of_two_modes_per_axis(side, radial, limit):
+    cut = process(radial, side, 31.75, 1319.4, 788.8)
+    assert 1e3 * sm.limiting_depth(published_receptance(), cut) == pytest.approx(limit, abs=6e-4)
+
+
+def test_skewed_modes_have_the_limit_of_tlusty():
+    """a = -1/(2 Kf G): one force direction, modes at +30 and -45 deg, against the real part found by hand."""
+    f = np.linspace(50, 600, 400001)
+    rows = [(250.0, 0.012, 2.26e8, np.radians(30)), (150.0, 0.010, 2.13e8, np.radians(-45))]
+    G = sum(np.cos(a) ** 2 / k / (1 - (f / n) ** 2 + 2j * z * f / n) for n, z, k, a in rows)
+    found = oriented_limit(G, 1000e6)
+    # near the dip of one mode alone: -cos² / (4 k z (1 + z)), the other mode adds its flexibility there
+    n, z, k, a = rows[0]
+    dip = -(np.cos(a) ** 2) / (4 * k * z * (1 + z))
+    other = np.cos(rows[1][3]) ** 2 / rows[1][2] / (1 - (n * np.sqrt(1 + 2 * z) / rows[1][0]) ** 2)
+    assert found == pytest.approx(-1 / (2 * 1000e6 * (dip + other)), rel=2e-3)
+
+
+def test_zero_order_is_the_border_of_a_full_slot():
+    """In a slot of many teeth the directional factors hardly vary: both methods then agree."""
+    cut = process(10.0, "slot")
+    cut["tool"]["teeth"] = 8
+    speed = np.array([3000.0, 4000.0, 5200.0]) * np.pi / 30
+    ds = sm.stability_lobes(TWO, cut, speeds=speed, depths=np.linspace(2e-6, 4e-4, 200), intervals=160)
+    np.testing.assert_allclose(ds.limit, ds.limit_zero_order, rtol=0.02)
+    assert ds.attrs["least"] <= ds.limit.min()
+
+
+def test_chips_are_the_means_of_their_integrand():
+    p = milling_process(process(3.0, "conventional"))
+    k = 7
+    found = chips(p, k)
+    first, last = 0.0, np.arccos(1 - 2 * 3.0 / 10.0)
+    phi = (np.arange(k * 4000) + 0.5) * np.pi / (k * 4000)
+    value = np.zeros((len(phi), 3, 2))
+    for tooth in range(2):
+        at = phi + tooth * np.pi
+        on = (at >= first) & (at <= last)
+        force = np.stack(
+            [-6e8 * np.cos(at) - 2e8 * np.sin(at), 6e8 * np.sin(at) - 2e8 * np.cos(at), 0 * at], -1
+        )
+        value += on[:, None, None] * force[:, :, None] * np.stack([np.sin(at), np.cos(at)], -1)[:, None, :]
+    np.testing.assert_allclose(found, value.reshape(k, 4000, 3, 2).mean(axis=1), atol=2e-4 * 6e8)
+
+
+def test_a_rest_that_follows_at_once_is_a_stiff_mode():
+    """Flexibility without mass against a mode far above all others."""
+    p = milling_process(process(5.0))
+    high = mode_rows([*ONE, (60e3, 0.3, 1.0, (1.0, 0.0, 0.0))])
+    rest = high.below(5e3, 0.0)
+    assert len(rest) == 1 and rest.rest[0, 0] == pytest.approx(1 / high.stiffness[1])
+    s, d = np.array([5000.0, 9000.0]) * np.pi / 30, np.array([2e-4, 6e-4])
+    with_mode, without = (multiplier_map(m, p, s, d, 320, 1) for m in (high, rest))
+    np.testing.assert_allclose(without, with_mode, rtol=2e-4)
+
+
+def test_modes_couple_where_eigenvalues_turn_complex():
+    """Two equal modes never do (K = k I); two that differ do at a depth that the 2x2 gives by hand."""
+    cut = process(10.0, "slot")
+    assert not mode_coupling(TWO, cut, 1e-4).unstable or mode_coupling(TWO, cut, 1e-4).square.imag.any()
+    rows = [(20.0, 0.02, 60.0, (1.0, 1.0, 0.0)), (23.0, 0.02, 60.0, (1.0, -1.0, 0.0))]
+    m = mode_rows(rows)
+    from stiffmap.machining.chatter.cut import mean_chips
+
+    A = m.way @ mean_chips(milling_process(cut)) @ m.way[:, :2].T / 60.0
+    w1, w2 = (2 * np.pi * np.array([20.0, 23.0])) ** 2
+
+    def gap(a):
+        return (w1 - w2 - a * (A[0, 0] - A[1, 1])) ** 2 + 4 * a**2 * A[0, 1] * A[1, 0]
+
+    depths = np.linspace(1e-6, 5e-3, 200001)
+    found = np.flatnonzero(gap(depths) < 0)
+    assert found.size
+    a = depths[found[0]]
+    assert not mode_coupling(rows, cut, 0.995 * a).unstable and mode_coupling(rows, cut, 1.005 * a).unstable
+    assert coupling_depth(rows, cut) > a  # damping holds a little longer
+
+
+def test_lobes_of_a_machine_and_their_pockets():
+    ds = sm.stability_lobes("ur10", "slot", speeds=np.linspace(300, 900, 12), method="zero order")
+    assert ds.limit.shape == (12,) and (ds.limit >= ds.attrs["least"] * (1 - 1e-9)).all()
+    assert "assumed" in ds.attrs["damping"] and ds.attrs["modes"] >= 5
+    assert pockets(np.arange(5.0), np.array([1.0, 3.0, 2.0, 4.0, 1.0]), 10.0) == [[3.0, 4.0], [1.0, 3.0]]
+    np.testing.assert_allclose(
+        border(np.array([1.0, 2.0, 3.0]), np.array([[0.5, 0.9, 1.1], [0.1, 0.2, 0.3]])), [2.5, np.inf]
+    )
+
+
+def test_limiting_depth_of_poses_and_at_one_speed():
+    machine = sm.load_machine("orthoglide-revised")
+    p = np.array([[0.0, 0.0, 0.0], [0.05, -0.05, 0.02], [9.0, 9.0, 9.0]])
+    H = sm.frequency_response(machine, p, np.linspace(5, 400, 800))
+    least = sm.limiting_depth(H, "slot")
+    assert least.shape == (3,) and np.isnan(least[2]) and (least[:2] > 0).all()
+    at = sm.limiting_depth(H[:2], "slot", speed="6000 rpm")
+    assert (at >= least[:2] * (1 - 1e-9)).all()
+
+
+@pytest.mark.parametrize(
+    ("modes", "given", "message"),
+    [
+        ([], {}, "got none"),
+        ([(922, 0.011)], {}, "frequency Hz, damping ratio, mass kg, direction"),
+        ([(922, 1.1, 1.0, "x")], {}, "below 1"),
+        ([(922, 0.0, 1.0, "x")], {}, "damping ratio above zero"),
+        ([(922, 0.1, 0.0, "x")], {}, "a mass .kg. above zero"),
+        ([(922, 0.1, 1.0, "w")], {}, "direction x, y, z"),
+        (ONE, {"speed": "5000 turns"}, "5000 rpm"),
+        (ONE, {"speed": -3.0}, "above zero in rad/s"),
+        (ONE, {"depth": 5.0}, "depth of cut in m"),
+        (ONE, {"intervals": 1}, "intervals"),
+    ],
+)
+def test_bad_input_is_one_message(modes, given, message):
+    with pytest.raises(sm.StiffmapError, match=message):
+        sm.floquet_multiplier(modes, process(), **given)
+
+
+def test_a_coated_tool_has_no_lobes():
+    with pytest.raises(sm.StiffmapError, match="no teeth"):
+        sm.floquet_multiplier(ONE, "trimming")

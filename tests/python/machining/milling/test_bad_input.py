@@ -1,0 +1,70 @@
+"""What cannot be milled: one message each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.common.errors import StiffmapError
+from stiffmap.machining.milling import mill_job
+from stiffmap.machining.toolpath import path_of
+from stiffmap.machining.toolpath.gcode.load import load_gcode
+
+M = sm.load_machine("linear-delta")
+LINE = path_of([[-0.02, 0, 0], [0.02, 0, 0]])
+
+
+def test_a_path_that_leaves_the_workspace_names_points_and_a_place() -> None:
+    with pytest.raises(StiffmapError) as caught:
+        mill_job(M, path_of([[0, 0, 0], [0.15, 0, 0]]), "trimming", at=(0.08, 0, 0.3), step=0.01)
+    text = str(caught.value)
+    assert "leaves the workspace of linear-delta" in text
+    assert "beyond the declared box by up to (130.0, 0.0, 0.0) mm" in text
+    place = text.rsplit("origin at (", 1)[1].split(")")[0]
+    at = 1e-3 * np.array([float(v) for v in place.split(",")])
+    assert at[0] == pytest.approx(-0.075)
+    mill_job(M, path_of([[0, 0, 0], [0.15, 0, 0]]), "trimming", at=at, step=0.01)
+
+
+def test_a_part_that_is_too_large() -> None:
+    with pytest.raises(StiffmapError, match="larger than that box"):
+        mill_job(M, "washbasin", "trimming", at=(0.1, 0, 0.3), step=0.01)
+
+
+@pytest.mark.parametrize(
+    ("head", "message"),
+    [
+        ("G21 G90 F600 S6000 M5", "line 2: the spindle is off"),
+        ("G21 G90 F600 S6000", "line 2: the spindle is off"),
+        ("G21 G90 F600 M3", "line 2: the spindle is off"),
+        ("G21 G90 F600 S6000 M4", "counter-clockwise"),
+    ],
+)
+def test_the_spindle(head: str, message: str) -> None:
+    path = load_gcode([head, "G1 X10", "M2"], name="p")
+    with pytest.raises(StiffmapError, match=message):
+        mill_job(M, path, "trimming", at=(0, 0, 0.3))
+
+
+def test_a_chip_thicker_than_its_tool() -> None:
+    path = load_gcode(["G21 G90 F9000000 S60 M3", "G1 X10", "M2"], name="p")
+    with pytest.raises(StiffmapError, match="line 2: the chip is too thick"):
+        mill_job(M, path, "slot", at=(0, 0, 0.3))
+
+
+def test_arguments() -> None:
+    with pytest.raises(StiffmapError, match="passes: expected 1 or more"):
+        mill_job(M, LINE, "trimming", at=(0, 0, 0.3), passes=0)
+    with pytest.raises(StiffmapError, match="placement: expected three finite numbers"):
+        mill_job(M, LINE, "trimming", at=(0, 0))
+    with pytest.raises(StiffmapError, match="step: expected a length above zero"):
+        mill_job(M, LINE, "trimming", at=(0, 0, 0.3), step=0.0)
+    with pytest.raises(StiffmapError, match="true_machine: expected the actuators"):
+        mill_job(M, LINE, "trimming", at=(0, 0, 0.3), true_machine=sm.load_machine("ur10"))
+    with pytest.raises(StiffmapError, match="no such process"):
+        mill_job(M, LINE, "trim", at=(0, 0, 0.3))
+    with pytest.raises(StiffmapError, match="no such file"):
+        mill_job(M, Path("nowhere.ngc"), "trimming")

@@ -1,0 +1,65 @@
+"""Stability along a path: where it chatters, which speeds are offered, and where it cannot be judged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from tests.python.machining.milling.gantry import gantry
+
+import stiffmap as sm
+from stiffmap.machining.milling import mill_job
+from stiffmap.machining.toolpath import path_of
+from stiffmap.model.description import Body
+from stiffmap.ui.report.milling import summary
+
+MASS, RATIO = 20.0, 0.02
+
+
+def massive():
+    d = gantry(2e-4, 1e-4, 1e-5).description
+    return sm.Machine(replace(d, platform=(*d.platform, Body("spindle", MASS)), modal_damping=(RATIO,)))
+
+
+def milled(depth):
+    p = sm.load_process("slot")
+    p = replace(p, cut=replace(p.cut, axial=depth))
+    return mill_job(massive(), path_of([[-0.05, 0, 0], [0.05, 0, 0]]), p, step=10e-3)
+
+
+def test_a_path_that_chatters_is_a_warning_with_speeds_that_are_stable():
+    found = milled(1e-3)
+    s = found.stability
+    rows = [
+        (np.sqrt(k / MASS) / (2 * np.pi), RATIO, MASS, way) for k, way in ((5e6, "x"), (1e7, "y"), (1e8, "z"))
+    ]
+    p = found.job.process
+    by_rows = sm.floquet_multiplier(rows, p, p.spindle, 1e-3, intervals=80)
+    np.testing.assert_allclose(s.multiplier, by_rows, rtol=1e-3)
+    assert by_rows > 1 and s.unstable == len(s.way) and s.offered.size
+    for w in s.offered:
+        assert sm.floquet_multiplier(rows, p, float(w), 1e-3, intervals=80) < 1
+    (said,) = [w for w in found.warnings if w.name == "chatter"]
+    assert said.points.all() and "rpm" in said.text and said.finding
+
+
+def test_a_shallow_cut_is_stable_and_said_so():
+    found = milled(1e-6)
+    assert "stable at" in summary(found)["stability"]["sentence"]
+    assert not any(w.name == "chatter" for w in found.warnings)
+
+
+def test_without_masses_it_is_not_judged():
+    found = mill_job(gantry(), path_of([[-0.05, 0, 0], [0.05, 0, 0]]), sm.load_process("slot"), step=20e-3)
+    assert "Stability is not judged" in found.stability and "masses" in found.stability
+
+
+def test_no_stable_speed_asks_for_less_depth():
+    from stiffmap.machining.milling.stability import PathStability
+
+    s = PathStability(np.zeros(2), np.array([1.2, 0.9]), np.linspace(50, 150, 5), np.full(5, 1.3), "")
+    assert not s.offered.size and "take less depth" in s.sentence(100.0)
+    s = PathStability(
+        np.zeros(2), np.array([1.2, 0.9]), np.linspace(50, 150, 5), np.array([1.3, 0.9, 1.2, 0.8, 0.9]), ""
+    )
+    assert list(s.offered) == [75.0, 125.0, 150.0] and "1 of 2 places" in s.sentence(100.0)

@@ -1,0 +1,77 @@
+"""Process files that cannot be used: one message each, with file, line and key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.python.machining.process.closed_form import END_MILL, process
+
+import stiffmap as sm
+from stiffmap.common.errors import FileError
+
+
+def changed(**given: Any) -> dict[str, Any]:
+    return {**process("climb", "5 mm"), **given}
+
+
+TOOL = {"diameter": "25 mm", "teeth": 2}
+BAD = [
+    ({"tool": {**TOOL, "diameter": 25}}, "unit is missing"),
+    ({"tool": {**TOOL, "diameter": "25 m"}}, "at most 1000 mm"),
+    ({"tool": {**TOOL, "diameter": "-25 mm"}}, "above zero"),
+    ({"tool": {**TOOL, "teeth": 0}}, "1 to 1000 teeth"),
+    ({"tool": {**TOOL, "teeth": 2.5}}, "teeth"),
+    ({"tool": {**TOOL, "teeth": "coated"}}, "feed per tooth"),
+    ({"tool": {**TOOL, "helix": "89 deg"}}, "helix"),
+    ({"tool": {**TOOL, "runout": {"offset": "20 mm"}}}, "quarter"),
+    ({"tool": {**TOOL, "flutes": 2}}, "unknown key 'flutes'"),
+    ({"spindle": "6000"}, "such as 6000 rpm"),
+    ({"spindle": "0 rpm"}, "above zero"),
+    ({"feed": "0 mm/min"}, "above zero"),
+    ({"feed": "0.075"}, "unit is missing"),
+    ({"feed": "1 km/min"}, "unknown unit"),
+    ({"feed": "900 m/min"}, "chip is too thick"),
+    ({"cut": {"side": "climb", "axial": "3 mm"}}, "missing key 'radial'"),
+    ({"cut": {"side": "up", "radial": "1 mm", "axial": "3 mm"}}, "conventional"),
+    ({"cut": {"side": "slot", "radial": "1 mm", "axial": "3 mm"}}, "as wide as the tool"),
+    ({"cut": {"side": "climb", "radial": "26 mm", "axial": "3 mm"}}, "at most the tool's diameter"),
+    ({"law": {}}, "expected one of end_mill, kienzle, trimming, found none"),
+    ({"law": {"end_mill": {k: v for k, v in END_MILL.items() if k != "Kre"}}}, "missing key 'Kre'"),
+    ({"law": {"end_mill": {**END_MILL, "Ktc": "-5 N/mm2"}}}, "above zero"),
+    ({"law": {"end_mill": {**END_MILL, "Ktc": {"value": "5 N/mm2", "u": "-1 N/mm2"}}}}, "zero or more"),
+    ({"law": {"end_mill": {**END_MILL, "Ktc": [1]}}}, "number with its unit"),
+    ({"law": {"trimming": {"specific_energy": "1 J/mm3", "radial": 0.5}}}, "without a number of teeth"),
+    ({"law": {"kienzle": {"kc11": "1800 N/mm2", "mc": 1.2, "radial": 0.4}}}, "exponent from 0"),
+    ({"tolerance": "0 mm"}, "above zero"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("given", "message"), BAD, ids=[m for _, m in BAD])
+def test_refused(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(FileError) as caught:
+        sm.load_process(changed(**given))
+    assert message in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_file_and_line_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "p.yaml"
+    path.write_text(
+        "name: p\ntool: {diameter: 10 mm, teeth: 2}\nspindle: 6000 rpm\nfeed: 0\n"
+        "cut: {side: slot, axial: 1 mm}\nlaw: {kienzle: {kc11: 1800 N/mm2, mc: 0.2, radial: 0.3}}\n"
+    )
+    with pytest.raises(FileError, match=r"p\.yaml, line 4: feed:"):
+        sm.load_process(path)
+
+
+def test_unknown_name() -> None:
+    with pytest.raises(FileError, match=r"did you mean 'trimming'.*slot, trimming"):
+        sm.load_process("triming")
+
+
+@pytest.mark.parametrize("feed", ["1e999999999 mm/min", "0." + "1" * 6000 + " mm/min", 10**400])
+def test_endless_numbers(feed: object) -> None:
+    with pytest.raises(FileError, match=r"feed: .*(endless|too large)"):
+        sm.load_process(changed(feed=feed))

@@ -1,0 +1,134 @@
+"""Coefficients from forces: what went in comes out; the measured set of the documentation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.common.errors import StiffmapError
+from stiffmap.machining.process.revolution import revolution
+
+MEASURED = {
+    "feed_per_tooth_mm": [0.025, 0.05, 0.075, 0.1, 0.125],
+    "Fx_N": [39.8, 60.1, 71.6, 76.8, 78.5],
+    "Fy_N": [63.0, 107.1, 137.7, 171.3, 210.7],
+    "Fz_N": [55.7, 70.9, 82.6, 85.2, 83.5],
+    "teeth": 2,
+    "axial_mm": 3.0,
+}
+
+
+def test_measured_set() -> None:
+    """Ordinary least squares by hand, from the slot's closed form: F = a + b c."""
+    law = sm.identify_process(MEASURED)
+    c = np.array(MEASURED["feed_per_tooth_mm"])
+    for n, column, per_chip, per_edge in (
+        ("t", "Fy_N", 2 * 3 / 4, 2 * 3 / np.pi),
+        ("r", "Fx_N", 2 * 3 / 4, 2 * 3 / np.pi),
+        ("a", "Fz_N", 2 * 3 / np.pi, 2 * 3 / 2),
+    ):
+        b, a = np.polyfit(c, np.array(MEASURED[column]), 1)
+        left = np.array(MEASURED[column]) - a - b * c
+        u = np.sqrt((left**2).sum() / 3 / ((c - c.mean()) ** 2).sum())
+        value, error = law.coefficients[f"K{n}c"]
+        assert value == pytest.approx(1e6 * b / per_chip, rel=1e-9)
+        assert error == pytest.approx(1e6 * u / per_chip, rel=1e-6)
+        assert law.coefficients[f"K{n}e"][0] == pytest.approx(1e3 * a / per_edge, rel=1e-9)
+    assert law.rms == pytest.approx([5.3, 2.9, 5.2], abs=0.05)
+    assert np.abs(law.left_out).max(axis=0) == pytest.approx([17, 8, 15], abs=0.5)
+    assert law.bent
+    assert law.best.model.name == "Kienzle"
+    assert any("bend" in w for w in law.words())
+    at = law.process(sm.load_process("slot"))
+    assert "secant" in at.note
+    assert sm.cutting_force(at).mean == pytest.approx(law.best.predict(at))
+
+
+def test_other_names_of_columns() -> None:
+    names = {
+        "feed_per_tooth_mm": "feed per tooth [mm]",
+        "Fx_N": "fx [N]",
+        "Fy_N": "FY_N",
+        "teeth": "n_teeth",
+        "axial_mm": "ap [mm]",
+    }
+    law = sm.identify_process({names.get(k, k): v for k, v in MEASURED.items()})
+    assert law.coefficients == sm.identify_process(MEASURED).coefficients
+
+
+def made(noise: float = 0.0, signals: bool = False, runout: float = 0.0) -> dict[str, Any]:
+    """Readings of the shipped slot at four feeds."""
+    rng = np.random.default_rng(3)
+    rows = []
+    p = sm.load_process("slot")
+    for chip in (0.05, 0.075, 0.1, 0.125):
+        cut = replace(p, feed=chip * 1e-3 * 2 * 100, tool=replace(p.tool, runout=runout))
+        _, force = revolution(cut, 200, 30)
+        if not signals:
+            rows.append((chip, 0.0, *sm.cutting_force(cut).mean))
+            continue
+        rows += [(chip, (t + k) / 200 / 100, *f) for k in (0, 200) for t, f in enumerate(force)]
+    columns = np.array(rows).T
+    out = dict(zip(("feed_per_tooth_mm", "time_s", "Fx_N", "Fy_N", "Fz_N"), columns, strict=True))
+    for n in ("Fx_N", "Fy_N", "Fz_N"):
+        out[n] = out[n] + rng.normal(0, noise, len(out[n])) if noise else out[n]
+    if not signals:
+        del out["time_s"]
+    return {**out, "teeth": 2, "axial_mm": 3.0, "spindle_rpm": 6000, "diameter_mm": 25, "helix_deg": 30}
+
+
+def test_straight_forces_come_back() -> None:
+    law = sm.identify_process(made(noise=0.5))
+    assert not law.bent
+    truth = sm.load_process("slot").law
+    for n, (value, u) in law.coefficients.items():
+        assert abs(value - getattr(truth, n)) < 4 * u, n
+
+
+def test_runout_from_the_line_at_the_spindle() -> None:
+    law = sm.identify_process(made(signals=True, runout=12e-6))
+    assert law.runout is not None
+    assert law.runout.offset == pytest.approx(12e-6, rel=0.03)
+    assert law.process(sm.load_process("slot")).tool.runout == law.runout.offset
+
+
+def test_side_cuts_and_a_file(tmp_path: Path) -> None:
+    p = sm.load_process("slot")
+    lines = ["feed_per_tooth_mm,Fx_N,Fy_N,Fz_N,teeth,axial_mm,side,radial_mm,diameter_mm"]
+    for chip in (0.05, 0.1, 0.15):
+        cut = replace(p, feed=chip * 1e-3 * 200, cut=replace(p.cut, side="climb", radial=8e-3))
+        f = sm.cutting_force(cut).mean
+        lines.append(f"{chip},{f[0]!r},{f[1]!r},{f[2]!r},2,3,climb,8,25")
+    path = tmp_path / "forces.csv"
+    path.write_text("\n".join(lines).replace("np.float64(", "").replace(")", ""))
+    law = sm.identify_process(path)
+    for n, (value, _) in law.coefficients.items():
+        assert value == pytest.approx(getattr(p.law, n), rel=1e-6)
+
+
+BAD = [
+    ({"teeth": None}, "missing column 'teeth'"),
+    ({"Fq_N": 1}, "unknown column 'Fq_N'"),
+    ({"feed_per_tooth_mm": [0.05, 0.05, 0.05, 0.1, 0.1]}, "3 or more feeds"),
+    ({"Fx_N": [1, 2, 3, 4, "x"]}, "Fx_N: expected"),
+    ({"Fx_N": [1, 2, 3]}, "Fx_N: expected"),
+    ({"Fx_N": [1, 2, 3, 4, float("nan")]}, "finite"),
+    ({"axial_mm": 0}, "axial_mm: expected a number above zero"),
+    ({"side": "climb"}, "radial_mm"),
+    ({"side": "up"}, "expected one of climb"),
+    ({"teeth": 2.5}, "whole number"),
+    ({"time_s": [1, 2, 3, 4, 5]}, "spindle_rpm"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("given", "message"), BAD, ids=[m for _, m in BAD])
+def test_refused(given: dict[str, Any], message: str) -> None:
+    table = {k: v for k, v in {**MEASURED, **given}.items() if v is not None}
+    with pytest.raises(StiffmapError) as caught:
+        sm.identify_process(table)
+    assert message in str(caught.value)

@@ -1,0 +1,148 @@
+"""G-code: the examples and rules of LinuxCNC's documentation, and what is refused."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from stiffmap.common.errors import FileError
+from stiffmap.machining.toolpath.gcode.load import load_gcode
+from stiffmap.machining.toolpath.gcode.words import read_block
+from stiffmap.machining.toolpath.path import Kind, Toolpath
+
+HEAD = "G21 G90 G17 G94 S6000 M3 F600\n"
+
+
+def read(text: str, head: str = HEAD) -> Toolpath:
+    return load_gcode((head + text).splitlines(), name="p.ngc")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("g0x +0. 12 34y 7", [("G", 0), ("X", 0.1234), ("Y", 7)]),  # blanks within numbers
+        ("G1 X1 (mid) Y2 ; rest", [("G", 1), ("X", 1), ("Y", 2)]),
+        ("N10 G2 X10 Y15 R20 Z5", [("N", 10), ("G", 2), ("X", 10), ("Y", 15), ("R", 20), ("Z", 5)]),
+        ("g1 x.5 y-.25 f100.", [("G", 1), ("X", 0.5), ("Y", -0.25), ("F", 100)]),
+        ("%", []),
+        ("(only a comment)", []),
+        ("/G1 X2", [("G", 1), ("X", 2)]),
+    ],
+)
+def test_words(text: str, words: list[tuple[str, float]]) -> None:
+    assert list(read_block(text, "p", 1).words) == words
+
+
+def test_lines_and_modes() -> None:
+    p = read("G0 X10 Y0 Z5\nG1 Z0\nX20\nG91 X5 Y5\nG90 G20 X1\nG21 G93 G1 X0 F2\n")
+    assert (1e3 * p.end[-4:]).tolist() == pytest.approx(
+        np.array([[20, 0, 0], [25, 5, 0], [25.4, 5, 0], [0, 5, 0]])
+    )
+    assert p.feed[2] == pytest.approx(0.01)
+    assert p.feed[-1] == pytest.approx(25.4e-3 * 2 / 60)
+    assert p.spindle[-1] == pytest.approx(200 * pi)
+    assert p.cuts.tolist() == [False, False, True, True, True, True]
+    assert p.line.tolist() == [2, 3, 4, 5, 6, 7]
+
+
+@pytest.mark.parametrize(
+    ("text", "length", "sweep", "middle"),
+    [
+        # quarter by centre, by radius, the long way by a negative radius
+        ("G3 X0 Y10 I-10 J0", 5 * pi, 90, (10 / 2**0.5, 10 / 2**0.5, 0)),
+        ("G3 X0 Y10 R10", 5 * pi, 90, (10 / 2**0.5, 10 / 2**0.5, 0)),
+        ("G3 X0 Y10 R-10", 15 * pi, 270, None),
+        ("G2 X0 Y10 I-10", 15 * pi, -270, None),
+        ("G2 X0 Y10 R10", 5 * pi, -90, (10 - 10 / 2**0.5, 10 - 10 / 2**0.5, 0)),
+        ("G2 X0 Y10 R-10", 15 * pi, -270, (-10 / 2**0.5, -10 / 2**0.5, 0)),
+        ("G2 I-10", 20 * pi, -360, (-10, 0, 0)),
+        ("G3 I-10 P2", 40 * pi, 720, (10, 0, 0)),
+        ("G3 X10 Y0 I-10 Z-3", (400 * pi**2 + 9) ** 0.5, 360, (-10, 0, -1.5)),  # helix
+        ("G90.1 G3 X0 Y10 I0 J0", 5 * pi, 90, (10 / 2**0.5, 10 / 2**0.5, 0)),
+        ("G91.1 G18 G2 X0 Z10 I-10 K0", 5 * pi, -90, (10 / 2**0.5, 0, 10 / 2**0.5)),
+        ("G19 G3 Y10 Z10 J0 K10", 5 * pi, 90, None),
+    ],
+)
+def test_arcs(text: str, length: float, sweep: float, middle: tuple[float, ...] | None) -> None:
+    p = read(f"G0 X10 Y0 Z0\n{text}\n")
+    assert p.kind[1] == Kind.ARC
+    assert 1e3 * p.length[1] == pytest.approx(length, rel=1e-12)
+    assert np.degrees(p.sweep[1]) == pytest.approx(sweep)
+    ends = p.at([1, 1], [0.0, 1.0])[0]
+    assert ends == pytest.approx(np.array([p.start[1], p.end[1]]), abs=1e-15)
+    if middle is not None:
+        assert 1e3 * p.at([1], [0.5])[0][0] == pytest.approx(middle, abs=1e-12)
+    # tangent and curvature against differences, of second order
+    s = np.array([0.3])
+    errors = []
+    for h in (1e-3, 5e-4):
+        a, b, c = (p.at([1], s + d)[0][0] for d in (-h, 0, h))
+        speed = p.length[1]
+        t = (c - a) / (2 * h * speed)
+        k = (c - 2 * b + a) / (h * speed) ** 2
+        _, tangent, bend = p.at([1], s)
+        errors.append(max(np.abs(t - tangent[0]).max(), 1e-3 * np.abs(k - bend[0]).max()))
+    assert errors[1] < max(0.3 * errors[0], 1e-8)
+
+
+def test_offsets_and_machine_coordinates() -> None:
+    p = load_gcode(
+        (HEAD + "G55 G0 X0 Y0 Z0\nG1 X10\nG53 G0 X1\nG54 G1 X0").splitlines(),
+        name="p",
+        offsets={"G54": (0, 0, 0), "G55": (0.1, 0, 0.2)},
+    )
+    assert (1e3 * p.end).tolist() == [[100, 0, 200], [110, 0, 200], [1, 0, 200], [0, 0, 200]]
+
+
+def test_notes_are_kept() -> None:
+    p = load_gcode(["G21 F100 G0 X0 Y0", "G1 X1", "G64 P0.01", "/G1 X2", "M30", "!!"])
+    text = " ".join(p.notes)
+    for part in ("no M3", "G64", "slash", "Z is never given"):
+        assert part in text
+    assert len(p) == 3
+
+
+BAD = [
+    ("G0 X1", "", "unit is missing"),
+    ("G1 X1", "G21 S1 M3\n", "F was never given"),
+    ("G1 X1 F0", HEAD, "feed above zero"),
+    ("G2 X1 Y1 R0.1", HEAD, "does not close"),
+    ("G2 X10 Y1 I5", HEAD, "does not close"),
+    ("G2 X1 Y1", HEAD, "without a centre"),
+    ("G2 X0 Y0 R5", HEAD, "not its start"),
+    ("G2 X1 K1", HEAD, "does not lie in the plane"),
+    ("G2 X1 I1 R1", HEAD, "not both"),
+    ("G2", HEAD, "without an end"),
+    ("G1 X1 I5", HEAD, "go with G2"),
+    ("G0 G1 X1", HEAD, "two motions"),
+    ("X5", "G21\n", "without a motion"),
+    ("G41 D1", HEAD, "cutter radius compensation"),
+    ("G81 X1 Z-1 R1", HEAD, "drilling"),
+    ("G5 X1 I0 J1 P0 Q1", HEAD, "splines"),
+    ("G12 X1", HEAD, "G12: unknown word"),
+    ("M98 P100", HEAD, "subprograms"),
+    ("M66", HEAD, "unknown word: M66"),
+    ("o100 call", HEAD, "subprograms"),
+    ("#1=5", HEAD, "parameters"),
+    ("G1 X[1+2]", HEAD, "expressions"),
+    ("G1 A30", HEAD, "rotary"),
+    ("G1 X1 Q3", HEAD, "unknown word: Q3"),
+    ("G1 X1 X2", HEAD, "given twice"),
+    ("G1 X1,5", HEAD, "expected words"),
+    ("G1 X1 (open", HEAD, "comment"),
+    ("G43", HEAD, "register"),
+    ("G93 G1 X1", HEAD, "every move needs its own F"),
+    ("G1 X1e5", HEAD, "unknown word: E5"),
+    ("G1 X99999999", HEAD, "beyond any machine"),
+    ("S-5", HEAD, "zero or more"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "head", "message"), BAD, ids=[t for t, _, _ in BAD])
+def test_refused(text: str, head: str, message: str) -> None:
+    with pytest.raises(FileError) as caught:
+        read(text + "\nG1 X3", head)
+    assert message in str(caught.value)
+    assert f"p.ngc, line {1 + head.count(chr(10))}" in str(caught.value)

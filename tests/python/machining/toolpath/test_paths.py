@@ -1,0 +1,161 @@
+"""Tables, CL files, outlines, points along them and the engagement there."""
+
+from __future__ import annotations
+
+from math import acos, pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.machining.toolpath import (
+    box,
+    engagement,
+    load_path,
+    outline,
+    outline_names,
+    path_of,
+    plate,
+    sampled,
+)
+
+
+def write(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def test_a_table(tmp_path: Path) -> None:
+    p = load_path(
+        write(
+            tmp_path,
+            "p.csv",
+            "x_mm,y [mm],z [m],feed_mm_min,spindle_rpm,i,j,k\n0,0,0,600,60,0,0,2\n10,0,0.001,1200,60,0,1,1\n0,5,0,600,60,0,0,1\n",
+        )
+    )
+    assert p.end[0].tolist() == [0.01, 0, 0.001]
+    assert p.feed.tolist() == pytest.approx([0.02, 0.01])
+    assert p.spindle[0] == pytest.approx(2 * pi)
+    assert p.tool[0] == pytest.approx([0, 2**-0.5, 2**-0.5])
+    assert p.line.tolist() == [3, 4]
+
+
+def test_a_cl_file(tmp_path: Path) -> None:
+    text = "PARTNO/TEST\nUNITS/MM\nSPINDL/6000,CLW\nRAPID\nGOTO/0,0,0\nFEDRAT/600,MMPM\nGOTO/10,0,$\n0\nGOTO/10,5,0,0,0,1 $$ note\nFINI\n"
+    p = load_path(write(tmp_path, "p.cl", text))
+    assert (1e3 * p.end).tolist() == [[10, 0, 0], [10, 5, 0]]
+    assert p.feed.tolist() == pytest.approx([0.01, 0.01])
+    assert p.spindle[0] == pytest.approx(200 * pi)
+
+
+@pytest.mark.parametrize("name", outline_names())
+def test_outlines_close_without_corners(name: str) -> None:
+    p = outline(name)
+    c = p.only(p.cuts)
+    assert np.abs(c.start[1:] - c.end[:-1]).max() < 1e-12
+    assert np.abs(c.start[0] - c.end[-1]).max() < 1e-12
+    a = c.at(np.arange(len(c)), np.ones(len(c)))[1]
+    b = c.at(np.arange(len(c)), np.zeros(len(c)))[1]
+    assert (a * np.roll(b, -1, axis=0)).sum(axis=1) == pytest.approx(np.ones(len(c)), abs=1e-9)
+    q = sampled(p, 1e-3)
+    area = 0.5 * np.cross(q.position[:-1, :2], q.position[1:, :2]).sum()
+    assert (area > 0) == (name == "pocket")  # around a part clockwise, in a pocket counter-clockwise
+    assert q.way[-1] == pytest.approx(c.length.sum())
+
+
+def test_a_curve_of_points_is_a_curve() -> None:
+    """A circle as a table has the circle's curvature and engagement, each point once."""
+    t = np.linspace(0, -2 * pi, 401)
+    p = path_of(np.stack([0.1 * np.cos(t), 0.1 * np.sin(t), 0 * t], axis=1))
+    q = sampled(p, 1.0)
+    assert len(q) == 401
+    process = sm.load_process("trimming")
+    e = engagement(q, p, process)
+    assert e.curvature == pytest.approx(np.full(401, -10.0), rel=1e-3)
+    pocket = outline("pocket")
+    q = sampled(pocket, 1e-4)
+    k = engagement(q, pocket, process).curvature
+    assert k.max() == pytest.approx(100.0)
+    assert k.min() == pytest.approx(0.0, abs=1e-9)
+    # from a line to an arc over the way that the contact reaches ahead
+    reach = process.tool.diameter / 2 * np.sin(process.arc)
+    corner = q.way[np.flatnonzero(pocket.kind[q.move] == 2)[0]]
+    half = np.interp(corner - reach / 2, q.way, k)
+    assert half == pytest.approx(50.0, rel=0.02)
+
+
+def test_an_inside_corner_of_a_pocket() -> None:
+    """At a right-angled corner the engaged arc rises by a quarter turn (theory.md, M8)."""
+    p = path_of(
+        [[0, 0, 0], [0.05, 0, 0], [0.05, 0.05, 0]]
+    )  # turns left, the part lies right: an inside corner
+    process = sm.load_process("trimming")
+    q = sampled(p, 1e-3)
+    extra = engagement(q, p, process).corner
+    at = int(np.flatnonzero(q.move == 0)[-1])
+    assert extra[at] == pytest.approx(pi / 2)
+    assert extra[0] == 0.0
+    assert extra[at + 1 :].max() == 0.0
+    r, ae, d = process.tool.diameter / 2, process.cut.radial, 2e-3
+    before = int(np.argmin(np.abs(q.way - (0.05 - d))))
+    assert extra[before] == pytest.approx(pi / 2 + acos(1 - (ae - d) / r) - acos(1 - ae / r))
+    away = path_of([[0, 0, 0], [0.05, 0, 0], [0.05, -0.05, 0]])
+    assert engagement(sampled(away), away, process).corner.max() == 0.0
+
+
+def test_stock_says_width_and_depth() -> None:
+    process = sm.load_process("trimming")
+    p = path_of([[-0.2, 0, 0], [0.2, 0, 0]])  # part right of it, stock to the left
+    q = sampled(p, 0.01)
+    e = engagement(q, p, process, box([-0.1, -1, -0.1], [0.1, -3e-3, 5e-3]))
+    inside = np.abs(q.position[:, 0]) < 0.0999
+    assert e.radial[inside] == pytest.approx(np.full(inside.sum(), 3e-3))
+    assert e.axial[inside] == pytest.approx(np.full(inside.sum(), 5e-3))
+    assert e.radial[np.abs(q.position[:, 0]) > 0.1001].max() == 0.0
+    e = engagement(q, p, process, plate(3e-3, 0.0))
+    assert e.axial == pytest.approx(np.full(len(q), 3e-3))
+    assert (e.radial > process.tool.diameter).all()  # the tool cuts its diameter of it
+    assert engagement(q, p, process, thickness=2e-3).radial[0] == 2e-3
+
+
+BAD = [
+    ("p.csv", "x,y_mm,z_mm\n0,0,0\n1,0,0\n", "unit is missing"),
+    ("p.csv", "x_mm,y_mm\n0,0\n1,0\n", "missing column z_mm"),
+    ("p.csv", "x_mm,y_mm,z_mm,q\n0,0,0,0\n1,0,0,0\n", "unknown column"),
+    ("p.csv", "x_mm,y_mm,z_mm\n0,0,0\n1,0\n", "expected 3 values"),
+    ("p.csv", "x_mm,y_mm,z_mm\n0,0,0\n1,zero,0\n", "expected a number"),
+    ("p.csv", "x_mm,y_mm,z_mm\n0,0,0\n", "two or more points"),
+    ("p.csv", "x_mm,y_mm,z_mm,feed_mm_min\n0,0,0,600\n1,0,0,0\n", "feed above zero"),
+    ("p.csv", "x_mm,y_mm,z_mm,spindle_rpm\n0,0,0,600\n1,0,0,0\n", "spindle is off"),
+    ("p.csv", "x_mm,y_mm,z_mm,i\n0,0,0,1\n1,0,0,1\n", "needs the columns"),
+    ("p.csv", "x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,0,1\n1,0,0,0,0,0\n", "not zero"),
+    ("p.cl", "GOTO/0,0,0\nGOTO/1,0,0\n", "UNITS/MM"),
+    ("p.cl", "UNITS/MM\nGOTO/0,0\n", "3 or 6 numbers"),
+    ("p.cl", "UNITS/MM\nCYCLE/DRILL\n", "unknown word 'CYCLE'"),
+    ("p.cl", "UNITS/MM\nFEDRAT/0,MMPM\n", "above zero"),
+    ("p.txt", "hello", "unknown kind of path"),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "message"), BAD, ids=[m for _, _, m in BAD])
+def test_refused(tmp_path: Path, name: str, text: str, message: str) -> None:
+    with pytest.raises(FileError) as caught:
+        load_path(write(tmp_path, name, text))
+    assert message in str(caught.value)
+
+
+def test_refused_without_a_file() -> None:
+    with pytest.raises(FileError, match="did you mean 'washbasin'"):
+        load_path("washbasn")
+    with pytest.raises(StiffmapError, match="expected the size width,depth"):
+        load_path("washbasin", size=(1.0,))
+    with pytest.raises(StiffmapError, match="no move cuts"):
+        sampled(path_of([[0, 0, 0], [0, 0, 1]]))
+    p = outline("circle")
+    with pytest.raises(StiffmapError, match="tool's diameter"):
+        engagement(sampled(p), p, sm.load_process("trimming"), thickness=1.0)
+    with pytest.raises(StiffmapError, match="lower first"):
+        box([0, 0, 0], [1, 1, -1])

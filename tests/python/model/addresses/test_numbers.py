@@ -1,0 +1,198 @@
+"""A machine in memory: its numbers by address, machines of other numbers, machines from text and plain data."""
+
+from __future__ import annotations
+
+from math import acos, atan2, hypot
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import stiffmap as sm
+from stiffmap.common.errors import HomeError, StiffmapError
+from stiffmap.model.addresses import known_values, listed, moved, number, with_values
+from stiffmap.model.addresses.setting import every_address
+from stiffmap.model.files.shipped import find
+from stiffmap.solve.starters import CLASSES, machine_text
+
+FORCE = [100.0, 50.0, 0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("name", sm.machine_names())
+def test_every_number_has_an_address_that_gives_and_takes_it(name: str) -> None:
+    d = sm.load_machine(name).description
+    rows = listed(d)
+    assert len({r.address for r in rows}) == len(rows)
+    for r in rows:
+        assert known_values(d, r.address) == [r.value], r.address
+    assert with_values(d, {r.address: r.value for r in rows}) == d
+    for address in every_address(d):
+        assert len(known_values(d, address)) == 1
+
+
+def test_the_table_has_uncertainty_unit_and_note() -> None:
+    t = sm.load_machine("linear-delta").numbers()
+    row = t.loc["a.carriage/stiffness"]
+    assert (row.value, row.unit, row.note) == (2.5e6, "N/m", "declared: belt and motor")
+    assert row.u == pytest.approx(2.5e5)
+    assert list(t.columns) == ["value", "unit", "u", "source", "note"]
+    assert t.loc["a.carriage/friction.viscous"].unit == "N·s/m"
+
+
+def crank_angle(base: float, tip: tuple[float, float], arm: float, forearm: float, bend: int) -> float:
+    """Of a five-bar's motor, by the law of cosines."""
+    x, y = tip[0] - base, tip[1]
+    r = hypot(x, y)
+    return atan2(y, x) - bend * acos((arm**2 + r**2 - forearm**2) / (2 * arm * r))
+
+
+@pytest.mark.parametrize("forearm", [0.36, 0.5, 0.65])
+def test_a_bar_of_another_length_is_the_machine_of_a_file_with_it(forearm: float) -> None:
+    """Geometry and stiffness, on the assembly branch that the machine has: law of cosines, and a file of its own."""
+    machine = sm.load_machine(machine_text("five-bar", "m", {})).with_number("forearm/length", forearm)
+    tip = (0.02, 0.43)
+    angles = sm.inverse_kinematics(machine, [*tip, 0]).actuators
+    by_hand = [crank_angle(x, tip, 0.3, forearm, b) for x, b in ((-0.15, -1), (0.15, 1))]
+    assert angles == pytest.approx(by_hand, abs=1e-9)
+    new = sm.load_machine(machine_text("five-bar", "m", {"forearm": 1e3 * forearm}))
+    a, b = (m.solve([*tip, 0], FORCE) for m in (machine, new))
+    assert a.displacement == pytest.approx(b.displacement, rel=1e-8, abs=1e-13)
+
+
+def test_a_beam_alone_changes_its_compliance() -> None:
+    machine = sm.load_machine(machine_text("gantry", "m", {}))
+    wider = machine.with_numbers({"gantry.ram/beam.tube.outer": 0.2, "gantry.ram/beam.tube.inner": 0.17})
+    file = sm.load_machine(machine_text("gantry", "m", {"tube": 200, "wall": 15}))
+    home = machine.description.home.p
+    assert wider.solve(home).compliance == pytest.approx(file.solve(home).compliance, rel=1e-12)
+    assert "gantry.ram/compliance.k11" not in machine.numbers().index  # it follows from the beam
+    with pytest.raises(StiffmapError, match="inner diameter must be smaller"):
+        machine.with_number("ram/beam.tube.outer", 0.05)
+
+
+def test_a_leg_a_name_or_a_branch() -> None:
+    machine = sm.load_machine("linear-delta")
+    d = machine.with_number("a.rod/length", 0.51).description
+    assert [known_values(d, f"{leg}.rod/length") for leg in "abc"] == [[0.51, 0.51], [0.5, 0.5], [0.5, 0.5]]
+    assert known_values(machine.with_number("rod/length", 0.51).description, "rod/length") == [0.51] * 6
+    left = machine.with_number("a.left.rod/beam.material.E", 1e11).description
+    assert known_values(left, "a.rod/beam.material.E") == [1e11, 1.2e11]
+    soft = machine.with_number("carriage/compliance", 1e-6)
+    assert soft.numbers().loc["c.carriage/stiffness"].value == 1e6
+
+
+def test_effects_are_added_again() -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    both = machine.with_effect("dead_zone", element="actuator", legs=["y"], half_width=1e-5).with_number(
+        "bar/length", 0.8
+    )
+    other = machine.with_number("bar/length", 0.8).with_effect(
+        "dead_zone", element="actuator", legs=["y"], half_width=1e-5
+    )
+    assert both == other
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("x.bar/lenght", "did you mean 'x.bar/length'"),
+        ("x.foot/complianc.k11", "did you mean 'x.foot/compliance.k11'"),
+        ("actuater/stiffness", "the nearest is 'actuator/stiffness'"),
+        ("bar", "expected the address of a number, such as 'x.bar/length'"),
+        ("x.low.bars/mass", "the nearest is 'x.low.bar/mass'"),
+    ],
+)
+def test_unknown_addresses_name_the_nearest(address: str, said: str) -> None:
+    with pytest.raises(StiffmapError, match=said.replace(".", r"\.")):
+        sm.load_machine("orthoglide-revised").with_number(address, 1.0)
+
+
+def test_bad_values_are_refused() -> None:
+    machine = sm.load_machine("five-bar")
+    for address, value in (("forearm/length", -1.0), ("motor/stiffness", 0.0), ("arm/mass", float("nan"))):
+        with pytest.raises(StiffmapError, match=address):
+            machine.with_number(address, value)
+    with pytest.raises(HomeError, match="of the change"):
+        machine.with_number("forearm/length", 3.0)
+
+
+def test_moved_as_built_leaves_the_controller() -> None:
+    d = sm.load_machine("five-bar").description
+    key = "left.arm_length/translation.x"
+    built = moved(d, key, 1e-4)
+    assert built is not None and number(built, "left.arm_length/actual.translation.x") == pytest.approx(
+        0.3001
+    )
+    changed = with_values(d, {key: 0.3001})
+    assert number(changed, key) == 0.3001 and number(changed, "left.arm_length/actual.translation.x") is None
+    # a number of the design moves an error that is there along
+    assert number(with_values(built, {key: 0.31}), "left.arm_length/actual.translation.x") == pytest.approx(
+        0.3101
+    )
+
+
+def test_machines_from_text_and_plain_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = find("five-bar").read_text(encoding="utf-8")
+    machine = sm.load_machine("five-bar")
+    data = yaml.safe_load(text)  # YAML 1.1 takes 7.0e4 for text
+    assert sm.load_machine(text) == machine == sm.load_machine(data)
+    data["platform"][0]["mass"] = np.float64(2.0)
+    assert known_values(sm.load_machine(data).description, "platform.tool/mass") == [2.0]
+    data["home"]["translaton"] = [0, 0, 0]
+    with pytest.raises(StiffmapError, match=r"home: unknown key 'translaton' \(did you mean 'translation'"):
+        sm.load_machine(data)
+    with pytest.raises(StiffmapError, match="expected a machine: a shipped name, a path"):
+        sm.load_machine(3)  # type: ignore[arg-type]
+    assert (
+        sm.error_map(data | {"home": {"translation": [0, 416, 0]}}, force=100, x=[0.0], y=[0.4]).sizes["z"]
+        == 1
+    )
+
+
+def test_design_sweep_is_the_machines_one_by_one() -> None:
+    machine = sm.load_machine("five-bar")
+    lengths, widths = [0.35, 0.4, 3.0], [0.04, 0.05]
+    ds = sm.design_sweep(
+        machine,
+        {"forearm/length": lengths, "arm/beam.hollow.width": widths},
+        wrench=FORCE,
+        evaluate=lambda m: {"stiff": float(m.solve(m.description.home.p).stiffness[0, 0])},
+    )
+    assert ds.displacement.dims == ("forearm.length", "arm.beam.hollow.width", "component")
+    one = machine.with_numbers({"forearm/length": 0.4, "arm/beam.hollow.width": 0.05})
+    s = one.solve(one.description.home.p, FORCE)
+    at = ds.sel({"forearm.length": 0.4, "arm.beam.hollow.width": 0.05})
+    assert np.array_equal(at.displacement, s.displacement)
+    assert float(at.stiff) == one.solve(one.description.home.p).stiffness[0, 0]
+    lost = ds.sel({"forearm.length": 3.0})
+    assert np.isnan(lost.deflection).all() and (lost.status == sm.Status.UNREACHABLE).all()
+    assert "does not close" in str(lost.problem.values[0]) and at.problem == ""
+    assert ds["forearm.length"].attrs == {"address": "forearm/length", "units": "m"}
+
+
+def test_design_sweep_can_be_saved(tmp_path: Path) -> None:
+    ds = sm.design_sweep(
+        "ur10", {"elbow/stiffness": [1e4, 2e4]}, position=[[-0.9, -0.16, 0.28]], wrench=FORCE
+    )
+    ds.to_netcdf(tmp_path / "sweep.nc")
+    assert (
+        ds.deflection.dims == ("elbow.stiffness", "pose")
+        and ds["elbow.stiffness"].attrs["units"] == "N·m/rad"
+    )
+    with pytest.raises(StiffmapError, match="nearest is 'elbow/stiffness'"):
+        sm.design_sweep("ur10", {"elbo/stiffness": [1e4]})
+
+
+def test_solution_as_a_dataset() -> None:
+    s = sm.load_machine("orthoglide-revised").solve(np.zeros((2, 3, 3)), FORCE)
+    ds = s.to_xarray(("row", "column"))
+    assert ds.displacement.dims == ("row", "column", "component")
+    assert np.array_equal(ds.compliance.sel(component="dx", wrench_component="fy"), s.compliance[..., 0, 1])
+    assert ds.actuator_effort.sel(actuator="x.actuator").shape == (2, 3)
+    with pytest.raises(StiffmapError, match="expected 2 different names"):
+        s.to_xarray(("pose",))
+
+
+def test_classes_are_a_dozen() -> None:
+    assert len(CLASSES) >= 12

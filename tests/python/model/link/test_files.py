@@ -1,0 +1,258 @@
+"""Fields, part files, case files and link files: read, written, and each bad one with its one error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.python.model.link.link_fields import REFERENCE, WRENCHES, bar_compliance, noisy_field
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.model.link import LinkFile, identify_link, load_link, save_link
+from stiffmap.model.link.inputs import read_cases, read_material, read_part
+from stiffmap.model.link.readers import read_ansys, read_dat, read_field, read_frd
+
+POINTS, U = noisy_field(n=10)
+
+
+def csv_text(unit="mm", factor=1e3):
+    names = ["node", *(f"{a} [{unit}]" for a in "xyz"), *(f"u{a} [{unit}]" for _ in range(6) for a in "xyz")]
+    rows = [
+        ",".join(
+            map(repr, [float(i + 1), *(factor * POINTS[i]).tolist(), *(factor * U[:, i]).ravel().tolist()])
+        )
+        for i in range(10)
+    ]
+    return "# a field\n" + ",".join(names) + "\n" + "\n".join(rows) + "\n"
+
+
+def dat_text():
+    blocks = []
+    for u in U[:2]:
+        rows = "\n".join(f"{i + 1:>10d} " + "".join(f"{v:14.6E}" for v in row) for i, row in enumerate(u))
+        blocks.append(f" displacements (vx,vy,vz) for set ALL and time  0.1000000E+01\n\n{rows}\n")
+    return "\n".join(blocks)
+
+
+def frd_text():
+    head = "    1C\n    2C" + " " * 18 + "10\n"
+    row = lambda i, v: f" -1{i + 1:10d}" + "".join(f"{x:12.5E}" for x in v)  # noqa: E731
+    text = head + "\n".join(row(i, p) for i, p in enumerate(POINTS)) + "\n -3\n"
+    for u in U[:2]:
+        text += " -4  DISP        4    1\n -5  D1          1    2    1    0\n"
+        text += "\n".join(row(i, v) for i, v in enumerate(u)) + "\n -3\n"
+    return text + " 9999\n"
+
+
+def ansys_text():
+    text = ""
+    for step, u in enumerate(U[:2], 1):
+        for page in (range(5), range(5, 10)):
+            text += f"\n PRINT U NODAL SOLUTION PER NODE\n  LOAD STEP= {step}  SUBSTEP= 1\n"
+            text += "    NODE       UX           UY           UZ           USUM\n"
+            for i in page:
+                text += f"{i + 1:9d}" + "".join(f"{v:13.5E}" for v in [*u[i], np.linalg.norm(u[i])]) + "\n"
+        text += "\n MAXIMUM ABSOLUTE VALUES\n NODE          3            1            4            3\n"
+    return text
+
+
+def test_csv_field_comes_back_in_metres(tmp_path):
+    for unit, factor in (("mm", 1e3), ("m", 1.0)):
+        (tmp_path / "f.csv").write_text(csv_text(unit, factor))
+        p, u = read_field(tmp_path / "f.csv")
+        assert p == pytest.approx(POINTS, rel=1e-12)
+        assert u == pytest.approx(U, rel=1e-12)
+
+
+def test_dat_frd_and_ansys_hold_the_same_field(tmp_path):
+    (tmp_path / "a.dat").write_text(dat_text())
+    (tmp_path / "a.frd").write_text(frd_text())
+    (tmp_path / "a.lis").write_text(ansys_text())
+    (tmp_path / "nodes.txt").write_text(
+        "\n".join(f"{i + 1} {x} {y} {z}" for i, (x, y, z) in enumerate(POINTS))
+    )
+    for numbers, fields in (read_dat(tmp_path / "a.dat"), read_ansys(tmp_path / "a.lis")):
+        assert numbers.tolist() == list(range(1, 11))
+        assert fields == pytest.approx(U[:2], rel=1e-5)
+    p, fields = read_frd(tmp_path / "a.frd")
+    assert p == pytest.approx(POINTS, rel=1e-5)
+    assert fields == pytest.approx(U[:2], rel=1e-5)
+    p, u = read_field(tmp_path / "a.dat", "mm", tmp_path / "nodes.txt")
+    assert p == pytest.approx(1e-3 * POINTS)
+    assert u == pytest.approx(1e-3 * U[:2], rel=1e-5)
+
+
+@pytest.mark.parametrize("name", ["a.vtu", "a.vtk"])
+def test_vtu_and_vtk_through_meshio(tmp_path, name):
+    meshio = pytest.importorskip("meshio", reason="needs the extra [fea]")
+    data = {f"case{k}": u for k, u in enumerate(U)}
+    meshio.Mesh(POINTS, [("vertex", np.arange(10)[:, None])], point_data=data).write(tmp_path / name)
+    p, u = read_field(tmp_path / name, "m")
+    assert np.array_equal(p, POINTS)
+    assert np.array_equal(u, U)
+    assert read_field(tmp_path / name, "mm")[1] == pytest.approx(1e-3 * U, rel=1e-15)
+
+
+def write(tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    return tmp_path / name
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "unit", "words"),
+    [
+        ("a.csv", csv_text().replace("ux [mm]", "ux"), None, "column ux needs its unit"),
+        ("a.csv", csv_text().replace("uz [mm]", "uw [mm]", 1), None, "ux, uy, uz once per load case"),
+        ("a.csv", csv_text().replace("\n2.0,", "\ntwo,"), None, "row 3 has a cell that is not a number"),
+        ("a.csv", csv_text() + "11.0,1\n", None, "row 12 has 2 cells"),
+        ("a.dat", dat_text(), None, "no units; give --unit"),
+        ("a.dat", dat_text(), "mm", "give the coordinates with --nodes"),
+        ("a.dat", "nothing\n", "mm", "expected nodal displacements, found none"),
+        ("a.frd", frd_text().replace("    2C", "    3C"), "mm", "a displacement and no coordinates"),
+        ("a.xyz", "", "mm", "expected .csv"),
+    ],
+)
+def test_bad_field_files(tmp_path, name, text, unit, words):
+    with pytest.raises(StiffmapError, match=words) as error:
+        read_field(write(tmp_path, name, text), unit)
+    assert "\n" not in str(error.value)
+
+
+def test_missing_field_file():
+    with pytest.raises(StiffmapError, match="no such file"):
+        read_field("absent.csv")
+
+
+def test_cases_come_in_si(tmp_path):
+    path = write(tmp_path, "c.csv", "fx [N],fy [kN],fz [N],mx [N*mm],my [N*m],mz [Nmm]\n1,2,3,4,5,6\n")
+    assert read_cases(path) == pytest.approx(np.array([[1, 2000, 3, 0.004, 5, 0.006]]))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("fx [N],fy [N],fz [N],mx [N*mm],my [N*mm],mz\n1,2,3,4,5,6\n", "missing .'mz'."),
+        ("fx [N],fy [N],fz [N],mx [N],my [N*mm],mz [N*m]\n1,2,3,4,5,6\n", "missing .'mx'."),
+        ("fx [N],fy [N],fz [N],mx [N*mm],my [N*mm],mz [Nm]\n1,2,3,4,5\n", "row 2 does not hold numbers"),
+        ("", "missing"),
+    ],
+)
+def test_bad_case_files(tmp_path, text, words):
+    with pytest.raises(StiffmapError, match=words):
+        read_cases(write(tmp_path, "c.csv", text))
+
+
+def test_materials():
+    assert read_material("steel").young == 210e9
+    assert read_material("70GPa,0.33")[:2] == (70e9, 0.33)
+    for bad, words in (
+        ("unobtainium", "expected one of"),
+        ("70,0.3", "needs its unit"),
+        ("70GPa,0.5", "in \\(-1"),
+    ):
+        with pytest.raises(StiffmapError, match=words):
+            read_material(bad)
+
+
+PART = """
+units: {length: mm, stress: MPa}
+part: {shape: hollow-bar, length: 310, width: 12, height: 24, wall: 1.5}
+material: {young: 70000, poisson: 0.33}
+"""
+
+
+def test_part_file_comes_in_si(tmp_path):
+    shape, material, name = read_part(write(tmp_path, "bar.yaml", PART))
+    assert shape.length == pytest.approx(0.31)
+    assert material.young == pytest.approx(70e9)
+    assert name == "bar"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("units: {length: mm, stress: MPa}", ""), "units: Field required"),
+        (("length: mm", "length: furlong"), "units.length: .*got 'furlong'"),
+        (("shape: hollow-bar", "shape: banana"), "part.shape: expected one of bar, hollow-bar"),
+        (("wall: 1.5", "wall: 7"), "wall: expected less than half of the smaller side"),
+        (("wall: 1.5", "wall: thick"), "wall: .*got 'thick'"),
+        (("length: 310", "length: -310"), "length: .*greater than 0, got -0.31"),
+        (("young: 70000, poisson: 0.33", "young: 70000"), "material: expected young and poisson"),
+        (("material", "mterial"), "mterial: Extra inputs"),
+        (("part:", "part: ["), "not valid YAML"),
+    ],
+)
+def test_bad_part_files(tmp_path, change, words):
+    with pytest.raises(StiffmapError, match=words) as error:
+        read_part(write(tmp_path, "bar.yaml", PART.replace(*change)))
+    assert "\n" not in str(error.value)
+
+
+def test_link_file_loads_back_equal(tmp_path):
+    points, u = noisy_field()
+    link = identify_link(points, u, WRENCHES, reference=REFERENCE)
+    C = (link.compliance + link.compliance.T) / 2
+    file = LinkFile(
+        C, link.covariance, link.reference, {"solver": "none", "noise_m": link.sigma.tolist()}, "bar"
+    )
+    save_link(file, tmp_path / "link.yaml")
+    back = load_link(tmp_path / "link.yaml")
+    assert np.array_equal(back.compliance, C)
+    assert np.array_equal(back.covariance, link.covariance)
+    assert np.array_equal(back.reference, link.reference)
+    assert back.provenance == file.provenance
+    assert back.name == "bar"
+    assert back.standard_error == pytest.approx(link.standard_error)
+
+
+def link_text(**changes):
+    C = bar_compliance()
+    data = {"kind": "stiffmap-link", "units": "{length: m, force: N, angle: rad}", "reference": "[0, 0, 0]",
+            "compliance": C.tolist(), "standard_error": (0.01 * np.abs(C)).tolist()} | changes  # fmt: skip
+    return "\n".join(f"{k}: {v}" for k, v in data.items() if v is not None)
+
+
+def test_link_file_with_standard_errors_only(tmp_path):
+    link = load_link(write(tmp_path, "l.yaml", link_text()))
+    assert link.standard_error == pytest.approx(0.01 * np.abs(bar_compliance()))
+
+
+SKEWED = bar_compliance()
+SKEWED[1, 5] *= 1.01
+LARGE = np.full((6, 6), 1e308)
+np.fill_diagonal(LARGE, 1e-6)
+LARGE_FREE = np.full((6, 6), 1e308)
+np.fill_diagonal(LARGE_FREE, 0.0)
+INDEFINITE = bar_compliance()
+INDEFINITE[1, 5] = INDEFINITE[5, 1] = 1.2 * np.sqrt(INDEFINITE[1, 1] * INDEFINITE[5, 5])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"kind": "machine"}, "expected a link file"),
+        ({"units": None}, "units: expected"),
+        ({"units": "{length: mm, force: N, angle: rad}"}, "units: expected"),
+        ({"compliance": None}, "missing key 'compliance'"),
+        ({"reference": "[0, 0]"}, r"reference: expected finite numbers of shape \(3,\)"),
+        ({"compliance": "[[1, a]]"}, "compliance: expected numbers"),
+        ({"compliance": SKEWED.tolist()}, r"symmetric matrix, got .* = 8.7e-03"),
+        ({"compliance": np.tril(LARGE).tolist()}, "symmetric matrix, got .* = inf"),
+        ({"compliance": LARGE.tolist()}, "symmetric matrix, got .* = nan"),
+        ({"compliance": LARGE_FREE.tolist()}, "expected no negative eigenvalue, got -1e"),
+        ({"compliance": INDEFINITE.tolist()}, "expected no negative eigenvalue, got -0.2"),
+        ({"standard_error": LARGE.tolist()}, r"standard_error: expected at most 1e\+150 .* got 1e\+308"),
+        ({"compliance": (-bar_compliance()).tolist()}, "diagonal that is not negative"),
+        ({"compliance": "[[.nan]]"}, "expected finite numbers of shape"),
+    ],
+)
+def test_bad_link_files(tmp_path, changes, words):
+    with pytest.raises(StiffmapError, match=words):
+        load_link(write(tmp_path, "l.yaml", link_text(**changes)))
+
+
+def test_missing_and_unwritable_link_file(tmp_path):
+    with pytest.raises(StiffmapError, match="no such link file"):
+        load_link(tmp_path / "absent.yaml")
+    file = LinkFile(bar_compliance(), np.zeros((36, 36)), np.zeros(3), {})
+    with pytest.raises(StiffmapError, match="cannot be written"):
+        save_link(file, tmp_path / "no" / "link.yaml")

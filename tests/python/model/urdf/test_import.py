@@ -1,0 +1,155 @@
+"""URDF files as machines, against Pinocchio and against a machine written by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.python.model.urdf import robots
+
+import stiffmap as sm
+from stiffmap.model.urdf import import_urdf
+from stiffmap.ui.cli import main
+
+
+def written(folder: Path, urdf: str, sidecar: str | None = None) -> tuple[Path, Path | None]:
+    a, b = folder / "robot.urdf", folder / "robot.yaml"
+    a.write_text(urdf)
+    if sidecar is not None:
+        b.write_text(sidecar)
+    return a, None if sidecar is None else b
+
+
+def machine(folder: Path, urdf: str, sidecar: str | None = None) -> sm.Machine:
+    return sm.Machine(import_urdf(*written(folder, urdf, sidecar)).description)
+
+
+def test_forward_kinematics_and_jacobian_of_pinocchio(tmp_path: Path) -> None:
+    pin = pytest.importorskip("pinocchio", reason="pinocchio is not installed (pip install pin)")
+    arm = machine(tmp_path, robots.ARM, robots.ARM_SIDECAR)
+    model = pin.buildModelFromXML(robots.ARM)
+    data, tool = model.createData(), model.getFrameId("tool")
+    rng = np.random.default_rng(2)
+    for q in rng.uniform([-1, -1, -0.5, 0.0], [1, 1, 1.5, 0.3], (6, 4)):
+        # q1 is continuous: Pinocchio keeps its cosine and sine
+        full = np.r_[np.cos(q[0]), np.sin(q[0]), q[1:]]
+        pin.computeJointJacobians(model, data, full)
+        pin.updateFramePlacements(model, data)
+        at = data.oMf[tool]
+        k = sm.forward_kinematics(arm, q)
+        assert k.status == sm.Status.CONVERGED
+        np.testing.assert_allclose(k.position, at.translation, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(k.rotation, at.rotation, rtol=0, atol=1e-12)
+        # with springs only in the drives, compliance = J K^-1 J^T
+        jacobian = pin.getFrameJacobian(model, data, tool, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        drives_only = robots.ARM_SIDECAR.split("springs:")[0]
+        s = machine(tmp_path, robots.ARM, drives_only).solve(at.translation, rotation=at.rotation)
+        assert int(s.flags) & sm.Flag.RIGID_DIRECTION
+        wanted = jacobian @ np.diag([1 / 4e4, 1 / 3e4, 5e-5, 1e-6]) @ jacobian.T
+        np.testing.assert_allclose(s.compliance, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())
+
+
+def test_masses_of_pinocchio(tmp_path: Path) -> None:
+    """Torques of the drives against gravity."""
+    pin = pytest.importorskip("pinocchio", reason="pinocchio is not installed (pip install pin)")
+    stiff = (
+        robots.ARM_SIDECAR.replace("e4}", "e9}")
+        .replace("e6}", "e9}")
+        .replace("5.0e-5", "1.0e-9")
+        .split("springs:")[0]
+    )
+    arm = machine(tmp_path, robots.ARM, stiff)
+    q = np.array([0.2, -0.4, 0.9, 0.1])
+    model = pin.buildModelFromXML(robots.ARM)
+    wanted = pin.rnea(
+        model, model.createData(), np.r_[np.cos(q[0]), np.sin(q[0]), q[1:]], np.zeros(4), np.zeros(4)
+    )
+    home = arm.description.home
+    s = arm.solve(home.p, rotation=home.r, gravity=[0, 0, -9.81])
+    np.testing.assert_allclose(s.actuator_effort, wanted, rtol=1e-5, atol=1e-5)
+
+
+def test_the_length_of_an_axis_does_not_matter(tmp_path: Path) -> None:
+    (tmp_path / "b").mkdir()
+    long = machine(tmp_path, robots.ARM.replace('<axis xyz="1 0 0"/>', '<axis xyz="1e308 0 0"/>'))
+    assert long == machine(tmp_path / "b", robots.ARM)
+
+
+def test_closed_loop_is_the_five_bar_written_by_hand(tmp_path: Path) -> None:
+    m = machine(tmp_path, robots.FIVE_BAR, robots.FIVE_BAR_SIDECAR)
+    assert len(m.legs) == 2 and len(m.actuators) == 2
+    p = np.array([[0.05, 0.40, 0], [-0.1, 0.45, 0], [0, 0.36, 0]])
+    mine = sm.inverse_kinematics(m, p)
+    shipped = sm.inverse_kinematics(sm.load_machine("five-bar"), p)
+    assert (mine.status == sm.Status.CONVERGED).all()
+    np.testing.assert_allclose(mine.actuators, shipped.actuators, rtol=0, atol=1e-10)
+    assert m.solve(p, [50, 20, 0, 0, 0, 0]).ok.all()
+
+
+def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    urdf, side = written(tmp_path, robots.FIVE_BAR, robots.FIVE_BAR_SIDECAR)
+    out = tmp_path / "out.yaml"
+    assert main(["import", str(urdf), "--sidecar", str(side), "-o", str(out)]) == 0
+    assert "2 actuators" in capsys.readouterr().out
+    assert sm.load_machine(out) == sm.Machine(import_urdf(urdf, side).description)
+    assert main(["import", str(urdf), "--sidecar", str(side), "-o", str(out)]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert main(["import", str(urdf), "-o", str(tmp_path / "other.yaml")]) == 2
+    assert "the tree has 2 ends (tip_a, tip_b)" in capsys.readouterr().err
+
+
+MESH = '<link name="base"><visual><geometry><mesh filename="meshes/base.stl"/></geometry></visual></link>'
+MIMIC = '<parent link="base"/><child link="shoulder"/><mimic joint="q3"/>'
+BAD_URDF = {
+    "mesh 'meshes/base.stl' is missing": ('<link name="base"/>', MESH),
+    "joint q1: mimics joint 'q3'": ('<parent link="base"/><child link="shoulder"/>', MIMIC),
+    "joint q1: type 'floating' cannot be imported": ('type="continuous"', 'type="floating"'),
+    "joint q1: no link 'sholder'": ('<child link="shoulder"/>', '<child link="sholder"/>'),
+    "a zero-length axis": ('<axis xyz="1 0 0"/>', '<axis xyz="0 0 0"/>'),
+    "xyz: expected three numbers, found '0 0'": ('<origin xyz="0 0 0.3"', '<origin xyz="0 0"'),
+    "not XML": ("</robot>", ""),
+    "expected one root link, found 2": ('<link name="fore"/>', '<link name="fore"/><link name="loose"/>'),
+}
+
+
+@pytest.mark.parametrize("message", BAD_URDF)
+def test_bad_urdf(message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    old, new = BAD_URDF[message]
+    assert old in robots.ARM
+    urdf, _ = written(tmp_path, robots.ARM.replace(old, new))
+    assert main(["import", str(urdf), "-o", str(tmp_path / "m.yaml")]) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+    assert not (tmp_path / "m.yaml").exists()
+
+
+def test_meshes_need_not_be_there(tmp_path: Path) -> None:
+    old, new = BAD_URDF["mesh 'meshes/base.stl' is missing"]
+    urdf, _ = written(tmp_path, robots.ARM.replace(old, new))
+    assert import_urdf(urdf, meshes=False).rigid == ("q1", "q2", "q3", "q4")
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "base.stl").write_bytes(b"")
+    import_urdf(urdf)
+
+
+BAD_SIDECAR = {
+    "closed_loop: no frame 'tip_c'": ("[[tip_a, tip_b]]", "[[tip_a, tip_c]]"),
+    "name_mot: no joint 'motor_c'": ("[motor_a, motor_b]", "[motor_a, motor_c]"),
+    "springs: no link 'arm_c'": ("arm_b: *arm", "arm_c: *arm"),
+    "type: expected one entry per entry of closed_loop (1), found 0": ("[3d]", "[]"),
+    "name_mot: a machine with closed loops has passive joints": ("[motor_a, motor_b]", "[]"),
+    "closed_loop: the loops do not close upon one body": ("closed_loop:", "tip: arm_b\nclosed_loop:"),
+    "give exactly one of stiffness and compliance": ("motor_a: {stiffness: 5.0e4}", "motor_a: {}"),
+    "home configuration does not close": ("motor_b: 0.92730", "motor_b: 2.5"),
+}
+
+
+@pytest.mark.parametrize("message", BAD_SIDECAR)
+def test_bad_sidecar(message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    old, new = BAD_SIDECAR[message]
+    assert old in robots.FIVE_BAR_SIDECAR
+    urdf, side = written(tmp_path, robots.FIVE_BAR, robots.FIVE_BAR_SIDECAR.replace(old, new))
+    assert main(["import", str(urdf), "--sidecar", str(side), "-o", str(tmp_path / "m.yaml")]) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1

@@ -1,0 +1,71 @@
+"""Which tests judge which room first: a mutant that they miss meets all others where `--wide` is given."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+TESTS = Path(__file__).parents[2]
+CORE = (
+    "solve",
+    "solve/compiled",
+    "solve",
+    "model/machines",
+    "workspace/performance",
+    "tests/oracle",
+    "model/effects",
+    "workspace/maps",
+)
+ROOMS = {
+    "calibration": ("identification/calibration",),
+    "compensation": ("machining/compensation",),
+    "compiled": ("solve", "solve/compiled"),
+    "derivatives": ("solve/compiled", "model/effects"),
+    "description": ("model/files", "model/machines", "solve"),
+    "design": ("workspace/performance",),
+    "diagnosis": ("identification/diagnosis",),
+    "effects": ("model/effects",),
+    "experiment": ("experiment", "identification/diagnosis"),
+    "files": ("model/files",),
+    "link": ("model/link",),
+    "maps": ("workspace/maps", "ui/cli"),
+    "performance": ("workspace/performance",),
+    "planning": ("identification/planning",),
+    "urdf": ("model/urdf",),
+    "budget": ("first_hour",),
+    "trial": ("first_hour",),
+    "beams": ("model/files", "solve"),
+}
+OTHERS = ("solve", "model/files", "solve", "model/machines", "first_hour", "solve/compiled")
+#: Not of a machine's numbers, or slow for what they say of them.
+NEVER = {"project", "docs", "fuzz", "mutation"}
+
+
+def folders(file: str) -> tuple[str, ...]:
+    """The folders of tests for one source, the nearest first."""
+    if file.startswith("cpp/"):
+        return CORE
+    parts = [part.removesuffix(".py") for part in Path(file).parts[2:]]
+    return next((ROOMS[p] for p in parts if p in ROOMS), OTHERS)
+
+
+def all_folders(file: str) -> tuple[str, ...]:
+    """Those, then all others."""
+    near = folders(file)
+    rest = sorted({p.parent.relative_to(TESTS).as_posix() for p in TESTS.rglob("test_*.py")})
+    return near + tuple(f for f in rest if f not in near and f not in NEVER)
+
+
+def test_files(file: str, source: str, start: int, chosen: tuple[str, ...]) -> list[str]:
+    """Test files of these folders; those first that name the function or the module of the mutant, shortest first."""
+    functions = re.findall(r"^\s*(?:def|class) (\w+)", source[:start], flags=re.MULTILINE)
+    names = {Path(file).stem, *functions[-1:]}
+    found = []
+    for rank, folder in enumerate(chosen):
+        for path in sorted((TESTS / folder).glob("test_*.py")):
+            text = path.read_text(encoding="utf-8")
+            named = sum(
+                bool(re.search(rf"(?<![a-zA-Z]){re.escape(n.strip('_'))}(?![a-zA-Z])", text)) for n in names
+            )
+            found.append((-named, rank, len(text), str(path)))
+    return [path for *_, path in sorted(found)]

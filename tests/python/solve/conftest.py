@@ -1,0 +1,24 @@
+"""Shipped machines, loaded once."""
+
+from __future__ import annotations
+
+import pytest
+
+import stiffmap as sm
+
+SHIPPED = ("orthoglide-revised", "orthoglide-original", "tripteron")
+
+
+@pytest.fixture(scope="session")
+def orthoglide() -> sm.Machine:
+    return sm.load_machine("orthoglide-revised")
+
+
+@pytest.fixture(scope="session")
+def tripteron() -> sm.Machine:
+    return sm.load_machine("tripteron")
+
+
+@pytest.fixture(scope="session", params=SHIPPED)
+def shipped(request: pytest.FixtureRequest) -> sm.Machine:
+    return sm.load_machine(request.param)

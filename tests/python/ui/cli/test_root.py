@@ -1,0 +1,150 @@
+"""The command line: what it prints, where, and its exit codes."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from stiffmap.common.errors import MissingPartError
+from stiffmap.ui.cli import main
+from stiffmap.ui.cli.app import load
+from stiffmap.ui.cli.commands import COMMANDS, Command
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    """Exit code, output, errors."""
+    code = main(arguments)
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_help_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, "--help")
+    assert code == 0
+    for command in COMMANDS:
+        if command.exists():
+            assert command.summary.split()[0] in out
+
+
+def test_help_imports_no_command() -> None:
+    script = (
+        "import sys; from stiffmap.ui.cli import main; main(['--help']); "
+        "heavy = {'matplotlib', 'xarray', 'scipy', 'pydantic'} & set(sys.modules); sys.exit(bool(heavy))"
+    )
+    assert subprocess.run([sys.executable, "-c", script], capture_output=True, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("name", ["machines", "new", "check"])
+def test_each_command_has_help_with_examples(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, name, "--help")
+    assert code == 0
+    assert f"stiffmap {name}" in out
+    assert "Examples" in out
+    assert "--json" in out
+
+
+def test_machines(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, "machines", "--json")
+    assert code == 0
+    assert {"orthoglide-revised", "tripteron"} <= {machine["name"] for machine in json.loads(out)}
+    code, out, _ = run(capsys, "machines")
+    assert code == 0
+    assert "orthoglide-original" in out
+
+
+def test_check(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, "check", "tripteron", "--json", "--strict")
+    assert code == 0
+    data = json.loads(out)
+    assert data["counts"] == {"legs": 3, "actuators": 3, "joints": 9, "springs": 6, "blocks": 0, "bodies": 0,
+                              "points": 0}  # fmt: skip
+    assert data["warnings"] == []
+    code, out, _ = run(capsys, "check", "tripteron")
+    assert code == 0
+    assert "usable" in out
+
+
+def test_new_then_check(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = str(tmp_path / "my machine.yaml")
+    assert run(capsys, "new", file)[0] == 0
+    assert run(capsys, "check", file, "--strict")[0] == 0
+    code, _, err = run(capsys, "new", file)
+    assert code == 2
+    assert "--overwrite" in err
+    assert run(capsys, "new", file, "--overwrite", "--json")[0] == 0
+
+
+def test_strict_makes_warnings_count(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "m.yaml"
+    run(capsys, "new", str(file))
+    file.write_text(file.read_text(encoding="utf-8").replace("home: 53.13\n", "home: 53\n"), encoding="utf-8")
+    assert run(capsys, "check", str(file))[0] == 0
+    code, out, _ = run(capsys, "check", str(file), "--strict")
+    assert code == 1
+    assert "left by" in out
+
+
+def test_unwritable(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(capsys, "new", str(tmp_path / "nowhere" / "m.yaml"))
+    assert code == 2
+    assert "cannot be written" in err
+
+
+def test_bad_input_is_one_line_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "check", "tripterom")
+    assert code == 2
+    assert out == ""
+    assert err.count("\n") == 1
+    assert "did you mean 'tripteron'" in err
+
+
+def test_usage_errors(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(capsys, "chek")[0] == 2
+    assert run(capsys, "check")[0] == 2
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, "--version")
+    assert code == 0
+    assert out.startswith("stiffmap")
+
+
+def test_interrupt(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def stop(file: str) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("stiffmap.ui.cli.check.check_file", stop)
+    assert run(capsys, "check", "tripteron")[0] == 130
+
+
+def test_a_defect_is_one_line_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(file: str) -> None:
+        raise ValueError("shapes\n(2,) (3,)")
+
+    monkeypatch.setattr("stiffmap.ui.cli.check.check_file", broken)
+    code, _, err = run(capsys, "check", "tripteron")
+    assert code == 70 and err.count("\n") == 1
+    assert "a defect of stiffmap" in err and "ValueError" in err and "shapes (2,) (3,)" in err
+    monkeypatch.setenv("STIFFMAP_TRACEBACK", "1")
+    with pytest.raises(ValueError, match="shapes"):
+        run(capsys, "check", "tripteron")
+
+
+def test_missing_parts_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "needs_more.py").write_text("import a_package_that_is_missing\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(MissingPartError, match=r"'stiffmap x' needs a_package_that_is_missing.*pip install"):
+        load(Command("x", "needs_more", "run", ""))
+    with pytest.raises(MissingPartError, match="installation of stiffmap lacks"):
+        load(Command("x", "stiffmap.ui.cli.not_written", "run", ""))
+
+
+def test_the_package_runs_as_the_command() -> None:
+    done = subprocess.run([sys.executable, "-m", "stiffmap", "--version"], capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.strip()

@@ -1,0 +1,93 @@
+"""Pages in headless Chromium: nothing overflows, no picture is missing, the console is silent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.python.ui.report.browser import look
+from tests.python.ui.report.planted import soft_drive
+
+import stiffmap as sm
+from stiffmap.identification.diagnosis.report.findings import Effect
+from stiffmap.identification.diagnosis.report.sentences import measured, sentence
+from stiffmap.ui.cli import main
+from stiffmap.ui.report.page import write_page
+
+
+@pytest.mark.parametrize("width", [500, 900])
+def test_the_page_of_a_loaded_machine(width: int, tmp_path: Path) -> None:
+    page = write_page(sm.load_machine("five-bar"), tmp_path / "m.html", None, [0, -100.0, 0, 0, 0, 0])
+    assert look(page, tmp_path, width) == {"wide": 0, "lost": 0, "console": 0}
+
+
+def test_an_effect_is_said_as_one_says_it() -> None:
+    parameters = {"scale": (2.148, 2.137, 2.159, "1"), "value": (3.007e-7, 2.992e-7, 3.023e-7, "m/N")}
+    e = Effect("compliance", "actuator", ("z",), parameters, [], {})
+    assert sentence(e) == (
+        "The drive of leg z is 2.15 times as soft as in your file: 0.3007 ± 0.0008 µm/N instead of 0.14"
+    )
+    assert measured(12.34e-6, 11.0e-6, 13.7e-6, "m") == "12.3 ± 0.7 µm"
+
+
+@pytest.mark.parametrize("width", [500, 794, 1200])  # a phone, A4, a screen
+def test_the_report_of_a_diagnosis(width: int, tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text("x", encoding="utf-8")
+    soft_drive().report(tmp_path / "r.html", date="14 March 2025", inputs=[tmp_path / "data.csv"])
+    assert look(tmp_path / "r.html", tmp_path, width) == {"wide": 0, "lost": 0, "console": 0}
+
+
+def test_measures_as_a_page_with_their_pictures(tmp_path: Path) -> None:
+    only = "mass,transmission_max,accuracy"
+    assert main(["measures", "orthoglide-revised", "--only", only, "--nodes", "3", "-o", str(tmp_path)]) == 0
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    pictures = sorted(p.name for p in tmp_path.glob("*.png"))
+    assert pictures == ["map-accuracy.png", "map-transmission_max.png", "transmission.png"]
+    assert text.count("<img") == len(pictures)
+    assert "3 measures" in text and "[green]" not in text and "://" not in text
+
+
+def test_a_broken_page_is_seen(tmp_path: Path) -> None:
+    """What the other tests ask for can be missing."""
+    page = tmp_path / "bad.html"
+    page.write_text(
+        "<!doctype html><html><body><div style='width:2000px'>x</div><img src='gone.png'>"
+        "<script>nothing()</script></body></html>",
+        encoding="utf-8",
+    )
+    found = look(page, tmp_path)
+    assert found["wide"] > 500
+    assert found["lost"] == 1
+    assert found["console"] >= 1
+
+
+def test_the_report_says_what_a_workshop_signs(tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text("x", encoding="utf-8")
+    d = soft_drive()
+    d.report(tmp_path / "r.html", date="14 March 2025", inputs=[tmp_path / "data.csv"])
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    order = [
+        "The drive of leg z is 2.15 times as soft as in your file",
+        "What to do next",
+        "Evidence",
+        "without load (dashed), under it (enlarged)",
+        "Where the corrected machine",
+        "What is left",
+        "What this experiment could have seen",
+        "Provenance",
+    ]
+    assert [text.index(part) for part in order] == sorted(text.index(part) for part in order)
+    # of what went in: the caller's date, the version, the seed, SHA-256 of "x"
+    for part in ("14 March 2025", sm.__version__, "<td>seed</td><td>1</td>", "sha256 2d711642b726b044"):
+        assert part in text, part
+    assert "0.301" in text
+    assert "µm/N" in text
+    assert "://" not in text
+    d.report(tmp_path / "again.html", date="14 March 2025", inputs=[tmp_path / "data.csv"])
+    assert (tmp_path / "again.html").read_text(encoding="utf-8") == text  # no clock of its own
+    assert "date</td><td>not given" in str(_with_no_date(d, tmp_path))
+
+
+def _with_no_date(d: sm.Diagnosis, folder: Path) -> str:
+    d.report(folder / "plain.html")
+    return (folder / "plain.html").read_text(encoding="utf-8")

@@ -1,0 +1,209 @@
+"""The view in a browser: a drag with the mouse, typed numbers, several pages, the page without a network."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.ui.cli import main
+from stiffmap.ui.view.colours import table
+from stiffmap.ui.view.open import View, model_of
+
+UNNAMED = """() => [...document.querySelectorAll("input:not([type=hidden]), textarea, button, [role=slider]")]
+    .filter(e => !e.getAttribute("aria-label") && !e.getAttribute("aria-labelledby") && !e.labels?.length
+        && !(e.tagName === "BUTTON" && e.textContent.trim()) && !e.closest("[aria-hidden=true]") && e.checkVisibility())
+    .map(e => e.outerHTML)"""
+"""Visible fields and buttons without a name for screen readers."""
+
+
+def until(true: Callable[[], object], seconds: float = 60.0) -> bool:
+    end = time.monotonic() + seconds
+    while not true() and time.monotonic() < end:
+        time.sleep(0.1)
+    return bool(true())
+
+
+def opened(browser: Any, view: View) -> Any:
+    """A page on which the panel has arrived."""
+    page = browser.new_page()
+    page.goto(view.url)
+    page.get_by_role("tab", name="Tool and load").wait_for()
+    return page
+
+
+def pixels(page: Any) -> np.ndarray[Any, Any]:
+    import io
+
+    import matplotlib.image
+
+    return np.rint(
+        255 * matplotlib.image.imread(io.BytesIO(page.screenshot()), format="png")[..., :3]
+    ).astype(int)
+
+
+def on_screen(view: View, page: Any, point: Any) -> tuple[float, float]:
+    """Where a point (m) is on the page, by the camera of the server's side."""
+    camera = next(iter(view._server.get_clients().values())).camera
+    forward = np.asarray(camera.look_at) - camera.position
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, camera.up_direction)
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    d = np.asarray(point) - camera.position
+    depth = d @ forward
+    box = page.locator("canvas").first.bounding_box()
+    half = np.tan(camera.fov / 2)
+    x = box["x"] + box["width"] / 2 + d @ right / depth / half * box["height"] / 2
+    y = box["y"] + box["height"] / 2 - d @ up / depth / half * box["height"] / 2
+    return float(x), float(y)
+
+
+def test_drag_probe_and_colours_equal_solve(browser: Any) -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    with View(model_of(machine, force=(200.0, 0.0, -100.0))) as view:
+        page = opened(browser, view)
+        view._server.get_clients()
+        assert until(lambda: view._server.get_clients())
+        client = next(iter(view._server.get_clients().values()))
+        client.camera.position = (0.6, -0.8, 0.9)  # this moves what is looked at as well
+        client.camera.look_at = (0.05, 0.05, 0.0)
+        page.wait_for_timeout(2000)
+        # the gizmo is dragged with the mouse by the handle of its z axis
+        length = 0.14 * view._viewer.scene.extent
+        a, b = (on_screen(view, page, (0, 0, z)) for z in (0.8 * length, 0.8 * length + 0.1))
+        page.mouse.move(*a)
+        page.mouse.down()
+        for k in range(1, 9):
+            page.mouse.move(a[0] + (b[0] - a[0]) * k / 8, a[1] + (b[1] - a[1]) * k / 8)
+            page.wait_for_timeout(60)
+        page.mouse.up()
+        assert until(lambda: view.state.position[2] > 0.05), view.state.position
+        x, y, z = view.state.position
+        assert abs(x) < 1e-9 and abs(y) < 1e-9 and 0.05 < z < 0.2
+        assert view._viewer.worker.idle(60)
+        # what the page says is what is solved
+        d = 1e6 * np.linalg.norm(machine.solve((x, y, z), view.state.wrench).displacement[:3])
+        page.get_by_text(f"{d:.2f} µm").first.wait_for()
+        # the probe: a click on the plane
+        spot = (-0.13, -0.13, z)  # clear of the gizmo
+        page.mouse.click(*on_screen(view, page, spot))
+        probe = page.get_by_role("textbox", name="Probe")
+        assert until(lambda: probe.input_value().startswith("probe at"))
+        found = re.match(r"probe at \((.*), (.*), (.*)\) mm: (.*) µm", probe.input_value())
+        assert found is not None
+        at = [1e-3 * float(v) for v in found.groups()[:3]]
+        assert np.linalg.norm(np.array(at) - spot) < 0.01
+        there = 1e6 * np.linalg.norm(machine.solve(view._viewer._probe, view.state.wrench).displacement[:3])
+        assert found[4] == f"{there:.5g}"
+        # the colours on the screen are those of the values
+        plane = view._viewer._plane
+        low, high = plane.range
+        page.wait_for_timeout(1500)
+        image = pixels(page)
+        seen = []
+        for px in ((-0.1, 0.05), (-0.15, -0.1), (0.1, 0.22), (0.2, 0.2), (0.25, 0.1), (-0.15, 0.25)):
+            value = 1e6 * np.linalg.norm(machine.solve((*px, z), view.state.wrench).displacement[:3])
+            want = table()[round((value - low) / (high - low) * 255)].astype(int)
+            u, v = (round(c) for c in on_screen(view, page, (*px, z)))
+            near = image[v - 3 : v + 4, u - 3 : u + 4].reshape(-1, 3)
+            seen.append(np.abs(near - want).max(axis=1).min() <= 4)
+        assert sum(seen) >= 3, seen  # a link may stand before the others
+
+
+def test_typed_numbers_undo_and_what_is_refused(browser: Any) -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    with View(model_of(machine)) as view:
+        page = opened(browser, view)
+        box = page.get_by_role("textbox", name="Force, N, z")
+        box.fill("-450")
+        box.press("Enter")
+        assert until(lambda: view.state.force == (0.0, 0.0, -450.0)), view.state.force
+        d = 1e6 * np.linalg.norm(machine.solve(view.state.position, view.state.wrench).displacement[:3])
+        page.get_by_text(f"{d:.2f} µm").first.wait_for()
+        tool = page.get_by_role("textbox", name="Tool, mm, x")
+        tool.fill("9000")
+        tool.press("Enter")
+        page.get_by_role("alert").get_by_text("cannot reach (9000").wait_for()
+        assert view.state.position == (0.0, 0.0, 0.0)
+        assert until(lambda: tool.input_value() == "0")  # the panel shows what holds
+        page.get_by_role("button", name="Undo").click()
+        assert until(lambda: view.state.force == (0.0, 0.0, -300.0))
+
+
+def test_several_pages_show_the_same_and_a_closed_one_costs_nothing(browser: Any) -> None:
+    machine = sm.load_machine("five-bar")
+    with View(model_of(machine, force=(10.0, 0.0, 0.0))) as view:
+        one, two = opened(browser, view), opened(browser, view)
+        assert until(lambda: len(view._server.get_clients()) == 2)
+        for k in range(100):
+            view._viewer.drag(
+                np.array([0.05 * np.sin(k), 0.42, 0.0]), np.array(view._viewer.scene.gizmo.wxyz)
+            )
+            time.sleep(0.02)
+            if k == 50:
+                two.close()
+        assert view._viewer.worker.idle(60)
+        d = 1e6 * np.linalg.norm(machine.solve(view.state.position, view.state.wrench).displacement[:3])
+        one.get_by_text(f"{d:.2f} µm").first.wait_for()
+        assert until(lambda: len(view._server.get_clients()) == 1)
+
+
+def test_the_page_holds_everything_and_asks_for_nothing(tmp_path: Path) -> None:
+    pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
+    machine = sm.load_machine("orthoglide-revised")
+    page = tmp_path / "out.html"
+    assert main(["view", "orthoglide-revised", "--at", "100,0,50", "--html", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "__VISER_EMBED_DATA__" in text and "orthoglide-revised at (100.0, 0.0, 50.0) mm" in text
+    for tag in ('<script src="http', '<link rel="stylesheet" href="http', "@import url(http"):
+        assert tag not in text
+    d = 1e6 * np.linalg.norm(machine.solve((0.1, 0, 0.05), (0, 0, -300.0, 0, 0, 0)).displacement[:3])
+    assert f"{d:.2f} µm" in text
+
+
+def test_the_page_opens_without_a_network(browser: Any, tmp_path: Path) -> None:
+    page_file = tmp_path / "out.html"
+    assert main(["view", "orthoglide-revised", "--html", str(page_file)]) == 0
+    browser.set_offline(True)
+    browser.asked.clear()
+    page = browser.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda e: errors.append(str(e)))
+    page.goto(page_file.as_uri())
+    page.locator("canvas").first.wait_for()
+    page.get_by_text("where it comes from").wait_for()
+    want = table()[0].astype(int)
+
+    def painted() -> bool:
+        return bool((np.abs(pixels(page) - want).max(axis=2) < 12).sum() > 300)
+
+    assert until(painted)
+    assert not errors
+    assert [u for u in browser.asked if not u.startswith(("file:", "data:", "blob:"))] == []
+
+
+def test_controls_have_names_and_take_the_keyboard(browser: Any) -> None:
+    with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
+        page = opened(browser, view)
+        page.get_by_role("tab", name="Tool and load").focus()
+        page.keyboard.press("ArrowRight")
+        assert page.get_by_role("tab", name="Map").get_attribute("aria-selected") == "true"
+        page.get_by_role("status").first.wait_for()
+        page.get_by_role("img", name=re.compile("deflection under this load")).wait_for()
+        page.keyboard.press("ArrowLeft")
+        assert page.get_by_role("slider", name="Size of the force, N").count() == 1
+        assert until(lambda: not page.evaluate(UNNAMED)), page.evaluate(UNNAMED)
+        for name in ("Undo", "Reset", "Round magnification"):
+            assert page.get_by_role("button", name=name, exact=True).count() == 1
+        page.keyboard.press("ArrowRight")
+        isolines = page.get_by_role("checkbox", name="Isolines")
+        isolines.focus()
+        page.keyboard.press("Space")
+        assert until(lambda: not view._viewer.controls.isolines)

@@ -1,0 +1,109 @@
+"""Structure matrices, distributions of tension and wrench-feasible boxes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from tests.python.workspace.cables.made import hanging
+
+from stiffmap import Machine, StiffmapError, inverse_kinematics, load_machine
+from stiffmap.model.description import Drive
+from stiffmap.workspace.cables import structure_matrix, tension_distribution, wrench_feasible
+
+SIX = ("x", "y", "z", "rx", "ry", "rz")
+
+
+def frame(radius: float = 0.0, force: float | None = None) -> Machine:
+    corners = [(sx * 2.0, sy * 1.5, z) for z in (0.0, 2.0) for sx in (-1, 1) for sy in (-1, 1)]
+    # Crossed: the upper cables hold the lower edge.
+    at = [
+        ((0.3 if z else 0.1) * np.sign(x), (0.1 if z else 0.3) * np.sign(y), -0.15 if z else 0.15)
+        for x, y, z in corners
+    ]
+    return hanging(
+        corners,
+        at=[tuple(map(float, p)) for p in at],
+        freedoms=SIX,
+        home=(0.0, 0.0, 1.0),
+        elasticity=1e5,
+        radius=radius,
+        mass=10.0,
+        gravity=(0.0, 0.0, -9.81),
+        drive=Drive(force=force) if force else None,
+    )
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.05])
+def test_structure_matrix_is_the_slope_of_the_lengths(radius: float) -> None:
+    """Virtual work: translations by central differences of the winch lengths."""
+    m, p, h = frame(radius), np.array([0.3, -0.2, 0.9]), 1e-5
+    w = structure_matrix(m, p)
+    for k in range(3):
+        e = h * np.eye(3)[k]
+        slope = (inverse_kinematics(m, p + e).actuators - inverse_kinematics(m, p - e).actuators) / (2 * h)
+        np.testing.assert_allclose(-w[k], slope, atol=1e-8)
+
+
+def test_distribution_balances_and_is_the_least() -> None:
+    """Balance, limits, and the conditions of Karush, Kuhn and Tucker."""
+    m = frame()
+    rng = np.random.default_rng(1)
+    p = np.array([0, 0, 1.0]) + rng.uniform(-0.4, 0.4, (20, 3))
+    w = np.zeros((20, 6))
+    w[:, :3] = rng.uniform(-100, 100, (20, 3))
+    d = tension_distribution(m, p, w, lowest=20.0, highest=500.0)
+    assert d.feasible.all()
+    a = structure_matrix(m, p)
+    load = w + np.array([0, 0, -98.1, 0, 0, 0])
+    np.testing.assert_allclose(np.einsum("mrn,mn->mr", a, d.tension), -load, atol=1e-5)
+    assert d.tension.min() >= 20.0 and d.tension.max() <= 500.0
+    for i in range(20):
+        free = (d.tension[i] > 20.0) & (d.tension[i] < 500.0)
+        v = np.linalg.lstsq(a[i][:, free].T, d.tension[i, free] - 20.0, rcond=None)[0]
+        z = a[i].T @ v
+        np.testing.assert_allclose(z[free], d.tension[i, free] - 20.0, atol=1e-4)
+        if np.linalg.matrix_rank(a[i][:, free]) == 6:
+            assert (z[d.tension[i] <= 20.0] < 1e-4).all()
+
+
+def test_infeasible_is_what_a_linear_program_says() -> None:
+    """Feasible or not, against an independent solver, at loads about the limit."""
+    m = frame(force=400.0)
+    rng = np.random.default_rng(2)
+    p = np.array([0, 0, 1.0]) + rng.uniform(-0.5, 0.5, (60, 3))
+    w = np.zeros((60, 6))
+    w[:, :3] = rng.normal(size=(60, 3)) * 350
+    d = tension_distribution(m, p, w, lowest=10.0)
+    a = structure_matrix(m, p)
+    seen = []
+    for i in range(60):
+        b = -(w[i] + np.array([0, 0, -98.1, 0, 0, 0]))
+        found = linprog(np.zeros(8), A_eq=a[i], b_eq=b, bounds=[(10.0, 400.0)] * 8)
+        seen.append(found.status == 0)
+    assert 5 < sum(seen) < 55
+    assert (d.feasible == np.array(seen)).all()
+    assert np.isnan(d.tension[~d.feasible]).all()
+
+
+def test_boxes_are_proven() -> None:
+    """Nothing inside fails, nothing outside holds, and most is decided."""
+    m = frame(force=400.0)
+    wrenches = 60.0 * np.array([[1, 0, 0, 0, 0, 0], [-1, 0, 0, 0, 0, 0], [0, 0, -1, 0, 0, 0.0]])
+    f = wrench_feasible(m, wrenches, box=[[-1.8, 0.0, 0.4], [1.8, 0.0, 1.9]], lowest=10.0, gap=0.01)
+    inside, outside, open_ = f.share
+    assert inside > 0.2 and outside > 0.05 and open_ < 0.45
+    rng = np.random.default_rng(3)
+    for cells, holds in ((f.inside, True), (f.outside, False)):
+        some = cells[rng.integers(0, len(cells), 60)]
+        p = some[:, 0] + rng.uniform(0, 1, (60, 3)) * (some[:, 1] - some[:, 0])
+        ok = tension_distribution(m, p[:, None], wrenches, lowest=10.0).feasible.all(axis=1)
+        assert (ok == holds).all()
+
+
+def test_bad_input_is_named() -> None:
+    """Limits that cross, machines with legs."""
+    with pytest.raises(StiffmapError, match="lowest"):
+        tension_distribution(frame(), (0, 0, 1.0), lowest=50.0, highest=20.0)
+    with pytest.raises(StiffmapError, match="legs"):
+        structure_matrix(load_machine("five-bar"), (0, 0.4, 0))

@@ -1,0 +1,222 @@
+"""Design files, the search, resuming, and machines that are written."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+import stiffmap.workspace.design
+from stiffmap.workspace.design import load_design, optimize
+from stiffmap.workspace.design.expressions import evaluate
+from stiffmap.workspace.design.judging import judge
+from stiffmap.workspace.design.store import Evaluations
+from stiffmap.workspace.performance import moving_mass
+
+pytest.importorskip("pymoo")
+
+FILE = """
+name: small
+machine: orthoglide-revised
+variables:
+  carriage: {low: 1, high: 9}
+  diameter: {low: 1.0e-5, high: 2.0e-4}
+derived: {bar: carriage / 2}
+numbers:
+  templates.leg.body[carriage].mass: carriage
+  templates.leg.block[parallelogram].branches.low.body[bar].mass: bar
+  templates.leg.actuator[actuator].compliance: diameter
+objectives: [mass, frequency]
+constraints: {mass: {at_most: 45 kg}}
+search: {population: 8, generations: 3, seed: 4, nodes: 2}
+"""
+
+
+def write(tmp_path: Path, text: str = FILE) -> Path:
+    path = tmp_path / "small.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_numbers_of_the_machine_file_change(tmp_path):
+    design = load_design(write(tmp_path))
+    machine = design.machine(np.array([4.0, 1e-4]))
+    # three legs: carriage, low bar at half of it, high bar as declared; the platform
+    assert moving_mass(machine) == pytest.approx(3 * (4 + 2 + 2.4) + 6)
+
+
+def test_the_same_seed_finds_the_same_set_also_after_a_kill(tmp_path):
+    path = write(tmp_path)
+    whole = optimize(path, folder=tmp_path / "a", processes=1)
+    lines = (tmp_path / "a/evaluations.jsonl").read_text(encoding="utf-8").splitlines()
+    broken = tmp_path / "b"
+    broken.mkdir()
+    kept = lines[:11]
+    row = json.loads(kept[4])
+    kept[4] = json.dumps({**row, "f": [10**400]})  # more than a number holds
+    kept[5] = json.dumps({**json.loads(kept[5]), "g": [0.0] * 9})  # not of this design
+    # killed in the middle of writing a line of the second generation
+    (broken / "evaluations.jsonl").write_text("\n".join(kept) + "\n" + lines[11][:20], encoding="utf-8")
+    again = optimize(path, folder=broken, processes=1)
+    np.testing.assert_array_equal(whole.x, again.x)
+    assert whole.history == again.history
+    assert len(lines) == 1 + 8 * 3 and "x" in json.loads(lines[1])
+
+
+def test_no_design_of_the_set_is_bettered_and_all_hold(tmp_path):
+    found = optimize(write(tmp_path), processes=1)
+    f = np.array([j.objectives for j in found.judged])
+    for i in range(len(f)):
+        assert not ((f <= f[i]).all(axis=1) & (f < f[i]).any(axis=1)).any()
+    assert all((j.violations <= 0).all() for j in found.judged)
+    assert found.history[-1][2] >= found.history[0][2]
+
+
+def test_an_infeasible_problem_says_what_is_missed_and_by_how_much(tmp_path):
+    path = write(tmp_path, FILE.replace("at_most: 45 kg", "at_most: 10 kg"))
+    with pytest.raises(
+        sm.StiffmapError, match=r"none of 24 designs .* mass is .* kg where ≤ 10 is required \(.* % off\)"
+    ):
+        optimize(path, processes=1)
+
+
+def test_a_design_that_cannot_be_is_infeasible_not_an_error(tmp_path):
+    design = load_design(write(tmp_path))
+    judged = judge(design, np.array([4.0, -1.0]))
+    assert judged.reason and (judged.violations > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "[mass, frequency]",
+            "[mass, beauty]",
+            r"unknown objective 'beauty' \(number 2\); known: .*frequency",
+        ),
+        ("low: 1, high: 9", "low: 9, high: 1", r"carriage: low \(9\) must be below high \(1\)"),
+        (
+            "body[carriage]",
+            "body[cart]",
+            r"expected one body named 'cart', found 0; here are: .*body\[carriage\]",
+        ),
+        ("carriage / 2", "cariage / 2", r"derived: unknown name 'cariage'; known: .*carriage"),
+        ("at_most: 45 kg", "at_most: 45", r"constraints: the unit is missing"),
+        (
+            "templates.leg.actuator[actuator].compliance",
+            "templates.leg.actuator[actuator].complianse",
+            r"no 'complianse' there",
+        ),
+    ],
+)
+def test_bad_design_files(tmp_path, old, new, words):
+    with pytest.raises(sm.StiffmapError, match=words):
+        load_design(write(tmp_path, FILE.replace(old, new)))
+
+
+def test_expressions_run_arithmetic_only():
+    assert evaluate("-(r + L)/2 + sqrt(4)*pi**0", {"r": 1.0, "L": 3.0}) == 0.0
+    for text in ("__import__('os')", "a.b", "[1]", "1/0", "f(2)"):
+        with pytest.raises(sm.StiffmapError):
+            evaluate(text, {"a": 1.0})
+
+
+def test_the_shipped_redesign_starts_from_a_sound_machine():
+    design = load_design("redesign")
+    low, high = design.bounds
+    judged = judge(design, (low + high) / 2)
+    assert not judged.reason and np.isfinite(judged.violations).all()
+
+
+@pytest.mark.parametrize("name", ["redesign", "small"])
+def test_quick_machines_are_those_of_the_file(tmp_path, name):
+    """Only the elements that change are built again; every number comes out as from the whole file."""
+    design = load_design(name if name == "redesign" else write(tmp_path))
+    low, high = design.bounds
+    assert design._editor.can
+    for x in np.random.default_rng(2).uniform(low, high, (4, len(low))):
+        whole, quick = design.machine(x).description, design.quick_machine(x).description
+        bare = {"uncertainty": (), "notes": ()}
+        assert replace(whole, **bare) == replace(quick, **bare)
+
+
+def test_quick_judgement_is_that_of_the_full_measures():
+    """At the same nodes: factors, speed and force alike; the deflection in its worst direction."""
+    design = load_design("redesign")
+    low, high = design.bounds
+    x = (low + high) / 2
+    quick = judge(design, x).values
+    n = design.model.search.nodes
+    full = sm.measures(
+        design.machine(x), requirements=design.requirements, nodes=n, coarse=n,
+        only=["velocity", "force", "transmission_min", "transmission_max", "mass", "footprint"],
+    )  # fmt: skip
+    for row in full.rows:
+        assert quick[row.measure.name] == pytest.approx(row.found.worst, rel=1e-9), row.measure.name
+    d = sm.worst_deflection(
+        design.machine(x), box=[full.case.low, full.case.high], force=300.0, nodes=n, refine=False
+    )
+    assert quick["deflection"] == pytest.approx(d.value, rel=2e-3)
+
+
+@pytest.mark.parametrize("line", ["", "[]", '{"x": 3}', "[" * 100_000])
+def test_evaluations_of_an_unknown_design_are_refused(tmp_path, line):
+    path = tmp_path / "evaluations.jsonl"
+    path.write_text(line + "\n", encoding="utf-8")
+    with pytest.raises(sm.StiffmapError, match=r"evaluations.jsonl, line 1: is damaged"):
+        Evaluations(load_design(write(tmp_path)), path)
+
+
+def test_a_search_that_is_killed_goes_on(tmp_path):
+    """SIGKILL in the middle: the same command ends with the set of a search that was left alone."""
+    path = write(tmp_path, FILE.replace("generations: 3", "generations: 6"))
+    code = f"from stiffmap.workspace.design import optimize; optimize({str(path)!r}, folder={str(tmp_path / 'b')!r}, processes=1)"
+    running = subprocess.Popen([sys.executable, "-c", code])
+    kept = tmp_path / "b/evaluations.jsonl"
+    until = time.monotonic() + 120
+    while not (kept.exists() and kept.read_bytes().count(b"\n") > 9):
+        assert running.poll() is None and time.monotonic() < until
+        time.sleep(0.002)
+    running.kill()
+    running.wait()
+    before = kept.read_bytes().count(b"\n")
+    again, whole = optimize(path, folder=tmp_path / "b", processes=1), optimize(path, processes=1)
+    np.testing.assert_array_equal(again.x, whole.x)
+    assert again.history == whole.history and 9 < before <= 1 + 8 * 6
+
+
+def test_masses_of_links_follow_their_sections(tmp_path):
+    """A variable of a section changes the mass as well, by hand: three legs of one tube each."""
+    text = Path(stiffmap.workspace.design.__file__).with_name("trimmer.yaml").read_text(encoding="utf-8")
+    text = text.replace("nu: 0.3}", "nu: 0.3, density: 7.85e-6}")
+    for _ in range(2):
+        text = text.replace(
+            "{body: bar, mass: 1.07, com: [387.5, 0, 0], inertia: [0, 53600, 53600]}", "{body: bar, of: bar}"
+        )
+    (tmp_path / "own.yaml").write_text(text, encoding="utf-8")
+    path = tmp_path / "design.yaml"
+    path.write_text(
+        """
+name: sections
+machine: own.yaml
+variables: {outer: {low: 28, high: 40}}
+numbers:
+  templates.leg.block[parallelogram].branches.low.spring[bar].beam.tube.outer: outer
+  templates.leg.block[parallelogram].branches.high.spring[bar].beam.tube.outer: outer
+objectives: [mass]
+""",
+        encoding="utf-8",
+    )
+    design = load_design(path)
+    for outer in (30.0, 36.0):
+        bar = 7.85e-6 * np.pi / 4 * (outer**2 - 26**2) * 775
+        assert judge(design, np.array([outer])).values["mass"] == pytest.approx(
+            3 * (5 + 2 * bar) + 6, rel=1e-9
+        )
