@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.tasks import workers
-from stiffmap.model.link import identify_link
+from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.zeros import miss_probability
 
 L, EIZ, EIY, EA, GJ = 0.31, 43.0, 205.0, 6.8e6, 10.8

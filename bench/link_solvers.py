@@ -10,9 +10,9 @@ import time
 
 import numpy as np
 
-from stiffmap.model.link import identify_link
 from stiffmap.model.link.beam import cantilever, rectangle
 from stiffmap.model.link.calculix import has_ccx, solve_ccx
+from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.inputs import UNIT_WRENCHES
 from stiffmap.model.link.refine import richardson
 from stiffmap.model.link.shapes import Bar

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
         load_process,
     )
     from stiffmap.model.files.shipped import machine_names
-    from stiffmap.model.link import identify_link
+    from stiffmap.model.link.identify import identify_link
     from stiffmap.solve.budget import DeflectionBudget, deflection_budget
     from stiffmap.solve.internal_wrenches import assembly_stress, assembly_wrenches
     from stiffmap.solve.kinematics import Kinematics, forward_kinematics, inverse_kinematics
@@ -121,7 +121,7 @@ _HOME = {
     "limiting_depth": "stiffmap.machining.chatter",
     "stability_lobes": "stiffmap.machining.chatter",
     "vibration_map": "stiffmap.machining.chatter",
-    "identify_link": "stiffmap.model.link",
+    "identify_link": "stiffmap.model.link.identify",
     "inverse_kinematics": "stiffmap.solve.kinematics",
     "load_machine": "stiffmap.solve.machine",
     "map_estimate": "stiffmap.workspace.maps",

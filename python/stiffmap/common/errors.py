@@ -28,6 +28,10 @@ class FileError(StiffmapError):
         self.file, self.line, self.key, self.reason = file, line, key, message
 
 
+class MissingColumnError(FileError):
+    """A table lacks a column that it needs."""
+
+
 class FileErrors(FileError):
     """Several problems of one file, one line each and the first twenty of them; ``problems`` holds all, the
     other attributes are those of the first."""

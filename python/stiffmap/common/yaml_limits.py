@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import yaml
@@ -22,10 +21,20 @@ def check_size(text: str, file: str = "") -> None:
     """
     if len(text) > MOST_CHARACTERS:
         raise FileError(f"expected at most {MOST_CHARACTERS} characters, found {len(text)}", file=file)
+    # libyaml is fast, but has limits and faults of its own, by version: what it refuses is judged as the reader sees it.
+    for loader in (getattr(yaml, "CSafeLoader", yaml.SafeLoader), yaml.SafeLoader):
+        try:
+            _check_events(yaml.parse(text, Loader=loader), file)
+            return
+        except yaml.YAMLError:
+            continue
+
+
+def _check_events(events: Any, file: str) -> None:
     anchored: dict[str, int] = {}
     open_: list[tuple[str | None, int]] = []  # anchor and number of values before it
     count = 0
-    for event in _events(text):
+    for event in events:
         line = event.start_mark.line + 1
         if isinstance(event, yaml.AliasEvent):
             count += anchored.get(str(event.anchor), 0)
@@ -50,10 +59,3 @@ def check_size(text: str, file: str = "") -> None:
                 file=file,
                 line=line,
             )
-
-
-def _events(text: str) -> Iterator[Any]:
-    try:
-        yield from yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    except yaml.YAMLError:
-        return  # the reader says it, with line and key

@@ -12,21 +12,13 @@ from pathlib import Path
 
 import pytest
 
+from stiffmap.common.from_above import PLACES
+
 PACKAGE = Path(__file__).parents[3] / "python/stiffmap"
 
-# Eight rooms, from what knows no robot to what a person sees. Each may import from itself and from earlier ones only.
-RANKS = (
-    ("_core",),
-    ("common",),
-    ("model",),
-    ("solve",),
-    ("workspace",),
-    ("experiment",),
-    ("identification",),
-    ("machining",),
-    ("ui",),
-)
-# Rooms inside a room, each may import earlier ones only.
+# From what knows no robot to what a person sees. Each room imports from itself and from earlier ones only.
+ROOMS = ("common", "model", "solve", "workspace", "experiment", "identification", "machining", "ui")
+# Packages inside a room or a package, each may import earlier ones only.
 INNER = {
     "identification.diagnosis": (
         "clock",
@@ -50,8 +42,26 @@ INNER = {
         "spreadsheet",
     ),
 }
-RANK = {name: i for i, names in enumerate(RANKS) for name in names}
-TOP = {"stiffmap", "stiffmap.__main__"}  # the shop window: it names what lies in all rooms
+RANK = {name: i for i, name in enumerate(("_core", *ROOMS))}
+FACE = {"stiffmap", "stiffmap.__main__"}  # names what lies in all rooms
+# Who may load a module by a name that is computed, and what: no reader and no other test sees such an import.
+BY_NAME = {
+    "stiffmap",  # public names, when they are first used
+    "stiffmap.common.from_above",  # the two methods that hand their work to a room above, as the face of the package says
+    "stiffmap.common.library",  # files of one folder
+    "stiffmap.common.python_file",  # a file that a user wrote
+    "stiffmap.model.link.optional",  # packages of the extra [fea]
+    "stiffmap.ui.cli.app",  # the module of a command
+}
+LOADERS = {
+    "import_module",
+    "__import__",
+    "exec_module",
+    "load_module",
+    "run_module",
+    "run_path",
+    "resolve_name",
+}
 
 
 def module_name(path: Path) -> str:
@@ -94,9 +104,8 @@ def test_no_circle() -> None:
 def test_imports_lead_to_earlier_ranks() -> None:
     wrong = []
     for name, targets in GRAPH.items():
-        for target in targets - TOP:
-            here, there = room(name), room(target)
-            if here in RANK and here != there and RANK.get(there, len(RANKS)) >= RANK[here]:
+        for target in targets - FACE:
+            if name not in FACE and RANK[room(target)] > RANK[room(name)]:
                 wrong.append(f"{name} imports {target}")
     assert wrong == []
 
@@ -117,13 +126,9 @@ def test_rooms_inside_a_room_have_an_order(outer: str) -> None:
     assert wrong == []
 
 
-def test_ranked_rooms_are_there() -> None:
-    assert set(RANK) - {"_core"} == {room(m) for m in MODULES} - {"", "__main__"}
-
-
 def test_only_commands_use_the_shop_window() -> None:
     users = {n for n, targets in GRAPH.items() if "stiffmap" in targets}
-    assert {n for n in users if room(n) not in ("ui", "__main__")} == set()
+    assert {n for n in users if room(n) != "ui"} - FACE == set()
 
 
 def test_one_package_imports_the_core() -> None:
@@ -131,15 +136,63 @@ def test_one_package_imports_the_core() -> None:
     assert users and all(n.startswith("stiffmap.solve.compiled.") for n in users)
 
 
+def loaders(path: Path) -> set[str]:
+    """Functions that load a module by its name as text, under whatever name a file imports or mentions them."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            found |= {a.name for a in node.names} & LOADERS
+        elif isinstance(node, ast.Attribute):
+            found |= {node.attr} & LOADERS | {ast.unparse(node)} & {"sys.modules"}
+        elif isinstance(node, ast.Name):
+            found |= {node.id} & (LOADERS | {"exec", "eval"})
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found |= {node.value} & LOADERS  # getattr(importlib, "import_module")
+    return found
+
+
+def test_modules_are_loaded_by_name_in_few_places() -> None:
+    assert {name for name, path in MODULES.items() if loaders(path)} == BY_NAME | {
+        "stiffmap.model.effects.library"  # sys.modules: itself
+    }
+
+
 def test_no_module_of_ours_is_imported_by_its_name_as_text() -> None:
-    """What a string imports no reader and no test sees; the two tables of lazy names are the exception."""
-    users = []
+    """The tables of public names, of commands, and of what lies above."""
+    users = set()
     for name, path in MODULES.items():
-        text = path.read_text(encoding="utf-8")
-        strings = {n.value for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Constant)}
-        if any(isinstance(s, str) and s in MODULES and s != "stiffmap" for s in strings):
-            users.append(name)
-    assert set(users) <= {"stiffmap", "stiffmap.ui.cli.commands"}
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            text = node.value if isinstance(node, ast.Constant) else ""
+            if isinstance(text, str) and (
+                text in MODULES.keys() - {"stiffmap"}
+                or text.startswith(tuple(f"stiffmap.{r}" for r in ROOMS))
+            ):
+                users.add(name)
+    assert users == {"stiffmap", "stiffmap.ui.cli.commands"}
+
+
+def test_two_methods_reach_up() -> None:
+    """Whatever else asks for a room above is misplaced."""
+    assert set(PLACES) == {"Machine.view", "Diagnosis.report"}
+    users = {n for n, targets in GRAPH.items() if "stiffmap.common.from_above" in targets} - {"stiffmap"}
+    assert users == {"stiffmap.solve.machine", "stiffmap.identification.diagnosis.report.result"}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from importlib import import_module as get\nget(f'{__package__}.view')",
+        "import importlib as i\ni.import_module('.ui', 'stiffmap')",
+        "import importlib\ngetattr(importlib, 'import_module')('stiffmap' + '.ui')",
+        "__import__('stiffmap.ui')",
+        "import sys\nsys.modules['stiffmap' + '.ui']",
+        "import pkgutil\npkgutil.resolve_name('stiffmap.ui:main')",
+        "exec('import stiffmap.ui')",
+    ],
+)
+def test_every_spelling_is_seen(text: str, tmp_path: Path) -> None:
+    (tmp_path / "sample.py").write_text(text)
+    assert loaders(tmp_path / "sample.py")
 
 
 def test_the_count_sees_every_kind_of_import(tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ def test_licences_of_what_is_compiled_in_go_into_the_wheel() -> None:
 
 
 def test_every_requirement_has_a_lowest_version_and_no_highest() -> None:
-    """`.ci/lowest` runs the former; with no upper limit every fresh environment is the job with the newest."""
+    """`.ci/versions` runs the lowest and the newest."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
     for requirement in [

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.yaml_text import read
 from stiffmap.experiment.channels import AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Experiment, Floats, Loop
@@ -109,7 +109,7 @@ def _readings(
     }
     _promise(reading, channels, table, seen, seen_rotation, absolute)
     if not np.isfinite(reading).any():
-        raise FileError(
+        raise MissingColumnError(
             f"missing column: no reading ({', '.join((*read_columns.read(), *read_columns.absolute()))}, joints)",
             file=table.file,
         )
@@ -239,7 +239,9 @@ def _promise(
 def _wrench(model: ExperimentFile, table: Table, scales: Scales) -> Floats:
     given = [c for c in WRENCH if c in table]
     if model.quantity == "deflection" and not given:
-        raise FileError("missing column: a deflection needs a load (fx, fy, fz, mx, my, mz)", file=table.file)
+        raise MissingColumnError(
+            "missing column: a deflection needs a load (fx, fy, fz, mx, my, mz)", file=table.file
+        )
     return np.asarray(scales.wrench(given) * read_columns.block(table, WRENCH, blank=False, missing=0.0))
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.cells import Cells, filled, packed, row_numbers
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import unguarded
 from stiffmap.model.files.schema.base import suggestion
@@ -41,7 +41,7 @@ class Table:
     def _cells(self, column: str) -> Cells:
         if column not in self.header:
             near = suggestion(column, list(self.header))
-            raise FileError(
+            raise MissingColumnError(
                 f"missing column '{column}'{near}; found {', '.join(self.header)}", file=self.file
             )
         return self.columns[self.header.index(column)]

@@ -57,11 +57,12 @@ def _levers(experiment: Experiment) -> Floats:
     out = np.zeros((len(experiment), 3))
     if experiment.rotation is None:  # the same in all rows: a shift
         return out
-    shifts = [shift for name, _, shift in experiment.registration if name.startswith("target ")]
+    shifts = {name: shift for name, _, shift in experiment.registration}
+    number, names = targets_of(experiment)
     for i, point in enumerate(experiment.points):
-        number = point.rpartition(SEEN)[2]
-        if SEEN in point and int(number) <= len(shifts):
-            out[i] = experiment.rotation[i] @ shifts[int(number) - 1]
+        target = f"target {names[number[i]]}"
+        if SEEN in point and target in shifts:
+            out[i] = experiment.rotation[i] @ shifts[target]
     return out
 
 

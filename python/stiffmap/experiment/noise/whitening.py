@@ -55,7 +55,7 @@ class Problem:
 
         uncertain
             (n, c, p) change of the readings per standard uncertainty of each number that is uncertain: the
-            readings are then judged with all of them integrated out (docs/theory.md (M1)).
+            readings are then judged with all of them integrated out (docs/theory.md (I1)).
         """
         rows = np.ones(len(experiment), bool) if keep is None else keep
         at, axis = readings_of(experiment, base)

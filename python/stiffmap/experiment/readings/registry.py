@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from os import PathLike
-from pkgutil import iter_modules
 
 import stiffmap.experiment.readings.library as library
 from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.library import modules_of
 from stiffmap.common.python_file import run_python_file
 from stiffmap.experiment.channels import AXES, Channel
 from stiffmap.experiment.readings.types import ReadingKind
 
-_LIBRARY: dict[str, ReadingKind] = {
-    kind.name: kind
-    for m in iter_modules(library.__path__)
-    for kind in [import_module(f"{library.__name__}.{m.name}").READING]
-}
+_LIBRARY: dict[str, ReadingKind] = {kind.name: kind for m in modules_of(library) for kind in [m.READING]}
 _KNOWN = dict(_LIBRARY)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.outputs import make_folder, only_job, put_files
 from stiffmap.common.outputs.alone import short
 from stiffmap.experiment import Experiment, load_experiment
@@ -54,7 +54,7 @@ def of_sheet(error: FileError, found: Imported, sheet: Sheet, fresh: Path) -> Fi
         return match[0] if c is None else f"column '{sheet.header[c.index]}' ({column_letter(c.index)})"
 
     reason = re.sub(r"column '([^']*)'", named, reason).replace(str(fresh), sheet.file)
-    if reason.startswith("missing column"):
+    if isinstance(error, MissingColumnError):
         reason += f"; say which by --map fx='HEADER'; columns: {', '.join(repr(h) for h in sheet.header)}"
     at = None
     if (

@@ -2,7 +2,7 @@
 readings that it has not seen, and be no further off than a number of this machine can be.
 
 A calibration has many numbers; some of them imitate in part whatever the readings show. Numbers that are the cause
-explain it better than any smooth function of pose and load does; numbers that imitate do not (docs/theory.md M3).
+explain it better than any smooth function of pose and load does; numbers that imitate do not (docs/theory.md I3).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Readings of one pose share what a model gets wrong there, repeats or not: a random effect per pose and
 channel, variance rho in units of the noise variance, with which the calibration is estimated again. rho
-maximises the restricted likelihood (REML; Patterson and Thompson 1971). docs/theory.md (M2).
+maximises the restricted likelihood (REML; Patterson and Thompson 1971). docs/theory.md (I2).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 With residuals r (N,) whitened to unit noise, and columns A (N, p), their change per standard uncertainty of
 each unknown, r = A t + e with t and e standard normal. All that is asked of a set of unknowns depends
-on G = AᵀA, b = Aᵀr and rᵀr only; sums over some of the rows are sums of theirs (docs/theory.md (M1)).
+on G = AᵀA, b = Aᵀr and rᵀr only; sums over some of the rows are sums of theirs (docs/theory.md (I1)).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Gears, screws, scales and encoders err with the coordinate of their drive, in a way that no tolerance of a dimension
 tells. The zero of each drive becomes a function of its coordinate, straight between knots that have equally many
-poses between them; the profiles of all drives are fitted together to what the calibration leaves (docs/theory.md (M4)),
+poses between them; the profiles of all drives are fitted together to what the calibration leaves (docs/theory.md (I4)),
 and judged on poses that neither they nor the calibration have seen.
 """
 

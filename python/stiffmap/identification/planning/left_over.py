@@ -2,7 +2,7 @@
 
 What a model of the machine leaves is no noise: it is smooth over the workspace, shared by the readings of a pose, and the
 same in both experiments where they stand at the same poses. Both are fitted at once, each with numbers of its own, jointly with
-one smooth field and one variance per pose, as large as the readings make likeliest (docs/theory.md M2, M3).
+one smooth field and one variance per pose, as large as the readings make likeliest (docs/theory.md I2, I3).
 """
 
 from __future__ import annotations

@@ -207,7 +207,7 @@ def build_law(model: LawModel, angular: bool, context: Context, name: str) -> La
 
 def load_link(name: str, context: Context) -> Matrix6:
     """Compliance of an identified link file, whose path is relative to the machine file."""
-    from stiffmap.model.link import load_link as read_link  # scipy, only where a file names a link
+    from stiffmap.model.link import load_link as read_link  # only where a file names a link
 
     path = context.folder / name
     if not path.exists():

@@ -86,8 +86,7 @@ def _message(error: Any) -> str:
     if kind.endswith("_type"):
         sorts = {"list": "a list", "dict": "a mapping", "string": "text", "bool": "true or false"}
         return f"expected {sorts.get(kind.removesuffix('_type'), 'a number')}; found {describe(found)}"
-    message: str = error["msg"]
-    return message.removeprefix("Value error, ")
+    return str(context["error"] if kind == "value_error" else error["msg"])
 
 
 def _choices(context: dict[str, Any]) -> list[str]:

@@ -1,8 +1,6 @@
 """Link springs from displacement fields and finite elements, with their uncertainty (docs/link.md)."""
 
-from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.linkfile import LinkFile, load_link, save_link
-from stiffmap.model.link.result import Link
 from stiffmap.model.link.transport import transport_compliance
 
-__all__ = ["Link", "LinkFile", "identify_link", "load_link", "save_link", "transport_compliance"]
+__all__ = ["LinkFile", "load_link", "save_link", "transport_compliance"]

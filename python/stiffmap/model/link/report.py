@@ -30,7 +30,7 @@ def unit_name(i: int, j: int, length: str) -> str:
 
 
 def write_report(link: Estimate, length: str) -> str:
-    """See :meth:`stiffmap.model.link.Link.report`."""
+    """See :meth:`stiffmap.model.link.result.Link.report`."""
     return "\n".join([*_table(link, length), *_field_lines(link), *_matrix_lines(link)])
 
 

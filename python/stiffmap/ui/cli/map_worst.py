@@ -61,7 +61,7 @@ def _of_directions(ds: Any) -> Worst | None:
     if not np.isfinite(size).any():
         return None
     k, j, i = np.unravel_index(int(np.nanargmax(size)), size.shape)
-    plane = ds.attrs["turning_force"].split(" in the ")[1][:2]
+    plane = ds.worst_direction.attrs["plane"]
     angle = float(ds.worst_direction.transpose("z", "y", "x").values[k, j, i])
     force = float(ds.attrs["turning_force_N"])
     wrench = np.zeros(6)

@@ -28,10 +28,9 @@ def nonlinearity(swp: xr.Dataset) -> float:
 def _limits(point: xr.Dataset, sweeps: dict[str, xr.Dataset]) -> dict[str, float]:
     out = {"worst": float(point.force_limit_xy)}
     for name, swp in sweeps.items():
-        if name != "worst direction":
+        if name != "worst":
             reached = swp.deflection_xy.values[-1] >= 0.25e-3
-            key = name.removesuffix(" direction")
-            out[key] = float(np.interp(0.25e-3, swp.deflection_xy, swp.force)) if reached else np.inf
+            out[name] = float(np.interp(0.25e-3, swp.deflection_xy, swp.force)) if reached else np.inf
     return out
 
 

@@ -73,5 +73,5 @@ def sweeps_at(machine: Machine, position: tuple[float, ...], at: xr.Dataset) -> 
     """Sweeps from 0 to 1000 N along x, y, and the weakest and strongest direction at 300 N."""
     worst, best = at.worst_direction_xy.item(), at.best_direction_xy.item()
     forces = np.linspace(0.0, LARGEST_FORCE, 41)
-    angles = {"Fx": 0.0, "Fy": np.pi / 2, "worst direction": worst, "best direction": best}
+    angles = {"Fx": 0.0, "Fy": np.pi / 2, "worst": worst, "best": best}
     return {n: sweep(machine, position, [np.cos(a), np.sin(a), 0.0], forces) for n, a in angles.items()}

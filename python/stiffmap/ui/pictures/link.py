@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +74,7 @@ def _draw_residuals(figure: Any, link: Link, cases: int) -> None:
 
 
 def _draw_shape(axes: Any, part: PartLink, triangles: Ints, case: int) -> None:
-    Poly3DCollection = import_module("mpl_toolkits.mplot3d.art3d").Poly3DCollection
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     step = max(1, len(triangles) // MOST_TRIANGLES)
     p, u = part.mesh.nodes, part.displacements[case]

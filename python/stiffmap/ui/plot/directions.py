@@ -25,7 +25,7 @@ def draw_directions(
         return
     angle = ds[name].isel({how.across: index}).transpose(how.up, how.right)
     angle = angle.isel({how.up: _spread(angle.sizes[how.up]), how.right: _spread(angle.sizes[how.right])})
-    first, second = str(ds[name].attrs["long_name"]).rpartition("from ")[2].split(" towards ")
+    first, second = ds[name].attrs["plane"]
     parts = {first: np.cos(angle.values), second: np.sin(angle.values)}
     u, v = (parts.get(a, np.zeros(angle.shape)) for a in (how.right, how.up))
     x, y = np.meshgrid(MM * angle[how.right], MM * angle[how.up])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -56,7 +55,7 @@ def draw_body(ax: Any, points: Floats) -> None:
             Polygon(corners, facecolor="0.55", edgecolor="0.25", alpha=0.5, zorder=1, label="platform")
         )
         return
-    Poly3DCollection = import_module("mpl_toolkits.mplot3d.art3d").Poly3DCollection
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     ax.add_collection3d(
         Poly3DCollection([corners], facecolor="0.55", edgecolor="0.25", alpha=0.45, label="platform")

@@ -73,7 +73,7 @@ def extreme_variables(plane: str, tolerance: float) -> list[Variable]:
         for word, size in (("worst", "largest"), ("best", "smallest")):
             text = f"{size} norm of the {what} over the force directions of the {plane} plane"
             out.append(Variable(f"{word}_deflection{suffix}", (), meaning("m", text)))
-            out.append(Variable(f"{word}_direction{suffix}", (), meaning("rad", angle)))
+            out.append(Variable(f"{word}_direction{suffix}", (), meaning("rad", angle, plane=plane)))
         text = f"force in the worst direction at which the norm of the {what} reaches the tolerance"
         out.append(Variable(f"force_limit{suffix}", (), meaning("N", text, tolerance_m=tolerance)))
     return out

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import Any
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.library import modules_of
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
 from stiffmap.workspace.performance import kinds
@@ -176,12 +175,7 @@ def over_poses(positions: Floats, values: Floats, better: str, note: str = "", *
 @lru_cache
 def all_measures() -> tuple[Measure, ...]:
     """Every measure, in the order of the table."""
-    found = [
-        import_module(f"{kinds.__name__}.{m.name}").MEASURE
-        for m in iter_modules(kinds.__path__)
-        if not m.name.startswith("_")
-    ]
-    return tuple(sorted(found, key=lambda m: (m.order, m.name)))
+    return tuple(sorted((m.MEASURE for m in modules_of(kinds)), key=lambda m: (m.order, m.name)))
 
 
 def get_measure(name: str) -> Measure:

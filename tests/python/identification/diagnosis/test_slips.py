@@ -172,7 +172,7 @@ def test_the_headline_names_the_unit_before_any_cause() -> None:
     d = sm.diagnose("orthoglide-revised", e, seed=1, cross_validate=False)
     assert d.verdict == "readings" and d.effects == []
     assert opening(d).startswith("Check first: kgf (kp) and N mixed up")
-    assert "With that undone: the machine agrees with its file" in opening(d)
+    assert "With that undone: The machine agrees with its file" in opening(d)
     assert "look for no cause in the machine before" in next_step(d)
     assert d.as_plain()["slips"][0]["kind"] == "factor"
     assert any(line.startswith("readings: check first: kgf") for line in d.lines())

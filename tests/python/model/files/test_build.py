@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +14,7 @@ from tests.python.model.files.machine_text import BASE, changed, description, wi
 from stiffmap.common.units import Dimension, UnitSystem
 from stiffmap.model.beams import rectangle_section
 from stiffmap.model.description import Element, Joint, Law, Offset, Spring
+from stiffmap.model.link import LinkFile, save_link
 
 
 def last(text: str) -> Element:
@@ -190,3 +194,26 @@ def test_link_files_give_their_compliance(tmp_path: object, monkeypatch: pytest.
     assert isinstance(spring, Spring)
     np.testing.assert_array_equal(np.array(spring.compliance), np.eye(6) * 1e-6)
     assert machine.notes == (("a.b/link", "bar.yaml"),)
+
+
+LOADED = """
+import sys, stiffmap as sm
+sm.load_machine(sys.argv[1])
+print(*sorted(m for m in sys.modules if m.startswith("stiffmap.model.link.")))
+"""
+
+
+@pytest.mark.parametrize("named", [False, True], ids=["no link file", "a link file"])
+def test_links_are_read_but_not_identified(named: bool, tmp_path: Path) -> None:
+    """Only a machine that names a link file loads `model.link`, and then what reads files and moves matrices alone."""
+    link = LinkFile(np.eye(6) * 1e-6, np.zeros((36, 36)), np.zeros(3), {})
+    save_link(link, tmp_path / "bar.yaml")
+    text = with_element(
+        {"spring": "b", "link": "bar.yaml"} if named else {"spring": "b", "compliance": [1e-6] * 6}
+    )
+    (tmp_path / "m.yaml").write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, tmp_path / "m.yaml"], capture_output=True, text=True, check=False
+    )
+    loaded = [name.rpartition(".")[2] for name in done.stdout.split()]
+    assert loaded == (["arrays", "linkfile", "transport"] if named else []), done.stderr

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from tests.python.model.link.link_fields import REFERENCE, WRENCHES, bar_compliance, end_nodes, noisy_field
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link import identify_link
+from stiffmap.model.link.identify import identify_link
 
 POINTS, U = noisy_field(n=12)
 NAN = U.copy()

@@ -13,8 +13,9 @@ from tests.python.model.link.link_fields import REFERENCE, WRENCHES, noisy_field
 from typer.testing import CliRunner
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link import calculix, identify_link, load_link
+from stiffmap.model.link import calculix, load_link
 from stiffmap.model.link.gmshmesh import mesh_file
+from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.mesh import checked_mesh
 from stiffmap.model.link.optional import need
 from stiffmap.model.link.plan import planned_error, smallest_force, smallest_nodes

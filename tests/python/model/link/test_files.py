@@ -7,7 +7,8 @@ import pytest
 from tests.python.model.link.link_fields import REFERENCE, WRENCHES, bar_compliance, noisy_field
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link import LinkFile, identify_link, load_link, save_link
+from stiffmap.model.link import LinkFile, load_link, save_link
+from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.inputs import read_cases, read_material, read_part
 from stiffmap.model.link.readers import read_ansys, read_dat, read_field, read_frd
 

@@ -11,8 +11,9 @@ pytest.importorskip("gmsh", reason="needs the extra [fea]", exc_type=(ImportErro
 pytest.importorskip("skfem", reason="needs the extra [fea]")
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link import calculix, identify_link
+from stiffmap.model.link import calculix
 from stiffmap.model.link.beam import cantilever, rectangle, tube
+from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.mesh import face_area_centre, face_loads
 from stiffmap.model.link.pipeline import link_from_part
 from stiffmap.model.link.refine import observed_order, richardson

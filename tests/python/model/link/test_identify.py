@@ -16,7 +16,8 @@ from tests.python.model.link.link_fields import (
     rigid_field,
 )
 
-from stiffmap.model.link import identify_link, transport_compliance
+from stiffmap.model.link import transport_compliance
+from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.plausibility import bending_lengths
 from stiffmap.model.link.transport import twist_transport
 

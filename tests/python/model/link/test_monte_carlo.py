@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import binom, kstest
 from tests.python.model.link.link_fields import REFERENCE, WRENCHES, bar_compliance, end_nodes, rigid_field
 
-from stiffmap.model.link import identify_link
 from stiffmap.model.link.correlation import analyse_correlation
+from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.rigidfit import fit_linear
 from stiffmap.model.link.zeros import miss_probability
 

@@ -44,7 +44,8 @@ LAUGHS = "a: &a [x, x]\n" + "".join(
     [
         ("[" * 5000, "line 1: expected at most 60 levels"),
         ("a: " + "{b: " * 5000, "line 1: expected at most 60 levels"),
-        ("a: [0, ? , " + "[ " * 6000, "expected at most 60 levels"),
+        ("a: [0, ? , " + "[ " * 6000, "line 1: expected at most 60 levels"),
+        ("".join(f"{' ' * i}-\n" for i in range(3000)), "line 61: expected at most 60 levels"),
         (LAUGHS, "line 7: expected at most 500000 values with all anchors written out"),
         ("a: " + "9" * 5000, "at most 300 digits, found 5000"),
         ("a: !!float x", "could not convert"),

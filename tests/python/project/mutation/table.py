@@ -9,44 +9,23 @@ TESTS = Path(__file__).parents[2]
 CORE = (
     "solve",
     "solve/compiled",
-    "solve",
     "model/machines",
     "workspace/performance",
-    "tests/oracle",
     "model/effects",
     "workspace/maps",
 )
-ROOMS = {
-    "calibration": ("identification/calibration",),
-    "compensation": ("machining/compensation",),
-    "compiled": ("solve", "solve/compiled"),
-    "derivatives": ("solve/compiled", "model/effects"),
-    "description": ("model/files", "model/machines", "solve"),
-    "design": ("workspace/performance",),
-    "diagnosis": ("identification/diagnosis",),
-    "effects": ("model/effects",),
-    "experiment": ("experiment", "identification/diagnosis"),
-    "files": ("model/files",),
-    "link": ("model/link",),
-    "maps": ("workspace/maps", "ui/cli"),
-    "performance": ("workspace/performance",),
-    "planning": ("identification/planning",),
-    "urdf": ("model/urdf",),
-    "budget": ("first_hour",),
-    "trial": ("first_hour",),
-    "beams": ("model/files", "solve"),
-}
-OTHERS = ("solve", "model/files", "solve", "model/machines", "first_hour", "solve/compiled")
+OTHERS = ("solve", "model/files", "model/machines", "solve/compiled")
 #: Not of a machine's numbers, or slow for what they say of them.
-NEVER = {"project", "docs", "fuzz", "mutation"}
+NEVER = {"project", "project/docs", "project/fuzz", "project/mutation"}
 
 
 def folders(file: str) -> tuple[str, ...]:
     """The folders of tests for one source, the nearest first."""
     if file.startswith("cpp/"):
         return CORE
-    parts = [part.removesuffix(".py") for part in Path(file).parts[2:]]
-    return next((ROOMS[p] for p in parts if p in ROOMS), OTHERS)
+    room, package, *_ = Path(file.removesuffix(".py")).parts[2:]
+    near = (f"{room}/{package}", room, *OTHERS)
+    return tuple(dict.fromkeys(f for f in near if any((TESTS / f).glob("test_*.py"))))
 
 
 def all_folders(file: str) -> tuple[str, ...]:

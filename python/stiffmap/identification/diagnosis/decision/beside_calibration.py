@@ -20,7 +20,6 @@ from stiffmap.identification.calibration.calibrator import pose_labels
 from stiffmap.identification.calibration.conclude import conclude
 from stiffmap.identification.calibration.floor import Blocks, model_form
 from stiffmap.identification.calibration.statistics import Sums
-from stiffmap.identification.diagnosis.candidates.candidates import Candidate
 from stiffmap.identification.diagnosis.decision.beside_field import standing
 from stiffmap.identification.diagnosis.decision.beside_noise import above_noise
 from stiffmap.identification.diagnosis.decision.beside_time import beside_time
@@ -354,18 +353,15 @@ def _shared(model: Model, finding: Finding, held: HeldOut | None) -> tuple[Model
     """The model without effects that the folds do not share; nothing where held-out readings do not gain."""
     if held is None:
         return model, ()
-    refused: list[str] = []
-
-    def drop(c: Candidate, why: str) -> None:
-        refused.append(f"{c}: {why}")
-
-    for c in model.candidates:
-        if not held.shared(str(c)):
-            drop(c, f"chosen in {held.chosen.get(str(c), 0)} of {held.folds} folds only")
-    if not refused and not held.pays and model.candidates and held.gain is not None:
-        for c in model.candidates:
-            drop(c, f"held-out readings gain {held.gain[0]:.2g} ± {held.gain[1]:.2g} noise variances")
-    for name in refused:
-        i = next(k for k, c in enumerate(model.candidates) if name.startswith(f"{c}: "))
+    refused = {
+        c: f"chosen in {held.chosen.get(str(c), 0)} of {held.folds} folds only"
+        for c in model.candidates
+        if not held.shared(str(c))
+    }
+    if not refused and not held.pays and held.gain is not None:
+        why = f"held-out readings gain {held.gain[0]:.2g} ± {held.gain[1]:.2g} noise variances"
+        refused = dict.fromkeys(model.candidates, why)
+    for c in refused:
+        i = model.candidates.index(c)
         model = fit_without(model, i, finding.search.predictor, finding.search.problem)
-    return model, tuple(refused)
+    return model, tuple(f"{c}: {why}" for c, why in refused.items())

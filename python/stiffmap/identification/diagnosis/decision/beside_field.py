@@ -1,7 +1,7 @@
 """Where an unexplained residual remains, an effect must gain with a smooth field that does not depend on the machine in the model.
 
 What is left over is seldom noise: an effect with a few free parameters takes some of it away wherever it is smooth. The
-effect that is there explains in its few directions what the field needs many for (docs/theory.md M3).
+effect that is there explains in its few directions what the field needs many for (docs/theory.md I3).
 """
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ def opening(d: Any) -> str:
     kind = inner_verdict(d)
     if not d.slips[-1].undone:
         return f"{_upper(first)}, before any cause is looked for in the machine."
-    return f"{_upper(first)}. With that undone: {_lower(_of_machine(d, kind))}"
+    return f"{_upper(first)}. With that undone: {_of_machine(d, kind)}"
 
 
 def slip_sentence(s: Slip) -> str:
@@ -105,10 +105,6 @@ def inner_verdict(d: Any) -> str:
 
 def _upper(text: str) -> str:
     return text[:1].upper() + text[1:]
-
-
-def _lower(text: str) -> str:
-    return text[:1].lower() + text[1:] if text.startswith(("The ", "No ")) else text
 
 
 def aliases(e: Effect) -> str:

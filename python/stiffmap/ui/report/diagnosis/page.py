@@ -21,7 +21,7 @@ from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.model.description.tree import joints
 from stiffmap.model.effects import registry
 from stiffmap.solve.budget import deflection_budget
-from stiffmap.ui.report.diagnosis.shop import in_axis_units, in_shop_units, in_shop_words, p_text, spoken
+from stiffmap.ui.report.diagnosis.shop import in_axis_units, in_shop_units, in_shop_words, p_text
 
 SHOWN = 12
 """Detectable effects above the fold."""
@@ -92,7 +92,7 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
         f"{1e6 * d.empirical.after:.2f} µ{d.before.size[1]} rms.",
         seen=_seen(d),
         shown=SHOWN,
-        unseen=[spoken(u) for u in d.unobservable],
+        unseen=[in_shop_words(u).replace("_", " ") for u in d.unobservable],
         limits=[in_shop_words(v) for v in d.limitations],
         provenance=provenance(date, d.seed, inputs, _digests(d)),
     )

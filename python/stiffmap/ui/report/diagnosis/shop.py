@@ -5,20 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.identification.diagnosis.report.sentences import UNITS
-from stiffmap.model.effects import registry
 
 
 def in_shop_words(text: str) -> str:
     """A line of the screen with drives called so, and no marks of code."""
     return text.replace("actuator", "drive").replace("`", "")
-
-
-def spoken(text: str) -> str:
-    """``bilinear of actuator, leg x (why)`` with the effect's title and drives called so."""
-    kind, of, rest = text.partition(" of ")
-    if not of or kind not in registry.kinds():
-        return in_shop_words(text)
-    return f"{registry.get(kind).title}: {in_shop_words(rest)}"
 
 
 def in_axis_units(axis: str, value: float) -> str:

@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from tests.python.experiment.conftest import Twin
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, residual
 from stiffmap.experiment.calls import placed
-
-from .conftest import Twin
 
 POSITION = ("--quantity", "position", "--poses", "12")
 FEW = ("--poses", "6", "--loads", "6")

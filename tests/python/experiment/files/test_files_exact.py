@@ -6,10 +6,9 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from tests.python.experiment.conftest import Twin
 
 from stiffmap.experiment import Experiment
-
-from .conftest import Twin
 
 PLANS = {
     "everything of a deflection": (
