@@ -174,7 +174,12 @@ struct Floating {
       done |= settled & ~failed;
     }
     const V3 away = now.tip.p - start.p;
-    far = dot(away, away) > far_away * far_away * P.length * P.length;
+    V chord = splat(0);
+    for (int i = 0; i < 3; ++i) {
+      const V3 turn = now.tip.R.c[i] - start.R.c[i];
+      chord += dot(turn, turn);
+    }
+    far = dot(away, away) * (1 / (P.length * P.length)) + 0.5 * chord > far_away * far_away;
     newton.tip = now.tip;
     newton.point = now.point;
     newton.dead_load = load_at(now.tip.R);

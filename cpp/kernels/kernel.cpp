@@ -111,7 +111,7 @@ struct Block : Answers {
   M set_base(const Program& of) {
     for (int q = 0; q < of.coordinate_count; ++q) {
       const CoordinateProgram& k = of.coordinates[q];
-      s.a_base[q] = k.role == 2 ? splat(0) : k.from_home ? splat(k.rest) : s.closed[q];
+      s.a_base[q] = k.role == 2 ? splat(k.stiffness > 0 ? 0 : k.rest) : k.from_home ? splat(k.rest) : s.closed[q];
       s.scale[q] = splat(1);
     }
     for (int d = 0; d < of.drive_count; ++d) {

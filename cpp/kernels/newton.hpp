@@ -212,8 +212,10 @@ struct Newton {
       const V change = larger(norm, e.transferred);
       const M whole = way.acting == 1.0;
       M last = change < small;
-      // An arm's axes are answered where this step leads: of the tangent only the loads' share is left behind.
-      M near = P.serial_joints > 0 ? ~last & (change < nearly * e.lowest) : M{};
+      // An arm's axes are answered where this step leads: of the tangent only the loads' share is left behind, with that
+      // of springs outside too much.
+      const V softest = e.lowest < 1.0 ? e.lowest : splat(1);
+      M near = P.serial_joints > 0 && P.spring_count == 0 ? ~last & (change < nearly * softest) : M{};
       last |= near;
       M settled = active & whole & (last | ((norm < in.tolerance) & (way.previous < in.tolerance)));
       if (P.hardens && any(settled)) {
@@ -265,7 +267,7 @@ struct Newton {
       if (any(arrived)) way.advance(arrived);
       // What this step leaves is of its square, and what one with the same factors leaves of that is next to nothing.
       if (P.parallel && !corners) {
-        const M soon = (change < chord_most * e.lowest) & (change < chord_longest);
+        const M soon = (change < chord_most * softest) & (change < chord_longest);
         const M close = active & whole & ~settled & ~distrusted & soon & (norm > chord_least);
         if (any(close)) chord_step(m, close);
       }
@@ -277,9 +279,10 @@ struct Newton {
       settle();
     } else {
       put_load(splat(1), splat(1));
+      if (load_moves() && P.serial_joints > 0) take_step();  // what pulls the tip does so where the step leads
       if (load_moves()) pull();
       if (P.serial_joints > 0 || any(stepped)) transmit();
-      take_step();
+      if (!(load_moves() && P.serial_joints > 0)) take_step();
     }
     return done & ~failed;
   }
@@ -309,6 +312,7 @@ struct Newton {
       s.tau[q] += s.dtau[q] * step;
     }
     const V6 twist = select(stepped, stepped_by, V6{});
+    tip.p = tip.p + twist.a + cross(twist.b, tip.p - point);
     point = point + twist.a;
     for (V3& column : tip.R.c) column = column + cross(twist.b, column);
   }

@@ -309,7 +309,8 @@ class FastBatch {
       table.run(&program_, &input, &answer, begin, end, kernel_scratch(table.scratch_size(&program_)));
       for (long place = begin; place < end; ++place) {
         const Index i = pose_at(place);
-        if (done_[at(i)] == pose_solved && leapt(i)) done_[at(i)] = pose_left;
+        const bool doubtful = done_[at(i)] == pose_unstable && (flags_[at(i)] & flag::branch_unverified);
+        if (doubtful || (done_[at(i)] == pose_solved && leapt(i))) done_[at(i)] = pose_left;
         const std::uint8_t how = done_[at(i)];
         if (how == pose_solved || how == pose_unstable || how == pose_loose) complete(i, how);
         else if (how == pose_unreachable || how == pose_nowhere)
@@ -324,7 +325,8 @@ class FastBatch {
   bool leapt(Index i) const {
     if (!corners_ || !out_.displacement) return false;
     const Index reads = std::max<Index>(1, static_cast<Index>(in_.read_points.size()));
-    return leaps(m_, Eigen::Map<const Vec3>(out_.displacement + 6 * i * reads));
+    const Eigen::Map<const Vec6> d(out_.displacement + 6 * i * reads);
+    return leaps(m_, Pose{}, {d.head<3>(), exp_so3(d.tail<3>())});
   }
 
   /// Fills what the kernels leave out for a pose that they did.

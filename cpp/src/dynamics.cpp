@@ -60,7 +60,7 @@ double add_springs(const Mechanism& m, const Frames& f, const VecX& x, VecX& out
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
     if (!c.from_home()) continue;
-    const double k = m.laws[at(c.law)].stiffness(), d = x[j] - m.home_coordinates[j];
+    const double k = m.laws[at(c.law)].stiffness(), d = x[j] - m.rest[j];
     out[j] += k * d;
     energy += 0.5 * k * d * d;
   }

@@ -169,13 +169,13 @@ Outcome steps_with_corners(const Mechanism& m, Problem& p, const EquilibriumOpti
                            State& state, EquilibriumResult& out) {
   double done = 0, step = 1, sign = unloaded_sign(m, p, ws, state);
   linearize(m, p, state, ws.lin);
-  Vec3 tip = ws.lin.frames.at(m.tip).p;
+  Pose tip = ws.lin.frames.at(m.tip);
   while (done < 1) {
     p.factor = std::min(1.0, done + step);
     ws.step_start = state;
     const bool found = newton(m, p, opt, done == 0, true, ws, state, out) == Outcome::converged;
-    const Vec3 moved = ws.lin.frames.at(m.tip).p;
-    if (found && !leaps(m, moved - tip)) {
+    const Pose moved = ws.lin.frames.at(m.tip);
+    if (found && !leaps(m, tip, moved)) {
       done = p.factor;
       tip = moved;
       count_sign(ws.saddle, sign, out);
@@ -191,18 +191,20 @@ Outcome steps_with_corners(const Mechanism& m, Problem& p, const EquilibriumOpti
   return Outcome::converged;
 }
 
-/// Laws with corners of which none sticks: the whole load at once, where that needs it by way of least energy. Not
-/// taken where the tip leaps.
+/// Laws with corners of which none sticks: the whole load at once, where that needs it by way of least energy. Where the
+/// tip leaps it is not taken, or flagged if there is no other way.
 bool at_once_with_corners(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
-                          State& state, EquilibriumResult& out) {
+                          State& state, EquilibriumResult& out, bool only_way) {
   p.factor = 1;
   EquilibriumOptions few = opt;
   few.max_iterations = std::min(opt.max_iterations, few_iterations);
   linearize(m, p, state, ws.lin);
-  const Vec3 tip = ws.lin.frames.at(m.tip).p;
+  const Pose tip = ws.lin.frames.at(m.tip);
   const auto found = [&] {
     out.falling = ws.stability.falling(ws.saddle);
-    return out.falling == 0 && !leaps(m, ws.lin.frames.at(m.tip).p - tip);
+    const bool far = leaps(m, tip, ws.lin.frames.at(m.tip));
+    if (far && only_way) out.flags |= flag::branch_unverified;
+    return out.falling == 0 && (only_way || !far);
   };
   if (newton(m, p, few, true, true, ws, state, out) == Outcome::converged && found()) return true;
   state = ws.start;
@@ -213,10 +215,17 @@ bool at_once_with_corners(const Mechanism& m, Problem& p, const EquilibriumOptio
 
 Outcome adaptive_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
                        State& state, EquilibriumResult& out) {
-  if (has_knots(m)) {
-    if (!rubs_or_sticks(m) && at_once_with_corners(m, p, opt, ws, state, out)) return Outcome::converged;
+  const auto at_once = [&](bool only_way) {
     state = ws.start;
-    return steps_with_corners(m, p, opt, ws, state, out);
+    out.sign_changes = 0;
+    return at_once_with_corners(m, p, opt, ws, state, out, only_way) ? Outcome::converged : Outcome::failed;
+  };
+  if (has_knots(m)) {
+    const bool slides = !rubs_or_sticks(m);
+    if (slides && at_once(false) == Outcome::converged) return Outcome::converged;
+    state = ws.start;
+    const Outcome stepped = steps_with_corners(m, p, opt, ws, state, out);
+    return slides && stepped != Outcome::converged ? at_once(true) : stepped;
   }
   LoadPath path(m, p, opt, ws, state, out);
   if (path.at_once()) return Outcome::converged;
@@ -225,9 +234,7 @@ Outcome adaptive_steps(const Mechanism& m, Problem& p, const EquilibriumOptions&
   const auto slackens = [](const NodeSpring& s) { return s.tension_only; };
   if (followed == Outcome::converged || std::none_of(m.external_springs.begin(), m.external_springs.end(), slackens))
     return followed;
-  state = ws.start;  // the path has a corner where one of them goes slack
-  out.sign_changes = 0;
-  return at_once_with_corners(m, p, opt, ws, state, out) ? Outcome::converged : Outcome::failed;
+  return at_once(true);  // the path has a corner where one of them goes slack
 }
 
 /// A platform in cables alone: the minimum of the energy that lies downhill, then Newton's last steps.

@@ -137,7 +137,7 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
   for (const ElasticJoint& e : chains.elastic) {
     CoordinateProgram& c = d.coordinates[static_cast<std::size_t>(e.coordinate)];
     c.stiffness = e.stiffness;
-    c.rest = e.rest;
+    if (e.stiffness > 0) c.rest = e.rest;
   }
   for (const Op& op : d.ops) {
     if (op.kind > OpKind::prismatic || !op.eliminated || op.law < 0) continue;

@@ -104,7 +104,7 @@ class Platform {
   static Pose moved(const Pose& from, const Vec6& step) {
     return {from.p + step.head<3>(), exp_so3(step.tail<3>()) * from.R};
   }
-  double away() const { return (now.p - home_.p).norm(); }
+  double away(double length) const { return distance(now, home_, length); }
 
   /// Coordinates of the free joints where the platform is now; `turned`: angle about a single axis.
   void coordinates(double turned, VecX& x) const {
@@ -223,7 +223,7 @@ FloatingResult find_floating(const Mechanism& m, const Problem& problem, VecX& x
       break;
     }
   }
-  out.leapt = body.away() > far_away * m.length;
+  out.leapt = body.away(m.length) > far_away * m.length;
   body.coordinates(turned, x);
   return out;
 }

@@ -102,6 +102,11 @@ double Follower::motion(const VecX& step) const {
   return ws_.equilibrium.saddle.step_norm(m_, v.head(m_.size()));
 }
 
+double Follower::apart(const LoadedState& a, const LoadedState& b) const {
+  const VecX between = b.state.z - a.state.z;
+  return ws_.equilibrium.saddle.step_norm(m_, between);
+}
+
 /// Right-hand side of the bordered system; `row` becomes its last row.
 VecX Follower::residual(const Constraint& c, const LoadedState& y, VecX& row) {
   SaddleSystem& saddle = ws_.equilibrium.saddle;

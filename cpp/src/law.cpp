@@ -7,6 +7,16 @@
 #include "stiffmap/check.hpp"
 
 namespace stiffmap {
+namespace {
+
+/// a of a + bend a^3 = y.
+double unbent(double y, double bend) {
+  if (bend == 0) return y;
+  const double s = std::sqrt(3 * bend);
+  return 2 / s * std::sinh(std::asinh(1.5 * s * y) / 3);
+}
+
+}  // namespace
 
 Law::Law(double stiffness, double cubic, std::vector<std::pair<double, double>> knots, double friction)
     : stiffness_(stiffness), cubic_(cubic), friction_(friction), knots_(std::move(knots)) {
@@ -31,7 +41,10 @@ bool Law::sticks() const {
 
 LawPoint Law::at(double z, double scale) const {
   const double k = stiffness_ / scale;
-  if (knots_.empty()) return {z, k * z + cubic_ * z * z * z, 1.0, k + 3 * cubic_ * z * z};
+  if (knots_.empty()) {
+    const double a = unbent(z, 0.5 * cubic_ / k), da = 1 / (1 + 1.5 * cubic_ / k * a * a);
+    return {a, k * a + cubic_ * a * a * a, da, (k + 3 * cubic_ * a * a) * da};
+  }
   // A knot's z does not move with `scale`: only the slope beyond the ends does, theory (L2).
   const std::size_t n = z_.size();
   if (z <= z_.front() || z >= z_.back()) {
@@ -47,11 +60,7 @@ LawPoint Law::at(double z, double scale) const {
 
 double Law::from_force(double tau, double scale) const {
   const double k = stiffness_ / scale;
-  if (knots_.empty()) {  // Newton on a convex branch falls to the root from above
-    double a = tau / k;
-    for (int i = 0; i < 60 && cubic_ > 0; ++i) a -= (k * a + cubic_ * a * a * a - tau) / (k + 3 * cubic_ * a * a);
-    return a;
-  }
+  if (knots_.empty()) return 0.5 * (unbent(tau / k, cubic_ / k) + tau / k);
   if (tau < knots_.front().second) {
     const double a = knots_.front().first + (tau - knots_.front().second) / k;
     return z_.front() + (a - knots_.front().first) + (tau - knots_.front().second) / stiffness_;
@@ -76,6 +85,7 @@ double Law::from_force(double tau, double scale) const {
 }
 
 double Law::from_deflection(double a, double scale) const {
+  if (knots_.empty()) return a + 0.5 * cubic_ * scale / stiffness_ * a * a * a;
   const std::size_t n = knots_.size();
   if (a <= knots_.front().first || a >= knots_.back().first) {
     const std::size_t end = a <= knots_.front().first ? 0 : n - 1;

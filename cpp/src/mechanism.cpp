@@ -118,6 +118,7 @@ Index Mechanism::add_spring(const Spring& spring, Index node, const std::string&
   for (int i = 0; i < 6; ++i) {
     node = add_coordinate(node, name + "." + axes[i], Role::spring, i < 3 ? JointType::prismatic : JointType::revolute,
                           Vec3::Unit(i % 3), 0.0);
+    if (spring.matrix.rigid[i] && !spring.matrix.rotated) coordinates.back().rest = spring.rest[i];
   }
   for (const auto& [direction, law] : spring.laws) {
     Mat6& K = group.matrix.stiffness;
@@ -126,7 +127,9 @@ Index Mechanism::add_spring(const Spring& spring, Index node, const std::string&
       require(i == direction || K(i, direction) == 0, name + ".laws", "an uncoupled direction", axes[direction]);
     K(direction, direction) = 0;
     group.matrix.rigid[direction] = false;
-    coordinates[static_cast<std::size_t>(group.first + direction)].law = static_cast<Index>(laws.size());
+    Coordinate& c = coordinates[static_cast<std::size_t>(group.first + direction)];
+    c.law = static_cast<Index>(laws.size());
+    c.rest = spring.rest[direction];  // the law's own deflection counts from there
     laws.push_back(law);
   }
   if (spring.stroke) {
@@ -290,9 +293,10 @@ void Mechanism::set_scales() {
   mean /= static_cast<double>(std::max<std::size_t>(1, places.size()));
   double radius = 0;
   for (const Vec3& p : places) radius = std::max(radius, (p - mean).norm());
-  // A single link has all its frames in one place: then the reach from the base counts.
+  // A single link has all its frames in one place: then the reach from the base counts, else that of what holds it.
   if (radius > 1e-9 * mean.norm()) length = radius;
   else if (mean.norm() > 0) length = mean.norm();
+  else if (const double far = farthest_anchor(); far > 0) length = far;
 
   // Stiffness: geometric mean over all elastic directions, angles as arcs at that length.
   double sum = 0;
@@ -316,7 +320,15 @@ void Mechanism::set_scales() {
     const NodeSpring& s = external_springs[static_cast<std::size_t>(i)];
     add(s.winch->elasticity > 0 ? s.winch->elasticity / length : s.stiffness);
   }
+  if (count == 0)  // nothing but springs outside the legs yields
+    for (const NodeSpring& s : external_springs) add(s.stiffness);
   if (count) stiffness = std::exp(sum / count);
+}
+
+double Mechanism::farthest_anchor() const {
+  double far = 0;
+  for (const NodeSpring& s : external_springs) far = std::max(far, s.anchor.norm());
+  return far;
 }
 
 }  // namespace stiffmap

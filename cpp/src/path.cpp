@@ -8,7 +8,9 @@ namespace stiffmap {
 namespace {
 
 constexpr int bisections = 36;
-constexpr double shortest_share = 1.0 / 1024;                  // of the first step
+constexpr double shortest_share = 1.0 / 16384;                 // of the first step
+constexpr double continuous = 1e-4;  // of a step's motion: what lies farther apart at one load are two paths
+constexpr double sharpest = 0.7;     // cosine of the turn in one step by arc
 constexpr double first_sizes[] = {1, 0.5, 0.25, 2, 0.125, 4};  // onto a crossing branch, in steps
 
 /// A branch as it grows: accepts points after locating what happened on the way to them.
@@ -16,11 +18,13 @@ class Trace {
  public:
   Trace(Follower& follower, Branch& out) : f_(follower), out_(out) {}
 
-  /// `step(from, share, to)` corrects the point at that share of the present step; `list`: it was asked for.
+  /// `step(from, share, to)` corrects the point at that share of the present step; `list`: it was asked for. False where
+  /// the step leapt to another path: `to` is then the last point of this one.
   template <class Step>
-  void accept(const LoadedState& from, LoadedState& to, double share, bool list, const Step& step) {
-    if (from.unstable != to.unstable) locate(from, to, share, step);
+  bool accept(const LoadedState& from, LoadedState& to, double share, bool list, const Step& step) {
+    if (from.unstable != to.unstable && !locate(from, to, share, step)) return false;
     if (list) out_.points.push_back(f_.report(to));
+    return true;
   }
 
   std::size_t size() const { return out_.points.size(); }
@@ -31,21 +35,27 @@ class Trace {
   Branch& out_;
 
   template <class Step>
-  void locate(const LoadedState& from, LoadedState& to, double share, const Step& step) {
+  bool locate(const LoadedState& from, LoadedState& to, double share, const Step& step) {
     double low = 0, high = share;
-    LoadedState y = to, last = to;
+    LoadedState y = to, last = to, before = from, after = to;
     for (int k = 0; k < bisections; ++k) {
       const double middle = 0.5 * (low + high);
-      if (!step(from, middle, y)) break;
+      if (!step(from, middle, y)) break;  // at a singular point, or between two paths
       last = y;
       (y.unstable == from.unstable ? low : high) = middle;
+      (y.unstable == from.unstable ? before : after) = y;
+    }
+    const double left = (high - low) / share;
+    if (left > 10 * continuous || f_.apart(before, after) > (continuous + 2 * left) * f_.apart(from, to)) {
+      if (!step(from, low, to)) to = from;
+      return false;
     }
     Crossing c = f_.critical(last);
     c.at.unstable = c.point.before = from.unstable;
     c.point.after = to.unstable;
     out_.critical.push_back(c.point);
     if (!c.point.limit) crossings.push_back(c);
-    step(from, share, to);  // the linearisation belongs to the accepted point again
+    return step(from, share, to);  // the linearisation belongs to the accepted point again
   }
 };
 
@@ -67,11 +77,11 @@ PathEnd by_control(Follower& f, const PathOptions& o, LoadedState y, Trace& trac
         if (share < shortest_share) return PathEnd::lost;
         continue;
       }
-      const bool there = share == 1;
-      trace.accept(y, next, share, there, step);
+      const bool there = share == 1, stayed = trace.accept(y, next, share, there, step);
       y = next;
-      if (there) break;
-      share = std::min(1.0, 2 * share);
+      if (there && stayed) break;
+      share = stayed ? std::min(1.0, 2 * share) : 0.25 * share;
+      if (share < shortest_share) return PathEnd::lost;
     }
   }
   return PathEnd::limit;
@@ -89,18 +99,21 @@ PathEnd by_arc(Follower& f, LoadedState y, VecX tangent, std::size_t most, Trace
       return f.correct({PathControl::arc, 0, tangent}, to);
     };
     LoadedState next = y;
-    if (!step(y, length, next)) {
+    bool fits = step(y, length, next);
+    if (fits && length > 2 * shortest_share * longest(tangent)) fits = f.tangent(tangent).dot(tangent) > sharpest;
+    if (!fits) {
       length *= 0.5;
       if (length < shortest_share * longest(tangent)) return PathEnd::lost;
       // the scaling of the next prediction belongs to the last accepted point
       f.correct({PathControl::force, y.load, {}}, y);
       continue;
     }
-    trace.accept(y, next, length, true, step);
+    const bool stayed = trace.accept(y, next, length, true, step);
     y = next;
     if (const PathEnd end = ended(y); end != PathEnd::not_followed) return end;
     tangent = f.tangent(tangent);
-    length = std::min(1.5 * length, longest(tangent));
+    length = stayed ? std::min(1.5 * length, longest(tangent)) : 0.25 * length;
+    if (length < shortest_share * longest(tangent)) return PathEnd::lost;
   }
   return PathEnd::most_points;
 }

@@ -195,8 +195,7 @@ ClosureResult PoseCloser::close(const Mechanism& m, const Pose& pose, VecX& x, b
       at_rest(m, x);
       ok = newton(m, pose, x);
     }
-    const bool near =
-        has_last_ && (pose.p - last_pose_.p).norm() < nearest * m.length && (pose.R - last_pose_.R).norm() < nearest;
+    const bool near = has_last_ && distance(pose, last_pose_, m.length) < nearest * m.length;
     if (!ok && near) {
       if (!extrapolated(pose, x)) x = last_;
       ok = newton(m, pose, x);

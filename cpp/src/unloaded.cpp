@@ -6,7 +6,7 @@ bool command(const Mechanism& m, const VecX& x, Problem& p) {
   p.friction_sign.setZero();
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
-    p.base[j] = c.role == Role::spring ? 0.0 : c.from_home() ? m.rest[j] : x[j];
+    p.base[j] = c.role == Role::spring || c.from_home() ? m.rest[j] : x[j];
   }
   for (const Drive& d : m.drives) {
     const double u = x[d.coordinate];
@@ -27,7 +27,9 @@ void start_state(const Mechanism& m, const VecX& x, State& state) {
   state.charts = {};
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
-    if (c.from_home()) state.z[j] = x[j] - m.rest[j];
+    if (!c.from_home()) continue;
+    const Law& law = m.laws[at(c.law)];
+    state.z[j] = law.has_knots() ? x[j] - m.rest[j] : law.from_deflection(x[j] - m.rest[j]);
   }
   VecX charted = x;
   if (!keep_off_locks(m, charted, state.charts)) return;

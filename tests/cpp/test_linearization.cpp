@@ -26,7 +26,7 @@ void check_tangent(const Mechanism& m, const Problem& p, const VecX& z) {
   State state(m);
   state.z = z;
   linearize(m, p, state, lin);
-  MatX T = lin.K - lin.H;
+  MatX T = (lin.K - lin.H) * lin.da.asDiagonal();
   for (Index j = 0; j < m.size(); ++j) T(j, j) += lin.dtau[j];
   Random random(3);
   for (int i = 0; i < 4; ++i) {
@@ -137,7 +137,7 @@ BOOST_AUTO_TEST_CASE(loop_wrenches_enter_the_tangent) {
   linearize(m, p, state, lin);
   const MatX null = Eigen::FullPivLU<MatX>(lin.J).kernel();
   const VecX d = null * Random(11).vector(null.cols(), 0.3);
-  MatX T = lin.K - lin.H;
+  MatX T = (lin.K - lin.H) * lin.da.asDiagonal();
   for (Index j = 0; j < m.size(); ++j) T(j, j) += lin.dtau[j];
   BOOST_TEST((lin.H - lin.H.transpose()).norm() < 1e-14 * lin.H.norm());
 

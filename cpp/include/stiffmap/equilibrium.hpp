@@ -46,7 +46,9 @@ void force_balance(const Mechanism& m, const Linearization& lin, const SaddleSys
 inline constexpr double largest_step = 0.2;
 
 /// Whether the tip went that far at once: with corners of laws the load is then taken in steps.
-inline bool leaps(const Mechanism& m, const Vec3& motion) { return !(motion.norm() < largest_step * m.length); }
+inline bool leaps(const Mechanism& m, const Pose& from, const Pose& to) {
+  return !(distance(from, to, m.length) < largest_step * m.length);
+}
 
 /// Laws of which the deflection does not say the force.
 bool rubs_or_sticks(const Mechanism& m);

@@ -64,6 +64,8 @@ class Follower {
   double along(const VecX& step) const { return gradient_.dot(step.head(m_.size())); }
   /// Largest motion of a step in multiples of the mechanism's length.
   double motion(const VecX& step) const;
+  /// The same between two points.
+  double apart(const LoadedState& a, const LoadedState& b) const;
   PathPoint report(const LoadedState& y) const;
   /// The same of a point corrected earlier.
   PathPoint report_again(LoadedState y);

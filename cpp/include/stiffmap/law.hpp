@@ -13,8 +13,8 @@ struct LawPoint {
   double a, tau, da, dtau;
 };
 
-/// Linear with an optional cubic term (z = a), or a monotone polyline (z = a + tau / stiffness,
-/// theory L1: both coordinates are then Lipschitz in z, so steps of either are ordinary points).
+/// Linear with an optional cubic term (z = (a + tau / stiffness) / 2), or a monotone polyline (z = a + tau / stiffness).
+/// Both coordinates are then Lipschitz in z (theory L1): a step is an ordinary point, whether force or deflection is given.
 class Law {
  public:
   explicit Law(double stiffness, double cubic = 0.0, std::vector<std::pair<double, double>> knots = {},
@@ -26,7 +26,7 @@ class Law {
   /// Parameter of the point that carries force tau: the start of a Newton iteration.
   double from_force(double tau, double scale = 1.0) const;
 
-  /// Parameter at deflection a, of a law that has corners and does not stick.
+  /// Parameter at deflection a, of a law that does not stick.
   double from_deflection(double a, double scale = 1.0) const;
 
   bool linear() const { return cubic_ == 0.0 && knots_.empty() && friction_ == 0.0; }

@@ -186,6 +186,7 @@ class Mechanism {
   void add_cable(const ExternalSpring& spring);
   bool floats() const;
   void set_scales();
+  double farthest_anchor() const;
   void find_balls();
 };
 

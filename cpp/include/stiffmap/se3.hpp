@@ -24,6 +24,11 @@ struct Pose {
   Pose inverse() const { return {-(R.transpose() * p), R.transpose()}; }
 };
 
+/// How far two poses are apart; a turn counts as the chord of its arc at the length.
+inline double distance(const Pose& a, const Pose& b, double length) {
+  return std::hypot((a.p - b.p).norm(), std::sqrt(0.5) * length * (a.R - b.R).norm());
+}
+
 /// Rotation by the rotation vector phi (theory R1).
 Mat3 exp_so3(const Vec3& phi);
 

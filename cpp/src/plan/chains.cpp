@@ -156,14 +156,16 @@ class Compiler {
   void elastic_joints(const Spring& s, const Mat6& K, Way& way, std::vector<Op>& ops) {
     for (int i = 0; i < 6; ++i, ++next_) {
       const Index law = m_.coordinates[static_cast<std::size_t>(next_)].law;
-      if (s.matrix.rigid[i] && law < 0) continue;  // a law makes a rigid direction yield
+      const bool rigid = s.matrix.rigid[i] && law < 0;  // a law makes a rigid direction yield
+      if (rigid && s.rest[i] == 0) continue;
       Op& op = push(i < 3 ? OpKind::prismatic : OpKind::revolute, way, ops);
       op.coordinate = next_;
-      op.eliminated = 1;
+      op.eliminated = !rigid;
       op.slot = out_.program.joint_slots++;
       op.axis = i % 3;
       op.direction[i % 3] = 1;
       op.law = i32(law);
+      if (rigid) continue;
       found_.elastic.push_back({next_, K(i, i), s.rest[i]});
       if (way.rigid && ++way.prefix > most_prefix)
         found_.missing = "more joints before the first link spring than are supported";

@@ -9,6 +9,7 @@ from tests.python.solve import builders as b
 
 import stiffmap as sm
 from stiffmap.model.description import Leg, MachineDescription, Pose
+from stiffmap.model.files import description_from_text
 
 LENGTH, ROOT, SHIFT = 0.5, 1000.0, 1e6  # m, N·m/rad, N/m
 BUCKLES = ROOT / LENGTH
@@ -28,7 +29,7 @@ def leaning(force: float, lean: float) -> float:
 
 
 @pytest.mark.parametrize("method", ["reference", "fast"])
-@pytest.mark.parametrize("lean", [3e-2, 1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("lean", [3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
 @pytest.mark.parametrize("side", [1, -1])
 def test_an_imperfect_column_leans_to_its_side(lean: float, side: int, method: str) -> None:
     machine = column()
@@ -77,3 +78,42 @@ def test_solve_follows_the_path_that_sweep_follows(
         moved = s.displacement[:, :3] @ d
         np.testing.assert_allclose(moved[~told], path.deflection_along.values[~told], rtol=1e-6, atol=1e-12)
         assert not told[0]
+
+
+SOFT = """
+name: soft
+units: {{length: m, force: N, angle: rad}}
+home: {{translation: [0.6, 0.5, 0], rotation: [[0, -1, 0], [1, 0, 0], [0, 0, 1]]}}
+task: [x, y]
+legs:
+  a:
+    elements:
+      - {{actuator: j1, kind: revolute, axis: z, law: {{stiffness: {k}, cubic: {cubic}}}}}
+      - {{offset: o1, translation: [0.6, 0, 0]}}
+      - {{actuator: j2, kind: revolute, axis: z, home: 1.5707963267948966, law: {{stiffness: {k}, cubic: {cubic}}}}}
+      - {{offset: o2, translation: [0.5, 0, 0]}}
+"""
+
+
+@pytest.mark.parametrize("method", ["fast", "reference"])
+@pytest.mark.parametrize("force", [100.0, 1000.0])
+@pytest.mark.parametrize(("k", "cubic"), [(10.0, 1e9), (1.0, 1e8), (100.0, 1e12), (1e3, 1e10)])
+def test_joints_that_are_soft_at_rest_and_stiffen(k: float, cubic: float, force: float, method: str) -> None:
+    """Torques follow from the tip's force alone: tau = k a + c a^3 at each joint, at the moved tip."""
+    machine = sm.Machine(description_from_text(SOFT.format(k=k, cubic=cubic)))
+    for angle in np.linspace(0, 2 * np.pi, 24, endpoint=False):
+        f = force * np.array([np.cos(angle), np.sin(angle)])
+        s = machine.solve((0.6, 0.5, 0), [*f, 0, 0, 0, 0], method=method)
+        assert s.status == sm.Status.CONVERGED
+        a = np.zeros(2)
+        for _ in range(200):  # fixed point: the torques hardly depend on the deflection
+            q1, q2 = a[0], a[0] + np.pi / 2 + a[1]
+            elbow = 0.6 * np.array([np.cos(q1), np.sin(q1)])
+            tip = elbow + 0.5 * np.array([np.cos(q2), np.sin(q2)])
+            torque = [tip[0] * f[1] - tip[1] * f[0], (tip - elbow)[0] * f[1] - (tip - elbow)[1] * f[0]]
+            a = np.array(
+                [np.real(r[np.argmin(np.abs(r.imag))]) for t in torque for r in [np.roots([cubic, 0, k, -t])]]
+            )
+        np.testing.assert_allclose(
+            s.displacement[:2], tip - [0.6, 0.5], rtol=0, atol=1e-9 * np.linalg.norm(tip - [0.6, 0.5])
+        )

@@ -67,8 +67,32 @@ def numbers(text: str, name: str, count: int | None = None) -> Floats:
 
 
 def position(text: str | None, machine: Machine, name: str = "at") -> Floats:
-    """A TCP position given in mm, in m; the home position where none is given."""
-    return machine.description.home.p if text is None else MM * numbers(text, name, 3)
+    """A TCP position given in mm, in m: all three coordinates or those that the machine commands, the others as at home;
+    the home position where none is given. StiffmapError for another value of what is not commanded."""
+    home, task = machine.description.home.p, machine.description.task
+    if text is None:
+        return home
+    commanded = [i for i, axis in enumerate("xyz") if axis in task]
+    few = len(text.replace(",", " ").split()) == len(commanded)
+    given = MM * numbers(text, name, len(commanded) if few else 3)
+    if few:
+        out = home.copy()
+        out[commanded] = given
+        return out
+    for i in {0, 1, 2} - set(commanded):
+        if abs(given[i] - home[i]) > 1e-6 * MM:
+            raise StiffmapError(
+                f"--{name}: {machine.name} does not command {'xyz'[i]}, which is {home[i] / MM:g} mm at home; got "
+                f"{given[i] / MM:g} (commanded: {', '.join(task)})"
+            )
+    return given
+
+
+def position_words(at: Floats, machine: Machine) -> str:
+    """``at (0, 400, 0) mm; not commanded: z``."""
+    others = [axis for axis in "xyz" if axis not in machine.description.task]
+    words = f"at ({', '.join(f'{v / MM:g}' for v in at)}) mm"
+    return f"{words}; not commanded: {', '.join(others)}" if others else words
 
 
 def rotation(text: str | None) -> Any:

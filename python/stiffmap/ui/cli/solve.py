@@ -32,6 +32,7 @@ from stiffmap.ui.cli.inputs import (
     machine_with,
     numbers,
     position,
+    position_words,
     rotation,
 )
 from stiffmap.ui.cli.output import JsonOption, print_json
@@ -100,16 +101,18 @@ def solve(
     else:
         acting = vector
     load = np.r_[acting, MM * numbers(moment, "moment", 3)]
-    s = m.solve(position(at, m), load, **how)
+    place = position(at, m)
+    s = m.solve(place, load, **how)
     if as_json:
-        print_json(as_plain(m.name, s, load) | {"reason": reason(m, s, position(at, m), how["rotation"])})
+        print_json(as_plain(m.name, s, load) | {"reason": reason(m, s, place, how["rotation"])})
     else:
         console = Console(highlight=False)
         if vector is None:
             told = ", ".join(f"{v:.1f}" for v in acting)
             console.print(f"{size:g} N in the direction that pushes furthest: force ({told}) N")
+        console.print(position_words(place, m))
         show(console, s)
-        if why := reason(m, s, position(at, m), how["rotation"]):
+        if why := reason(m, s, place, how["rotation"]):
             console.print(f"reason: {why}", soft_wrap=True)
         if int(s.status) == Status.SINGULAR and (ways := free_motions(m, s.free_twists)):
             console.print(f"free: the platform can {'; '.join(ways)}", soft_wrap=True)

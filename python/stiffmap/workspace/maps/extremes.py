@@ -79,8 +79,15 @@ def peak_angle(value: Floats, slope: Floats) -> Floats:
     coefficients = dot(np.concatenate([value, slope], axis=1)[:, None, :], _fit(count)[None])
     c = np.where(np.isfinite(coefficients).all(axis=1, keepdims=True), coefficients, 0.0)
     scan, degree = even_angles(SCAN), _degree(count)
-    best = np.argmax(dot(c[:, None, :], _basis(scan, degree)), axis=1)
-    return _refined(c, scan[best], degree)
+    at = dot(c[:, None, :], _basis(scan, degree))
+    # Of two peaks the higher one may lie between points of the scan, and the other on one: each is refined.
+    pose, point = np.nonzero((at >= np.roll(at, 1, axis=1)) & (at >= np.roll(at, -1, axis=1)))
+    peak = _refined(c[pose], scan[point], degree)
+    height = np.full(at.shape, -np.inf)
+    height[pose, point] = dot(c[pose], _basis(peak, degree))
+    angle = np.empty(at.shape)
+    angle[pose, point] = peak
+    return np.take_along_axis(angle, np.argmax(height, axis=1)[:, None], axis=1)[:, 0]
 
 
 def _degree(count: int) -> int:

@@ -45,10 +45,10 @@ def test_beyond_the_end_of_the_path_both_paths_wander_alike(name: str) -> None:
     fast = machine.solve(position, wrench)
     beyond = np.flatnonzero(fast.flags & sm.Flag.BRANCH_UNVERIFIED)[:12]
     assert len(beyond) == 12
-    assert fast.reference_share < 1e-3
+    assert fast.reference_share < 0.02  # of poses beyond a change of stability that the kernels doubt
     reference = machine.solve(position[beyond], wrench[beyond], method="reference")
     np.testing.assert_array_equal(fast.status[beyond], reference.status)
-    np.testing.assert_array_equal(fast.flags[beyond], reference.flags)
+    np.testing.assert_array_equal(fast.flags[beyond] & ~np.uint32(sm.Flag.REFERENCE_PATH), reference.flags)
     assert (reference.status == sm.Status.NOT_CONVERGED).any()
     found = np.isfinite(reference.displacement).all(axis=1)
     np.testing.assert_array_equal(np.isfinite(fast.displacement[beyond]).all(axis=1), found)

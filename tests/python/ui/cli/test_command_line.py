@@ -153,3 +153,40 @@ def test_a_table_is_whole_on_80_columns(
         "velocity",
     }
     assert max(map(len, rows)) <= 80
+
+
+@pytest.mark.parametrize(
+    ("machine", "at", "shown"),
+    [
+        ("five-bar", "0,400", "at (0, 400, 0) mm; not commanded: z"),
+        ("five-bar", "0,400,0", "at (0, 400, 0) mm; not commanded: z"),
+        ("3-rps", "600", "at (0, 0, 600) mm; not commanded: x, y"),
+        ("orthoglide-revised", "1,2,3", "at (1, 2, 3) mm\n"),
+    ],
+)
+def test_a_pose_is_given_in_what_the_machine_commands(
+    machine: str, at: str, shown: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["solve", machine, "--at", at]) == 0
+    assert shown in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["solve", "polar", "show", "stress"])
+@pytest.mark.parametrize(
+    ("machine", "at", "words"),
+    [
+        (
+            "five-bar",
+            "0,400,50",
+            "five-bar does not command z, which is 0 mm at home; got 50 (commanded: x, y)",
+        ),
+        ("3-rps", "5,0,600", "3-rps does not command x, which is 0 mm at home; got 5"),
+        ("five-bar", "400", "--at: expected 3 numbers separated by commas, got '400'"),
+        ("orthoglide-revised", "0,400", "--at: expected 3 numbers separated by commas, got '0,400'"),
+    ],
+)
+def test_another_value_of_what_is_not_commanded_is_refused(
+    command: str, machine: str, at: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, machine, "--at", at]) == 2
+    assert words in " ".join(capsys.readouterr().err.split())

@@ -100,3 +100,24 @@ def test_pulleys_agree() -> None:
     assert (fast.status == Status.CONVERGED).all()
     near = ~((fast.flags | reference.flags) & Flag.BRANCH_UNVERIFIED).astype(bool)
     np.testing.assert_allclose(fast.displacement[near], reference.displacement[near], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", [3, 8, 21])
+def test_a_platform_that_turns_far_is_flagged(seed: int) -> None:
+    """A turn counts as an arc at the machine's length: without the flag both paths stand in one minimum, and near."""
+    machine = suspension(seed)
+    rng = np.random.default_rng(seed)
+    wrench = rng.normal(size=(80, 6)) * 2e3
+    wrench[:, 3:] *= 10 ** rng.uniform(-1, 1.6, (80, 1))
+    at = np.tile(machine.description.home.p, (80, 1))
+    answers = [machine.solve(at, wrench, gravity=(0, 0, -9.81), method=method) for method in SMOOTH]
+    turned = [np.linalg.norm(a.displacement[:, 3:], axis=1) for a in answers]
+    assert max(np.nanmax(t) for t in turned) > 1.0
+    for a, t in zip(answers, turned, strict=True):
+        flagged = (a.flags & Flag.BRANCH_UNVERIFIED) != 0
+        assert not ((a.status == Status.CONVERGED) & (t > 0.3) & ~flagged).any()
+    near = ~((answers[0].flags | answers[1].flags) & Flag.BRANCH_UNVERIFIED).astype(bool)
+    assert near.any()
+    np.testing.assert_allclose(
+        answers[0].displacement[near], answers[1].displacement[near], rtol=0, atol=1e-8
+    )

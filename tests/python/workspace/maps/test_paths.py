@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.python.solve import structures as s
+from tests.python.solve.test_load_path import BUCKLES, LENGTH, SHIFT, column, leaning
 
 import stiffmap as sm
 from stiffmap.workspace.maps.files import read_dataset, write_dataset
@@ -127,3 +128,22 @@ def test_a_path_is_the_same_from_the_disk(tmp_path: Path, ending: str) -> None:
     assert path.sizes["critical"] == 2
     with read_dataset(write_dataset(path, tmp_path / f"path.{ending}")) as stored:
         assert stored.load().identical(path)
+
+
+@pytest.mark.parametrize(
+    ("control", "limit"), [("force", 1.3 * BUCKLES), ("arc", 0.35), ("displacement", 0.2)]
+)
+@pytest.mark.parametrize("steps", [6, 10, 40])
+@pytest.mark.parametrize("lean", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7])
+def test_a_sharp_bend_is_not_stepped_over(lean: float, steps: int, control: str, limit: float) -> None:
+    """A column that leans a little has no bifurcation: its path bends within a share of about lean^(2/3) of the load, and
+    another one, which is unstable, goes straight on. A step by load, displacement or arc stays on the path that bends."""
+    along = np.array([lean, 0, -1]) / np.hypot(lean, 1)
+    path = sm.sweep(column(), (0, 0, LENGTH), along, control=control, limit=limit, steps=steps)
+    assert path.attrs["end"] == "the limit was reached"
+    assert (path.unstable_modes == 0).all()
+    force, aside = path.force.values[1:], path.displacement.values[1:, 0]
+    load = force / np.hypot(lean, 1)
+    wanted = [LENGTH * np.sin(leaning(f, lean)) + lean * f / SHIFT for f in load]
+    np.testing.assert_allclose(aside, wanted, rtol=1e-6, atol=1e-9)
+    assert abs(aside[-1]) > 0.3

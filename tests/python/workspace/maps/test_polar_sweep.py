@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
+from stiffmap.model.files import description_from_text
 
 CORNER = np.array([-0.2, -0.2, -0.2])
 
@@ -65,3 +66,59 @@ def test_single_forces_and_paths_have_one_schema(machine: sm.Machine) -> None:
     assert np.isnan(path.compliance_along).all() and (path.unstable_modes == 0).all()
     assert single.attrs["end"] == "" and single.sizes["critical"] == 0 and (single.branch == 0).all()
     np.testing.assert_allclose(path.displacement[-1], single.displacement[-1], rtol=1e-7, atol=1e-12)
+
+
+SLIDES = """
+name: slides
+units: {{length: m, force: N, angle: deg, mass: kg}}
+gravity: [{gx}, {gy}, 0]
+home: {{translation: [0, 0, 0], turns: [{{about: z, by: {turn}}}]}}
+task: [x, y]
+legs:
+  a:
+    frame: {{translation: [0, 0, 0], turns: [{{about: z, by: {turn}}}]}}
+    elements:
+      - {{actuator: stiff, kind: prismatic, axis: x, stiffness: 1.0e8}}
+      - {{actuator: soft, kind: prismatic, axis: y, stiffness: {soft}}}
+platform:
+  - {{body: tool, mass: 10, com: [0, 0, 0], inertia: [1, 1, 1]}}
+"""
+
+
+@pytest.mark.parametrize("soft", [1e6, 2e7])
+@pytest.mark.parametrize("turn", [1.25, 2.5, 31.0, 88.1])
+@pytest.mark.parametrize(("gx", "gy"), [(-14.9821, -0.98146), (3.0, -9.0), (0.0, -14.0)])
+def test_of_two_extremes_the_farther_one_is_found(soft: float, turn: float, gx: float, gy: float) -> None:
+    """Two slides under gravity are a linear machine: |C (m g + F u)|. Its two minima, and its two maxima, lie half a turn
+    apart, on points of a scan or between them."""
+    m = sm.Machine(description_from_text(SLIDES.format(soft=soft, turn=turn, gx=gx, gy=gy)))
+    c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    turned = np.array([[c, -s], [s, c]])
+    compliance = turned @ np.diag([1e-8, 1 / soft]) @ turned.T
+    angle = np.linspace(0, 2 * np.pi, 200_001)
+    push = 300 * np.array([np.cos(angle), np.sin(angle)])
+    size = np.linalg.norm(compliance @ (10 * np.array([[gx], [gy]]) + push), axis=0)
+    pol = sm.polar(m, np.zeros(3), force=300.0)
+    assert float(pol.best_deflection) == pytest.approx(size.min(), rel=1e-5)
+    assert float(pol.worst_deflection) == pytest.approx(size.max(), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "gravity"),
+    [
+        ("five-bar", (-0.1, 0.365, 0), (1, -2, -9)),
+        ("ur10", (-0.7, 0.2, 0.4), (2, 3, -9)),
+        ("tripteron", (0.3, 0.4, 0.5), (4, -3, -9)),
+    ],
+)
+def test_extremes_of_machines_under_gravity(
+    name: str, at: tuple[float, ...], gravity: tuple[float, ...]
+) -> None:
+    m = sm.load_machine(name)
+    angle = np.linspace(0, 2 * np.pi, 1441)
+    wrench = np.zeros((angle.size, 6))
+    wrench[:, 0], wrench[:, 1] = 300 * np.cos(angle), 300 * np.sin(angle)
+    size = np.linalg.norm(m.solve(at, wrench, gravity=gravity).displacement[:, :3], axis=1)
+    pol = sm.polar(m, at, force=300.0, gravity=gravity)
+    assert float(pol.best_deflection) <= size.min() * (1 + 1e-9)
+    assert float(pol.worst_deflection) >= size.max() * (1 - 1e-9)
