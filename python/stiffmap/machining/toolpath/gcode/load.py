@@ -11,6 +11,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
 from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
+from stiffmap.machining.toolpath.gcode.state import NEVER
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
 NUMBERS = 13
@@ -57,7 +58,7 @@ def load_gcode(
         raise FileError("the program has no moves", file=file)
     v, c = np.array(numbers).reshape(n, NUMBERS), np.array(codes).reshape(n, 3)
     state = reader.state
-    missing = [a for a, k in zip("XYZ", state.known, strict=True) if not k]
+    missing = [a for a, line in zip("XYZ", state.given, strict=True) if line == NEVER]
     notes = [f"line {line}: {note}" for note, line in reader.notes.items()]
     if missing:
         notes.append(f"{', '.join(missing)} is never given: taken as 0")
@@ -77,6 +78,7 @@ def load_gcode(
         text=tuple(text),
         turn=_turns(v[:, 12]),
         offsets=dict(reader.offsets),
+        given=(state.given[0], state.given[1], state.given[2]),
     )
 
 

@@ -39,7 +39,7 @@ class Reader:
 
     def __init__(self, file: str, offsets: Mapping[str, Sequence[float]] | None = None) -> None:
         """`offsets`: work offsets by name (``G54``), m."""
-        self.file, self.state, self.notes = file, State(), dict[str, int]()
+        self.file, self.state, self.notes, self.optional = file, State(), dict[str, int](), False
         self.offsets = {k: tuple(map(float, v)) for k, v in (offsets or {}).items()}
 
     def note(self, text: str, number: int) -> None:
@@ -51,6 +51,9 @@ class Reader:
         words, optional = read_block(text, self.file, number)
         if not words:
             return None
+        if self.optional:
+            self.state.breaks += 1
+        self.optional = optional
         if optional:
             self.note("lines with a slash (block delete) are carried out", number)
         s = self.state
@@ -111,17 +114,23 @@ class Reader:
         s = self.state
         if value in meaning.PLANES:
             s.plane = meaning.PLANES[value]
+            s.said.add("plane")
         elif value in (20.0, 21.0):
             s.unit = INCH if value == 20.0 else MM
         elif value in (90.0, 91.0):
             s.absolute = value == 90.0
+            s.said.add("distance")
         elif value in (90.1, 91.1):
             s.absolute_centres = value == 90.1
+            s.said.add("centres")
         elif value in (93.0, 94.0):
+            s.said.add("feed mode")
             if s.inverse_time != (value == 93.0):
                 s.inverse_time, s.feed = value == 93.0, None
         elif value in meaning.OFFSETS:
             s.offset = f"G{value:g}"
+            s.said.add("offset")
+            s.breaks += 1
             if self.offsets and s.offset not in self.offsets:
                 fail(self.file, number, f"no work offset {s.offset}; given: {', '.join(self.offsets)}")
         elif value in (4.0, 43.0, 53.0):
@@ -141,6 +150,8 @@ class Reader:
             self.state.spindle = {3.0: 1, 4.0: -1, 5.0: 0}[value]
         elif value in meaning.ENDS:
             self.state.ended = True
+        elif value in meaning.BREAKS_M:
+            self.state.breaks += 1
         elif value in meaning.REFUSED_M:
             fail(self.file, number, f"M{value:g}: {meaning.REFUSED_M[value]} are not read")
         elif value not in meaning.IGNORED_M:
@@ -160,6 +171,7 @@ class Reader:
             if "H" not in values:
                 fail(self.file, number, "G43 needs the register of the tool's length: H")
             s.length = int(values["H"])
+            s.breaks += 1
             self.note("G43: programmed positions are taken as those of the tool's tip", number)
         elif "H" in values:
             fail(self.file, number, "H goes with G43")
@@ -177,7 +189,8 @@ class Reader:
                 end[i] = step + shift[i] if s.absolute or machine else start[i] + step
                 if not abs(end[i]) < FARTHEST:
                     fail(self.file, number, f"{axis}{values[axis]:g} is {end[i]:.3g} m: beyond any machine")
-                s.known[i] = True
+                if s.absolute or machine:
+                    s.given[i] = min(s.given[i], number)
         goal = (end[0], end[1], end[2])
         centre, sweep = (nan, nan, nan), 0.0
         if s.motion in ("G2", "G3"):

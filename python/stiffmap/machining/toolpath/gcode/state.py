@@ -6,15 +6,21 @@ from dataclasses import dataclass, field
 from math import pi
 
 MM, INCH = 1e-3, 25.4e-3
+NEVER = 2**62
+"""Line at which an axis is given that never is."""
 AXES = "XYZ"
 MOTIONS = {0.0: "G0", 1.0: "G1", 2.0: "G2", 3.0: "G3"}
 PLANES = {17.0: 2, 18.0: 1, 19.0: 0}
 OFFSETS = (54.0, 55.0, 56.0, 57.0, 58.0, 59.0)
 CENTRES = {2: "IJ", 1: "IK", 0: "JK"}
 """Words of an arc's centre by the axis that it turns about."""
+STARTS = {"distance": "G90", "feed mode": "G94", "plane": "G17", "centres": "G91.1", "offset": "G54"}
+"""What is taken where a program says nothing; a controller may stand otherwise, so that a written program says it."""
 IGNORED_G = {40.0, 49.0, 61.0, 61.1, 64.0, 80.0}
 """Without meaning for the path: modes of tracking, cancelled compensation and cycles."""
-IGNORED_M = {0.0, 1.0, 6.0, 7.0, 8.0, 9.0}
+IGNORED_M = {7.0, 8.0, 9.0}
+BREAKS_M = {0.0, 1.0, 6.0}
+"""Stops and the change of a tool: somebody may move the axes meanwhile."""
 ENDS = {2.0, 30.0}
 REFUSED_G = {
     5.0: "splines", 5.1: "splines", 5.2: "NURBS", 10.0: "tables set by the program", 28.0: "moves to the machine's home",
@@ -47,7 +53,12 @@ class State:
     length: int | None = None
     """Register of the tool's length (G43 H)."""
     position: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    known: list[bool] = field(default_factory=lambda: [False, False, False])
+    given: list[int] = field(default_factory=lambda: [NEVER, NEVER, NEVER])
+    """Line that first gives each axis by an absolute word."""
+    said: set[str] = field(default_factory=set)
+    """Groups of modal words of which one stood (`GROUPS`)."""
+    breaks: int = 0
+    """How often it ceased to be sure where the axes stand: another offset or length, a change of tool, a stop, an optional line."""
     turn: float = float("nan")
     """rad of the tool about its axis (C)."""
     ended: bool = False
