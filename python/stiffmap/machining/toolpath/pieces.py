@@ -118,6 +118,8 @@ def _off(points: Floats, arc: MovedPiece, normal: int) -> float:
     radius = np.linalg.norm(spoke, axis=1)
     angle = np.arctan2(spoke[0, 0] * spoke[:, 1] - spoke[0, 1] * spoke[:, 0], spoke @ spoke[0])
     angle = np.where(angle * arc.sweep < -1e-12, angle + np.sign(arc.sweep) * 2 * np.pi, angle)
+    if (np.diff(angle) * arc.sweep < -1e-12).any():  # they go round more than once
+        return float("inf")
     rise = points[:, normal] - points[0, normal]
     along = (points[-1, normal] - points[0, normal]) * angle / arc.sweep
     return float(np.hypot(radius - radius[0], rise - along).max())

@@ -19,12 +19,11 @@ KINDS = {"G0": Kind.RAPID, "G1": Kind.LINE, "G2": Kind.ARC, "G3": Kind.ARC}
 
 
 def lines_of(path: Path) -> Iterator[str]:
-    """Lines of a text file; raises FileError where it cannot be read."""
+    """Lines of a text file, a byte-order mark passed over; a line that is not UTF-8 is Latin-1. Raises FileError where it cannot be read."""
     try:
-        with path.open(encoding="utf-8", errors="strict") as stream:
-            yield from stream
-    except UnicodeDecodeError as error:
-        raise FileError("not UTF-8 text", file=str(path)) from error
+        with path.open(encoding="utf-8-sig", errors="surrogateescape") as stream:
+            for line in stream:
+                yield line if line.isascii() else _decoded(line)
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
 
@@ -78,8 +77,17 @@ def load_gcode(
         text=tuple(text),
         turn=_turns(v[:, 12]),
         offsets=dict(reader.offsets),
+        actions=tuple(reader.actions),
         given=(state.given[0], state.given[1], state.given[2]),
     )
+
+
+def _decoded(line: str) -> str:
+    try:
+        line.encode()
+    except UnicodeEncodeError:
+        return line.encode("utf-8", "surrogateescape").decode("latin-1")
+    return line
 
 
 def _turns(given: Floats) -> Floats | None:

@@ -8,10 +8,12 @@ from typing import NamedTuple
 
 from stiffmap.machining.toolpath.gcode import state as meaning
 from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, INCH, MM, State
-from stiffmap.machining.toolpath.gcode.words import fail, read_block
+from stiffmap.machining.toolpath.gcode.words import bare, fail, read_block
 
 CLOSES, CLOSES_SHARE = 5e-6, 1e-3
 """m and share of the radius by which an arc's ends may differ from one circle (LinuxCNC's rule)."""
+LETTERS = frozenset("XYZCIJKRFSTHPQND")
+MOVING = "XYZCIJKR"
 EVERY = 20_000
 """Lines between two calls of `progress`."""
 FARTHEST = 1e4
@@ -40,6 +42,9 @@ class Reader:
     def __init__(self, file: str, offsets: Mapping[str, Sequence[float]] | None = None) -> None:
         """`offsets`: work offsets by name (``G54``), m."""
         self.file, self.state, self.notes, self.optional = file, State(), dict[str, int](), False
+        self.begun, self.moves, self._stops = False, 0, list[str]()
+        self.actions: list[tuple[str, int]] = []
+        """Words that act but do not move, each with the number of moves before it."""
         self.offsets = {k: tuple(map(float, v)) for k, v in (offsets or {}).items()}
 
     def note(self, text: str, number: int) -> None:
@@ -50,34 +55,72 @@ class Reader:
         """The move of a line, if it has one."""
         words, optional = read_block(text, self.file, number)
         if not words:
+            if bare(text) == "%":
+                self.state.ended, self.begun = self.begun, True
             return None
-        if self.optional:
-            self.state.breaks += 1
-        self.optional = optional
-        if optional:
-            self.note("lines with a slash (block delete) are carried out", number)
+        self.begun = True
+        if self.optional or optional:
+            self.state.breaks += self.optional
+            self.optional = optional
+            if optional:
+                self.note("lines with a slash (block delete) are carried out", number)
         s = self.state
         values, own, motion = self._sort(words, number)
-        if motion and not own.isdisjoint({"G53"}) and motion not in ("G0", "G1"):
-            fail(self.file, number, "G53 goes with G0 or G1")
-        s.motion = motion or s.motion
-        moved = [a for a in "XYZCIJKR" if a in values]
-        if "G4" in own or not moved:
-            self._arc_without_words(motion, number)
+        if own:
+            self._one_line(values, own, motion, number)
+        if motion:
+            s.motion = "" if motion == "G80" else motion
+        if values.keys().isdisjoint(MOVING) or not own.isdisjoint(meaning.REFERENCES):
+            if motion in ("G2", "G3"):
+                fail(self.file, number, f"{motion} without an end, a centre or a radius")
+            self._stop()
             return None
         if not s.motion:
-            fail(self.file, number, f"{moved[0]} without a motion: expected G0, G1, G2 or G3 before it")
+            first = next(a for a in MOVING if a in values)
+            fail(
+                self.file,
+                number,
+                f"{first} without a motion: expected G0, G1, G2 or G3 {'in it' if motion else 'before it'}",
+            )
         if not s.unit:
             fail(
                 self.file,
                 number,
                 "the unit is missing: expected G21 (mm) or G20 (inch) before the first move",
             )
-        return self._move(values, "G53" in own, number)
+        move = self._move(values, "G53" in own, number)
+        self.moves += 1
+        self._stop()
+        return move
 
-    def _arc_without_words(self, motion: str, number: int) -> None:
-        if motion in ("G2", "G3"):
-            fail(self.file, number, f"{motion} without an end, a centre or a radius")
+    def _stop(self) -> None:
+        """What stops a program does so after the motion of its line."""
+        if self._stops:
+            self.actions += [(word, self.moves) for word in self._stops]
+            self._stops = []
+
+    def _one_line(self, values: dict[str, float], own: set[str], motion: str, number: int) -> None:
+        """G4, G28, G30, G53, which hold for their line."""
+        s = self.state
+        if "G53" in own and (motion or s.motion) not in ("G0", "G1"):
+            fail(self.file, number, "G53 goes with G0 or G1")
+        if "G53" in own and not s.absolute:
+            fail(self.file, number, "G53 needs absolute positions (G90)")
+        if "G4" in own:
+            if not values.get("P", -1.0) >= 0:
+                fail(self.file, number, "G4 needs the time of the dwell: P of zero or more")
+            if not values.keys().isdisjoint(MOVING):
+                fail(self.file, number, "a dwell (G4) and a motion in one line: expected two lines")
+            self.actions.append((f"G4 P{values['P']:g}", self.moves))
+        for word in sorted(own & meaning.REFERENCES):
+            if motion:
+                fail(self.file, number, f"{word} and {motion} in one line: both take the axes")
+            s.lost |= {a for a in AXES if a in values} or set(AXES)
+            s.breaks += 1
+            self.note(
+                f"{word}: where the reference point lies is not known; nothing may be cut before the axes are given again",
+                number,
+            )
 
     def _sort(
         self, words: tuple[tuple[str, float], ...], number: int
@@ -86,28 +129,37 @@ class Reader:
         values: dict[str, float] = {}
         own: set[str] = set()
         motion = ""
+        groups: dict[str, str] = {}
         for letter, value in words:
-            if letter == "G":
-                if value in meaning.MOTIONS:
-                    if motion:
-                        fail(
-                            self.file,
-                            number,
-                            f"two motions in one line: {motion} and {meaning.MOTIONS[value]}",
-                        )
+            if letter == "G" or letter == "M":
+                group = (meaning.GROUPS if letter == "G" else meaning.GROUPS_M).get(value)
+                if group:
+                    word = f"{letter}{value:g}"
+                    if group in groups:
+                        what = "two motions" if group == "motion" else "two words that exclude each other"
+                        fail(self.file, number, f"{what} in one line: {groups[group]} and {word}")
+                    groups[group] = word
+                if group == "motion":
                     motion = meaning.MOTIONS[value]
-                else:
+                elif letter == "G":
                     self._g(value, own, number)
-            elif letter == "M":
-                self._m(value, number)
-            elif letter in "XYZCIJKRFSTHPN":
+                else:
+                    self._m(value, number)
+            elif letter in LETTERS:
                 if letter in values:
                     fail(self.file, number, f"{letter} is given twice")
                 values[letter] = value
             else:
                 what = "rotary and secondary axes are not read" if letter in "ABUVW" else "unknown word"
                 fail(self.file, number, f"{what}: {letter}{value:g}")
-        self._numbers(values, own, number)
+        if "Q" in values and groups.get("tracking") != "G64":
+            fail(self.file, number, f"unknown word: Q{values['Q']:g}")
+        if "unit" in groups and "F" in values:
+            self.note(
+                "F in a line that changes the unit is taken in the new one; LinuxCNC takes the old one",
+                number,
+            )
+        self._numbers(values, own, number, motion or self.state.motion, groups)
         return values, own, motion
 
     def _g(self, value: float, own: set[str], number: int) -> None:
@@ -116,7 +168,10 @@ class Reader:
             s.plane = meaning.PLANES[value]
             s.said.add("plane")
         elif value in (20.0, 21.0):
-            s.unit = INCH if value == 20.0 else MM
+            unit = INCH if value == 20.0 else MM
+            if s.unit and s.feed is not None and not s.inverse_time:
+                s.feed *= s.unit / unit  # it keeps its speed
+            s.unit = unit
         elif value in (90.0, 91.0):
             s.absolute = value == 90.0
             s.said.add("distance")
@@ -128,12 +183,12 @@ class Reader:
             if s.inverse_time != (value == 93.0):
                 s.inverse_time, s.feed = value == 93.0, None
         elif value in meaning.OFFSETS:
+            s.breaks += s.offset != f"G{value:g}" or "offset" not in s.said
             s.offset = f"G{value:g}"
             s.said.add("offset")
-            s.breaks += 1
             if self.offsets and s.offset not in self.offsets:
                 fail(self.file, number, f"no work offset {s.offset}; given: {', '.join(self.offsets)}")
-        elif value in (4.0, 43.0, 53.0):
+        elif value in (4.0, 28.0, 30.0, 43.0, 53.0):
             own.add(f"G{value:g}")
         elif value not in meaning.IGNORED_G:
             why = meaning.REFUSED_G.get(value)
@@ -146,6 +201,10 @@ class Reader:
             self.note(f"G{value:g}: how closely the controller tracks corners is not simulated", number)
 
     def _m(self, value: float, number: int) -> None:
+        if meaning.GROUPS_M.get(value) == "stop":
+            self._stops.append(f"M{value:g}")
+        else:
+            self.actions.append((f"M{value:g}", self.moves))
         if value in (3.0, 4.0, 5.0):
             self.state.spindle = {3.0: 1, 4.0: -1, 5.0: 0}[value]
         elif value in meaning.ENDS:
@@ -157,7 +216,9 @@ class Reader:
         elif value not in meaning.IGNORED_M:
             fail(self.file, number, f"unknown word: M{value:g}")
 
-    def _numbers(self, values: dict[str, float], own: set[str], number: int) -> None:
+    def _numbers(
+        self, values: dict[str, float], own: set[str], number: int, motion: str, groups: dict[str, str]
+    ) -> None:
         s = self.state
         if "F" in values:
             if not values["F"] > 0:
@@ -175,7 +236,10 @@ class Reader:
             self.note("G43: programmed positions are taken as those of the tool's tip", number)
         elif "H" in values:
             fail(self.file, number, "H goes with G43")
-        if "P" in values and "G4" not in own and self.state.motion not in ("G2", "G3"):
+        if "P" in values and groups.get("tracking") == "G64":
+            if motion in ("G2", "G3") and not values.keys().isdisjoint(MOVING):
+                fail(self.file, number, "P is for G64 and for the arc: expected two lines")
+        elif "P" in values and "G4" not in own and motion not in ("G2", "G3"):
             self.note("P is for dwells and arcs; here it is not used", number)
 
     def _move(self, values: dict[str, float], machine: bool, number: int) -> Move:
@@ -183,6 +247,12 @@ class Reader:
         shift = (0.0, 0.0, 0.0) if machine else self.offsets.get(s.offset, (0.0, 0.0, 0.0))
         start = (s.position[0], s.position[1], s.position[2])
         end = list(start)
+        if s.lost and s.motion != "G0":
+            fail(
+                self.file,
+                number,
+                f"where {', '.join(sorted(s.lost))} stands after a reference point is not known: expected a rapid there (G90 G0)",
+            )
         for i, axis in enumerate(AXES):
             if axis in values:
                 step = values[axis] * s.unit
@@ -190,12 +260,14 @@ class Reader:
                 if not abs(end[i]) < FARTHEST:
                     fail(self.file, number, f"{axis}{values[axis]:g} is {end[i]:.3g} m: beyond any machine")
                 if s.absolute or machine:
-                    s.given[i] = min(s.given[i], number)
+                    if s.given[i] > number:
+                        s.given[i] = number
+                    s.lost.discard(axis)
         goal = (end[0], end[1], end[2])
         centre, sweep = (nan, nan, nan), 0.0
         if s.motion in ("G2", "G3"):
             centre, sweep = self._arc(values, start, goal, shift, number)
-        elif any(w in values for w in "IJKR"):
+        elif not values.keys().isdisjoint("IJKR"):
             fail(self.file, number, f"I, J, K and R go with G2 or G3, not with {s.motion}")
         feed = nan
         if s.motion != "G0":

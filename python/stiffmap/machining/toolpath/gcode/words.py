@@ -48,7 +48,7 @@ def plain(token: str) -> str:
 
 def bare(text: str) -> str:
     """Letters and numbers of a line, without comments and blanks."""
-    return "".join(_COMMENT.sub("", text).split()).upper()
+    return "".join((_COMMENT.sub("", text) if "(" in text or ";" in text else text).split()).upper()
 
 
 def fail(file: str, number: int, message: str) -> NoReturn:
@@ -68,19 +68,18 @@ def read_block(text: str, file: str, number: int) -> Block:
     for sign, message in _REFUSED:
         if sign in line:
             fail(file, number, message)
-    optional = line.startswith("/")
-    line = line.removeprefix("/")
-    if line.startswith("O"):
+    optional = line[0] == "/"
+    line = line[1:] if optional else line
+    if line[:1] == "O":
+        if line[1:].isdecimal():  # the number of the program
+            return Block((), optional)
         fail(file, number, f"subprograms and loops (O words) are not read: {text.strip()[:40]!r}")
-    words, at = [], 0
-    for match in _WORD.finditer(line):
-        if match.start() != at:
-            break
-        words.append((match[1], float(match[2])))
-        at = match.end()
-    large = [w for w in words if abs(w[1]) > LARGEST]
-    if large:
-        fail(file, number, f"the number of {large[0][0]} is too large")
-    if at != len(line):
-        fail(file, number, f"expected words such as X12.5, found {line[at : at + 30]!r}")
-    return Block(tuple(words), optional)
+    parts = _WORD.split(line)
+    if any(parts[::3]):
+        wrong = next(k for k, between in enumerate(parts[::3]) if between)
+        fail(file, number, f"expected words such as X12.5, found {''.join(parts[3 * wrong :])[:30]!r}")
+    words = tuple(zip(parts[1::3], map(float, parts[2::3]), strict=True))
+    for letter, value in words:
+        if not -LARGEST <= value <= LARGEST:
+            fail(file, number, f"the number of {letter} is too large")
+    return Block(words, optional)
