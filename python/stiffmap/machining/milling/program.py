@@ -34,6 +34,9 @@ class Program:
     """(moves of `path`,) the move of the wanted path that each is a piece of."""
     pieces: int
     """Cutting moves that were written."""
+    command: Floats
+    """(m, 3) m, part's axes: what the cuts of the program go through, in this order."""
+    within: float
 
 
 def program(job: Setting, command: Floats, within: float = WITHIN, feeds: Floats | None = None) -> Program:
@@ -73,7 +76,7 @@ def program(job: Setting, command: Floats, within: float = WITHIN, feeds: Floats
             moved[i - 1] = [MovedPiece(Kind(int(path.kind[i - 1])), end, np.full(3, np.nan), 0.0, angle)]
     text, origin = rewritten(_turning(path, points.move[first], turn, first, last), moved, feeds)
     again = load_gcode(text.splitlines(), name=path.name, offsets=path.offsets or None)
-    return Program(text, ".ngc", again, np.array(origin), sum(map(len, moved.values())))
+    return Program(text, ".ngc", again, np.array(origin), sum(map(len, moved.values())), part, within)
 
 
 def _turning(
@@ -117,4 +120,4 @@ def _table(job: Setting, part: Floats, turn: Floats | None) -> Program:
     again = path_of(
         np.round(part, 9), feed=job.feed, spindle=spindle, tool=points.tool, name=path.name, turn=turn
     )
-    return Program(buffer.getvalue(), ".csv", again, points.move[1:], len(again))
+    return Program(buffer.getvalue(), ".csv", again, points.move[1:], len(again), part, WITHIN)

@@ -11,7 +11,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
 from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
-from stiffmap.machining.toolpath.gcode.state import NEVER
+from stiffmap.machining.toolpath.gcode.state import NEVER, State
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
 NUMBERS = 13
@@ -35,15 +35,19 @@ def load_gcode(
     offsets: Mapping[str, Sequence[float]] | None = None,
     progress: Callable[[int], None] | None = None,
     keep_text: bool = True,
+    start: Sequence[float] | None = None,
 ) -> Toolpath:
     """Moves of a program.
 
     offsets: work offsets by name (``G54``), m; None: all zero. progress: called with the number of lines read.
     keep_text: False where the program will not be written again, so that memory holds numbers only.
+    start: where a controller stands of whose modes nothing is known (3,), m, NaN: not known either; None: at 0, as usual.
     Raises FileError naming file and line.
     """
     file = str(source) if isinstance(source, Path) else name or "program"
     reader = Reader(file, offsets)
+    if start is not None:
+        reader.state = State.unknown(start)
     text: list[str] = []
     lines: Iterable[str] = lines_of(source) if isinstance(source, Path) else source
     if keep_text:

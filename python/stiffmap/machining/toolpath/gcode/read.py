@@ -257,7 +257,7 @@ class Reader:
             if axis in values:
                 step = values[axis] * s.unit
                 end[i] = step + shift[i] if s.absolute or machine else start[i] + step
-                if not abs(end[i]) < FARTHEST:
+                if abs(end[i]) >= FARTHEST:
                     fail(self.file, number, f"{axis}{values[axis]:g} is {end[i]:.3g} m: beyond any machine")
                 if s.absolute or machine:
                     if s.given[i] > number:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import pi
 
@@ -77,6 +78,11 @@ class State:
     turn: float = float("nan")
     """rad of the tool about its axis (C)."""
     ended: bool = False
+
+    @classmethod
+    def unknown(cls, start: Sequence[float]) -> State:
+        """A controller that stands where nobody knows (NaN in `start`, m) and otherwise than programs take for granted."""
+        return cls(0.0, "", 0, False, True, True, offset="", position=list(start))
 
     @property
     def rate(self) -> float:

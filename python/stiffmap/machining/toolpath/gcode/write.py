@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.machining.toolpath.gcode.read import Reader
+from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
 from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, INCH, STARTS, State
 from stiffmap.machining.toolpath.gcode.words import bare, plain, tokens_of
 from stiffmap.machining.toolpath.path import Kind, Toolpath
@@ -35,6 +35,7 @@ def rewritten(
     """
     reader = Reader(path.name, path.offsets)
     speed = path.feed if feeds is None else feeds
+    starts = _starts(path)
     turned, driven = nan, (nan, 0.0)
     by_line = {int(line): i for i, line in enumerate(path.line)}
     out: list[str] = []
@@ -45,6 +46,9 @@ def rewritten(
         if reader.state.ended:
             out.append(text)
             continue
+        if starts and bare(text).lstrip("%")[:1] not in ("", "O"):
+            out.append(starts)
+            starts = ""
         move = reader.block(text, number)
         state = reader.state
         if state.breaks != breaks:
@@ -56,8 +60,6 @@ def rewritten(
         if move is None or i is None:
             out.append(text)
             continue
-        if not origin and (starts := _starts(path, state)):
-            out.append(starts)
         new = pieces.get(i)
         if new is None:
             new = [_as_it_was(path, i, written)]
@@ -100,9 +102,11 @@ def rewritten(
     return "\n".join(out) + "\n", origin
 
 
-def _starts(path: Toolpath, state: State) -> str:
-    """What is taken without being said and matters: a controller may hold something else."""
-    silent = [w for group, w in STARTS.items() if group not in state.said]
+def _starts(path: Toolpath) -> str:
+    """What is taken without being said before the first move and matters: a controller may hold something else."""
+    reader = Reader(path.name, path.offsets)
+    next(read_moves(path.text, reader), None)
+    silent = [w for group, w in STARTS.items() if group not in reader.state.said]
     if not (path.kind == Kind.ARC).any():
         silent = [w for w in silent if w not in ("G17", "G91.1")]
     return " ".join(w for w in silent if w != "G54" or path.offsets)
