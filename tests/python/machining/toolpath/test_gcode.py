@@ -11,6 +11,7 @@ import pytest
 from stiffmap.common.errors import FileError
 from stiffmap.machining.toolpath import load_path
 from stiffmap.machining.toolpath.gcode.load import load_gcode
+from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
 from stiffmap.machining.toolpath.gcode.words import read_block
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
@@ -268,3 +269,48 @@ def test_refused_as_linuxcnc_does(text: str, message: str) -> None:
 def test_g80_leaves_the_rest() -> None:
     p = read("G0 X0 Y0 Z0\nG1 X30\nG80\nG1 Y30\n")
     assert 1e3 * p.length[p.cuts] == pytest.approx([30, 30])
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["G1 X1.5", "X-2 Y3. F300", "G00 X1 Y2 Z3", "N7 G01 Z-.5", "G1X2Y3F20.5", "Y4 (a)", "G0", "F500", "N3", "X1e2", "G1 X0 Y0 Z0 F0", "X99999999", "X1 X2", "", "G1 X--1", "G1 F99999999999 X1"],
+)  # fmt: skip
+@pytest.mark.parametrize(
+    "before",
+    [
+        "G21 G90 S6000 M3 F600",
+        "G20 G91 M3 S1 F9",
+        "G21 G93 M3",
+        "G21 F600",
+        "G21 M3 S5 F60\nG28",
+        "G21 M3 S5 F60 G2",
+    ],
+)
+def test_the_quick_way_reads_the_same(line: str, before: str) -> None:
+    """A space ahead sends a line the long way."""
+    found: list[object] = []
+    for ahead in ("", " "):
+        reader = Reader("p", {"G54": (0.1, 0, 0)})
+        try:
+            moves = list(
+                read_moves(
+                    [
+                        *before.split("\n"),
+                        "G1 X3" if "G93" not in before else "",
+                        ahead + line,
+                        ahead + "X7 F8",
+                    ],
+                    reader,
+                )
+            )
+        except FileError as error:
+            found.append(str(error))
+        else:
+            found.append(
+                (
+                    [tuple(map(repr, map(list, m[1:4]))) + (m.motion, repr(m[4:])) for m in moves],
+                    reader.state.given,
+                    reader.moves,
+                )
+            )
+    assert found[0] == found[1]
