@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from tests.python.machining.toolpath.controller import UNKNOWN, Controller
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill_job
 from stiffmap.machining.milling.verify import run
-from stiffmap.machining.toolpath import outline
+from stiffmap.machining.toolpath import load_path, outline
 from stiffmap.machining.toolpath.entry import entered_at, turned_round
 from stiffmap.machining.toolpath.gcode.fresh import fresh_text
 from stiffmap.machining.toolpath.gcode.load import load_gcode
@@ -181,3 +182,31 @@ def test_a_spoilt_program_is_not_within(how: str) -> None:
     assert text != found.program.text
     with pytest.raises(StiffmapError):
         run(found.job, replace(found.program, text=text))
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "0,0,5 0,0,0 40,0,0 40,0,5 40,60,5 40,60,0 0,60,0 0,60,5",
+        "0,0,0 40,0,0 40,0,5 40,60,5 40,60,0 0,60,0",
+        "0,0,5 0,0,0 40,0,0",
+        "0,0,0 40,0,0 40,30,0",
+    ],
+)
+def test_a_table_keeps_what_leads_from_cut_to_cut(tmp_path: Path, rows: str) -> None:
+    file = tmp_path / "p.csv"
+    file.write_text("\n".join(["x_mm,y_mm,z_mm", *rows.split()]) + "\n")
+    path = load_path(file)
+    found = mill_job(gantry(x=1e-4, y=2.5e-4), path, "trimming", at=(0, 0, 0))
+    again = tmp_path / "out.csv"
+    again.write_text(found.program.text)
+    made = load_path(again)
+    want = np.array([[float(v) for v in r.split(",")] for r in rows.split()])
+    got = 1e3 * np.vstack([made.start[:1], made.end])
+    at = 0
+    for point in want:  # every point, in order
+        near = np.flatnonzero(np.linalg.norm(got[at:] - point, axis=1) < FAR)
+        assert near.size, point
+        at += int(near[0])
+    assert len(found.program.origin) == len(found.program.path)
+    assert 1e3 * made.length.sum() == pytest.approx(1e3 * path.length.sum(), abs=6 * FAR)

@@ -10,13 +10,19 @@ from stiffmap.machining.toolpath.gcode.load import load_gcode
 from stiffmap.machining.toolpath.gcode.state import CENTRES
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
+COOLANT = ("M7", "M8", "M9")
 PLANES = {2: "G17", 1: "G18", 0: "G19"}
 
 
 def fresh_text(path: Toolpath) -> str:
-    """Lines in mm, absolute, one per move; the controller adds the first of the work offsets again, if there are any."""
+    """Lines in mm, absolute, one per move, with the coolant of the first cut; the controller adds the first of the work offsets again, if there are any."""
     offset, shift = next(iter(path.offsets.items()), ("", (0.0, 0.0, 0.0)))
     out = [f"({path.name})", f"G21 G90 G94 G40 G17 G91.1 {offset}".strip()]
+    cooled: list[str] = []
+    for word, before in path.actions:
+        if before <= int(np.argmax(path.cuts)) and word in COOLANT:
+            cooled = [] if word == "M9" else [*cooled, word]
+    out += dict.fromkeys(cooled)
     at, plane, feed, spindle, turn = np.full(3, nan), 2, nan, nan, nan
     for i in range(len(path)):
         words = []
@@ -54,7 +60,7 @@ def fresh_text(path: Toolpath) -> str:
             words.append(f"F{_text(6e4 * feed)}")
         out.append(" ".join(words))
         at = np.where([a in free for a in range(3)], at, end)
-    return "\n".join([*out, "M5", "M2"]) + "\n"
+    return "\n".join([*out, *(["M9"] if cooled else []), "M5", "M2"]) + "\n"
 
 
 def with_lines(path: Toolpath, like: Toolpath) -> Toolpath:
