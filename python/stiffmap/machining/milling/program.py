@@ -34,6 +34,9 @@ class Program:
     """(moves of `path`,) the move of the wanted path that each is a piece of."""
     pieces: int
     """Cutting moves that were written."""
+    command: Floats
+    """(m, 3) m, part's axes: what the cuts of the program go through, in this order."""
+    within: float
 
 
 def program(job: Setting, command: Floats, within: float = WITHIN, feeds: Floats | None = None) -> Program:
@@ -73,7 +76,7 @@ def program(job: Setting, command: Floats, within: float = WITHIN, feeds: Floats
             moved[i - 1] = [MovedPiece(Kind(int(path.kind[i - 1])), end, np.full(3, np.nan), 0.0, angle)]
     text, origin = rewritten(_turning(path, points.move[first], turn, first, last), moved, feeds)
     again = load_gcode(text.splitlines(), name=path.name, offsets=path.offsets or None)
-    return Program(text, ".ngc", again, np.array(origin), sum(map(len, moved.values())))
+    return Program(text, ".ngc", again, np.array(origin), sum(map(len, moved.values())), part, within)
 
 
 def _turning(
@@ -103,18 +106,37 @@ def _first(turn: Floats | None) -> float:
 
 def _table(job: Setting, part: Floats, turn: Floats | None) -> Program:
     """Points of the compensated path with feed, spindle and tool axis."""
+    command = part
     points, path = job.points, job.path
     buffer = io.StringIO()
     out = csv.writer(buffer, lineterminator="\n")
-    spindle = np.where(np.isfinite(points.spindle), points.spindle, job.process.spindle)
+    # what leads from one cut to the next stands in it as well: a table without it would go straight across the part
+    idle = np.flatnonzero(~path.cuts)
+    lead = np.searchsorted(points.move, idle + 1)
+    leads = np.isin(idle + 1, points.move)
+    ends = np.where(leads[:, None], part[np.minimum(lead, len(part) - 1)], path.end[idle])
+    head = idle[:1][idle[:1] == 0]  # where the path begins, if not in a cut
+    move = np.r_[head, idle, points.move]
+    order = np.argsort(move, kind="stable")
+
+    def column(of_moves: Floats, of_points: Floats) -> Floats:
+        return np.concatenate([of_moves[head], of_moves[idle], of_points])[order]
+
+    part = np.concatenate([path.start[head], ends, part])[order]
+    move = move[order]
+    feed = column(np.where(np.isfinite(path.feed), path.feed, job.process.feed), job.feed)
+    spindle = column(path.spindle, points.spindle)
+    spindle = np.where(np.isfinite(spindle), spindle, job.process.spindle)
+    tool = column(path.tool, points.tool)
+    if turn is not None:
+        turned = np.full(len(path), turn[0]) if path.turn is None else path.turn
+        turn = column(turned, turn)
     names = ["x_mm", "y_mm", "z_mm", "feed_mm_min", "spindle_rpm", "i", "j", "k"]
     out.writerow(names + ([] if turn is None else ["turn_deg"]))
-    columns = np.hstack([1e3 * part, (6e4 * job.feed)[:, None], (spindle * 30 / np.pi)[:, None], points.tool])
+    columns = np.hstack([1e3 * part, (6e4 * feed)[:, None], (spindle * 30 / np.pi)[:, None], tool])
     if turn is not None:
         columns = np.hstack([columns, np.degrees(turn)[:, None]])
     for row in columns:
         out.writerow([f"{v:.9g}" if k > 2 else f"{v:.6f}" for k, v in enumerate(row)])
-    again = path_of(
-        np.round(part, 9), feed=job.feed, spindle=spindle, tool=points.tool, name=path.name, turn=turn
-    )
-    return Program(buffer.getvalue(), ".csv", again, points.move[1:], len(again))
+    again = path_of(np.round(part, 9), feed=feed, spindle=spindle, tool=tool, name=path.name, turn=turn)
+    return Program(buffer.getvalue(), ".csv", again, move[1:], len(points) - 1, command, WITHIN)

@@ -8,16 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling.equilibrium import Equilibrium, equilibrium
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.program import Program
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.toolpath import Points, Toolpath
+from stiffmap.machining.toolpath.gcode.load import load_gcode
 from stiffmap.machining.toolpath.path import Kind
 from stiffmap.machining.toolpath.sampling import sampled
 from stiffmap.solve.machine import Machine
 
 ROUNDS = 3
+TOLERANCE = 1e-7
+"""m: numbers are written to 1e-9 m, inches to 3e-9 m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +46,7 @@ def run(
     threads: int | None = None,
 ) -> Run:
     """Simulate a program on the job's machine or on another one, the force re-evaluated at the true distance from the wall."""
+    must_cut_whole(job, made)
     p = made.path
     own = sampled(p, step)
     u = job.place.points(own.position)
@@ -62,6 +67,78 @@ def run(
         at = job.place.back(here.position + np.nan_to_num(state.error))
     normal = (state.error * here.off).sum(axis=1)
     return Run(here, state, normal, way)
+
+
+def must_cut_whole(job: Setting, made: Program) -> None:
+    """The text, read by a controller that starts anywhere, cuts what is commanded, whole and in order, and nothing else; what
+    goes with a cut (feed, spindle, coolant, dwell, stop) goes with its pieces. Raises StiffmapError.
+    """
+    path = job.path
+    if not path.text:
+        return
+    first = path.line[int(np.argmax(path.cuts))]
+    start = [np.nan if line <= first else 0.0 for line in path.given]
+    p = load_gcode(made.text.splitlines(), name=path.name, offsets=path.offsets or None, start=start)
+    n, of = len(path), made.origin
+    if not np.array_equal(np.unique(of), np.arange(n)) or (np.diff(of) < 0).any() or len(p) != len(of):
+        raise _wrong(path, f"has {len(p)} moves, {len(of)} were expected", min(len(p), len(of)) - 1, of)
+    cuts = path.cuts[of]
+    slack = TOLERANCE + float(np.linalg.norm(made.command - job.points.position, axis=1).max())
+    far = np.linalg.norm(np.nan_to_num(p.end - path.end[of]), axis=1) > slack
+    same_feed = np.isclose(p.feed, path.feed[of], rtol=1e-3, atol=1e-7, equal_nan=True) | ~(
+        p.length > TOLERANCE
+    )
+    for what, wrong in (
+        (
+            "is rapid where a cut is wanted, or the other way round",
+            (p.kind == Kind.RAPID) != (path.kind[of] == Kind.RAPID),
+        ),
+        ("has another feed", ~same_feed),
+        ("has another speed of the spindle", ~np.isclose(p.spindle, path.spindle[of], equal_nan=True)),
+        ("starts where nobody knows", cuts & ~np.isfinite(p.start).all(axis=1)),
+        ("goes elsewhere", ~cuts & far),
+        ("cuts elsewhere", _elsewhere(job, made, p)),
+    ):
+        if wrong.any():
+            raise _wrong(path, what, int(np.argmax(wrong)), of)
+    after = np.r_[of, n]
+    whole = np.r_[True, np.diff(after) > 0]
+    if [(w, int(after[k])) for w, k in p.actions if whole[k]] != list(path.actions):
+        raise _wrong(path, "does not keep dwells, spindle, coolant or stops where they were", len(of) - 1, of)
+
+
+def _wrong(path: Toolpath, what: str, k: int, of: NDArray[np.int64]) -> StiffmapError:
+    return StiffmapError(
+        f"{path.name}, line {path.line[of[k]]}: the compensated program {what} there; it is not to be run"
+    )
+
+
+def _elsewhere(job: Setting, made: Program, p: Toolpath) -> NDArray[np.bool_]:
+    """(pieces,) cuts that do not follow the commanded points: each ends at one, passes the others in between in order, and is no longer than their way."""
+    of, q, move = made.origin, made.command, job.points.move
+    near = made.within + TOLERANCE
+    wrong = np.zeros(len(p), bool)
+    piece = np.full(len(q), -1)
+    last = np.searchsorted(move, np.arange(len(job.path)), side="right") - 1
+    at, way = 0, np.zeros(len(p))
+    for k in np.flatnonzero(job.path.cuts[of]):
+        if k == 0 or of[k] != of[k - 1]:
+            at = int(np.searchsorted(move, of[k]))
+        begin = at
+        while at <= last[of[k]] and np.abs(q[at] - p.end[k]).max() > TOLERANCE:
+            at += 1
+        wrong[k] = at > last[of[k]] or ((k + 1 == len(of) or of[k + 1] != of[k]) and at != last[of[k]])
+        piece[begin : at + 1] = k
+        way[k] = np.linalg.norm(np.diff(np.vstack([p.start[k], q[begin : at + 1]]), axis=0), axis=1).sum()
+        at += at < last[of[k]]
+    here = np.flatnonzero(piece >= 0)
+    mine = piece[here]
+    share = nearest(p, mine, q[here])
+    off = np.linalg.norm(p.at(mine, share)[0] - q[here], axis=1) > near
+    back = np.r_[False, (np.diff(share) < -1e-6) & (np.diff(mine) == 0)]
+    wrong[mine[off | back]] = True
+    wrong |= (of >= 0) & job.path.cuts[of] & ~(np.nan_to_num(p.length) <= 1.6 * way + near)
+    return wrong
 
 
 def _job(job: Setting, points: Points, angle: Floats | None) -> Setting:

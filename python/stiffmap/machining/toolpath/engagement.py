@@ -72,6 +72,7 @@ def engagement(
     axial = np.full(m, process.cut.axial)
     if stock is not None:
         radial, axial = _in_box(points, process, stock, side)
+    radial[points.along] = axial[points.along] = 0.0
     if process.cut.side == "slot":
         return Engagement(radial, np.zeros(m), np.zeros(m), axial)
     curvature = _over_contact(points, process, -side * (points.bend * points.normal).sum(axis=1))

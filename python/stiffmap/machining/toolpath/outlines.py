@@ -127,7 +127,7 @@ def outline_text(
         raise StiffmapError(f"{name}: expected the size {words}, got {len(given)} numbers")
     (x, y), pieces = make(*given)
     out = [
-        f"({name} {' x '.join(f'{1e3 * v:g}' for v in given)} mm, path of the tool's centre)", "G21 G90 G17 G94 G40",
+        f"({name} {' x '.join(f'{1e3 * v:g}' for v in given)} mm, path of the tool's centre)", "G21 G90 G17 G94 G40 G91.1",
         f"S{rpm:g} M3", f"G0 X{_mm(x)} Y{_mm(y)} Z5", f"G1 Z0 F{60e3 * feed:g}",
     ]  # fmt: skip
     for p in pieces:

@@ -55,6 +55,10 @@ class Toolpath:
     """(n,) rad, turn of an arm's tool about its axis at the end of the move; None: the path says nothing."""
     offsets: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Work offsets with which the G-code was read, m."""
+    actions: tuple[tuple[str, int], ...] = ()
+    """Dwells, words of spindle, coolant and tool, and stops of the G-code, each with the number of moves before it."""
+    given: tuple[int, int, int] = (0, 0, 0)
+    """Line of the file from which on each axis is given; before it, where the tool stands is taken as 0."""
 
     def __len__(self) -> int:
         return len(self.kind)

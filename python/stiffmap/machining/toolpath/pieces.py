@@ -81,7 +81,14 @@ def arc_pieces(
         elif j - i <= 2:
             lines = arc is None or abs(arc.sweep) > WIDEST or bool(_uneven(turn, i, j))
             part = None if turn is None else turn[i : j + 1]
-            out += line_pieces(points[i : j + 1], within, part) if lines or arc is None else [arc]
+            if lines or arc is None or j - i < 2:
+                out += line_pieces(points[i : j + 1], within, part)
+            else:  # one circle, but not one rise: an arc to the middle and one from it
+                share = _angles(points[i : j + 1], arc, normal)[1] / arc.sweep
+                out.append(
+                    MovedPiece(arc.kind, points[middle], arc.centre, share * arc.sweep, _at(turn, middle))
+                )
+                out.append(arc._replace(sweep=(1 - share) * arc.sweep))
         else:
             middle += (middle - i) % 2  # both halves keep an even number of intervals
             stack += [(middle, j), (i, middle)]
@@ -113,11 +120,18 @@ def _arc(points: Floats, middle: int, normal: int, sense: float) -> MovedPiece |
 
 def _off(points: Floats, arc: MovedPiece, normal: int) -> float:
     """m: largest distance of the points from the arc (or helix)."""
-    flat, centre = _flat(points, normal), _flat(arc.centre[None], normal)[0]
-    spoke = flat - centre
-    radius = np.linalg.norm(spoke, axis=1)
-    angle = np.arctan2(spoke[0, 0] * spoke[:, 1] - spoke[0, 1] * spoke[:, 0], spoke @ spoke[0])
-    angle = np.where(angle * arc.sweep < -1e-12, angle + np.sign(arc.sweep) * 2 * np.pi, angle)
+    radius = np.linalg.norm(_flat(points, normal) - _flat(arc.centre[None], normal), axis=1)
+    angle = _angles(points, arc, normal)
+    if (np.diff(angle) * arc.sweep < -1e-12).any():  # they go round more than once
+        return float("inf")
     rise = points[:, normal] - points[0, normal]
     along = (points[-1, normal] - points[0, normal]) * angle / arc.sweep
     return float(np.hypot(radius - radius[0], rise - along).max())
+
+
+def _angles(points: Floats, arc: MovedPiece, normal: int) -> Floats:
+    """(k,) rad of the points along an arc."""
+    spoke = _flat(points, normal) - _flat(arc.centre[None], normal)
+    angle = np.arctan2(spoke[0, 0] * spoke[:, 1] - spoke[0, 1] * spoke[:, 0], spoke @ spoke[0])
+    angle = np.where(angle * arc.sweep < -1e-12, angle + np.sign(arc.sweep) * 2 * np.pi, angle)
+    return np.asarray(angle)

@@ -13,6 +13,8 @@ from stiffmap.machining.toolpath.path import Integers, Kind, Toolpath
 
 CORNER = np.radians(15.0)
 """Turn of a polyline from which on it is a corner and not a curve."""
+ALONG = 1e-3
+"""Share of the travel across the tool below which a move goes along it."""
 MOST = 20_000_000
 """Points of a path."""
 
@@ -47,7 +49,17 @@ class Points:
     def normal(self) -> Floats:
         """(m, 3) to the left of the travel, seen against the tool."""
         n = np.cross(self.tool, self.tangent)
+        if self.along.any() and not self.along.all():  # as beside it, on the same move where that can be
+            good, bad = np.flatnonzero(~self.along), np.flatnonzero(self.along)
+            after = good[np.minimum(np.searchsorted(good, bad), len(good) - 1)]
+            before = good[np.maximum(np.searchsorted(good, bad) - 1, 0)]
+            n[bad] = n[np.where(self.move[after] == self.move[bad], after, before)]
         return np.asarray(n / np.linalg.norm(n, axis=1, keepdims=True))
+
+    @property
+    def along(self) -> NDArray[np.bool_]:
+        """(m,) points whose travel is along the tool: nothing is cut across there, as in a plunge."""
+        return np.asarray(np.linalg.norm(np.cross(self.tool, self.tangent), axis=1) < ALONG)
 
 
 def sampled(path: Toolpath, step: float = 2e-3) -> Points:
@@ -62,7 +74,8 @@ def sampled(path: Toolpath, step: float = 2e-3) -> Points:
     arcs = (
         path.kind[cuts] == Kind.ARC
     )  # an even number of intervals, and enough for an arc through three of their ends
-    count = np.where(arcs, np.maximum(2 * np.ceil(count / 2), 8), count) + 1
+    turns = np.maximum(1, np.ceil(np.abs(path.sweep[cuts]) / (2 * np.pi) - 1e-9))
+    count = np.where(arcs, np.maximum(2 * np.ceil(count / 2), 8 * turns), count) + 1
     if count.sum() > MOST:
         raise StiffmapError(
             f"step: {count.sum():.3g} points; expected at most {MOST:.0e}: take a larger step"

@@ -77,3 +77,14 @@ def test_fresh_lines_say_the_same() -> None:
         assert getattr(again, name) == pytest.approx(getattr(path, name), abs=1e-8, nan_ok=True), name
     assert again.turn is not None
     assert np.degrees(again.turn)[-1] == pytest.approx(30)
+
+
+@pytest.mark.parametrize(
+    ("before", "kept"),
+    [("M8", ["M8"]), ("M7\nM8", ["M7", "M8"]), ("M8\nM9\nM7", ["M7"]), ("M8\nM9", []), ("", [])],
+)
+def test_lines_of_its_own_keep_the_coolant(before: str, kept: list[str]) -> None:
+    text = f"G21 G90 S6000 M3\nG0 X0 Y0 Z5\n{before}\nG1 Z0 F600\nG1 X50\nM9\nG0 Z5\nM2"
+    made = turned_round(load_gcode(text.splitlines())).text
+    assert [w for w in made if w in ("M7", "M8")] == kept
+    assert ("M9" in made) == bool(kept)

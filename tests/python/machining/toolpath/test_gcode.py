@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from stiffmap.common.errors import FileError
+from stiffmap.machining.toolpath import load_path
 from stiffmap.machining.toolpath.gcode.load import load_gcode
+from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
 from stiffmap.machining.toolpath.gcode.words import read_block
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
@@ -146,3 +149,168 @@ def test_refused(text: str, head: str, message: str) -> None:
         read(text + "\nG1 X3", head)
     assert message in str(caught.value)
     assert f"p.ngc, line {1 + head.count(chr(10))}" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "O0042",
+        "o1234 (name)",
+        "O0042 ; number",
+        "G64 P0.02 Q0.01",
+        "G64 P0.02",
+        "G64 Q0",
+        "G17 G40 G49 G80 G98",
+        "G97 S6000 M3",
+        "M48",
+        "T1 M6",
+        "G4 P0.5",
+    ],
+)
+def test_what_everybody_writes(line: str) -> None:
+    p = read(f"{line}\nG0 X0 Y0 Z0\nG1 X30\n")
+    assert 1e3 * p.length == pytest.approx([0, 30])
+    assert not any("P is for" in note for note in p.notes)
+
+
+@pytest.mark.parametrize(
+    "raw",
+    [
+        "(Ébauche, côté gauche)".encode("latin-1"), "(Fräser Ø12 µm)".encode("latin-1"), "(ébauche)".encode(),
+        b"; \xb0\xff\x80", b"(a) \r",
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
+def test_bytes_of_comments_and_a_mark_do_not_matter(tmp_path: Path, raw: bytes, mark: bytes) -> None:
+    file = tmp_path / "p.nc"
+    file.write_bytes(mark + b"G21 G90 S6000 M3 F600\n" + raw + b"\nG0 X0 Y0 Z0\nG1 X30\n")
+    p = load_path(file)
+    assert 1e3 * p.length == pytest.approx([0, 30])
+    assert "�" not in "".join(p.text)
+    table = tmp_path / "p.csv"
+    table.write_bytes(mark + b"x_mm,y_mm,z_mm\n0,0,0\n30,0,0\n")
+    assert 1e3 * load_path(table).length == pytest.approx([30])
+
+
+@pytest.mark.parametrize("word", ["G28", "G30", "G91 G28 Z0\nG90", "G28 G91 Z0\nG90", "G30 Z5"])
+def test_a_reference_point_is_not_known(word: str) -> None:
+    p = read(f"G0 X0 Y0 Z5\nG1 X30\n{word}\nG0 X0 Y0 Z5\nG1 Y30\n{word}\n")
+    assert 1e3 * p.length[p.cuts] == pytest.approx([30, 30])
+    assert any("reference point" in note for note in p.notes)
+    with pytest.raises(FileError, match=r"line .*: where .*Z stands after a reference point is not known"):
+        read(f"G0 X0 Y0 Z5\nG1 X30\n{word}\nG0 X0 Y0\nG1 Y30\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "length"),
+    [("G2 X20 Y0 I10 J0 P2", 30 * pi), ("G3 X0 Y0 I10 J0 P3", 60 * pi), ("G2 X0 Y0 Z-4 I10 J0 P2", (16 + (40 * pi) ** 2) ** 0.5), ("G18 G3 X20 Z0 I10 K0 P2", 30 * pi)],
+)  # fmt: skip
+def test_turns_of_an_arc_are_no_note(text: str, length: float) -> None:
+    p = read(f"G0 X0 Y0 Z0\n{text}\n")
+    assert 1e3 * p.length[-1] == pytest.approx(length)
+    assert not any("P is for" in note for note in p.notes)
+
+
+@pytest.mark.parametrize(
+    ("text", "speed"),
+    [
+        ("G20 F10\nG21\nG1 X30", 254), ("G21 F254\nG20\nG1 X3", 254), ("G20 F40\nG21\nG20\nG1 X3", 1016), ("G20 F10\nG21\nF300 G1 X30", 300),
+        ("G20 F10\nG21 G1 X30", 254), ("G21 F300\nG21\nG1 X30", 300),
+    ],
+)  # fmt: skip
+def test_a_feed_keeps_its_speed(text: str, speed: float) -> None:
+    p = load_gcode(f"G90 S6000 M3\n{text}".splitlines())
+    assert 6e4 * p.feed[-1] == pytest.approx(speed)
+
+
+@pytest.mark.parametrize(
+    ("text", "moves"),
+    [
+        ("%\nG21 F600 G0 X0\nG1 X30\n%\nG1 X90\n!!", 2), ("(head)\n\n%\nG21 F600 G0 X0\nG1 X30\n % \nG1 X90", 2),
+        ("G21 F600 G0 X0\nG1 X30\n%\nG1 X90", 2), ("%\n%\nG21 G0 X0", 0), ("%\nG21 F600 G0 X0\nG1 X30 M2\nG1 X90", 2), ("G21 F600 G0 X0\nM30 G1 X30\nG1 X90", 2),
+    ],
+)  # fmt: skip
+def test_where_a_program_ends(text: str, moves: int) -> None:
+    if moves:
+        assert len(load_gcode(text.splitlines())) == moves
+    else:
+        with pytest.raises(FileError, match="no moves"):
+            load_gcode(text.splitlines())
+
+
+EXCLUSIVE = [
+    "G90 G91", "G20 G21", "G17 G18", "G93 G94", "G54 G55", "G90.1 G91.1", "G61 G64", "G43 G49 H1", "M3 M5", "M7 M9", "M0 M30",
+    "G28 G53", "G4 G53 P1", "G1 G80 X1", "G98 G99", "G90 G90",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", EXCLUSIVE)
+def test_two_words_of_one_group(text: str) -> None:
+    with pytest.raises(
+        FileError, match=r"p\.ngc, line 2: two (words that exclude each other|motions) in one line"
+    ):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("G80\nX5", "without a motion"), ("G0 X1\nG80\nY5", "without a motion"), ("G80 X5", "without a motion"), ("G1 X1\nG80\nG2", "without an end"),
+        ("G4 P1 X10", "two lines"), ("G1 X1\nG4 P1 Y10", "two lines"), ("G4 X1", "time of the dwell"), ("G4 P-1", "time of the dwell"),
+        ("G1 X1\nG91\nG53 G0 X5", "absolute"), ("G2 X0 Y10 R10\nG53 X5", "G53 goes with"), ("G28 G1 X5", "both take the axes"),
+        ("G64 P0.1 G2 X1 Y0 I0.5 J0", "two lines"), ("G28.1", "reference points"), ("O100 sub", "subprograms"), ("o<name> call", "subprograms"),
+    ],
+)  # fmt: skip
+def test_refused_as_linuxcnc_does(text: str, message: str) -> None:
+    with pytest.raises(FileError, match=message):
+        read(text)
+
+
+def test_g80_leaves_the_rest() -> None:
+    p = read("G0 X0 Y0 Z0\nG1 X30\nG80\nG1 Y30\n")
+    assert 1e3 * p.length[p.cuts] == pytest.approx([30, 30])
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["G1 X1.5", "X-2 Y3. F300", "G00 X1 Y2 Z3", "N7 G01 Z-.5", "G1X2Y3F20.5", "Y4 (a)", "G0", "F500", "N3", "X1e2", "G1 X0 Y0 Z0 F0", "X99999999", "X1 X2", "", "G1 X--1", "G1 F99999999999 X1"],
+)  # fmt: skip
+@pytest.mark.parametrize(
+    "before",
+    [
+        "G21 G90 S6000 M3 F600",
+        "G20 G91 M3 S1 F9",
+        "G21 G93 M3",
+        "G21 F600",
+        "G21 M3 S5 F60\nG28",
+        "G21 M3 S5 F60 G2",
+    ],
+)
+def test_the_quick_way_reads_the_same(line: str, before: str) -> None:
+    """A space ahead sends a line the long way."""
+    found: list[object] = []
+    for ahead in ("", " "):
+        reader = Reader("p", {"G54": (0.1, 0, 0)})
+        try:
+            moves = list(
+                read_moves(
+                    [
+                        *before.split("\n"),
+                        "G1 X3" if "G93" not in before else "",
+                        ahead + line,
+                        ahead + "X7 F8",
+                    ],
+                    reader,
+                )
+            )
+        except FileError as error:
+            found.append(str(error))
+        else:
+            found.append(
+                (
+                    [tuple(map(repr, map(list, m[1:4]))) + (m.motion, repr(m[4:])) for m in moves],
+                    reader.state.given,
+                    reader.moves,
+                )
+            )
+    assert found[0] == found[1]

@@ -11,19 +11,19 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
 from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
+from stiffmap.machining.toolpath.gcode.state import NEVER, State
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
-NUMBERS = 13
+NUMBERS = 10
 KINDS = {"G0": Kind.RAPID, "G1": Kind.LINE, "G2": Kind.ARC, "G3": Kind.ARC}
 
 
 def lines_of(path: Path) -> Iterator[str]:
-    """Lines of a text file; raises FileError where it cannot be read."""
+    """Lines of a text file, a byte-order mark passed over; a line that is not UTF-8 is Latin-1. Raises FileError where it cannot be read."""
     try:
-        with path.open(encoding="utf-8", errors="strict") as stream:
-            yield from stream
-    except UnicodeDecodeError as error:
-        raise FileError("not UTF-8 text", file=str(path)) from error
+        with path.open(encoding="utf-8-sig", errors="surrogateescape") as stream:
+            for line in stream:
+                yield line if line.isascii() else _decoded(line)
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
 
@@ -35,49 +35,65 @@ def load_gcode(
     offsets: Mapping[str, Sequence[float]] | None = None,
     progress: Callable[[int], None] | None = None,
     keep_text: bool = True,
+    start: Sequence[float] | None = None,
 ) -> Toolpath:
     """Moves of a program.
 
     offsets: work offsets by name (``G54``), m; None: all zero. progress: called with the number of lines read.
     keep_text: False where the program will not be written again, so that memory holds numbers only.
+    start: where a controller stands of whose modes nothing is known (3,), m, NaN: not known either; None: at 0, as usual.
     Raises FileError naming file and line.
     """
     file = str(source) if isinstance(source, Path) else name or "program"
     reader = Reader(file, offsets)
+    if start is not None:
+        reader.state = State.unknown(start)
     text: list[str] = []
     lines: Iterable[str] = lines_of(source) if isinstance(source, Path) else source
     if keep_text:
         lines = _kept(lines, text)
-    numbers, codes = array("d"), array("q")
+    numbers, codes = array("d"), array("l")
     for m in read_moves(lines, reader, progress):
-        numbers.extend((*m.start, *m.end, *m.centre, m.sweep, m.feed, m.spindle, m.turn))
+        if not codes:
+            first = m.start
+        numbers.extend((*m.end, *m.centre, m.sweep, m.feed, m.spindle, m.turn))
         codes.extend((KINDS[m.motion], m.plane, m.line))
     n = len(codes) // 3
     if n == 0:
         raise FileError("the program has no moves", file=file)
-    v, c = np.array(numbers).reshape(n, NUMBERS), np.array(codes).reshape(n, 3)
+    v, c = np.frombuffer(numbers).reshape(n, NUMBERS), np.frombuffer(codes, dtype="l").reshape(n, 3)
     state = reader.state
-    missing = [a for a, k in zip("XYZ", state.known, strict=True) if not k]
+    missing = [a for a, line in zip("XYZ", state.given, strict=True) if line == NEVER]
     notes = [f"line {line}: {note}" for note, line in reader.notes.items()]
     if missing:
         notes.append(f"{', '.join(missing)} is never given: taken as 0")
     return Toolpath(
         kind=c[:, 0].astype(np.uint8),
-        start=v[:, 0:3].copy(),
-        end=v[:, 3:6].copy(),
-        centre=v[:, 6:9].copy(),
+        start=np.vstack([first, v[:-1, 0:3]]),
+        end=v[:, 0:3],
+        centre=v[:, 3:6],
         normal=c[:, 1].astype(np.int8),
-        sweep=v[:, 9].copy(),
-        feed=v[:, 10].copy(),
-        spindle=v[:, 11].copy(),
+        sweep=v[:, 6],
+        feed=v[:, 7],
+        spindle=v[:, 8],
         line=c[:, 2].astype(np.int64),
         tool=np.tile([0.0, 0.0, 1.0], (n, 1)),
         name=Path(file).stem,
         notes=tuple(notes),
         text=tuple(text),
-        turn=_turns(v[:, 12]),
+        turn=_turns(v[:, 9]),
         offsets=dict(reader.offsets),
+        actions=tuple(reader.actions),
+        given=(state.given[0], state.given[1], state.given[2]),
     )
+
+
+def _decoded(line: str) -> str:
+    try:
+        line.encode()
+    except UnicodeEncodeError:
+        return line.encode("utf-8", "surrogateescape").decode("latin-1")
+    return line
 
 
 def _turns(given: Floats) -> Floats | None:

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import atan2, copysign, hypot, isfinite, nan, pi, radians, sqrt
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from stiffmap.machining.toolpath.gcode import state as meaning
 from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, INCH, MM, State
-from stiffmap.machining.toolpath.gcode.words import fail, read_block
+from stiffmap.machining.toolpath.gcode.words import bare, fail, read_block
 
 CLOSES, CLOSES_SHARE = 5e-6, 1e-3
 """m and share of the radius by which an arc's ends may differ from one circle (LinuxCNC's rule)."""
+LETTERS = frozenset("XYZCIJKRFSTHPQND")
+MOVING = "XYZCIJKR"
+STRAIGHT = ("G0", "G1")
+NOWHERE, NO_CENTRE = (0.0, 0.0, 0.0), (nan, nan, nan)
+_SIGNED = r"(-?\d+(?:\.\d*)?) ?)?"
+_PLAIN = re.compile(
+    rf"(?:N\d+ ?)?(?:G0?([01]) ?)?(?:X{_SIGNED}(?:Y{_SIGNED}(?:Z{_SIGNED}(?:F(\d{{1,7}}(?:\.\d*)?) ?)?(?:\([^()]*\))?\r?\n?"
+).fullmatch
 EVERY = 20_000
 """Lines between two calls of `progress`."""
 FARTHEST = 1e4
@@ -39,159 +48,254 @@ class Reader:
 
     def __init__(self, file: str, offsets: Mapping[str, Sequence[float]] | None = None) -> None:
         """`offsets`: work offsets by name (``G54``), m."""
-        self.file, self.state, self.notes = file, State(), dict[str, int]()
+        self.file, self.state, self.notes, self.optional = file, State(), dict[str, int](), False
+        self.begun, self.moves, self.number, self._stops = False, 0, 0, list[str]()
+        self.actions: list[tuple[str, int]] = []
+        """Words that act but do not move, each with the number of moves before it."""
         self.offsets = {k: tuple(map(float, v)) for k, v in (offsets or {}).items()}
 
-    def note(self, text: str, number: int) -> None:
+    def fail(self, message: str) -> NoReturn:
+        """Raise an error at the line that is read."""
+        fail(self.file, self.number, message)
+
+    def note(self, text: str) -> None:
         """Keep a sentence with the first line that it is about."""
-        self.notes.setdefault(text, number)
+        self.notes.setdefault(text, self.number)
 
     def block(self, text: str, number: int) -> Move | None:
         """The move of a line, if it has one."""
         words, optional = read_block(text, self.file, number)
+        self.number = number
         if not words:
+            if bare(text) == "%":
+                self.state.ended, self.begun = self.begun, True
             return None
-        if optional:
-            self.note("lines with a slash (block delete) are carried out", number)
+        self.begun = True
+        if self.optional or optional:
+            self.state.breaks += self.optional
+            self.optional = optional
+            if optional:
+                self.note("lines with a slash (block delete) are carried out")
         s = self.state
-        values, own, motion = self._sort(words, number)
-        if motion and not own.isdisjoint({"G53"}) and motion not in ("G0", "G1"):
-            fail(self.file, number, "G53 goes with G0 or G1")
-        s.motion = motion or s.motion
-        moved = [a for a in "XYZCIJKR" if a in values]
-        if "G4" in own or not moved:
-            self._arc_without_words(motion, number)
+        values, own, motion = self._sort(words)
+        if own:
+            self._one_line(values, own, motion)
+        if motion:
+            s.motion = "" if motion == "G80" else motion
+        if values.keys().isdisjoint(MOVING) or not own.isdisjoint(meaning.REFERENCES):
+            if motion in ("G2", "G3"):
+                self.fail(f"{motion} without an end, a centre or a radius")
+            self._stop()
             return None
         if not s.motion:
-            fail(self.file, number, f"{moved[0]} without a motion: expected G0, G1, G2 or G3 before it")
-        if not s.unit:
-            fail(
-                self.file,
-                number,
-                "the unit is missing: expected G21 (mm) or G20 (inch) before the first move",
+            first = next(a for a in MOVING if a in values)
+            self.fail(
+                f"{first} without a motion: expected G0, G1, G2 or G3 {'in it' if motion else 'before it'}"
             )
-        return self._move(values, "G53" in own, number)
+        if not s.unit:
+            self.fail("the unit is missing: expected G21 (mm) or G20 (inch) before the first move")
+        move = self._move(values, "G53" in own, number)
+        self.moves += 1
+        self._stop()
+        return move
 
-    def _arc_without_words(self, motion: str, number: int) -> None:
-        if motion in ("G2", "G3"):
-            fail(self.file, number, f"{motion} without an end, a centre or a radius")
+    def plain(self, line: re.Match[str], number: int) -> Move | None:
+        """The move of a line of the commonest form in the commonest state, as `block` has it but faster; None: ask there."""
+        s = self.state
+        code, *axes, feed = line.groups()
+        motion = f"G{code}" if code else s.motion
+        rate = float(feed) if feed else s.feed
+        usual = (
+            s.unit
+            and s.absolute
+            and s.spindle is not None
+            and not (s.inverse_time or s.lost or self.optional)
+        )
+        if not (usual and rate and motion in STRAIGHT and any(axes)):
+            return None
+        end = s.position.copy()
+        shift = self.offsets.get(s.offset, NOWHERE)
+        for i in range(3):
+            if word := axes[i]:
+                end[i] = float(word) * s.unit + shift[i]
+                if s.given[i] > number:
+                    s.given[i] = number
+                if abs(end[i]) >= FARTHEST:
+                    return None
+        start, s.position, s.motion, s.feed = s.position, end, motion, rate
+        self.moves += 1
+        speed = nan if motion == "G0" else rate * s.unit / 60
+        return Move(motion, start, end, NO_CENTRE, s.plane, 0.0, speed, s.rate, number, s.turn)  # type: ignore[arg-type]
 
-    def _sort(
-        self, words: tuple[tuple[str, float], ...], number: int
-    ) -> tuple[dict[str, float], set[str], str]:
+    def _stop(self) -> None:
+        """What stops a program does so after the motion of its line."""
+        if self._stops:
+            self.actions += [(word, self.moves) for word in self._stops]
+            self._stops = []
+
+    def _one_line(self, values: dict[str, float], own: set[str], motion: str) -> None:
+        """G4, G28, G30, G53, which hold for their line."""
+        s = self.state
+        if "G53" in own and (motion or s.motion) not in ("G0", "G1"):
+            self.fail("G53 goes with G0 or G1")
+        if "G53" in own and not s.absolute:
+            self.fail("G53 needs absolute positions (G90)")
+        if "G4" in own:
+            if not values.get("P", -1.0) >= 0:
+                self.fail("G4 needs the time of the dwell: P of zero or more")
+            if not values.keys().isdisjoint(MOVING):
+                self.fail("a dwell (G4) and a motion in one line: expected two lines")
+            self.actions.append((f"G4 P{values['P']:g}", self.moves))
+        for word in sorted(own & meaning.REFERENCES):
+            if motion:
+                self.fail(f"{word} and {motion} in one line: both take the axes")
+            s.lost |= {a for a in AXES if a in values} or set(AXES)
+            s.breaks += 1
+            self.note(
+                f"{word}: where the reference point lies is not known; nothing may be cut before the axes are given again"
+            )
+
+    def _sort(self, words: tuple[tuple[str, float], ...]) -> tuple[dict[str, float], set[str], str]:
         """Values by letter, words that hold for this line only, and the motion of the line."""
         values: dict[str, float] = {}
         own: set[str] = set()
         motion = ""
+        groups: dict[str, str] = {}
         for letter, value in words:
-            if letter == "G":
-                if value in meaning.MOTIONS:
-                    if motion:
-                        fail(
-                            self.file,
-                            number,
-                            f"two motions in one line: {motion} and {meaning.MOTIONS[value]}",
-                        )
+            if letter == "G" or letter == "M":
+                group = (meaning.GROUPS if letter == "G" else meaning.GROUPS_M).get(value)
+                if group:
+                    word = f"{letter}{value:g}"
+                    if group in groups:
+                        what = "two motions" if group == "motion" else "two words that exclude each other"
+                        self.fail(f"{what} in one line: {groups[group]} and {word}")
+                    groups[group] = word
+                if group == "motion":
                     motion = meaning.MOTIONS[value]
+                elif letter == "G":
+                    self._g(value, own)
                 else:
-                    self._g(value, own, number)
-            elif letter == "M":
-                self._m(value, number)
-            elif letter in "XYZCIJKRFSTHPN":
+                    self._m(value)
+            elif letter in LETTERS:
                 if letter in values:
-                    fail(self.file, number, f"{letter} is given twice")
+                    self.fail(f"{letter} is given twice")
                 values[letter] = value
             else:
                 what = "rotary and secondary axes are not read" if letter in "ABUVW" else "unknown word"
-                fail(self.file, number, f"{what}: {letter}{value:g}")
-        self._numbers(values, own, number)
+                self.fail(f"{what}: {letter}{value:g}")
+        if "Q" in values and groups.get("tracking") != "G64":
+            self.fail(f"unknown word: Q{values['Q']:g}")
+        if "unit" in groups and "F" in values:
+            self.note("F in a line that changes the unit is taken in the new one; LinuxCNC takes the old one")
+        self._numbers(values, own, motion or self.state.motion, groups)
         return values, own, motion
 
-    def _g(self, value: float, own: set[str], number: int) -> None:
+    def _g(self, value: float, own: set[str]) -> None:
         s = self.state
         if value in meaning.PLANES:
             s.plane = meaning.PLANES[value]
+            s.said.add("plane")
         elif value in (20.0, 21.0):
-            s.unit = INCH if value == 20.0 else MM
+            unit = INCH if value == 20.0 else MM
+            if s.unit and s.feed is not None and not s.inverse_time:
+                s.feed *= s.unit / unit  # it keeps its speed
+            s.unit = unit
         elif value in (90.0, 91.0):
             s.absolute = value == 90.0
+            s.said.add("distance")
         elif value in (90.1, 91.1):
             s.absolute_centres = value == 90.1
+            s.said.add("centres")
         elif value in (93.0, 94.0):
+            s.said.add("feed mode")
             if s.inverse_time != (value == 93.0):
                 s.inverse_time, s.feed = value == 93.0, None
         elif value in meaning.OFFSETS:
+            s.breaks += s.offset != f"G{value:g}" or "offset" not in s.said
             s.offset = f"G{value:g}"
+            s.said.add("offset")
             if self.offsets and s.offset not in self.offsets:
-                fail(self.file, number, f"no work offset {s.offset}; given: {', '.join(self.offsets)}")
-        elif value in (4.0, 43.0, 53.0):
+                self.fail(f"no work offset {s.offset}; given: {', '.join(self.offsets)}")
+        elif value in (4.0, 28.0, 30.0, 43.0, 53.0):
             own.add(f"G{value:g}")
         elif value not in meaning.IGNORED_G:
             why = meaning.REFUSED_G.get(value)
-            fail(
-                self.file,
-                number,
+            self.fail(
                 f"G{value:g}: {why or 'unknown word'}{' are not read' if why and '(' not in why else ''}",
             )
         elif value in (61.0, 61.1, 64.0):
-            self.note(f"G{value:g}: how closely the controller tracks corners is not simulated", number)
+            self.note(f"G{value:g}: how closely the controller tracks corners is not simulated")
 
-    def _m(self, value: float, number: int) -> None:
+    def _m(self, value: float) -> None:
+        if meaning.GROUPS_M.get(value) == "stop":
+            self._stops.append(f"M{value:g}")
+        else:
+            self.actions.append((f"M{value:g}", self.moves))
         if value in (3.0, 4.0, 5.0):
             self.state.spindle = {3.0: 1, 4.0: -1, 5.0: 0}[value]
         elif value in meaning.ENDS:
             self.state.ended = True
+        elif value in meaning.BREAKS_M:
+            self.state.breaks += 1
         elif value in meaning.REFUSED_M:
-            fail(self.file, number, f"M{value:g}: {meaning.REFUSED_M[value]} are not read")
+            self.fail(f"M{value:g}: {meaning.REFUSED_M[value]} are not read")
         elif value not in meaning.IGNORED_M:
-            fail(self.file, number, f"unknown word: M{value:g}")
+            self.fail(f"unknown word: M{value:g}")
 
-    def _numbers(self, values: dict[str, float], own: set[str], number: int) -> None:
+    def _numbers(self, values: dict[str, float], own: set[str], motion: str, groups: dict[str, str]) -> None:
         s = self.state
         if "F" in values:
             if not values["F"] > 0:
-                fail(self.file, number, f"expected a feed above zero, found F{values['F']:g}")
+                self.fail(f"expected a feed above zero, found F{values['F']:g}")
             s.feed = values["F"]
         if "S" in values:
             if values["S"] < 0:
-                fail(self.file, number, f"expected a speed of zero or more, found S{values['S']:g}")
+                self.fail(f"expected a speed of zero or more, found S{values['S']:g}")
             s.speed = values["S"]
         if "G43" in own:
             if "H" not in values:
-                fail(self.file, number, "G43 needs the register of the tool's length: H")
+                self.fail("G43 needs the register of the tool's length: H")
             s.length = int(values["H"])
-            self.note("G43: programmed positions are taken as those of the tool's tip", number)
+            s.breaks += 1
+            self.note("G43: programmed positions are taken as those of the tool's tip")
         elif "H" in values:
-            fail(self.file, number, "H goes with G43")
-        if "P" in values and "G4" not in own and self.state.motion not in ("G2", "G3"):
-            self.note("P is for dwells and arcs; here it is not used", number)
+            self.fail("H goes with G43")
+        if "P" in values and groups.get("tracking") == "G64":
+            if motion in ("G2", "G3") and not values.keys().isdisjoint(MOVING):
+                self.fail("P is for G64 and for the arc: expected two lines")
+        elif "P" in values and "G4" not in own and motion not in ("G2", "G3"):
+            self.note("P is for dwells and arcs; here it is not used")
 
     def _move(self, values: dict[str, float], machine: bool, number: int) -> Move:
         s = self.state
         shift = (0.0, 0.0, 0.0) if machine else self.offsets.get(s.offset, (0.0, 0.0, 0.0))
         start = (s.position[0], s.position[1], s.position[2])
         end = list(start)
+        if s.lost and s.motion != "G0":
+            self.fail(
+                f"where {', '.join(sorted(s.lost))} stands after a reference point is not known: expected a rapid there (G90 G0)"
+            )
         for i, axis in enumerate(AXES):
             if axis in values:
                 step = values[axis] * s.unit
                 end[i] = step + shift[i] if s.absolute or machine else start[i] + step
-                if not abs(end[i]) < FARTHEST:
-                    fail(self.file, number, f"{axis}{values[axis]:g} is {end[i]:.3g} m: beyond any machine")
-                s.known[i] = True
+                if abs(end[i]) >= FARTHEST:
+                    self.fail(f"{axis}{values[axis]:g} is {end[i]:.3g} m: beyond any machine")
+                if s.absolute or machine:
+                    if s.given[i] > number:
+                        s.given[i] = number
+                    s.lost.discard(axis)
         goal = (end[0], end[1], end[2])
         centre, sweep = (nan, nan, nan), 0.0
         if s.motion in ("G2", "G3"):
-            centre, sweep = self._arc(values, start, goal, shift, number)
-        elif any(w in values for w in "IJKR"):
-            fail(self.file, number, f"I, J, K and R go with G2 or G3, not with {s.motion}")
+            centre, sweep = self._arc(values, start, goal, shift)
+        elif not values.keys().isdisjoint("IJKR"):
+            self.fail(f"I, J, K and R go with G2 or G3, not with {s.motion}")
         feed = nan
         if s.motion != "G0":
-            feed = self._feed(values, start, goal, sweep, centre, number)
+            feed = self._feed(values, start, goal, sweep, centre)
             if s.spindle is None:
-                self.note(
-                    "no M3 stands before a move at feed: the spindle's speed is taken from the process",
-                    number,
-                )
+                self.note("no M3 stands before a move at feed: the spindle's speed is taken from the process")
         if "C" in values:  # the turn of the tool about its own axis
             s.turn = radians(values["C"]) + (0.0 if s.absolute or not isfinite(s.turn) else s.turn)
         s.position = end
@@ -204,12 +308,11 @@ class Reader:
         end: tuple[float, ...],
         sweep: float,
         centre: tuple[float, ...],
-        number: int,
     ) -> float:
         s = self.state
         if s.inverse_time:
             if "F" not in values:
-                fail(self.file, number, "under G93 every move needs its own F")
+                self.fail("under G93 every move needs its own F")
             way = hypot(*(b - a for a, b in zip(start, end, strict=True)))
             if sweep:
                 flat = [i for i in range(3) if i != s.plane]
@@ -217,7 +320,7 @@ class Reader:
                 way = hypot(radius * sweep, end[s.plane] - start[s.plane])
             return way * values["F"] / 60
         if s.feed is None:
-            fail(self.file, number, f"{s.motion} without a feed: F was never given")
+            self.fail(f"{s.motion} without a feed: F was never given")
         return s.feed * s.unit / 60
 
     def _arc(
@@ -226,7 +329,6 @@ class Reader:
         start: tuple[float, float, float],
         end: tuple[float, float, float],
         shift: tuple[float, ...],
-        number: int,
     ) -> tuple[tuple[float, float, float], float]:
         """Centre and sweep about the plane's normal."""
         s = self.state
@@ -235,33 +337,28 @@ class Reader:
         ax, ay, bx, by = start[i], start[j], end[i], end[j]
         if "R" in values:
             if any(w in values for w in "IJK"):
-                fail(self.file, number, "an arc has a centre (I J K) or a radius (R), not both")
-            x, y = self._centre_of_radius(values["R"] * s.unit, sense, (ax, ay), (bx, by), number)
+                self.fail("an arc has a centre (I J K) or a radius (R), not both")
+            x, y = self._centre_of_radius(values["R"] * s.unit, sense, (ax, ay), (bx, by))
         else:
             given = CENTRES[s.plane]
             wrong = [w for w in "IJK" if w in values and w not in given]
             if wrong:
-                fail(
-                    self.file,
-                    number,
-                    f"{wrong[0]} does not lie in the plane of the arc (G{ {2: 17, 1: 18, 0: 19}[s.plane] })",
+                self.fail(
+                    f"{wrong[0]} does not lie in the plane of the arc (G{ {2: 17, 1: 18, 0: 19}[s.plane] })"
                 )
             if not any(w in values for w in given):
-                fail(self.file, number, f"{s.motion} without a centre ({' '.join(given)}) or a radius (R)")
+                self.fail(f"{s.motion} without a centre ({' '.join(given)}) or a radius (R)")
             c = {w: values[w] * s.unit if w in values else None for w in given}
             names = "IJK"
             x, y = (
                 (ax, ay)[k] + (c[names[axis]] or 0.0)
                 if not s.absolute_centres
-                else self._absolute(c[names[axis]], shift[axis], number)
+                else self._absolute(c[names[axis]], shift[axis])
                 for k, axis in enumerate((i, j))
             )
         ra, rb = hypot(ax - x, ay - y), hypot(bx - x, by - y)
         if ra == 0.0 or (abs(ra - rb) > CLOSES and abs(ra - rb) > CLOSES_SHARE * max(ra, rb)):
-            fail(
-                self.file, number,
-                f"the arc does not close: its radius is {1e3 * ra:.6g} mm at the start and {1e3 * rb:.6g} mm at the end",
-            )  # fmt: skip
+            self.fail(f"the arc does not close: its radius is {1e3 * ra:.6g} mm at the start and {1e3 * rb:.6g} mm at the end")  # fmt: skip
         turn = atan2(by - y, bx - x) - atan2(ay - y, ax - x)
         turn = (sense * turn) % (2 * pi)
         if (ax, ay) == (bx, by):
@@ -270,29 +367,26 @@ class Reader:
             turn += 2 * pi
         turns = values.get("P", 1.0)
         if turns != int(turns) or not 1 <= turns <= 1000:
-            fail(self.file, number, f"P: expected a whole number of turns from 1 to 1000, found {turns:g}")
+            self.fail(f"P: expected a whole number of turns from 1 to 1000, found {turns:g}")
         centre = [0.0, 0.0, 0.0]
         centre[i], centre[j], centre[s.plane] = x, y, start[s.plane]
         return (centre[0], centre[1], centre[2]), sense * (turn + 2 * pi * (turns - 1))
 
-    def _absolute(self, value: float | None, shift: float, number: int) -> float:
+    def _absolute(self, value: float | None, shift: float) -> float:
         if value is None:
-            fail(self.file, number, "under G90.1 both words of the centre are needed")
+            self.fail("under G90.1 both words of the centre are needed")
         return value + shift
 
     def _centre_of_radius(
-        self, radius: float, sense: float, a: tuple[float, float], b: tuple[float, float], number: int
+        self, radius: float, sense: float, a: tuple[float, float], b: tuple[float, float]
     ) -> tuple[float, float]:
         """Negative radius: the longer of the two arcs."""
         dx, dy = b[0] - a[0], b[1] - a[1]
         half = hypot(dx, dy) / 2
         if half == 0.0:
-            fail(self.file, number, "an arc by its radius needs an end that is not its start")
+            self.fail("an arc by its radius needs an end that is not its start")
         if radius == 0.0 or half > abs(radius) * (1 + 1e-6) + CLOSES:
-            fail(
-                self.file, number,
-                f"the arc does not close: its ends are {2e3 * half:.6g} mm apart, more than twice its radius of {1e3 * abs(radius):.6g} mm",
-            )  # fmt: skip
+            self.fail(f"the arc does not close: its ends are {2e3 * half:.6g} mm apart, more than twice its radius of {1e3 * abs(radius):.6g} mm")  # fmt: skip
         height = copysign(sqrt(max(radius**2 - half**2, 0.0)), radius * sense)
         ux, uy = dx / (2 * half), dy / (2 * half)
         return a[0] + dx / 2 - height * uy, a[1] + dy / 2 + height * ux
@@ -305,7 +399,8 @@ def read_moves(
     for number, text in enumerate(lines, 1):
         if reader.state.ended:
             break
-        move = reader.block(text, number)
+        plain = _PLAIN(text)
+        move = (reader.plain(plain, number) if plain else None) or reader.block(text, number)
         if move is not None:
             yield move
         if progress is not None and number % EVERY == 0:

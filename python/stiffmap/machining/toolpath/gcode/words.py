@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import NamedTuple, NoReturn
 
 from stiffmap.common.errors import FileError
 
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
+_PARTS = re.compile(r"(\([^()]*\)|;.*)")
+_ANY = re.compile(r"[A-Z][+-]?[\d.]+", re.IGNORECASE)
 _WORD = re.compile(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))")
 _REFUSED = (
     ("#", "parameters (#) are not read: expand them in the program that wrote the file"),
@@ -25,6 +28,29 @@ class Block(NamedTuple):
     optional: bool
 
 
+def tokens_of(text: str) -> Iterator[str]:
+    """Comments as they stand, and words without blanks, of a line that `read_block` reads; a slash ahead is one."""
+    for part in _PARTS.split(text):
+        if part.startswith(("(", ";")):
+            yield part.strip()
+        else:
+            inked = "".join(part.split())
+            if inked.startswith("/"):
+                yield "/"
+            yield from (m[0] for m in _ANY.finditer(inked))
+
+
+def plain(token: str) -> str:
+    """A word as it is compared: ``g01`` is ``G1``; a comment stays."""
+    match = _WORD.fullmatch(token.upper())
+    return token if match is None else f"{match[1]}{float(match[2]):g}"
+
+
+def bare(text: str) -> str:
+    """Letters and numbers of a line, without comments and blanks."""
+    return "".join((_COMMENT.sub("", text) if "(" in text or ";" in text else text).split()).upper()
+
+
 def fail(file: str, number: int, message: str) -> NoReturn:
     """Raise an error at a line."""
     raise FileError(message, file=file, line=number)
@@ -34,28 +60,26 @@ def read_block(text: str, file: str, number: int) -> Block:
     """Words of a line; blanks do not count, nor does case. Raises `FileError` for what is no word."""
     if len(text) > LONGEST:
         fail(file, number, f"expected at most {LONGEST} characters, found {len(text)}")
-    bare = _COMMENT.sub("", text) if "(" in text or ";" in text else text
-    bare = "".join(bare.split()).upper()
-    if not bare or bare == "%":
+    line = bare(text)
+    if not line or line == "%":
         return Block((), False)
-    if "(" in bare or ")" in bare:
+    if "(" in line or ")" in line:
         fail(file, number, "a comment is not closed, or closed twice")
     for sign, message in _REFUSED:
-        if sign in bare:
+        if sign in line:
             fail(file, number, message)
-    optional = bare.startswith("/")
-    bare = bare.removeprefix("/")
-    if bare.startswith("O"):
+    optional = line[0] == "/"
+    line = line[1:] if optional else line
+    if line[:1] == "O":
+        if line[1:].isdecimal():  # the number of the program
+            return Block((), optional)
         fail(file, number, f"subprograms and loops (O words) are not read: {text.strip()[:40]!r}")
-    words, at = [], 0
-    for match in _WORD.finditer(bare):
-        if match.start() != at:
-            break
-        words.append((match[1], float(match[2])))
-        at = match.end()
-    large = [w for w in words if abs(w[1]) > LARGEST]
-    if large:
-        fail(file, number, f"the number of {large[0][0]} is too large")
-    if at != len(bare):
-        fail(file, number, f"expected words such as X12.5, found {bare[at : at + 30]!r}")
-    return Block(tuple(words), optional)
+    parts = _WORD.split(line)
+    if any(parts[::3]):
+        wrong = next(k for k, between in enumerate(parts[::3]) if between)
+        fail(file, number, f"expected words such as X12.5, found {''.join(parts[3 * wrong :])[:30]!r}")
+    words = tuple(zip(parts[1::3], map(float, parts[2::3]), strict=True))
+    for letter, value in words:
+        if not -LARGEST <= value <= LARGEST:
+            fail(file, number, f"the number of {letter} is too large")
+    return Block(words, optional)

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from math import nan
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.machining.toolpath.gcode.read import Reader
-from stiffmap.machining.toolpath.gcode.state import CENTRES, INCH, State
+from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
+from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, INCH, STARTS, State
+from stiffmap.machining.toolpath.gcode.words import bare, plain, tokens_of
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 from stiffmap.machining.toolpath.pieces import MovedPiece
 
-_PARTS = re.compile(r"(\([^()]*\)|;.*)")
-_MOTION = re.compile(r"G\s*0*[0123](?![\d.])|[XYZCIJKR]\s*[+-]?[\d.][\d.\s]*", re.IGNORECASE)
-_TURNS = re.compile(r"P\s*[\d.]+", re.IGNORECASE)
-_FEED = re.compile(r"F\s*[\d.][\d.\s]*", re.IGNORECASE)
+STOPS = ("M0", "M1", "M2", "M30", "M60")
+MOTIONS = ("G0", "G1", "G2", "G3")
 SAME_TURN = 1e-7
 """rad."""
 DIGITS = {True: 7, False: 6}
@@ -36,18 +35,27 @@ def rewritten(
     """
     reader = Reader(path.name, path.offsets)
     speed = path.feed if feeds is None else feeds
+    starts = _starts(path)
     turned, driven = nan, (nan, 0.0)
     by_line = {int(line): i for i, line in enumerate(path.line)}
     out: list[str] = []
     origin: list[int] = []
     written: Floats = np.zeros(3)
+    held, breaks = np.zeros(3, bool), 0  # axes of which the controller provably holds `written`
     for number, text in enumerate(path.text, 1):
         if reader.state.ended:
             out.append(text)
             continue
+        if starts and bare(text).lstrip("%")[:1] not in ("", "O"):
+            out.append(starts)
+            starts = ""
         move = reader.block(text, number)
+        state = reader.state
+        if state.breaks != breaks:
+            held, breaks, driven = np.zeros(3, bool), state.breaks, (nan, 0.0)
+            turned = nan if state.absolute else turned
         i = by_line.get(number)
-        if move is None and "F" in _PARTS.sub("", text).upper():
+        if move is None and "F" in bare(text):
             driven = (nan, 0.0)
         if move is None or i is None:
             out.append(text)
@@ -55,26 +63,53 @@ def rewritten(
         new = pieces.get(i)
         if new is None:
             new = [_as_it_was(path, i, written)]
-        machine = bool(re.search(r"G\s*53(?![\d.])", _PARTS.sub("", text), re.IGNORECASE))
-        shift = np.zeros(3) if machine else np.array(reader.offsets.get(reader.state.offset, (0.0, 0.0, 0.0)))
-        for k, (piece, start) in enumerate(_with_starts(new, written)):
-            words, written = _words(reader.state, path, i, piece, written, shift, machine)
+        tokens = list(tokens_of(text))
+        machine = "G53" in {plain(t) for t in tokens}
+        shift = np.zeros(3) if machine else np.array(reader.offsets.get(state.offset, (0.0, 0.0, 0.0)))
+        asked = np.array([i in pieces or any(t[0] == a for t in tokens) for a in AXES])
+        lines = []
+        for piece, start in _with_starts(new, written):
+            words, written, named = _words(
+                state,
+                path,
+                i,
+                piece,
+                written,
+                shift,
+                machine,
+                asked & ~held if state.absolute else asked & False,
+            )
+            # without its offset a position in the axes of the machine says nothing in those of the part
+            held = (held | (named & state.absolute)) & ~(named & (machine and not reader.offsets))
             if np.isfinite(piece.turn) and not abs(piece.turn - turned) <= SAME_TURN:
-                before = 0.0 if reader.state.absolute or np.isnan(turned) else turned
+                before = 0.0 if state.absolute or np.isnan(turned) else turned
                 angle = round(float(np.degrees(piece.turn - before)), 5)
                 words += f" C{_number(angle, 5)}"
                 turned = before + float(np.radians(angle))
             feed = ""
-            if path.kind[i] != Kind.RAPID and path.length[i] > 0:
-                now = (float(speed[i]), reader.state.unit)
-                if reader.state.inverse_time:
+            if path.kind[i] != Kind.RAPID:
+                now = (float(speed[i]), state.unit)
+                if state.inverse_time:
                     driven = (nan, 0.0)
-                    feed = f" F{_number(60 * speed[i] / max(_size(piece, start), 1e-12), 6)}"
+                    size = _size(piece, start)
+                    rate = 60 * speed[i] / size if speed[i] > 0 and size > 0 else state.feed or 1.0
+                    feed = f" F{_number(rate, 6)}"
                 elif feeds is not None and now != driven:
-                    feed, driven = f" F{_number(60 * speed[i] / reader.state.unit, 3)}", now
-            out.append(_line(text, words + feed, bool(feed) or feeds is not None) if k == 0 else words + feed)
+                    feed, driven = f" F{_number(60 * speed[i] / state.unit, 3)}", now
+            lines.append(words + feed)
             origin.append(i)
+        out += _lines(tokens, lines, state.inverse_time or feeds is not None)
     return "\n".join(out) + "\n", origin
+
+
+def _starts(path: Toolpath) -> str:
+    """What is taken without being said before the first move and matters: a controller may hold something else."""
+    reader = Reader(path.name, path.offsets)
+    next(read_moves(path.text, reader), None)
+    silent = [w for group, w in STARTS.items() if group not in reader.state.said]
+    if not (path.kind == Kind.ARC).any():
+        silent = [w for w in silent if w not in ("G17", "G91.1")]
+    return " ".join(w for w in silent if w != "G54" or path.offsets)
 
 
 def _with_starts(pieces: Sequence[MovedPiece], start: Floats) -> Iterator[tuple[MovedPiece, Floats]]:
@@ -100,9 +135,16 @@ def _as_it_was(path: Toolpath, i: int, written: Floats) -> MovedPiece:
 
 
 def _words(
-    state: State, path: Toolpath, i: int, piece: MovedPiece, written: Floats, shift: Floats, machine: bool
-) -> tuple[str, Floats]:
-    """Words of a piece in the program's own unit and modes, and where it ends as written (m)."""
+    state: State,
+    path: Toolpath,
+    i: int,
+    piece: MovedPiece,
+    written: Floats,
+    shift: Floats,
+    machine: bool,
+    needed: NDArray[np.bool_],
+) -> tuple[str, Floats, NDArray[np.bool_]]:
+    """Words of a piece in the program's own unit and modes, where it ends as written (m), and (3,) axes with a word; those `needed` have one."""
     inch = state.unit == INCH
     digits = DIGITS[inch]
     rapid = path.kind[i] == Kind.RAPID
@@ -111,39 +153,45 @@ def _words(
     base = shift if state.absolute or machine else written
     values = np.round((piece.end - base) / state.unit, digits)
     now = values * state.unit + base
-    words = [code]
-    changed = np.abs(now - written) > 0.5 * 10.0**-digits * state.unit
+    words = ["G53", code] if machine else [code]
+    changed = needed | (np.abs(now - written) > 0.5 * 10.0**-digits * state.unit)
     if piece.kind == Kind.ARC:
         flat = [a for a in range(3) if a != plane]
         changed[flat] = True
     if not changed.any():
         changed[:] = True
-    words += [f"{'XYZ'[a]}{_number(values[a], digits)}" for a in range(3) if changed[a]]
+    words += [f"{AXES[a]}{_number(values[a], digits)}" for a in range(3) if changed[a]]
     now = np.where(changed, now, written)
     if piece.kind == Kind.ARC:
         origin = shift if state.absolute_centres else written
         for word in CENTRES[plane]:
             a = "IJK".index(word)
             words.append(f"{word}{_number((piece.centre[a] - origin[a]) / state.unit, digits)}")
-    return " ".join(words), now
+    return " ".join(words), now, changed
 
 
-def _line(text: str, words: str, feed: bool) -> str:
-    """The line with its motion exchanged, other words and comments where they were."""
-    parts, placed = [], False
-    for part in _PARTS.split(text):
-        if part.startswith(("(", ";")):
-            parts.append(part)
-            continue
-        bare = _MOTION.sub("\0", _FEED.sub("", part) if feed else part)
-        if "\0" in bare:
-            bare = _TURNS.sub("", bare)
-            head, _, tail = bare.partition("\0")
-            bare = f"{head}{'' if placed else words}{tail.replace(chr(0), '')}"
-            placed = True
-        parts.append(re.sub(r"  +", " ", bare))
-    line = " ".join(p.strip() for p in parts if p.strip())
-    return line if placed else f"{line} {words}".strip()
+def _lines(tokens: list[str], pieces: list[str], feed: bool) -> list[str]:
+    """A line with its motion exchanged by pieces; the other words and comments stay in front of or in the first, for there they
+    act before the motion, but what stops or ends the program comes after the last. A slash goes before each."""
+    own: list[str] = []
+    stops: list[str] = []
+    tracking = any(plain(t) == "G64" for t in tokens)
+    placed = -1
+    for token in tokens:
+        word = plain(token)
+        if word in STOPS:
+            stops.append(token)
+        elif word in MOTIONS or word[0] in "XYZCIJKR" or (word[0] == "F" and feed):
+            placed = len(own) if placed < 0 else placed
+        elif word not in ("G53", "/") and not (word[0] == "P" and not tracking):
+            own.append(token)
+    out = [" ".join([*own[:placed], pieces[0], *own[placed:]]), *pieces[1:]]
+    if stops and len(out) > 1:
+        out[-1] = " ".join([out[-1], *stops])
+    elif stops:
+        comment = next((k for k, t in enumerate(own) if k >= placed and t[0] in "(;"), len(own))
+        out = [" ".join([*own[:placed], pieces[0], *own[placed:comment], *stops, *own[comment:]])]
+    return ["/" + line for line in out] if "/" in tokens else out
 
 
 def _number(value: float, digits: int) -> str:
