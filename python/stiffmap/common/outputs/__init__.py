@@ -1,6 +1,7 @@
 """The one place that writes files: whole or not at all, one job at a time, space asked for before."""
 
 from stiffmap.common.outputs.alone import only_job, reserved
+from stiffmap.common.outputs.keeping import asked_to_replace, check_replaceable, one_command
 from stiffmap.common.outputs.pictures import write_picture
 from stiffmap.common.outputs.space import mapped_array, needs_space
 from stiffmap.common.outputs.tables import guarded, unguarded, write_rows
@@ -16,10 +17,13 @@ from stiffmap.common.outputs.writing import (
 
 __all__ = [
     "add_lines",
+    "asked_to_replace",
+    "check_replaceable",
     "guarded",
     "make_folder",
     "mapped_array",
     "needs_space",
+    "one_command",
     "only_job",
     "put_files",
     "put_folder",

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs.alone import is_device, refused, reserved, short
+from stiffmap.common.outputs.keeping import WRITTEN, check_replaceable, note_written
 
 
 @contextmanager
@@ -24,6 +25,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         if target.is_dir():
             raise FileError("cannot be written: it is a folder", file=os.fspath(path))
+        check_replaceable(path)
         if is_device(target):
             with tempfile.TemporaryDirectory() as folder:
                 fresh = Path(folder) / f"output{target.suffix}"
@@ -52,6 +54,7 @@ def _replaced(target: Path) -> Iterator[Path]:
         if mode is not None:
             fresh.chmod(mode)
         synced(fresh)
+        note_written(target, fresh)
         os.replace(fresh, target)
         synced(target.parent)
     finally:
@@ -91,9 +94,11 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 
 def put_folder(fresh: Path, path: Path) -> None:
     """Put a complete folder in the place of another one (of files that stiffmap wrote); FileError."""
+    check_replaceable(path)
     try:
         for file in fresh.rglob("*"):
             synced(file)
+        note_written(Path(os.path.realpath(path)), fresh)
         old = path.with_name(f".{path.name}.old")
         shutil.rmtree(old, ignore_errors=True)
         if path.is_dir():
@@ -110,9 +115,13 @@ def put_files(fresh: Path, folder: str | os.PathLike[str]) -> None:
 
     Other files of that folder stay.
     """
-    target = make_folder(folder)
+    target = Path(os.path.realpath(make_folder(folder)))
+    files = [file for file in sorted(fresh.iterdir()) if file.name != WRITTEN]
+    for file in files:
+        check_replaceable(Path(folder) / file.name)
     try:
-        for file in sorted(fresh.iterdir()):
+        for file in files:
+            note_written(target / file.name, file)
             os.replace(file, target / file.name)
         synced(target)
     except OSError as error:
