@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from stiffmap.common.errors import FileError
-from stiffmap.common.outputs.alone import is_device, refused, reserved, short
+from stiffmap.common.outputs.alone import is_device, only_job, refused, reserved, short
 from stiffmap.common.outputs.keeping import WRITTEN, check_replaceable, note_written
 
 
@@ -110,18 +110,38 @@ def put_folder(fresh: Path, path: Path) -> None:
         raise refused(path, error) from error
 
 
-def put_files(fresh: Path, folder: str | os.PathLike[str]) -> None:
-    """Put the complete files of one folder into another one of the same disk, which is made where it is missing; FileError.
+@contextmanager
+def putting(folder: str | os.PathLike[str], head: str) -> Iterator[Path]:
+    """A fresh folder for files that belong together; complete, they are put into `folder`, whose other files stay.
 
-    Other files of that folder stay.
+    `head` is the file without which the others are nothing: the old one goes before they change and the new one comes after
+    them, so that a kill leaves the old files, the new ones or a folder that says what it lacks, never a mixture. Raises
+    FileError.
     """
-    target = Path(os.path.realpath(make_folder(folder)))
-    files = [file for file in sorted(fresh.iterdir()) if file.name != WRITTEN]
+    path = Path(folder)
+    there = next(p for p in (path, *path.absolute().parents) if p.is_dir())
+    fresh = there / f".{short(path.name)}.new"
+    with only_job(folder):
+        shutil.rmtree(fresh, ignore_errors=True)  # of a job that was killed
+        try:
+            yield make_folder(fresh)
+            _put_files(fresh, path, head)
+        finally:
+            shutil.rmtree(fresh, ignore_errors=True)
+
+
+def _put_files(fresh: Path, folder: Path, head: str) -> None:
+    files = sorted((f for f in fresh.iterdir() if f.name != WRITTEN), key=lambda f: (f.name == head, f.name))
     for file in files:
-        check_replaceable(Path(folder) / file.name)
+        check_replaceable(folder / file.name)
+    target = Path(os.path.realpath(make_folder(folder)))
     try:
         for file in files:
             note_written(target / file.name, file)
+        if len(files) > 1:
+            (target / head).unlink(missing_ok=True)
+            synced(target)
+        for file in files:
             os.replace(file, target / file.name)
         synced(target)
     except OSError as error:

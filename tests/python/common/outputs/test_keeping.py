@@ -9,7 +9,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.common.errors import FileError
-from stiffmap.common.outputs import asked_to_replace, one_command, put_files, write_rows, write_text
+from stiffmap.common.outputs import asked_to_replace, one_command, putting, write_rows, write_text
 from stiffmap.common.outputs.keeping import WRITTEN
 from stiffmap.ui.cli import main
 
@@ -104,14 +104,16 @@ def test_what_stiffmap_wrote_is_an_input_when_it_is_read(
 def test_each_way_to_write(tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("mine")
     (tmp_path / "empty").write_text("")
-    fresh = tmp_path / "fresh"
-    fresh.mkdir()
-    (fresh / "mine").write_text("new")
+
+    def together() -> None:
+        with putting(tmp_path, "mine") as fresh:
+            (fresh / "mine").write_text("new")
+
     with one_command():
         for call in (
             lambda: write_text(tmp_path / "mine", "new"),
             lambda: write_rows(tmp_path / "mine", ["a"], [[1]]),
-            lambda: put_files(fresh, tmp_path),
+            together,
         ):
             with pytest.raises(FileError, match="no command of stiffmap wrote"):
                 call()
