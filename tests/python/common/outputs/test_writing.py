@@ -185,7 +185,7 @@ def test_files_that_belong_together_never_mix(
         save_experiment(new, tmp_path / "e")
     assert (tmp_path / "e/photo.jpg").read_text() == "mine"
     if killed_at < 2:
-        with pytest.raises(FileError, match="experiment.yaml"):
+        with pytest.raises(FileError, match=r"experiment\.yaml"):
             load_experiment(tmp_path / "e")
     else:
         found = load_experiment(tmp_path / "e")
