@@ -53,7 +53,7 @@ def size_of(unit: str, *tables: Mapping[str, Fraction | float]) -> float:
 
 
 class Dimension(NamedTuple):
-    """Exponents of length, force, angle and mass; times are always in seconds."""
+    """Exponents of length, force, angle and mass of a unit as it is, with its angles; times are in seconds."""
 
     length: int = 0
     force: int = 0
@@ -106,11 +106,15 @@ class UnitSystem:
     mass: str = "kg"
 
     def to_si(self, value: float, dimension: Dimension) -> float:
-        """SI value of ``value``, rounded once: 775 mm is the double nearest to 0.775 m."""
+        """SI value of ``value``, rounded once: 775 mm is the double nearest to 0.775 m.
+
+        An angle that stands together with a force is in radians whatever `angle` says: stiffness, compliance, damping
+        and friction per speed are per radian in every file. Otherwise a coupled matrix would not be symmetric.
+        """
         scale = _scale(self.length, self.force, self.mass, dimension)
         # repr gives the decimal number that was written, so that no binary rounding enters twice
         result = value if scale == 1 else _rounded_once(repr(float(value)), scale)
-        if self.angle == "deg" and dimension.angle:
+        if self.angle == "deg" and dimension.angle and not dimension.force:
             result *= math.radians(1.0) ** dimension.angle
         return float(result)
 

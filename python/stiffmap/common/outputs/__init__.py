@@ -1,14 +1,15 @@
 """The one place that writes files: whole or not at all, one job at a time, space asked for before."""
 
 from stiffmap.common.outputs.alone import only_job, reserved
+from stiffmap.common.outputs.keeping import asked_to_replace, check_replaceable, one_command
 from stiffmap.common.outputs.pictures import write_picture
 from stiffmap.common.outputs.space import mapped_array, needs_space
 from stiffmap.common.outputs.tables import guarded, unguarded, write_rows
 from stiffmap.common.outputs.writing import (
     add_lines,
     make_folder,
-    put_files,
     put_folder,
+    putting,
     synced,
     write_text,
     writing,
@@ -16,13 +17,16 @@ from stiffmap.common.outputs.writing import (
 
 __all__ = [
     "add_lines",
+    "asked_to_replace",
+    "check_replaceable",
     "guarded",
     "make_folder",
     "mapped_array",
     "needs_space",
+    "one_command",
     "only_job",
-    "put_files",
     "put_folder",
+    "putting",
     "reserved",
     "synced",
     "unguarded",

@@ -8,6 +8,7 @@ from typing import Any
 import typer
 
 from stiffmap.common.outputs.alone import reserved
+from stiffmap.common.outputs.keeping import check_replaceable
 
 
 def written(*names: str, help: str) -> Any:
@@ -21,4 +22,6 @@ def written(*names: str, help: str) -> Any:
 def _alone(context: typer.Context, path: Path | None) -> Path | None:
     if path is not None and not context.resilient_parsing:
         context.with_resource(reserved(path))
+        if path.is_file() and "overwrite" not in {p.name for p in context.command.params}:
+            check_replaceable(path)  # before anything is computed
     return path

@@ -10,7 +10,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from stiffmap.common.errors import FileError
-from stiffmap.common.outputs.alone import is_device, refused, reserved, short
+from stiffmap.common.outputs.alone import is_device, only_job, refused, reserved, short
+from stiffmap.common.outputs.keeping import WRITTEN, check_replaceable, note_written
 
 
 @contextmanager
@@ -24,6 +25,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         if target.is_dir():
             raise FileError("cannot be written: it is a folder", file=os.fspath(path))
+        check_replaceable(path)
         if is_device(target):
             with tempfile.TemporaryDirectory() as folder:
                 fresh = Path(folder) / f"output{target.suffix}"
@@ -52,6 +54,7 @@ def _replaced(target: Path) -> Iterator[Path]:
         if mode is not None:
             fresh.chmod(mode)
         synced(fresh)
+        note_written(target, fresh)
         os.replace(fresh, target)
         synced(target.parent)
     finally:
@@ -91,9 +94,11 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 
 def put_folder(fresh: Path, path: Path) -> None:
     """Put a complete folder in the place of another one (of files that stiffmap wrote); FileError."""
+    check_replaceable(path)
     try:
         for file in fresh.rglob("*"):
             synced(file)
+        note_written(Path(os.path.realpath(path)), fresh)
         old = path.with_name(f".{path.name}.old")
         shutil.rmtree(old, ignore_errors=True)
         if path.is_dir():
@@ -105,14 +110,38 @@ def put_folder(fresh: Path, path: Path) -> None:
         raise refused(path, error) from error
 
 
-def put_files(fresh: Path, folder: str | os.PathLike[str]) -> None:
-    """Put the complete files of one folder into another one of the same disk, which is made where it is missing; FileError.
+@contextmanager
+def putting(folder: str | os.PathLike[str], head: str) -> Iterator[Path]:
+    """A fresh folder for files that belong together; complete, they are put into `folder`, whose other files stay.
 
-    Other files of that folder stay.
+    `head` is the file without which the others are nothing: the old one goes before they change and the new one comes after
+    them, so that a kill leaves the old files, the new ones or a folder that says what it lacks, never a mixture. Raises
+    FileError.
     """
-    target = make_folder(folder)
+    path = Path(folder)
+    there = next(p for p in (path, *path.absolute().parents) if p.is_dir())
+    fresh = there / f".{short(path.name)}.new"
+    with only_job(folder):
+        shutil.rmtree(fresh, ignore_errors=True)  # of a job that was killed
+        try:
+            yield make_folder(fresh)
+            _put_files(fresh, path, head)
+        finally:
+            shutil.rmtree(fresh, ignore_errors=True)
+
+
+def _put_files(fresh: Path, folder: Path, head: str) -> None:
+    files = sorted((f for f in fresh.iterdir() if f.name != WRITTEN), key=lambda f: (f.name == head, f.name))
+    for file in files:
+        check_replaceable(folder / file.name)
+    target = Path(os.path.realpath(make_folder(folder)))
     try:
-        for file in sorted(fresh.iterdir()):
+        for file in files:
+            note_written(target / file.name, file)
+        if len(files) > 1:
+            (target / head).unlink(missing_ok=True)
+            synced(target)
+        for file in files:
             os.replace(file, target / file.name)
         synced(target)
     except OSError as error:

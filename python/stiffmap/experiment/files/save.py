@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
+from stiffmap.common.outputs import make_folder, putting, write_rows, write_text
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Channel, Experiment, Floats, Loop
 from stiffmap.experiment.files.columns import APPROACH, POSE, POSE2, SEEN, SEEN_TURNED
@@ -33,9 +32,9 @@ def save_experiment(experiment: Experiment, folder: str | PathLike[str], title: 
     """Write the folder; raises `FileError` where it cannot be written."""
     columns = _columns(experiment)
     head = _head(experiment, title) | {"rows": len(experiment)}
-    with only_job(make_folder(folder)):
-        write_rows(Path(folder) / "data.csv", list(columns), zip(*columns.values(), strict=True))
-        write_text(Path(folder) / "experiment.yaml", text_of(head))
+    with putting(make_folder(folder), "experiment.yaml") as fresh:
+        write_rows(fresh / "data.csv", list(columns), zip(*columns.values(), strict=True))
+        write_text(fresh / "experiment.yaml", text_of(head))
 
 
 def _head(e: Experiment, title: str) -> dict[str, Any]:

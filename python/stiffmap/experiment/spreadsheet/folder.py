@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from stiffmap.common.errors import FileError, MissingColumnError
-from stiffmap.common.outputs import make_folder, only_job, put_files
-from stiffmap.common.outputs.alone import short
+from stiffmap.common.outputs import putting
 from stiffmap.experiment import Experiment, load_experiment
 from stiffmap.experiment.spreadsheet.convert import Imported, write_folder
 from stiffmap.experiment.spreadsheet.sheet import Sheet, column_letter
@@ -28,19 +26,12 @@ def make_experiment(
 ) -> Experiment:
     """Write the folder and load it. Where it does not load nothing is left behind, and the error names row and column of
     the sheet. Raises FileError."""
-    there = next(p for p in (folder, *folder.absolute().parents) if p.is_dir())
-    fresh = there / f".{short(folder.name)}.new"
-    with only_job(folder):
-        shutil.rmtree(fresh, ignore_errors=True)  # of a job that was killed
+    with putting(folder, "experiment.yaml") as fresh:
+        write_folder(found, sheet, fresh, machine, quantity, noise, title, record)
         try:
-            write_folder(found, sheet, make_folder(fresh), machine, quantity, noise, title, record)
-            try:
-                made = load_experiment(fresh)
-            except FileError as error:
-                raise of_sheet(error, found, sheet, fresh) from None
-            put_files(fresh, folder)
-        finally:
-            shutil.rmtree(fresh, ignore_errors=True)
+            made = load_experiment(fresh)
+        except FileError as error:
+            raise of_sheet(error, found, sheet, fresh) from None
     return replace(made, name=folder.name)
 
 

@@ -162,7 +162,7 @@ def _law(model: JointModel | ActuatorModel, angular: bool, context: Context) -> 
 
 def _linear_law(key: str, number: Number, angular: bool, context: Context, axis: str = "") -> Law:
     """The law of one stiffness or compliance at this place of the file."""
-    linear = Dimension(length=1, force=1) if angular else Dimension(length=-1, force=1)
+    linear = Dimension(length=1, force=1, angle=-1) if angular else Dimension(length=-1, force=1)
     if key == "compliance":
         return Law(context.inverse(number, Dimension(*(-n for n in linear)), f"stiffness{axis}"))
     if number.value <= 0.0:

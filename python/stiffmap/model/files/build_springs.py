@@ -18,8 +18,12 @@ from stiffmap.model.files.schema.base import Number
 from stiffmap.model.files.schema.elements import SpringModel
 from stiffmap.model.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix
 
-_COMPLIANCE = {0: Dimension(length=1, force=-1), 1: Dimension(force=-1), 2: Dimension(length=-1, force=-1)}
-_STIFFNESS = {0: Dimension(length=-1, force=1), 1: FORCE, 2: MOMENT}
+_COMPLIANCE = {
+    0: Dimension(length=1, force=-1),
+    1: Dimension(force=-1, angle=1),
+    2: Dimension(length=-1, force=-1, angle=1),
+}
+_STIFFNESS = {turns: Dimension(*(-n for n in d)) for turns, d in _COMPLIANCE.items()}
 
 
 def build_spring(model: SpringModel, context: Context) -> Spring:
@@ -196,7 +200,7 @@ def build_law(model: LawModel, angular: bool, context: Context, name: str) -> La
     stiffness = context.si(model.stiffness, _STIFFNESS[2 if angular else 0], f"{name}.stiffness")
     cubic = 0.0
     if model.cubic is not None:
-        dimension = MOMENT if angular else Dimension(force=1, length=-3)
+        dimension = Dimension(length=1, force=1, angle=-3) if angular else Dimension(force=1, length=-3)
         cubic = context.si(model.cubic, dimension, f"{name}.cubic")
     across, along = (ANGLE, MOMENT) if angular else (LENGTH, FORCE)
     knots = tuple((context.si(a, across), context.si(f, along)) for a, f in model.knots or [])

@@ -10,7 +10,7 @@ from stiffmap.model.description import BeamStroke, Element, Joint, MachineDescri
 from stiffmap.model.description.tree import all_elements, edit
 from stiffmap.model.files.build_springs import build_matrix
 from stiffmap.model.files.context import Context, Gathered, StrokeUse
-from stiffmap.model.files.schema.base import suggestion
+from stiffmap.model.files.schema.base import Number, suggestion
 
 
 def with_strokes(description: MachineDescription, gathered: Gathered) -> MachineDescription:
@@ -63,7 +63,7 @@ def _beam(use: StrokeUse, joint: Joint, coordinate: Dimension) -> BeamStroke:
         length=context.si(length, LENGTH),
         along="xyz".index(along[-1]),
         at=0.0 if model.at is None else context.at("at").si(model.at, coordinate),
-        rate=1.0 if model.rate is None else context.at("rate").si(model.rate, per),
+        rate=context.at("rate").si(model.rate or Number(value=1.0), per),
     )
     for end in ends(joint):
         left = out.length + out.rate * (end - out.at)

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from stiffmap.common.errors import FileErrors, MissingPartError, StiffmapError
+from stiffmap.common.outputs.keeping import one_command
 from stiffmap.ui.cli.commands import COMMANDS, Command
 from stiffmap.ui.cli.streams import plain_streams
 from stiffmap.ui.cli.vectors import joined
@@ -34,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``stiffmap`` (default: with the process's arguments); returns the exit code."""
     given = joined(sys.argv[1:] if arguments is None else arguments)
     try:
-        with plain_streams():
+        with plain_streams(), one_command():
             build_app(given)(args=given, prog_name="stiffmap")
     except StiffmapError as error:
         for problem in error.problems if isinstance(error, FileErrors) else (error,):

@@ -15,6 +15,7 @@ from rich.table import Table
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import number_in
+from stiffmap.common.outputs import asked_to_replace
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli.output import JsonOption, print_json
 
@@ -135,6 +136,8 @@ def experiment(
         raise StiffmapError("experiment: give either --machine or --dh")
     if (output / "experiment.yaml").exists() and not overwrite:
         raise FileError("exists already; use --overwrite to replace it", file=str(output / "experiment.yaml"))
+    if overwrite:
+        asked_to_replace(output)
     given = Answers(
         {k: v.split("|") for k, v in pairs(mapped, "map").items()},
         pairs(unit, "unit"),

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from stiffmap.common.errors import FileError
+from stiffmap.common.outputs import asked_to_replace
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli.output import JsonOption, print_json
 
@@ -65,6 +66,8 @@ def import_urdf(
     file = output or urdf.with_name(f"{machine.name}.yaml")
     if file.exists() and not overwrite:
         raise FileError("exists already; use --overwrite to replace it", file=str(file))
+    if overwrite:
+        asked_to_replace(file)
     machine.save(file)
     if as_json:
         print_json({"file": str(file), "name": machine.name, "legs": list(machine.legs),

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.outputs import write_text
+from stiffmap.common.outputs import asked_to_replace, write_text
 from stiffmap.model.files.starter import starter_text
 from stiffmap.solve.starters import CLASSES, OPTIONS, class_of, machine_text
 from stiffmap.ui.cli.output import JsonOption, print_json
@@ -74,6 +74,8 @@ def new(
         raise StiffmapError(f"--{given[0]}: only with --from; the classes are {', '.join(CLASSES)}")
     if file.exists() and not overwrite:
         raise FileError("exists already; use --overwrite to replace it", file=str(file))
+    if overwrite:
+        asked_to_replace(file)
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
     write_text(file, starter_text(name) if kind is None else machine_text(kind, name, dimensions))
     if as_json:

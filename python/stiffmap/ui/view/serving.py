@@ -37,9 +37,10 @@ class Guard:
         name = urlsplit(f"//{headers.get('Host', '')}").hostname or ""
         if self.host in LOCAL and name not in LOCAL:
             return "this view is for programs on its own computer"
-        origin = headers.get("Origin")
-        if origin and urlsplit(origin).netloc != headers.get("Host", ""):
-            return "another page may not steer this view"
+        origin, site = headers.get("Origin"), headers.get("Sec-Fetch-Site")
+        foreign = site == "cross-site" or (site == "same-site" and not _is_page(headers))
+        if foreign or (origin and urlsplit(origin).netloc != headers.get("Host", "")):
+            return "another page may not steer this view; open its address yourself"
         if self.token and not (self._same(self.asked(path, "token")) or self._same(_cookie(headers))):
             return "open the address with the token that stiffmap view printed"
         return ""
@@ -63,7 +64,8 @@ class Guard:
                 head = {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))}
                 return Response(HTTPStatus.FORBIDDEN, "Forbidden", Headers(**head), body)
             link = self.asked(request.path, "state")
-            if link and self.on_link is not None and request.headers.get("Upgrade") != "websocket":
+            page = _is_page(request.headers) and request.headers.get("Upgrade") != "websocket"
+            if link and self.on_link is not None and page:
                 self.on_link(link)
             out = process(connection, request)
             if out is not None and out.headers.get("Content-Type", "").startswith("text/html"):
@@ -75,6 +77,11 @@ class Guard:
             return out
 
         return answer
+
+
+def _is_page(headers: Any) -> bool:
+    """Whether a browser asks for a page to show, not for a picture or a script; programs don't say."""
+    return headers.get("Sec-Fetch-Dest", "document") in ("document", "iframe")
 
 
 def _cookie(headers: Any) -> str:
@@ -92,7 +99,17 @@ def start_server(host: str, port: int | None, guard: Guard, label: str) -> Any:
     with _guarded(guard), silent():
         server = viser.ViserServer(host=host, port=chosen, label=label, verbose=False)
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
+    logging.getLogger("asyncio").addFilter(in_one_line)  # the same function is added once
     return server
+
+
+def in_one_line(record: logging.LogRecord) -> bool:
+    """A message that the server does not understand, in place of its traceback."""
+    if record.exc_info and record.exc_info[0] is not None:
+        what = record.exc_info[0].__name__
+        record.msg, record.args = f"stiffmap view: a message was not understood and is ignored ({what})", ()
+        record.exc_info = record.exc_text = None
+    return True
 
 
 @contextlib.contextmanager

@@ -6,6 +6,7 @@ import csv
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -109,10 +110,12 @@ def _universal(path: Path) -> list[MeasuredResponse]:
     except Exception as problem:  # the reader raises whatever its parsing meets
         raise FileError(f"expected a universal file with data sets 58; {problem}", file=str(path)) from None
     sets = [s for s in (sets if isinstance(sets, list) else [sets]) if s.get("type") == 58]
+    for s in sets:
+        _check_whole(s, path)
     responses = [s for s in sets if s["func_type"] == RESPONSE]
     if not responses:
         raise FileError("no frequency response (data set 58, function type 4) in it", file=str(path))
-    coherence = {_ends(s): np.real(s["data"]) for s in sets if s["func_type"] == COHERENCE}
+    coherence = {_ends(s): s for s in sets if s["func_type"] == COHERENCE}
     out = []
     for s in responses:
         kind = int(s.get("ordinate_spec_data_type", 0))
@@ -123,14 +126,38 @@ def _universal(path: Path) -> list[MeasuredResponse]:
             )  # fmt: skip
         f = np.asarray(s["x"], dtype=float)
         response, reference = _ends(s)
+        of = coherence.get((response, reference))
+        if of is not None and not np.array_equal(of["x"], f):
+            raise FileError(
+                f"response {s.get('id1', '')}: expected its coherence at the same {len(f)} frequencies; found "
+                f"{len(of['x'])}, which are others", file=str(path)
+            )  # fmt: skip
+        known = np.full(len(f), np.nan) if of is None else np.real(of["data"])
         out.append(
             MeasuredResponse(
                 str(s.get("id1", path.stem)), f, _receptance(f, np.asarray(s["data"], complex), MOTIONS[kind]),
-                np.asarray(coherence.get((response, reference), np.full(len(f), np.nan)), dtype=float),
-                response, reference,
+                np.asarray(known, dtype=float), response, reference,
             )
         )  # fmt: skip
     return out
+
+
+def _check_whole(s: dict[str, Any], path: Path) -> None:
+    """What a data set 58 promises in its head against what is in it; FileError."""
+    name = f"data set 58 {s.get('id1', '')}".strip()
+    whole = {k: s.get(k) for k in ("func_type", "num_pts", "rsp_node", "rsp_dir", "ref_node", "ref_dir")}
+    lost = [k for k, v in whole.items() if not isinstance(v, int)]
+    if lost:
+        raise FileError(f"{name}: expected a whole number for {', '.join(lost)} in its head", file=str(path))
+    x, data = np.atleast_1d(s.get("x", ())), np.atleast_1d(s.get("data", ()))
+    if not len(x) == len(data) == s["num_pts"]:
+        raise FileError(
+            f"{name}: expected {s['num_pts']} points, as its head says; found {len(data)}: a line is lost, or one too many",
+            file=str(path),
+        )
+    if not np.isfinite(data).all():
+        k = int(np.flatnonzero(~np.isfinite(data))[0])
+        raise FileError(f"{name}: expected finite numbers; point {k + 1} has {data[k]}", file=str(path))
 
 
 def _ends(s: dict[str, object]) -> tuple[str, str]:

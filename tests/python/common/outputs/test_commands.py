@@ -15,7 +15,8 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.common.errors import FileError
-from stiffmap.common.outputs import reserved
+from stiffmap.common.outputs import one_command, reserved, write_text
+from stiffmap.common.outputs.keeping import WRITTEN
 from stiffmap.experiment import load_experiment
 from stiffmap.ui.cli import main
 from stiffmap.workspace.maps import grid_map
@@ -35,6 +36,13 @@ def command(
     code = f"import resource, sys; {limit}\nfrom stiffmap.ui.cli import main; sys.exit(main(sys.argv[1:]))"
     return subprocess.run([sys.executable, "-B", "-c", code, *arguments], cwd=folder, check=False,
                           stdout=stdout, stderr=subprocess.PIPE, text=True)  # fmt: skip
+
+
+def earlier(path: Path) -> None:
+    """What an earlier command wrote there: only that may be replaced."""
+    path.parent.mkdir()
+    with one_command():
+        write_text(path, "old")
 
 
 def sheet(path: Path, rows: int) -> Path:
@@ -71,8 +79,7 @@ def test_two_maps_on_one_netcdf_file_never_mix(tmp_path: Path, monkeypatch: pyte
 @pytest.mark.parametrize("size", [2e3, 12e3])
 def test_a_map_on_a_full_disk_is_one_message(size: float, tmp_path: Path) -> None:
     """The first limit stops the arrays in which the map grows, the second one the NetCDF file."""
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out/map.nc").write_text("old")
+    earlier(tmp_path / "out/map.nc")
     done = command(
         ["map", "orthoglide-revised", "--points", "5", "--z", "0", "-o", "out"],
         tmp_path,
@@ -96,14 +103,14 @@ def test_a_command_that_is_not_alone_says_so_before_it_computes(tmp_path: Path) 
 @pytest.mark.parametrize("name", ["diagnose", "calibrate", "residual"])
 def test_results_on_a_full_disk_keep_the_previous_ones(name: str, tmp_path: Path) -> None:
     file = {"diagnose": "diagnosis.json", "calibrate": "calibration.json", "residual": "residual.csv"}[name]
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / file).write_text("old")
+    earlier(tmp_path / "out" / file)
     machine = load_experiment(DATA).machine
     budget = [] if name == "residual" else ["--budget", "1"]
     done = command([name, machine, str(DATA), "-o", "out", *budget], tmp_path, size=400)
     assert done.returncode == 2
     assert f"stiffmap: out/{file}: cannot be written: File too large" in done.stderr
-    assert {p.name: p.read_text() for p in (tmp_path / "out").iterdir()} == {file: "old"}
+    left = {p.name: p.read_text() for p in (tmp_path / "out").iterdir() if p.name != WRITTEN}
+    assert left == {file: "old"}
 
 
 def test_a_data_set_that_was_cut_off_is_refused(tmp_path: Path) -> None:
@@ -151,7 +158,7 @@ def test_killed_while_it_writes_a_data_set(tmp_path: Path) -> None:
         job.send_signal(signal.SIGKILL)
     assert not (tmp_path / "e").exists()
     assert command(args, tmp_path).returncode == 0
-    assert sorted(p.name for p in (tmp_path / "e").iterdir()) == ["data.csv", "experiment.yaml"]
+    assert sorted(p.name for p in (tmp_path / "e").iterdir()) == [WRITTEN, "data.csv", "experiment.yaml"]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "e"]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import signal
@@ -14,6 +15,9 @@ import pytest
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs import add_lines, mapped_array, needs_space, put_folder, write_text, writing
+from stiffmap.experiment import load_experiment, save_experiment
+
+DATA = Path(__file__).parents[4] / "tests/data/experiments/C-backlash"
 
 
 def run(code: str, folder: Path, *, megabytes: float | None = None) -> subprocess.CompletedProcess[str]:
@@ -155,3 +159,34 @@ def test_space_is_asked_for_before_it_is_used(tmp_path: Path) -> None:
     done = run("from pathlib import Path\nfrom stiffmap.common.outputs import mapped_array\n"
                "mapped_array(Path('b.npy'), 'f8', (1000, 1000))", tmp_path, megabytes=1)  # fmt: skip
     assert "File too large" in done.stderr and not (tmp_path / "b.npy").exists()
+
+
+@pytest.mark.parametrize("killed_at", range(4))
+def test_files_that_belong_together_never_mix(
+    killed_at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kill before any of the renames: all old, all new, or without the file that says what they are."""
+    old, new = load_experiment(DATA), load_experiment(DATA.with_name("A-servo"))
+    save_experiment(old, tmp_path / "e")
+    (tmp_path / "e/photo.jpg").write_text("mine")
+    count = iter(range(10))
+    replace = os.replace
+
+    class Killed(BaseException):
+        pass
+
+    def rename(source: Path, target: Path) -> None:
+        if Path(target).parent == tmp_path / "e" and next(count) == killed_at:
+            raise Killed
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", rename)
+    with contextlib.suppress(Killed):
+        save_experiment(new, tmp_path / "e")
+    assert (tmp_path / "e/photo.jpg").read_text() == "mine"
+    if killed_at < 2:
+        with pytest.raises(FileError, match=r"experiment\.yaml"):
+            load_experiment(tmp_path / "e")
+    else:
+        found = load_experiment(tmp_path / "e")
+        assert len(found) == len(new) and found.machine == new.machine

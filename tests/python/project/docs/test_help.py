@@ -14,6 +14,7 @@ import pytest
 from tests.python.project.docs.reader_files import ROBOT, link_tables
 
 import stiffmap as sm
+from stiffmap.common.outputs import one_command, write_text
 from stiffmap.ui.cli import main
 from stiffmap.ui.cli.app import load
 from stiffmap.ui.cli.commands import COMMANDS
@@ -62,9 +63,11 @@ def make_workshop(at: Path) -> Path:
     machine = sm.load_machine("orthoglide-revised").with_effect(
         "length", element="bar", legs=["x"], error=1e-4
     )
-    for name in ("corrected.yaml", "result/machine.yaml", "my.yaml"):
-        (at / name).parent.mkdir(exist_ok=True)
-        machine.save(at / name)
+    with one_command():  # as earlier commands wrote them, so that the examples may replace them
+        for name in ("corrected.yaml", "result/machine.yaml", "my.yaml"):
+            (at / name).parent.mkdir(exist_ok=True)
+            machine.save(at / name)
+        write_text(at / "arm.urdf", ROBOT)
     shutil.copytree(SERVO, at / "experiments/servo")
     shutil.copytree(SERVO, at / "dial_gauges")
     simulate("linear-delta", "experiments/heights", "--quantity", "position")
@@ -104,7 +107,6 @@ def make_workshop(at: Path) -> Path:
     rows = "".join(f"{k},{-60 + 5 * k},90,-120,-90,{3 * k},{400 + k},{2 * k},{300 - k}\n" for k in range(8))
     head = "q1,q2,q3,q4,q5,q6,px [mm],py [mm],pz [mm]\n"
     (at / "joints.csv").write_text(head + rows, encoding="utf-8")
-    (at / "arm.urdf").write_text(ROBOT, encoding="utf-8")
     (at / "delta.urdf").write_text(ROBOT.replace('"arm"', '"delta"'), encoding="utf-8")
     (at / "robot.yaml").write_text(
         "actuators:\n  q1: {stiffness: 4.0e4}\n  q2: {stiffness: 3.0e4}\n", encoding="utf-8"

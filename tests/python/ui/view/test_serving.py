@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import gzip
+import logging
 import socket
+from types import SimpleNamespace
 
 import pytest
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.view.names import SCRIPT, named
-from stiffmap.ui.view.serving import COOKIE, FIRST_PORT, Guard, free_port
+from stiffmap.ui.view.serving import COOKIE, FIRST_PORT, Guard, free_port, in_one_line
 
 HERE = {"Host": "127.0.0.1:8080"}
 
@@ -31,10 +33,38 @@ def test_this_computer_is_let_in_without_a_token(host: str) -> None:
         HERE | {"Origin": "http://evil.example"},
         HERE | {"Origin": "http://127.0.0.1:9999"},
         HERE | {"Origin": "null"},
+        HERE | {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Dest": "image"},
+        HERE | {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Dest": "document"},
+        HERE | {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Dest": "iframe"},
+        HERE | {"Sec-Fetch-Site": "cross-site"},
+        HERE | {"Sec-Fetch-Site": "same-site", "Sec-Fetch-Dest": "image"},
+        HERE | {"Sec-Fetch-Site": "same-site", "Sec-Fetch-Dest": "script"},
     ],
 )
 def test_other_names_and_other_pages_are_refused(headers: dict[str, str]) -> None:
     assert Guard("127.0.0.1").refusal("/", headers)
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Sec-Fetch-Site": "none", "Sec-Fetch-Dest": "document"},
+        {"Sec-Fetch-Site": "same-origin", "Sec-Fetch-Dest": "websocket"},
+        {"Sec-Fetch-Site": "same-origin", "Sec-Fetch-Dest": "image"},
+        {"Sec-Fetch-Site": "same-site", "Sec-Fetch-Dest": "iframe"},  # a notebook shows a view
+    ],
+)
+def test_its_own_pages_are_let_in(headers: dict[str, str]) -> None:
+    assert Guard("127.0.0.1").refusal("/", HERE | headers) == ""
+
+
+@pytest.mark.parametrize("to", ["image", "script", "style", "empty", "document", "iframe"])
+def test_a_link_sets_the_state_as_a_page_only(to: str) -> None:
+    links: list[str] = []
+    answer = Guard("127.0.0.1", links.append).wrapped(lambda connection, request: None)
+    headers = HERE | {"Sec-Fetch-Site": "same-origin", "Sec-Fetch-Dest": to}
+    answer(None, SimpleNamespace(path="/?state=abc", headers=headers))
+    assert links == (["abc"] if to in ("document", "iframe") else [])
 
 
 def test_beyond_this_computer_a_token_is_asked_for() -> None:
@@ -69,3 +99,15 @@ def test_a_taken_port_is_named_and_another_is_found() -> None:
     assert free_port("127.0.0.1", None) >= FIRST_PORT
     with pytest.raises(StiffmapError, match="--port: expected 0 to 65535, got 70000"):
         free_port("127.0.0.1", 70000)
+
+
+@pytest.mark.parametrize("kind", [KeyError, TypeError, AssertionError, UnicodeDecodeError])
+def test_a_hostile_message_is_one_line(kind: type[Exception], caplog: pytest.LogCaptureFixture) -> None:
+    log = logging.getLogger("asyncio.of.a.test")
+    log.addFilter(in_one_line)
+    try:
+        raise kind(*(("utf-8", b"", 0, 1, "bad") if kind is UnicodeDecodeError else ("type",)))
+    except kind:
+        log.exception("Task exception was never retrieved\nfuture: <Task finished>")
+    (line,) = caplog.text.splitlines()
+    assert line.endswith(f"a message was not understood and is ignored ({kind.__name__})")

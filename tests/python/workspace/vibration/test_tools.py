@@ -106,3 +106,43 @@ def test_a_universal_file_is_read(tmp_path):
     np.testing.assert_allclose(one.receptance, values, rtol=1e-4)
     assert (one.response, one.reference) == ("3 +z", "1 -x")
     np.testing.assert_allclose(one.coherence, 0.95, rtol=1e-6)
+
+
+def _lines(rows: list[str]) -> list[list[str]]:
+    """Lines of each data set of a universal file."""
+    ends = [i for i, row in enumerate(rows) if row.strip() == "-1"]
+    return [rows[a : b + 1] for a, b in zip(ends[::2], ends[1::2], strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("harm", "message"),
+    [
+        (lambda one, two: (one[:-3] + one[-2:], two), "expected 20 points, .* found 1"),
+        (lambda one, two: (one[:18] + one[19:], two), "expected 20 points, .* found 1"),
+        (lambda one, two: (one[:20] + one[19:], two), "expected 20 points, .* found 2"),
+        (lambda one, two: (one, two[:-3] + two[-2:]), "expected 20 points, .* found 1"),
+        (lambda one, two: ([r.replace("        20", "        19", 1) for r in one], two), "expected 19 points"),
+        (lambda one, two: (one, [r.replace("        20", "        21", 1) for r in two]), "expected 21 points"),
+        (lambda one, two: ([r.replace("        20", "          ", 1) for r in one], two), "tap.uff: .*expected"),
+        (lambda one, two: (one, [r.replace("1.00000e+00  1.", "2.00000e+00  1.", 1) for r in two]), "same 20"),
+        (lambda one, two: (one[:16] + [one[16][:13] + "         nan " + one[16][26:]] + one[17:], two), "tap.uff: "),
+    ],
+    ids=["last", "middle", "twice", "coherence", "fewer", "more", "none", "elsewhere", "nan"],
+)  # fmt: skip
+def test_a_universal_file_that_is_not_whole_is_one_message(harm, message, tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    f, path = np.arange(1.0, 21.0), tmp_path / "tap.uff"
+    for kind, data in ((4, 1e-3 / (1 + 0.1j * f)), (6, 0.95 + 0 * f)):
+        pyuff.UFF(str(path)).write_sets(
+            pyuff.prepare_58(
+                func_type=kind, rsp_node=3, rsp_dir=3, ref_node=1, ref_dir=-1, data=data + 0j, x=f, id1="tap",
+                ordinate_spec_data_type=12, abscissa_spacing=1, abscissa_min=1.0, abscissa_inc=1.0,
+                orddenom_spec_data_type=13, binary=0,
+            ), "add",
+        )  # fmt: skip
+    assert len(read_responses(path)[0].frequency) == 20
+    sets = harm(*_lines(path.read_text().splitlines()))
+    path.write_text("".join(f"{row}\n" for rows in sets for row in rows))
+    with pytest.raises(sm.StiffmapError, match=message) as problem:
+        read_responses(path)
+    assert str(path) in str(problem.value)

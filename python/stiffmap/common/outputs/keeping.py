@@ -1,0 +1,111 @@
+"""Nothing that a user has is replaced unasked: a command replaces what stiffmap wrote before, and none of its inputs."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from stiffmap.common.errors import FileError
+from stiffmap.common.fingerprints import digest, file_digest
+
+WRITTEN = ".stiffmap"
+"""Next to outputs: a line for each that a command wrote, a digest of its name and of what it wrote. What has been
+edited since is the user's."""
+
+
+class _Command:
+    """What the command of this process has read, has written, and was asked to replace."""
+
+    def __init__(self) -> None:
+        self.read: set[str] = set()
+        self.own: set[str] = set()
+        self.asked: set[str] = set()
+
+
+_RUNNING: list[_Command] = []
+_HOOKED: list[bool] = []
+
+
+def _seen(event: str, arguments: tuple[Any, ...]) -> None:
+    """Every file that Python opens to read, whoever asks for it."""
+    if event == "open" and _RUNNING and isinstance(arguments[1], str) and not set(arguments[1]) & set("wax+"):
+        with suppress(Exception):  # a number, a name that the system refuses: no file of the user
+            _RUNNING[-1].read.add(os.path.realpath(os.fsdecode(arguments[0])))
+
+
+@contextmanager
+def one_command() -> Iterator[None]:
+    """While a command runs its inputs are noted, and `check_replaceable` holds; calls from Python are as they say."""
+    if not _HOOKED:
+        _HOOKED.append(True)
+        sys.addaudithook(_seen)
+    _RUNNING.append(_Command())
+    try:
+        yield
+    finally:
+        _RUNNING.pop()
+
+
+def asked_to_replace(path: Path) -> None:
+    """The user has said that this output, a file or a folder, may be replaced."""
+    for command in _RUNNING:
+        command.asked.add(os.path.realpath(path))
+
+
+def check_replaceable(path: str | os.PathLike[str]) -> None:
+    """FileError where something is at this output that is an input of the command, or that stiffmap did not write."""
+    target = Path(os.path.realpath(path))
+    if not _noted(target) or str(target) in _RUNNING[-1].own or not (target.is_file() or target.is_dir()):
+        return
+    command = _RUNNING[-1]
+    inside = f"{target}{os.sep}"
+    if any(f == str(target) or f.startswith(inside) for f in tuple(command.read)):
+        raise FileError(
+            "cannot be written: this command read it, and replaces no input; name another output",
+            file=os.fspath(path),
+        )
+    if command.asked & {str(target), str(target.parent)} or _nothing(target):
+        return
+    before = set(command.read)
+    mine = _line(target, target) in _lines(target)
+    command.read = before  # looking is not reading
+    if not mine:
+        raise FileError(
+            "cannot be written: something is there that no command of stiffmap wrote, or that was edited since; "
+            "move or delete it, or name another output",
+            file=os.fspath(path),
+        )
+
+
+def note_written(target: Path, fresh: Path) -> None:
+    """Note that what is at `fresh` is about to stand at `target`: before it does, so that no kill leaves it unknown."""
+    if not _noted(target):
+        return
+    _RUNNING[-1].own.add(str(target))
+    line = _line(target, fresh)
+    if line not in _lines(target):
+        with target.with_name(WRITTEN).open("a", encoding="utf-8") as file:
+            file.write(f"{line}\n")
+
+
+def _noted(target: Path) -> bool:
+    """In a command, and not in a folder in which it grows an output, `.NAME.new` or `NAME.partial`."""
+    folder = target.parent.name
+    return bool(_RUNNING) and not (folder.startswith(".") or folder.endswith(".partial"))
+
+
+def _lines(target: Path) -> list[str]:
+    known = target.with_name(WRITTEN)
+    return known.read_text(encoding="utf-8", errors="replace").split() if known.is_file() else []
+
+
+def _line(target: Path, content: Path) -> str:
+    return digest(target.name, "folder" if content.is_dir() else file_digest(content))
+
+
+def _nothing(target: Path) -> bool:
+    return not any(target.iterdir()) if target.is_dir() else target.stat().st_size == 0

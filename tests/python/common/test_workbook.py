@@ -1,0 +1,63 @@
+"""Workbooks: formulas without values, and files that unpack to far more than they are."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
+
+import pytest
+
+from stiffmap.common.errors import FileError
+from stiffmap.common.workbook import sheet_names, workbook_lines
+
+openpyxl = pytest.importorskip("openpyxl")
+
+
+def workbook(path: Path, *rows: list[object]) -> Path:
+    """A workbook of one sheet, as a program writes it that computes no formula."""
+    book = openpyxl.Workbook()
+    book.active.title = "readings"
+    for row in rows:
+        book.active.append(row)
+    book.save(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("rows", "cell"),
+    [
+        ([["x", "fx"], [1, 2], ["=A2+1", "=B2"]], "A3"),
+        ([["x", "fx"], [1, 2], [3, "=B2*2"]], "B3"),
+        ([["x", "fx"], [1, "=SUM(A2)"], [3, 4]], "B2"),
+        ([["=A2", "fx"], [1, 2]], "A1"),
+        ([["x"], ["=1"], [3], ["=2"]], "A2"),
+    ],
+)
+def test_a_formula_without_a_value_is_named(rows: list[list[object]], cell: str, tmp_path: Path) -> None:
+    path = workbook(tmp_path / "b.xlsx", *rows)
+    with pytest.raises(FileError, match=f"line {cell[1]}: sheet 'readings', cell {cell}: the formula"):
+        workbook_lines(path, None)
+
+
+def test_numbers_and_blanks_are_read_as_before(tmp_path: Path) -> None:
+    path = workbook(tmp_path / "b.xlsx", ["x", None, "note"], [1.5, None, None], [None], [2, 3, "a"])
+    name, lines = workbook_lines(path, None)
+    assert name == "readings"
+    assert [n for n, _ in lines()] == [1, 2, 4]
+
+
+@pytest.mark.parametrize(
+    "part", ["xl/worksheets/sheet2.xml", "xl/media/image.png", "docProps/more.xml", "other.bin"]
+)
+def test_what_unpacks_to_too_much_is_refused_at_once(part: str, tmp_path: Path) -> None:
+    path = workbook(tmp_path / "b.xlsx", ["x"], [1])
+    with ZipFile(path, "a", ZIP_DEFLATED) as packed, packed.open(part, "w", force_zip64=True) as file:
+        for _ in range(201):
+            file.write(b" " * 1_000_000)
+    assert path.stat().st_size < 2e6
+    started = time.process_time()
+    for call in (lambda: sheet_names(path), lambda: workbook_lines(path, None)):
+        with pytest.raises(FileError, match="at most 200 MB when unpacked; found 201 MB"):
+            call()
+    assert time.process_time() - started < 1.0
