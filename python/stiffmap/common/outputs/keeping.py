@@ -12,10 +12,6 @@ from typing import Any
 from stiffmap.common.errors import FileError
 from stiffmap.common.fingerprints import digest, file_digest
 
-WRITTEN = ".stiffmap"
-"""Next to outputs: a line for each that a command wrote, a digest of its name and of what it wrote. What has been
-edited since is the user's."""
-
 
 class _Command:
     """What the command of this process has read, has written, and was asked to replace."""
@@ -71,7 +67,7 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
     if command.asked & {str(target), str(target.parent)} or _nothing(target):
         return
     before = set(command.read)
-    mine = _line(target, target) in _lines(target)
+    mine = _content(target) in _notes(target)
     command.read = before  # looking is not reading
     if not mine:
         raise FileError(
@@ -86,10 +82,10 @@ def note_written(target: Path, fresh: Path) -> None:
     if not _noted(target):
         return
     _RUNNING[-1].own.add(str(target))
-    line = _line(target, fresh)
-    if line not in _lines(target):
-        with target.with_name(WRITTEN).open("a", encoding="utf-8") as file:
-            file.write(f"{line}\n")
+    note = _note(target)
+    with suppress(OSError):  # no place to remember: the next command will ask
+        note.parent.mkdir(parents=True, exist_ok=True)
+        note.write_text(" ".join([*_notes(target)[-1:], _content(fresh)]), encoding="utf-8")
 
 
 def _noted(target: Path) -> bool:
@@ -98,13 +94,19 @@ def _noted(target: Path) -> bool:
     return bool(_RUNNING) and not (folder.startswith(".") or folder.endswith(".partial"))
 
 
-def _lines(target: Path) -> list[str]:
-    known = target.with_name(WRITTEN)
-    return known.read_text(encoding="utf-8", errors="replace").split() if known.is_file() else []
+def _note(target: Path) -> Path:
+    """Where it is remembered, among the user's caches, what commands wrote at an output: the last two digests."""
+    caches = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    return Path(caches) / "stiffmap" / "written" / digest(str(target))
 
 
-def _line(target: Path, content: Path) -> str:
-    return digest(target.name, "folder" if content.is_dir() else file_digest(content))
+def _notes(target: Path) -> list[str]:
+    note = _note(target)
+    return note.read_text(encoding="utf-8", errors="replace").split() if note.is_file() else []
+
+
+def _content(path: Path) -> str:
+    return digest("folder" if path.is_dir() else file_digest(path))
 
 
 def _nothing(target: Path) -> bool:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs.alone import is_device, only_job, refused, reserved, short
-from stiffmap.common.outputs.keeping import WRITTEN, check_replaceable, note_written
+from stiffmap.common.outputs.keeping import check_replaceable, note_written
 
 
 @contextmanager
@@ -131,7 +131,7 @@ def putting(folder: str | os.PathLike[str], head: str) -> Iterator[Path]:
 
 
 def _put_files(fresh: Path, folder: Path, head: str) -> None:
-    files = sorted((f for f in fresh.iterdir() if f.name != WRITTEN), key=lambda f: (f.name == head, f.name))
+    files = sorted(fresh.iterdir(), key=lambda f: (f.name == head, f.name))
     for file in files:
         check_replaceable(folder / file.name)
     target = Path(os.path.realpath(make_folder(folder)))

@@ -45,7 +45,7 @@ def stress(
 
     Examples:
 
-      [cyan]stiffmap stress my_machine.yaml --at 0,0,200[/cyan]
+      [cyan]stiffmap stress my_machine.yaml --at 0,200[/cyan]
 
       [cyan]stiffmap stress swing-table --gravity 0,0,-9.81 -o out[/cyan]
     """

@@ -16,7 +16,6 @@ import pytest
 import stiffmap as sm
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs import one_command, reserved, write_text
-from stiffmap.common.outputs.keeping import WRITTEN
 from stiffmap.experiment import load_experiment
 from stiffmap.ui.cli import main
 from stiffmap.workspace.maps import grid_map
@@ -109,7 +108,7 @@ def test_results_on_a_full_disk_keep_the_previous_ones(name: str, tmp_path: Path
     done = command([name, machine, str(DATA), "-o", "out", *budget], tmp_path, size=400)
     assert done.returncode == 2
     assert f"stiffmap: out/{file}: cannot be written: File too large" in done.stderr
-    left = {p.name: p.read_text() for p in (tmp_path / "out").iterdir() if p.name != WRITTEN}
+    left = {p.name: p.read_text() for p in (tmp_path / "out").iterdir()}
     assert left == {file: "old"}
 
 
@@ -158,7 +157,7 @@ def test_killed_while_it_writes_a_data_set(tmp_path: Path) -> None:
         job.send_signal(signal.SIGKILL)
     assert not (tmp_path / "e").exists()
     assert command(args, tmp_path).returncode == 0
-    assert sorted(p.name for p in (tmp_path / "e").iterdir()) == [WRITTEN, "data.csv", "experiment.yaml"]
+    assert sorted(p.name for p in (tmp_path / "e").iterdir()) == ["data.csv", "experiment.yaml"]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "e"]
 
 

@@ -10,7 +10,6 @@ import pytest
 import stiffmap as sm
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs import asked_to_replace, one_command, putting, write_rows, write_text
-from stiffmap.common.outputs.keeping import WRITTEN
 from stiffmap.ui.cli import main
 
 ROOT = Path(__file__).parents[4]
@@ -20,7 +19,7 @@ SIMULATE = ["simulate", "five-bar", "--poses", "4", "--loads", "2", "-o"]
 
 def contents(folder: Path) -> dict[str, bytes]:
     """What a user sees of a folder."""
-    return {p.name: p.read_bytes() for p in folder.iterdir() if p.is_file() and p.name != WRITTEN}
+    return {p.name: p.read_bytes() for p in folder.iterdir() if p.is_file()}
 
 
 @pytest.fixture
