@@ -24,7 +24,12 @@ from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.model.description import TASK
-from stiffmap.solve.kinematics import Kinematics, forward_kinematics, inverse_kinematics
+from stiffmap.solve.kinematics import (
+    Kinematics,
+    forward_kinematics,
+    inverse_kinematics,
+    must_take,
+)
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.validity import Validity
 
@@ -202,6 +207,7 @@ def _plan(
     else:
         p = np.atleast_2d(trailing(position, (3,), "position", "positions (m)"))  # type: ignore[arg-type]
         r = None if rotation is None else trailing(rotation, (3, 3), "rotation", "rotation matrices")
+        must_take(machine, p, r)
         at = inverse_kinematics(machine, p, r)
     names, n = machine.compiled.names, len(at.position)
     plan = Experiment(

@@ -31,19 +31,20 @@ def commanded(plant: Plant, before: Equilibrium) -> Commanded:
     """Inverse of the loaded machine: on the path the cut is the wanted one, so that its force is known there."""
     job = plant.job
     force = job.force(np.zeros((len(job), 2)))
+    steered = np.array([1.0 if axis in job.machine.description.task else 0.0 for axis in "xyz"])
     # the machine's tangent tells where the tool would stand under the wanted cut
     further = np.einsum("mij,mj->mi", before.compliance, force - before.force)
-    u = job.position - np.nan_to_num(before.error) - np.nan_to_num(further)
+    u = job.position - steered * (np.nan_to_num(before.error) + np.nan_to_num(further))
     rest = np.full((len(job), 3), np.nan)
     active = np.arange(len(job))
     for _ in range(STEPS):
         s = plant.stand(u[active], force[active], rows=active)
         rest[active] = u[active] + s.moved - job.position[active]
-        far = np.abs(rest[active]).max(axis=1)
+        far = np.abs(steered * rest[active]).max(axis=1)
         go = far > DONE  # a lost point compares false
-        u[active[go]] -= rest[active[go]]
+        u[active[go]] -= steered * rest[active[go]]
         active = active[go]
         if not active.size:
             break
     u[~np.isfinite(rest).all(axis=1)] = np.nan
-    return Commanded(u, np.linalg.norm(rest, axis=1), job.position - before.error)
+    return Commanded(u, np.linalg.norm(rest, axis=1), job.position - steered * before.error)

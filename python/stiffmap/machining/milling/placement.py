@@ -15,6 +15,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
 from stiffmap.machining.milling.equilibrium import equilibrium
 from stiffmap.machining.milling.plant import Plant
+from stiffmap.machining.milling.reach import astray, followed, must_follow
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.toolpath import Placement, Toolpath, sampled
@@ -105,6 +106,9 @@ def placements(
     if count < 1 or points < 2:
         raise StiffmapError(f"count and points: expected 1 or more and 2 or more, got {count} and {points}")
     low, high = np.asarray(machine.workspace if box is None else box, dtype=float)
+    # along what the machine does not command the part has one place
+    steered = [axis in machine.description.task for axis in "xyz"]
+    low, high = (np.where(steered, end, machine.description.home.p) for end in (low, high))
     search = Search(machine, path, process, points, threads)
     middle = (low + high) / 2
     naive = Placement(middle - search.middle, 0.0)
@@ -114,6 +118,7 @@ def placements(
     at = search.inside(unit[:, :3], turn, low, high)
     largest = _tried(search, at, turn, scheduler)
     if not np.isfinite(largest).any():
+        must_follow(search.at_place(naive), threads)
         raise StiffmapError(
             f"no placement of {count} holds the path on {machine.name}: it measures "
             f"{', '.join(f'{v:.0f}' for v in 1e3 * search.size)} mm, the box {', '.join(f'{v:.0f}' for v in 1e3 * (high - low))} mm"
@@ -170,14 +175,14 @@ class Search:
         if len(self.points) > 1.3 * points:  # a table of points
             keep = np.unique(np.linspace(0, len(self.points) - 1, points).astype(int))
             self.points = Points(*(getattr(self.points, n)[keep] for n in Points.__dataclass_fields__))
-        self.job = self._at(Placement(np.zeros(3), 0.0))
+        self.job = self.at_place(Placement(np.zeros(3), 0.0))
         still = np.zeros((len(self.job), 2))
         self.force, self.slope = self.job.force(still), self.job.force_slopes(still)[:, :, 0]
         p = self.points.position
         self.middle = (p.max(axis=0) + p.min(axis=0)) / 2
         self.size = np.ptp(p, axis=0)
 
-    def _at(self, place: Placement) -> Setting:
+    def at_place(self, place: Placement) -> Setting:
         return setting(self.machine, self.path, self.process, self.points, place)
 
     def _extent(self, turn: Floats) -> tuple[Floats, Floats]:
@@ -213,7 +218,9 @@ class Search:
         slope = np.einsum("nij,mj->nmi", r, self.slope)
         bent = np.matmul(s.compliance[..., :3, :3], slope[..., None])[..., 0]
         loop = 1 - np.einsum("nmi,nmi->nm", off, bent)  # 1 + kp/k
-        good = (s.ok & (s.flags & LIMITS == 0) & (loop > 0)).all(axis=1)
+        good = (
+            s.ok & (s.flags & LIMITS == 0) & (loop > 0) & followed(astray(self.job, position, self.threads))
+        ).all(axis=1)
         error = np.einsum("nmi,nmi->nm", s.displacement[..., :3], off)
         with np.errstate(divide="ignore", invalid="ignore"):
             error = np.abs(error / loop).max(axis=1)
@@ -225,9 +232,10 @@ class Search:
 
     def errors(self, place: Placement) -> Floats:
         """(k,) m across the wall at the points of the search; infinite where one fails."""
-        job = self._at(place)
+        job = self.at_place(place)
         e = equilibrium(Plant(job, threads=self.threads), job.position)
         fine = np.isfinite(e.error).all(axis=1) & (e.flags & LIMITS == 0)
+        fine &= followed(astray(job, job.position, self.threads))
         normal = np.where(fine, np.nan_to_num((e.error * job.off).sum(axis=1)), np.inf)
         return np.asarray(normal)
 

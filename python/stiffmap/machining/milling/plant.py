@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.experiment.prediction.unloaded_state import STILL, TRAVEL, lagging, lags
 from stiffmap.machining.milling.setting import Setting
-from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.solve.kinematics import inverse_kinematics, missed
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 
@@ -83,7 +83,9 @@ class Plant:
                 threads=self.threads,
             )
             ok = s.ok & np.isfinite(command[here]).all(axis=1)
-            moved[here] = np.where(ok[:, None], s.displacement[:, :3], np.nan)
+            # along what the machine does not command the tool stays where it was
+            stays = missed(machine, np.nan_to_num(command[here], nan=1e3), self._turns(mine[here]))[:, :3]
+            moved[here] = np.where(ok[:, None], s.displacement[:, :3] + stays, np.nan)
             status[here], flags[here] = s.status, s.flags
             if full:
                 turned[here] = s.displacement[:, 3:]

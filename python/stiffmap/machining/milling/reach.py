@@ -10,17 +10,45 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling.setting import Setting
+from stiffmap.solve.kinematics import SAME, missed, missed_words
 from stiffmap.solve.status import Status
 
 
 def reached(job: Setting, position: Floats, threads: int | None = None) -> NDArray[np.bool_]:
     """(...,) bool: poses (..., m, 3) that the machine takes without load."""
     s = job.machine.solve(position, rotation=job.rotation, stiffness=False, threads=threads)
-    return np.asarray(s.status != Status.UNREACHABLE)
+    return np.asarray((s.status != Status.UNREACHABLE) & followed(astray(job, position, threads)))
+
+
+def astray(job: Setting, position: Floats, threads: int | None = None) -> Floats:
+    """(..., m, 6) m, rad by which the machine misses what the path asks for at positions (..., m, 3): of the three coordinates, the
+    tool's axis, and the turn about it where the path sets one."""
+    gap = missed(job.machine, position, job.rotation, threads)
+    if job.angle is None:
+        axis = np.einsum("mji,mj->mi", job.rotation, job.tool)
+        gap[..., 3:] -= (gap[..., 3:] * axis).sum(axis=-1, keepdims=True) * axis
+    return gap
+
+
+def followed(gap: Floats) -> NDArray[np.bool_]:
+    """(...,) bool of gaps (..., 6) m, rad."""
+    return np.asarray((np.abs(gap) <= SAME).all(axis=-1))
+
+
+def must_follow(job: Setting, threads: int | None = None) -> None:
+    """Raise StiffmapError with the directions in which the machine does not follow the path."""
+    gap = astray(job, job.position, threads)
+    words = missed_words(job.machine, gap)
+    if words:
+        i = int(np.argmax((np.abs(gap) > SAME).any(axis=-1)))
+        raise StiffmapError(
+            f"{job.machine.name} cannot follow the path: it misses {words}; from line {job.path.line[job.points.move[i]]} of the path on"
+        )
 
 
 def must_reach(job: Setting, threads: int | None = None) -> None:
     """Raise StiffmapError naming the points out of reach, how far the part sticks out, and a place that holds it."""
+    must_follow(job, threads)
     ok = reached(job, job.position, threads)
     if not ok.all():
         _refuse(job, ok, threads)

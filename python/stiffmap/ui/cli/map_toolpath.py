@@ -13,6 +13,7 @@ from rich.console import Console
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.outputs import make_folder, write_rows
 from stiffmap.common.plain import plain
+from stiffmap.solve.kinematics import must_take
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli.inputs import MM, finish, force_given
 from stiffmap.ui.cli.output import print_json
@@ -34,6 +35,7 @@ def map_toolpath(
     from stiffmap.workspace.performance import load_motion
 
     position, given = load_motion(toolpath).places()
+    must_take(m, position)
     load = given if given.any() else _load(m, position, force, how)
     wrench = np.hstack([load, np.zeros_like(load)])
     s = m.solve(position, wrench, **how)

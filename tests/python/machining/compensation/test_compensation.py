@@ -33,7 +33,10 @@ def with_error(name: str) -> sm.Machine:
 
 def middle(machine: sm.Machine) -> np.ndarray:
     low, high = machine.workspace
-    return low + (high - low) * np.array([[0.3, 0.6, 0.4], [0.7, 0.4, 0.6]])
+    out = low + (high - low) * np.array([[0.3, 0.6, 0.4], [0.7, 0.4, 0.6]])
+    still = [axis not in machine.description.task for axis in "xyz"]
+    out[:, still] = machine.description.home.p[still]  # what is not commanded stays at home
+    return out
 
 
 @pytest.mark.parametrize("name", MACHINES)
