@@ -212,8 +212,8 @@ struct Newton {
       const V change = larger(norm, e.transferred);
       const M whole = way.acting == 1.0;
       M last = change < small;
-      // An arm's axes are answered where this step leads: of the tangent only the loads' share is left behind, with that
-      // of springs outside too much.
+      // An arm's axes are answered where this step leads: of the tangent only the loads' share is left behind, with
+      // that of springs outside too much.
       const V softest = e.lowest < 1.0 ? e.lowest : splat(1);
       M near = P.serial_joints > 0 && P.spring_count == 0 ? ~last & (change < nearly * softest) : M{};
       last |= near;

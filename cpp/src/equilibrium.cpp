@@ -191,8 +191,8 @@ Outcome steps_with_corners(const Mechanism& m, Problem& p, const EquilibriumOpti
   return Outcome::converged;
 }
 
-/// Laws with corners of which none sticks: the whole load at once, where that needs it by way of least energy. Where the
-/// tip leaps it is not taken, or flagged if there is no other way.
+/// Laws with corners of which none sticks: the whole load at once, where that needs it by way of least energy. Where
+/// the tip leaps it is not taken, or flagged if there is no other way.
 bool at_once_with_corners(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
                           State& state, EquilibriumResult& out, bool only_way) {
   p.factor = 1;

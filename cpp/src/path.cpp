@@ -8,9 +8,9 @@ namespace stiffmap {
 namespace {
 
 constexpr int bisections = 36;
-constexpr double shortest_share = 1.0 / 16384;                 // of the first step
-constexpr double continuous = 1e-4;  // of a step's motion: what lies farther apart at one load are two paths
-constexpr double sharpest = 0.7;     // cosine of the turn in one step by arc
+constexpr double shortest_share = 1.0 / 16384;  // of the first step
+constexpr double continuous = 1e-4;             // of a step's motion: what lies farther apart at one load are two paths
+constexpr double sharpest = 0.7;                // cosine of the turn in one step by arc
 constexpr double first_sizes[] = {1, 0.5, 0.25, 2, 0.125, 4};  // onto a crossing branch, in steps
 
 /// A branch as it grows: accepts points after locating what happened on the way to them.
@@ -18,8 +18,8 @@ class Trace {
  public:
   Trace(Follower& follower, Branch& out) : f_(follower), out_(out) {}
 
-  /// `step(from, share, to)` corrects the point at that share of the present step; `list`: it was asked for. False where
-  /// the step leapt to another path: `to` is then the last point of this one.
+  /// `step(from, share, to)` corrects the point at that share of the present step; `list`: it was asked for. False
+  /// where the step leapt to another path: `to` is then the last point of this one.
   template <class Step>
   bool accept(const LoadedState& from, LoadedState& to, double share, bool list, const Step& step) {
     if (from.unstable != to.unstable && !locate(from, to, share, step)) return false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Mutants that are chosen at run time by STIFFMAP_MUTANT (tests/python/project/mutation): included in front of every source of
-// a copy of the core, never by the core itself.
+// Mutants that are chosen at run time by STIFFMAP_MUTANT (tests/python/project/mutation): included in front of every
+// source of a copy of the core, never by the core itself.
 #pragma once
 
 #include <algorithm>

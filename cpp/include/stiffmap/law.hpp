@@ -13,8 +13,9 @@ struct LawPoint {
   double a, tau, da, dtau;
 };
 
-/// Linear with an optional cubic term (z = (a + tau / stiffness) / 2), or a monotone polyline (z = a + tau / stiffness).
-/// Both coordinates are then Lipschitz in z (theory L1): a step is an ordinary point, whether force or deflection is given.
+/// Linear with an optional cubic term (z = (a + tau / stiffness) / 2), or a monotone polyline (z = a + tau /
+/// stiffness). Both coordinates are then Lipschitz in z (theory L1): a step is an ordinary point, whether force or
+/// deflection is given.
 class Law {
  public:
   explicit Law(double stiffness, double cubic = 0.0, std::vector<std::pair<double, double>> knots = {},
