@@ -18,7 +18,7 @@ from stiffmap.machining.chatter.coupling import coupling_depth
 from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, milling_process
 from stiffmap.machining.chatter.floquet import multiplier_map
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows, modes_of_machine
-from stiffmap.machining.chatter.zero_order import FEED, TOOL, at_periods, frequencies_of, limits
+from stiffmap.machining.chatter.zero_order import FEED, TOOL, at_periods, frequencies_of, least_depth, limits
 from stiffmap.machining.process import Process
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
@@ -29,6 +29,8 @@ SPEEDS, DEPTHS = 120, 80
 PER_WAVE = 16
 """Intervals of a tooth period for each oscillation of the fastest mode in it."""
 LEAST, MOST = 40, 320
+ZOOMS, PARTS = 4, 8
+"""Times that a limit is found anew between two depths, and parts of them."""
 PER_TASK = 8
 """Speeds of one task on a cluster."""
 HIGHEST = 4.0
@@ -43,8 +45,8 @@ def stability_lobes(
     *,
     speeds: ArrayLike | None = None,
     depths: ArrayLike | None = None,
-    feed: ArrayLike = FEED,
-    tool: ArrayLike = TOOL,
+    feed: ArrayLike | None = None,
+    tool: ArrayLike | None = None,
     also: Iterable[Any] = (),
     method: str = "semi-discretization",
     intervals: int | None = None,
@@ -65,7 +67,8 @@ def stability_lobes(
     speeds, depths
         (speed,) rad/s and (depth,) m, rising; None: around the process's speed, up to four times the least limit.
     feed, tool
-        (3,) directions of the feed, and from the tool's tip to its holder, base axes.
+        (3,) directions of the feed, and from the tool's tip to its holder, base axes. None: the tool stands along the flange's
+        axis (z of the machine's tool frame), and feeds along the first of x, y that goes across it.
     also
         Further modes in series with the machine's, of spindle and tool, in the axes of the cut.
     method
@@ -82,8 +85,10 @@ def stability_lobes(
     Dataset
         `limit` (speed) m: least unstable depth, infinite where none on the diagram; `limit_zero_order` (speed) m;
         `multiplier` (speed, depth); attributes: `least` m and `frequency` Hz of zero order, `at_process` the
-        multiplier at the speed and depth of the process, `coupling` m where modes couple
-        without regeneration, `damping`, `stable_speeds` [rad/s, m]: where the limit has its largest values.
+        multiplier at the speed and depth of the process, `limit_at_process` m up to which it is stable at that speed,
+        `tool` and `feed` base axes, `coupling` m where modes couple
+        without regeneration, `damping`, `stable_speeds` [rad/s, m]: where the limit has its largest values. Limits are the
+        deepest that are known to be stable, never between two depths.
 
     Raises StiffmapError for bad input. Source: docs/theory.md, V4 to V6.
     """
@@ -92,20 +97,21 @@ def stability_lobes(
     if isinstance(machine, str | PathLike):
         machine = as_machine(machine)
     p = milling_process(process)
-    modes, said = _modes(
-        machine, position, cut_axes(real_array(feed, "feed"), real_array(tool, "tool")), pose
-    )
+    along = flange(machine, pose.get("rotation")) if tool is None else real_array(tool, "tool")
+    ahead = _across(along) if feed is None else real_array(feed, "feed")
+    modes, said = _modes(machine, position, cut_axes(ahead, along), pose)
     extra = list(also)
     if extra:
         modes = modes.and_also(mode_rows(extra))
     modes = modes.below(np.inf)
-    frequency = frequencies_of(modes)
+    frequency = frequencies_of(modes.frequency)
     depth0, angle = limits(modes.receptance(frequency), p)
-    least = float(depth0.min())
+    least = least_depth(frequency, modes.receptance, p)
     s = _axis(speeds, "speeds", "rad/s") if speeds is not None else p.spindle * np.linspace(0.25, 1.5, SPEEDS)
     top = HIGHEST * least if np.isfinite(least) else p.cut.axial
     d = _axis(depths, "depths", "m") if depths is not None else np.linspace(0, max(top, 1e-9), DEPTHS + 1)[1:]
     zero = at_periods(frequency, depth0, angle, 2 * pi / (p.tool.teeth * s))
+    own = np.array([p.spindle])
     ds = xr.Dataset(
         {"limit_zero_order": ("speed", zero, {"units": "m"})},
         coords={"speed": ("speed", s, {"units": "rad/s"}), "depth": ("depth", d, {"units": "m"})},
@@ -113,7 +119,9 @@ def stability_lobes(
             "process": p.name, "method": method, "least": least, "damping": said, "modes": len(modes),
             "frequency": float(frequency[int(np.argmin(depth0.min(axis=-1)))]),
             "coupling": coupling_depth(modes, p),
-            "at_process": float(_multipliers(modes, p, np.array([p.spindle]), np.array([p.cut.axial]), intervals, 1)[0, 0]),
+            "at_process": float(_multipliers(modes, p, own, np.array([p.cut.axial]), intervals, 1)[0, 0]),
+            "limit_at_process": float(_limits_at(modes, p, own, d, _multipliers(modes, p, own, d, intervals, 1), intervals)[0]),
+            "tool": along.tolist(), "feed": ahead.tolist(),
             "helix": "left out: the tooth is straight" if p.tool.helix else "none",
         },
     )  # fmt: skip
@@ -122,9 +130,39 @@ def stability_lobes(
     else:
         mu = _multipliers(modes, p, s, d, intervals, threads, scheduler)
         ds["multiplier"] = (("speed", "depth"), mu)
-        ds["limit"] = ("speed", border(d, mu), {"units": "m"})
+        ds["limit"] = ("speed", _limits_at(modes, p, s, d, mu, intervals), {"units": "m"})
     ds.attrs["stable_speeds"] = pockets(s, ds.limit.values, d[-1])
     return ds
+
+
+def flange(machine: Any, rotation: ArrayLike | None) -> Floats:
+    """(3,) from a tool's tip to its holder, base axes, the tool along z of the machine's tool frame: z points out of an arm's flange,
+    and up, to the spindle, where at home it points up."""
+    if not isinstance(machine, Machine):
+        return np.array(TOOL)
+    home = machine.description.home.r
+    r = home if rotation is None else real_array(rotation, "rotation")
+    return np.asarray((1.0 if home[2, 2] > np.sqrt(0.5) else -1.0) * r[..., :, 2].reshape(-1, 3)[0])
+
+
+def _across(tool: Floats) -> Floats:
+    return np.array(FEED if abs(tool[0]) < np.sqrt(0.5) * np.linalg.norm(tool) else (0.0, 1.0, 0.0))
+
+
+def _limits_at(
+    modes: ToolModes, p: Process, speed: Floats, depth: Floats, multiplier: Floats, intervals: int | None
+) -> Floats:
+    """(speeds,) m: `border`, found anew between its depth and the next."""
+    out = border(depth, multiplier)
+    for i in np.flatnonzero(np.isfinite(out)):
+        low, high = out[i], depth[np.searchsorted(depth, out[i], side="right")]
+        for _ in range(ZOOMS):
+            tried = np.linspace(low, high, PARTS + 1)
+            over = _multipliers(modes, p, speed[i : i + 1], tried[1:-1], intervals, 1)[0] >= 1
+            j = int(np.argmax(np.r_[over, True]))
+            low, high = tried[j], tried[j + 1]
+        out[i] = low
+    return out
 
 
 def _modes(
@@ -187,16 +225,10 @@ def _some_speeds(shared: tuple[ToolModes, Process, Floats, int | None], item: tu
 
 
 def border(depth: Floats, multiplier: Floats) -> Floats:
-    """(speeds,) m: least depth where the multiplier passes one, between depths by its value; infinite where it does not."""
+    """(speeds,) m: deepest of the depths below the first that chatters, 0 where all do; infinite where none does."""
     over = multiplier >= 1
-    first = np.argmax(over, axis=1)
-    out = np.full(len(multiplier), np.inf)
-    for i in np.flatnonzero(over.any(axis=1)):
-        j = first[i]
-        a, b = (0.0, depth[0]) if j == 0 else (depth[j - 1], depth[j])
-        m0, m1 = (0.0 if j == 0 else multiplier[i, j - 1]), multiplier[i, j]
-        out[i] = a + (b - a) * ((1 - m0) / (m1 - m0) if j else 1.0)
-    return out
+    safe = np.r_[0.0, depth][np.argmax(over, axis=1)]
+    return np.where(over.any(axis=1), safe, np.inf)
 
 
 def pockets(speed: Floats, limit: Floats, top: float, most: int = 5) -> list[list[float]]:

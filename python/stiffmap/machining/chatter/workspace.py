@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, real_array, trailing
 from stiffmap.common.tasks import workers
 from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, milling_process
-from stiffmap.machining.chatter.zero_order import FEED, TOOL, limits
+from stiffmap.machining.chatter.zero_order import FEED, TOOL, frequencies_of, least_depth
 from stiffmap.machining.process import Process
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
@@ -117,8 +117,14 @@ def _block(
     way = _real(np.linalg.eigh(at_peak.conj().transpose(0, 2, 1) @ at_peak)[1][:, :, -1])
     depth: Floats | float = np.nan
     if cut is not None:
-        depth = limits(axes @ H[:, f > 0] @ axes.T, cut)[0].min(axis=(-1, -2))
+        depth = np.array([_limit(_only(some, here[i : i + 1]), axes, cut) for i in here])
     return 1 / np.sqrt(largest[here, peak]), f[peak], way, depth
+
+
+def _limit(one: TipModes, axes: Floats, cut: Process) -> float:
+    """m: limiting depth of one pose."""
+    f = frequencies_of(one.frequency[np.isfinite(one.frequency)])
+    return least_depth(f, lambda x: axes @ receptance(one, x)[0, :, :3, :3] @ axes.T, cut)
 
 
 def _around(found: TipModes) -> Floats:

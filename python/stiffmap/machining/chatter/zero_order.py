@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from math import pi
 from typing import Any
 
@@ -15,8 +15,15 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, mean_chips, milling_process, spindle_speed
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows
 
+Response = Callable[[Floats], np.ndarray]
+"""Receptance (frequencies, 3, 3) m/N in the axes of the cut at (frequencies,) Hz."""
 FEED, TOOL = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 """Directions of the feed and from the tool's tip to its holder where none is given, base axes."""
+BETWEEN = 20
+"""Frequencies between two samples."""
+MOST_TERMS, EXACT = 80, 1e-10
+"""Of a rational function through samples; largest error, as a share of the largest value."""
+ZOOMS = 4
 AROUND = 400
 """Frequencies close to each mode."""
 
@@ -46,18 +53,20 @@ def limiting_depth(
     Infinite where nothing that vibrates can chatter, NaN where a pose failed. Zero order: the mean of the directional
     factors; for low immersion ask `floquet_multiplier`. Raises StiffmapError for bad input. Source: docs/theory.md, V4.
     """
-    p = milling_process(process)
+    p, modes = milling_process(process), None
     if isinstance(receptance, xr.DataArray):
         frequency, values = _from_array(receptance)
         axes = cut_axes(real_array(feed, "feed"), real_array(tool, "tool"))
         G = axes @ values[..., :3, :3] @ axes.T
     else:
         modes = mode_rows(receptance)
-        frequency = frequencies_of(modes)
+        frequency = frequencies_of(modes.frequency)
         G = modes.receptance(frequency)
     depth, angle = limits(G, p)
     if speed is None:
-        out = np.min(depth, axis=(-1, -2))
+        out = np.empty(G.shape[:-3])
+        for i in np.ndindex(out.shape):  # a mode may lie between two samples
+            out[i] = least_depth(*((frequency, modes.receptance) if modes else _between(frequency, G[i])), p)
     else:
         period = 2 * pi / (p.tool.teeth * spindle_speed(speed, p))
         out = at_periods(frequency, depth, angle, np.array([period]))[..., 0]
@@ -80,12 +89,50 @@ def _from_array(receptance: xr.DataArray) -> tuple[Floats, np.ndarray]:
     return f[f > 0], receptance.values[..., f > 0, :, :]
 
 
-def frequencies_of(modes: ToolModes) -> Floats:
-    """Hz, dense around each mode."""
+def frequencies_of(own: Floats) -> Floats:
+    """Hz, dense around each mode of frequencies (modes,) Hz."""
     widths = np.sinh(np.linspace(-4, 4, AROUND)) / np.sinh(4)
-    close = modes.frequency[:, None] * (1 + 0.5 * widths)
-    low, high = 0.2 * modes.frequency.min(), 4 * modes.frequency.max()
+    close = own[:, None] * (1 + 0.5 * widths)
+    low, high = 0.2 * own.min(), 4 * own.max()
     return np.unique(np.concatenate([close.ravel(), np.geomspace(low, high, 4 * AROUND)]))
+
+
+def least_depth(frequency: Floats, response: Response, process: Any) -> float:
+    """m: least limit of a receptance over all frequencies, first of some (Hz), then ever closer to the least; infinite: none."""
+    least = np.inf
+    for _ in range(ZOOMS):
+        depth = limits(response(frequency), process)[0].min(axis=-1)
+        k = int(np.argmin(depth))
+        least = min(least, float(depth[k]))
+        frequency = np.linspace(frequency[max(k - 1, 0)], frequency[min(k + 1, len(depth) - 1)], 33)
+    return least
+
+
+def _between(frequency: Floats, G: np.ndarray) -> tuple[Floats, Response]:
+    """More frequencies, and the rational function through G (frequencies, 3, 3) by few of its samples (AAA; Nakatsukasa, Sète and
+    Trefethen 2018); where there is none, as with noise, the nearest sample."""
+    values = G.reshape(len(G), -1)
+    size = np.abs(values).max()
+    fit, chosen = np.broadcast_to(values.mean(axis=0), values.shape), []
+    for _ in range(min(MOST_TERMS, len(G) // 2) if np.isfinite(size) else 0):
+        chosen.append(int(np.argmax(np.abs(values - fit).max(axis=1))))
+        rest = np.setdiff1d(np.arange(len(G)), chosen)
+        q, f = values[chosen], frequency[chosen]
+        cauchy = 1 / (frequency[rest, None] - f)
+        loewner = np.swapaxes((values[rest, None] - q) * cauchy[..., None], 1, 2).reshape(-1, len(chosen))
+        w = np.linalg.svd(loewner, full_matrices=False)[2][-1].conj()
+        fit = values.copy()
+        fit[rest] = (cauchy * w) @ q / (cauchy @ w)[:, None]
+        if np.abs(values - fit).max() <= EXACT * size:
+
+            def at(x: Floats, w: np.ndarray = w, f: Floats = f, q: np.ndarray = q) -> np.ndarray:
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    c = w / (x[:, None] - f)
+                    return np.asarray((c @ q / c.sum(axis=1, keepdims=True)).reshape(-1, 3, 3))
+
+            share = (np.arange(BETWEEN) + 0.5) / BETWEEN
+            return (frequency[:-1, None] + np.diff(frequency)[:, None] * share).ravel(), at
+    return frequency, lambda x: G[np.abs(frequency - x[:, None]).argmin(axis=1)]
 
 
 def limits(G: np.ndarray, process: Any) -> tuple[Floats, Floats]:

@@ -54,10 +54,13 @@ class PathStability:
         """What it means, in words."""
         rpm = 60 / (2 * pi)
         if not self.unstable:
-            return f"The cut is stable at {len(self.way)} places along the path (largest multiplier {self.multiplier.max():.3f})."
+            return (
+                f"The cut is stable at {len(self.way)} places along the path (largest multiplier "
+                f"{self.multiplier.max():.3f}; damping {self.damping})."
+            )
         text = (
             f"The cut chatters at {self.unstable} of {len(self.way)} places along the path (multiplier up to "
-            f"{self.multiplier.max():.3f} at {spindle * rpm:.0f} rpm)."
+            f"{self.multiplier.max():.3f} at {spindle * rpm:.0f} rpm; damping {self.damping})."
         )
         if not self.offered.size:
             low, high = self.speed[[0, -1]] * rpm

@@ -6,7 +6,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.machining.milling.limits import BROKEN
 from stiffmap.solve.status import Status
 
 
@@ -20,25 +19,31 @@ def sizes(values: ArrayLike) -> dict[str, float]:
 
 
 def verdict(ds: xr.Dataset) -> str:
-    """One sentence."""
-    bad = int((ds.status.values != Status.CONVERGED).sum())
-    if (ds.status.values == Status.UNSTABLE).any():
-        return f"The cut runs away at {int((ds.status.values == Status.UNSTABLE).sum())} points: the force grows faster than the machine resists."
+    """The worst of what was found comes first: no equilibrium, chatter, broken limits, errors."""
+    states, points = ds.status.values, ds.sizes["point"]
+    told = []
+    away, bad = int((states == Status.UNSTABLE).sum()), int((states != Status.CONVERGED).sum())
+    if away:
+        told.append(f"The cut runs away at {away} points: the force grows faster than the machine resists.")
+    elif bad:
+        told.append(f"{bad} of {points} points have no equilibrium.")
+    if "multiplier" in ds and (ds.multiplier.values > 1).any():
+        told.append(f"{ds.multiplier.attrs['said']} The errors are those of a cut without chatter.")
+    names = ds.warnings.attrs["names"] if "warnings" in ds else []
+    over = [n for n in names if n not in ("chatter", "declared workspace")]
+    if over:
+        told.append(f"Limits are broken: {', '.join(over)}.")
     if bad:
-        return f"{bad} of {ds.sizes['point']} points have no equilibrium."
+        return " ".join(told)
     b, a = sizes(ds.error_normal), sizes(ds.error_normal_after)
     lost = int((~np.isfinite(ds.error_normal_after.values)).sum())
+    told.append(f"The part is off by {b['largest']:.3f} mm at most; with the compensated program ")
     if lost:
-        return (
-            f"The part is off by {b['largest']:.3f} mm at most. With the compensated program {lost} of {ds.sizes['point']} points have "
-            "no equilibrium."
-        )
-    text = f"The part is off by {b['largest']:.3f} mm at most; with the compensated program by {a['largest']:.4f} mm."
-    flags = ds.flags.values | ds.flags_after.values
-    over = [name for name, flag in BROKEN.items() if (flags & flag).any()]
-    end = f" Limits are broken: {', '.join(over)}." if over else ""
-    if "tolerance" not in ds.attrs:
-        return text + end
-    t = 1e3 * ds.attrs["tolerance"]
-    words = [("within" if v["largest"] <= t else "beyond") for v in (b, a)]
-    return f"{text} The tolerance is {t:g} mm: {words[0]} it as it is, {words[1]} it compensated.{end}"
+        told[-1] += f"{lost} of {points} points have no equilibrium."
+        return " ".join([told.pop(), *told])
+    told[-1] += f"by {a['largest']:.4f} mm."
+    if "tolerance" in ds.attrs:
+        t = 1e3 * ds.attrs["tolerance"]
+        words = [("within" if v["largest"] <= t else "beyond") for v in (b, a)]
+        told.append(f"The tolerance is {t:g} mm: {words[0]} it as it is, {words[1]} it compensated.")
+    return " ".join(told)

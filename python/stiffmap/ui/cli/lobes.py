@@ -43,10 +43,13 @@ def lobes(
         list[str] | None,
         typer.Option(help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]"),
     ] = None,
-    feed: Annotated[str, typer.Option(help="Direction of the feed, base axes.")] = "1,0,0",
+    feed: Annotated[
+        str | None, typer.Option(help="Direction of the feed, base axes. [default: x, or y across the tool]")
+    ] = None,
     tool: Annotated[
-        str, typer.Option(help="Direction from the tool's tip to its holder, base axes.")
-    ] = "0,0,1",
+        str | None,
+        typer.Option(help="Direction from the tool's tip to its holder, base axes. [default: the flange's]"),
+    ] = None,
     rotation_: RotationOption = None,
     speeds: Annotated[
         str | None, typer.Option(help="Lowest and highest speed, rpm, e.g. 2000,12000.")
@@ -104,7 +107,8 @@ def lobes(
     given: dict[str, Any] = {
         "speeds": None if ends is None else np.linspace(ends[0], ends[1], many[0]) / RPM,
         "depths": None if depth is None else MM * np.linspace(0, depth, many[1] + 1)[1:],
-        "feed": numbers(feed, "feed", 3), "tool": numbers(tool, "tool", 3), "also": _modes(mode), "method": method,
+        "feed": None if feed is None else numbers(feed, "feed", 3),
+        "tool": None if tool is None else numbers(tool, "tool", 3), "also": _modes(mode), "method": method,
         "rotation": rotation(rotation_), "gravity": gravity(gravity_), "threads": threads,
         "scheduler": scheduler,
         "damping": None if damping is None else numbers(damping, "damping") / 100,
@@ -126,14 +130,15 @@ def _one(
 
     place = position(at, machine)
     ds = stability_lobes(machine, p, place, **given)
-    limit, a = _at_process(ds, p), ds.attrs
+    a = ds.attrs
     out: dict[str, Any] = {
         "at_mm": (place / MM).tolist(), "modes": a["modes"], "damping": a["damping"],
+        "tool": a["tool"], "feed": a["feed"],
         "least_limit_mm": a["least"] / MM, "chatter_frequency_Hz": a["frequency"],
         "least_on_diagram_mm": float(ds.limit.min()) / MM,
         "least_at_rpm": float(ds.speed.values[int(ds.limit.values.argmin())]) * RPM,
         "coupling_limit_mm": a["coupling"] / MM,
-        "process": {"speed_rpm": p.spindle * RPM, "depth_mm": p.cut.axial / MM, "limit_mm": limit / MM,
+        "process": {"speed_rpm": p.spindle * RPM, "depth_mm": p.cut.axial / MM, "limit_mm": a["limit_at_process"] / MM,
             "multiplier": a["at_process"],
         },
         "stable": a["at_process"] < 1,
@@ -142,15 +147,6 @@ def _one(
     if output is not None:
         out["files"] = _write(ds, p, machine.name, place, make_folder(output), i)
     return out
-
-
-def _at_process(ds: xr.Dataset, p: Process) -> float:
-    """m: limit at the process's speed, between the speeds of the diagram; NaN outside of it, infinite above its top."""
-    s, v = ds.speed.values, np.minimum(ds.limit.values, ds.depth.values[-1])
-    if not s[0] <= p.spindle <= s[-1]:
-        return float("nan")
-    found = float(np.interp(p.spindle, s, v))
-    return float("inf") if found >= ds.depth.values[-1] else found
 
 
 def _modes(given: list[str] | None) -> list[tuple[float, float, float, str]]:
@@ -187,17 +183,29 @@ def _say(a: dict[str, Any]) -> None:
     word = "stable" if a["stable"] else "chatters"
     verdict = f"{word}: {p['depth_mm']:.4g} mm at {p['speed_rpm']:.0f} rpm (multiplier {p['multiplier']:.3f})"
     if np.isfinite(limit):
-        verdict += f"; from {limit:.4g} mm on it chatters"
-    print(f"at ({where}) mm: {verdict}")
+        verdict += f"; from {_down(limit)} mm on it chatters"
+    print(f"at ({where}) mm, damping {a['damping']}: {verdict}")
+    axes = (", ".join(f"{v + 0.0:.3g}" for v in a[name]) for name in ("tool", "feed"))
+    print("  tool from tip to holder along ({}), feed along ({})".format(*axes))
     if np.isfinite(a["least_on_diagram_mm"]):
-        print(f"  least limit {a['least_on_diagram_mm']:.4g} mm, at {a['least_at_rpm']:.0f} rpm")
+        print(f"  least limit {_down(a['least_on_diagram_mm'])} mm, at {a['least_at_rpm']:.0f} rpm")
     print(
-        f"  zero order, any speed: {a['least_limit_mm']:.4g} mm ({a['chatter_frequency_Hz']:.1f} Hz); without regeneration modes "
-        f"couple from {a['coupling_limit_mm']:.4g} mm on"
+        f"  zero order, any speed: {_down(a['least_limit_mm'])} mm ({a['chatter_frequency_Hz']:.1f} Hz); without regeneration modes "
+        f"couple from {_down(a['coupling_limit_mm'])} mm on"
     )
     if a["stable_speeds"]:
-        pockets = ", ".join(f"{s['speed_rpm']:.0f} rpm ({s['limit_mm']:.4g} mm)" for s in a["stable_speeds"])
+        pockets = ", ".join(
+            f"{s['speed_rpm']:.0f} rpm ({_down(s['limit_mm'])} mm)" for s in a["stable_speeds"]
+        )
         print(f"  deepest between lobes: {pockets}")
-    print(f"  {a['modes']} modes; damping {a['damping']}")
+    print(f"  {a['modes']} modes")
     for f in a.get("files", []):
         print(f"  wrote {f}")
+
+
+def _down(limit: float) -> str:
+    """A limit (mm) of four digits, never rounded up."""
+    if not 0 < limit < np.inf:
+        return f"{limit:g}"
+    unit = 10.0 ** (np.floor(np.log10(limit)) - 3)
+    return f"{np.floor(limit / unit * (1 - 1e-12)) * unit:.4g}"

@@ -8,12 +8,14 @@ import xarray as xr
 
 import stiffmap as sm
 from stiffmap.machining.chatter.coupling import coupling_depth, mode_coupling
-from stiffmap.machining.chatter.cut import chips, milling_process
+from stiffmap.machining.chatter.cut import chips, cut_axes, milling_process
 from stiffmap.machining.chatter.floquet import multiplier_map
 from stiffmap.machining.chatter.lobes import border, pockets
-from stiffmap.machining.chatter.modes import mode_rows
-from stiffmap.machining.chatter.zero_order import oriented_limit
+from stiffmap.machining.chatter.modes import mode_rows, modes_of_machine
+from stiffmap.machining.chatter.zero_order import limits, oriented_limit
 from stiffmap.solve.compiled import multipliers
+from stiffmap.ui.cli import main
+from stiffmap.workspace.vibration.modes import tip_modes
 
 ONE = [(922.0, 0.011, 0.03993, "x")]
 ZERO = {"Kac": "0 N/mm2", "Kte": "0 N/mm", "Kre": "0 N/mm", "Kae": "0 N/mm"}
@@ -179,7 +181,7 @@ def test_lobes_of_a_machine_and_their_pockets():
     assert "assumed" in ds.attrs["damping"] and ds.attrs["modes"] >= 5
     assert pockets(np.arange(5.0), np.array([1.0, 3.0, 2.0, 4.0, 1.0]), 10.0) == [[3.0, 4.0], [1.0, 3.0]]
     np.testing.assert_allclose(
-        border(np.array([1.0, 2.0, 3.0]), np.array([[0.5, 0.9, 1.1], [0.1, 0.2, 0.3]])), [2.5, np.inf]
+        border(np.array([1.0, 2.0, 3.0]), np.array([[0.5, 0.9, 1.1], [0.1, 0.2, 0.3]])), [2.0, np.inf]
     )
 
 
@@ -216,3 +218,57 @@ def test_bad_input_is_one_message(modes, given, message):
 def test_a_coated_tool_has_no_lobes():
     with pytest.raises(sm.StiffmapError, match="no teeth"):
         sm.floquet_multiplier(ONE, "trimming")
+
+
+@pytest.mark.parametrize("name", ["ur10", "linear-delta", "orthoglide-revised", "hexapod"])
+@pytest.mark.parametrize("count", [60, 200, 400])
+def test_limiting_depth_is_no_deeper_than_any_sample(name, count):
+    """A coarse receptance answers as a dense one: the least limit is found between the samples."""
+    machine = sm.load_machine(name)
+    own = sm.natural_frequencies(machine, machine.description.home.p, modes=6).frequency
+    own = own[np.isfinite(own)]
+    f = np.linspace(0.3 * own.min(), 2 * own.max(), 200_001)
+    at = machine.description.home.p
+    axes = cut_axes(np.array([1.0, 0, 0]), np.array([0, 0, 1.0]))
+    dense = axes @ sm.frequency_response(machine, at, f).values[:, :3, :3] @ axes.T
+    least = limits(dense, milling_process("slot"))[0].min()
+    coarse = sm.frequency_response(machine, at, np.linspace(f[0], f[-1], count))
+    found = sm.limiting_depth(coarse, "slot")
+    assert 0.997 * least < found <= least * (1 + 1e-5)
+    modes = modes_of_machine(tip_modes(machine, at)).turned(axes)
+    assert sm.limiting_depth(modes, "slot") <= least * (1 + 1e-5)
+    ds = sm.vibration_map(machine, np.array([at]), "slot")
+    assert float(ds.limiting_depth[0]) <= least * (1 + 1e-5)
+
+
+@pytest.mark.parametrize(
+    ("spindle", "top", "count"), [(5000, 3.0, 5), (6500, 2.0, 7), (9000, 2.5, 20), (4000, 1.5, 2)]
+)
+def test_depths_that_are_said_to_be_stable_are(spindle, top, count):
+    cut = {**process(), "spindle": f"{spindle} rpm"}
+    speeds = np.linspace(0.5, 1.3, 9) * spindle * 2 * np.pi / 60
+    ds = sm.stability_lobes(
+        TWO, cut, speeds=speeds, depths=1e-3 * np.linspace(0, top, count + 1)[1:], intervals=80
+    )
+    said = [(milling_process(cut).spindle, ds.attrs["limit_at_process"]), *ds.attrs["stable_speeds"]]
+    said += zip(speeds, ds.limit.values, strict=True)
+    for speed, limit in said:
+        if 0 < limit < np.inf:
+            assert sm.floquet_multiplier(TWO, cut, speed=float(speed), depth=float(limit), intervals=80) < 1
+    limit = ds.attrs["limit_at_process"]
+    if np.isfinite(limit):
+        assert sm.floquet_multiplier(TWO, cut, depth=1.01 * limit, intervals=80) >= 1
+
+
+def test_a_tool_stands_along_the_flange_by_default(capsys):
+    for name, tool in (("ur10", [0, 0, 1]), ("examples/taps/kr210.yaml", [-1, 0, 0]), ("hexapod", [0, 0, 1])):
+        ds = sm.stability_lobes(name, "slot", speeds=[300.0, 400.0], method="zero order")
+        np.testing.assert_allclose(ds.attrs["tool"], tool, atol=1e-3)
+        assert abs(np.dot(ds.attrs["tool"], ds.attrs["feed"])) < 0.71
+    turned = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]]) @ sm.load_machine("ur10").description.home.r
+    ds = sm.stability_lobes("ur10", "slot", rotation=turned, speeds=[300.0], method="zero order")
+    np.testing.assert_allclose(ds.attrs["tool"], [0, -1, 0], atol=1e-9)
+    main(["lobes", "ur10", "--process", "slot", "--speeds", "2000,3000", "--points", "3,3"])
+    said = capsys.readouterr().out
+    assert "damping assumed: 2 % of every mode" in said.splitlines()[0]
+    assert "tool from tip to holder along (0, 0, 1), feed along (1, 0, 0)" in said

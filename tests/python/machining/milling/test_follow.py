@@ -75,7 +75,9 @@ def test_paths_within_the_task_are_followed(name: str) -> None:
 
 def test_commands_refuse(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     motion = tmp_path / "motion.csv"
-    motion.write_text("t [s],x [mm],y [mm],z [mm]\n0,0,416,0\n1,10,416,5\n2,20,416,9\n")
+    motion.write_text(
+        "t [s],x [mm],y [mm],z [mm]\n" + "".join(f"{k},{2 * k},416,{min(k, 9)}\n" for k in range(12))
+    )
     assert main(["map", "five-bar", "--toolpath", str(motion), "-o", str(tmp_path)]) == 2
     assert "it misses z by up to 9 mm" in capsys.readouterr().err
     assert main(["mill", "3-rps", "circle", "--size", "20", "--process", "slot"]) == 2

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from tests.python.machining.milling.gantry import gantry
 
 import stiffmap as sm
 from stiffmap.machining.milling import mill_job
+from stiffmap.machining.milling.verdict import verdict
 from stiffmap.machining.toolpath import path_of
 from stiffmap.model.description import Body
+from stiffmap.solve.status import Status
 from stiffmap.ui.report.milling import summary
 
 MASS, RATIO = 20.0, 0.02
@@ -41,6 +44,26 @@ def test_a_path_that_chatters_is_a_warning_with_speeds_that_are_stable():
         assert sm.floquet_multiplier(rows, p, float(w), 1e-3, intervals=80) < 1
     (said,) = [w for w in found.warnings if w.name == "chatter"]
     assert said.points.all() and "rpm" in said.text and said.finding
+    first = summary(found)["verdict"].split(". ")[0]
+    assert first.startswith("The cut chatters at") and found.stability.damping in first
+
+
+@pytest.mark.parametrize("worst", ["NOT_CONVERGED", "UNSTABLE", "chatter", "drive effort"])
+def test_the_headline_is_the_worst_verdict(worst):
+    ds = milled(1e-6).dataset.copy(deep=True)
+    ds.attrs["tolerance"] = 1.0
+    assert verdict(ds).startswith("The part is off") and "within it compensated" in verdict(ds)
+    if worst in Status.__members__:
+        ds.status[0] = Status[worst]
+        assert "equilibrium" in verdict(ds) or "runs away" in verdict(ds)
+        assert "within" not in verdict(ds)
+    elif worst == "chatter":
+        ds.multiplier[0] = 1.1
+        ds.multiplier.attrs["said"] = "The cut chatters at 1 of 3 places."
+        assert verdict(ds).startswith("The cut chatters at 1 of 3 places.")
+    else:
+        ds.warnings.attrs["names"] = [worst]
+        assert verdict(ds).startswith(f"Limits are broken: {worst}.")
 
 
 def test_a_shallow_cut_is_stable_and_said_so():
