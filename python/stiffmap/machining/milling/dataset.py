@@ -38,7 +38,7 @@ def flags_along(job: Setting, made: Run) -> NDArray[np.uint32]:
 def dataset_of(
     job: Setting, before: Equilibrium, command: Floats, left: Floats, after: Run, mirrored: Equilibrium
 ) -> xr.Dataset:
-    normal = (before.error * job.off).sum(axis=1)
+    normal = job.across(before.error)
     tolerance = job.process.tolerance
     xyz = ("point", "axis")
     ds = xr.Dataset(
@@ -51,7 +51,7 @@ def dataset_of(
             "command": (xyz, command),
             "command_left": ("point", left),
             "error_normal_after": along(job, after),
-            "mirror_left": ("point", (mirrored.error * job.off).sum(axis=1)),
+            "mirror_left": ("point", job.across(mirrored.error)),
             "taper": ("point", taper(job, before)),
             "force": (xyz, before.force),
             "gain": ("point", before.gain),
@@ -60,6 +60,7 @@ def dataset_of(
             "status": ("point", before.status),
             "flags": ("point", before.flags),
             "flags_after": ("point", flags_along(job, after)),
+            "wall": ("point", job.engaged.wall),
             "width": ("point", job.width(np.zeros(len(job)))),
             "feed": ("point", job.feed),
         },

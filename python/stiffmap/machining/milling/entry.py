@@ -30,6 +30,6 @@ def best_entry(job: Setting, threads: int | None = None) -> Entry:
     e = equilibrium(Plant(job, threads=threads), job.position)
     size = np.abs(np.where(np.isfinite(e.error), e.error, np.inf) * job.off).sum(axis=1)
     normal = np.abs((np.nan_to_num(e.error) * job.off).sum(axis=1))
-    normal = np.where(np.isfinite(size) & (job.engaged.corner == 0), normal, np.inf)
+    normal = np.where(np.isfinite(size) & (job.engaged.corner == 0) & job.engaged.wall, normal, np.inf)
     k = int(np.argmin(normal))
     return Entry(float(job.points.way[k]), float(normal[k]), float(normal[0]))

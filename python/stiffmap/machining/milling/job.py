@@ -120,7 +120,7 @@ def mill_job(
         )
     real = equilibrium(Plant(job, true_machine, threads), job.position)
     real_after = run(job, made, true_machine, step=step, threads=threads)
-    ds["true_error_normal"] = ("point", (real.error * job.off).sum(axis=1))
+    ds["true_error_normal"] = ("point", job.across(real.error))
     ds["true_error_normal_after"] = along(job, real_after)
     return replace(out, true_before=real, true_after=real_after)
 

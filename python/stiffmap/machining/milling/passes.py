@@ -14,7 +14,7 @@ from stiffmap.machining.milling.setting import Setting
 
 def after_passes(job: Setting, first: Equilibrium, passes: int, threads: int | None = None) -> Floats:
     """(passes, m) m: height of the wall over the wanted one after each pass; never below what a pass before it took."""
-    wall = (first.error * job.off).sum(axis=1)
+    wall = job.across(first.error)
     out = [wall]
     for _ in range(passes - 1):
         engaged = replace(
@@ -22,6 +22,6 @@ def after_passes(job: Setting, first: Equilibrium, passes: int, threads: int | N
         )
         rest = replace(job, engaged=engaged)
         e = equilibrium(Plant(rest, threads=threads), job.position)
-        wall = np.minimum(wall, (e.error * job.off).sum(axis=1))
+        wall = np.minimum(wall, job.across(e.error))
         out.append(wall)
     return np.array(out)

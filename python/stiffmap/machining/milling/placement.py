@@ -236,7 +236,7 @@ class Search:
         e = equilibrium(Plant(job, threads=self.threads), job.position)
         fine = np.isfinite(e.error).all(axis=1) & (e.flags & LIMITS == 0)
         fine &= followed(astray(job, job.position, self.threads))
-        normal = np.where(fine, np.nan_to_num((e.error * job.off).sum(axis=1)), np.inf)
+        normal = np.where(fine, np.nan_to_num(job.across(e.error)), np.inf)
         return np.asarray(normal)
 
     def refined(

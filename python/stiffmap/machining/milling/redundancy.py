@@ -104,7 +104,7 @@ def _turned(shared: tuple[Setting, int | None], angle: float) -> tuple[Floats, F
     turned = replace(job, rotation=orientations(job.machine, job.tool, job.place, np.full(len(job), angle)))
     e = equilibrium(Plant(turned, threads=threads), job.position)
     good = np.isfinite(e.error).all(axis=1) & (e.flags & LIMITS == 0)
-    error = np.where(good, np.nan_to_num((e.error * job.off).sum(axis=1)), np.inf)
+    error = np.where(good, np.nan_to_num(job.across(e.error)), np.inf)
     return error, inverse_kinematics(job.machine, job.position, turned.rotation, threads=threads).actuators
 
 

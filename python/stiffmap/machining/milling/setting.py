@@ -66,6 +66,10 @@ class Setting:
         """(m, 2, 3) directions that change the cut: off the wall, and along the tool to its holder."""
         return np.stack([self.off, self.tool], axis=1)
 
+    def across(self, error: Floats) -> Floats:
+        """(m,) m across the wall, positive where material stays, of errors (m, 3) m; 0 where there is no wall."""
+        return np.where(self.engaged.wall, (error * self.off).sum(axis=1), 0.0)
+
     def width(self, off: Floats) -> Floats:
         """(m,) m: width of the straight cut that has the engaged arc, the tool pushed `off` (m,) m."""
         e, r = self.engaged, self.process.tool.diameter / 2

@@ -64,7 +64,7 @@ def best_feeds(job: Setting, tolerance: float | None = None, threads: int | None
     def exact(share: Floats) -> NDArray[np.bool_]:
         faster = replace(job, feed=job.feed * share, faster=job.faster * share)
         e = equilibrium(Plant(faster, threads=threads), job.position)
-        return np.asarray(np.abs(np.nan_to_num((e.error * job.off).sum(axis=1), nan=np.inf)) <= t)
+        return np.asarray(np.abs(np.nan_to_num(job.across(e.error), nan=np.inf)) <= t)
 
     borne = _largest(strong, np.full(len(job), SLOWEST), top)
     share = _largest(exact, np.full(len(job), SLOWEST), borne)

@@ -30,7 +30,7 @@ def verdict(ds: xr.Dataset) -> str:
     if "multiplier" in ds and (ds.multiplier.values > 1).any():
         told.append(f"{ds.multiplier.attrs['said']} The errors are those of a cut without chatter.")
     names = ds.warnings.attrs["names"] if "warnings" in ds else []
-    over = [n for n in names if n not in ("chatter", "declared workspace")]
+    over = [n for n in names if n not in ("chatter", "declared workspace", "outside corner")]
     if over:
         told.append(f"Limits are broken: {', '.join(over)}.")
     if bad:

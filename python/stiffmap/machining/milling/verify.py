@@ -65,7 +65,7 @@ def run(
         plant = Plant(here, machine, threads)
         state = equilibrium(plant, u)
         at = job.place.back(here.position + np.nan_to_num(state.error))
-    normal = (state.error * here.off).sum(axis=1)
+    normal = here.across(state.error)
     return Run(here, state, normal, way)
 
 
@@ -155,7 +155,12 @@ def _job(job: Setting, points: Points, angle: Floats | None) -> Setting:
     e = job.engaged
     bent = np.interp(points.way, way, e.curvature[order])
     engaged = replace(
-        made.engaged, radial=e.radial[old], axial=e.axial[old], corner=e.corner[old], curvature=bent
+        made.engaged,
+        radial=e.radial[old],
+        axial=e.axial[old],
+        corner=e.corner[old],
+        curvature=bent,
+        wall=e.wall[old],
     )
     return replace(made, engaged=engaged)
 

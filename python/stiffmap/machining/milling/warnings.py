@@ -48,7 +48,21 @@ def chatter(job: Setting, ds: xr.Dataset) -> list[Warned]:
     return [Warned("chatter", ds.multiplier.values > 1, ds.multiplier.attrs["said"])]
 
 
-SOURCES: tuple[Callable[[Setting, xr.Dataset], list[Warned]], ...] = (limits, chatter)
+def corners(job: Setting, ds: xr.Dataset) -> list[Warned]:
+    """What happens to sharp outside corners: the two walls that meet in each."""
+    none = ~job.engaged.wall
+    last = np.flatnonzero(none != np.r_[none[1:], none[-1:]])  # beside it, on the one or the other side
+    beside = np.unique(np.where(none[last], np.minimum(last + 1, len(none) - 1), last))
+    most = [1e3 * np.nanmax(np.abs(ds[n].values[beside]), initial=0.0) for n in AT_CORNERS]
+    text = (
+        f"Sharp outside corners have no wall within a tool radius, so that {int(none.sum())} points beside them do not count; the "
+        f"walls that meet there are off by up to {most[0]:.4f} mm, compensated {most[1]:.4f} mm."
+    )
+    return [Warned("outside corner", none, text, finding=False)]
+
+
+AT_CORNERS = ("error_normal", "error_normal_after")
+SOURCES: tuple[Callable[[Setting, xr.Dataset], list[Warned]], ...] = (limits, chatter, corners)
 
 
 def warned(job: Setting, ds: xr.Dataset) -> tuple[Warned, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
@@ -15,6 +15,8 @@ from stiffmap.machining.toolpath.sampling import Points
 
 LEAST_CORNER = np.radians(1.0)
 """Turn below which two moves make no corner."""
+OUTMOST = np.radians(170.0)
+"""Of an outside corner; a way back is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,8 @@ class Engagement:
     """(m,) rad: arc that the next wall of an inside corner adds ahead."""
     axial: Floats
     """(m,) m, depth."""
+    wall: NDArray[np.bool_]
+    """(m,) whether the part has a wall there: none within a tool radius of a sharp outside corner."""
 
 
 def part_side(process: Process) -> float:
@@ -73,22 +77,29 @@ def engagement(
     if stock is not None:
         radial, axial = _in_box(points, process, stock, side)
     radial[points.along] = axial[points.along] = 0.0
+    corner, wall = _corners(points, path, process, radial, side)
     if process.cut.side == "slot":
-        return Engagement(radial, np.zeros(m), np.zeros(m), axial)
+        return Engagement(radial, np.zeros(m), np.zeros(m), axial, wall)
     curvature = _over_contact(points, process, -side * (points.bend * points.normal).sum(axis=1))
-    return Engagement(radial, curvature, _corners(points, path, process, radial, side), axial)
+    return Engagement(radial, curvature, corner, axial, wall)
 
 
 def _over_contact(points: Points, process: Process, curvature: Floats) -> Floats:
-    """Mean over the way from abeam to the front end of the contact: where a line becomes an arc the cut changes over that way."""
-    ahead = process.tool.diameter / 2 * np.sin(min(process.arc, np.pi / 2))
-    step = np.diff(points.way, prepend=points.way[:1])
-    before = np.r_[curvature[:1], curvature[:-1]]
-    turned = np.cumsum(step * (curvature + before) / 2)
-    end = np.minimum(points.way + ahead, points.way[-1])
-    length = end - points.way
-    mean = np.interp(end, points.way, turned) - turned
-    return np.where(length > 1e-9, mean / np.maximum(length, 1e-12), curvature)
+    """Mean over the contact's length l ahead with the weight 2(1 - x/l) of what lies x ahead: where a line becomes an arc the
+    stock at the front end of the contact leaves the line by the double integral of the curvature (theory.md, M5)."""
+    way, step = points.way, np.diff(points.way, append=points.way[-1:])
+    after = np.r_[curvature[1:], curvature[-1:]]
+    bent = np.divide(
+        after - curvature, step, out=np.zeros_like(step), where=step > 0
+    )  # linear between points
+    turned = np.r_[0.0, np.cumsum(step * (curvature + after) / 2)[:-1]]
+    aside = np.r_[0.0, np.cumsum(step * (turned + step * (curvature / 2 + step * bent / 6)))[:-1]]
+    end = np.minimum(way + process.tool.diameter / 2 * np.sin(process.arc), way[-1])
+    k = np.clip(np.searchsorted(way, end, side="right") - 1, 0, len(way) - 1)
+    x, length = end - way[k], end - way
+    there = aside[k] + x * (turned[k] + x * (curvature[k] / 2 + x * bent[k] / 6))
+    mean = 2 * (there - aside - length * turned) / np.maximum(length, 1e-12) ** 2
+    return np.where(length > 1e-7, np.clip(mean, curvature.min(), curvature.max()), curvature)
 
 
 def _in_box(points: Points, process: Process, stock: Box, side: float) -> tuple[Floats, Floats]:
@@ -105,9 +116,12 @@ def _in_box(points: Points, process: Process, stock: Box, side: float) -> tuple[
     return width.clip(0.0), height.clip(0.0, process.cut.axial)
 
 
-def _corners(points: Points, path: Toolpath, process: Process, radial: Floats, side: float) -> Floats:
-    """Ahead of an inside corner the tool already meets the stock of the next wall (theory.md, M8)."""
-    extra = np.zeros(len(points))
+def _corners(
+    points: Points, path: Toolpath, process: Process, radial: Floats, side: float
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Ahead of an inside corner the tool already meets the stock of the next wall (theory.md, M8); beside an outside corner the part
+    has ended, and there is no wall."""
+    extra, wall = np.zeros(len(points)), np.ones(len(points), bool)
     r = process.tool.diameter / 2
     ends = np.flatnonzero(np.diff(points.move, append=-1) != 0)
     starts = np.r_[0, ends[:-1] + 1]
@@ -116,12 +130,16 @@ def _corners(points: Points, path: Toolpath, process: Process, radial: Floats, s
     touch = np.linalg.norm(points.position[here] - points.position[there], axis=1) < 1e-9
     turn = np.arctan2((np.cross(a, b) * points.tool[here]).sum(axis=1), (a * b).sum(axis=1))
     inside = -side * turn  # positive: away from the part
-    for k in np.flatnonzero(touch & (inside > LEAST_CORNER) & (inside < np.pi)):
-        theta = inside[k]
+    for k in np.flatnonzero(touch & (np.abs(inside) > LEAST_CORNER)):
+        theta, way = inside[k], points.way - points.way[ends[k]]
+        if theta < 0:
+            near = np.abs(way) < (1 - 1e-6) * r * np.tan(min(-theta, OUTMOST) / 2)
+            wall[starts[k] : ends[k + 1] + 1] &= ~near[starts[k] : ends[k + 1] + 1]
+            continue
         rows = np.arange(starts[k], ends[k] + 1)
-        ahead = (points.way[ends[k]] - points.way[rows]) * np.sin(min(theta, np.pi / 2))
+        ahead = -way[rows] * np.sin(min(theta, np.pi / 2))
         share = np.clip(1 - (radial[rows] - ahead) / r, -1.0, 1.0)
         half = np.where(radial[rows] > ahead, np.arccos(share), -np.inf)
         own = np.arccos(np.clip(1 - radial[rows] / r, -1.0, 1.0))
         extra[rows] = np.maximum(extra[rows], np.maximum(theta + half - own, 0.0))
-    return extra
+    return extra, wall

@@ -45,11 +45,11 @@ def summary(found: Milled) -> dict[str, object]:
         "statuses": {
             s.name: int((ds.status.values == s).sum()) for s in Status if (ds.status.values == s).any()
         },
-        "error_normal_mm": sizes(ds.error_normal),
-        "error_normal_after_mm": sizes(ds.error_normal_after),
+        "error_normal_mm": sizes(ds.error_normal.where(ds.wall)),
+        "error_normal_after_mm": sizes(ds.error_normal_after.where(ds.wall)),
         "error_along_mm": sizes(ds.error_along),
         "error_axial_mm": sizes(ds.error_axial),
-        "mirror_leaves_mm": sizes(ds.mirror_left),
+        "mirror_leaves_mm": sizes(ds.mirror_left.where(ds.wall)),
         "command_left_mm": float(1e3 * np.nanmax(ds.command_left.values, initial=0.0)),
         "loop_gain": {"least": float(np.nanmin(ds.gain)), "largest": float(np.nanmax(ds.gain))},
         "force_N": {"least": float(np.nanmin(force)), "largest": float(np.nanmax(force))},
@@ -67,8 +67,8 @@ def summary(found: Milled) -> dict[str, object]:
     if "error_normal_passes" in ds:
         out["error_normal_passes_mm"] = [sizes(p) for p in ds.error_normal_passes]
     if "true_error_normal" in ds:
-        out["true_error_normal_mm"] = sizes(ds.true_error_normal)
-        out["true_error_normal_after_mm"] = sizes(ds.true_error_normal_after)
+        out["true_error_normal_mm"] = sizes(ds.true_error_normal.where(ds.wall))
+        out["true_error_normal_after_mm"] = sizes(ds.true_error_normal_after.where(ds.wall))
     if found.feeds is not None:
         f = found.feeds
         out["feeds"] = {"time_s": f.time, "before_s": f.before, "held": bool(f.held.all())}

@@ -83,8 +83,8 @@ def test_a_curve_of_points_is_a_curve() -> None:
     # from a line to an arc over the way that the contact reaches ahead
     reach = process.tool.diameter / 2 * np.sin(process.arc)
     corner = q.way[np.flatnonzero(pocket.kind[q.move] == 2)[0]]
-    half = np.interp(corner - reach / 2, q.way, k)
-    assert half == pytest.approx(50.0, rel=0.02)
+    half = np.interp(corner - reach / 2, q.way, k)  # the stock is aside by the square of what is left
+    assert half == pytest.approx(25.0, rel=0.02)
 
 
 def test_an_inside_corner_of_a_pocket() -> None:
