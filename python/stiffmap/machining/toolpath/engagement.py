@@ -130,6 +130,9 @@ def _corners(
     touch = np.linalg.norm(points.position[here] - points.position[there], axis=1) < 1e-9
     turn = np.arctan2((np.cross(a, b) * points.tool[here]).sum(axis=1), (a * b).sum(axis=1))
     inside = -side * turn  # positive: away from the part
+    # what comes down along the tool leaves no wall that could end
+    down = np.array([points.along[i : j + 1].any() for i, j in zip(starts, ends, strict=True)], bool)
+    touch &= (inside > 0) | ~(down[:-1] | down[1:])
     for k in np.flatnonzero(touch & (np.abs(inside) > LEAST_CORNER)):
         theta, way = inside[k], points.way - points.way[ends[k]]
         if theta < 0:
