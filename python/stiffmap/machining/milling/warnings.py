@@ -55,7 +55,7 @@ def corners(job: Setting, ds: xr.Dataset) -> list[Warned]:
     beside = np.unique(np.where(none[last], np.minimum(last + 1, len(none) - 1), last))
     most = [1e3 * np.nanmax(np.abs(ds[n].values[beside]), initial=0.0) for n in AT_CORNERS]
     text = (
-        f"Sharp outside corners have no wall within a tool radius, so that {int(none.sum())} points beside them do not count; the "
+        f"Sharp outside corners have no wall within a tool radius, so that {int(none.sum())} points next to them do not count; the "
         f"walls that meet there are off by up to {most[0]:.4f} mm, compensated {most[1]:.4f} mm."
     )
     return [Warned("outside corner", none, text, finding=False)]

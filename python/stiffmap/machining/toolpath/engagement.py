@@ -119,7 +119,7 @@ def _in_box(points: Points, process: Process, stock: Box, side: float) -> tuple[
 def _corners(
     points: Points, path: Toolpath, process: Process, radial: Floats, side: float
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Ahead of an inside corner the tool already meets the stock of the next wall (theory.md, M8); beside an outside corner the part
+    """Ahead of an inside corner the tool already meets the stock of the next wall (theory.md, M8); next to an outside corner the part
     has ended, and there is no wall."""
     extra, wall = np.zeros(len(points)), np.ones(len(points), bool)
     r = process.tool.diameter / 2
