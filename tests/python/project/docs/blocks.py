@@ -13,7 +13,7 @@ from typing import Any
 
 FENCE = re.compile(r"^([ >]*)```(\w*)\n(.*?)^\1```", re.DOTALL | re.MULTILINE)
 SHELL = ("sh", "bash", "console", "")
-INSTALL = re.compile(r"-m venv|pip install|activate|\./test\.sh|^git |apt ")
+INSTALL = re.compile(r"-m venv|pip install|activate|\./(?:test|install)\.sh|^git |apt ")
 """Commands that install or test stiffmap itself: `.ci/run` is what runs these."""
 
 

@@ -14,6 +14,7 @@ import pytest
 
 import stiffmap as sm
 import stiffmap.workspace.design
+from stiffmap.common import python_file
 from stiffmap.workspace.design import load_design, optimize
 from stiffmap.workspace.design.expressions import evaluate
 from stiffmap.workspace.design.judging import judge
@@ -174,8 +175,11 @@ def test_evaluations_of_an_unknown_design_are_refused(tmp_path, line):
         Evaluations(load_design(write(tmp_path)), path)
 
 
-def test_a_search_that_is_killed_goes_on(tmp_path):
+def test_a_search_that_is_killed_goes_on(tmp_path, monkeypatch):
     """SIGKILL in the middle: the same command ends with the set of a search that was left alone."""
+    monkeypatch.setattr(
+        python_file, "_RUN", {}
+    )  # files of other tests in this process: part of a design's key
     path = write(tmp_path, FILE.replace("generations: 3", "generations: 6"))
     code = f"from stiffmap.workspace.design import optimize; optimize({str(path)!r}, folder={str(tmp_path / 'b')!r}, processes=1)"
     running = subprocess.Popen([sys.executable, "-c", code])
