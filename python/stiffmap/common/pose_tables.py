@@ -89,7 +89,7 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
     are wanted. Raises FileError naming file, line, column, what was expected and what was found.
     """
     file = str(place)
-    rows = _rows(place, file)
+    rows = csv_rows(place, file)
     number, head = rows[0]
     heads = [_head(cell, file, number) for cell in head]
     names = [n for n, _ in heads]
@@ -115,7 +115,8 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
     return PoseTable(file, columns, [line for line, _ in rows[1:]])
 
 
-def _rows(place: Path, file: str) -> list[tuple[int, list[str]]]:
+def csv_rows(place: Path, file: str) -> list[tuple[int, list[str]]]:
+    """Line and cells of every row with something in it but remarks; FileError where there is none."""
     try:
         text = place.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:

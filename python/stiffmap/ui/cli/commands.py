@@ -66,6 +66,9 @@ COMMANDS = (
     Command(
         "mill", "stiffmap.ui.cli.mill", "mill", "The part as it is cut, and a program that makes it right."
     ),
+    Command(
+        "process", "stiffmap.ui.cli.process", "process", "Force coefficients from a dynamometer's table."
+    ),
     Command("lobes", "stiffmap.ui.cli.lobes", "lobes", "Which depth of cut chatters at which speed."),
     Command("taps", "stiffmap.ui.cli.taps", "taps", "Which effect explains frequencies of tap tests."),
     Command("bench", "stiffmap.ui.cli.bench", "bench", "Speed of this installation on this computer."),

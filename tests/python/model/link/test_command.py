@@ -270,12 +270,3 @@ def test_plan_predicts_the_errors_and_the_smallest_field():
     assert planned_error(points, factor * WRENCHES, REFERENCE, 2e-8)[0, 0] == pytest.approx(wanted[0, 0])
     with pytest.raises(StiffmapError, match=r"wanted: expected .* positive errors"):
         smallest_force(points, WRENCHES, REFERENCE, 2e-8, np.zeros((6, 6)))
-
-
-def test_plan_picture_is_written(tmp_path):
-    from stiffmap.ui.pictures.link_plan import draw_plan
-
-    draw_plan(noisy_field(n=40)[0], WRENCHES, REFERENCE, 2e-8, tmp_path / "plan.png")
-    assert (tmp_path / "plan.png").stat().st_size > 20_000
-    with pytest.raises(StiffmapError, match="cannot be written"):
-        draw_plan(noisy_field(n=40)[0], WRENCHES, REFERENCE, 2e-8, tmp_path / "no" / "plan.png")

@@ -58,6 +58,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     ),
     "mill": ("mill orthoglide-revised outline.ngc --process trimming -o mil",),
     "bench": ("bench --rounds 1",),
+    "process": ("process forces.csv --process slot -o process.yaml", "process signals.csv"),
     "lobes": ("lobes linear-delta --process slot --mode 1243,6.2,0.048,x --mode 1747,2.9,0.1,y",),
     "taps": ("taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance",),
     "view": ("view five-bar --html v.html",),

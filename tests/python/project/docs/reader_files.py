@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
+import stiffmap as sm
+from stiffmap.machining.process.revolution import revolution
 
 ROBOT = """<robot name="arm"><link name="base"/><link name="upper"/><link name="tool"/>
 <joint name="q1" type="revolute"><origin xyz="0 0 0.3"/><axis xyz="0 0 1"/><parent link="base"/><child link="upper"/>
@@ -12,6 +16,29 @@ ROBOT = """<robot name="arm"><link name="base"/><link name="upper"/><link name="
 <joint name="q2" type="revolute"><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/><parent link="upper"/><child link="tool"/>
 <limit lower="-2" upper="2" effort="80" velocity="2"/></joint></robot>
 """
+FORCES = """feed_per_tooth_mm,Fx_N,Fy_N,Fz_N,teeth,axial_mm
+0.025,39.8,63.0,55.7,2,3
+0.05,60.1,107.1,70.9,2,3
+0.075,71.6,137.7,82.6,2,3
+0.1,76.8,171.3,85.2,2,3
+0.125,78.5,210.7,83.5,2,3
+"""
+"""Means of a dynamometer; slots."""
+
+
+def force_signals() -> str:
+    """Signals of the shipped slot at four feeds, with run-out and noise."""
+    rng, p = np.random.default_rng(3), sm.load_process("slot")
+    rows = ["feed_per_tooth_mm,time_s,Fx_N,Fy_N,Fz_N,teeth,axial_mm,spindle_rpm,diameter_mm,helix_deg"]
+    for chip in (0.05, 0.075, 0.1, 0.125):
+        cut = replace(p, feed=0.2 * chip, tool=replace(p.tool, runout=12e-6))
+        force = np.tile(revolution(cut, 100, 20)[1], (3, 1))
+        force += rng.normal(0, 2, force.shape)
+        rows += [
+            f"{chip},{k / 1e4:g},{','.join(f'{v:.3f}' for v in f)},2,3,6000,25,30"
+            for k, f in enumerate(force)
+        ]
+    return "\n".join(rows) + "\n"
 
 
 def link_arrays() -> dict[str, Any]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.python.project.docs.reader_files import ROBOT, link_tables
+from tests.python.project.docs.reader_files import FORCES, ROBOT, force_signals, link_tables
 
 import stiffmap as sm
 from stiffmap.common.outputs import one_command, write_text
@@ -99,6 +99,8 @@ def make_workshop(at: Path) -> Path:
     (at / "clocks.csv").write_text(clocks, encoding="utf-8")
     shutil.copy(SHIPPED / "machining/process/library/trimming.yaml", at)
     shutil.copytree(TAPS, at / "examples/taps")
+    (at / "forces.csv").write_text(FORCES, encoding="utf-8")
+    (at / "signals.csv").write_text(force_signals(), encoding="utf-8")
     (at / "outline.ngc").write_text(OUTLINE, encoding="utf-8")
     (at / "points.csv").write_text(TRACKER, encoding="utf-8")
     _workbook(at / "readings.xlsx")

@@ -1,29 +1,30 @@
-"""From a table of forces to a law: values with intervals, lack of fit, what explains it, a feed left out."""
+"""A law from measured forces: values with intervals, rivals, and which of them the readings refuse."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import f as fisher
-from scipy.stats import t as student
+from scipy.stats import wilcoxon
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import with_uncertainty
 from stiffmap.common.short import short_repr
 from stiffmap.machining.process.description import EndMill, Process
-from stiffmap.machining.process.identify.models import MODELS, NAMES, Fitted, fit, power_basis, straight_basis
-from stiffmap.machining.process.identify.runout import Runout, runout_of
-from stiffmap.machining.process.identify.table import ForceTable, need, read_table
+from stiffmap.machining.process.identify.columns import COLUMNS
+from stiffmap.machining.process.identify.models import Fitted
+from stiffmap.machining.process.identify.runout import Runout
+from stiffmap.machining.process.identify.table import ForceTable
+from stiffmap.machining.process.save import save_process
 
 SIGNIFICANT = 0.01
 """Probability by chance below which a bend is stated."""
-RIVAL = 4.0
-"""Difference of the criterion within which another explanation stays a rival."""
+APART = 0.02
+"""Probability by chance below which the held-out errors of two laws are distinguished."""
 
 
 @short_repr
@@ -40,7 +41,7 @@ class IdentifiedLaw:
     left_out: Floats
     """(n, 3) N: measured less predicted by the law fitted without that cut's feed; NaN where the others are too few."""
     explanations: tuple[Fitted, ...]
-    """Laws by the criterion of Akaike, the likeliest first."""
+    """Laws by their error at feeds that were left out, the least first."""
     bend: float
     """Probability that a straight law with this scatter bends as much by chance."""
     runout: Runout | None
@@ -58,30 +59,69 @@ class IdentifiedLaw:
 
     @property
     def best(self) -> Fitted:
-        """The likeliest law; where the forces bend, of those that do."""
+        """The law with the least error at feeds left out; where the forces bend, of those that do."""
         return next(e for e in self.explanations if not self.bent or e.model.name != "straight")
 
-    def process(self, base: Process) -> Process:
-        """The process with this law; a law that bends is taken by its secant at the chip of that process."""
-        law, note = EndMill(**{n: v for n, (v, _) in self.coefficients.items()}), ""
-        if self.bent and self.best.model.name == "Kienzle":
-            bent, straight = power_basis(base, self.best.parameter), straight_basis(base)[:, ::2]
-            same = (bent * straight).sum(axis=0) / (straight**2).sum(
-                axis=0
-            )  # the same mean force at this feed
-            law = EndMill(*(float(v) for v in self.best.values * same))
+    def chance(self, other: Fitted) -> float:
+        """Probability that a law as good as the best one errs by so much more (Wilcoxon's signed ranks of all readings left
+        out; of the straight law that of its bend where it is smaller)."""
+        scale = np.min([e.sigma for e in self.explanations], axis=0)
+        more = ((np.abs(other.left_out) - np.abs(self.best.left_out)) / scale).ravel()
+        if other is self.best or not np.isfinite(more).all() or not more.any():
+            return 1.0
+        p = float(wilcoxon(more).pvalue)
+        return min(p, self.bend) if other.model.name == "straight" and self.bent else p
+
+    @property
+    def alike(self) -> tuple[Fitted, ...]:
+        """The best law, and those that these readings cannot distinguish from it."""
+        return tuple(e for e in self.explanations if e is self.best or self.chance(e) >= APART)
+
+    @property
+    def used(self) -> Fitted:
+        """The law of `process`: the straight one where it is among those alike, or the best one."""
+        return next((e for e in self.alike if e.model.name == "straight"), self.best)
+
+    def process(self, base: Process | None = None) -> Process:
+        """The process with the law `used`; a law that bends is taken by its secant at the chip of that process.
+
+        base: tool, speeds and cut; None: those of the table's feed in the middle, with a diameter and a speed of the spindle
+        from it. Raises StiffmapError where it has none.
+        """
+        base = self._middle() if base is None else base
+        numbers = self.used.end_mill(base)
+        law, note = EndMill(**{n: v for n, (v, *_) in numbers.items()}), ""
+        if self.used.model.exponents:
             note = f"the law that bends is taken by its secant at {1e3 * base.chip:.4g} mm per tooth"
         tool = base.tool if self.runout is None else replace(base.tool, runout=self.runout.offset)
-        u = {n: u for n, (_, u) in self.coefficients.items()}
+        u = {n: u for n, (_, u, *_) in numbers.items() if u > 0}
         return replace(base, law=law, tool=tool, note=note, uncertainty=u)
+
+    def _middle(self) -> Process:
+        for name in ("diameter", "spindle"):
+            if name not in self.table.given:
+                raise FileError(
+                    f"missing column '{COLUMNS[name][0]}', which a process needs; give it, or a process with tool and speeds",
+                    file=self.table.file,
+                )
+        return self.table.cuts[int(np.argsort(self.table.chip)[len(self.table.cuts) // 2])]
+
+    def save(self, path: str | PathLike[str], base: Process | None = None) -> Path:
+        """Write `process` as a file that `load_process` reads: source, uncertainties, intervals. Raises FileError."""
+        p, numbers = self.process(base), self.used.end_mill(self._middle() if base is None else base)
+        says = " ".join(self.verdict())
+        source = f"fitted to the forces of {Path(self.table.file).name}. {says}" + (
+            f" Here {p.note}." if p.note else ""
+        )
+        return save_process(replace(p, name=Path(path).stem, source=source), path, numbers)
 
     def words(self) -> list[str]:
         """What a workshop reads, one sentence each."""
         out = [
-            f"{n} = {with_uncertainty(v / 1e6, u / 1e6)} N/mm²"
-            if n.endswith("c")
-            else f"{n} = {with_uncertainty(v / 1e3, u / 1e3)} N/mm"
-            for n, (v, u) in self.coefficients.items()
+            f"{n} = {with_uncertainty(v, u)}{unit}, 95 %: {low:.4g} to {high:.4g}"
+            for e in sorted(self.explanations, key=lambda e: e is not self.used)
+            if e is self.used or e.model.name == "straight"
+            for n, (v, u, low, high, unit) in shown(e).items()
         ]
         r = self.rms
         out.append(f"The straight law leaves {r[0]:.1f}, {r[1]:.1f}, {r[2]:.1f} N rms in x, y, z.")
@@ -90,91 +130,69 @@ class IdentifiedLaw:
             w = np.nanmax(far, axis=0)
             out.append(f"It misses a feed left out by up to {w[0]:.0f}, {w[1]:.0f}, {w[2]:.0f} N.")
         if self.bent:
-            best = self.best
-            close = [
-                e.model.name
-                for e in self.explanations
-                if e is not best and e.model.name != "straight" and e.score() - best.score() < RIVAL
-            ]
-            named = ", ".join(
-                f"{n} {v:.3g}" for n, v in zip(best.model.parameters, best.parameter, strict=True)
-            )
-            named = f" ({named})" if named else ""
             out.append(
-                f"The forces bend: a straight law would by chance with probability {self.bend:.2g} only. Likeliest: {best.model.name}{named}, "
-                f"{best.model.words}; it leaves {', '.join(f'{v:.1f}' for v in np.sqrt((best.residual**2).mean(axis=0)))} N."
-                + (f" These readings cannot separate it from: {', '.join(close)}." if close else "")
+                f"The forces bend: a straight law would by chance with probability {self.bend:.2g} only."
             )
         else:
             out.append(f"No bend is shown (probability {self.bend:.2g} by chance).")
+        out += self.verdict()
         if self.runout is not None:
+            low, high = self.runout.interval
             out.append(
-                f"Run-out of {1e6 * self.runout.offset:.3g} µm explains the line at the spindle's frequency."
+                f"Run-out of {1e6 * self.runout.offset:.3g} µm, 95 %: {1e6 * low:.3g} to {1e6 * high:.3g}, explains the line at "
+                "the spindle's frequency."
             )
         return out + list(self.table.notes)
 
-
-def identify_process(
-    table: str | PathLike[str] | Mapping[str, Any], process: Process | None = None
-) -> IdentifiedLaw:
-    """Coefficients of the mechanistic law from a dynamometer's table: means per feed, or signals over time.
-
-    table
-        CSV file or columns ``feed_per_tooth_mm, Fx_N, Fy_N, Fz_N, teeth, axial_mm`` and, where the cut is no slot,
-        ``side, radial_mm, diameter_mm``; signals also ``time_s, spindle_rpm``. Single values stand for all rows.
-    process
-        Gives tool, cut and speed where no column does.
-
-    Raises FileError for a table that cannot be used, StiffmapError where there are fewer than three feeds.
-    """
-    t = read_table(table, process)
-    need(t, 3)
-    fitted = [fit(m, t) for m in MODELS if _fits(m.name, t)]
-    straight = next(f for f in fitted if f.model.name == "straight")
-    u = np.sqrt(np.diag(straight.covariance))
-    reach = float(student.ppf(0.975, max(len(t.cuts) - 2, 1)))
-    values = {n: (float(v), float(s)) for n, v, s in zip(NAMES, straight.values, u, strict=True)}
-    law = EndMill(**{n: v for n, (v, _) in values.items()})
-    return IdentifiedLaw(
-        values,
-        {n: (v - reach * s, v + reach * s) for n, (v, s) in values.items()},
-        straight.residual,
-        _left_out(t),
-        tuple(sorted(fitted, key=lambda f: f.score())),
-        _bend(straight, next((f for f in fitted if f.model.name == "bend"), None)),
-        runout_of(t, law),
-        t,
-    )
-
-
-def _fits(name: str, t: ForceTable) -> bool:
-    """Whether the table can hold the parameters of a law."""
-    feeds = len(np.unique(np.round(t.chip, 12)))
-    if name == "run-out":
-        return feeds > 3 and all(p.tool.teeth > 1 for p in t.cuts)
-    return name == "straight" or feeds > 3
-
-
-def _left_out(t: ForceTable) -> Floats:
-    out = np.full_like(t.force, np.nan)
-    feeds = np.round(t.chip, 12)
-    if len(np.unique(feeds)) < 3:
+    def verdict(self) -> list[str]:
+        """Which law predicts forces that it has not seen, by how much, and whether the readings can distinguish them."""
+        if len(self.explanations) < 2:
+            return ["Rivals of the straight law need forces at four feeds or more."]
+        best, rest = self.best, [e for e in self.explanations if e is not self.best]
+        named = ", ".join(f"{n} {v:.3g}" for n, v in zip(best.model.exponents, best.parameter, strict=False))
+        out = [
+            f"Best at feeds left out: {best.model.name}{f' ({named})' if named else ''}, {best.model.words}; it misses them by "
+            f"{errors(best)} N rms in x, y, z."
+        ]
+        for e in rest:
+            apart = "worse" if e not in self.alike else "and cannot be distinguished"
+            out.append(
+                f"The law {e.model.name} misses them by {errors(e)} N, {apart} (probability {self.chance(e):.2g} by chance)."
+            )
         return out
-    for c in np.unique(feeds):
-        known = fit(MODELS[0], t.rows(feeds != c))
-        for i in np.flatnonzero(feeds == c):
-            out[i] = t.force[i] - straight_basis(t.cuts[i]) @ known.values
+
+    def to_dict(self) -> dict[str, Any]:
+        """Data of the answer, SI; a number is its value, standard uncertainty and both ends of its 95 % interval."""
+        laws = [
+            {
+                "name": e.model.name, "numbers": e.numbers, "left_out_rms": rms(e.left_out),
+                "residual_rms": rms(e.residual), "chance": self.chance(e),
+            }
+            for e in self.explanations
+        ]  # fmt: skip
+        return {
+            "table": self.table.file, "best": self.best.model.name, "used": self.used.model.name,
+            "alike": [e.model.name for e in self.alike], "bend": self.bend, "laws": laws,
+            "runout": self.runout and {"offset": self.runout.offset, "interval": self.runout.interval},
+            "notes": self.table.notes,
+        }  # fmt: skip
+
+
+def rms(error: Floats) -> list[float]:
+    """N of each axis."""
+    return [float(v) for v in np.sqrt((error**2).mean(axis=0))]
+
+
+def errors(e: Fitted) -> str:
+    """Held-out errors of the axes."""
+    return ", ".join(f"{v:.1f}" for v in rms(e.left_out))
+
+
+def shown(e: Fitted) -> dict[str, tuple[float, float, float, float, str]]:
+    """Numbers of a law in the units of a workshop."""
+    out = {}
+    for n, number in e.numbers.items():
+        size, unit = (1.0, "") if n[0] == "m" else (1e3, " N/mm") if n[-1] == "e" else (1e6, " N/mm²")
+        v, u, low, high = (x / size for x in number)
+        out[n] = (v, u, low, high, unit)
     return out
-
-
-def _bend(straight: Fitted, bent: Fitted | None) -> float:
-    """F test of three squares of the feed against the straight law, each axis in its own scatter."""
-    if bent is None:
-        return 1.0
-    n = len(straight.residual)
-    free = n - 3
-    if free < 1:
-        return 1.0
-    a, b = (straight.residual**2).sum(axis=0), (bent.residual**2).sum(axis=0)
-    each = fisher.sf((a - b) / np.maximum(b / free, 1e-18), 1, free)
-    return float(chi2.sf(-2 * np.log(np.maximum(each, 1e-300)).sum(), 6))  # Fisher's sum over the three axes

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
+from scipy.optimize import least_squares
+from scipy.stats import t as student
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.process.description import EDGES, PRESSURES, EndMill, Process
@@ -18,8 +19,10 @@ from stiffmap.machining.process.revolution import mean_basis_with_runout
 NAMES = ("Ktc", "Kte", "Krc", "Kre", "Kac", "Kae")
 REFERENCE = 1e-3
 """m: chip at which a pressure with an exponent is stated."""
-MOST_RUNOUT = 2.0
-"""Of the largest feed per tooth."""
+BOUNDS = (-1.5, 0.98)
+"""Of a fitted exponent; noise may carry one below zero."""
+STEP = 1e-5
+"""Of an exponent, for slopes by central differences."""
 
 
 def unit_laws() -> list[EndMill]:
@@ -58,6 +61,10 @@ def bent_basis(p: Process, _none: Floats) -> Floats:
     return np.hstack([straight_basis(p), np.eye(3) * (p.chip / 1e-4) ** 2])
 
 
+Number = tuple[float, float, float, float]
+"""Value, standard uncertainty and ends of the 95 % interval (Student), SI."""
+
+
 @dataclass(frozen=True)
 class Model:
     """A law: its basis at values of its own parameters, and what it says."""
@@ -65,23 +72,16 @@ class Model:
     name: str
     words: str
     basis: Callable[[Process, Floats], Floats]
-    parameters: tuple[str, ...] = ()
-    coefficients: int = 6
+    coefficients: tuple[str, ...] = NAMES
+    exponents: tuple[str, ...] = ()
 
 
-MODELS = (
-    Model("straight", "force grows in proportion to the chip", lambda p, _: straight_basis(p)),
-    Model(
-        "Kienzle",
-        "the chip pressure falls as a power of the chip's thickness",
-        power_basis,
-        ("mt", "mr", "ma"),
-        3,
-    ),
-    Model("run-out", "a tooth leaves the cut at the small feeds", runout_basis, ("offset",)),
-    Model("bend", "a square of the feed in each axis, with no cause stated", bent_basis, (), 9),
-)
-LARGEST_EXPONENT = 0.98
+STRAIGHT = Model("straight", "force grows in proportion to the chip", lambda p, _: straight_basis(p))
+KIENZLE = Model(
+    "Kienzle", "the chip pressure falls as a power of the chip's thickness", power_basis, ("Kt", "Kr", "Ka"), ("mt", "mr", "ma")
+)  # fmt: skip
+RUNOUT = Model("run-out", "a tooth leaves the cut at the small feeds", runout_basis)
+BEND = Model("bend", "a square of the feed in each axis, with no cause stated", bent_basis)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,73 +90,106 @@ class Fitted:
 
     model: Model
     values: Floats
-    """(k,) coefficients."""
-    covariance: Floats
-    """(k, k)."""
+    """(k,) coefficients: N/m² of chip (of Kienzle's law at a chip of `REFERENCE`), N/m of edge."""
     parameter: Floats
-    """(parameters,) of the model: exponents, or m of run-out."""
+    """Exponents, or m of run-out."""
+    covariance: Floats
+    """Of the values; of Kienzle's law of the logarithms of its pressures and of its exponents."""
     residual: Floats
     """(n, 3) N, measured less fitted."""
     sigma: Floats
     """(3,) N, of the readings of each axis, from the residuals."""
+    freedom: Floats
+    """Degrees of freedom of each number (Welch and Satterthwaite: those of the axes that it rests on)."""
+    left_out: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    """(n, 3) N: measured less predicted by the law fitted without that cut's feed."""
 
     @property
-    def misfit(self) -> float:
-        """n log of the residual variances, summed over the axes: the smaller the likelier."""
-        n = len(self.residual)
-        return float(n * np.log(np.maximum((self.residual**2).mean(axis=0), 1e-18)).sum())
-
-    def score(self) -> float:
-        """Akaike's criterion with its correction for few readings; infinite where parameters equal readings."""
-        n, k = self.residual.size, self.model.coefficients + len(self.model.parameters) + 3
-        return np.inf if n - k - 1 <= 0 else self.misfit + 2 * k + 2 * k * (k + 1) / (n - k - 1)
+    def numbers(self) -> dict[str, Number]:
+        """By name, of coefficients and exponents."""
+        m, u = self.model, np.sqrt(np.diag(self.covariance))
+        if not m.exponents:
+            return stated(NAMES, self.values, u, self.freedom)
+        k = len(self.values)
+        return {
+            **stated(m.coefficients, self.values, u[:k], self.freedom[:k], relative=True),
+            **stated(m.exponents, self.parameter, u[k:], self.freedom[k:]),
+        }
 
     def predict(self, p: Process) -> Floats:
         """(3,) N, mean force of a cut."""
         return np.asarray(self.model.basis(p, self.parameter) @ self.values)
 
+    def end_mill(self, p: Process) -> dict[str, Number]:
+        """Numbers of the law of chips and edges; of Kienzle's law of its secant, which has the same mean force at that feed."""
+        if not self.model.exponents:
+            return self.numbers
+        straight = straight_basis(p)[:, ::2]
 
-def fit(model: Model, table: ForceTable) -> Fitted:
-    """Least squares with a variance of its own for each axis."""
+        def same(m: Floats) -> Floats:
+            return np.asarray((power_basis(p, m) * straight).sum(axis=0) / (straight**2).sum(axis=0))
 
-    def at(values: Floats) -> Fitted:
-        return _linear(model, table, values)
-
-    if not model.parameters:
-        return at(np.zeros(0))
-    if model.name == "run-out":
-        grid = np.linspace(0.0, MOST_RUNOUT * float(table.chip.max()), 13)
-        best = int(np.argmin([at(np.array([v])).misfit for v in grid]))
-        found = minimize_scalar(
-            lambda v: at(np.array([v])).misfit,
-            bounds=(grid[max(best - 1, 0)], grid[min(best + 1, 12)]),
-            method="bounded",
-            options={"xatol": 1e-3 * grid[1]},
-        )
-        return at(np.array([found.x]))
-    start = np.full(len(model.parameters), 0.3)
-    found = minimize(
-        lambda v: at(np.clip(v, 0.0, LARGEST_EXPONENT)).misfit,
-        start,
-        method="Nelder-Mead",
-        options={"xatol": 1e-4, "fatol": 1e-5, "maxfev": 400},
-    )
-    return at(np.clip(found.x, 0.0, LARGEST_EXPONENT))
+        value = self.values * same(self.parameter)
+        turn = np.log(same(self.parameter + STEP) / same(self.parameter - STEP)) / (2 * STEP)
+        by = np.hstack([np.eye(3), np.diag(turn)])
+        u = np.sqrt(np.diag(by @ self.covariance @ by.T))
+        edges = dict.fromkeys(NAMES[1::2], (0.0, 0.0, 0.0, 0.0))
+        return {**stated(NAMES[::2], value, u, self.freedom[:3], relative=True), **edges}
 
 
-def _linear(model: Model, table: ForceTable, parameter: Floats) -> Fitted:
-    n = len(table.cuts)
-    basis = np.stack([model.basis(p, parameter) for p in table.cuts])  # (n, 3, k)
-    k = basis.shape[2]
-    sigma = np.ones(3)
-    freedom = max(n - (k + len(parameter)) / 3, 1e-9)
+def stated(
+    names: Sequence[str], v: Floats, u: Floats, freedom: Floats, relative: bool = False
+) -> dict[str, Number]:
+    """Numbers by name; `relative`: u is of their logarithms."""
+    reach = student.ppf(0.975, freedom) * u
+    far = np.exp(np.minimum(reach, 300.0))
+    ends = np.sort([v / far, v * far], axis=0) if relative else np.array([v - reach, v + reach])
+    each = np.array([v, np.abs(v) * u if relative else u, *ends]).T.tolist()
+    return {n: (row[0], row[1], row[2], row[3]) for n, row in zip(names, each, strict=True)}
+
+
+def fit(model: Model, table: ForceTable, known: Floats | None = None) -> Fitted:
+    """Least squares with a variance of its own for each axis; `known`: the run-out that signals show, m."""
+    if not model.exponents:
+        return _linear(model, table, np.zeros(0) if known is None else known)
+    at = np.full(len(model.exponents), 0.3)
     for _ in range(3):  # the variances of the axes follow from the residuals
-        a = (basis / sigma[:, None]).reshape(3 * n, k)
+        s = _linear(model, table, at).sigma
+        at = least_squares(
+            lambda v, s=s: (_linear(model, table, v, s).residual / s).ravel(), at, bounds=BOUNDS
+        ).x
+    return _linear(model, table, at)
+
+
+def _linear(model: Model, table: ForceTable, parameter: Floats, sigma: Floats | None = None) -> Fitted:
+    """The coefficients at values of the parameters, and what is known of both; `sigma` where it is known."""
+    basis = np.stack([model.basis(p, parameter) for p in table.cuts])  # (n, 3, k)
+    n, _, k = basis.shape
+    free = n - (k + len(model.exponents)) / 3
+    s = np.ones(3) if sigma is None else sigma
+    for _ in range(3 if sigma is None else 1):
+        a = (basis / s[:, None]).reshape(3 * n, k)
         size = np.linalg.norm(a, axis=0)
         size = np.where(size > 0, size, 1.0)
-        values = np.linalg.lstsq(a / size, (table.force / sigma).ravel(), rcond=1e-12)[0] / size
+        values = np.linalg.lstsq(a / size, (table.force / s).ravel(), rcond=1e-12)[0] / size
         residual = table.force - basis @ values
-        sigma = np.maximum(np.sqrt((residual**2).sum(axis=0) / freedom), 1e-9)
-    a = (basis / sigma[:, None]).reshape(3 * n, k)
+        if sigma is None:
+            s = np.maximum(np.sqrt((residual**2).sum(axis=0) / max(free, 1e-9)), 1e-9)
+    if sigma is not None:
+        return Fitted(model, values, parameter, np.zeros((0, 0)), residual, s, np.zeros(0))
+    if model.exponents:  # slopes by the logarithms of the pressures, and by the exponents
+        turns = STEP * np.eye(len(parameter))
+        by = [
+            np.stack([model.basis(p, parameter + d) - model.basis(p, parameter - d) for p in table.cuts])
+            for d in turns
+        ]
+        basis = np.concatenate(
+            [basis * values, np.stack([b @ values for b in by], axis=2) / (2 * STEP)], axis=2
+        )
+    a = (basis / s[:, None]).reshape(3 * n, -1)
+    size = np.linalg.norm(a, axis=0)
+    size = np.where(size > 0, size, 1.0)
     covariance = np.linalg.pinv((a / size).T @ (a / size)) / np.outer(size, size)
-    return Fitted(model, values, covariance, parameter, residual, sigma)
+    by_axis = ((covariance @ a.T) ** 2).reshape(-1, n, 3).sum(axis=1)  # of each variance
+    freedom = max(free, 1) * by_axis.sum(axis=1) ** 2 / np.maximum((by_axis**2).sum(axis=1), 1e-300)
+    return Fitted(model, values, parameter, covariance, residual, s, freedom)

@@ -1,0 +1,52 @@
+"""``stiffmap process``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from stiffmap.common.outputs.option import written
+from stiffmap.common.plain import plain
+from stiffmap.ui.cli.output import JsonOption, print_json
+
+
+def process(
+    table: Annotated[
+        Path,
+        typer.Argument(
+            help="CSV file or workbook: feed_per_tooth_mm, Fx_N, Fy_N, Fz_N, teeth, axial_mm; side, radial_mm, diameter_mm, "
+            "helix_deg, spindle_rpm; time_s. Also feed [mm/min], Fx [kN] …"
+        ),
+    ],
+    base: Annotated[
+        str | None,
+        typer.Option(
+            "--process", help="Process file or shipped name: tool, cut and speed that no column has."
+        ),
+    ] = None,
+    sheet: Annotated[str | None, typer.Option(help="Sheet of a workbook. [default: the first]")] = None,
+    output: Annotated[Path | None, written(help="Process file, for mill, lobes, map and so on.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Coefficients of the cutting force from a dynamometer's table.
+
+    A row is a cut with its mean forces or, with a column of time, a sample. Every number has its 95 % interval. The straight
+    law, Kienzle's and, from signals, run-out are judged by their errors at feeds that were left out.
+
+    Examples:
+
+      [cyan]stiffmap process forces.csv[/cyan]
+
+      [cyan]stiffmap process forces.csv --process slot -o process.yaml[/cyan]
+    """
+    from stiffmap.machining.process import identify_process, load_process
+
+    given = None if base is None else load_process(base)
+    law = identify_process(table, given, sheet)
+    files = [] if output is None else [str(law.save(output, given))]
+    if as_json:
+        print_json(plain({**law.to_dict(), "files": files}))
+    else:
+        print("\n".join([*law.words(), *(f"wrote {f}" for f in files)]))
