@@ -13,9 +13,9 @@ import argparse
 from typing import NamedTuple
 
 import numpy as np
+from link_bars import fork_bar
 from scipy.optimize import least_squares
 
-from stiffmap.model.link.beam import fork_bar
 from stiffmap.model.link.inputs import MATERIALS, UNIT_WRENCHES
 from stiffmap.model.link.pipeline import PartLink, link_from_part
 from stiffmap.model.link.shapes import ForkBar

@@ -26,9 +26,8 @@ def save_process(
     try:
         load_process(data)
     except FileError as error:
-        raise FileError(
-            f"no process file can be written: {error.key}: {error.reason}", file=str(path)
-        ) from error
+        what = f"no process file can be written: {error.key}: {error.reason}"
+        raise FileError(what, file=str(path)) from error
     return write_text(path, text_of(data))
 
 
@@ -38,16 +37,12 @@ def _keys(p: Process, numbers: Mapping[str, tuple[float, float, float, float]]) 
     assert isinstance(p.law, EndMill)
     for n, (v, u, low, high) in numbers.items():
         size, unit = (1e6, "N/mm2") if n in PRESSURES else (1e3, "N/mm")
-        note = f"95 % interval {low / size:.4g} to {high / size:.4g} {unit}"
-        law[n] = {
-            "value": f"{v / size:.6g} {unit}",
-            **({"u": f"{u / size:.3g} {unit}", "note": note} if u > 0 else {}),
-        }
-    tool: dict[str, Any] = {
-        "diameter": _mm(t.diameter),
-        "teeth": t.teeth,
-        "helix": f"{t.helix * 180 / pi:.10g} deg",
-    }
+        law[n] = {"value": f"{v / size:.6g} {unit}"}
+        if u > 0:
+            note = f"95 % interval {low / size:.4g} to {high / size:.4g} {unit}"
+            law[n] |= {"u": f"{u / size:.3g} {unit}", "note": note}
+    helix = f"{t.helix * 180 / pi:.10g} deg"
+    tool: dict[str, Any] = {"diameter": _mm(t.diameter), "teeth": t.teeth, "helix": helix}
     if t.runout:
         angle = f"{t.runout_angle * 180 / pi:.10g} deg"
         tool["runout"] = {"offset": f"{1e6 * t.runout:.4g} um", "angle": angle}

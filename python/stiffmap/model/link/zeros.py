@@ -1,10 +1,9 @@
-"""Which entries of the compliance are zero: a test with family-wise control, and what it misses."""
+"""Which entries of the compliance are zero: a test with family-wise control."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.stats import nct, t
+from scipy.stats import t
 
 from stiffmap.model.link.arrays import Bools, Floats
 
@@ -26,16 +25,3 @@ def insignificant_entries(compliance: Floats, error: Floats, dof: Floats, level:
         level: family-wise level; tests: distinct entries (21 under symmetry, else 36).
     """
     return np.asarray(np.abs(compliance) <= critical_multiple(level, tests, dof) * error)
-
-
-def miss_probability(
-    true_entry: ArrayLike, error: ArrayLike, dof: Floats | float, level: float, tests: int
-) -> Floats:
-    """Probability that an entry of this true size is declared zero: noncentral t, link (9).
-
-    At ``true_entry = 0`` it is ``1 - level / tests``.
-    """
-    k, shift = critical_multiple(level, tests, dof), np.asarray(true_entry) / np.asarray(error)
-    # Beyond 1e6 degrees of freedom t is normal to 1e-6 and nct loses accuracy.
-    nu = np.minimum(np.asarray(dof, dtype=float), 1e6)
-    return np.asarray(nct.cdf(k, nu, shift) - nct.cdf(-k, nu, shift))

@@ -10,9 +10,10 @@ import pytest
 pytest.importorskip("gmsh", reason="needs the extra [fea]", exc_type=(ImportError, OSError))
 pytest.importorskip("skfem", reason="needs the extra [fea]")
 
+from examples.link_bars import cantilever, rectangle, tube
+
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link import calculix
-from stiffmap.model.link.beam import cantilever, rectangle, tube
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.mesh import face_area_centre, face_loads
 from stiffmap.model.link.pipeline import link_from_part

@@ -28,10 +28,9 @@ def identify_process(
     table
         CSV file, workbook or columns ``feed_per_tooth_mm, Fx_N, Fy_N, Fz_N, teeth, axial_mm`` and, where the cut is no slot,
         ``side, radial_mm, diameter_mm``; signals also ``time_s, spindle_rpm``. Other units are ``Fx [kN]``,
-        ``feed [mm/min]`` (with ``spindle_rpm``) or ``feed [mm/rev]``. Single values stand for all rows.
+        ``feed [mm/min]`` (with ``spindle_rpm``). Single values stand for all rows.
     process
         Gives tool, cut and speed where no column does.
-
     sheet
         Of a workbook; the first one where none is named.
 
@@ -58,7 +57,7 @@ def identify_process(
         straight.residual,
         fitted[0].left_out,
         tuple(sorted(fitted, key=lambda f: float(((f.left_out / scale) ** 2).sum()))),
-        _bend(straight, fit(BEND, t) if found > 3 else None),
+        _bend(straight, fit(BEND, t)) if found > 3 else 1.0,
         runout,
         t,
     )
@@ -73,14 +72,9 @@ def _left_out(model: Model, t: ForceTable, known: Floats | None) -> Floats:
     return out
 
 
-def _bend(straight: Fitted, bent: Fitted | None) -> float:
+def _bend(straight: Fitted, bent: Fitted) -> float:
     """F test of three squares of the feed against the straight law, each axis in its own scatter."""
-    if bent is None:
-        return 1.0
-    n = len(straight.residual)
-    free = n - 3
-    if free < 1:
-        return 1.0
+    free = len(straight.residual) - 3
     a, b = (straight.residual**2).sum(axis=0), (bent.residual**2).sum(axis=0)
     each = fisher.sf((a - b) / np.maximum(b / free, 1e-18), 1, free)
     return float(chi2.sf(-2 * np.log(np.maximum(each, 1e-300)).sum(), 6))  # Fisher's sum over the three axes

@@ -26,6 +26,9 @@ SIGNIFICANT = 0.01
 APART = 0.02
 """Probability by chance below which the held-out errors of two laws are distinguished."""
 
+UNITS = {"e": (1e3, " N/mm"), **dict.fromkeys("ctra", (1e6, " N/mm²"))}
+"""SI size and unit by the last letter of a coefficient."""
+
 
 @short_repr
 @dataclass(frozen=True, eq=False)
@@ -93,71 +96,63 @@ class IdentifiedLaw:
         law, note = EndMill(**{n: v for n, (v, *_) in numbers.items()}), ""
         if self.used.model.exponents:
             note = f"the law that bends is taken by its secant at {1e3 * base.chip:.4g} mm per tooth"
-        tool = base.tool if self.runout is None else replace(base.tool, runout=self.runout.offset)
+        shown = self.runout is not None and self.runout.interval[0] > 0
+        tool = replace(base.tool, runout=self.runout.offset) if self.runout and shown else base.tool
         u = {n: u for n, (_, u, *_) in numbers.items() if u > 0}
         return replace(base, law=law, tool=tool, note=note, uncertainty=u)
 
     def _middle(self) -> Process:
-        for name in ("diameter", "spindle"):
-            if name not in self.table.given:
-                raise FileError(
-                    f"missing column '{COLUMNS[name][0]}', which a process needs; give it, or a process with tool and speeds",
-                    file=self.table.file,
-                )
+        if missing := [COLUMNS[n][0] for n in ("diameter", "spindle") if n not in self.table.given]:
+            what = f"missing column '{missing[0]}', which a process needs; give it, or a process with tool and speeds"
+            raise FileError(what, file=self.table.file)
         return self.table.cuts[int(np.argsort(self.table.chip)[len(self.table.cuts) // 2])]
 
     def save(self, path: str | PathLike[str], base: Process | None = None) -> Path:
         """Write `process` as a file that `load_process` reads: source, uncertainties, intervals. Raises FileError."""
         p, numbers = self.process(base), self.used.end_mill(self._middle() if base is None else base)
         says = " ".join(self.verdict())
-        source = f"fitted to the forces of {Path(self.table.file).name}. {says}" + (
-            f" Here {p.note}." if p.note else ""
-        )
+        here = f" Here {p.note}." if p.note else ""
+        source = f"fitted to the forces of {Path(self.table.file).name}. {says}{here}"
         return save_process(replace(p, name=Path(path).stem, source=source), path, numbers)
 
     def words(self) -> list[str]:
         """What a workshop reads, one sentence each."""
         out = [
-            f"{n} = {with_uncertainty(v, u)}{unit}, 95 %: {low:.4g} to {high:.4g}"
+            f"{n} = {with_uncertainty(v / size, u / size)}{unit}, 95 %: {low / size:.4g} to {high / size:.4g}"
             for e in sorted(self.explanations, key=lambda e: e is not self.used)
             if e is self.used or e.model.name == "straight"
-            for n, (v, u, low, high, unit) in shown(e).items()
+            for n, (v, u, low, high) in e.numbers.items()
+            for size, unit in [UNITS.get(n[-1] if n[0] == "K" else "", (1.0, ""))]
         ]
-        r = self.rms
-        out.append(f"The straight law leaves {r[0]:.1f}, {r[1]:.1f}, {r[2]:.1f} N rms in x, y, z.")
-        far = np.abs(self.left_out)
-        if np.isfinite(far).any():
-            w = np.nanmax(far, axis=0)
-            out.append(f"It misses a feed left out by up to {w[0]:.0f}, {w[1]:.0f}, {w[2]:.0f} N.")
-        if self.bent:
-            out.append(
-                f"The forces bend: a straight law would by chance with probability {self.bend:.2g} only."
-            )
-        else:
-            out.append(f"No bend is shown (probability {self.bend:.2g} by chance).")
-        out += self.verdict()
-        if self.runout is not None:
-            low, high = self.runout.interval
-            out.append(
-                f"Run-out of {1e6 * self.runout.offset:.3g} µm, 95 %: {1e6 * low:.3g} to {1e6 * high:.3g}, explains the line at "
-                "the spindle's frequency."
-            )
-        return out + list(self.table.notes)
+        out.append(f"The straight law leaves {listed(self.residual)} N rms in x, y, z.")
+        shown = (
+            "The forces bend: a straight law would" if self.bent else "No bend is shown: a straight law would"
+        )
+        out.append(f"{shown} by chance with probability {self.bend:.2g}.")
+        return [*out, *self.verdict(), *self.table.notes]
 
     def verdict(self) -> list[str]:
-        """Which law predicts forces that it has not seen, by how much, and whether the readings can distinguish them."""
-        if len(self.explanations) < 2:
-            return ["Rivals of the straight law need forces at four feeds or more."]
-        best, rest = self.best, [e for e in self.explanations if e is not self.best]
+        """Which law predicts forces that it has not seen, by how much, whether the readings can distinguish them, and run-out."""
+        best = self.best
         named = ", ".join(f"{n} {v:.3g}" for n, v in zip(best.model.exponents, best.parameter, strict=False))
         out = [
             f"Best at feeds left out: {best.model.name}{f' ({named})' if named else ''}, {best.model.words}; it misses them by "
-            f"{errors(best)} N rms in x, y, z."
+            f"{listed(best.left_out)} N rms in x, y, z."
         ]
-        for e in rest:
-            apart = "worse" if e not in self.alike else "and cannot be distinguished"
+        for e in self.explanations:
+            if e is not best:
+                apart = "and cannot be distinguished" if e in self.alike else "worse"
+                out.append(
+                    f"The law {e.model.name} misses them by {listed(e.left_out)} N, {apart} "
+                    f"(probability {self.chance(e):.2g} by chance)."
+                )
+        if len(self.explanations) < 2:
+            out.append("Rivals of the straight law need forces at four feeds or more.")
+        if self.runout is not None:
+            low, high = (1e6 * v for v in self.runout.interval)
+            what = "explains the line at the spindle's frequency" if low > 0 else "none is shown"
             out.append(
-                f"The law {e.model.name} misses them by {errors(e)} N, {apart} (probability {self.chance(e):.2g} by chance)."
+                f"Run-out of {1e6 * self.runout.offset:.3g} µm, 95 %: {low:.3g} to {high:.3g}: {what}."
             )
         return out
 
@@ -183,16 +178,6 @@ def rms(error: Floats) -> list[float]:
     return [float(v) for v in np.sqrt((error**2).mean(axis=0))]
 
 
-def errors(e: Fitted) -> str:
-    """Held-out errors of the axes."""
-    return ", ".join(f"{v:.1f}" for v in rms(e.left_out))
-
-
-def shown(e: Fitted) -> dict[str, tuple[float, float, float, float, str]]:
-    """Numbers of a law in the units of a workshop."""
-    out = {}
-    for n, number in e.numbers.items():
-        size, unit = (1.0, "") if n[0] == "m" else (1e3, " N/mm") if n[-1] == "e" else (1e6, " N/mm²")
-        v, u, low, high = (x / size for x in number)
-        out[n] = (v, u, low, high, unit)
-    return out
+def listed(error: Floats) -> str:
+    """The same in words."""
+    return ", ".join(f"{v:.1f}" for v in rms(error))

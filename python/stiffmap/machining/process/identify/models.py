@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.machining.process.description import EDGES, PRESSURES, EndMill, Process
+from stiffmap.machining.process.description import EndMill, Process
 from stiffmap.machining.process.gauss import gauss
 from stiffmap.machining.process.identify.table import ForceTable
 from stiffmap.machining.process.mean import engaged, mean_force, widened
@@ -25,14 +25,10 @@ STEP = 1e-5
 """Of an exponent, for slopes by central differences."""
 
 
-def unit_laws() -> list[EndMill]:
-    """One coefficient each."""
-    return [EndMill(**{**dict.fromkeys((*PRESSURES, *EDGES), 0.0), n: 1.0}) for n in NAMES]
-
-
 def straight_basis(p: Process) -> Floats:
     """(3, 6) mean force per unit of each coefficient."""
-    cuts = [replace(p, law=law) for law in unit_laws()]
+    zero = EndMill(0.0, 0.0)
+    cuts = [replace(p, law=replace(zero, **{n: 1.0})) for n in NAMES]
     return np.stack([mean_force(c, c.cut.radial, c.cut.axial) for c in cuts], axis=1)
 
 

@@ -19,7 +19,7 @@ LARGEST, GRID = 1.5, 16
 """Feeds per tooth, and how many run-outs are tried before the best is refined."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Runout:
     """Run-out that signals show."""
 
@@ -27,8 +27,6 @@ class Runout:
     """m: of a tool with two teeth half the difference of their radii, with more the offset of the axis."""
     interval: tuple[float, float]
     """m, ends of the 95 % interval: scatter of the feeds, and the uncertainty of the coefficients."""
-    power: Floats
-    """(n,) N²: squared amplitudes at the spindle's frequency of both axes across the tool, less their noise."""
 
 
 def line_power(s: Signals, frequency: float) -> tuple[float, float]:
@@ -92,4 +90,4 @@ def runout_of(table: ForceTable, law: Fitted) -> Runout | None:
     correlation = law.covariance / np.maximum(np.outer(u, u), 1e-300)
     reach = float(np.sqrt(reach**2 + moved @ correlation @ moved))
     low, high = (float(np.sqrt(max(middle + k * reach, 0.0))) for k in (-1, 1))
-    return Runout(offset, (low, max(high, offset)), measured)
+    return Runout(offset, (low, max(high, offset)))

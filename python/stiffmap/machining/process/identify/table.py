@@ -91,14 +91,9 @@ def read_table(
 
 def _whole_turns(c: Columns, here: Any, force: Floats) -> Signals:
     time, turn = c.values["time"][here], 2 * pi / c.above_zero("spindle", int(here[0]))
-    late = np.flatnonzero(np.diff(time) <= 0)
-    if late.size:
-        i = late[0]
-        c.fail(
-            f"expected rising times in a cut, found {time[i + 1]:g} s behind {time[i]:g} s",
-            "time",
-            here[i + 1],
-        )
+    for i in np.flatnonzero(np.diff(time) <= 0)[:1]:
+        what = f"expected rising times in a cut, found {time[i + 1]:g} s behind {time[i]:g} s"
+        c.fail(what, "time", here[i + 1])
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     turns = int((time[-1] - time[0] + step) / turn * (1 + 1e-9))
     if len(time) < 8 or turns < 1:
