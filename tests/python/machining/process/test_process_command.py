@@ -46,20 +46,21 @@ def law_of(kind: str, side: str, noise: float) -> sm.IdentifiedLaw:
     [
         ("straight", "slot", FEEDS, 0.02, 250), ("straight", "slot", FEEDS * 2, 0.3, 250),
         ("straight", "climb", FEEDS, 0.3, 250), ("straight", "conventional", FEEDS * 2, 0.02, 250),
-        ("Kienzle", "slot", FEEDS, 0.15, 60), ("Kienzle", "climb", FEEDS, 0.02, 60),
+        ("Kienzle", "slot", FEEDS, 0.15, 30), ("Kienzle", "climb", FEEDS, 0.02, 30),
     ],
 )  # fmt: skip
 def test_intervals_hold_the_truth_as_often_as_they_say(
     law: str, side: str, cuts: Any, noise: float, count: int
 ) -> None:
-    """bench/force_laws.py has the campaign; here the bounds are three standard deviations of so few tables wider."""
+    """bench/force_laws.py has the campaign; where few tables fit here the bounds are three standard deviations wider."""
     share, many = coverage(law, noisy(law, side, list(cuts), noise, count, 5))
-    assert share == pytest.approx(0.95, abs=0.02 + 3 * np.sqrt(0.95 * 0.05 / many * 2))
+    few = 3 * np.sqrt(2 * 0.95 * 0.05 / many) if many < 1000 else 0.0
+    assert share == pytest.approx(0.95, abs=0.02 + few)
 
 
 def test_run_out_is_held_by_its_interval_and_zero_by_that_of_a_true_tool() -> None:
-    assert runout_coverage(0.012, 40.0, 4, 1) >= 0.75
-    assert runout_coverage(0.0, 40.0, 4, 1) >= 0.75
+    assert runout_coverage(0.012, 40.0, 1, 1) == 1
+    assert runout_coverage(0.0, 40.0, 1, 1) == 1
 
 
 def test_heavier_noise_gives_wider_intervals() -> None:
