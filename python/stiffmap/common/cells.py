@@ -10,6 +10,7 @@ from itertools import chain, islice
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.number_text import LARGEST, SMALLEST
 
 BETWEEN = "\x1f"
 """Stands between cells; one inside a cell becomes a blank."""
@@ -39,7 +40,7 @@ class Cells:
         return (block.split(BETWEEN) for block in self.blocks)
 
     def numbers(self, one: Callable[[str, int], float]) -> Floats:
-        """All as numbers. `one` (cell, row) reads whatever is no plain finite number, or raises."""
+        """All as numbers. `one` (cell, row) reads whatever is no plain number of at most ``LARGEST``, or raises."""
         out = np.empty(self._count)
         start = 0
         for block, cells in zip(self.blocks, self.parts(), strict=True):
@@ -59,7 +60,8 @@ class Cells:
             )
         except ValueError:
             return np.array([one(c, start + i) for i, c in enumerate(cells)])
-        for i in np.flatnonzero(~np.isfinite(out)):
+        out[np.abs(out) < SMALLEST] = 0.0
+        for i in np.flatnonzero(~(np.abs(out) <= LARGEST)):
             out[i] = one(cells[i], start + int(i))
         return out
 

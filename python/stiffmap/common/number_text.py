@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
-from math import floor, isfinite, log10
+from math import floor, inf, isfinite, log10
+
+from stiffmap.common.errors import StiffmapError
+
+LARGEST, SMALLEST = 1e60, 1e-60
+"""Bounds of what is read: squares of ratios of two numbers stay finite. What is smaller is 0, such as a tensor's dust."""
 
 
 def number_in(text: str) -> float:
-    """The number that a text is; ValueError for what only Python takes for one: ``1_0``, digits of other scripts."""
+    """The number that a text is; ValueError for what only Python takes for one (``1_0``, digits of other scripts)
+    and beyond ``LARGEST``."""
     if "_" in text or not text.isascii():
         raise ValueError(f"could not convert string to float: {text!r}")
-    return float(text)
+    return bounded(float(text))
+
+
+def bounded(value: float) -> float:
+    """A number as it is, 0 where it is below ``SMALLEST``; StiffmapError for one beyond ``LARGEST`` that is not endless."""
+    if LARGEST < abs(value) < inf:
+        raise StiffmapError(f"expected a number of at most {LARGEST:.0e}, found {str(value)[:20]}")
+    return 0.0 if abs(value) < SMALLEST else value
 
 
 def with_uncertainty(value: float, u: float) -> str:

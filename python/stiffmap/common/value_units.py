@@ -7,7 +7,7 @@ from collections import Counter
 from fractions import Fraction
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.number_text import number_in
+from stiffmap.common.number_text import bounded, number_in
 from stiffmap.common.units import FORCES, LENGTHS, MASSES, PLANE_ANGLES
 
 _MICRO = Fraction(1, 10**6)
@@ -90,5 +90,5 @@ def read_value(text: str, expected: str) -> float:
     if dimension != want:
         raise StiffmapError(f"expected a unit such as {expected}, got {unit!r}")
     if isinstance(factor, Fraction):  # 12um is the double nearest to 12e-6
-        return float(Fraction(number) * factor)
-    return number_in(number) * factor
+        return bounded(float(Fraction(number) * factor))
+    return bounded(number_in(number) * factor)

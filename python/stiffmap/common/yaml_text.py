@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 
 from stiffmap.common.errors import FileError
+from stiffmap.common.number_text import bounded
 from stiffmap.common.yaml_limits import check_size
 
 KeyPath = tuple[str | int, ...]
@@ -49,11 +50,21 @@ def _construct_int(loader: Any, node: Any) -> int:
             problem=f"expected an integer of at most {LONGEST_INTEGER} digits, found {len(digits)}",
             problem_mark=node.start_mark,
         )
+    _sized(loader, node)
     return int(digits)  # decimal, also with a leading zero
+
+
+def _sized(loader: Any, node: Any) -> float:
+    """A number within the bounds of what is read."""
+    try:
+        return bounded(loader.construct_yaml_float(node))
+    except ValueError as error:
+        raise yaml.constructor.ConstructorError(problem=str(error), problem_mark=node.start_mark) from error
 
 
 _PLAIN = {f"tag:yaml.org,2002:{t}" for t in ("null", "bool", "int", "float", "str", "seq", "map")}
 _Loader.add_constructor("tag:yaml.org,2002:int", _construct_int)
+_Loader.add_constructor("tag:yaml.org,2002:float", _sized)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Standard output and error: terminals without our signs, full disks, readers that have gone."""
+"""Standard output and error: terminals without our signs, full disks, readers that have gone, warnings."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import errno
 import io
 import os
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
@@ -40,16 +41,19 @@ codecs.register_error("stiffmap", _in_ascii)
 def plain_streams() -> Iterator[None]:
     """Whatever is printed inside can be printed; FileError where standard output cannot be written.
 
-    A reader that has gone (``| head``) ends the command quietly.
+    A reader that has gone (``| head``) ends the command quietly. Warnings to the user are one line each; those that
+    libraries have for programmers are not shown.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="stiffmap")
     try:
-        try:
-            yield
-        finally:
-            sys.stdout.flush()
+        with warnings.catch_warnings():
+            warnings.showwarning = _warned
+            try:
+                yield
+            finally:
+                sys.stdout.flush()
     except BrokenPipeError:
         _quiet()
         raise SystemExit(0) from None
@@ -58,6 +62,11 @@ def plain_streams() -> Iterator[None]:
             raise
         _quiet()
         raise FileError(f"cannot be written: {error.strerror or error}", file="standard output") from error
+
+
+def _warned(message: Warning | str, category: type[Warning], *_: object) -> None:
+    if category is UserWarning:
+        print(f"stiffmap: {' '.join(str(message).split())}", file=sys.stderr)
 
 
 def _quiet() -> None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import bounded
 from stiffmap.ui.view.quantities import QUANTITIES
 
 PLANES = ("x", "y", "z", "free")
@@ -130,9 +131,9 @@ def _value(name: str, value: Any) -> Any:
 
 
 def _number(name: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < math.inf:
         raise StiffmapError(f"{name}: expected finite numbers, got {value!r}")
-    return float(value)
+    return float(bounded(value))
 
 
 def permalink(machine: str, state: State) -> str:

@@ -1,0 +1,97 @@
+"""Numbers are bounded where they are read: what is enormous is refused by name, dust is zero, warnings are one line."""
+
+from __future__ import annotations
+
+import shutil
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stiffmap.common import yaml_text
+from stiffmap.common.cells import Cells
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import LARGEST, SMALLEST, bounded, number_in
+from stiffmap.common.value_units import read_value
+from stiffmap.experiment.spreadsheet.sheet import read_sheet
+from stiffmap.ui.cli import main
+from stiffmap.ui.view.state import State, from_permalink, permalink
+
+ENORMOUS = ["1e160", "-1e61", "1" + 300 * "0"]
+DUST = ["1e-300", "-1e-114", "5e-324"]
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.mark.parametrize("text", ENORMOUS)
+def test_what_is_enormous_is_refused_by_every_reader(text: str) -> None:
+    for read in (number_in, lambda t: yaml_text.parse(f"a: [0, {t}]"), lambda t: read_value(f"{t} m", "m")):
+        with pytest.raises(StiffmapError, match=r"at most|neither endless nor enormous"):
+            read(text)
+    with pytest.raises(StiffmapError, match="at most"):
+        Cells.of(["1", text]).numbers(lambda cell, row: number_in(cell))
+
+
+@pytest.mark.parametrize("text", DUST)
+def test_dust_is_zero_to_every_reader(text: str) -> None:
+    assert number_in(text) == 0.0
+    assert yaml_text.parse(f"a: {text}").data == {"a": 0.0}
+    assert read_value(f"{text} m", "m") == 0.0
+    np.testing.assert_array_equal(Cells.of(["1", text]).numbers(lambda cell, row: 7.0), [1.0, 0.0])
+
+
+def test_what_is_within_the_bounds_is_exact() -> None:
+    for value in (LARGEST, -LARGEST, SMALLEST, 0.1, np.inf, -np.inf):
+        assert bounded(value) == value
+        assert yaml_text.parse(f"a: {str(value).replace('inf', '.inf')}").data["a"] == value
+
+
+@pytest.mark.parametrize("noise", ["1e160", "1e-300"])
+@pytest.mark.parametrize("command", ["residual", "calibrate"])
+def test_noise_of_any_size_is_no_defect(
+    noise: str, command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(ROOT / "tests/data/experiments/C-backlash", tmp_path / "e")
+    file = tmp_path / "e/experiment.yaml"
+    text = file.read_text()
+    assert "0.003" in text
+    file.write_text(text.replace("0.003", noise))
+    code = main([command, "orthoglide-revised", str(tmp_path / "e")])
+    error = capsys.readouterr().err
+    assert code in (1, 2)
+    assert len(error.splitlines()) == (1 if code == 2 else 0)
+
+
+def test_a_number_of_a_link_to_the_view_is_bounded() -> None:
+    for state in (State((0.0, 0.0, 1e300)), State((0.0, 0.0, 0.0), tolerance=10**400)):
+        with pytest.raises(StiffmapError, match=r"at most|finite"):
+            from_permalink(permalink("orthoglide-revised", state))
+
+
+def test_warnings_of_a_command_are_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def noisy(_: object) -> None:
+        warnings.warn("two\nlines", UserWarning, stacklevel=1)
+        warnings.warn("of a library", RuntimeWarning, stacklevel=1)
+
+    monkeypatch.setattr("stiffmap.ui.cli.app._register", noisy)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        assert main(["machines"]) == 0
+    assert capsys.readouterr().err == "stiffmap: two lines\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "cells"),
+    [
+        ("id,x,y,note\na,1.5,2.5,ok; warm; slow\nb,2.5,3.5,cold; late; x\n", ("a", "1.5", "2.5", "ok; warm; slow")),
+        ("id;x;y;note\na;1,5;2,5;ok, warm, slow\nb;2,5;3,5;cold, late, x\n", ("a", "1,5", "2,5", "ok, warm, slow")),
+        ("id|x|y\na|1|2\nb|3|4\n", ("a", "1", "2")),
+        ("id\tx\ty\na, b\t1,5\t2\nc; d\t3\t4,5\n", ("a, b", "1,5", "2")),
+        ('id,x,y,note\na,1,2,"1;2;3;4;5;6"\nb,2,3,"1;2;3;4;5;6"\n', ("a", "1", "2", "1;2;3;4;5;6")),
+    ],
+)  # fmt: skip
+def test_the_separator_is_what_parts_numbers(text: str, cells: tuple[str, ...], tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    assert next(read_sheet(tmp_path / "t.csv").rows) == cells

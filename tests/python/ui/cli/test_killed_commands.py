@@ -1,0 +1,154 @@
+"""Every command that writes, killed at one of its renames, and twice at once: what stands there is whole, and the same
+command then ends as if nothing had happened.
+
+Run as a program (name of a command, folder) this file does it in processes of its own, which never ran a thread before.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[4]
+BACKLASH = shlex.quote(str(ROOT / "tests/data/experiments/C-backlash"))
+KR210, TAPS = (shlex.quote(str(ROOT / "examples/taps" / n)) for n in ("kr210.yaml", "taps.csv"))
+DESIGN = """
+name: small
+machine: orthoglide-revised
+variables: {carriage: {low: 1, high: 9}}
+numbers: {"templates.leg.body[carriage].mass": carriage}
+objectives: [mass]
+search: {population: 4, generations: 2, seed: 4, nodes: 2}
+"""
+BAR = "length: 300 mm\nsection: {circle: {diameter: 30 mm}}\nmaterial: steel\n"
+COMMANDS = {
+    "map": "map orthoglide-revised --points 3 --z 0 -o out",
+    "mill": "mill orthoglide-revised circle --size 20 --process trimming --at 50,50,0 --step 20 -o out",
+    "sweep": "sweep orthoglide-revised --at 0,0,0 --direction 1,0,0 --to 300 --points 3 -o out",
+    "polar": "polar orthoglide-revised --at 0,0,0 --force 300 -o out",
+    "diagnose": f"diagnose orthoglide-revised {BACKLASH} --budget 1 -o out",
+    "calibrate": f"calibrate orthoglide-revised {BACKLASH} -o out",
+    "residual": f"residual orthoglide-revised {BACKLASH} -o out",
+    "optimize": "optimize small.yaml -o out",
+    "plan": "plan orthoglide-revised --identify 'compliance actuator x scale=1' --rows 4 -o out.csv",
+    "link": "link bar.yaml --size 15 --out out.yaml",
+    "taps": f"taps {KR210} {TAPS} --only compliance -o out",
+    "view": "view orthoglide-revised --at 0,0,0 --html out.html",
+}
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="kills processes")
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n != "sweep" else []) for n in COMMANDS]
+)
+def test_killed_or_twice_at_once_nothing_is_half_written(name: str, tmp_path: Path) -> None:
+    for package in {"link": ["skfem", "gmsh"], "optimize": ["pymoo"]}.get(name, []):
+        pytest.importorskip(package)
+    alone = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-B", __file__, name, str(tmp_path / "work")],
+        check=False, capture_output=True, text=True, env=alone,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, "whole\n"), done.stderr[-3000:]
+
+
+def _started(arguments: list[str], kill_at: int | None) -> int:
+    """A process that runs the command and dies before its rename of that number; its rename count stands in ``count``."""
+    child = os.fork()
+    if child:
+        return child
+    from stiffmap.ui.cli import main
+
+    sink = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(sink, 1)
+    rename, count = os.replace, 0
+
+    def counted(source: str, target: str) -> None:
+        nonlocal count
+        if Path(target).resolve().is_relative_to(Path.cwd()):
+            if count == kill_at:
+                os.kill(os.getpid(), signal.SIGKILL)
+            count += 1
+        rename(source, target)
+
+    os.replace = os.rename = counted
+    code = main(arguments)
+    if kill_at is None:
+        Path("../count").write_text(str(count))
+    os._exit(code)
+
+
+def _files() -> dict[str, Path]:
+    return {str(p): p for p in Path().rglob("*") if p.is_file()}
+
+
+def _whole(path: Path, complete: int) -> bool:
+    """Whether a file of a killed command is complete: by its form; by its lines where its form has no end."""
+    import netCDF4
+
+    if path.suffix == ".json":
+        json.loads(path.read_text())
+    elif path.suffix == ".nc":
+        netCDF4.Dataset(path).close()
+    elif path.suffix == ".png":
+        return path.read_bytes()[-8:-4] == b"IEND"
+    elif path.suffix == ".html":
+        return path.read_text().rstrip().endswith("</html>")
+    elif path.suffix in (".csv", ".txt", ".yaml", ".ngc"):
+        return len(path.read_text().splitlines()) == complete
+    return path.stat().st_size > 0
+
+
+def _lines(path: Path) -> int:
+    return len(path.read_bytes().decode("latin-1").splitlines())
+
+
+def _tried(name: str, folder: Path) -> None:
+    import stiffmap.ui.cli.app as app
+
+    app.load(next(c for c in app.COMMANDS if c.name == name))
+    arguments = shlex.split(COMMANDS[name])
+    folder.mkdir()
+    os.chdir(folder)
+    Path("small.yaml").write_text(DESIGN)
+    Path("bar.yaml").write_text(BAR)
+    given = set(_files())
+
+    def run(kill_at: int | None = None) -> int:
+        return os.waitstatus_to_exitcode(os.waitpid(_started(arguments, kill_at), 0)[1])
+
+    code = run()
+    assert code in (0, 1), code
+    complete = {n: _lines(p) for n, p in _files().items() if n not in given}
+    count = int(Path("../count").read_text())
+    assert complete and count, "the command wrote nothing"
+    for kill_at in sorted({0, count // 2, count - 1}):
+        for path in (p for n, p in _files().items() if n not in given):
+            path.unlink()
+        assert run(kill_at) == -signal.SIGKILL
+        shown = {n: p for n, p in _files().items() if n not in given and not _hidden(n)}
+        assert set(shown) <= set(complete), (kill_at, set(shown) - set(complete))
+        assert all(_whole(p, complete[n]) for n, p in shown.items()), kill_at
+        assert run() == code, kill_at
+        assert {n for n in _files() if n not in given} == set(complete), (kill_at, _files())
+    first, second = _started(arguments, None), _started(arguments, None)
+    codes = [os.waitstatus_to_exitcode(os.waitpid(p, 0)[1]) for p in (first, second)]
+    assert code in codes and set(codes) <= {code, 2}, codes
+    found = {n: p for n, p in _files().items() if n not in given}
+    assert set(found) == set(complete) and all(_whole(p, complete[n]) for n, p in found.items())
+    print("whole")
+
+
+def _hidden(name: str) -> bool:
+    return any(part.startswith(".") or part.endswith(".partial") for part in Path(name).parts)
+
+
+if __name__ == "__main__":
+    _tried(sys.argv[1], Path(sys.argv[2]))
