@@ -1,4 +1,4 @@
-"""Pictures of vibration: stability lobes, frequency responses, waterfalls along a path."""
+"""Pictures of vibration: stability lobes, frequency responses."""
 
 from __future__ import annotations
 
@@ -79,20 +79,4 @@ def response_figure(responses: Mapping[str, xr.DataArray], axes: str = "xyz") ->
         headline(figure, "Frequency response at the tool")
         if len(responses) > 1:
             legend_below(figure, panels[0].get_legend_handles_labels()[0])
-    return figure
-
-
-def waterfall_figure(way: np.ndarray, responses: xr.DataArray, axis: str = "y") -> Figure:
-    """Size of a receptance (µm/N) along one base axis over the way along a path (m) and the frequency."""
-    own = MICRO * np.abs(responses.sel(response=axis, force=f"f{axis}").values)
-    with paper_style():
-        figure = new_figure(5.4, 3.4)
-        ax = figure.add_subplot()
-        filled = ax.pcolormesh(
-            responses.frequency, MM * way, np.log10(own), cmap=COLOURS, shading="nearest", rasterized=True
-        )
-        figure.colorbar(filled, ax=ax).set_label(f"log10 of the receptance along {axis}, µm/N")
-        ax.set_xlabel("frequency, Hz")
-        ax.set_ylabel("way along the path, mm")
-        headline(figure, f"Frequency response along the path, {axis}")
     return figure

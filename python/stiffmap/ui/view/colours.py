@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.style import COLOURS
 from stiffmap.ui.view.plane import PlaneMap
-from stiffmap.ui.view.quantities import QUANTITIES, Mask
+from stiffmap.ui.view.quantities import Mask
 
 Image = NDArray[np.uint8]
 HATCHED, PERIOD = 4, 8
@@ -64,11 +64,3 @@ def plane_image(found: PlaneMap, limits: tuple[float, float]) -> Image:
 def _stripes(size: int) -> Mask:
     rows, columns = np.indices((size, size))
     return np.asarray((rows + columns) % PERIOD < 2)
-
-
-def legend_text(found: PlaneMap, limits: tuple[float, float]) -> str:
-    """What the colours mean, in a line."""
-    q = QUANTITIES[found.quantity]
-    if found.quantity == "status":
-        return q.title
-    return f"{q.title}: {limits[0]:.4g} to {limits[1]:.4g} {q.unit}"
