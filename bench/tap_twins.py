@@ -17,7 +17,9 @@ from tests.python.workspace.vibration.mujoco_frf import machine_of, modes
 
 import stiffmap as sm
 from stiffmap.identification.taps import TapTest, explain_taps
-from stiffmap.identification.taps.explain import _candidates, _fitted, _refined
+from stiffmap.identification.taps.causes import causes
+from stiffmap.identification.taps.causes import term as change
+from stiffmap.identification.taps.explain import _fitted, _refined
 from stiffmap.identification.taps.problem import Problem, shifted, uncertain_numbers
 from stiffmap.model.effects import apply_records
 
@@ -46,14 +48,14 @@ def twin(machine, rng, term=None):
 def visible(problem, place, scale):
     """Standard deviations by which an effect shifts the readings, net of what uncertain numbers can imitate, to first order."""
     rows, W = problem.whitener()
-    return float(np.linalg.norm(W @ (problem.residual(place.term([scale])) - problem.residual())[rows]))
+    return float(np.linalg.norm(W @ (problem.residual(change(place, scale)) - problem.residual())[rows]))
 
 
 def drawn(machine, rng):
     """A drive that is softer than its file says, visible to these taps."""
     problem = Problem(machine, twin(machine, rng), None, DEFAULT)
     own = {a.rpartition(".")[2] for a in machine.actuators}
-    drives = [c for c in _candidates(machine.description) if c.kind == "compliance" and c.element in own]
+    drives = [c for c in causes(problem) if c.kind == "compliance" and c.element in own]
     while True:
         place, scale = drives[rng.integers(len(drives))], float(rng.uniform(1.5, 6.0))
         if len(place.legs) == 1 and visible(problem, place, scale) > VISIBLE:

@@ -89,7 +89,7 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
     are wanted. Raises FileError naming file, line, column, what was expected and what was found.
     """
     file = str(place)
-    rows = csv_rows(place, file)
+    rows = rows_of(place)
     number, head = rows[0]
     heads = [_head(cell, file, number) for cell in head]
     names = [n for n, _ in heads]
@@ -107,7 +107,7 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
     out = np.zeros((len(rows) - 1, len(heads)))
     for i, (line, row) in enumerate(rows[1:]):
         for j, (name, scale) in enumerate(heads):
-            out[i, j] = scale * _number(row[j] if j < len(row) else "", name, file, line)
+            out[i, j] = scale * cell_number(row[j] if j < len(row) else "", name, file, line)
     columns = {name: out[:, j] for j, (name, _) in enumerate(heads)}
     for c in missing:
         assert at_home is not None  # refused before
@@ -115,8 +115,9 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
     return PoseTable(file, columns, [line for line, _ in rows[1:]])
 
 
-def csv_rows(place: Path, file: str) -> list[tuple[int, list[str]]]:
-    """Line and cells of every row with something in it but remarks; FileError where there is none."""
+def rows_of(place: Path) -> list[tuple[int, list[str]]]:
+    """Lines of a CSV file with their cells, without remarks and empty lines; FileError."""
+    file = str(place)
     try:
         text = place.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -134,15 +135,15 @@ def csv_rows(place: Path, file: str) -> list[tuple[int, list[str]]]:
     return rows
 
 
-def _number(text: str, name: str, file: str, line: int) -> float:
+def cell_number(text: str, name: str, file: str, line: int) -> float:
+    """The finite number of a cell; FileError naming file, line and column."""
+    found = f"'{text.strip()}'" if text.strip() else "an empty cell"
     try:
         value = number_in(text.strip())
     except ValueError:
-        raise FileError(
-            f"expected a number, found '{text.strip()}'", file=file, line=line, key=name
-        ) from None
+        raise FileError(f"expected a number, found {found}", file=file, line=line, key=name) from None
     if not math.isfinite(value):
-        raise FileError(f"expected a finite number, found '{text.strip()}'", file=file, line=line, key=name)
+        raise FileError(f"expected a finite number, found {found}", file=file, line=line, key=name)
     return value
 
 

@@ -6,7 +6,7 @@ uncertain move within their uncertainty in every fit, so that none of them passe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,19 +16,17 @@ from scipy.stats import chi2
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import Experiment
-from stiffmap.identification.diagnosis.candidates.candidates import Candidate, of_kind
-from stiffmap.identification.taps.problem import STEPS, Problem, Term, slopes_of
+from stiffmap.identification.diagnosis.candidates.candidates import Candidate
+from stiffmap.identification.taps.causes import causes, scaled, term
+from stiffmap.identification.taps.predict import predict_taps
+from stiffmap.identification.taps.problem import LEAST, STEPS, Problem, slopes_of
 from stiffmap.identification.taps.table import TapTest
-from stiffmap.model import effects
-from stiffmap.model.description import MachineDescription
-from stiffmap.model.effects import Parameter
 from stiffmap.solve.machine import Machine, takes_machine
 
-KINDS = ("compliance", "joint_compliance", "base_compliance", "tool_compliance")
-"""Effects that frequencies show; besides them a mass on the platform."""
-PAYLOAD = Parameter("mass", "kg", 0.0, 1e4, 0.0, 1.0, "of a body at the TCP that the machine file leaves out")
 SIGNIFICANT = 1e-3
 """Probability with which the best of all candidates may be one where nothing is missing."""
+UNLIKELY = 0.05
+"""Probability below which readings do not fit the machine, and with which a cause that is only the likeliest may be chance."""
 ALIKE = 6.0
 """Chi-squares of candidates nearer than this cannot be distinguished."""
 DISAGREE = 3.0
@@ -37,6 +35,8 @@ REFINED = 5
 """Candidates whose fit leaves the uncertain numbers free."""
 STARTS = (-1.5, -0.7, -0.2, 0.2, 0.7, 1.2, 1.7)
 """Logarithms of a factor, of which the best begins its fit."""
+SIZES = (-10.0, -3.0, -1.0, 0.05, 1.0, 3.0, 10.0, 30.0)
+"""The same of a number whose null is zero, in typical sizes."""
 FEWEST = 16
 """Candidates that are fitted at least; the others promise less."""
 
@@ -113,32 +113,62 @@ def explain_taps(
     problem = Problem(machine, taps, statics, default_u)
     before, _ = problem.settled()
     n = int(problem.used.sum())
-    tried = [c for c in _candidates(machine.description) if only is None or c.kind in only]
+    tried = [c for c in causes(problem) if only is None or c.kind in only]
     if not tried:
         raise StiffmapError(f"only: no candidate of {', '.join(only or ())} on {machine.name}")
-    if before < chi2.isf(0.05, n):
-        said = f"Nothing is missing that these readings show: chi-square {before:.1f} of {n} readings."
-        return TapDiagnosis(before, n, None, (), said)
-    promising = sorted(tried, key=lambda c: -_promise(problem, c))[: max(FEWEST, len(tried) // 3)]
-    first = sorted((e for c in promising if (e := _fitted(problem, c))), key=lambda e: e.chi2)[:REFINED]
-    found = sorted((_refined(problem, e) for e in first), key=lambda e: e.chi2)
-    before = min([before, *(problem.settled(start=e.off)[0] for e in found[:2] if e.off is not None)])
-    if not found or before - found[0].chi2 < chi2.isf(SIGNIFICANT / len(tried), 1):
-        said = "Nothing is missing that these readings show" if before < chi2.isf(SIGNIFICANT, n) else (
-            "The readings do not fit, and no single effect explains them"
+    remarks = _remarks(problem)
+    certain, likely = (chi2.isf(p / len(tried), 1) for p in (SIGNIFICANT, UNLIKELY))
+    found: list[Explained] = []
+    if before >= min(certain, chi2.isf(UNLIKELY, n)):
+        promising = sorted(tried, key=lambda c: -_promise(problem, c))[: max(FEWEST, len(tried) // 3)]
+        first = sorted((e for c in promising if (e := _fitted(problem, c))), key=lambda e: e.chi2)[:REFINED]
+        found = sorted((_refined(problem, e) for e in first), key=lambda e: e.chi2)
+        before = min([before, *(problem.settled(start=e.off)[0] for e in found[:2] if e.off is not None)])
+    fall, poor = before - found[0].chi2 if found else 0.0, before >= chi2.isf(UNLIKELY, n)
+    if fall < (likely if poor else certain):
+        lead = "The readings do not fit, and no single effect explains them: chi-square" if poor else (
+            "Nothing is missing that these readings show: chi-square"
         )  # fmt: skip
-        return TapDiagnosis(before, n, None, (), f"{said}: chi-square {before:.1f} of {n} readings.")
+        return TapDiagnosis(before, n, None, (), f"{lead} {before:.1f} of {n} readings.{remarks}")
     best = _both(problem, found[0])
     alike = (best, *(e for e in found[1:] if e.chi2 < best.chi2 + ALIKE))
     fits = best.chi2 < chi2.isf(SIGNIFICANT, n)
-    return TapDiagnosis(before, n, best if fits else None, alike, _sentence(best, alike, before, n, fits))
+    lead = "" if fits else "Not explained by one effect; the best is "
+    if fits and fall < certain:
+        lead = (
+            f"The readings do not fit (chi-square {before:.1f} of {n}), nothing is certain; the likeliest is "
+        )
+    said = f"{lead}{_sentence(best, alike, before, n)}{remarks}"
+    return TapDiagnosis(before, n, best if fits and fall >= certain else None, alike, said)
 
 
-def _sentence(best: Explained, alike: tuple[Explained, ...], before: float, n: int, fits: bool) -> str:
+def _remarks(problem: Problem) -> str:
+    """What of the readings has no say, and how damping compares."""
+    p, taps, text = predict_taps(problem.machine, problem.taps), problem.taps, ""
+    lost = int(np.isnan(p.frequency).sum())
+    if lost:
+        text += f" {lost} of {len(taps)} rows are not used: their pose cannot be reached, or has no mode left for them."
+    noise = int((np.isfinite(taps.direction).all(axis=1) & ~p.voted).sum())
+    if noise:
+        text += (
+            f" The shape of {noise} rows is that of no mode near, as noise is: frequency alone assigns them."
+        )
+    merged = int((np.isfinite(taps.hammer[:, 0]) & (p.merged > 0)).sum())
+    if merged:
+        text += f" {merged} rows are several modes in one, of which only the frequency counts."
+    off = np.log(taps.ratio / np.maximum(p.ratio, LEAST))
+    if np.isfinite(off).any():
+        low, high = 100 * np.nanmin(taps.ratio), 100 * np.nanmax(taps.ratio)
+        text += (
+            f" Damping is {low:.2g} to {high:.2g} %, {np.exp(np.nanmedian(off)):.2f} times the "
+            f"{'assumed' if problem.declared.assumed else 'declared'} (median)."
+        )
+    return text
+
+
+def _sentence(best: Explained, alike: tuple[Explained, ...], before: float, n: int) -> str:
     values = ", ".join(f"{k} = {v:.4g} ± {best.u[k]:.2g}" for k, v in best.parameters.items())
     text = f"{best.candidate}: {values}; chi-square {before:.1f} before, {best.chi2:.1f} after, {n} readings."
-    if not fits:
-        text = f"Not explained by one effect; the best is {text}"
     if len(alike) > 1:
         text += f" These readings cannot distinguish it from: {'; '.join(e.candidate for e in alike[1:])}."
     off = best.disagreement
@@ -152,36 +182,13 @@ def _sentence(best: Explained, alike: tuple[Explained, ...], before: float, n: i
     return text
 
 
-def _candidates(d: MachineDescription) -> list[Candidate]:
-    found = [c for kind in KINDS for c in of_kind(effects.get(kind), d)]
-    found = [
-        replace(c, parameters=(p,)) for c in found for p in c.parameters if p.null is not None
-    ]  # each number by itself: frequencies are few
-    return [*found, Candidate("payload", "platform", (), (PAYLOAD,))]
-
-
-def _term(c: Candidate, value: float) -> Term:
-    return float(value) if c.kind == "payload" else c.term([value])
-
-
-def _scaled(p: Parameter) -> tuple[Callable[[float], float], float, float]:
-    """From a free number to the parameter (factors by their logarithm), and its bounds."""
-    if p.null == 1.0:
-        return (
-            (lambda t: float(np.clip(np.exp(t), p.lower, p.upper))),
-            float(np.log(p.lower)),
-            float(np.log(p.upper)),
-        )
-    return (lambda t: float(np.clip(t * p.scale, p.lower, p.upper))), p.lower / p.scale, p.upper / p.scale
-
-
 def _promise(problem: Problem, c: Candidate) -> float:
     """Fall of chi-square that one small step promises, to first order."""
-    to, _, _ = _scaled(c.parameters[0])
+    to, _, _ = scaled(c.parameters[0])
     rows, W = problem.whitener()
     r0 = W @ problem.residual()[rows]
     try:
-        slope = (W @ problem.residual(_term(c, to(0.1)))[rows] - r0) / 0.1
+        slope = (W @ problem.residual(term(c, to(0.1)))[rows] - r0) / 0.1
     except StiffmapError:
         return -1.0
     size = float(slope @ slope)
@@ -191,16 +198,16 @@ def _promise(problem: Problem, c: Candidate) -> float:
 def _fitted(problem: Problem, c: Candidate, part: str = "") -> Explained | None:
     """With uncertain numbers to first order; None where the readings say nothing of it."""
     p = c.parameters[0]
-    to, low, high = _scaled(p)
+    to, low, high = scaled(p)
     rows, W = problem.whitener(part)
 
     def residual(t: Floats) -> Floats:
         try:
-            return np.asarray(W @ problem.residual(_term(c, to(float(t[0]))))[rows])
+            return np.asarray(W @ problem.residual(term(c, to(float(t[0]))))[rows])
         except StiffmapError:
             return np.full(int(rows.sum()), 1e3)
 
-    starts = STARTS if p.null == 1.0 else (0.05, 1.0)
+    starts = [t for t in (STARTS if p.null == 1.0 else SIZES) if low < t < high]
     grid = [(float((residual(np.array([t])) ** 2).sum()), t) for t in starts]
     fit = least_squares(
         residual,
@@ -217,21 +224,21 @@ def _fitted(problem: Problem, c: Candidate, part: str = "") -> Explained | None:
     u *= value if p.null == 1.0 else p.scale
     return Explained(
         c, {p.name: value}, {p.name: float(u)}, float(2 * fit.cost),
-        machine=problem.machine_with(_term(c, value)),
+        machine=problem.real(term(c, value))[0],
     )  # fmt: skip
 
 
 def _refined(problem: Problem, e: Explained) -> Explained:
     """The fit again with the uncertain numbers as unknowns of their own, which are not taken to be small."""
     p = e.place.parameters[0]
-    to, low, high = _scaled(p)
+    to, low, high = scaled(p)
     k = len(problem.numbers)
     value = e.parameters[p.name]
     start = np.clip(np.log(value) if p.null == 1.0 else value / p.scale, low + 1e-9, high - 1e-9)
 
     def residual(t: Floats) -> Floats:
         try:
-            r = problem.residual(_term(e.place, to(float(t[0]))), t[1:])
+            r = problem.residual(term(e.place, to(float(t[0]))), t[1:])
         except StiffmapError:
             r = np.full(int(problem.used.sum()), 1e3)
         return np.concatenate([r, t[1:]])
@@ -243,7 +250,7 @@ def _refined(problem: Problem, e: Explained) -> Explained:
     value = to(float(fit.x[0]))
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac)
     u = float(np.sqrt(covariance[0, 0])) * (value if p.null == 1.0 else p.scale)
-    machine = problem.machine_with(_term(e.place, value), fit.x[1:])
+    machine, _ = problem.real(term(e.place, value), fit.x[1:])
     return replace(
         e, parameters={p.name: value}, u={p.name: u}, chi2=float(2 * fit.cost), machine=machine, off=fit.x[1:]
     )

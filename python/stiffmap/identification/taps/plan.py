@@ -6,7 +6,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
-from stiffmap.identification.taps.explain import _candidates, _scaled, _term
+from stiffmap.identification.taps.causes import causes, scaled, term
 from stiffmap.identification.taps.problem import Problem
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.solve.machine import Machine, takes_machine
@@ -46,14 +46,14 @@ def where_to_tap(
     problem = Problem(machine, taps, None, default_u)
     here = problem.residual()
     columns = []
-    for c in _candidates(machine.description):
-        to, _, _ = _scaled(c.parameters[0])
+    for c in causes(problem):
+        to, _, _ = scaled(c.parameters[0])
         try:
-            columns.append((problem.residual(_term(c, to(STEP))) - here) / STEP)
+            columns.append((problem.residual(term(c, to(STEP))) - here) / STEP)
         except StiffmapError:
             continue
     A, J = np.stack(columns, axis=1), problem.slopes[problem.used]
-    pose = pose[problem.used]
+    pose = pose[problem.used[: len(pose)]]
     if len(np.unique(pose)) < wanted:
         raise StiffmapError(
             f"{machine.name}: {len(np.unique(pose))} of {pool} poses can be reached, {wanted} are wanted"

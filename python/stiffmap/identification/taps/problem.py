@@ -17,10 +17,10 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.taps.predict import predict_taps
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.model.addresses import moved, number
-from stiffmap.model.description import AppliedEffect, Body, MachineDescription
+from stiffmap.model.description import Body, MachineDescription
 from stiffmap.model.description.tree import all_elements
-from stiffmap.model.effects import apply_records
 from stiffmap.solve.machine import Machine
+from stiffmap.workspace.vibration.damping import ASSUMED, damping_of
 
 FELT = 0.05
 """Numbers whose uncertainty shifts no reading by more than this share of its noise are not fitted."""
@@ -29,8 +29,13 @@ LOST = 3.0
 STEPS = 15
 STEP = 0.02
 """Of a difference, in standard uncertainties or logarithms of a factor."""
-Term = AppliedEffect | float | None
-"""An effect, the mass of a body at the TCP in kg, or none."""
+SPREAD, LEVEL = 0.5, 1.0
+"""Logarithms: what damping ratios of one machine differ by from mode to mode, and what their level is off by, where none is declared."""
+LEAST = 1e-4
+"""Damping ratio of a mode without a damper."""
+MODAL = "modal_damping"
+Term = Callable[[MachineDescription, TapTest], tuple[MachineDescription, TapTest]]
+"""What a cause makes of a machine and of a tap test."""
 
 
 @dataclass(eq=False)
@@ -45,51 +50,80 @@ class Problem:
     """Name, value and standard uncertainty of the numbers that readings feel."""
 
     def __post_init__(self) -> None:
-        self.noise = self.taps.u / self.taps.frequency
+        t = self.taps
+        self.declared = damping_of(self.machine)
+        d = self.machine.description
+        if self.declared.assumed:  # a number like any other, so that a damper does not replace it
+            self.machine = Machine(replace(d, modal_damping=(ASSUMED,)), like=self.machine)
+        spread = SPREAD if self.declared.assumed else 0.0
+        self.size = np.linalg.norm(np.nan_to_num(t.flexibility), axis=1)[:, None]
+        real = np.nan_to_num(
+            t.ratio
+        )  # modes are taken as real: dampers shift frequencies by the square of the ratio, shapes by it
+        with np.errstate(divide="ignore", invalid="ignore"):
+            of_shape = np.hypot(t.u_flexibility / self.size, real[:, None]).ravel()
+        merged = np.where(np.isfinite(t.hammer[:, 0]), predict_taps(self.machine, t).merged, 0.0)
+        of_damping = np.sqrt((t.u_ratio / t.ratio) ** 2 + spread**2 + real**2)
+        of_damping[merged > 0] = of_shape.reshape(-1, 3)[merged > 0] = (
+            np.nan
+        )  # of two modes that were found as one
+        of_frequency = np.sqrt((t.u / t.frequency) ** 2 + real**4 + merged**2)
+        self.noise = np.concatenate([of_frequency, of_damping, of_shape])
+        self.kind = np.repeat(["frequency", "damping", "flexibility"], [len(t), len(t), 3 * len(t)])
         if self.statics is not None:
             at_first = Predictor(self.machine, self.statics)(())
             self.keep = self.statics.read & np.isfinite(at_first)
             self.noise = np.concatenate([self.noise, noise_of(self.statics).sigma[self.keep]])
-        base = self._raw(self.machine)
-        self.used = np.isfinite(base)
-        self.is_tap: NDArray[np.bool_] = np.arange(len(base)) < len(self.taps)
+            self.kind = np.concatenate([self.kind, ["statics"] * int(self.keep.sum())])
+        base = self._raw(self.machine, t)
+        self.used = np.isfinite(base) & np.isfinite(self.noise)
         columns = []
-        for key, value, u in uncertain_numbers(self.machine.description, self.default_u):
+        free = uncertain_numbers(self.machine.description, self.default_u)
+        if self.declared.assumed:
+            free.append((MODAL, ASSUMED, LEVEL * ASSUMED))
+        for key, value, u in free:
             other = shifted(self.machine.description, [(key, value, u)], np.ones(1))
-            column = np.nan_to_num((self._raw(Machine(other, like=self.machine)) - base) / self.noise)
+            column = np.where(
+                self.used, (self._raw(Machine(other, like=self.machine), t) - base) / self.noise, 0
+            )
+            column = np.nan_to_num(column)
             if np.abs(column).max() > FELT:
                 self.numbers.append((key, value, u))
                 columns.append(column)
         self.slopes = np.stack(columns, axis=1) if columns else np.zeros((len(base), 0))
 
-    def _raw(self, machine: Machine) -> Floats:
-        parts = [np.log(predict_taps(machine, self.taps).frequency / self.taps.frequency)]
+    def _raw(self, machine: Machine, taps: TapTest) -> Floats:
+        p = predict_taps(machine, taps)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shape = (p.flexibility - taps.flexibility) / self.size
+        damping = np.log(np.maximum(p.ratio, LEAST) / taps.ratio)
+        parts = [np.log(p.frequency / taps.frequency), damping, shape.ravel()]
         if self.statics is not None:
             parts.append((Predictor(machine, self.statics)(()) - self.statics.reading)[self.keep])
         return np.concatenate(parts)
 
-    def machine_with(self, term: Term, off: Floats | None = None) -> Machine:
-        """The machine with an effect, its uncertain numbers off by so many standard uncertainties (numbers,)."""
-        d = self.machine.description
+    def real(self, term: Term | None, off: Floats | None = None) -> tuple[Machine, TapTest]:
+        """Machine and tap test with a cause, uncertain numbers off by so many standard uncertainties (numbers,)."""
+        d, taps = self.machine.description, self.taps
         if off is not None and len(off):
             d = shifted(d, self.numbers, off)
-        if isinstance(term, float):
-            return Machine(replace(d, platform=(*d.platform, Body("tapped_load", term))), like=self.machine)
-        return Machine(apply_records(d, [term]) if term else d, like=self.machine)
+        if term is not None:
+            d, taps = term(d, taps)
+        return Machine(d, like=self.machine), taps
 
-    def residual(self, term: Term = None, off: Floats | None = None) -> Floats:
+    def residual(self, term: Term | None = None, off: Floats | None = None) -> Floats:
         """(n,) by noise."""
-        raw = self._raw(self.machine_with(term, off))
+        raw = self._raw(*self.real(term, off))
         return np.asarray(np.where(np.isfinite(raw), raw, LOST)[self.used] / self.noise[self.used])
 
     def whitener(self, part: str = "") -> tuple[NDArray[np.bool_], Floats]:
         """Rows (mask) of a part of the readings (``taps``, ``statics``, all), and what whitens them to first order."""
-        tap = self.is_tap[self.used]
+        tap = self.kind[self.used] != "statics"
         rows = tap if part == "taps" else ~tap if part == "statics" else np.ones(len(tap), np.bool_)
         J = self.slopes[self.used][rows]
         return rows, np.linalg.inv(np.linalg.cholesky(np.eye(len(J)) + J @ J.T))
 
-    def settled(self, term: Term = None, start: Floats | None = None) -> tuple[float, Floats]:
+    def settled(self, term: Term | None = None, start: Floats | None = None) -> tuple[float, Floats]:
         """Least chi-square near a start with the uncertain numbers free within their uncertainty, and where they then are."""
         k = len(self.numbers)
         if not k:
@@ -109,7 +143,7 @@ class Problem:
         )
         return float(2 * fit.cost), fit.x
 
-    def _safe(self, term: Term, off: Floats) -> Floats:
+    def _safe(self, term: Term | None, off: Floats) -> Floats:
         try:
             return self.residual(term, off)
         except StiffmapError:
@@ -143,6 +177,9 @@ def shifted(
 ) -> MachineDescription:
     """Numbers off by so many standard uncertainties; stiffness, compliance and mass by factors, so that they stay positive."""
     for (key, value, u), t in zip(numbers, off, strict=True):
+        if key == MODAL:
+            d = replace(d, modal_damping=(float(value * np.exp(t * u / value)),))
+            continue
         field_ = key.partition("/")[2]
         positive = value > 0 and field_.startswith(("compliance", "stiffness", "mass"))
         delta = value * (np.exp(t * u / value) - 1) if positive else t * u

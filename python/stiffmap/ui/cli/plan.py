@@ -30,11 +30,14 @@ MM = 1e-3
 def plan(
     machine: Annotated[str, typer.Argument(help="Machine: shipped name or machine file.")],
     identify: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option(
             "--identify", help="Effect whose numbers are to be identified, at the value given; repeatable."
         ),
-    ],
+    ] = None,
+    taps: Annotated[
+        int | None, typer.Option(help="In place of --identify: so many poses for tap tests, best first.")
+    ] = None,
     output: Annotated[Path | None, written(help="CSV file of the rows chosen.")] = None,
     rival: Annotated[
         list[str] | None, typer.Option("--rival", help="Explanation to separate from; repeatable.")
@@ -77,12 +80,21 @@ def plan(
 
       [cyan]stiffmap plan ur10 --identify 'zero_offset elbow error=1mrad' --quantity position --frame unknown[/cyan]
 
+      [cyan]stiffmap plan examples/taps/kr210.yaml --taps 3 -o taps.csv[/cyan]
+
       [cyan]stiffmap plan orthoglide-revised --identify 'dead_zone actuator y half_width=10um' --rival 'compliance actuator y scale=1.2'[/cyan]
 
       [cyan]stiffmap plan orthoglide-revised --identify 'compliance actuator scale=1' --until 0.05 --twin 'compliance actuator scale=1.4'[/cyan]
     """
     m = load_machine(machine)
-    terms = [placed(m, text) for text in identify]
+    if (taps is None) == (not identify):
+        raise StiffmapError(
+            "expected either --identify, with the effects, or --taps, with the number of poses"
+        )
+    if taps is not None:
+        _taps(m, taps, poses, seed, output, as_json)
+        return
+    terms = [placed(m, text) for text in identify or ()]
     if rival and for_map:
         raise StiffmapError("--map and --rival exclude each other")
     aim = "separate" if rival else "map" if for_map else "identify"
@@ -103,6 +115,22 @@ def plan(
         print_json(_plain(found))
     else:
         print("\n".join(_lines(found)))
+
+
+def _taps(m: Machine, count: int, tries: int, seed: int, output: Path | None, as_json: bool) -> None:
+    """Poses to tap."""
+    from stiffmap.identification.taps import where_to_tap
+
+    poses = [[round(float(v), 1) for v in p] for p in where_to_tap(m, count, tries=tries, seed=seed) / MM]
+    if output is not None:
+        write_rows(output, ["x_mm", "y_mm", "z_mm"], poses)
+    if as_json:
+        none: dict[str, Any] = {"parameters": [], "value": None, "value_random": None}
+        print_json({"aim": "taps", "rows": len(poses), "poses_mm": poses, **none})
+        return
+    print(f"{len(poses)} poses to tap, the most informative first (x, y, z in mm)")
+    for p in poses:
+        print("  " + ", ".join(f"{v:.1f}" for v in p))
 
 
 def _sequential(

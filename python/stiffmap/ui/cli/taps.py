@@ -23,7 +23,7 @@ def taps(
     table: Annotated[
         Path,
         typer.Argument(
-            help="CSV: x_mm, y_mm, z_mm, frequency_Hz; u_Hz, damping_percent, dir_x, dir_y, dir_z."
+            help="CSV: x_mm, y_mm, z_mm, frequency_Hz; u_Hz, damping_percent, dir_x, dir_y, dir_z; or response, along, hammer."
         ),
     ],
     statics: Annotated[
@@ -35,9 +35,9 @@ def taps(
     output: FolderOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Which effect explains the natural frequencies that tap tests found.
+    """Which effect explains the frequencies and damping that tap tests found, typed or from measured responses.
 
-    Modes are paired by the direction in which the tool moves and by frequency. With -o: the corrected machine
+    Effects of stiffness, masses of links, dampers, and a hammer held otherwise are tried. Modes are paired by the direction in which the tool moves and by frequency. With -o: the corrected machine
     (corrected.yaml), a table and a picture of the frequency response before and after.
 
     Exit codes: 0 nothing is missing, 1 an effect was named or the readings do not fit, 2 bad input.
@@ -54,7 +54,7 @@ def taps(
     if not 0 < mass_u < 100:
         raise StiffmapError(f"--mass-u: expected an uncertainty above 0 and below 100 %, got {mass_u:g}")
     m = machine_with(machine, effect)
-    measured = load_taps(table)
+    measured = load_taps(table, m)
     found = explain_taps(
         m, measured, None if statics is None else load_experiment(statics), default_u=mass_u / 100,
         only=None if only is None else [k.strip() for k in only.split(",")],
@@ -68,10 +68,20 @@ def taps(
         for r in rows:
             after = "" if r["after_Hz"] is None else f", after {r['after_Hz']:.2f}"
             mac = "" if r["mac"] is None or np.isnan(r["mac"]) else f", MAC {r['mac']:.2f}"
-            print(f"  {r['measured_Hz']:8.2f} Hz measured, {r['before_Hz']:8.2f} before{after}{mac}")
+            print(
+                f"  {r['measured_Hz']:8.2f} Hz measured, {r['before_Hz']:8.2f} before{after}{mac}{_damping(r)}"
+            )
         for f in files:
             print(f"wrote {f}")
     finish(bool(found.alike) or not found.sentence.startswith("Nothing"))
+
+
+def _damping(row: dict[str, Any]) -> str:
+    if np.isnan(row["damping_percent"]):
+        return ""
+    after = row["damping_after_percent"]
+    text = f"; damping {row['damping_percent']:.2f} % measured, {row['damping_before_percent']:.2f} before"
+    return text if after is None else f"{text}, after {after:.2f}"
 
 
 def as_plain(found: TapDiagnosis) -> dict[str, Any]:
@@ -101,6 +111,8 @@ def compared(machine: Any, measured: TapTest, found: TapDiagnosis) -> list[dict[
             "at_mm": (1e3 * measured.position[i]).tolist(), "measured_Hz": float(measured.frequency[i]),
             "before_Hz": float(before.frequency[i]), "after_Hz": None if after is None else float(after.frequency[i]),
             "mac": float(before.mac[i] if after is None else after.mac[i]),
+            "damping_percent": 100 * float(measured.ratio[i]), "damping_before_percent": 100 * float(before.ratio[i]),
+            "damping_after_percent": None if after is None else 100 * float(after.ratio[i]),
         }
         for i in range(len(measured))
     ]  # fmt: skip
@@ -108,6 +120,7 @@ def compared(machine: Any, measured: TapTest, found: TapDiagnosis) -> list[dict[
 
 def write(machine: Any, measured: TapTest, found: TapDiagnosis, folder: Path) -> list[str]:
     """Corrected machine and responses before and after."""
+    from stiffmap.identification.taps.causes import corrected
     from stiffmap.ui.plot.style import save
     from stiffmap.ui.plot.vibration import response_figure
     from stiffmap.workspace.vibration import frequency_response
@@ -115,15 +128,11 @@ def write(machine: Any, measured: TapTest, found: TapDiagnosis, folder: Path) ->
     f = np.geomspace(0.3 * measured.frequency.min(), 2 * measured.frequency.max(), 600)
     at = measured.position[0]
     many = {"before": frequency_response(machine, at, f)}
-    out = []
-    real = found.named.machine if found.named else None
-    if real is not None:
-        many["after"] = frequency_response(real, at, f)
-        p = found.named.place.term(list(found.named.parameters.values()))  # type: ignore[union-attr]
-        if found.named.place.kind != "payload":  # type: ignore[union-attr]
-            given = dict(p.parameters)
-            saved = machine.with_effect(p.kind, element=p.element, legs=list(p.legs) or None, **given)
-            saved.save(folder / "corrected.yaml")
-            out.append(str(folder / "corrected.yaml"))
+    out: list[str] = []
+    named = found.named
+    if named is not None and named.machine is not None and not named.place.kind.startswith("hammer"):
+        many["after"] = frequency_response(named.machine, at, f)
+        corrected(machine, named.place, next(iter(named.parameters.values()))).save(folder / "corrected.yaml")
+        out.append(str(folder / "corrected.yaml"))
     save(response_figure(many), folder / "response.png")
     return [*out, str(folder / "response.png")]

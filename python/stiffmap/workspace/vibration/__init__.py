@@ -1,4 +1,4 @@
-"""Vibration: damping, modes at the tool, frequency responses, tools coupled by receptance, files of measured responses."""
+"""Vibration: damping, modes at the tool, frequency responses, files of measured responses and their modes."""
 
 from stiffmap.workspace.vibration.modes import TipModes, tip_modes
 from stiffmap.workspace.vibration.response import frequency_response

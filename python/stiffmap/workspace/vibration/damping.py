@@ -29,6 +29,8 @@ class Damping:
     """Of the modes, lowest first, the last for all further ones; empty: none."""
     said: str
     """Where it comes from, in words."""
+    assumed: bool = False
+    """Whether the machine file declares none."""
 
     def of_modes(self, count: int) -> Floats:
         """(count,) damping ratios."""
@@ -45,7 +47,8 @@ def damping_of(machine: Machine, given: ArrayLike | None = None) -> Damping:
     """
     viscous, loss = coordinate_damping(machine)
     own = machine.description.modal_damping
-    parts = []
+    parts: list[str] = []
+    assumed = given is None and not (own or np.any(viscous) or np.any(loss))
     if np.any(viscous):
         parts.append(f"dampers at {int(np.count_nonzero(viscous))} coordinates")
     if np.any(loss):
@@ -62,7 +65,7 @@ def damping_of(machine: Machine, given: ArrayLike | None = None) -> Damping:
     else:
         ratios = (ASSUMED,)
         parts.append(f"assumed: {100 * ASSUMED:g} % of every mode, since the machine file declares none")
-    return Damping(viscous, loss, ratios, "; ".join(parts))
+    return Damping(viscous, loss, ratios, "; ".join(parts), assumed)
 
 
 def coordinate_damping(machine: Machine) -> tuple[Floats, Floats]:

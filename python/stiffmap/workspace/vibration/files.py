@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, MissingPartError
+from stiffmap.common.pose_tables import cell_number, rows_of
 from stiffmap.workspace.vibration.poles import Complex
 
 UNITS = {"m/N": 1.0, "um/N": 1e-6, "µm/N": 1e-6, "mm/N": 1e-3}
@@ -56,27 +56,26 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
 
 
 def _csv(path: Path) -> MeasuredResponse:
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        rows = [r for r in csv.reader(file) if r and not r[0].lstrip().startswith("#")]
-    if len(rows) < 3:
-        raise FileError("expected a head and two rows or more", file=str(path))
-    head = [h.strip() for h in rows[0]]
-    unit = head[1].partition("_")[2] if len(head) > 1 else ""
-    if head[0] != "frequency_Hz" or len(head) not in (3, 4) or unit not in KINDS:
+    (first, head), *rows = rows_of(path)
+    head = [h.strip() for h in head]
+    unit = head[1].removeprefix("real_") if len(head) > 1 else ""
+    if (
+        unit not in KINDS
+        or head[:3] != ["frequency_Hz", f"real_{unit}", f"imag_{unit}"]
+        or head[3:] not in ([], ["coherence"])
+    ):
         raise FileError(
             f"expected the columns {HEAD}, UNIT one of {', '.join(KINDS)}; found {', '.join(head)}",
-            file=str(path),
-        )
-    if not (head[1].startswith("real_") and head[2] == f"imag_{unit}" and head[3:] in ([], ["coherence"])):
-        raise FileError(f"expected the columns {HEAD}; found {', '.join(head)}", file=str(path), line=1)
-    values = np.empty((len(rows) - 1, len(head)))
-    for i, row in enumerate(rows[1:]):
-        try:
-            values[i] = [float(v) for v in row]
-        except ValueError:
-            raise FileError(
-                f"expected {len(head)} numbers; found {', '.join(row)}", file=str(path), line=i + 2
-            ) from None
+            file=str(path), line=first,
+        )  # fmt: skip
+    if len(rows) < 2:
+        raise FileError("expected two rows or more below the header", file=str(path), line=first)
+    for line, row in rows:
+        if len(row) != len(head):
+            raise FileError(f"expected {len(head)} cells; found {len(row)}", file=str(path), line=line)
+    values = np.array(
+        [[cell_number(c, n, str(path), line) for n, c in zip(head, row, strict=True)] for line, row in rows]
+    )
     f = values[:, 0]
     coherence = values[:, 3] if len(head) == 4 else np.full(len(f), np.nan)
     scale = UNITS.get(unit, 9.80665 if unit == "g/N" else 1.0)

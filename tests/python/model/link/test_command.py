@@ -18,7 +18,6 @@ from stiffmap.model.link.gmshmesh import mesh_file
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.mesh import checked_mesh
 from stiffmap.model.link.optional import need
-from stiffmap.model.link.plan import planned_error, smallest_force, smallest_nodes
 from stiffmap.model.link.readers import read_dat, read_field
 from stiffmap.model.link.solve import Material, Setup, solve_skfem
 from stiffmap.ui.cli.link_command import link_command
@@ -254,19 +253,3 @@ def test_missing_extra_names_the_command(monkeypatch):
     monkeypatch.setattr(calculix.shutil, "which", lambda _: None)
     with pytest.raises(StiffmapError, match=r"CalculiX .* is not installed"):
         calculix.solve_ccx(None, Material(1.0, 0.3), Setup("a", "b", np.zeros(3)), np.eye(6))
-
-
-def test_plan_predicts_the_errors_and_the_smallest_field():
-    points, u = noisy_field(n=40)
-    planned = planned_error(points, WRENCHES, REFERENCE, 2e-8)
-    link = identify_link(
-        points, u, WRENCHES, reference=REFERENCE, noise=2e-8, symmetric=False, outliers=False
-    )
-    assert planned == pytest.approx(link.standard_error, rel=1e-9)
-    wanted = np.full((6, 6), np.inf)
-    wanted[0, 0] = planned[0, 0] / 3
-    assert smallest_nodes(points, WRENCHES, REFERENCE, 2e-8, wanted) == 9 * 40
-    factor = smallest_force(points, WRENCHES, REFERENCE, 2e-8, wanted)
-    assert planned_error(points, factor * WRENCHES, REFERENCE, 2e-8)[0, 0] == pytest.approx(wanted[0, 0])
-    with pytest.raises(StiffmapError, match=r"wanted: expected .* positive errors"):
-        smallest_force(points, WRENCHES, REFERENCE, 2e-8, np.zeros((6, 6)))

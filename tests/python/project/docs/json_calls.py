@@ -50,7 +50,10 @@ CALLS: dict[str, tuple[str, ...]] = {
     "diagnose": ("diagnose orthoglide-revised january -o d1",),
     "calibrate": ("calibrate orthoglide-revised held_out -o c1",),
     "simulate": ("simulate five-bar --poses 3 -o sim",),
-    "plan": ("plan orthoglide-revised --identify 'compliance actuator x scale=1' --rows 4 --poses 8",),
+    "plan": (
+        "plan orthoglide-revised --identify 'compliance actuator x scale=1' --rows 4 --poses 8",
+        "plan examples/taps/kr210.yaml --taps 2 --poses 4",
+    ),
     "monitor": ("monitor orthoglide-revised january june --effect 'dead_zone actuator y half_width=10um'",),
     "compensate": (
         "compensate orthoglide-revised poses.csv",

@@ -15,7 +15,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import number_in
-from stiffmap.common.pose_tables import csv_rows
+from stiffmap.common.pose_tables import rows_of
 from stiffmap.common.units import name_and_unit
 from stiffmap.common.workbook import workbook_lines
 from stiffmap.workspace.performance.quantities import quantity
@@ -151,7 +151,7 @@ def _of_file(path: Path, sheet: str | None) -> list[tuple[int, list[str]]]:
     if path.suffix.lower() in (".xlsx", ".xlsm"):
         rows = list(workbook_lines(path, sheet)[1]())
         return [(n, row + [""] * (len(rows[0][1]) - len(row))) for n, row in rows]
-    rows = csv_rows(path, str(path))
+    rows = rows_of(path)
     for line, row in rows:
         if len(row) != len(rows[0][1]):
             raise FileError(f"expected {len(rows[0][1])} values, found {len(row)}", file=str(path), line=line)

@@ -1,0 +1,44 @@
+"""Poles and flexibilities of responses with noise against the modes of the machine that they are of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.workspace.vibration import tip_modes
+from stiffmap.workspace.vibration.extraction import extract_modes
+from stiffmap.workspace.vibration.files import MeasuredResponse
+
+
+@pytest.mark.parametrize("coherent", [True, False])
+@pytest.mark.parametrize("name", ["ur10", "five-bar", "travelling-column"])
+def test_modes_of_a_machine_within_their_uncertainty(name, coherent):
+    machine = sm.load_machine(name)
+    low, high = machine.workspace
+    p = low + 0.4 * (high - low)
+    modes = tip_modes(machine, p, damping=0.03)
+    flexibility = modes.tip[0, :3] * modes.tip[0, :3].sum(axis=0) / np.sqrt(3)
+    f = np.linspace(0.4 * modes.frequency[0, 0], 1.3 * modes.frequency[0, 1], 500)
+    H = sm.frequency_response(machine, p, f, damping=0.03).values[:, :3, :3].sum(axis=2) / np.sqrt(3)
+    rng = np.random.default_rng(3)
+    s = 0.01 * np.abs(H) + 1e-4 * np.abs(H).max()
+    noisy = H + s * (rng.normal(size=(*H.shape, 2)) @ [1, 1j]) / np.sqrt(2)
+    c = 1 / (1 + 5 * s**2 / np.abs(H) ** 2) if coherent else np.full(H.shape, np.nan)
+    found = extract_modes([MeasuredResponse("", f, noisy[:, a], c[:, a]) for a in range(3)])
+    size = np.linalg.norm(found.flexibility, axis=1)
+    k = int(np.argmax(size))
+    j = int(np.argmin(np.abs(modes.frequency[0] - found.frequency[k])))
+    assert (
+        abs(found.frequency[k] - modes.frequency[0, j]) < 4 * found.u_frequency[k] < 0.01 * found.frequency[k]
+    )
+    assert abs(found.ratio[k] - 0.03) < 4 * found.u_ratio[k] < 0.006
+    assert (
+        np.abs(found.flexibility[k] - flexibility[:, j]) < 4 * found.u_flexibility[k] + 0.02 * size[k]
+    ).all()
+
+
+def test_noise_alone_has_no_mode():
+    f, rng = np.linspace(5, 50, 400), np.random.default_rng(0)
+    H = 1e-6 * (rng.normal(size=(400, 2)) @ [1, 1j])
+    assert not len(extract_modes([MeasuredResponse("", f, H, np.full(400, np.nan))]).frequency)
