@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from stiffmap.model.files.shipped import machine_names
     from stiffmap.model.link.identify import identify_link
     from stiffmap.solve.budget import DeflectionBudget, deflection_budget
-    from stiffmap.solve.internal_wrenches import assembly_stress, assembly_wrenches
+    from stiffmap.solve.internal_wrenches import assembly_wrenches
     from stiffmap.solve.kinematics import Kinematics, forward_kinematics, inverse_kinematics
     from stiffmap.solve.machine import Machine, load_machine
     from stiffmap.solve.solution import Solution
@@ -106,7 +106,6 @@ _HOME = {
     "Solution": "stiffmap.solve.solution",
     "DeflectionBudget": "stiffmap.solve.budget",
     "deflection_budget": "stiffmap.solve.budget",
-    "assembly_stress": "stiffmap.solve.internal_wrenches",
     "assembly_wrenches": "stiffmap.solve.internal_wrenches",
     "design_sweep": "stiffmap.workspace.maps",
     "error_map": "stiffmap.workspace.maps",
@@ -149,7 +148,6 @@ __all__ = [
     "StiffmapError",
     "__version__",
     "accuracy_transmission",
-    "assembly_stress",
     "assembly_wrenches",
     "calibrate",
     "compensate",

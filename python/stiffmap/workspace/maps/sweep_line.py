@@ -8,10 +8,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.deprecation import warn_renamed
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.solve.options import LoadingKeywords, SolveOptions, spelled_out
+from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.workspace.maps.fixed_order_sums import dot
 from stiffmap.workspace.maps.inputs import force_list, place, unit
 from stiffmap.workspace.maps.load_path import check_control, load_path
@@ -31,7 +30,6 @@ def sweep(
     limit: float | None = None,
     steps: int = 40,
     cross: int = 0,
-    options: SolveOptions | None = None,
     **given: Unpack[LoadingKeywords],
 ) -> xr.Dataset:
     """Deflection against the size of a force of one direction, at one position.
@@ -45,7 +43,7 @@ def sweep(
     other side. That branch ends at the `limit`, or where the force falls to zero.
 
     position (3,) m; direction (3,), any length; forces (n,) N, negative ones act against it;
-    limit of either sign; steps to the limit. Other keywords as in `Machine.solve`; `options` is deprecated.
+    limit of either sign; steps to the limit. Other keywords as in `Machine.solve`.
 
     Returns a Dataset with dimension ``step`` and the coordinate force: displacement, deflection, deflection_xy,
     deflection_along (component along the force), compliance_along (of a little more force, m/N; NaN on a path),
@@ -57,9 +55,7 @@ def sweep(
     ``end`` and ``crossing_end`` say why its branches ended (empty for single forces).
     Raises StiffmapError for bad input.
     """
-    if options is not None:
-        warn_renamed("options=", "its fields as keywords")
-    loading = Loading(machine, options, **given)
+    loading = Loading(machine, **given)
     p, u = place(position), unit(direction)
     if forces is None or control != "force":
         if forces is not None:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array
-from stiffmap.common.deprecation import renamed
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.rotations import as_rotations
 from stiffmap.common.short import short_repr
@@ -69,7 +68,6 @@ class LargestBox:
         return np.stack([local - self.edges / 2, local + self.edges / 2])
 
 
-@renamed(factors="norm", gap="tolerance", work="max_evaluations")
 @takes_machine
 def largest_box(
     machine: Machine,
