@@ -17,7 +17,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.from_above import from_above
 from stiffmap.common.html import machine_html
-from stiffmap.common.recent import Recent
+from stiffmap.common.kept import Recent
 from stiffmap.model.addresses import Listed, listed
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import add_effect

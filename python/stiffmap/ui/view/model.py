@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.recent import Recent
+from stiffmap.common.kept import Recent
 from stiffmap.solve.closing import Kinematics
 from stiffmap.solve.compiled import Role, Status
 from stiffmap.solve.kinematics import inverse_kinematics
