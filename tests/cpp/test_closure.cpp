@@ -2,9 +2,11 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "machines.hpp"
 #include "numeric.hpp"
+#include "stiffmap/charts.hpp"
 
 using namespace stiffmap;
 using namespace stiffmap::test;
@@ -25,6 +27,21 @@ Vec3 actuators(const Mechanism& m, const Pose& pose) {
   const ClosureResult r = inverse_closure(m, pose, ws, x);
   BOOST_REQUIRE(r.status == Status::converged);
   return {x[m.drives[0].coordinate], x[m.drives[1].coordinate], x[m.drives[2].coordinate]};
+}
+
+/// A rod of which only the length is driven, on a ball at either end.
+Mechanism rod_on_two_balls() {
+  const auto ball = [](const std::string& n) {
+    std::vector<Joint> axes{revolute(n + "1", Vec3::UnitX()), revolute(n + "2", Vec3::UnitY()),
+                            revolute(n + "3", Vec3::UnitZ())};
+    axes[0].ball = BallChart::free;
+    return axes;
+  };
+  Chain rod;
+  for (const Joint& j : ball("base")) rod.elements.emplace_back(j);
+  rod.elements.emplace_back(actuator("length", JointType::prismatic, Vec3::UnitZ(), 1, 1e7));
+  for (const Joint& j : ball("top")) rod.elements.emplace_back(j);
+  return assemble({{Block{"legs", {{"rod", rod}}}}}, {Vec3(0, 0, 1), Mat3::Identity()});
 }
 
 }  // namespace
@@ -93,18 +110,32 @@ BOOST_AUTO_TEST_CASE(home_is_closed_from_rounded_coordinates) {
 }
 
 BOOST_AUTO_TEST_CASE(a_rod_on_two_ball_joints_spins) {
-  const auto ball = [](const std::string& n) {
-    return std::vector<Joint>{revolute(n + "1", Vec3::UnitX()), revolute(n + "2", Vec3::UnitY()),
-                              revolute(n + "3", Vec3::UnitZ())};
-  };
-  Chain rod;
-  for (const Joint& j : ball("base")) rod.elements.emplace_back(j);
-  rod.elements.emplace_back(actuator("length", JointType::prismatic, Vec3::UnitZ(), 1, 1e7));
-  for (const Joint& j : ball("top")) rod.elements.emplace_back(j);
-  const Mechanism m = assemble({{Block{"legs", {{"rod", rod}}}}}, {Vec3(0, 0, 1), Mat3::Identity()});
+  const Mechanism m = rod_on_two_balls();
   int locked = 0;
   for (const Coordinate& c : m.coordinates) locked += c.locked;
   BOOST_TEST(locked == 1);
+}
+
+BOOST_AUTO_TEST_CASE(a_ball_has_the_coordinates_of_the_nearer_of_its_two_triples) {
+  const Mechanism m = rod_on_two_balls();
+  BOOST_REQUIRE(!m.balls.empty());
+  const Index first = m.balls[0].first;
+  Charts charts;
+  charts.turns.resize(m.balls.size());
+  charts.turns[0].used = true;
+  Random random(4);
+  for (int i = 0; i < 50; ++i) {
+    VecX x = m.home_coordinates;
+    for (Index k = 0; k < 3; ++k) x[first + k] = random.uniform(-1.2, 1.2);
+    const VecX same = by_own_axes(m, charts, x, x);
+    BOOST_TEST((same - x).cwiseAbs().maxCoeff() < 1e-12);
+    // The other triple of the same rotation, asked for from near it.
+    VecX other = x;
+    other[first] += std::numbers::pi;
+    other[first + 1] = std::numbers::pi - x[first + 1];
+    other[first + 2] += std::numbers::pi;
+    BOOST_TEST((by_own_axes(m, charts, x, other) - other).cwiseAbs().maxCoeff() < 1e-12);
+  }
 }
 
 BOOST_AUTO_TEST_CASE(limits_are_flags) {

@@ -229,6 +229,7 @@ def _in_ascii(error: UnicodeError) -> tuple[str, int]:
 
 STREAM = (errno.ENOSPC, errno.EFBIG, errno.EIO, errno.EBADF)
 """What a write to a stream may be refused for; files have their own errors."""
+LONGEST = 300  # characters of a warning
 
 
 codecs.register_error("stiffmap", _in_ascii)
@@ -263,7 +264,7 @@ def plain_streams() -> Iterator[None]:
 
 def _warned(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
     if category is UserWarning:
-        print(f"stiffmap: {' '.join(str(message).split())}", file=sys.stderr)
+        print(f"stiffmap: {' '.join(str(message).split())[:LONGEST]}", file=sys.stderr)
 
 
 def _quiet() -> None:

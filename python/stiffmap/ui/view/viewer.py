@@ -86,7 +86,7 @@ class Viewer:
             try:
                 deed(self.model)
                 self.error = ""
-            except StiffmapError as problem:
+            except ValueError as problem:  # StiffmapError, or a message of a page with a turn that is none
                 self.error = str(problem)
         self.worker.ask()
         return not self.error
@@ -130,11 +130,12 @@ class Viewer:
         """The gizmo was moved (m, quaternion)."""
         from scipy.spatial.transform import Rotation
 
-        with self.lock:
+        def deed(model: Model) -> None:
             turned = Rotation.from_quat(np.roll(wxyz, -1)).as_matrix()
-            now = rotation_of(self.model.machine, self.model.state)
-            same = np.abs(turned - now).max() < 1e-9
-            self.act(lambda m: m.drag(position, None if same else turned))
+            same = np.abs(turned - rotation_of(model.machine, model.state)).max() < 1e-9
+            model.drag(position, None if same else turned)
+
+        self.act(deed)
 
     def probe_along(self, origin: Any, direction: Any) -> None:
         """Solve where a ray meets the plane."""

@@ -98,6 +98,12 @@ def halves(cells: Floats) -> Floats:
     return np.concatenate([one, other])
 
 
+def turned(straight: Floats, reach: Floats) -> Floats:
+    """Bound of how far the unit vector along a line of this length moves where its end moves by `reach`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(straight > reach, reach / (straight - reach), np.inf)
+
+
 @dataclass(frozen=True, eq=False)
 class _Ask:
     h: Hanging
@@ -111,9 +117,7 @@ class _Ask:
         reach = 0.5 * np.linalg.norm(cells[:, 1] - cells[:, 0], axis=1)
         unit, straight, arm = lines(self.h, centre, self.rotation)
         plain = matrix(unit, straight, arm)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            turn = np.where(straight > reach[:, None], reach[:, None] / (straight - reach[:, None]), np.inf)
-        column = turn * np.sqrt(1.0 + (arm**2).sum(-1) / self.h.length**2)  # of dW
+        column = turned(straight, reach[:, None]) * np.sqrt(1.0 + (arm**2).sum(-1) / self.h.length**2)  # of dW
         inside, outside = np.ones(len(cells), dtype=bool), np.zeros(len(cells), dtype=bool)
         top = np.where(np.isfinite(self.high), self.high, self.low + ROOMY)
         for wrench in self.wrenches:

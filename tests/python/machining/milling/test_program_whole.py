@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.python.machining.milling.gantry import gantry
+from tests.python.machining.milling.random_programs import Program
 from tests.python.machining.toolpath.controller import UNKNOWN, Controller
 
 from stiffmap.common.errors import StiffmapError
@@ -146,6 +147,19 @@ def test_the_written_program_is_cut_whole(name: str) -> None:
         if at is not None and to is not None:
             assert at == pytest.approx(to, abs=FAR), word
     assert max(f for _, f in found.cuts) == pytest.approx(max(f for _, f in want.cuts), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "seed", [*range(3), *(pytest.param(n, marks=pytest.mark.slow) for n in range(20, 35))]
+)
+def test_programs_at_random_are_cut_whole(seed: int) -> None:
+    offsets = {"G54": (0.0, 0.0, 0.0), "G55": (0.01, -0.005, 0.001)}
+    text = Program(seed).text
+    want = Controller("G90 G94 G17 G91.1\nG0 X0 Y0 Z0\n" + text.split("%\n")[1], offsets)
+    found = Controller(written(text, offsets), offsets)
+    assert apart(found, want) < FAR
+    assert found.length == pytest.approx(want.length, abs=FAR * len(want.cuts))
+    assert [w for w, _ in found.events] == [w for w, _ in want.events]
 
 
 def test_optional_lines_are_left_out_whole() -> None:

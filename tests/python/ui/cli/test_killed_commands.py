@@ -27,7 +27,7 @@ numbers: {"templates.leg.body[carriage].mass": carriage}
 objectives: [mass]
 search: {population: 4, generations: 2, seed: 4, nodes: 2}
 """
-BAR = "length: 300 mm\nsection: {circle: {diameter: 30 mm}}\nmaterial: steel\n"
+BAR = "units: {length: mm}\npart: {shape: bar, length: 300, width: 30, height: 30}\nmaterial: steel\n"
 COMMANDS = {
     "map": "map orthoglide-revised --points 3 --z 0 -o out",
     "mill": "mill orthoglide-revised circle --size 20 --process trimming --at 50,50,0 --step 20 -o out",

@@ -10,6 +10,7 @@ from tests.python.workspace.cables.made import hanging
 from stiffmap import Machine, StiffmapError, inverse_kinematics, load_machine
 from stiffmap.model.description import Drive
 from stiffmap.workspace.cables import structure_matrix, tension_distribution, wrench_feasible
+from stiffmap.workspace.cables.feasible import turned
 
 SIX = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -84,6 +85,39 @@ def test_infeasible_is_what_a_linear_program_says() -> None:
     assert 5 < sum(seen) < 55
     assert (d.feasible == np.array(seen)).all()
     assert np.isnan(d.tension[~d.feasible]).all()
+
+
+def test_the_last_newton_that_tensions_hold_is_found() -> None:
+    """Along random directions up to the largest force of a linear program: a millionth less holds, a millionth more does
+    not."""
+    m = frame(force=400.0)
+    rng = np.random.default_rng(5)
+    p = np.array([0, 0, 1.0]) + rng.uniform(-0.4, 0.4, (12, 3))
+    way = np.zeros((12, 6))
+    way[:, :3] = rng.normal(size=(12, 3))
+    weight = np.array([0, 0, -98.1, 0, 0, 0])
+    most = np.empty(12)
+    for i, a in enumerate(structure_matrix(m, p)):
+        found = linprog(
+            [*np.zeros(8), -1.0], A_eq=np.c_[a, way[i]], b_eq=-weight, bounds=[(10.0, 400.0)] * 8 + [(0, None)]
+        )
+        most[i] = found.x[-1]
+    for share, holds in ((1 - 1e-6, True), (1 + 1e-6, False), (1 + 1e-4, False)):
+        d = tension_distribution(m, p, share * most[:, None] * way, lowest=10.0)
+        assert (d.feasible == holds).all(), share
+
+
+def test_a_line_turns_by_no_more_than_its_bound() -> None:
+    """Ends moved in all directions, and a bound that is hardly larger where the way is short."""
+    rng = np.random.default_rng(6)
+    moves = rng.normal(size=(4000, 3))
+    moves /= np.linalg.norm(moves, axis=1, keepdims=True)
+    for straight, reach in ((2.0, 0.5), (1.0, 0.05), (0.3, 0.29), (5.0, 1e-3)):
+        end = np.array([straight, 0, 0]) + reach * moves
+        most = np.linalg.norm(end / np.linalg.norm(end, axis=1, keepdims=True) - [1, 0, 0], axis=1).max()
+        bound = float(turned(np.array(straight), np.array(reach)))
+        assert most <= bound <= most * 1.01 * straight / (straight - reach)
+    assert turned(np.array(1.0), np.array(1.0)) == np.inf
 
 
 def test_boxes_are_proven() -> None:
