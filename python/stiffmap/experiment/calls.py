@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 
-from stiffmap.common.deprecation import renamed
 from stiffmap.experiment.comparison import residual as comparison
 from stiffmap.experiment.comparison.residual import Residual
 from stiffmap.experiment.experiment import Experiment
@@ -47,7 +46,6 @@ def residual(
     return comparison.residual(m, as_experiment(experiment), effects_of(m, effects), threads=threads)
 
 
-@renamed(outliers="outlier_share")
 def simulate(
     machine: Machine | Source,
     plan: Experiment | str | PathLike[str],

@@ -17,7 +17,7 @@ from stiffmap.model.description.sources import in_words, source_of
 from stiffmap.model.description.tree import joints
 from stiffmap.solve.compiled import Role, Status
 from stiffmap.solve.machine import Machine, metres_expected, takes_machine
-from stiffmap.solve.options import SolveKeywords, merged
+from stiffmap.solve.options import SolveKeywords, options_of
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.solving import Call, solve_call
 
@@ -129,7 +129,7 @@ def deflection_budget(
     g = machine.compiled.gravity(gravity)
     options: SolveKeywords = {"rotation": rotation, "point": point, "method": "reference"}
     cases = ((load, g), (np.zeros(6), np.zeros(3)))
-    calls = [Call(p, w, merged(None, {**options, "gravity": a})) for w, a in cases]
+    calls = [Call(p, w, options_of({**options, "gravity": a})) for w, a in cases]
     loaded, free = (solve_call(machine.compiled, call)[0] for call in calls)
     for s in (loaded, free):
         if s.status.shape != ():
@@ -163,7 +163,7 @@ def _of_cables(
 
     def pulled(share: float, extra: Floats) -> Solution:
         options: SolveKeywords = {"rotation": rotation, "point": point, "gravity": share * gravity}
-        return solve_call(compiled, Call(p, share * load + extra, merged(None, options)))[0]
+        return solve_call(compiled, Call(p, share * load + extra, options_of(options)))[0]
 
     sides = np.concatenate([np.diag(steps), -np.diag(steps)])
     at = [pulled(s, np.zeros(6)) for s in ends]

@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, real_array, rows, thread_count
-from stiffmap.common.deprecation import warn_renamed
 from stiffmap.common.short import short_repr
 from stiffmap.model.description.tree import joints
-from stiffmap.model.files.load import Source
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.results import OverPoses
 
@@ -98,24 +96,4 @@ def _has_law(machine: Machine, name: str) -> bool:
     return any(
         any(j.laws) and (name == n or name.rpartition(".")[0] == n)
         for n, j in joints(machine.description).items()
-    )
-
-
-def assembly_stress(
-    machine: Machine | Source,
-    position: ArrayLike,
-    *,
-    wrench: ArrayLike | None = None,
-    rotation: ArrayLike | None = None,
-    point: str = "tcp",
-    gravity: ArrayLike | None = (0.0, 0.0, 0.0),
-    threads: int | None = None,
-) -> InternalWrenches:
-    """Deprecated name of `assembly_wrenches`, without gravity by default: (..., 3) m, (..., 6) N, N·m.
-
-    Raises StiffmapError for bad input.
-    """
-    warn_renamed("assembly_stress()", "assembly_wrenches(gravity=)")
-    return assembly_wrenches(
-        machine, position, wrench=wrench, rotation=rotation, point=point, gravity=gravity, threads=threads
     )

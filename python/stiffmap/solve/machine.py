@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, wraps
 from os import PathLike
+from types import FrameType
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.deprecation import frames_of_this_package, warn_renamed
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.from_above import from_above
 from stiffmap.common.html import machine_html
-from stiffmap.common.recent import Recent
+from stiffmap.common.kept import Recent
 from stiffmap.model.addresses import Listed, listed
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import add_effect
@@ -25,7 +26,7 @@ from stiffmap.model.files.load import Source
 from stiffmap.solve.compiled import CompiledMachine, Status
 from stiffmap.solve.derivatives import Prepared, Request, differentiate, prepare, read_requests
 from stiffmap.solve.holding_wrench import HoldingWrench, holding_wrench
-from stiffmap.solve.options import SolveKeywords, SolveOptions, merged, spelled_out
+from stiffmap.solve.options import SolveKeywords, options_of, spelled_out
 from stiffmap.solve.redesign import redesigned
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.solving import Call, solve_call, solve_joints
@@ -115,7 +116,6 @@ class Machine:
         *,
         derivatives: Sequence[Request] = (),
         derivatives_of: Sequence[str] = ("displacement",),
-        options: SolveOptions | None = None,
         **given: Unpack[SolveKeywords],
     ) -> Solution:
         """Equilibrium, stiffness and compliance at commanded poses under external wrenches.
@@ -163,23 +163,19 @@ class Machine:
             mode of home.
         threads
             None: all cores that this process may use.
-        options
-            Deprecated: give its fields as keywords.
 
         Notes
         -----
         Poses never raise: see `Solution.status`. Raises StiffmapError for bad input.
         """
-        if options is None and not derivatives and (not given or given in PLAIN):
+        if not derivatives and (not given or given in PLAIN):
             one = self._compiled.solve_one(position, wrench)
             if one is not None:
                 s = Solution(one, (), self._compiled.names, "tcp")
                 if not sum(map(abs, position)) <= METRES_TOO_FAR * self._compiled.length:  # type: ignore[arg-type]  # plain numbers; nan too
                     hint_metres(self, position, bool(s.status == Status.UNREACHABLE))
                 return s
-        if options is not None:
-            warn_renamed("solve(options=)", "its fields as keywords")
-        call = Call(position, wrench, merged(options, given))
+        call = Call(position, wrench, options_of(given))
         if not derivatives:
             s = solve_call(self._compiled, call)[0]
             hint_metres(self, position, bool((s.status == Status.UNREACHABLE).all()))
@@ -193,8 +189,6 @@ class Machine:
         self,
         actuators: ArrayLike,
         wrench: ArrayLike | None = None,
-        *,
-        options: SolveOptions | None = None,
         **given: Unpack[SolveKeywords],
     ) -> Solution:
         """Equilibrium and stiffness at commanded actuators (..., actuators) m or rad, in the order of `actuators`.
@@ -203,10 +197,8 @@ class Machine:
         (as in `solve`); `Solution.unloaded` holds it, and displacements count from there. The other arguments
         are those of `solve`. UNREACHABLE where the actuators do not go together. StiffmapError for bad input.
         """
-        if options is not None:
-            warn_renamed("solve_joints(options=)", "its fields as keywords")
         home = self._description.home.p
-        return solve_joints(self._compiled, actuators, Call(home, wrench, merged(options, given)))
+        return solve_joints(self._compiled, actuators, Call(home, wrench, options_of(given)))
 
     def wrench(
         self,
@@ -383,11 +375,20 @@ def hint_metres(machine: Machine, position: ArrayLike, failed: bool) -> None:
     if not finite.all():
         rows = np.atleast_1d(finite.all(axis=-1))
         text = f"{int((~rows).sum())} of {rows.size} positions are not finite numbers (nan or inf); their status is UNREACHABLE"
-        warnings.warn(text, stacklevel=frames_of_this_package())
+        warnings.warn(text, stacklevel=_frames_of_this_package())
         return
     text = metres_expected(machine.compiled, position) if failed else ""
     if text:
-        warnings.warn(f"no pose can be reached: {text}", stacklevel=frames_of_this_package())
+        warnings.warn(f"no pose can be reached: {text}", stacklevel=_frames_of_this_package())
+
+
+def _frames_of_this_package() -> int:
+    """How many callers, from the function that asks on, are in stiffmap itself."""
+    frame: FrameType | None = sys._getframe(1)
+    count = 1
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "stiffmap":
+        frame, count = frame.f_back, count + 1
+    return count
 
 
 def metres_expected(machine: CompiledMachine, position: ArrayLike) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from inspect import Parameter, signature
 from typing import Any, ParamSpec, TypedDict, TypeVar, get_type_hints
 
@@ -126,7 +126,7 @@ def _default(defaults: SolveOptions, name: str) -> Any:
     return None if name == "wrenches" else getattr(defaults, name)
 
 
-def merged(options: SolveOptions | None, given: SolveKeywords | LoadingKeywords) -> SolveOptions:
-    """The options with some fields as given; TypeError for a keyword that is none."""
+def options_of(given: SolveKeywords | LoadingKeywords) -> SolveOptions:
+    """Options with some fields as given; TypeError for a keyword that is none."""
     known: dict[str, Any] = {k: v for k, v in given.items() if not (k == "wrenches" and v is None)}
-    return SolveOptions(**known) if options is None else replace(options, **known)
+    return SolveOptions(**known)

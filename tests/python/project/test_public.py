@@ -82,7 +82,7 @@ def test_values_agree_with_the_core() -> None:
     text = {p.stem: p.read_text(encoding="utf-8") for p in folder.glob("*.hpp")}
     from stiffmap.solve.compiled import Role
     from stiffmap.solve.compiled.machine import LOAD_TYPES, PATH_CONTROLS
-    from stiffmap.workspace.maps.load_path import ENDS
+    from stiffmap.workspace.maps.sweep_line import ENDS
 
     assert enum_of(text["types"], "Status") == {s.name: s.value for s in Status}
     assert enum_of(text["mechanism"], "Role") == {r.name: r.value for r in Role}

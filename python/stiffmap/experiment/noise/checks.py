@@ -9,14 +9,108 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import combinations, pairwise
 
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.noise.conditions import Conditions, Contrast
-from stiffmap.experiment.noise.contrasts import CONTRASTS
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.level import Mask
+
+Contrast = tuple[list[tuple[int, int]], list[float]]
+"""(condition, channel) pairs and their weights."""
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Means of repeats; k conditions, c channels."""
+
+    mean: Floats
+    """(k, c)."""
+    variance: Floats
+    """(k, c) of the mean, the zero apart."""
+    zero: Floats
+    """(c,) variance of the zero that a pose's readings share."""
+    zero_known: bool
+    """False: the state without load is unknown, and only what does not depend on it can be tested."""
+    wrench: Floats
+    group: Integers
+    """(k,) pose number."""
+    state: Integers
+    """(k,) number of what else may differ between conditions of a pose."""
+    unloading: Mask
+    work_conjugate: bool
+    """Whether the force acts where the reading is taken, from and to the floor or base."""
+
+    @staticmethod
+    def of(e: Experiment, values: Floats, sigma: Floats, keep: Mask) -> Conditions:
+        """Weighted means of the kept rows of each condition."""
+        good = np.isfinite(values) & np.isfinite(sigma) & keep[:, None]
+        weight = np.where(good, 1.0 / np.where(good, sigma, 1.0) ** 2, 0.0)
+        total = _sums(e, weight)
+        sums = _sums(e, np.where(good, values, 0.0) * weight)
+        first = np.unique(e.conditions, return_index=True)[1]
+        branch = np.array(e.branch or ("",) * len(e))[first]
+        safe = np.where(total > 0, total, 1.0)
+        return Conditions(
+            np.where(total > 0, sums / safe, np.nan),
+            np.where(total > 0, 1.0 / safe, np.nan),
+            e.zeros**2,
+            e.unloaded != "unknown",
+            e.wrench[first],
+            e.groups[first],
+            _states(e)[first],
+            branch == "unloading",
+            _conjugate(e),
+        )
+
+    def usable(self, contrast: Contrast) -> bool:
+        """Whether all means are known, and the zero cancels where it is not."""
+        where, weights = contrast
+        if not all(np.isfinite(self.mean[at]) for at in where):
+            return False
+        return self.zero_known or abs(sum(weights)) < 1e-12
+
+    def values_of(self, contrasts: list[Contrast]) -> Floats:
+        """(m,) contrasts."""
+        return np.array([sum(w * self.mean[at] for at, w in zip(*c, strict=True)) for c in contrasts])
+
+    def covariance_of(self, contrasts: list[Contrast]) -> Floats:
+        """(m, m) of contrasts of one pose."""
+        cells = sorted({at for where, _ in contrasts for at in where})
+        index = {at: i for i, at in enumerate(cells)}
+        matrix = np.zeros((len(contrasts), len(cells)))
+        for row, (where, weights) in enumerate(contrasts):
+            for at, w in zip(where, weights, strict=True):
+                matrix[row, index[at]] += w
+        channel = np.array([a for _, a in cells])
+        shared = np.where(channel[:, None] == channel, self.zero[channel], 0.0)
+        v = np.diag([self.variance[at] for at in cells]) + shared
+        return np.asarray(matrix @ v @ matrix.T)
+
+
+def _sums(e: Experiment, values: Floats) -> Floats:
+    number = int(e.conditions.max()) + 1
+    return np.stack([np.bincount(e.conditions, v, number) for v in values.T], axis=1)
+
+
+def _states(e: Experiment) -> Integers:
+    """(n,) number of everything but pose and load: only alike conditions are compared. Temperature is not
+    among it: the unloaded reading is as warm as the loaded one."""
+    parts = [np.zeros(len(e))]
+    words = [e.branch, e.setup, e.points, e.load_points]
+    parts += [np.unique(w, return_inverse=True)[1].reshape(-1).astype(float) for w in words if w]
+    parts += list(e.approach.T) if e.approach is not None else []
+    return np.unique(np.column_stack(parts), axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def _conjugate(e: Experiment) -> bool:
+    points = e.points or (e.point,) * len(e)
+    loads = e.load_points or (e.load_point,) * len(e)
+    whole = e.loop.instrument_on == e.loop.force_against and e.loop.target_on == "tool"
+    return points == loads and whole
+
 
 BROKEN = 1e-4
 """p-value of the linearity below which reciprocity says nothing: it holds for linear machines only."""
@@ -75,3 +169,112 @@ def _chi_square(value: Floats, covariance: Floats) -> tuple[float, int]:
     good = eigenvalues > 1e-9 * eigenvalues[-1]
     along = vectors[:, good].T @ (value / scale)
     return float(np.sum(along**2 / eigenvalues[good])), int(good.sum())
+
+
+def alike(t: Conditions) -> Iterator[Integers]:
+    """Conditions of each pose that differ by their load only; where there is but one nothing can be contrasted."""
+    return (here for here in _grouped(t.group, t.state) if here.size > 1)
+
+
+def _grouped(*keys: Integers) -> Iterator[Integers]:
+    """Rows of each combination of keys, rising."""
+    order = np.lexsort(keys[::-1])
+    ends = np.zeros(order.size, dtype=bool)
+    for key in keys:
+        ends[1:] |= np.diff(key[order]) != 0
+    return iter(np.split(order, np.flatnonzero(ends)) if order.size else ())
+
+
+def _every(t: Conditions, rows: list[int], weights: list[float]) -> Iterator[Contrast]:
+    """The same contrast in every channel."""
+    yield from (([(i, a) for i in rows], weights) for a in range(t.mean.shape[1]))
+
+
+def linearity(t: Conditions) -> Iterator[Contrast]:
+    """Neighbouring sizes of the same direction of force."""
+    for here in alike(t):
+        for line in _lines(t, here):
+            for i, j in pairwise(line):
+                si, sj = float(np.linalg.norm(t.wrench[i])), float(np.linalg.norm(t.wrench[j]))
+                yield from _every(t, [i, j], [1.0, -si / sj])
+
+
+def _lines(t: Conditions, here: Integers) -> Iterator[list[int]]:
+    size = np.linalg.norm(t.wrench[here], axis=1)
+    loaded, size = here[size > 0], size[size > 0]
+    direction = np.round(t.wrench[loaded] / size[:, None], 6) + 0.0
+    same: dict[tuple[float, ...], list[int]] = {}
+    for k, d in enumerate(direction.tolist()):
+        same.setdefault(tuple(d), []).append(k)
+    for _, ks in sorted(same.items()):
+        yield [int(loaded[k]) for k in sorted(ks, key=lambda k: float(size[k]))]
+
+
+def reversal(t: Conditions) -> Iterator[Contrast]:
+    """Opposite forces."""
+    for here in alike(t):
+        for i, j in _matching(t, here, np.negative):
+            if i < j:
+                yield from _every(t, [i, j], [1.0, 1.0])
+
+
+def _matching(t: Conditions, here: Integers, change: Callable[[Floats], Floats]) -> Iterator[tuple[int, int]]:
+    known = {tuple(np.round(t.wrench[i], 6) + 0.0): int(i) for i in here}
+    for i in here:
+        j = known.get(tuple(np.round(change(t.wrench[i]), 6) + 0.0))
+        if j is not None and np.any(t.wrench[i]):
+            yield int(i), j
+
+
+def superposition(t: Conditions) -> Iterator[Contrast]:
+    """Two forces along different lines and their sum."""
+    for here in alike(t):
+        for i in here:
+            for j, k in _matching(t, here, partial(np.add, t.wrench[i])):
+                if i < j and np.linalg.matrix_rank(t.wrench[[i, j]]) == 2:
+                    yield from _every(t, [int(i), j, k], [1.0, 1.0, -1.0])
+
+
+def zero(t: Conditions) -> Iterator[Contrast]:
+    """Rows without load."""
+    for i in np.flatnonzero(~t.wrench.any(axis=1)):
+        yield from _every(t, [int(i)], [1.0])
+
+
+def reciprocity(t: Conditions) -> Iterator[Contrast]:
+    """Motion along b under unit force along a against that along a under unit force along b."""
+    if not t.work_conjugate:
+        return
+    for here in alike(t):
+        best: dict[int, int] = {}
+        for i in (int(i) for i in here if np.count_nonzero(t.wrench[i]) == 1):
+            a = int(np.argmax(np.abs(t.wrench[i])))
+            if a not in best or abs(t.wrench[i][a]) > abs(t.wrench[best[a]][a]):
+                best[a] = i
+        for a, b in combinations(sorted(best), 2):
+            i, j = best[a], best[b]
+            yield [(i, b), (j, a)], [1.0, -float(t.wrench[i][a] / t.wrench[j][b])]
+
+
+def hysteresis(t: Conditions) -> Iterator[Contrast]:
+    """The same load on both branches."""
+    if not t.unloading.any():
+        return
+    for pose in _grouped(t.group):
+        here = pose[~t.unloading[pose]]
+        known = {tuple(np.round(t.wrench[i], 6) + 0.0): int(i) for i in here}
+        for j in pose[t.unloading[pose]]:
+            i = known.get(tuple(np.round(t.wrench[j], 6) + 0.0))
+            if i is not None:
+                yield from _every(t, [i, int(j)], [1.0, -1.0])
+
+
+CONTRASTS: dict[str, tuple[str, Callable[[Conditions], Iterator[Contrast]]]] = {
+    "linearity": ("twice the force, twice the deflection", linearity),
+    "sign reversal": ("the opposite force gives the opposite deflection", reversal),
+    "superposition": ("the sum of two forces gives the sum of their deflections", superposition),
+    "return to zero": ("without force no deflection", zero),
+    "reciprocity": ("the measured compliance is symmetric (Maxwell-Betti)", reciprocity),
+    "hysteresis": ("loading and unloading read the same", hysteresis),
+}
+"""Name of each check: what it says of the machine, and its contrasts."""

@@ -8,7 +8,7 @@ from weakref import WeakKeyDictionary
 
 from numpy.typing import NDArray
 
-from stiffmap.common.recent import Recent
+from stiffmap.common.kept import Recent
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.model.description.rigid import nominal_geometry
 from stiffmap.solve.machine import Machine

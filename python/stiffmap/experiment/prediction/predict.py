@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.kept import Kept
-from stiffmap.common.recent import Recent
+from stiffmap.common.kept import Kept, Recent
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.poses.against_command import resolved
 from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, without

@@ -9,7 +9,6 @@ from os import PathLike
 import numpy as np
 
 from stiffmap.common.broadcasting import whole_number
-from stiffmap.common.deprecation import renamed
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.comparison.limitations import refuse
@@ -27,7 +26,6 @@ from stiffmap.solve.machine import Machine, load_machine
 
 
 @on_one_thread
-@renamed(budget="time_limit")
 def calibrate(
     machine: Machine | str | PathLike[str],
     experiment: Experiment | str | PathLike[str],

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.stats import chi2
 
 from stiffmap.common.broadcasting import whole_number
-from stiffmap.common.deprecation import renamed
 from stiffmap.common.number_text import within
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.comparison.limitations import limitations, refuse
@@ -56,7 +55,6 @@ LISTED = 20
 
 
 @on_one_thread
-@renamed(budget="time_limit")
 def diagnose(
     machine: Machine | str | PathLike[str],
     experiment: Experiment | str | PathLike[str],

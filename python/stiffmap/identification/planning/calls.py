@@ -8,7 +8,6 @@ from os import PathLike
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import real_array
-from stiffmap.common.deprecation import renamed
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.calls import Effects, as_experiment, effects_of
@@ -18,7 +17,6 @@ from stiffmap.model.files.load import Source
 from stiffmap.solve.machine import Machine, as_machine
 
 
-@renamed(at="position", load="wrench")
 def plan(
     machine: Machine | Source,
     identify: Effects,

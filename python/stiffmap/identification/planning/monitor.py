@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.short import short_repr
-from stiffmap.experiment.experiment import Experiment
+from stiffmap.experiment.experiment import PER_ROW, Experiment
+from stiffmap.identification.calibration.claims import LENGTHS, SIZES, field_columns
+from stiffmap.identification.calibration.floor import Blocks, likeliest
 from stiffmap.identification.planning.estimate import Estimate, estimate
-from stiffmap.identification.planning.left_over import difference
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine
 
@@ -91,3 +93,83 @@ def compare(
         for n, s, x, d, w, p in zip(a.names, a.units, a.values, step, u, single, strict=True)
     )
     return Comparison(a, b, changes, float(chi2.sf(together, max(len(told), 1))))
+
+
+# The difference of fitted numbers between two experiments, judged against the residual of their model.
+#
+# What a model of the machine leaves is no noise: it is smooth over the workspace, shared by the readings of a pose, and the
+# same in both experiments where they stand at the same poses. Both are fitted at once, each with numbers of its own, jointly with
+# one smooth field and one variance per pose, as large as the readings make likeliest (docs/theory.md I2, I3).
+
+WIDE = 1e3
+"""Of a number's standard uncertainty by noise alone: a prior that says nothing."""
+NATS = 1.0
+"""By which a floor must be likelier than none."""
+
+
+def difference(a: Estimate, b: Estimate) -> tuple[Floats, Floats]:
+    """(k,) second minus first value, SI, and (k, k) its covariance; infinite variances of numbers that either does not
+    tell."""
+    k = len(a.values)
+    told = np.flatnonzero(np.isfinite(a.sigma) & np.isfinite(b.sigma))
+    shift, covariance = b.values - a.values, np.diag(np.full(k, np.inf))
+    if not told.size:
+        return shift, covariance
+    scale = np.concatenate([WIDE * e.misfit * e.sigma[told] for e in (a, b)])
+    first, second = (e.jacobian[:, told] for e in (a, b))
+    numbers = np.block(
+        [
+            [first, np.zeros((len(first), len(told)))],
+            [np.zeros((len(second), len(told))), second],
+        ]
+    )
+    residual = np.concatenate([a.residual, b.residual])
+    e = _together(a.experiment, b.experiment)
+    label = _labels(e, a, b)
+    best, where = -np.inf, Blocks.of(numbers * scale, residual, label)
+    rho = 0.0
+    for size, columns in _fields(e, a, b):
+        blocks = Blocks.of(np.hstack([numbers * scale, size * columns]), residual, label)
+        for share, nats in ((0.0, blocks.log_likelihood(0.0) + NATS), likeliest(blocks, 1e-3)):
+            if nats > best:
+                best, where, rho = nats, blocks, share
+    sums = where.beside(rho)
+    m = 2 * len(told)
+    values, spread = sums.estimate[:m] * scale, sums.covariance[:m, :m] * np.outer(scale, scale)
+    spread = spread * max(1.0, sums.chi2 / max(a.freedom + b.freedom, 1))
+    step = np.hstack([-np.eye(len(told)), np.eye(len(told))])
+    shift[told] += step @ values
+    covariance[np.ix_(told, told)] = step @ spread @ step.T
+    return shift, covariance
+
+
+def _fields(e: Experiment, a: Estimate, b: Estimate) -> list[tuple[float, Floats]]:
+    """Sizes and whitened columns (N, m) of the fields that are tried; none at first."""
+    n = len(a.experiment)
+    out = [(0.0, np.zeros((len(a.residual) + len(b.residual), 0)))]
+    for length in LENGTHS:
+        field = field_columns(e, np.concatenate([a.left, b.left]), length)
+        white = np.vstack([a.problem.white(field[:n]), b.problem.white(field[n:])])
+        out += [(size, white) for size in SIZES]
+    return out
+
+
+def _labels(e: Experiment, a: Estimate, b: Estimate) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
+    """(N,) number of the pose and channel of each reading of both."""
+    row = np.concatenate([a.problem.index[0], b.problem.index[0] + len(a.experiment)])
+    channel = np.concatenate([a.problem.index[1], b.problem.index[1]])
+    return np.asarray(e.groups[row] * len(e.channels) + channel, dtype=np.intp)
+
+
+def _together(a: Experiment, b: Experiment) -> Experiment:
+    """The rows of both; what one of them does not record is recorded by neither."""
+
+    def joined(name: str) -> object:
+        one, other = getattr(a, name), getattr(b, name)
+        if one is None or other is None:
+            return None
+        if isinstance(one, tuple):
+            return (*one, *other) if len(one) and len(other) else ()
+        return np.concatenate([one, other])
+
+    return replace(a, **{name: joined(name) for name in PER_ROW}, absolute={})  # type: ignore[arg-type]

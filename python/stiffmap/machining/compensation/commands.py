@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats, trailing, wrench_array
-from stiffmap.common.deprecation import renamed
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.short import short_repr
@@ -105,7 +104,6 @@ class Commands:
         )
 
 
-@renamed(joints="actuators")
 @takes_machine
 def compensate(
     machine: Machine,

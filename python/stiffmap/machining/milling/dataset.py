@@ -10,7 +10,6 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.milling.equilibrium import Equilibrium
 from stiffmap.machining.milling.limits import drive_speeds
 from stiffmap.machining.milling.setting import Setting
-from stiffmap.machining.milling.taper import taper
 from stiffmap.machining.milling.verify import Run
 
 
@@ -84,3 +83,14 @@ def dataset_of(
         ds["margin_after"] = tolerance - np.abs(ds.error_normal_after)
         ds.attrs["tolerance"] = tolerance
     return ds
+
+
+def taper(job: Setting, state: Equilibrium) -> Floats:
+    """(m,) m across the wall, top of the cut less tip: the holder's turn, and the slope of a tool that bends (a cantilever's: 3/2 of
+    its deflection over its length)."""
+    depth, tool = job.engaged.axial, job.process.tool
+    tilt = np.cross(state.turned, job.tool)
+    if tool.compliance:
+        across = state.force - (state.force * job.tool).sum(axis=1, keepdims=True) * job.tool
+        tilt = tilt - 1.5 * tool.compliance / tool.stick_out * across
+    return np.asarray(depth * (tilt * job.off).sum(axis=1))

@@ -13,23 +13,21 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.machining.milling.command import commanded
 from stiffmap.machining.milling.dataset import along, dataset_of
 from stiffmap.machining.milling.equilibrium import Equilibrium, equilibrium
-from stiffmap.machining.milling.passes import after_passes
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.program import WITHIN, Program, program
 from stiffmap.machining.milling.reach import must_reach
-from stiffmap.machining.milling.ripple import ripple
 from stiffmap.machining.milling.setting import Setting, scaled, setting
 from stiffmap.machining.milling.speed import Feeds, best_feeds
 from stiffmap.machining.milling.stability import PathStability, path_stability
 from stiffmap.machining.milling.verify import Run, run
 from stiffmap.machining.milling.warnings import Warned, warned
-from stiffmap.machining.process import Process, load_process
+from stiffmap.machining.process import Process, cutting_force, load_process
 from stiffmap.machining.toolpath import Box, Toolpath, load_path, sampled
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
+from stiffmap.workspace.performance.motion.frequencies import natural_frequencies
 
 BAND = 0.2
 """Share of the force within which a result with a band holds."""
@@ -176,3 +174,85 @@ def mill(
         For bad input: paths that leave the workspace, cuts with the spindle off ….
     """
     return mill_job(as_machine(machine), path, process, **options).dataset
+
+
+def after_passes(job: Setting, first: Equilibrium, passes: int, threads: int | None = None) -> Floats:
+    """(passes, m) m: height of the wall over the wanted one after each pass; never below what a pass before it took."""
+    wall = job.across(first.error)
+    out = [wall]
+    for _ in range(passes - 1):
+        engaged = replace(
+            job.engaged, radial=np.maximum(np.nan_to_num(wall), 0.0), corner=0 * job.engaged.corner
+        )
+        rest = replace(job, engaged=engaged)
+        e = equilibrium(Plant(rest, threads=threads), job.position)
+        wall = np.minimum(wall, job.across(e.error))
+        out.append(wall)
+    return np.array(out)
+
+
+SLOW = 3.0
+"""The lowest natural frequency must be this many times the tooth passing's."""
+
+
+def ripple(job: Setting, state: Equilibrium) -> Floats:
+    """(m,) m: amplitude across the wall at the tooth-passing frequency; 0 for a coated tool, NaN where the teeth pass
+    too fast for statics or the machine declares no masses."""
+    teeth = job.process.tool.teeth
+    if not teeth:
+        return np.zeros(len(job))
+    force = cutting_force(job.process)
+    try:
+        lowest = float(
+            np.min(
+                natural_frequencies(
+                    job.machine, job.position[:1], modes=1, rotation=job.rotation[:1]
+                ).frequency
+            )
+        )
+    except StiffmapError:
+        lowest = 0.0
+    if not lowest > SLOW * teeth * force.spindle_frequency:
+        return np.full(len(job), np.nan)
+    amplitude = np.einsum("i,mij->mj", force.amplitude[teeth - 1], np.abs(job.axes))
+    return np.asarray(np.abs(np.einsum("mi,mij,mj->m", job.off, state.compliance, amplitude)))
+
+
+STEPS = 40
+DONE = 1e-11
+"""m: distance from the path below which a command stands."""
+
+
+@dataclass(frozen=True, eq=False)
+class Commanded:
+    """m points, base axes, m."""
+
+    position: Floats
+    """(m, 3) to command; NaN where the machine has no answer."""
+    left: Floats
+    """(m,) m: how far the model still is from the path there, under the force of the wanted cut."""
+    mirror: Floats
+    """(m, 3) the mirrored commands: the wanted position less the error."""
+
+
+def commanded(plant: Plant, before: Equilibrium) -> Commanded:
+    """Inverse of the loaded machine: on the path the cut is the wanted one, so that its force is known there."""
+    job = plant.job
+    force = job.force(np.zeros((len(job), 2)))
+    steered = np.array([1.0 if axis in job.machine.description.task else 0.0 for axis in "xyz"])
+    # the machine's tangent tells where the tool would stand under the wanted cut
+    further = np.einsum("mij,mj->mi", before.compliance, force - before.force)
+    u = job.position - steered * (np.nan_to_num(before.error) + np.nan_to_num(further))
+    rest = np.full((len(job), 3), np.nan)
+    active = np.arange(len(job))
+    for _ in range(STEPS):
+        s = plant.stand(u[active], force[active], rows=active)
+        rest[active] = u[active] + s.moved - job.position[active]
+        far = np.abs(steered * rest[active]).max(axis=1)
+        go = far > DONE  # a lost point compares false
+        u[active[go]] -= steered * rest[active[go]]
+        active = active[go]
+        if not active.size:
+            break
+    u[~np.isfinite(rest).all(axis=1)] = np.nan
+    return Commanded(u, np.linalg.norm(rest, axis=1), job.position - steered * before.error)

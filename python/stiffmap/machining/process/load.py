@@ -7,7 +7,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from stiffmap.common.deprecation import renamed
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.machining.process.build import process_of
@@ -22,7 +21,6 @@ def process_names() -> list[str]:
     return sorted(p.stem for p in FOLDER.glob("*.yaml"))
 
 
-@renamed(name_path_or_dict="source")
 def load_process(source: str | PathLike[str] | Mapping[str, Any]) -> Process:
     """A process by its shipped name (``trimming``, ``slot``), from a file, or from a mapping with the file's keys.
 

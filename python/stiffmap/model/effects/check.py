@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.recent import Recent
+from stiffmap.common.kept import Recent
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import registry
 from stiffmap.model.effects.types import EffectType, Parameter, Place

@@ -13,7 +13,6 @@ from stiffmap.model.addresses.beam import SECTIONS
 from stiffmap.model.description import BeamNumbers, Law, Spring
 from stiffmap.model.description.elements import Matrix6
 from stiffmap.model.files.context import Context, LinkUse, StrokeUse
-from stiffmap.model.files.matrix_checks import asymmetry, lowest_eigenvalue
 from stiffmap.model.files.schema.base import Number
 from stiffmap.model.files.schema.elements import SpringModel
 from stiffmap.model.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix
@@ -236,3 +235,32 @@ def _keep_covariance(name: str, covariance: NDArray[np.float64], context: Contex
 def as_rows(matrix: ArrayLike) -> Matrix6:
     """6x6 as hashable rows."""
     return tuple(tuple(float(v) for v in row) for row in np.asarray(matrix))
+
+
+SYMMETRY_TOLERANCE = 1e-12
+EIGENVALUE_TOLERANCE = 1e-12
+
+
+def _scale(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    scale = np.sqrt(np.abs(np.diag(matrix)))
+    known = scale > 0.0
+    for i in np.flatnonzero(~known):
+        # a zero diagonal term has no scale of its own; its couplings, which must vanish, give one
+        scale[i] = max(np.abs(matrix[i, known]) / scale[known], default=0.0)
+    return np.where(scale > 0.0, scale, 1.0)
+
+
+def asymmetry(matrix: NDArray[np.float64]) -> tuple[float, int, int]:
+    """Largest |k_ij - k_ji| / sqrt(k_ii k_jj) with its row and column; 0 within rounding."""
+    scale = _scale(matrix)
+    difference = np.abs(matrix - matrix.T) / np.outer(scale, scale)
+    i, j = np.unravel_index(int(np.argmax(difference)), difference.shape)
+    size = float(difference[i, j])
+    return (size if size > SYMMETRY_TOLERANCE else 0.0), int(i), int(j)
+
+
+def lowest_eigenvalue(matrix: NDArray[np.float64]) -> float:
+    """Lowest eigenvalue of the scaled matrix, where negative beyond rounding; else 0."""
+    scale = _scale(matrix)
+    lowest = float(np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0])
+    return lowest if lowest < -EIGENVALUE_TOLERANCE else 0.0

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from os import PathLike
+from typing import Any
 
 import yaml
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import write_text
 from stiffmap.common.yaml_text import text_of
-from stiffmap.model.description import MachineDescription
-from stiffmap.model.files.dump import dump
+from stiffmap.model.description import (
+    TASK,
+    AppliedEffect,
+    Block,
+    Branch,
+    Element,
+    ExternalSpring,
+    Joint,
+    Leg,
+    MachineDescription,
+    Offset,
+)
+from stiffmap.model.files.dump_elements import Plain, dump_elements, dump_pose, floats
 from stiffmap.model.files.load import description_from_text
 
 
@@ -42,3 +54,129 @@ def description_text(description: MachineDescription) -> str:
             f"{', '.join(changed)}"
         )
     return text
+
+
+UNITS = {"length": "m", "force": "N", "angle": "rad", "mass": "kg"}
+TEMPLATE = "leg"
+
+
+def dump(description: MachineDescription) -> Plain:
+    """Plain data of the declared machine and of the effects added to it.
+
+    Uncertainties, sources and notes are gathered at the end, by full names. Raises `StiffmapError` for a
+    machine with effects whose declared machine is unknown.
+    """
+    declared = description.declared or description
+    if description.effects and description.declared is None:
+        raise StiffmapError(
+            f"machine '{description.name}' has effects but not the machine before them (`declared`), "
+            "so it cannot be saved"
+        )
+    plain: Plain = {
+        "name": description.name,
+        "title": description.title,
+        "source": description.source,
+        "units": dict(UNITS),
+        "gravity": None if declared.gravity is None else floats(declared.gravity),
+        "home": {**dump_pose(declared.home), **({"solve": True} if declared.search_home else {})},
+        "task": None if declared.task == TASK else list(declared.task),
+        "freedoms": None if declared.freedoms == TASK else list(declared.freedoms),
+        "workspace": None if declared.workspace is None else _box(declared.workspace),
+        **_legs(declared.legs),
+        "base": dump_elements(declared.base),
+        "platform": dump_elements(declared.platform),
+        "modal_damping": floats(declared.modal_damping),
+        "external_springs": {spring.name: _external_spring(spring) for spring in declared.external_springs},
+        "effects": [_effect(effect) for effect in description.effects],
+        "uncertainty": {key: float(value) for key, value in description.uncertainty},
+        "sources": dict(description.sources),
+        "notes": dict(description.notes),
+        "extra": {key: _lists(value) for key, value in description.extra},
+    }
+    return {key: value for key, value in plain.items() if value not in (None, "", [], {})}
+
+
+def _box(box: Any) -> Plain:
+    low, high = box
+    return {axis: floats((low[i], high[i])) for i, axis in enumerate("xyz")}
+
+
+def _external_spring(spring: ExternalSpring) -> Plain:
+    return {
+        "point": spring.point,
+        "anchor": floats(spring.anchor),
+        "stiffness": float(spring.stiffness),
+        "length": float(spring.length),
+        "tension_only": bool(spring.tension_only),
+    }
+
+
+def _effect(effect: AppliedEffect) -> Plain:
+    return {
+        "kind": effect.kind,
+        "element": effect.element,
+        "legs": list(effect.legs),
+        "parameters": {key: float(value) for key, value in effect.parameters},
+        "options": dict(effect.options),
+    }
+
+
+def _legs(legs: tuple[Leg, ...]) -> Plain:
+    """Legs that differ by their frames and home coordinates only share a template."""
+    if not legs:
+        return {}
+    placed = [_placed(leg) for leg in legs]
+    middles = [middle for _, middle, _ in placed]
+    template = middles[0]
+    shared = len(legs) > 1 and all(_without_home(m) == _without_home(template) for m in middles)
+    plain = {}
+    for leg, (frame, middle, attach) in zip(legs, placed, strict=True):
+        chain: Plain = {"template": TEMPLATE} if shared else {"elements": dump_elements(middle)}
+        home = _different_homes(middle, template) if shared else {}
+        plain[leg.name] = {**chain, **frame, **attach, **({"home": home} if home else {})}
+    return {"templates": {TEMPLATE: dump_elements(template)} if shared else {}, "legs": plain}
+
+
+def _placed(leg: Leg) -> tuple[Plain, tuple[Element, ...], Plain]:
+    """Frame, elements between, and attachment of a leg."""
+    middle = leg.elements
+    frame: Plain = {}
+    attach: Plain = {}
+    if middle and _is_plain_offset(middle[0], "frame"):
+        frame, middle = {"frame": dump_pose(middle[0].nominal)}, middle[1:]  # type: ignore[union-attr]
+    if middle and _is_plain_offset(middle[-1], "attach"):
+        attach, middle = {"attach": dump_pose(middle[-1].nominal)}, middle[:-1]  # type: ignore[union-attr]
+    return frame, middle, attach
+
+
+def _is_plain_offset(element: Element, name: str) -> bool:
+    return isinstance(element, Offset) and element.name == name and element.actual is None
+
+
+def _without_home(elements: tuple[Element, ...]) -> tuple[Element, ...]:
+    def strip(element: Element) -> Element:
+        if isinstance(element, Joint):
+            return replace(element, home=(0.0,) * len(element.home))
+        if isinstance(element, Block):
+            return replace(
+                element, branches=tuple(Branch(b.name, _without_home(b.elements)) for b in element.branches)
+            )
+        return element
+
+    return tuple(strip(element) for element in elements)
+
+
+def _different_homes(elements: tuple[Element, ...], template: tuple[Element, ...], prefix: str = "") -> Plain:
+    homes: Plain = {}
+    for element, other in zip(elements, template, strict=True):
+        if isinstance(element, Joint) and isinstance(other, Joint) and element.home != other.home:
+            home = floats(element.home)
+            homes[prefix + element.name] = home[0] if len(home) == 1 else home
+        if isinstance(element, Block) and isinstance(other, Block):
+            for a, b in zip(element.branches, other.branches, strict=True):
+                homes.update(_different_homes(a.elements, b.elements, f"{prefix}{a.name}."))
+    return homes
+
+
+def _lists(value: Any) -> Any:
+    return [_lists(v) for v in value] if isinstance(value, (tuple, list)) else value

@@ -6,25 +6,18 @@ are computed from the numbers of the file, in the file's units.
 
 from __future__ import annotations
 
-import ast
-import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from stiffmap.common.arithmetic import sum_of_numbers
 from stiffmap.common.errors import FileError, together
 from stiffmap.common.yaml_text import Document, KeyPath
 from stiffmap.model.files.report import key_text
 from stiffmap.model.files.schema.base import describe, suggestion
 
 _REFERENCE = re.compile(r"\$([A-Za-z_]\w*)")
-_OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-}
 
 
 def expanded(document: Document, file: str) -> Document:
@@ -129,7 +122,7 @@ class _Substitution:
         if alone:
             return self.values[alone[1]]
         try:
-            return evaluate(_REFERENCE.sub(lambda m: repr(self._number(m[1])), data))
+            return sum_of_numbers(_REFERENCE.sub(lambda m: repr(self._number(m[1])), data))
         except (SyntaxError, TypeError, ZeroDivisionError, RecursionError, MemoryError):
             self.fail(path, f"expected $name, or numbers and $names with + - * / ( ); found {describe(data)}")
             return data
@@ -141,19 +134,3 @@ class _Substitution:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise TypeError(name)
         return float(value)
-
-
-def evaluate(text: str) -> float:
-    """The value of sums, products and quotients of numbers; SyntaxError for anything else."""
-
-    def value(node: ast.expr) -> float:
-        match node:
-            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-                return float(number)
-            case ast.UnaryOp(op=ast.USub(), operand=operand):
-                return -value(operand)
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-                return _OPERATORS[type(op)](value(left), value(right))
-        raise SyntaxError(text)
-
-    return value(ast.parse(text.strip(), mode="eval").body)

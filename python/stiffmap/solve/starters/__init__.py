@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 from stiffmap.common.errors import HomeError, StiffmapError
+from stiffmap.common.yaml_text import read
 from stiffmap.model.files.load import description_from_text
 from stiffmap.model.files.schema.base import suggestion
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
-from stiffmap.solve.starters.dimension import OPTIONS, MachineClass
-from stiffmap.solve.starters.parallel import PARALLEL
-from stiffmap.solve.starters.planar import PLANAR
-from stiffmap.solve.starters.serial import SERIAL
+from stiffmap.solve.starters.machine_class import OPTIONS, MachineClass
 
-CLASSES: dict[str, MachineClass] = {c.name: c for c in (*PLANAR, *PARALLEL, *SERIAL)}
+NAMES = ("3-rrr", "3-prr", "five-bar", "xy-table", "hexapod", "delta", "linear-delta", "orthoglide",
+         "scara", "gantry", "five-axis", "arm")  # fmt: skip
+CLASSES = {n: MachineClass(n, read(Path(__file__).with_name(f"{n}.yaml")).data) for n in NAMES}
 SHRINK, MOST_TRIES = 0.8, 16
 
 __all__ = ["CLASSES", "OPTIONS", "class_of", "machine_text"]

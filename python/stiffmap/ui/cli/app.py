@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import codecs
+import errno
+import io
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from inspect import getdoc
 from typing import Annotated, Any
 
 import typer
 
-from stiffmap.common.errors import FileErrors, MissingPartError, StiffmapError
+from stiffmap.common.errors import FileError, FileErrors, MissingPartError, StiffmapError
+from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.keeping import one_command
 from stiffmap.ui.cli.commands import COMMANDS, Command
-from stiffmap.ui.cli.streams import plain_streams
-from stiffmap.ui.cli.vectors import joined
 
 BAD_INPUT = 2
 DEFECT = 70
@@ -159,3 +163,111 @@ def _root(
 
 
 _root.__doc__ = HELP
+
+
+VECTORS = frozenset(
+    (
+        "--at",
+        "--force",
+        "--moment",
+        "--direction",
+        "--by",
+        "--turn",
+        "--rotation",
+        "--gravity",
+        "--view",
+        "--load",
+    )
+)
+"""Options whose value is a vector; all but ``--view`` have three numbers."""
+
+
+def joined(arguments: Sequence[str]) -> list[str]:
+    """The arguments with numbers that follow such an option drawn together by commas.
+
+    A negative number would otherwise be read as an option, and a second one as an argument.
+    """
+    out: list[str] = []
+    rest = list(arguments)
+    while rest:
+        word = rest.pop(0)
+        option, equals, first = word.partition("=")
+        if option not in VECTORS:
+            out.append(word)
+            continue
+        parts = [first] if equals else []
+        while rest and len(parts) < 3 and _numbers(rest[0]):
+            parts.append(rest.pop(0).strip(" ,"))
+        out.append(f"{option}={','.join(parts)}" if parts else word)
+    return out
+
+
+def _numbers(word: str) -> bool:
+    """Whether a word is a number, or several with commas between."""
+    try:
+        return bool([number_in(part) for part in word.strip(" ,").split(",")])
+    except ValueError:
+        return False
+
+
+ASCII = {
+    "µ": "u", "μ": "u", "°": " deg", "±": "+-", "·": "*", "×": "x", "²": "^2", "³": "^3", "⁻": "^-", "≤": "<=", "≥": ">=",
+    "→": "->", "–": "-", "—": "-", "−": "-", "…": "...", "’": "'", "‘": "'", "“": '"', "”": '"', "√": "sqrt", "θ": "theta",
+    "φ": "phi", "σ": "sigma", "χ": "chi", "ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss",
+}  # fmt: skip
+"""Signs of our own texts for terminals that have ASCII only."""
+
+
+def _in_ascii(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text = error.object[error.start : error.end]
+    return "".join(
+        ASCII.get(c, f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}") for c in text
+    ), error.end
+
+
+STREAM = (errno.ENOSPC, errno.EFBIG, errno.EIO, errno.EBADF)
+"""What a write to a stream may be refused for; files have their own errors."""
+LONGEST = 300  # characters of a warning
+
+
+codecs.register_error("stiffmap", _in_ascii)
+
+
+@contextmanager
+def plain_streams() -> Iterator[None]:
+    """Whatever is printed inside can be printed; FileError where standard output cannot be written.
+
+    A reader that has gone (``| head``) ends the command quietly. Warnings to the user are one line each; those that
+    libraries have for programmers are not shown.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="stiffmap")
+    try:
+        with warnings.catch_warnings():
+            warnings.showwarning = _warned
+            try:
+                yield
+            finally:
+                sys.stdout.flush()
+    except BrokenPipeError:
+        _quiet()
+        raise SystemExit(0) from None
+    except OSError as error:
+        if error.filename is not None or error.errno not in STREAM:
+            raise
+        _quiet()
+        raise FileError(f"cannot be written: {error.strerror or error}", file="standard output") from error
+
+
+def _warned(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
+    if category is UserWarning:
+        print(f"stiffmap: {' '.join(str(message).split())[:LONGEST]}", file=sys.stderr)
+
+
+def _quiet() -> None:
+    """Nothing more is written when the interpreter ends."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import numpy as np
+import typer
 from rich.console import Console
 
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
+from stiffmap.common.outputs.option import written
 from stiffmap.common.plain import plain
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli.inputs import (
@@ -21,37 +26,19 @@ from stiffmap.ui.cli.inputs import (
     ThreadsOption,
     ToleranceOption,
     finish,
+    force_given,
     gravity,
     machine_with,
 )
 from stiffmap.ui.cli.map_big import print_estimate, print_statistics
 from stiffmap.ui.cli.map_files import Wanted, write_files
-from stiffmap.ui.cli.map_inputs import cases, grid, named_formats
-from stiffmap.ui.cli.map_options import (
-    ComplianceOption,
-    DirectionsOption,
-    EstimateOption,
-    FormatsOption,
-    OutputOption,
-    OwnScalesOption,
-    PicturesOption,
-    PointsOption,
-    ResumeOption,
-    SchedulerOption,
-    StatisticsOption,
-    TablesOption,
-    ToolpathOption,
-    UncertaintyOption,
-    XOption,
-    YOption,
-    ZarrOption,
-    ZOption,
-)
 from stiffmap.ui.cli.map_summary import as_table, beyond, failures, summary
 from stiffmap.ui.cli.map_uncertainty import print_uncertainty, uncertainty_data
 from stiffmap.ui.cli.map_worst import in_words, worst_pose
 from stiffmap.ui.cli.output import JsonOption, print_json
 from stiffmap.ui.cli.statuses import failed_in_words
+from stiffmap.workspace.maps.inputs import magnitude, plane_axes
+from stiffmap.workspace.maps.workspace_grid import grid_of
 
 
 def map_command(
@@ -183,3 +170,79 @@ def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wa
             console.print(f"[yellow]{line}[/yellow]", soft_wrap=True)
         console.print(f"wrote {', '.join(map(str, files))}", soft_wrap=True)
     finish(bool(failed))
+
+
+def grid(machine: Machine, planes: dict[str, list[float] | None], points: int) -> dict[str, Any]:
+    """Axes (m) over the workspace box; a coordinate that is not commanded has one value, its home."""
+    given = {a: MM * np.array(v) for a, v in planes.items() if v}
+    if len(given) > 1:
+        raise StiffmapError(f"--{' and --'.join(given)}: expected planes across one axis")
+    return grid_of(machine, given, points)
+
+
+def named_formats(text: str, option: str, known: Sequence[str]) -> list[str]:
+    """Endings of files, separated by commas."""
+    kinds = [k.strip().lower() for k in text.split(",")]
+    if not set(kinds) <= set(known):
+        several = ",".join(known[:2])
+        raise StiffmapError(f"{option}: expected {', '.join(known)}, or several as {several}; got '{text}'")
+    return kinds
+
+
+def cases(plane: str, text: str) -> dict[str, list[float]]:
+    """The force that is given as a vector; of a size, forces along the axes of the plane."""
+    size, vector = force_given(text)
+    magnitude(size, "--force", "N")
+    if vector is not None:
+        return {"F": [*vector, 0.0, 0.0, 0.0]}
+    return {f"F{'xyz'[i]}": [size if k == i else 0.0 for k in range(6)] for i in plane_axes(plane)}
+
+
+OutputOption = Annotated[Path, written(help="Folder for the map and its pictures.")]
+ZOption = Annotated[
+    list[float] | None,
+    typer.Option(help="z-plane in mm; repeatable. [default: lowest, 0, highest of the workspace]"),
+]
+YOption = Annotated[list[float] | None, typer.Option(help="Planes across y instead, in mm; repeatable.")]
+XOption = Annotated[list[float] | None, typer.Option(help="Planes across x instead, in mm; repeatable.")]
+PointsOption = Annotated[
+    int, typer.Option(help="Positions along each axis of a plane, over the whole workspace.")
+]
+DirectionsOption = Annotated[
+    int,
+    typer.Option(
+        help="Force directions solved before the extremes are searched; 16 or more for machines with play."
+    ),
+]
+ComplianceOption = Annotated[bool, typer.Option(help="Keep the 6x6 compliance of every pose.")]
+UncertaintyOption = Annotated[
+    bool, typer.Option("--uncertainty", help="Standard deviation of the map, from links and `u` of the file.")
+]
+ZarrOption = Annotated[bool, typer.Option("--zarr", help="Write Zarr instead of NetCDF.")]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="Take up an interrupted run.")]
+PicturesOption = Annotated[bool, typer.Option(help="Draw the maps, and write them as a report (HTML).")]
+FormatsOption = Annotated[
+    str, typer.Option("--format", help="Formats of the pictures: png, svg, pdf, or several as png,pdf.")
+]
+TablesOption = Annotated[
+    str | None, typer.Option("--table", help="Write the map as a table too: csv, xlsx, or csv,xlsx.")
+]
+OwnScalesOption = Annotated[
+    bool, typer.Option("--own-scales", help="A colour scale for each plane instead of a common one.")
+]
+EstimateOption = Annotated[
+    bool,
+    typer.Option("--estimate", help="Only say how long it will take, and the memory and disk it needs."),
+]
+StatisticsOption = Annotated[
+    bool, typer.Option("--statistics", help="Maxima, percentiles and shares only; no map is stored.")
+]
+SchedulerOption = Annotated[
+    str | None, typer.Option(help="Address of a dask scheduler whose workers solve the map.")
+]
+ToolpathOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Along a path of the tool instead of over planes: CSV or YAML, as for `efforts`; or a shipped one: trim."
+    ),
+]

@@ -9,11 +9,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.plot.directions import draw_directions
 from stiffmap.ui.plot.failed import hatch_failed
-from stiffmap.ui.plot.isolines import draw_isolines, draw_tolerance
+from stiffmap.ui.plot.isolines import draw_isolines, draw_tolerance, halo
 from stiffmap.ui.plot.map_lines import draw_line
 from stiffmap.ui.plot.planes import Planes, on_grid, planes
 from stiffmap.ui.plot.style import (
@@ -239,3 +239,32 @@ def load_text(ds: xr.Dataset, case: str | None) -> str:
     names = zip(wrench.wrench_component.values, wrench.values, strict=True)
     parts = [f"{n} = {v:g} {'N' if n.startswith('f') else 'N m'}" for n, v in names if v]
     return ", ".join(parts) or "no wrench"
+
+
+LINE: dict[str, Any] = {"pivot": "mid", "headwidth": 0, "headlength": 0, "headaxislength": 0, "width": 0.005}
+
+
+def draw_directions(
+    ax: Axes, ds: xr.Dataset, variable: str, how: Planes, index: int, entries: dict[str, Any]
+) -> None:
+    """Lines along the force, as they are seen in the panel's plane; shorter where the force leaves it."""
+    name = variable.replace("_deflection", "_direction")
+    if name == variable or name not in ds:
+        return
+    angle = ds[name].isel({how.across: index}).transpose(how.up, how.right)
+    angle = angle.isel({how.up: _spread(angle.sizes[how.up]), how.right: _spread(angle.sizes[how.right])})
+    first, second = ds[name].attrs["plane"]
+    parts = {first: np.cos(angle.values), second: np.sin(angle.values)}
+    u, v = (parts.get(a, np.zeros(angle.shape)) for a in (how.right, how.up))
+    x, y = np.meshgrid(MM * angle[how.right], MM * angle[how.up])
+    ax.quiver(x, y, u, v, color="white", scale=18, **LINE).set_path_effects(halo(1.8, "#444444"))
+    entries["direction"] = Line2D(
+        [], [], color="white", label="direction of the force", path_effects=halo(2.5, "#444444")
+    )
+
+
+def _spread(count: int, most: int = 9) -> Any:
+    """Indices of at most nine evenly spaced grid values, none at the border."""
+    if count <= most:
+        return np.arange(count)
+    return np.unique(np.round((np.arange(most) + 0.5) * count / most - 0.5).astype(int))

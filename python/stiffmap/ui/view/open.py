@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
 import webbrowser
+from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,6 @@ from stiffmap.ui.view.optional import need_viser
 from stiffmap.ui.view.serving import HERE, LOCAL, Guard, silent, start_server
 from stiffmap.ui.view.state import State, from_permalink, permalink
 from stiffmap.ui.view.viewer import Viewer
-from stiffmap.ui.view.watch import Watch
 
 POLL = 0.2
 """s between two looks whether the view is closed."""
@@ -182,3 +183,39 @@ def model_of(
 
 def _listed(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else list(value) if isinstance(value, tuple) else value
+
+
+EVERY = 0.4
+"""s between two looks."""
+Stamp = tuple[int, int] | None
+
+
+def stamp(path: Path) -> Stamp:
+    """What changes when a file is written; None where there is none."""
+    try:
+        s = path.stat()
+    except OSError:
+        return None
+    return s.st_mtime_ns, s.st_size
+
+
+class Watch:
+    """Calls back when the file's stamp changes."""
+
+    def __init__(self, path: Path, changed: Callable[[], None]) -> None:
+        self._path, self._changed = path, changed
+        self._end = threading.Event()
+        self._seen = stamp(path)
+        self._thread = threading.Thread(target=self._run, daemon=True, name="stiffmap view file")
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._end.wait(EVERY):
+            now = stamp(self._path)
+            if now is not None and now != self._seen:
+                self._seen = now
+                self._changed()
+
+    def stop(self) -> None:
+        """End the thread."""
+        self._end.set()

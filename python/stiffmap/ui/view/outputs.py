@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
 import tempfile
 from pathlib import Path
 from typing import Any
 
-from stiffmap.ui.view.lines import command_line, python_lines
+import numpy as np
+
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.page import page_of
 from stiffmap.ui.view.picture import write_view_picture
-from stiffmap.ui.view.state import permalink
+from stiffmap.ui.view.state import State, as_plain, permalink
 
 
 class Outputs:
@@ -57,3 +59,53 @@ def _picture(moment: Moment, kind: str) -> bytes:
         file = Path(folder) / f"view.{kind}"
         write_view_picture(moment, file)
         return file.read_bytes()
+
+
+def command_line(machine: str, moment: Moment) -> str:
+    """For a shell; files and units as there: mm, deg, µm as mm."""
+    s = moment.state
+    words = [
+        "stiffmap",
+        "view",
+        machine,
+        f"--at={_numbers(1e3 * np.array(s.position))}",
+        f"--force={_numbers(s.force)}",
+    ]
+    default = State(s.position)
+    if s.rotation is not None:
+        words.append(f"--rotation={_numbers(np.rad2deg(s.rotation))}")
+    if any(s.moment):
+        words.append(f"--moment={_numbers(s.moment)}")
+    if s.gravity is not None:
+        words.append(f"--gravity={_numbers(s.gravity)}")
+    words.append(f"--plane={_numbers(s.normal) if s.plane == 'free' else s.plane}")
+    if s.quantity != default.quantity:
+        words.append(f"--quantity={s.quantity}")
+    if s.tolerance != default.tolerance:
+        words.append(f"--tolerance={1e3 * s.tolerance:.9g}")
+    if s.frequency:
+        words.append(f"--frequency={s.frequency:.9g}")
+    if s.magnification is not None:
+        words.append(f"--magnify={s.magnification:.9g}")
+    words += [f"--set={a}={v!r}" for a, v in s.changes]
+    words += [f"--start={_numbers(s.start)}"] if s.start is not None else []
+    return shlex.join(words)
+
+
+def python_lines(machine: str, moment: Moment) -> str:
+    """A program that opens the view and, in the machine as its file says it, solves the pose."""
+    s = moment.state
+    given = ", ".join(f"{k}={v!r}" for k, v in as_plain(s).items() if k != "position")
+    p = tuple(float(v) for v in s.position)
+    lines = ["import stiffmap as sm", "", f"machine = sm.load_machine({machine!r})"]
+    lines.append(f"machine.view({p!r}{', ' if given else ''}{given})")
+    if not s.changes and s.rotation is None and s.start is None:
+        gravity = "" if s.gravity is None else f", gravity={list(s.gravity)!r}"
+        lines.append(
+            f"print(machine.solve({list(p)!r}, {[float(v) for v in s.wrench]!r}{gravity}).displacement)"
+        )
+    return "\n".join(lines)
+
+
+def _numbers(values: object) -> str:
+    return ",".join(f"{v:.12g}" for v in np.asarray(values, dtype=float))

@@ -117,7 +117,9 @@ class _Ask:
         reach = 0.5 * np.linalg.norm(cells[:, 1] - cells[:, 0], axis=1)
         unit, straight, arm = lines(self.h, centre, self.rotation)
         plain = matrix(unit, straight, arm)
-        column = turned(straight, reach[:, None]) * np.sqrt(1.0 + (arm**2).sum(-1) / self.h.length**2)  # of dW
+        column = turned(straight, reach[:, None]) * np.sqrt(
+            1.0 + (arm**2).sum(-1) / self.h.length**2
+        )  # of dW
         inside, outside = np.ones(len(cells), dtype=bool), np.zeros(len(cells), dtype=bool)
         top = np.where(np.isfinite(self.high), self.high, self.low + ROOMY)
         for wrench in self.wrenches:

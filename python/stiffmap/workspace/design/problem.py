@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from stiffmap.common.arithmetic import evaluate
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.yaml_text import Document, read
@@ -21,7 +22,6 @@ from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.design.editing import Editor
-from stiffmap.workspace.design.expressions import evaluate
 from stiffmap.workspace.design.places import put, unshared
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion, near_or_shipped
 from stiffmap.workspace.performance.quantities import quantity

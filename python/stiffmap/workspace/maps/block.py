@@ -8,14 +8,19 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.solve.solution import Solution
 from stiffmap.solve.validity import Validity
-from stiffmap.workspace.maps.direction_sweep import DirectionSweep, even_directions
-from stiffmap.workspace.maps.extremes import find_extreme
+from stiffmap.workspace.maps.direction_sweep import (
+    DirectionSweep,
+    direction,
+    even_directions,
+    solve_directions,
+)
+from stiffmap.workspace.maps.extremes import Extreme, find_extreme, value_growth
 from stiffmap.workspace.maps.fixed_order_sums import norm
-from stiffmap.workspace.maps.limit import force_limit
-from stiffmap.workspace.maps.loading import without_failed
+from stiffmap.workspace.maps.loading import Loading, without_failed
 from stiffmap.workspace.maps.plan import MapPlan
-from stiffmap.workspace.maps.uncertainty_block import load_deviations, worst_deviations
+from stiffmap.workspace.maps.uncertainty import Uncertain
 from stiffmap.workspace.maps.variables import BEYOND
 
 ALL = (0, 1, 2)
@@ -85,3 +90,105 @@ def _extremes(
         f"force_limit{suffix}": np.where(np.isnan(worst.value), np.nan, limit),
     }
     return values, np.maximum(worst.status, best.status)
+
+
+STEPS = 8
+CLOSE = 1e-3
+"""Relative distance to the tolerance from which one more Newton step is exact to about its square."""
+
+
+def force_limit(
+    loading: Loading,
+    position: Floats,
+    force: float,
+    axes: tuple[int, int],
+    worst: Extreme,
+    parts: tuple[int, ...],
+    tolerance: float,
+) -> Floats:
+    """Force (p,) in N along the worst direction at which the deflection reaches the tolerance (m).
+
+    Newton's method on loaded equilibria, started at the worst direction's own. 0 where the tolerance
+    is exceeded without any force; NaN where an equilibrium on the way fails.
+    """
+    limit = newton_step(np.full(len(position), force), worst.value, worst.growth, tolerance)
+    open_ = np.abs(worst.value - tolerance) > CLOSE * tolerance
+    for _ in range(STEPS):
+        rows = np.flatnonzero(open_ & (limit > 0))
+        if rows.size == 0:
+            return limit
+        f = solve_directions(loading, position[rows], worst.angle[rows, None], limit[rows], axes)
+        value = norm(f.translation[..., parts])[:, 0]
+        growth = value_growth(f.translation[..., parts], f.growing[..., parts])[:, 0]
+        limit[rows] = newton_step(limit[rows], value, growth, tolerance)
+        open_[rows] = np.abs(value - tolerance) > CLOSE * tolerance
+    return np.where(open_ & (limit > 0), np.nan, limit)
+
+
+def newton_step(force: Floats, value: Floats, growth: Floats, tolerance: float) -> Floats:
+    """Next force, not below zero; NaN where the deflection does not grow."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        step = np.where(growth > 0, (tolerance - value) / growth, np.nan)
+    return np.asarray(np.maximum(force + step, 0.0))
+
+
+def load_deviations(plan: MapPlan, uncertain: Uncertain, position: Floats) -> dict[str, Any]:
+    """Standard deviations under the load cases, at positions (poses, 3)."""
+    s, j = sensitivities(plan.loading, uncertain, position[:, None], plan.wrenches)
+    d = without_failed(s.displacement, s.status)
+    std, parts = deviation(j, d, ALL, uncertain.covariance)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = parts / (std**2)[..., None]
+    return {
+        "displacement_std": np.sqrt(_variance(j, uncertain.covariance)),
+        "deflection_std": std,
+        f"deflection_{plan.shown_plane}_std": deviation(j, d, plan.axes, uncertain.covariance)[0],
+        "variance_share": share,
+    }
+
+
+def worst_deviations(
+    plan: MapPlan, uncertain: Uncertain, position: Floats, extremes: dict[str, Any]
+) -> dict[str, Any]:
+    """Standard deviation of the deflection in the worst direction.
+
+    The direction itself moves with the numbers, but that adds nothing to first order: it is an extremum.
+    """
+    out = {}
+    for suffix, parts in (("", ALL), (f"_{plan.shown_plane}", plan.axes)):
+        along = direction(np.nan_to_num(extremes[f"worst_direction{suffix}"]), plan.axes)
+        wrench = np.concatenate([plan.force * along, np.zeros_like(along)], axis=-1)
+        s, j = sensitivities(plan.loading, uncertain, position, wrench)
+        std = deviation(j, without_failed(s.displacement, s.status), parts, uncertain.covariance)[0]
+        failed = np.isnan(extremes[f"worst_deflection{suffix}"])
+        out[f"worst_deflection{suffix}_std"] = np.where(failed, np.nan, std)
+    return out
+
+
+def sensitivities(
+    loading: Loading, uncertain: Uncertain, position: Floats, wrench: Floats
+) -> tuple[Solution, Floats]:
+    """Equilibria (...) and the derivatives (..., P, 6) of their displacement; NaN where a pose failed."""
+    s, varied = loading.solve_varied(position, wrench, uncertain.machines)
+    slope = (varied[..., 1::2, :] - varied[..., 0::2, :]) / (2 * uncertain.steps[:, None])
+    return s, without_failed(slope, s.status)
+
+
+def deviation(j: Floats, d: Floats, parts: tuple[int, ...], covariance: Floats) -> tuple[Floats, Floats]:
+    """Standard deviation (...) of the norm of the components `parts`, and its variance by number (..., P).
+
+    A number's part is its own variance and half of what it shares with each correlated one. NaN where the
+    deflection is zero and uncertain: its norm has no slope there.
+    """
+    size = norm(d[..., parts])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit = d[..., parts] / size[..., None]
+    slope = np.einsum("...pk,...k->...p", j[..., parts], unit)
+    still = (size == 0) & ~np.any(j[..., parts], axis=(-2, -1))
+    slope = np.where(still[..., None], 0.0, slope)
+    shares = slope * np.einsum("pq,...q->...p", covariance, slope)
+    return np.sqrt(np.maximum(shares.sum(axis=-1), 0.0)), shares
+
+
+def _variance(j: Floats, covariance: Floats) -> Floats:
+    return np.asarray(np.maximum(np.einsum("...pk,pq,...qk->...k", j, covariance, j), 0.0))

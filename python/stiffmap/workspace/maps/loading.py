@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.machine import Machine
-from stiffmap.solve.options import LoadingKeywords, SolveOptions, merged
+from stiffmap.solve.options import LoadingKeywords, options_of
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.solving import Call
 from stiffmap.solve.status import Status
@@ -20,11 +20,9 @@ from stiffmap.solve.variants import solve_varied
 class Loading:
     """A machine and the options that a whole map shares."""
 
-    def __init__(
-        self, machine: Machine, options: SolveOptions | None = None, **given: Unpack[LoadingKeywords]
-    ) -> None:
+    def __init__(self, machine: Machine, **given: Unpack[LoadingKeywords]) -> None:
         self.machine = machine
-        self.options = merged(options, given)
+        self.options = options_of(given)
 
     def solve(self, position: Floats, wrench: Floats, *, stiffness: bool = True) -> Solution:
         """Equilibria at positions (..., 3) under wrenches (..., 6), broadcast together; without the 6x6 if not asked."""

@@ -9,11 +9,10 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, whole_number
-from stiffmap.common.deprecation import warn_renamed
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
 from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.solve.options import LoadingKeywords, SolveOptions, spelled_out
+from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.workspace.maps.direction_sweep import DirectionSweep, direction, direction_sweep_of, even_angles
 from stiffmap.workspace.maps.extremes import find_extreme
 from stiffmap.workspace.maps.fixed_order_sums import norm
@@ -31,22 +30,19 @@ def polar(
     plane: str = "xy",
     *,
     directions: int = 72,
-    options: SolveOptions | None = None,
     **given: Unpack[LoadingKeywords],
 ) -> xr.Dataset:
     """Deflection against the direction of a pure force in a plane, at one position.
 
     position (3,) m; force N; `directions` equally spaced directions from the plane's first axis
-    towards its second, each a loaded equilibrium. Other keywords as in `Machine.solve`; `options` is deprecated.
+    towards its second, each a loaded equilibrium. Other keywords as in `Machine.solve`.
 
     Returns a Dataset with dimension ``angle`` (rad): displacement, deflection, deflection_xy, status,
     flags, and the scalars worst_deflection, worst_direction, best_deflection, best_direction (whole
     translation; with ``_xy`` in the plane) searched between the directions. Failed directions hold NaN
     and their status. Raises StiffmapError for bad input.
     """
-    if options is not None:
-        warn_renamed("options=", "its fields as keywords")
-    loading = Loading(machine, options, **given)
+    loading = Loading(machine, **given)
     p, axes = place(position), plane_axes(plane)
     force = magnitude(force, "force", "N")
     if (directions := whole_number(directions, "directions", 1)) < 3:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.deprecation import warn_renamed
+from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
-from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.solve.options import LoadingKeywords, SolveOptions, spelled_out
+from stiffmap.solve.compiled.machine import PATH_CONTROLS as CONTROLS
+from stiffmap.solve.machine import Machine, hint_metres, takes_machine
+from stiffmap.solve.options import LoadingKeywords, spelled_out
+from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.fixed_order_sums import dot
 from stiffmap.workspace.maps.inputs import force_list, place, unit
-from stiffmap.workspace.maps.load_path import check_control, load_path
 from stiffmap.workspace.maps.loading import Loading, without_failed
 from stiffmap.workspace.maps.sweep_dataset import Equilibria, Followed, sweep_dataset
 
@@ -31,7 +32,6 @@ def sweep(
     limit: float | None = None,
     steps: int = 40,
     cross: int = 0,
-    options: SolveOptions | None = None,
     **given: Unpack[LoadingKeywords],
 ) -> xr.Dataset:
     """Deflection against the size of a force of one direction, at one position.
@@ -45,7 +45,7 @@ def sweep(
     other side. That branch ends at the `limit`, or where the force falls to zero.
 
     position (3,) m; direction (3,), any length; forces (n,) N, negative ones act against it;
-    limit of either sign; steps to the limit. Other keywords as in `Machine.solve`; `options` is deprecated.
+    limit of either sign; steps to the limit. Other keywords as in `Machine.solve`.
 
     Returns a Dataset with dimension ``step`` and the coordinate force: displacement, deflection, deflection_xy,
     deflection_along (component along the force), compliance_along (of a little more force, m/N; NaN on a path),
@@ -57,9 +57,7 @@ def sweep(
     ``end`` and ``crossing_end`` say why its branches ended (empty for single forces).
     Raises StiffmapError for bad input.
     """
-    if options is not None:
-        warn_renamed("options=", "its fields as keywords")
-    loading = Loading(machine, options, **given)
+    loading = Loading(machine, **given)
     p, u = place(position), unit(direction)
     if forces is None or control != "force":
         if forces is not None:
@@ -85,3 +83,97 @@ def sweep(
     )
     call = {"position": p, "direction": u, "forces": f}
     return sweep_dataset(loading, "force sweep", call, found, Followed())
+
+
+UNITS = {"force": "N", "displacement": "m", "arc": "m"}
+ENDS = (
+    "the limit was reached",
+    "the commanded pose is out of reach",
+    "singular without load",
+    "no further equilibrium was found",
+    "the largest number of points was listed",
+    "the force fell to zero",
+    "not followed",
+)
+"""In the order of the core's reasons why a branch ends."""
+
+
+def load_path(
+    loading: Loading, position: Floats, direction: Floats, control: str, limit: float, steps: int, cross: int
+) -> xr.Dataset:
+    """See `sweep`: what it does with a `limit`."""
+    machine, options = loading.machine, loading.options
+    if options.point not in machine.points:
+        raise StiffmapError(f"point: expected one of {', '.join(machine.points)}, got {options.point!r}")
+    turned = machine.compiled.home_rotation if options.rotation is None else options.rotation
+    flags, *branches = machine.compiled.path(
+        position,
+        np.ascontiguousarray(turned, dtype=float),
+        direction,
+        point=options.point,
+        gravity=np.array(loading.acting_gravity()),
+        control=control,
+        limit=limit,
+        steps=steps,
+        cross=cross,
+    )
+    (end, points, critical), (crossing_end, crossing, crossing_critical) = branches
+    hint_metres(machine, position, not points)
+    _check_cross(cross, critical, str(ENDS[end]))
+    call = {"position": position, "direction": direction, "control": control,
+            "limit": limit, "steps": steps, "cross": cross}  # fmt: skip
+    followed = Followed(
+        ENDS[end],
+        _crossing_end(cross, critical, crossing, ENDS[crossing_end]),
+        tuple(critical),
+        tuple(crossing_critical),
+    )
+    found = _equilibria(points, crossing, int(flags))
+    return sweep_dataset(loading, f"load path by {control}", call, found, followed)
+
+
+def _crossing_end(cross: int, critical: list[dict[str, Any]], points: list[Any], end: str) -> str:
+    """Why it ended; at its first point, where several modes leave no single branch to follow."""
+    if cross and len(points) == 1:
+        fork = [c for c in critical if not c["limit"]][abs(cross) - 1]
+        if abs(fork["after"] - fork["before"]) > 1:
+            return f"not followed: {abs(fork['after'] - fork['before'])} modes at once, no single branch"
+    return end
+
+
+def _check_cross(cross: int, critical: list[dict[str, Any]], end: str) -> None:
+    forks = sum(not c["limit"] for c in critical)
+    if abs(cross) > forks:
+        raise StiffmapError(f"cross: the path has {forks} bifurcations, got {cross} (end of the path: {end})")
+
+
+def check_control(control: str, limit: float | None, steps: int, load_type: object, cross: int) -> float:
+    """The limit as a number; StiffmapError where the options do not fit together."""
+    if control not in CONTROLS:
+        raise StiffmapError(f"control: expected one of {', '.join(CONTROLS)}, got {control!r}")
+    if limit is None or not np.isfinite(limit) or limit == 0:
+        raise StiffmapError(
+            f"limit: expected a number other than 0 ({UNITS[control]} for control {control!r}), got {limit!r}"
+        )
+    whole_number(steps, "steps", 1, what="a positive number")
+    if isinstance(cross, bool) or not isinstance(cross, int):
+        raise StiffmapError(f"cross: expected the number of a bifurcation, 1, -1, 2 …, got {cross!r}")
+    if load_type != "dead":
+        raise StiffmapError(f"load_type: a path needs a conservative force, 'dead'; got {load_type!r}")
+    return float(limit)
+
+
+def _equilibria(points: list[dict[str, Any]], crossing: list[dict[str, Any]], flags: int) -> Equilibria:
+    """Both branches, one after the other; the flags are those of the whole path."""
+    both = points + crossing
+    unstable = np.array([p["unstable"] for p in both], dtype=float)
+    return Equilibria(
+        force=np.array([p["load"] for p in both], dtype=float),
+        displacement=np.array([p["displacement"] for p in both], dtype=float).reshape(-1, 6),
+        along=np.array([p["along"] for p in both], dtype=float),
+        compliance_along=np.full(len(both), np.nan),
+        unstable_modes=unstable,
+        status=np.where(unstable > 0, Status.UNSTABLE, Status.CONVERGED).astype(np.uint8),
+        flags=np.full(len(both), flags, dtype=np.uint32),
+        branch=np.repeat([0, 1], [len(points), len(crossing)]),
+    )

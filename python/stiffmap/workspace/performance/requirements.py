@@ -10,7 +10,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from stiffmap.common.deprecation import renamed
 from stiffmap.common.errors import FileError
 from stiffmap.common.short import short_repr
 from stiffmap.common.yaml_text import Document, read
@@ -100,7 +99,6 @@ class Requirements:
         return dict(self.bounds).get(measure)
 
 
-@renamed(name_or_path="source")
 def load_requirements(source: str | PathLike[str]) -> Requirements:
     """Requirements from a file, or the shipped ones by name (``trimming``).
 

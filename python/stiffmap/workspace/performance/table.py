@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array, thread_count
-from stiffmap.common.deprecation import renamed
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
@@ -102,7 +101,6 @@ class MeasuresTable:
         }
 
 
-@renamed(gap="box_tolerance")
 @takes_machine
 def measures(
     machine: Machine,

@@ -11,10 +11,10 @@ import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.virtual.plans import with_distances
 from stiffmap.identification.calibration import Calibrator, calibrate, unknowns
+from stiffmap.identification.calibration.claims import widened
 from stiffmap.identification.calibration.homing import own_part, zeros_anew
 from stiffmap.identification.calibration.model import predicted
 from stiffmap.identification.calibration.statistics import Sums
-from stiffmap.identification.calibration.width import widened
 
 
 def sessions(size: float) -> tuple[sm.Machine, Experiment]:

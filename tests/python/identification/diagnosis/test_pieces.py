@@ -15,7 +15,7 @@ from stiffmap.identification.diagnosis.decision.largest_residual import located
 from stiffmap.identification.diagnosis.decision.patterns import Pattern
 from stiffmap.identification.diagnosis.fitting.interval import seen_alone
 from stiffmap.identification.diagnosis.fitting.model import Model
-from stiffmap.identification.diagnosis.rivals.rivals import Rival, p_of_loss
+from stiffmap.identification.diagnosis.rivals.explain import Rival, p_of_loss
 from stiffmap.model.effects import Parameter
 
 ONE = Candidate("length", "bar", ("x",), (Parameter("error", "m", -1.0, 1.0, 0.0, 1e-4, ""),))

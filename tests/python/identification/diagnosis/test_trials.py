@@ -13,8 +13,7 @@ from stiffmap.experiment import Predictor, random_plan, simulate
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import Problem, readings_of
 from stiffmap.identification.diagnosis.candidates.candidates import Candidate, candidates, clash
-from stiffmap.identification.diagnosis.candidates.probe import STEP, PlanProbe
-from stiffmap.identification.diagnosis.candidates.sensitivity import Variant, difference
+from stiffmap.identification.diagnosis.candidates.sensitivity import STEP, PlanProbe, Variant, difference
 from stiffmap.identification.diagnosis.candidates.stack import Stack
 from stiffmap.identification.diagnosis.fitting.fit import evaluate, fit
 from stiffmap.identification.diagnosis.fitting.model import Model

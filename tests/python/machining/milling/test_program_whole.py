@@ -16,8 +16,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill_job
 from stiffmap.machining.milling.verify import run
 from stiffmap.machining.toolpath import load_path, outline
-from stiffmap.machining.toolpath.entry import entered_at, turned_round
-from stiffmap.machining.toolpath.gcode.fresh import fresh_text
+from stiffmap.machining.toolpath.entry import entered_at, fresh_text, turned_round
 from stiffmap.machining.toolpath.gcode.load import load_gcode
 from stiffmap.machining.toolpath.path import Toolpath
 

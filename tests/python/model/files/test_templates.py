@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from stiffmap.common.arithmetic import sum_of_numbers
 from stiffmap.common.errors import FileError, FileErrors, StiffmapError
 from stiffmap.model.files import description_from_text, description_text
-from stiffmap.model.files.templates import evaluate
 
 HEAD = """
 name: pair
@@ -93,7 +93,7 @@ def test_a_leg_without_parameters_takes_no_with() -> None:
 
 @pytest.mark.parametrize(("text", "value"), [("-500/2", -250.0), ("2*(40 - 8.5)", 63.0), ("1e3+1", 1001.0)])
 def test_formulas(text: str, value: float) -> None:
-    assert evaluate(text) == value
+    assert sum_of_numbers(text) == value
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_formulas(text: str, value: float) -> None:
 )
 def test_formulas_are_numbers_only(text: str) -> None:
     with pytest.raises(SyntaxError):
-        evaluate(text)
+        sum_of_numbers(text)
 
 
 def test_all_mistakes_of_the_schema_at_once() -> None:

@@ -18,7 +18,7 @@ from tests.python.model.link.link_fields import (
 
 from stiffmap.model.link import transport_compliance
 from stiffmap.model.link.identify import identify_link
-from stiffmap.model.link.plausibility import bending_lengths
+from stiffmap.model.link.report import bending_lengths
 from stiffmap.model.link.transport import twist_transport
 
 C = bar_compliance()

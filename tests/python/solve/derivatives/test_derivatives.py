@@ -11,7 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap import _core
 from stiffmap.model.effects import get, kinds
-from stiffmap.solve.derivatives.neighbours import Neighbours, with_requests
+from stiffmap.solve.derivatives.prepared import Neighbours, with_requests
 from stiffmap.solve.derivatives.stencil import central, within
 
 MACHINE = sm.load_machine("orthoglide-revised")
@@ -93,7 +93,7 @@ def test_gravity_of_a_variant_counts() -> None:
 
 @pytest.mark.parametrize("name", ["position", "rotation"])
 def test_inputs(name: str) -> None:
-    from stiffmap.solve.derivatives.inputs import _moved, _step
+    from stiffmap.solve.derivatives.differentiate import _moved, _step
     from stiffmap.solve.solving import Call
 
     machine = sm.load_machine("hexapod") if name == "rotation" else MACHINE  # the Orthoglide never turns

@@ -11,7 +11,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.ui.cli import main
-from stiffmap.ui.cli.vectors import joined
+from stiffmap.ui.cli.app import joined
 
 NAME = "orthoglide-revised"
 

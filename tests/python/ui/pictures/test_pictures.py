@@ -14,7 +14,7 @@ from matplotlib.text import Text
 
 import stiffmap as sm
 from stiffmap import plot
-from stiffmap.ui.cli.map_inputs import grid
+from stiffmap.ui.cli.map import grid
 from stiffmap.ui.plot.error_maps import shares
 
 FORCE = {"Fx": [300.0, 0, 0, 0, 0, 0]}

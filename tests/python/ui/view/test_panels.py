@@ -15,8 +15,8 @@ from stiffmap.solve.status import Status
 from stiffmap.ui.cli.view import _change, _state
 from stiffmap.ui.view import model_of
 from stiffmap.ui.view.drawing import element_links
-from stiffmap.ui.view.lines import command_line, python_lines
 from stiffmap.ui.view.model import Model
+from stiffmap.ui.view.outputs import command_line, python_lines
 from stiffmap.ui.view.panels import (
     bars,
     colour_bar,

@@ -99,7 +99,10 @@ def test_the_last_newton_that_tensions_hold_is_found() -> None:
     most = np.empty(12)
     for i, a in enumerate(structure_matrix(m, p)):
         found = linprog(
-            [*np.zeros(8), -1.0], A_eq=np.c_[a, way[i]], b_eq=-weight, bounds=[(10.0, 400.0)] * 8 + [(0, None)]
+            [*np.zeros(8), -1.0],
+            A_eq=np.c_[a, way[i]],
+            b_eq=-weight,
+            bounds=[(10.0, 400.0)] * 8 + [(0, None)],
         )
         most[i] = found.x[-1]
     for share, holds in ((1 - 1e-6, True), (1 + 1e-6, False), (1 + 1e-4, False)):

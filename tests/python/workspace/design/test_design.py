@@ -15,8 +15,8 @@ import pytest
 import stiffmap as sm
 import stiffmap.workspace.design
 from stiffmap.common import python_file
+from stiffmap.common.arithmetic import evaluate
 from stiffmap.workspace.design import load_design, optimize
-from stiffmap.workspace.design.expressions import evaluate
 from stiffmap.workspace.design.judging import judge
 from stiffmap.workspace.design.store import Evaluations
 from stiffmap.workspace.performance import moving_mass

@@ -22,7 +22,7 @@ import xarray as xr
 import stiffmap as sm
 from stiffmap.workspace.maps import tiles
 from stiffmap.workspace.maps.files import read_dataset
-from stiffmap.workspace.maps.histogram import RELATIVE_WIDTH, Histogram
+from stiffmap.workspace.maps.statistics import RELATIVE_WIDTH, Histogram
 from stiffmap.workspace.maps.zarr_map import ZarrMap
 
 pytest.importorskip("zarr")

@@ -20,9 +20,9 @@ from stiffmap.model.files.shipped import find
 from stiffmap.model.link import LinkFile, save_link
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import main
+from stiffmap.workspace.maps.block import sensitivities
 from stiffmap.workspace.maps.loading import Loading
 from stiffmap.workspace.maps.uncertainty import UPPER, uncertain_numbers
-from stiffmap.workspace.maps.uncertainty_block import sensitivities
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
 GRID = {"x": [-0.05, 0.1], "y": [0.1], "z": [0.05]}

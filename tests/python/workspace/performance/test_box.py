@@ -10,11 +10,10 @@ import pytest
 import stiffmap as sm
 from stiffmap.model.files.shipped import find
 from stiffmap.workspace.performance import drive_kinematics
+from stiffmap.workspace.performance.box.box import best_orientation
 from stiffmap.workspace.performance.box.box_search import BoxSearch
 from stiffmap.workspace.performance.box.cells import shrink
-from stiffmap.workspace.performance.box.enclosed import enclose
-from stiffmap.workspace.performance.box.proof import judge_cells
-from stiffmap.workspace.performance.box.turning import best_orientation
+from stiffmap.workspace.performance.box.proof import enclose, judge_cells
 from stiffmap.workspace.performance.limits.bars import segment_distance
 from stiffmap.workspace.performance.limits.limit import Limit
 from stiffmap.workspace.performance.limits.limits import Bounds

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import dataclass, replace
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.fingerprints import digest
+from stiffmap.common.kept import Kept
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.predict import Predictor
@@ -36,7 +36,7 @@ class Plan:
         return self.stack.variants
 
 
-_PLANS: OrderedDict[str, Plan] = OrderedDict()
+_PLANS: Kept[str, Plan] = Kept(8)
 
 
 def plan_of(predictor: Predictor, clock: Clock | None = None) -> Plan:
@@ -45,15 +45,13 @@ def plan_of(predictor: Predictor, clock: Clock | None = None) -> Plan:
     clock = clock or Clock()
     registered = [(k, id(get(k))) for k in kinds()]  # users may register more
     key = digest(fingerprint(predictor), predictor.experiment.read, registered)
-    if key not in _PLANS:
+    plan = _PLANS.get(key)
+    if plan is None:
         found, whole = _compute(predictor, clock)
         if not whole:
             return replace(found, digest=f"{key}, the first {len(found.variants)}")
-        _PLANS[key] = replace(found, digest=key)
-        if len(_PLANS) > 8:
-            _PLANS.popitem(last=False)
-    _PLANS.move_to_end(key)
-    return _PLANS[key]
+        plan = _PLANS.put(key, replace(found, digest=key), 1)
+    return plan
 
 
 def _compute(predictor: Predictor, clock: Clock) -> tuple[Plan, bool]:

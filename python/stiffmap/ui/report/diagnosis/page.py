@@ -15,13 +15,18 @@ from stiffmap.common.outputs import write_text
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.identification.diagnosis.decision.patterns import Pattern
 from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Findings
-from stiffmap.identification.diagnosis.report.sentences import alias_words, interval, next_step, opening
+from stiffmap.identification.diagnosis.report.sentences import (
+    UNITS,
+    alias_words,
+    interval,
+    next_step,
+    opening,
+)
 from stiffmap.identification.diagnosis.report.wording import effect_text, five_lines, separation_text
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.model.description.tree import joints
 from stiffmap.model.effects import registry
 from stiffmap.solve.budget import deflection_budget
-from stiffmap.ui.report.diagnosis.shop import in_axis_units, in_shop_units, in_shop_words, p_text
 
 SHOWN = 12
 """Detectable effects above the fold."""
@@ -227,3 +232,26 @@ def _digests(d: Findings) -> dict[str, str]:
         f"machine {d.declared.name}, as loaded": digest(d.declared.description),
         f"readings of {e.name}, SI": digest(e.position, e.wrench, e.reading, e.sigma),
     }
+
+
+def in_shop_words(text: str) -> str:
+    """A line of the screen with drives called so, and no marks of code."""
+    return text.replace("actuator", "drive").replace("`", "")
+
+
+def in_axis_units(axis: str, value: float) -> str:
+    """A reading's size: µm, µrad for a rotation; a dash for none."""
+    if not np.isfinite(value):
+        return "–"
+    return f"{1e6 * value:.2f} {'µrad' if axis.startswith('r') else 'µm'}"
+
+
+def in_shop_units(value: float, unit: str) -> str:
+    """A number of an effect: µm, µm/N, mrad."""
+    factor, name = UNITS.get(unit, (1.0, unit))
+    return f"{factor * value:.4g} {name}".rstrip()
+
+
+def p_text(p: float) -> str:
+    """A p-value; 0 is what no double holds."""
+    return f"{p:.2g}" if p > 0 else "below 1e-300"

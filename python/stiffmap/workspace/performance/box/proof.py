@@ -6,16 +6,20 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, thread_count
 from stiffmap.common.tasks import workers
-from stiffmap.workspace.performance.box.cell import Cells
-from stiffmap.workspace.performance.box.enclosed import enclose
-from stiffmap.workspace.performance.box.sampled import sample
+from stiffmap.workspace.performance.box.cell import BOX, Cells
+from stiffmap.workspace.performance.limits.limit import UNLIMITED
 from stiffmap.workspace.performance.limits.limits import Bounds
+from stiffmap.workspace.performance.motion.closing import kernel_starts
+from stiffmap.workspace.performance.motion.scaling import revolute_drives
+from stiffmap.workspace.performance.motion.zonotopes import corners
 
 Judge = Callable[[Floats, Floats, Floats], Cells]
 """Of cells with centres (n, 3) m, half lengths (n, 3) m along the columns of axes (3, 3)."""
@@ -56,3 +60,165 @@ def judge_on(bounds: Bounds, scheduler: Any = None) -> Iterator[Judge]:
 def _some_cells(bounds: Bounds, cells: tuple[Floats, Floats, Floats]) -> Cells:
     """Enclosures, as a task."""
     return enclose(bounds, *cells)
+
+
+SAFETY = 2.0
+"""On second derivatives, which are second differences between the nodes of each cell."""
+_NODES = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
+_MIDDLE = 13
+_LINES = [
+    [[int(np.ravel_multi_index(tuple(np.insert(rest, axis, v)), (3, 3, 3))) for v in (0, 1, 2)]
+     for rest in product((0, 1, 2), repeat=2)]
+    for axis in range(3)
+]  # fmt: skip
+
+
+def sample(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells:
+    """As `Bounds.over`, from nodes: an array differs from its interpolant by its second differences."""
+    n = len(centre)
+    local = _NODES[None] * half[:, None]
+    closed, limits = bounds.at((centre[:, None] + local @ axes.T).reshape(-1, 3))
+    closed = closed.reshape(n, 27)
+    names = ["closure", *(limit.name for limit in limits)]
+    most, mid = (
+        [np.where(closed.all(axis=1), -np.inf, np.inf)],
+        [np.where(closed[:, _MIDDLE], -np.inf, np.inf)],
+    )
+    bend = np.zeros((n, 3))
+    for limit in limits:
+        values = limit.array.reshape(n, 27, -1)
+        nodes = limit.value.reshape(n, 27)
+        size = max(abs(limit.most), 1e-9)
+        error = np.zeros(n)
+        for axis, lines in enumerate(_LINES):
+            bends = [
+                np.linalg.norm(values[:, a] - 2 * values[:, b] + values[:, c], axis=-1) for a, b, c in lines
+            ]
+            share = np.max(bends, axis=0) / 8  # of the node spacing's second difference h² f''
+            bend[:, axis] += share / size
+            error += SAFETY * share
+        with np.errstate(invalid="ignore"):
+            most.append((nodes.max(axis=1) + error - limit.most) / size)
+            mid.append((nodes[:, _MIDDLE] - limit.most) / size)
+    table, centres = np.stack(most), np.stack(mid)
+    with np.errstate(invalid="ignore"):
+        broken = np.asarray(~(centres <= 0).all(axis=0))
+        inside = np.asarray((table <= 0).all(axis=0))
+        return Cells(inside, broken, np.zeros_like(half),
+                     np.argmax(np.where(np.isnan(table), np.inf, table), axis=0), tuple(names), bend)  # fmt: skip
+
+
+def enclose(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells:
+    """Cells (n, 3) of positions, base axes, with half lengths (n, 3) along the columns of `axes`."""
+    bounds.counter[0] += len(centre)
+    compiled = bounds.machine.compiled
+    drives = list(compiled.drives)
+    wide = bounds.transmission is not None and len(drives) == 6
+    watched = bounds.bars.nodes if bounds.clearance is not None else ()
+    rotation = compiled.home_rotation if bounds.rotation is None else bounds.rotation
+    start = kernel_starts(bounds.machine, centre, bounds.rotation, bounds.threads)
+    e = compiled.enclose(
+        np.ascontiguousarray(centre), np.ascontiguousarray(half), axes, rotation, start=start,
+        slopes=6 if wide else 3, watched=watched, threads=thread_count(bounds.threads),
+    )  # fmt: skip
+    ok = np.asarray(e["enclosed"])
+    names, most, least = (
+        ["closure"],
+        [np.where(ok, -np.inf, np.inf)],
+        [np.where(e["closed"], -np.inf, np.inf)],
+    )
+    places = [np.zeros_like(half)]
+
+    def add(name: str, value: Floats, slack: Floats, bound: float, place: Floats) -> None:
+        """A limit's value at its worst corner, by the linear model, and what that may miss."""
+        size = max(abs(bound), 1e-9)
+        names.append(name)
+        with np.errstate(invalid="ignore"):
+            most.append(np.where(ok, (value + slack - bound) / size, np.inf))
+            least.append(np.where(ok, (value - slack - bound) / size, -np.inf))
+        places.append(place)
+
+    x = e["coordinates"]
+    for index, name, low, high in bounds.intervals_wanted:
+        for sign, bound in ((1.0, high), (-1.0, -low)):
+            if abs(bound) < UNLIMITED:
+                slope = sign * e["slope"][:, index, :3]
+                value = sign * x[:, index] + (np.abs(slope) * half).sum(axis=1)
+                add(name, value, e["radius"][:, index], bound, np.where(slope < 0, -1.0, 1.0) * half)
+    if bounds.clearance is not None:
+        d, moved = bounds.bars.over(e["points"], e["moved"])
+        add("clearance of bars", -d, moved, -bounds.clearance, np.zeros_like(half))
+    if bounds.transmission is not None:
+        frame = np.eye(6)
+        frame[:3, :3] = axes
+        turn = revolute_drives(bounds.machine)
+        rows = np.where(turn, bounds.size, 1.0)[:, None]
+        columns = np.concatenate([np.ones(3), np.full(3, 1 / bounds.size)])[: 6 if wide else 3]
+        scale = rows * columns
+        w = e["slope"][:, drives] * scale
+        change = e["change"][:, :, drives] * scale
+        slack = np.linalg.norm(e["slack"][:, drives] * scale, axis=(1, 2))
+        for name, value, rest, bound, corner in _factors_over(
+            w, change * half[:, :, None, None], slack, bounds.transmission, bounds.factors
+        ):
+            add(name, value, rest, bound, BOX[corner] * half)
+    table, sure = np.stack(most), np.stack(least)
+    table, sure = np.where(np.isnan(table), np.inf, table), np.where(np.isnan(sure), -np.inf, sure)
+    broken, worst = (sure > 0).any(axis=0), np.argmax(sure, axis=0)
+    limit = np.where(broken, worst, np.argmax(table, axis=0))
+    where = np.stack(places)[worst, np.arange(len(centre))]
+    inside = np.asarray((table <= 0).all(axis=0))
+    return Cells(inside, np.asarray(broken), where, limit, tuple(names), np.asarray(e["bend"]))
+
+
+def _factors_over(
+    w: Floats, step: Floats, slack: Floats, transmission: tuple[float, float], factors: str
+) -> list[tuple[str, Floats, Floats, float, NDArray[np.int64]]]:
+    """Name, value at the worst corner by the linear model, what it may miss, bound and number of that corner,
+    from W = J^-1 (n, d, d), its change to the cell's faces (n, 3, d, d), the Frobenius norm of the rest (n,)."""
+    low, high = transmission
+    n, d = len(w), w.shape[-1]
+    out = []
+    sphere = factors == "sphere"
+    ok = np.isfinite(w).all(axis=(1, 2)) & np.isfinite(slack)
+    if low > 0:
+        at = w[ok][:, None] + np.einsum("ck,nkab->ncab", BOX, step[ok])
+        values = _largest(at) if sphere else np.linalg.norm(at, axis=3).max(axis=2)
+        name = "transmission below" if sphere else "cube factor below"
+        out.append((name, *_spread(n, ok, values, slack[ok]), 1 / low, _worst(n, ok, values)))
+    if not np.isfinite(high):
+        return out
+    ok = ok & (np.abs(np.linalg.det(np.where(ok[:, None, None], w, np.eye(d)))) > 1e-12)
+    v = np.linalg.inv(w[ok])
+    relative = v[:, None] @ step[ok]
+    size = _largest(v)
+    # J = (1 + Z)^-1 V with Z = V (step + rest): its part of first order is exact, the others are bounded
+    z = _largest(np.einsum("ck,nkab->ncab", BOX, relative)).max(axis=1) + size * slack[ok]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rest = np.where(z < 1, (z**2 / (1 - z) + size * slack[ok]) * size, np.inf)
+    at = v[:, None] - np.einsum("ck,nkab->ncab", BOX, relative @ v[:, None])
+    if sphere:
+        values = _largest(at)
+    else:
+        values, rest = np.linalg.norm(at @ corners(d).T, axis=2).max(axis=2), rest * np.sqrt(d)
+    name = "transmission above" if sphere else "cube factor above"
+    out.append((name, *_spread(n, ok, values, rest), high, _worst(n, ok, values)))
+    return out
+
+
+def _spread(n: int, ok: NDArray[np.bool_], values: Floats, rest: Floats) -> tuple[Floats, Floats]:
+    value, slack = np.full(n, np.nan), np.full(n, np.inf)
+    value[ok], slack[ok] = values.max(axis=1), rest
+    return value, slack
+
+
+def _worst(n: int, ok: NDArray[np.bool_], values: Floats) -> NDArray[np.int64]:
+    out = np.zeros(n, dtype=np.int64)
+    out[ok] = values.argmax(axis=1)
+    return out
+
+
+def _largest(a: Floats) -> Floats:
+    """(...) largest singular value."""
+    gram = np.swapaxes(a, -1, -2) @ a
+    return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(gram)[..., -1], 0.0)))

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from stiffmap.common.broadcasting import Floats, random_numbers, real_array
-from stiffmap.common.deprecation import renamed
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.rotations import as_rotations
 from stiffmap.common.short import short_repr
@@ -59,7 +58,6 @@ class Workspace:
         return self.ask(real_array(position, "position").reshape(-1, 3), self.drawn)
 
 
-@renamed(factors="norm")
 @takes_machine
 def workspace_volume(
     machine: Machine,
