@@ -21,7 +21,9 @@ def number_in(text: str) -> float:
 def bounded(value: float) -> float:
     """A number as it is, 0 where it is below ``SMALLEST``; StiffmapError for one beyond ``LARGEST`` that is not endless."""
     if LARGEST < abs(value) < inf:
-        raise StiffmapError(f"expected a number of at most {LARGEST:.0e}, found {str(value)[:20]}")
+        raise StiffmapError(
+            f"the number is too large: expected at most {LARGEST:.0e}, found {str(value)[:20]}"
+        )
     return 0.0 if abs(value) < SMALLEST else value
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import bounded
 
 KeyPath = tuple[str | int, ...]
@@ -21,7 +21,7 @@ LONGEST_INTEGER = 300  # digits: what a float can hold
 
 
 class _Loader(yaml.SafeLoader):
-    pass
+    file = ""
 
 
 # YAML 1.2 core schema, in place of PyYAML's 1.1
@@ -57,8 +57,8 @@ def _sized(loader: Any, node: Any) -> float:
     """A number within the bounds of what is read."""
     try:
         return bounded(loader.construct_yaml_float(node))
-    except ValueError as error:
-        raise yaml.constructor.ConstructorError(problem=str(error), problem_mark=node.start_mark) from error
+    except StiffmapError as error:
+        raise FileError(str(error), file=loader.file, line=node.start_mark.line + 1) from error
 
 
 _PLAIN = {f"tag:yaml.org,2002:{t}" for t in ("null", "bool", "int", "float", "str", "seq", "map")}
@@ -86,6 +86,7 @@ def parse(text: str, file: str = "") -> Document:
     check_size(text, file)
     try:
         loader = _Loader(text)  # refuses characters that YAML has not
+        loader.file = file
     except yaml.YAMLError as error:
         raise FileError(f"not valid YAML: {' '.join(str(error).split())}", file=file) from error
     try:

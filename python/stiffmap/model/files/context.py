@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NoReturn, TypeVar
 
 from stiffmap.common.errors import FileError, together
+from stiffmap.common.number_text import LARGEST, SMALLEST
 from stiffmap.common.units import Dimension, UnitSystem
 from stiffmap.common.yaml_text import Document, KeyPath
 from stiffmap.model.files.report import key_text
@@ -17,8 +18,6 @@ from stiffmap.model.files.schema.elements import SpringModel
 from stiffmap.model.files.schema.springs import Material
 
 T = TypeVar("T")
-SMALLEST, LARGEST = 1e-60, 1e60
-"""Of a number that is not zero (SI): what lies beyond is a slip of the pen, and its products overflow."""
 
 
 @dataclass

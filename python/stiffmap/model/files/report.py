@@ -26,8 +26,6 @@ def validated(model: type[M], document: Document, file: str, expected: str) -> M
         return model.model_validate(document.data)
     except ValidationError as error:
         raise file_error(error, document, file) from error
-    except OverflowError as error:
-        raise FileError("a number is too large", file=file) from error
 
 
 def file_error(error: ValidationError, document: Document, file: str) -> FileError:
