@@ -154,11 +154,11 @@ def _limits_at(
 ) -> Floats:
     """(speeds,) m: `border`, found anew between its depth and the next, by parts and then by secants; itself stable."""
     out = border(depth, multiplier)
-    parts = max(2, -(-LOOKS // len(depth)))
+    ends = max(2, -(-LOOKS // len(depth))) + 1
     for i in np.flatnonzero(np.isfinite(out)):
         j = int(np.argmax(multiplier[i] >= 1))
         at, mu = np.r_[0.0, depth][j : j + 2], np.r_[0.0, multiplier[i]][j : j + 2]
-        close, tried = (at[1] - at[0]) / CLOSE, np.linspace(at[0], at[1], parts + 1)
+        close, tried = (at[1] - at[0]) / CLOSE, np.linspace(at[0], at[1], ends)
         while at[1] - at[0] > close:
             tried = np.sort(tried[(tried > at[0]) & (tried < at[1])])
             found = _multipliers(modes, p, speed[i : i + 1], tried, intervals, 1)[0]
@@ -188,11 +188,8 @@ def _modes(
 
 def _axis(given: ArrayLike, name: str, unit: str) -> Floats:
     out = np.atleast_1d(real_array(given, name, f"rising numbers above zero ({unit})"))
-    if (
-        out.ndim != 1
-        or not out.size
-        or not (np.isfinite(out).all() and out[0] > 0 and (np.diff(out) > 0).all())
-    ):
+    rises = out.ndim == 1 and out.size and np.isfinite(out).all() and out[0] > 0 and (np.diff(out) > 0).all()
+    if not rises:
         raise StiffmapError(f"{name}: expected rising numbers above zero ({unit})")
     return out
 

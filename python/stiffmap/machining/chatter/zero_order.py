@@ -25,9 +25,8 @@ SEARCHED = 20_000
 """Frequencies between the samples, in all."""
 MOST_TERMS, EXACT = 80, 1e-10
 """Of a rational function through samples; largest error, as a share of the largest value."""
-ZOOMS = 4
-AROUND = 400
-"""Frequencies close to each mode."""
+ZOOMS, AROUND = 4, 400
+"""Times that a least limit is looked at more closely, and frequencies close to each mode."""
 
 
 def limiting_depth(
@@ -132,13 +131,10 @@ def _between(frequency: Floats, G: np.ndarray) -> tuple[Floats, Response]:
                     c = w / (x[:, None] - f)
                     return np.asarray((c @ q / c.sum(axis=1, keepdims=True)).reshape(-1, 3, 3))
 
-            many = max(20, SEARCHED // len(G))
-            share = (np.arange(many) + 0.5) / many
+            share = np.linspace(0, 1, max(20, SEARCHED // len(G)) + 2)[1:-1]
             return (frequency[:-1, None] + np.diff(frequency)[:, None] * share).ravel(), at
-    warnings.warn(
-        f"receptance: no rational function passes through its {len(G)} samples (few of them, or noise), so the limiting depth is an "
-        "estimate: a mode between two samples may lower it", stacklevel=frames_of_this_package()
-    )  # fmt: skip
+    text = f"receptance: no rational function passes through its {len(G)} samples: the depth is an estimate, maybe too deep"
+    warnings.warn(text, stacklevel=frames_of_this_package())
     return frequency, lambda x: G[np.abs(frequency - x[:, None]).argmin(axis=1)]
 
 
