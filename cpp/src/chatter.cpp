@@ -4,119 +4,104 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <numbers>
+#include <numeric>
 
 #include "stiffmap/dense.hpp"
 
 namespace stiffmap {
 namespace {
 
-using Vec2 = Eigen::Vector2d;
 constexpr int most_terms = 18;  // of an exponential whose argument is at most one
-constexpr Index first_look = 10, looks = 6;
+constexpr Index first_look = 10, looks = 3, most_together = 8, most_nodes = 12;
+constexpr double settled = 1e-10;  // residual of the largest multiplier, relative
+constexpr double exact = 1e-13;    // of blocks by interpolation, whose entries are of order one
 
-/// d/dt of (q, q') by rows of `columns` numbers; the last two columns are pushed by what the last pass left.
-void rate(const ToolModes& m, const Chip& gain, std::size_t columns, bool pushed, const double* v, double* out) {
-  const auto n = static_cast<std::size_t>(m.omega.size());
-  std::copy(v + n * columns, v + 2 * n * columns, out);
-  for (std::size_t c = 0; c < columns; ++c) {
-    Vec2 seen = Vec2::Zero();
-    for (std::size_t k = 0; k < n; ++k) {
-      const auto i = static_cast<Index>(k);
-      seen[0] += m.way(0, i) * v[k * columns + c];
-      seen[1] += m.way(1, i) * v[k * columns + c];
-    }
-    if (pushed && c + 2 == columns) seen[0] -= 1;
-    if (pushed && c + 1 == columns) seen[1] -= 1;
-    const Vec3 force = gain * seen;
-    for (std::size_t k = 0; k < n; ++k) {
-      const auto i = static_cast<Index>(k);
-      const double w = m.omega[i];
-      out[(n + k) * columns + c] = -w * w * v[k * columns + c] - 2 * m.ratio[i] * w * v[(n + k) * columns + c] +
-                                   m.way.col(i).dot(force) / m.mass[i];
+/// Scratch of one row of depths.
+struct ChatterWorkspace {
+  MatX step, term, next;   // of one interval
+  MatX blocks;             // maps of some intervals each, one a column
+  MatX basis, hessenberg;  // of the search, which begins near what the last one found
+  VecX start, past, from, to;
+  Eigen::VectorXcd found;
+};
+
+/// Exact step of an interval: rows q and q' by the highest frequency, columns the same and what the last pass left.
+void transition(const ToolModes& m, const Chip& gain, double length, ChatterWorkspace& ws) {
+  const Index n = m.omega.size();
+  const double own = m.omega.maxCoeff();
+  const MatX pushed = m.mass.cwiseInverse().asDiagonal() * (m.way.transpose() * gain) / own;
+  MatX turned = pushed * m.way.topRows<2>();
+  turned.diagonal() -= m.omega.cwiseAbs2() / own;
+  const VecX slowed = -2 * m.ratio.cwiseProduct(m.omega);
+  const double fastest = std::max(own, turned.norm()) + slowed.cwiseAbs().maxCoeff();
+  const double pieces = std::ceil(std::max(1.0, length * fastest)), h = length / pieces;
+  ws.step.setIdentity(2 * n, 2 * n + 2);
+  ws.next.resize(2 * n, 2 * n + 2);
+  for (int piece = 0; piece < pieces; ++piece) {
+    ws.term = ws.step;
+    double left = 1;
+    for (int j = 1; j <= most_terms && left > 1e-17; ++j) {
+      ws.next.topRows(n) = own * ws.term.bottomRows(n);
+      ws.next.bottomRows(n) = turned.lazyProduct(ws.term.topRows(n)) + slowed.asDiagonal() * ws.term.bottomRows(n);
+      if (j == 1) ws.next.bottomRightCorner(n, 2) -= pushed;
+      ws.term = (h / j) * ws.next;
+      ws.step += ws.term;
+      left *= h * fastest / j;
     }
   }
 }
 
-/// Exact step of one interval with constant coefficients, into 2 n rows of 2 n + 2 numbers.
-void transition(const ToolModes& m, const Chip& gain, double length, double fastest, ChatterWorkspace& ws,
-                double* step) {
-  const auto n = 2 * static_cast<std::size_t>(m.omega.size());
-  const std::size_t columns = n + 2, size = n * columns;
-  const int pieces = static_cast<int>(std::ceil(std::max(1.0, length * fastest)));
-  const double h = length / pieces, argument = h * fastest;
-  ws.state.assign(size, 0.0);
-  ws.term.resize(size);
-  ws.next.resize(size);
-  for (std::size_t i = 0; i < n; ++i) ws.state[i * columns + i] = 1;
-  for (int piece = 0; piece < pieces; ++piece) {
-    rate(m, gain, columns, true, ws.state.data(), ws.term.data());
-    double factor = h, left = argument;
-    for (int j = 2; j <= most_terms; ++j) {
-      for (std::size_t i = 0; i < size; ++i) ws.state[i] += factor * ws.term[i];
-      left *= argument / j;
-      if (left < 1e-17) break;
-      rate(m, gain, columns, false, ws.term.data(), ws.next.data());
-      ws.term.swap(ws.next);
-      factor *= h / j;
-    }
+/// Some intervals at once: from the state and displacements of the last pass to the state and those of this pass.
+void prepare(const ToolModes& m, const std::vector<Chip>& chips, double period, double depth, ChatterWorkspace& ws) {
+  const auto k = static_cast<Index>(chips.size());
+  const Index n = m.omega.size(), together = k > most_together ? std::gcd(k, most_together) : 1;
+  const Index rows = 2 * n + 2 * together, columns = rows + 2;
+  const MatX before = MatX::Identity(columns, columns).bottomRows(2 * together + 2);
+  ws.blocks.setZero(rows * columns, k / together);
+  for (Index i = 0; i < k; ++i) {
+    const Index j = 2 * (i % together);
+    Eigen::Map<MatX> block(ws.blocks.col(i / together).data(), rows, columns);
+    if (j == 0) block.topRows(2 * n).setIdentity();
+    const Chip cut = depth * chips[static_cast<std::size_t>(i)];
+    const Chip gain = (Mat3::Identity() - cut * m.rest.topRows<2>()).inverse() * cut;
+    transition(m, gain, period / static_cast<double>(k), ws);
+    const MatX bent = m.way.topRows<2>() * block.topRows(n);
+    block.middleRows(2 * n + j, 2) = bent + m.rest.topRows<2>() * gain * (bent - before.middleRows(j, 2));
+    const MatX mean = 0.5 * (before.middleRows(j, 2) + before.middleRows(j + 2, 2));
+    const MatX moved = ws.step.leftCols(2 * n) * block.topRows(2 * n) + ws.step.rightCols(2) * mean;
+    block.topRows(2 * n) = moved;
   }
-  std::copy(ws.state.begin(), ws.state.end(), step);
 }
 
 /// One tooth period: state, then displacements of the last period, the oldest first.
-void pass(const ToolModes& m, ChatterWorkspace& ws, double* z) {
-  const auto n = static_cast<std::size_t>(m.omega.size());
-  const std::size_t k = ws.gain.size(), rows = 2 * n, columns = rows + 2;
-  const bool rests = !m.rest.isZero(0);
-  ws.passed.resize(4 * k);
-  ws.next.resize(rows);
-  std::copy(z + rows, z + rows + 2 * k, ws.passed.begin());
-  for (std::size_t i = 0; i < k; ++i) {
-    Vec2 bent = Vec2::Zero();
-    for (std::size_t j = 0; j < n; ++j) bent += z[j] * m.way.col(static_cast<Index>(j)).head<2>();
-    double* w = ws.passed.data() + 2 * i;
-    if (rests) bent += m.rest.topRows<2>() * (ws.gain[i] * (bent - Vec2(w[0], w[1])));
-    w[2 * k] = bent[0];
-    w[2 * k + 1] = bent[1];
-    const double x = 0.5 * (w[0] + w[2]), y = 0.5 * (w[1] + w[3]);
-    const double* row = ws.step.data() + i * rows * columns;
-    for (std::size_t r = 0; r < rows; ++r, row += columns) {
-      double sum = row[rows] * x + row[rows + 1] * y;
-      for (std::size_t c = 0; c < rows; ++c) sum += row[c] * z[c];
-      ws.next[r] = sum;
-    }
-    std::copy(ws.next.begin(), ws.next.begin() + static_cast<std::ptrdiff_t>(rows), z);
+void pass(Index state, ChatterWorkspace& ws, VecX& z) {
+  const Index past = z.size() - state, many = past / ws.blocks.cols(), rows = state + many;
+  ws.past.resize(past + 2);
+  ws.past.head(past) = z.tail(past);
+  ws.from.resize(rows + 2);
+  for (Index i = 0; i < ws.blocks.cols(); ++i) {
+    ws.from << z.head(state), ws.past.segment(i * many, many + 2);
+    ws.to.noalias() = Eigen::Map<const MatX>(ws.blocks.col(i).data(), rows, rows + 2) * ws.from;
+    z.head(state) = ws.to.head(state);
+    z.segment(state + i * many, many) = ws.to.tail(many);
+    if (i == 0) ws.past.tail<2>() = ws.to.segment<2>(state);  // where the last pass ended
   }
-  std::copy(ws.passed.begin() + static_cast<std::ptrdiff_t>(2 * k), ws.passed.end(), z + rows);
 }
 
-/// Largest eigenvalue of the leading j x j block and the length of its residual; `vector`: its real direction.
-double ritz(const MatX& H, Index j, double& residual, VecX& vector) {
-  const ComplexEigen e = general_eigen(MatX(H.topLeftCorner(j, j)));
-  Index best = 0;
-  const double top = e.values.cwiseAbs().maxCoeff(&best);
-  residual = std::abs(H(j, j - 1)) * std::abs(e.vectors(j - 1, best));
-  vector = e.vectors.col(best).real();
-  return top;
-}
-
-/// Arnoldi's iteration on the map of one tooth period, from what the last call found.
-double dominant(const ToolModes& modes, ChatterWorkspace& ws) {
-  const Index size = 2 * modes.omega.size() + 2 * static_cast<Index>(ws.gain.size());
-  if (ws.start.size() != size || !(ws.start.norm() > 0) || !ws.start.allFinite()) {
-    ws.start.resize(size);
-    for (Index i = 0; i < size; ++i) ws.start[i] = 1 + 0.5 * std::sin(1.7 * static_cast<double>(i * i) + 0.3);
-  }
+/// Arnoldi's iteration on the map of one tooth period, from what the last calls found.
+double dominant(Index state, Index size, ChatterWorkspace& ws) {
+  if (!(ws.start.norm() > 0) || !ws.start.allFinite())
+    ws.start = 1 + 0.5 * (1.7 * Eigen::ArrayXd::LinSpaced(size, 0, static_cast<double>(size - 1)).square() + 0.3).sin();
   const Index most = std::min<Index>(size, 120);
   ws.basis.resize(size, most + 1);
-  ws.hessenberg.setZero(most + 1, most);
+  ws.hessenberg.resize(most + 1, most);
   ws.basis.col(0) = ws.start.normalized();
-  double top = 0, residual = 0;
-  VecX vector;
-  for (Index j = 0; j < most; ++j) {
+  for (Index j = 0;; ++j) {
     VecX z = ws.basis.col(j);
-    pass(modes, ws, z.data());
+    pass(state, ws, z);
     const double before = z.norm();
+    ws.hessenberg.col(j).setZero();
     for (int twice = 0; twice < 2; ++twice) {
       const VecX c = ws.basis.leftCols(j + 1).transpose() * z;
       z -= ws.basis.leftCols(j + 1) * c;
@@ -126,34 +111,63 @@ double dominant(const ToolModes& modes, ChatterWorkspace& ws) {
     ws.hessenberg(j + 1, j) = rest;
     const bool last = j + 1 == most || rest <= 1e-14 * before;
     if (last || (j + 1 >= first_look && (j + 1 - first_look) % looks == 0)) {
-      top = ritz(ws.hessenberg, j + 1, residual, vector);
-      if (last || residual <= ws.settled * std::max(top, 1e-3)) {
-        ws.start = ws.basis.leftCols(j + 1) * vector + 1e-3 * ws.basis.col(0);
+      const ComplexEigen e = general_eigen(MatX(ws.hessenberg.topLeftCorner(j + 1, j + 1)));
+      Index best = 0;
+      const double top = e.values.cwiseAbs().maxCoeff(&best);
+      if (last || rest * std::abs(e.vectors(j, best)) <= settled * std::max(top, 1e-3)) {
+        Eigen::VectorXcd found = ws.basis.leftCols(j + 1) * e.vectors.col(best);
+        const std::complex<double> turn = ws.found.size() > 0 ? ws.found.dot(found) : 0;
+        const bool same = std::abs(turn) > 0.9;  // of length one both: the path of one vector goes on
+        if (same) found *= std::conj(turn) / std::abs(turn);
+        ws.start = same ? VecX((2 * found - ws.found).real()) : VecX(found.real());
+        ws.start += 1e-3 * ws.basis.col(0);
+        ws.found = found;
         return top;
       }
     }
     ws.basis.col(j + 1) = z / rest;
   }
-  return top;
+}
+
+/// Lagrange's weights of nodes at a depth.
+VecX weights(const VecX& nodes, double depth) {
+  VecX w = VecX::Ones(nodes.size());
+  for (Index i = 0; i < nodes.size(); ++i)
+    for (Index j = 0; j < nodes.size(); ++j)
+      if (i != j) w[i] *= (depth - nodes[j]) / (nodes[i] - nodes[j]);
+  return w;
 }
 
 }  // namespace
 
-double largest_multiplier(const ToolModes& modes, const std::vector<Chip>& chips, double period, double depth,
-                          ChatterWorkspace& ws) {
-  const std::size_t k = chips.size(), rows = 2 * static_cast<std::size_t>(modes.omega.size()), size = rows * (rows + 2);
-  ws.step.resize(k * size);
-  ws.gain.resize(k);
-  const double own = modes.omega.maxCoeff(), lightest = modes.mass.minCoeff();
-  for (std::size_t i = 0; i < k; ++i) {
-    const Chip cut = depth * chips[i];
-    ws.gain[i] = modes.rest.isZero(0) ? cut : Chip((Mat3::Identity() - cut * modes.rest.topRows<2>()).inverse() * cut);
-    const double fastest =
-        std::sqrt(own * own + static_cast<double>(modes.omega.size()) * ws.gain[i].norm() / lightest) +
-        2 * modes.ratio.maxCoeff() * own;
-    transition(modes, ws.gain[i], period / static_cast<double>(k), fastest, ws, ws.step.data() + i * size);
+VecX largest_multipliers(const ToolModes& modes, const std::vector<Chip>& chips, double period, const VecX& depths) {
+  ChatterWorkspace ws;
+  const Index state = 2 * modes.omega.size(), size = state + 2 * static_cast<Index>(chips.size());
+  VecX nodes, out(depths.size());
+  MatX at_nodes, at_ends;  // blocks, one depth a column
+  const auto keep = [&](MatX& kept, double depth) {
+    prepare(modes, chips, period, depth, ws);
+    kept.conservativeResize(ws.blocks.size(), kept.cols() + 1);
+    kept.rightCols<1>() = ws.blocks.reshaped();
+  };
+  bool direct = true;  // or else polynomials in the depth through Chebyshev's nodes, judged where they are worst
+  for (Index count = 4; direct && count <= most_nodes && count + 2 < depths.size(); count += 2) {
+    const double low = depths.minCoeff(), high = depths.maxCoeff(), gap = std::numbers::pi / static_cast<double>(count);
+    nodes = VecX::LinSpaced(count, 0.5 * gap, std::numbers::pi - 0.5 * gap).array().cos();
+    nodes = (0.5 * (low + high) + 0.5 * (high - low) * nodes.array()).matrix();
+    at_nodes.resize(0, 0);
+    for (const double node : nodes) keep(at_nodes, node);
+    if (at_ends.size() == 0)
+      for (const double end : {low, high}) keep(at_ends, end);
+    direct = !((at_nodes * weights(nodes, low) - at_ends.col(0)).cwiseAbs().maxCoeff() <= exact &&
+               (at_nodes * weights(nodes, high) - at_ends.col(1)).cwiseAbs().maxCoeff() <= exact);
   }
-  return dominant(modes, ws);
+  for (Index j = 0; j < depths.size(); ++j) {
+    if (direct) prepare(modes, chips, period, depths[j], ws);
+    else ws.blocks.reshaped().noalias() = at_nodes * weights(nodes, depths[j]);
+    out[j] = dominant(state, size, ws);
+  }
+  return out;
 }
 
 }  // namespace stiffmap

@@ -90,17 +90,15 @@ py::array_t<double> multipliers(const Array& frequency, const Array& ratio, cons
   std::vector<Chip> cut;
   for (py::ssize_t i = 0; i < k; ++i)
     cut.emplace_back(Eigen::Map<const Eigen::Matrix<double, 3, 2, Eigen::RowMajor>>(c + 6 * i));
-  const double *periods = data(period, {n}, "period"), *depths = data(depth, {d}, "depth");
+  const double* periods = data(period, {n}, "period");
+  const VecX depths = Eigen::Map<const VecX>(data(depth, {d}, "depth"), d);
   py::array_t<double> out({n, d});
   double* found = out.mutable_data();
   {
     py::gil_scoped_release free;
     parallel_chunks(n, 1, threads, [&](int, long begin, long end) {
-      ChatterWorkspace ws;
-      for (long i = begin; i < end; ++i) {
-        ws.start.resize(0);  // a row depends on no other
-        for (py::ssize_t j = 0; j < d; ++j) found[d * i + j] = largest_multiplier(tool, cut, periods[i], depths[j], ws);
-      }
+      for (long i = begin; i < end; ++i)
+        Eigen::Map<VecX>(found + d * i, d) = largest_multipliers(tool, cut, periods[i], depths);
     });
   }
   return out;

@@ -2,7 +2,6 @@
 // Stability of milling: the largest multiplier of one tooth period by semi-discretization (theory V5).
 #pragma once
 
-#include <cstddef>
 #include <vector>
 
 #include "stiffmap/types.hpp"
@@ -18,19 +17,7 @@ struct ToolModes {
   Mat3 rest = Mat3::Zero();                      ///< m/N that follows the force at once
 };
 
-/// Scratch of `largest_multiplier`.
-struct ChatterWorkspace {
-  std::vector<double> step;  ///< per interval, by rows: state by state and by what the last pass left
-  std::vector<double> state, term, next;
-  std::vector<Chip> gain;
-  MatX basis, hessenberg;
-  VecX start;                  ///< where the next search begins: near what the last one found
-  std::vector<double> passed;  ///< displacements of two periods, the oldest first
-  double settled = 1e-10;      ///< residual of the largest multiplier, relative
-};
-
-/// |mu| of the largest multiplier; `chips`: means over the equal intervals of a tooth period (s), depth in m.
-double largest_multiplier(const ToolModes& modes, const std::vector<Chip>& chips, double period, double depth,
-                          ChatterWorkspace& ws);
+/// |mu| of the largest multiplier at depths (m); `chips`: means over the equal intervals of a tooth period (s).
+VecX largest_multipliers(const ToolModes& modes, const std::vector<Chip>& chips, double period, const VecX& depths);
 
 }  // namespace stiffmap

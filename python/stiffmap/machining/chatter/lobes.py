@@ -29,8 +29,8 @@ SPEEDS, DEPTHS = 120, 80
 PER_WAVE = 16
 """Intervals of a tooth period for each oscillation of the fastest mode in it."""
 LEAST, MOST = 40, 320
-ZOOMS, PARTS = 4, 8
-"""Times that a limit is found anew between two depths, and parts of them."""
+LOOKS, CLOSE = 640, 4096
+"""Depths of a diagram at which a limit is looked for, and parts of the step between two to which it is then found."""
 PER_TASK = 8
 """Speeds of one task on a cluster."""
 HIGHEST = 4.0
@@ -152,16 +152,22 @@ def _across(tool: Floats) -> Floats:
 def _limits_at(
     modes: ToolModes, p: Process, speed: Floats, depth: Floats, multiplier: Floats, intervals: int | None
 ) -> Floats:
-    """(speeds,) m: `border`, found anew between its depth and the next."""
+    """(speeds,) m: `border`, found anew between its depth and the next, by parts and then by secants; itself stable."""
     out = border(depth, multiplier)
+    ends = max(2, -(-LOOKS // len(depth))) + 1
     for i in np.flatnonzero(np.isfinite(out)):
-        low, high = out[i], depth[np.searchsorted(depth, out[i], side="right")]
-        for _ in range(ZOOMS):
-            tried = np.linspace(low, high, PARTS + 1)
-            over = _multipliers(modes, p, speed[i : i + 1], tried[1:-1], intervals, 1)[0] >= 1
-            j = int(np.argmax(np.r_[over, True]))
-            low, high = tried[j], tried[j + 1]
-        out[i] = low
+        j = int(np.argmax(multiplier[i] >= 1))
+        at, mu = np.r_[0.0, depth][j : j + 2], np.r_[0.0, multiplier[i]][j : j + 2]
+        close, tried = (at[1] - at[0]) / CLOSE, np.linspace(at[0], at[1], ends)
+        while at[1] - at[0] > close:
+            tried = np.sort(tried[(tried > at[0]) & (tried < at[1])])
+            found = _multipliers(modes, p, speed[i : i + 1], tried, intervals, 1)[0]
+            at, mu = np.r_[at[0], tried, at[1]], np.r_[mu[0], found, mu[1]]
+            j = int(np.argmax(mu >= 1))
+            at, mu = at[j - 1 : j + 1], mu[j - 1 : j + 1]
+            root = at[0] + (1 - mu[0]) / (mu[1] - mu[0]) * (at[1] - at[0])
+            tried = np.array([root - 0.4 * close, root + 0.4 * close, at.mean()])
+        out[i] = at[0]
     return out
 
 
@@ -182,11 +188,8 @@ def _modes(
 
 def _axis(given: ArrayLike, name: str, unit: str) -> Floats:
     out = np.atleast_1d(real_array(given, name, f"rising numbers above zero ({unit})"))
-    if (
-        out.ndim != 1
-        or not out.size
-        or not (np.isfinite(out).all() and out[0] > 0 and (np.diff(out) > 0).all())
-    ):
+    rises = out.ndim == 1 and out.size and np.isfinite(out).all() and out[0] > 0 and (np.diff(out) > 0).all()
+    if not rises:
         raise StiffmapError(f"{name}: expected rising numbers above zero ({unit})")
     return out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable
 from math import pi
 from typing import Any
@@ -11,6 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.deprecation import frames_of_this_package
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, mean_chips, milling_process, spindle_speed
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows
@@ -19,13 +21,12 @@ Response = Callable[[Floats], np.ndarray]
 """Receptance (frequencies, 3, 3) m/N in the axes of the cut at (frequencies,) Hz."""
 FEED, TOOL = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 """Directions of the feed and from the tool's tip to its holder where none is given, base axes."""
-BETWEEN = 20
-"""Frequencies between two samples."""
+SEARCHED = 20_000
+"""Frequencies between the samples, in all."""
 MOST_TERMS, EXACT = 80, 1e-10
 """Of a rational function through samples; largest error, as a share of the largest value."""
-ZOOMS = 4
-AROUND = 400
-"""Frequencies close to each mode."""
+ZOOMS, AROUND = 4, 400
+"""Times that a least limit is looked at more closely, and frequencies close to each mode."""
 
 
 def limiting_depth(
@@ -50,7 +51,8 @@ def limiting_depth(
     feed, tool
         (3,) directions of the feed and from the tool's tip to its holder, base axes; of a receptance only.
 
-    Infinite where nothing that vibrates can chatter, NaN where a pose failed. Zero order: the mean of the directional
+    Infinite where nothing that vibrates can chatter, NaN where a pose failed. Between the samples of a receptance a rational function
+    through them is searched; where there is none, as with noise or few samples, a warning says that the depth is an estimate. Zero order: the mean of the directional
     factors; for low immersion ask `floquet_multiplier`. Raises StiffmapError for bad input. Source: docs/theory.md, V4.
     """
     p, modes = milling_process(process), None
@@ -62,16 +64,15 @@ def limiting_depth(
         modes = mode_rows(receptance)
         frequency = frequencies_of(modes.frequency)
         G = modes.receptance(frequency)
-    depth, angle = limits(G, p)
-    if speed is None:
-        out = np.empty(G.shape[:-3])
-        for i in np.ndindex(out.shape):  # a mode may lie between two samples
-            out[i] = least_depth(*((frequency, modes.receptance) if modes else _between(frequency, G[i])), p)
-    else:
-        period = 2 * pi / (p.tool.teeth * spindle_speed(speed, p))
-        out = at_periods(frequency, depth, angle, np.array([period]))[..., 0]
-    failed = np.isnan(G).any(axis=(-1, -2, -3))
-    out = np.where(failed, np.nan, out)
+    period = None if speed is None else np.array([2 * pi / (p.tool.teeth * spindle_speed(speed, p))])
+    out = np.full(G.shape[:-3], np.nan)
+    for i in np.argwhere(np.isfinite(G).all(axis=(-1, -2, -3))):  # a mode may lie between two samples
+        f, response = (frequency, modes.receptance) if modes else _between(frequency, G[*i])
+        out[*i] = (
+            least_depth(f, response, p)
+            if period is None
+            else at_periods(f, *limits(response(f), p), period)[0]
+        )
     return float(out) if out.ndim == 0 else out
 
 
@@ -114,7 +115,7 @@ def _between(frequency: Floats, G: np.ndarray) -> tuple[Floats, Response]:
     values = G.reshape(len(G), -1)
     size = np.abs(values).max()
     fit, chosen = np.broadcast_to(values.mean(axis=0), values.shape), []
-    for _ in range(min(MOST_TERMS, len(G) // 2) if np.isfinite(size) else 0):
+    for _ in range(min(MOST_TERMS, len(G) // 3)):
         chosen.append(int(np.argmax(np.abs(values - fit).max(axis=1))))
         rest = np.setdiff1d(np.arange(len(G)), chosen)
         q, f = values[chosen], frequency[chosen]
@@ -130,8 +131,10 @@ def _between(frequency: Floats, G: np.ndarray) -> tuple[Floats, Response]:
                     c = w / (x[:, None] - f)
                     return np.asarray((c @ q / c.sum(axis=1, keepdims=True)).reshape(-1, 3, 3))
 
-            share = (np.arange(BETWEEN) + 0.5) / BETWEEN
+            share = np.linspace(0, 1, max(20, SEARCHED // len(G)) + 2)[1:-1]
             return (frequency[:-1, None] + np.diff(frequency)[:, None] * share).ravel(), at
+    text = f"receptance: no rational function passes through its {len(G)} samples: the depth is an estimate, maybe too deep"
+    warnings.warn(text, stacklevel=frames_of_this_package())
     return frequency, lambda x: G[np.abs(frequency - x[:, None]).argmin(axis=1)]
 
 
@@ -161,9 +164,3 @@ def at_periods(frequency: Floats, depth: Floats, angle: Floats, period: Floats) 
         a, b = depth[..., :-1, :, None], depth[..., 1:, :, None]
         between = np.where(crossed & np.isfinite(a) & np.isfinite(b), a + share * (b - a), np.inf)
     return np.asarray(np.min(between, axis=(-2, -3)))
-
-
-def oriented_limit(receptance: ArrayLike, pressure: float) -> float:
-    """m: -1/(2 Kf G), G the least real part of an oriented receptance (frequencies,) m/N, Kf N/m² (Tlusty's limit)."""
-    least = float(np.real(np.asarray(receptance)).min())
-    return np.inf if least >= 0 else -1 / (2 * pressure * least)

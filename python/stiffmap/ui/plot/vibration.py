@@ -53,7 +53,7 @@ def lobes_figure(
         ax.set_ylim(0, d[-1])
         ax.set_xlabel("speed of the spindle, rpm")
         ax.set_ylabel("depth along the tool, mm")
-        headline(figure, title)
+        headline(figure, f"{title}\ndamping {lobes.attrs['damping']}")
         legend_below(figure, ax.get_legend_handles_labels()[0])
     return figure
 

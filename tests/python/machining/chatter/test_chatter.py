@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -12,7 +14,7 @@ from stiffmap.machining.chatter.cut import chips, cut_axes, milling_process
 from stiffmap.machining.chatter.floquet import multiplier_map
 from stiffmap.machining.chatter.lobes import border, pockets
 from stiffmap.machining.chatter.modes import mode_rows, modes_of_machine
-from stiffmap.machining.chatter.zero_order import limits, oriented_limit
+from stiffmap.machining.chatter.zero_order import at_periods, limits
 from stiffmap.solve.compiled import multipliers
 from stiffmap.ui.cli import main
 from stiffmap.workspace.vibration.modes import tip_modes
@@ -102,19 +104,6 @@ def test_zero_order_of_two_modes_per_axis(side, radial, limit):
     assert 1e3 * sm.limiting_depth(published_receptance(), cut) == pytest.approx(limit, abs=6e-4)
 
 
-def test_skewed_modes_have_the_limit_of_tlusty():
-    """a = -1/(2 Kf G): one force direction, modes at +30 and -45 deg, against the real part found by hand."""
-    f = np.linspace(50, 600, 400001)
-    rows = [(250.0, 0.012, 2.26e8, np.radians(30)), (150.0, 0.010, 2.13e8, np.radians(-45))]
-    G = sum(np.cos(a) ** 2 / k / (1 - (f / n) ** 2 + 2j * z * f / n) for n, z, k, a in rows)
-    found = oriented_limit(G, 1000e6)
-    # near the dip of one mode alone: -cos² / (4 k z (1 + z)), the other mode adds its flexibility there
-    n, z, k, a = rows[0]
-    dip = -(np.cos(a) ** 2) / (4 * k * z * (1 + z))
-    other = np.cos(rows[1][3]) ** 2 / rows[1][2] / (1 - (n * np.sqrt(1 + 2 * z) / rows[1][0]) ** 2)
-    assert found == pytest.approx(-1 / (2 * 1000e6 * (dip + other)), rel=2e-3)
-
-
 def test_zero_order_is_the_border_of_a_full_slot():
     """In a slot of many teeth the directional factors hardly vary: both methods then agree."""
     cut = process(10.0, "slot")
@@ -173,6 +162,87 @@ def test_modes_couple_where_eigenvalues_turn_complex():
     a = depths[found[0]]
     assert not mode_coupling(rows, cut, 0.995 * a).unstable and mode_coupling(rows, cut, 1.005 * a).unstable
     assert coupling_depth(rows, cut) > a  # damping holds a little longer
+
+
+def time_domain(modes, p, speed, depth, steps, periods=60):
+    """(cells,) growth of one tooth period: the equation with delay, integrated by Runge and Kutta's method of order four."""
+    law, n, cells = p.law, p.tool.teeth, len(speed)
+    T = (2 * np.pi / (n * speed))[:, None]
+    own = 2 * np.pi * modes.frequency
+    h, still = T / steps, modes.rest[:2]
+
+    def force(part, bare, before):
+        """Of the displacement without the part that follows at once, and of the last pass; part of a tooth period."""
+        A = np.zeros((3, 2))
+        for at in 2 * np.pi / n * (part % 1 + np.arange(n)):
+            if p.cut.side == "slot" and at <= np.pi:
+                s, c = np.sin(at), np.cos(at)
+                t, r, a = law.Ktc, law.Krc, law.Kac
+                A += np.outer([-t * c - r * s, t * s - r * c, a], [s, c])
+        A = depth[:, None, None] * A
+        F = np.linalg.solve(np.eye(3) - A @ still, (A @ (bare - before)[..., None]))[..., 0]
+        return F, bare + F @ still.T
+
+    def rate(q, v, F):
+        return v, F @ modes.way.T / modes.mass - own**2 * q - 2 * modes.ratio * own * v
+
+    past = np.zeros((2 * steps + 1, cells, 2))
+    q, v = np.ones((cells, len(modes))), np.zeros((cells, len(modes)))
+    way, size = modes.way[:, :2], []
+    for _ in range(periods):
+        now = np.zeros_like(past)
+        for i in range(steps):
+            F, now[2 * i] = force(i / steps, q @ way, past[2 * i])
+            a0, b0 = rate(q, v, F)
+            a1, b1 = rate(
+                q + h / 2 * a0,
+                v + h / 2 * b0,
+                force((i + 0.5) / steps, (q + h / 2 * a0) @ way, past[2 * i + 1])[0],
+            )
+            a2, b2 = rate(
+                q + h / 2 * a1,
+                v + h / 2 * b1,
+                force((i + 0.5) / steps, (q + h / 2 * a1) @ way, past[2 * i + 1])[0],
+            )
+            last = past[2 * i + 2] if i + 1 < steps else now[0]
+            a3, b3 = rate(q + h * a2, v + h * b2, force((i + 1) / steps, (q + h * a2) @ way, last)[0])
+            new, fast = q + h / 6 * (a0 + 2 * a1 + 2 * a2 + a3), v + h / 6 * (b0 + 2 * b1 + 2 * b2 + b3)
+            middle = (q + new) / 2 + h / 8 * (v - fast)
+            now[2 * i + 1] = force((i + 0.5) / steps, middle @ way, past[2 * i + 1])[1]
+            q, v = new, fast
+        past = now
+        past[-1] = force(0.0, q @ way, now[0])[1]
+        size.append(np.log((past**2).sum(axis=(0, 2))) / 2)
+    third = periods // 3
+    return np.exp((np.mean(size[2 * third :], axis=0) - np.mean(size[third : 2 * third], axis=0)) / third)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "rpm"),
+    [
+        ("ur10", "slot", (700, 2000)), ("linear-delta", "slot", (6000, 9000)),
+        ("orthoglide-revised", "slot", (2500, 4000)), ("hexapod", "slot", (6000, 9000)),
+        ("examples/taps/kr210.yaml", "examples/taps/cut.yaml", (700, 1000)),
+    ],
+)  # fmt: skip
+def test_lobes_of_machines_in_the_time_domain(name, given, rpm):
+    """Half, nine tenths, six fifths and twice the limit, and how fast the deepest grows."""
+    speeds = np.array(rpm) * np.pi / 30
+    ds = sm.stability_lobes(name, given, speeds=speeds, depths=1e-4 * np.linspace(0, 50, 31)[1:])
+    shares = np.array([0.5, 0.9, 1.2, 2])
+    speed, depth = np.repeat(speeds, 4), (ds.limit.values[:, None] * shares).ravel()
+    machine = sm.load_machine(name)
+    axes = cut_axes(np.array(ds.attrs["feed"]), np.array(ds.attrs["tool"]))
+    modes = modes_of_machine(tip_modes(machine, machine.description.home.p)).turned(axes).below(np.inf)
+    found = time_domain(modes, milling_process(given), speed, depth, 120 if "kr210" in name else 240).reshape(
+        2, 4
+    )
+    assert ((found < 1) == (shares < 1)).all()
+    mu = [
+        sm.floquet_multiplier(modes, given, s, 2 * d, 320)
+        for s, d in zip(speeds, ds.limit.values, strict=True)
+    ]
+    np.testing.assert_allclose(found[:, 3], mu, rtol=4e-3)
 
 
 def test_lobes_of_a_machine_and_their_pockets():
@@ -239,6 +309,27 @@ def test_limiting_depth_is_no_deeper_than_any_sample(name, count):
     assert sm.limiting_depth(modes, "slot") <= least * (1 + 1e-5)
     ds = sm.vibration_map(machine, np.array([at]), "slot")
     assert float(ds.limiting_depth[0]) <= least * (1 + 1e-5)
+
+
+@pytest.mark.parametrize("name", ["ur10", "linear-delta", "orthoglide-revised", "hexapod"])
+@pytest.mark.parametrize(("count", "noise"), [(5, 0.0), (10, 0.0), (20, 0.0), (60, 0.0), (60, 1e-3)])
+@pytest.mark.parametrize("speed", [None, "6000 rpm"])
+def test_few_or_noisy_samples_are_safe_or_an_estimate(name, count, noise, speed):
+    machine = sm.load_machine(name)
+    at = machine.description.home.p
+    own = sm.natural_frequencies(machine, at, modes=6).frequency
+    f = np.linspace(0.3 * np.nanmin(own), 2 * np.nanmax(own), count)
+    axes, p = cut_axes(np.array([1.0, 0, 0]), np.array([0, 0, 1.0])), milling_process("slot")
+    many = np.linspace(f[0], f[-1], 20_001)
+    depth, angle = limits(axes @ sm.frequency_response(machine, at, many).values[:, :3, :3] @ axes.T, p)
+    dense = depth.min() if speed is None else at_periods(many, depth, angle, np.array([np.pi / p.spindle]))[0]
+    H = sm.frequency_response(machine, at, f)
+    rng = np.random.default_rng(1)
+    H = H + noise * np.abs(H) * (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        found = sm.limiting_depth(H, "slot", speed=speed)
+    assert any("is an estimate" in str(w.message) for w in said) or 0 < found <= dense * 1.001
 
 
 @pytest.mark.parametrize(
