@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Sequence
+from types import FrameType
 
 LONGEST_WORD, LONGEST_MESSAGE = 400, 3000  # characters
 MOST_PROBLEMS = 20  # shown of one file
@@ -70,3 +72,12 @@ def shortened(message: str) -> str:
     cut = re.sub(rf"\S{{{LONGEST_WORD},}}", lambda m: f"{m[0][:60]}…{m[0][-20:]}", message)
     left = len(cut) - LONGEST_MESSAGE
     return cut if left <= 0 else f"{cut[:LONGEST_MESSAGE]}… ({left} more characters)"
+
+
+def frames_of_this_package() -> int:
+    """How many callers, from the function that asks on, are in stiffmap itself."""
+    frame: FrameType | None = sys._getframe(1)
+    count = 1
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "stiffmap":
+        frame, count = frame.f_back, count + 1
+    return count

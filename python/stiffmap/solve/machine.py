@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, wraps
 from os import PathLike
-from types import FrameType
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError, frames_of_this_package
 from stiffmap.common.from_above import from_above
 from stiffmap.common.html import machine_html
 from stiffmap.common.kept import Recent
@@ -375,20 +373,11 @@ def hint_metres(machine: Machine, position: ArrayLike, failed: bool) -> None:
     if not finite.all():
         rows = np.atleast_1d(finite.all(axis=-1))
         text = f"{int((~rows).sum())} of {rows.size} positions are not finite numbers (nan or inf); their status is UNREACHABLE"
-        warnings.warn(text, stacklevel=_frames_of_this_package())
+        warnings.warn(text, stacklevel=frames_of_this_package())
         return
     text = metres_expected(machine.compiled, position) if failed else ""
     if text:
-        warnings.warn(f"no pose can be reached: {text}", stacklevel=_frames_of_this_package())
-
-
-def _frames_of_this_package() -> int:
-    """How many callers, from the function that asks on, are in stiffmap itself."""
-    frame: FrameType | None = sys._getframe(1)
-    count = 1
-    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "stiffmap":
-        frame, count = frame.f_back, count + 1
-    return count
+        warnings.warn(f"no pose can be reached: {text}", stacklevel=frames_of_this_package())
 
 
 def metres_expected(machine: CompiledMachine, position: ArrayLike) -> str:

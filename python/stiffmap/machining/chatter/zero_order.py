@@ -12,8 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array
-from stiffmap.common.deprecation import frames_of_this_package
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError, frames_of_this_package
 from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, mean_chips, milling_process, spindle_speed
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows
 
