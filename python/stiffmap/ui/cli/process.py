@@ -17,7 +17,7 @@ def process(
         Path,
         typer.Argument(
             help="CSV file or workbook: feed_per_tooth_mm, Fx_N, Fy_N, Fz_N, teeth, axial_mm; side, radial_mm, diameter_mm, "
-            "helix_deg, spindle_rpm; time_s. Also feed [mm/min], Fx [kN] …"
+            "helix_deg, spindle_rpm; time_s. Also feed (mm/min), Fx (kN) …"
         ),
     ],
     base: Annotated[
@@ -26,7 +26,9 @@ def process(
             "--process", help="Process file or shipped name: tool, cut and speed that no column has."
         ),
     ] = None,
-    sheet: Annotated[str | None, typer.Option(help="Sheet of a workbook. [default: the first]")] = None,
+    sheet: Annotated[
+        str | None, typer.Option(help="Sheet of a workbook; the first where none is named.")
+    ] = None,
     output: Annotated[Path | None, written(help="Process file, for mill, lobes, map and so on.")] = None,
     as_json: JsonOption = False,
 ) -> None:

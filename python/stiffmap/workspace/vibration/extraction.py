@@ -52,11 +52,11 @@ def extract_modes(responses: list[MeasuredResponse]) -> ExtractedModes:
     f, H = f[take], np.array([r.receptance[take] for r in responses])
     fit = _Fit(f, H, np.array([_noise(r, take) for r in responses]))
     best, t = fit.criterion(np.zeros(0)), np.zeros(0)
-    while len(t) < 2 * MOST:
-        better = next((new for new in fit.with_one_more(t) if fit.criterion(new) < best - GAIN), None)
-        if better is None:
+    while len(t) < 2 * MOST and (more := fit.with_one_more(t)) is not None:
+        better = fit.criterion(more)
+        if not better < best - GAIN:
             break
-        t, best = better, fit.criterion(better)
+        t, best = more, better
     return fit.answer(t)
 
 
@@ -85,29 +85,30 @@ class _Fit:
         far = np.stack([np.ones_like(self.f), (self.f[0] / self.f) ** 2], axis=1)
         return np.asarray(np.hstack([q, 1j * x * q, far]))
 
-    def solved(self, t: Floats) -> tuple[list[Floats], Floats, list[Floats]]:
-        """Coefficients, misfit (responses, 2 frequencies) by noise, and covariance of the coefficients, of each response."""
+    def columns(self, t: Floats) -> list[Floats]:
+        """Of each response (2 frequencies, coefficients), by its noise."""
         A = self.basis(t)
-        coefficients, misfit, covariance = [], [], []
-        for h, s in zip(self.H, self.sigma, strict=True):
-            B = np.concatenate([A.real / s[:, None], A.imag / s[:, None]])
+        return [np.concatenate([A.real / s[:, None], A.imag / s[:, None]]) for s in self.sigma]
+
+    def solved(self, t: Floats) -> tuple[list[Floats], Floats]:
+        """Coefficients, and misfit (responses, 2 frequencies) by noise, of each response."""
+        coefficients, misfit = [], []
+        for B, h, s in zip(self.columns(t), self.H, self.sigma, strict=True):
             y = np.concatenate([h.real / s, h.imag / s])
             c = np.linalg.lstsq(B, y, rcond=1e-12)[0]
             coefficients.append(c)
             misfit.append(B @ c - y)
-            covariance.append(np.linalg.pinv(B.T @ B))
-        return coefficients, np.array(misfit), covariance
+        return coefficients, np.array(misfit)
 
     def criterion(self, t: Floats) -> float:
         """Bayesian information criterion, the level of the noise being free."""
         r, n = self.solved(t)[1], 2 * self.H.size
         return float(n * np.log((r**2).sum() / n) + (len(t) + len(self.H) * len(t)) * np.log(n))
 
-    def with_one_more(self, t: Floats) -> list[Floats]:
-        """Poles with one more, fitted, the most promising first."""
+    def with_one_more(self, t: Floats) -> Floats | None:
+        """Poles with one more, fitted, at the most promising place where all stay within their bounds; None: nowhere."""
         r = self.solved(t)[1].reshape(len(self.H), 2, -1)
         power = uniform_filter1d((r**2).sum(axis=(0, 1)), 3)
-        out = []
         for _ in range(PEAKS):
             k = int(np.argmax(power))
             power[np.abs(np.log(self.f / self.f[k])) < 0.05] = 0.0
@@ -123,23 +124,23 @@ class _Fit:
                 bounds=(low, high), max_nfev=30,
             )  # fmt: skip
             if ((fit.x > low + 1e-3) & (fit.x < high - 1e-3)).all():
-                out.append(fit.x)
-                break
-        return out
+                return np.asarray(fit.x)
+        return None
 
     def answer(self, t: Floats) -> ExtractedModes:
         """Modes by frequency; the level of the noise is that of the misfit."""
         n = len(t) // 2
-        c, r, own = self.solved(t)
+        c, r = self.solved(t)
         moved = [self.solved(t + 1e-5 * e) for e in np.eye(2 * n)]
         J = np.array([(m[1] - r).ravel() for m in moved]).reshape(2 * n, r.size).T / 1e-5
         level = (r**2).sum() / max(1, r.size - 2 * n - len(r) * (2 * n + 2))
         C = level * np.linalg.pinv(J.T @ J)
         flexibility, u = np.zeros((n, len(r))), np.zeros((n, len(r)))
-        for j in range(len(r)):
+        for j, B in enumerate(self.columns(t)):
+            own = np.linalg.pinv(B.T @ B)
             G = np.array([(m[0][j] - c[j])[:n] for m in moved]).reshape(2 * n, n).T / 1e-5
             flexibility[:, j] = c[j][:n]
-            u[:, j] = np.sqrt(np.diag(level * own[j])[:n] + np.einsum("ik,kl,il->i", G, C, G))
+            u[:, j] = np.sqrt(np.diag(level * own)[:n] + np.einsum("ik,kl,il->i", G, C, G))
         (f, ratio), (u_f, u_ratio) = np.exp(t.reshape(2, -1)), np.sqrt(np.diag(C)).reshape(2, -1)
         by = np.argsort(f)
         by = by[(f[by] > self.f[0]) & (f[by] < self.f[-1])]
