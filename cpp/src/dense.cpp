@@ -19,7 +19,7 @@ void Orthogonal::solve(const VecX& b, VecX& x) const { x = cod_.solve(b); }
 void Orthogonal::solve(const MatX& B, MatX& X) const { X = cod_.solve(B); }
 
 Singular singular_vectors(const MatX& A) {
-  const Eigen::BDCSVD<MatX> svd(A, Eigen::ComputeFullV);
+  const Eigen::JacobiSVD<MatX> svd(A, Eigen::ComputeFullV);  // BDCSVD is for larger ones, 20 s more to compile
   return {svd.singularValues(), svd.matrixV()};
 }
 
