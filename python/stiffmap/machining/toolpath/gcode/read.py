@@ -12,14 +12,17 @@ from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, INCH, MM, Sta
 from stiffmap.machining.toolpath.gcode.words import bare, fail, read_block
 
 CLOSES, CLOSES_SHARE = 5e-6, 1e-3
-"""m and share of the radius by which an arc's ends may differ from one circle (LinuxCNC's rule)."""
-LETTERS = frozenset("XYZCIJKRFSTHPQND")
+"""m and share of the radius by which an arc's ends may differ from one circle."""
+LEAST_RADIUS, LEAST_SWEEP = 1.27e-6, 1e-6
+"""m and rad: LinuxCNC refuses arcs by a smaller radius, or ends further than twice the radius by it; a smaller turn is a full one."""
+LETTERS = frozenset("XYZCIJKRFSTHPQN")
 MOVING = "XYZCIJKR"
 STRAIGHT = ("G0", "G1")
 NOWHERE, NO_CENTRE = (0.0, 0.0, 0.0), (nan, nan, nan)
 _SIGNED = r"(-?\d+(?:\.\d*)?) ?)?"
 _PLAIN = re.compile(
-    rf"(?:N\d+ ?)?(?:G0?([01]) ?)?(?:X{_SIGNED}(?:Y{_SIGNED}(?:Z{_SIGNED}(?:F(\d{{1,7}}(?:\.\d*)?) ?)?(?:\([^()]*\))?\r?\n?"
+    rf"(?:N\d+ ?)?(?:G0?([01]) ?)?(?:X{_SIGNED}(?:Y{_SIGNED}(?:Z{_SIGNED}(?:F(\d{{1,7}}(?:\.\d*)?) ?)?(?:\([^()]*\))?\r?\n?",
+    re.ASCII,
 ).fullmatch
 EVERY = 20_000
 """Lines between two calls of `progress`."""
@@ -136,19 +139,22 @@ class Reader:
     def _one_line(self, values: dict[str, float], own: set[str], motion: str) -> None:
         """G4, G28, G30, G53, which hold for their line."""
         s = self.state
-        if "G53" in own and (motion or s.motion) not in ("G0", "G1"):
+        moving = not values.keys().isdisjoint(MOVING)
+        if "G53" in own and (motion or (moving and s.motion)) not in STRAIGHT:
             self.fail("G53 goes with G0 or G1")
         if "G53" in own and not s.absolute:
             self.fail("G53 needs absolute positions (G90)")
         if "G4" in own:
             if not values.get("P", -1.0) >= 0:
                 self.fail("G4 needs the time of the dwell: P of zero or more")
-            if not values.keys().isdisjoint(MOVING):
+            if moving:
                 self.fail("a dwell (G4) and a motion in one line: expected two lines")
             self.actions.append((f"G4 P{values['P']:g}", self.moves))
         for word in sorted(own & meaning.REFERENCES):
             if motion:
                 self.fail(f"{word} and {motion} in one line: both take the axes")
+            if not values.keys().isdisjoint("IJKR"):
+                self.fail(f"I, J, K and R go with G2 or G3, not with {word}")
             s.lost |= {a for a in AXES if a in values} or set(AXES)
             s.breaks += 1
             self.note(
@@ -175,7 +181,7 @@ class Reader:
                 elif letter == "G":
                     self._g(value, own)
                 else:
-                    self._m(value)
+                    self._m(value, "spindle" in groups)
             elif letter in LETTERS:
                 if letter in values:
                     self.fail(f"{letter} is given twice")
@@ -208,8 +214,7 @@ class Reader:
             s.said.add("centres")
         elif value in (93.0, 94.0):
             s.said.add("feed mode")
-            if s.inverse_time != (value == 93.0):
-                s.inverse_time, s.feed = value == 93.0, None
+            s.inverse_time, s.feed = value == 93.0, None
         elif value in meaning.OFFSETS:
             s.breaks += s.offset != f"G{value:g}" or "offset" not in s.said
             s.offset = f"G{value:g}"
@@ -226,7 +231,7 @@ class Reader:
         elif value in (61.0, 61.1, 64.0):
             self.note(f"G{value:g}: how closely the controller tracks corners is not simulated")
 
-    def _m(self, value: float) -> None:
+    def _m(self, value: float, turning: bool) -> None:
         if meaning.GROUPS_M.get(value) == "stop":
             self._stops.append(f"M{value:g}")
         else:
@@ -237,6 +242,8 @@ class Reader:
             self.state.ended = True
         elif value in meaning.BREAKS_M:
             self.state.breaks += 1
+            if value == 6.0 and self.state.spindle and not turning:
+                self.state.spindle = 0  # a change of tool stops it, unless its line turns it on
         elif value in meaning.REFUSED_M:
             self.fail(f"M{value:g}: {meaning.REFUSED_M[value]} are not read")
         elif value not in meaning.IGNORED_M:
@@ -248,10 +255,13 @@ class Reader:
             if not values["F"] > 0:
                 self.fail(f"expected a feed above zero, found F{values['F']:g}")
             s.feed = values["F"]
-        if "S" in values:
-            if values["S"] < 0:
-                self.fail(f"expected a speed of zero or more, found S{values['S']:g}")
-            s.speed = values["S"]
+        for letter in "STH":
+            value, whole = values.get(letter, 0.0), letter != "S"
+            if value < 0 or (whole and value % 1):
+                self.fail(
+                    f"expected a {'whole number' if whole else 'speed'} of zero or more, found {letter}{value:g}"
+                )
+        s.speed = values.get("S", s.speed)
         if "G43" in own:
             if "H" not in values:
                 self.fail("G43 needs the register of the tool's length: H")
@@ -260,11 +270,12 @@ class Reader:
             self.note("G43: programmed positions are taken as those of the tool's tip")
         elif "H" in values:
             self.fail("H goes with G43")
-        if "P" in values and groups.get("tracking") == "G64":
-            if motion in ("G2", "G3") and not values.keys().isdisjoint(MOVING):
-                self.fail("P is for G64 and for the arc: expected two lines")
-        elif "P" in values and "G4" not in own and motion not in ("G2", "G3"):
-            self.note("P is for dwells and arcs; here it is not used")
+        arc = motion in ("G2", "G3") and not values.keys().isdisjoint(MOVING)
+        tracking = groups.get("tracking") == "G64"
+        if "P" in values and arc and tracking:
+            self.fail("P is for G64 and for the arc: expected two lines")
+        if "P" in values and not (arc or tracking or "G4" in own):
+            self.fail(f"unknown word: P{values['P']:g} (expected with G4, G64, G2 or G3)")
 
     def _move(self, values: dict[str, float], machine: bool, number: int) -> Move:
         s = self.state
@@ -320,7 +331,7 @@ class Reader:
                 way = hypot(radius * sweep, end[s.plane] - start[s.plane])
             return way * values["F"] / 60
         if s.feed is None:
-            self.fail(f"{s.motion} without a feed: F was never given")
+            self.fail(f"{s.motion} without a feed: F was never given, or before G94")
         return s.feed * s.unit / 60
 
     def _arc(
@@ -357,13 +368,15 @@ class Reader:
                 for k, axis in enumerate((i, j))
             )
         ra, rb = hypot(ax - x, ay - y), hypot(bx - x, by - y)
-        if ra == 0.0 or (abs(ra - rb) > CLOSES and abs(ra - rb) > CLOSES_SHARE * max(ra, rb)):
+        if ra < LEAST_RADIUS:
+            self.fail(f"the arc has no radius: {1e3 * ra:.6g} mm")
+        if abs(ra - rb) > CLOSES and abs(ra - rb) > CLOSES_SHARE * max(ra, rb):
             self.fail(f"the arc does not close: its radius is {1e3 * ra:.6g} mm at the start and {1e3 * rb:.6g} mm at the end")  # fmt: skip
         turn = atan2(by - y, bx - x) - atan2(ay - y, ax - x)
         turn = (sense * turn) % (2 * pi)
         if (ax, ay) == (bx, by):
             turn = 2 * pi
-        elif turn < 1e-12:
+        elif turn < LEAST_SWEEP:
             turn += 2 * pi
         turns = values.get("P", 1.0)
         if turns != int(turns) or not 1 <= turns <= 1000:
@@ -385,7 +398,7 @@ class Reader:
         half = hypot(dx, dy) / 2
         if half == 0.0:
             self.fail("an arc by its radius needs an end that is not its start")
-        if radius == 0.0 or half > abs(radius) * (1 + 1e-6) + CLOSES:
+        if radius == 0.0 or half > abs(radius) + LEAST_RADIUS:
             self.fail(f"the arc does not close: its ends are {2e3 * half:.6g} mm apart, more than twice its radius of {1e3 * abs(radius):.6g} mm")  # fmt: skip
         height = copysign(sqrt(max(radius**2 - half**2, 0.0)), radius * sense)
         ux, uy = dx / (2 * half), dy / (2 * half)
