@@ -142,7 +142,7 @@ BAD = [
     ("S-5", HEAD, "speed of zero or more, found S-5"),
     ("T1.5", HEAD, "whole number of zero or more, found T1.5"),
     ("G43 H-1", HEAD, "whole number of zero or more, found H-1"),
-    ("G1 X1 N5", HEAD, "N: expected the line's number at its beginning, found N5"),
+    ("G1 X1 N5", HEAD, "N: expected the line's number at its beginning, found 'G1X1N5'"),
     ("G1 X1 P2", HEAD, "unknown word: P2 (expected with G4, G64, G2 or G3)"),
     ("G40 D1", HEAD, "unknown word: D1"),
     ("G94 G1 X1", HEAD, "F was never given, or before G94"),
