@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import csv
-import io
 from dataclasses import dataclass, replace
+from io import StringIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +75,7 @@ def program(job: Setting, command: Floats, within: float = WITHIN, feeds: Floats
             end, angle = starts[i]
             moved[i - 1] = [MovedPiece(Kind(int(path.kind[i - 1])), end, np.full(3, np.nan), 0.0, angle)]
     text, origin = rewritten(_turning(path, points.move[first], turn, first, last), moved, feeds)
-    again = load_gcode(text.splitlines(), name=path.name, offsets=path.offsets or None)
+    again = load_gcode(StringIO(text), name=path.name, offsets=path.offsets or None)
     return Program(text, ".ngc", again, np.array(origin), sum(map(len, moved.values())), part, within)
 
 
@@ -108,7 +108,7 @@ def _table(job: Setting, part: Floats, turn: Floats | None) -> Program:
     """Points of the compensated path with feed, spindle and tool axis."""
     command = part
     points, path = job.points, job.path
-    buffer = io.StringIO()
+    buffer = StringIO()
     out = csv.writer(buffer, lineterminator="\n")
     # what leads from one cut to the next stands in it as well: a table without it would go straight across the part
     idle = np.flatnonzero(~path.cuts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from io import StringIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +79,7 @@ def must_cut_whole(job: Setting, made: Program) -> None:
         return
     first = path.line[int(np.argmax(path.cuts))]
     start = [np.nan if line <= first else 0.0 for line in path.given]
-    p = load_gcode(made.text.splitlines(), name=path.name, offsets=path.offsets or None, start=start)
+    p = load_gcode(StringIO(made.text), name=path.name, offsets=path.offsets or None, start=start)
     n, of = len(path), made.origin
     if not np.array_equal(np.unique(of), np.arange(n)) or (np.diff(of) < 0).any() or len(p) != len(of):
         raise _wrong(path, f"has {len(p)} moves, {len(of)} were expected", min(len(p), len(of)) - 1, of)

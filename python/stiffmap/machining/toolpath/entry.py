@@ -148,7 +148,7 @@ def fresh_text(path: Toolpath) -> str:
             for word in CENTRES[plane]:
                 a = "IJK".index(word)
                 words.append(f"{word}{_text(1e3 * (path.centre[i, a] - path.start[i, a]))}")
-            turns = int(np.ceil(abs(path.sweep[i]) / (2 * pi) - 1e-9))
+            turns = int(np.ceil(abs(path.sweep[i]) / (2 * pi) - 1e-6))
             words += [f"P{turns}"] if turns > 1 else []
         if path.turn is not None and path.turn[i] != turn:
             turn = float(path.turn[i])

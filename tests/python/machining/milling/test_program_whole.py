@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,8 +15,11 @@ from tests.python.machining.toolpath.controller import UNKNOWN, Controller
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill_job
+from stiffmap.machining.milling.program import program
+from stiffmap.machining.milling.setting import setting
 from stiffmap.machining.milling.verify import run
-from stiffmap.machining.toolpath import load_path, outline
+from stiffmap.machining.process import load_process
+from stiffmap.machining.toolpath import load_path, outline, sampled
 from stiffmap.machining.toolpath.entry import entered_at, fresh_text, turned_round
 from stiffmap.machining.toolpath.gcode.load import load_gcode
 from stiffmap.machining.toolpath.path import Toolpath
@@ -48,7 +52,7 @@ UNSURE = {
     "starts at zero": "G0 X0 Y40 Z5\nG1 Z0 F6000\nG1 X40\nG0 Z5\nM2",
     "height first": "G0 Z0\nG0 X0 Y0\nG1 X30 F6000\nM2",
     "another offset, not given": "G54 G0 X0 Y0 Z0\nG1 X30 F6000\nG55 G0 X30 Y0 Z0\nG1 Y30\nM2",
-    "tool changed": "G0 X0 Y0 Z0\nG1 X30 F6000\nT2 M6\nG0 X30 Y0 Z0\nG1 Y30\nM2",
+    "tool changed": "G0 X0 Y0 Z0\nG1 X30 F6000\nT2 M6\nM3 G0 X30 Y0 Z0\nG1 Y30\nM2",
     "another length": "G0 X0 Y0 Z0\nG1 X30 F6000\nG43 H2\nG0 X30 Y0 Z0\nG1 Y30\nM2",
     "optional line": "G0 X0 Y0 Z0\n/G1 X30 F6000\nG0 X30 Y0 Z0\nG1 Y30 F6000\nM2",
 }
@@ -160,6 +164,26 @@ def test_programs_at_random_are_cut_whole(seed: int) -> None:
     assert apart(found, want) < FAR
     assert found.length == pytest.approx(want.length, abs=FAR * len(want.cuts))
     assert [w for w, _ in found.events] == [w for w, _ in want.events]
+
+
+@pytest.mark.parametrize(
+    ("text", "feeds"),
+    [
+        ("G21 F6000 S18000 M3 G90\nG0 X0 Y0 Z0\nG1 X40\nM2", [6000]),
+        ("G21 S18000 M3\nG0 X0 Y0 Z0\nG1 X40 F6000\nG20 G1 Y2 F200\nG21 F3000\nX0\nM2", [6000, 5080, 3000]),
+        ("G21 S18000 M3\nG0 X0 Y0 Z0\nG1 X40 F6000\n/G20 G1 Y2 F200\n/N5 F3000 G21\nX0 F3000\nM2", [6000, 5080, 3000]),
+        ("G21 S18000 M3\nG0 X0 Y0 Z0\nG94 G1 X40 F6000\nG94 G1 Y40 F6000\nM2", [6000]),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("chosen", [False, True])
+def test_a_feed_beside_its_unit_or_mode(text: str, feeds: list[float], chosen: bool) -> None:
+    """A controller takes F in the unit that stood before the line, and none outlives G94, as rs274 of LinuxCNC has it."""
+    path = load_gcode(text.splitlines(), name="p")
+    assert list(dict.fromkeys(np.round(6e4 * path.feed[path.cuts], 6))) == feeds
+    job = setting(gantry(), path, load_process("trimming"), sampled(path, 2e-3), path.placed((0, 0, 0)))
+    made = program(job, job.position, feeds=path.feed if chosen else None)
+    found = Controller(made.text)
+    assert [f for f, _ in itertools.groupby(round(f, 2) for _, f in found.cuts)] == pytest.approx(feeds)
 
 
 def test_optional_lines_are_left_out_whole() -> None:

@@ -21,7 +21,7 @@ class Controller:
         skip: bool = False,
     ) -> None:
         self.p = list(UNKNOWN)
-        self.unit, self.motion, self.feed = 1.0, "", 0.0
+        self.unit, self.motion, self.feed = 25.4, "", 0.0
         self.modes = set(modes.split())
         self.offset, self.offsets = "G54", offsets or {}
         self.cuts: list[tuple[list[tuple[float, ...]], float]] = []
@@ -54,9 +54,12 @@ class Controller:
                 self.events.append((x, len(self.cuts)))
         if "G4" in g:
             self.events.append(("G4", len(self.cuts)))
+        if {"G93", "G94"} & set(g):
+            self.feed = 0.0
         for codes in ({"G17", "G18", "G19"}, {"G90", "G91"}, {"G93", "G94"}, {"G90.1", "G91.1"}):
             for x in codes & set(g):
                 self.group(codes, x)
+        self.feed = v.get("F", self.feed)
         for x in g:
             if x in ("G20", "G21"):
                 new = 25.4 if x == "G20" else 1.0
@@ -66,7 +69,6 @@ class Controller:
                 self.offset = x
             if x in ("G0", "G1", "G2", "G3"):
                 self.motion = x
-        self.feed = v.get("F", self.feed)
         if "G4" not in g and any(a in v for a in "XYZIJKR"):
             self.move(v, "G53" in g)
         for x in m:

@@ -139,7 +139,17 @@ BAD = [
     ("G93 G1 X1", HEAD, "every move needs its own F"),
     ("G1 X1e5", HEAD, "unknown word: E5"),
     ("G1 X99999999", HEAD, "beyond any machine"),
-    ("S-5", HEAD, "zero or more"),
+    ("S-5", HEAD, "speed of zero or more, found S-5"),
+    ("T1.5", HEAD, "whole number of zero or more, found T1.5"),
+    ("G43 H-1", HEAD, "whole number of zero or more, found H-1"),
+    ("G1 X1 N5", HEAD, "N: expected the line's number at its beginning, found 'G1X1N5'"),
+    ("G1 X1 P2", HEAD, "unknown word: P2 (expected with G4, G64, G2 or G3)"),
+    ("G40 D1", HEAD, "unknown word: D1"),
+    ("G94 G1 X1", HEAD, "F was never given, or before G94"),
+    ("G2 X0.001 I0.0005", HEAD, "the arc has no radius"),
+    ("G2 X10.01 R5", HEAD, "does not close"),
+    ("G53", HEAD, "G53 goes with G0 or G1"),
+    ("G28 I1", HEAD, "go with G2 or G3, not with G28"),
 ]  # fmt: skip
 
 
@@ -240,7 +250,7 @@ def test_where_a_program_ends(text: str, moves: int) -> None:
 
 EXCLUSIVE = [
     "G90 G91", "G20 G21", "G17 G18", "G93 G94", "G54 G55", "G90.1 G91.1", "G61 G64", "G43 G49 H1", "M3 M5", "M7 M9", "M0 M30",
-    "G28 G53", "G4 G53 P1", "G1 G80 X1", "G98 G99", "G90 G90",
+    "G28 G53", "G40 G40", "G97 G97", "G4 G53 P1", "G1 G80 X1", "G98 G99", "G90 G90",
 ]  # fmt: skip
 
 
@@ -264,6 +274,20 @@ def test_two_words_of_one_group(text: str) -> None:
 def test_refused_as_linuxcnc_does(text: str, message: str) -> None:
     with pytest.raises(FileError, match=message):
         read(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "rpm"), [("T1 M6", 0), ("M6 M3", 6000), ("M3 S500 M6", 500), ("M4 M6", -6000), ("M6 S500", 0), ("M6\nM3", 6000), ("M0", 6000)]
+)  # fmt: skip
+def test_a_change_of_tool_stops_the_spindle(text: str, rpm: float) -> None:
+    p = read(f"G0 X0 Y0 Z0\n{text}\nG1 X5\n")
+    assert p.spindle[-1] * 30 / pi == pytest.approx(rpm)
+
+
+def test_a_turn_too_small_to_see_is_a_full_one() -> None:
+    """LinuxCNC draws no arc of less than a millionth of a radian."""
+    p = read("G0 X0 Y0 Z0\nG2 X0.000001 Y0.000001 I5\nG2 X0.000001 Y0.0001 I5\n")
+    assert np.degrees(p.sweep[1:]) == pytest.approx([-360, -0.0011], abs=2e-4)
 
 
 def test_g80_leaves_the_rest() -> None:

@@ -18,10 +18,10 @@ NUMBERS = 10
 KINDS = {"G0": Kind.RAPID, "G1": Kind.LINE, "G2": Kind.ARC, "G3": Kind.ARC}
 
 
-def lines_of(path: Path) -> Iterator[str]:
-    """Lines of a text file, a byte-order mark passed over; a line that is not UTF-8 is Latin-1. Raises FileError where it cannot be read."""
+def lines_of(path: Path, newline: str | None = None) -> Iterator[str]:
+    """Lines of a text file, ended by `newline` or, where that is None, as any system ends them; a byte-order mark passed over; a line that is not UTF-8 is Latin-1. Raises FileError where it cannot be read."""
     try:
-        with path.open(encoding="utf-8-sig", errors="surrogateescape") as stream:
+        with path.open(encoding="utf-8-sig", errors="surrogateescape", newline=newline) as stream:
             for line in stream:
                 yield line if line.isascii() else _decoded(line)
     except OSError as error:
@@ -49,7 +49,7 @@ def load_gcode(
     if start is not None:
         reader.state = State.unknown(start)
     text: list[str] = []
-    lines: Iterable[str] = lines_of(source) if isinstance(source, Path) else source
+    lines: Iterable[str] = lines_of(source, "\n") if isinstance(source, Path) else source
     if keep_text:
         lines = _kept(lines, text)
     numbers, codes = array("d"), array("l")

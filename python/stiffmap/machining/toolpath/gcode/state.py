@@ -29,7 +29,7 @@ GROUPS = {
     **dict.fromkeys(MOTIONS, "motion"), **dict.fromkeys(PLANES, "plane"), **dict.fromkeys(OFFSETS, "offset"),
     20.0: "unit", 21.0: "unit", 90.0: "distance", 91.0: "distance", 90.1: "centres", 91.1: "centres",
     93.0: "feed mode", 94.0: "feed mode", 61.0: "tracking", 61.1: "tracking", 64.0: "tracking", 43.0: "length", 49.0: "length",
-    98.0: "return", 99.0: "return", 4.0: "one line", 28.0: "one line", 30.0: "one line", 53.0: "one line",
+    40.0: "compensation", 97.0: "speed", 98.0: "return", 99.0: "return", 4.0: "one line", 28.0: "one line", 30.0: "one line", 53.0: "one line",
 }  # fmt: skip
 """Of two G words of one group in a line nobody knows which one holds."""
 GROUPS_M = {

@@ -10,8 +10,9 @@ from stiffmap.common.errors import FileError
 
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
 _PARTS = re.compile(r"(\([^()]*\)|;.*)")
-_ANY = re.compile(r"[A-Z][+-]?[\d.]+", re.IGNORECASE)
-_WORD = re.compile(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))")
+_ANY = re.compile(r"[A-Z][+-]?[\d.]+", re.IGNORECASE | re.ASCII)
+_WORD = re.compile(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))", re.ASCII)
+_BLANKS = dict.fromkeys(b" \t\n\v\f\r")
 _REFUSED = (
     ("#", "parameters (#) are not read: expand them in the program that wrote the file"),
     ("[", "expressions in brackets are not read: write numbers"),
@@ -34,7 +35,7 @@ def tokens_of(text: str) -> Iterator[str]:
         if part.startswith(("(", ";")):
             yield part.strip()
         else:
-            inked = "".join(part.split())
+            inked = part.translate(_BLANKS)
             if inked.startswith("/"):
                 yield "/"
             yield from (m[0] for m in _ANY.finditer(inked))
@@ -48,7 +49,7 @@ def plain(token: str) -> str:
 
 def bare(text: str) -> str:
     """Letters and numbers of a line, without comments and blanks."""
-    return "".join((_COMMENT.sub("", text) if "(" in text or ";" in text else text).split()).upper()
+    return (_COMMENT.sub("", text) if "(" in text or ";" in text else text).translate(_BLANKS).upper()
 
 
 def fail(file: str, number: int, message: str) -> NoReturn:
@@ -79,6 +80,8 @@ def read_block(text: str, file: str, number: int) -> Block:
         wrong = next(k for k, between in enumerate(parts[::3]) if between)
         fail(file, number, f"expected words such as X12.5, found {''.join(parts[3 * wrong :])[:30]!r}")
     words = tuple(zip(parts[1::3], map(float, parts[2::3]), strict=True))
+    if "N" in line[1:] or line.startswith("N-"):
+        fail(file, number, f"N: expected the line's number at its beginning, found {line[:40]!r}")
     for letter, value in words:
         if not -LARGEST <= value <= LARGEST:
             fail(file, number, f"the number of {letter} is too large")

@@ -49,13 +49,19 @@ def rewritten(
         if starts and bare(text).lstrip("%")[:1] not in ("", "O"):
             out.append(starts)
             starts = ""
+        tokens = list(tokens_of(text))
+        plainly = [plain(t) for t in tokens]
+        units = [w for w in plainly if w in ("G20", "G21")]
+        rated = "F" in bare(text)
+        if units and rated:  # ahead of F, which LinuxCNC takes in the unit that stood before its line
+            out.append("/" * (tokens[0] == "/") + units[0])
         move = reader.block(text, number)
         state = reader.state
         if state.breaks != breaks:
             held, breaks, driven = np.zeros(3, bool), state.breaks, (nan, 0.0)
             turned = nan if state.absolute else turned
         i = by_line.get(number)
-        if move is None and "F" in bare(text):
+        if (move is None and rated) or "G94" in plainly:
             driven = (nan, 0.0)
         if move is None or i is None:
             out.append(text)
@@ -63,8 +69,7 @@ def rewritten(
         new = pieces.get(i)
         if new is None:
             new = [_as_it_was(path, i, written)]
-        tokens = list(tokens_of(text))
-        machine = "G53" in {plain(t) for t in tokens}
+        machine = "G53" in plainly
         shift = np.zeros(3) if machine else np.array(reader.offsets.get(state.offset, (0.0, 0.0, 0.0)))
         asked = np.array([i in pieces or any(t[0] == a for t in tokens) for a in AXES])
         lines = []
