@@ -29,28 +29,72 @@ class Judgement:
     """Whether the 95 % interval of a fault that is named at its place holds its size."""
 
 
-def judged(twin: Twin, d: Diagnosis) -> Judgement:
-    """The worst word of all that is named; silent where nothing is."""
+Named = tuple[str, str, tuple[str, ...]]
+"""Kind, element, legs."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What an engine says, in words that do not depend on it."""
+
+    verdict: str
+    effects: list[list[Named]]
+    """Per effect that is named: its place first, then all that would show the same."""
+    numbers: list[list[str]]
+    """Per declared number that is called off: its name first, then those that would show the same."""
+    missing: bool
+    """Whether it says that something is missing that it cannot name."""
+    wide: bool
+    """Whether it calls numbers off without naming one."""
+    change: np.ndarray
+    """(n, 3) m: what it adds to the readings."""
+    intervals: list[tuple[Named, dict[str, tuple[float, float]]]]
+    """Per effect, 95 % intervals of its parameters."""
+
+    @property
+    def said(self) -> str:
+        """In one line."""
+        words = [
+            f"{kind} of {element} {' '.join(legs)}".strip() for (kind, element, legs), *_ in self.effects
+        ]
+        return f"{self.verdict}: {'; '.join(words)} | {'; '.join(n[0] for n in self.numbers)}"
+
+
+def of_diagnosis(d: Diagnosis) -> Claim:
+    """The claim of a diagnosis."""
     named = [(e.kind, e.element, e.legs) for e in d.effects]
     groups = [
         [n, *places(e.aliases), *rivals(d, k)] for k, (n, e) in enumerate(zip(named, d.effects, strict=True))
     ]
     c = d.calibration
-    numbers = [[b.name, *b.rivals] for b in c.beyond] if c else []
-    said = f"{d.verdict}: {'; '.join(map(str, d.effects))} | {c.verdict if c else '-'}"
-    if not named and not numbers:
-        wide = bool(c and c.wider)
+    return Claim(
+        d.verdict,
+        groups,
+        [[b.name, *b.rivals] for b in c.beyond] if c else [],
+        d.verdict == "unattributed" or bool(c and c.verdict == "unattributed"),
+        bool(c and c.wider),
+        (d.residual_before - d.residual_after)[:, :3],
+        [
+            (n, {k: (low, high) for k, (_, low, high, _) in e.parameters.items()})
+            for n, e in zip(named, d.effects, strict=True)
+        ],
+    )
+
+
+def judged(twin: Twin, claim: Claim) -> Judgement:
+    """The worst word of all that is named; silent where nothing is."""
+    if not claim.effects and not claim.numbers:
         if not twin.faults:
-            return Judgement("false" if wide else "quiet", said, ())
-        missing = d.verdict == "unattributed" or bool(c and c.verdict == "unattributed")
-        return Judgement("within" if tolerable(twin) else "unattributed" if missing else "silent", said, ())
+            return Judgement("false" if claim.wide else "quiet", claim.said, ())
+        word = "within" if tolerable(twin) else "unattributed" if claim.missing else "silent"
+        return Judgement(word, claim.said, ())
     if not twin.faults:
-        return Judgement("false", said, ())
+        return Judgement("false", claim.said, ())
     truths = [f.at for f in twin.faults]
-    words = [any(at(place, t) for place in g for t in truths) for g in groups]
-    words += [any(within(n, t) for n in names for t in truths) for names in numbers]
-    word = "right" if all(words) else "same" if alike(twin, d) else "false"
-    return Judgement(word, said, tuple(covered(twin, d)))
+    words = [any(at(place, t) for place in g for t in truths) for g in claim.effects]
+    words += [any(within(n, t) for n in names for t in truths) for names in claim.numbers]
+    word = "right" if all(words) else "same" if alike(twin, claim) else "false"
+    return Judgement(word, claim.said, tuple(covered(twin, claim)))
 
 
 def tolerable(twin: Twin) -> bool:
@@ -94,15 +138,14 @@ def within(number: str, truth: str) -> bool:
     )
 
 
-def alike(twin: Twin, d: Diagnosis) -> bool:
-    change = (d.residual_before - d.residual_after)[:, :3]
-    good = np.isfinite(change) & np.isfinite(twin.signal)
-    a, b = change[good], twin.signal[good]
+def alike(twin: Twin, claim: Claim) -> bool:
+    good = np.isfinite(claim.change) & np.isfinite(twin.signal)
+    a, b = claim.change[good], twin.signal[good]
     size = float(np.linalg.norm(a) * np.linalg.norm(b))
     return size > 0.0 and float(a @ b) / size > ALIKE
 
 
-def covered(twin: Twin, d: Diagnosis) -> Iterator[bool]:
+def covered(twin: Twin, claim: Claim) -> Iterator[bool]:
     """Intervals of faults that are named by their own kind at their own place and leg; an effect on a block speaks of all its
     branches, a fault of one."""
     own = {
@@ -114,8 +157,8 @@ def covered(twin: Twin, d: Diagnosis) -> Iterator[bool]:
         if f.at.count(".") != 1:
             continue
         kind, parameter, null = own[f.kind]
-        for e in d.effects:
-            alone = len(e.legs) == 1 and at((e.kind, e.element, e.legs), f.at) and "." not in e.element
-            if e.kind == kind and alone and parameter in e.parameters:
-                _, low, high, _ = e.parameters[parameter]
+        for place, intervals in claim.intervals:
+            alone = len(place[2]) == 1 and at(place, f.at) and "." not in place[1]
+            if place[0] == kind and alone and parameter in intervals:
+                low, high = intervals[parameter]
                 yield low <= null + size <= high

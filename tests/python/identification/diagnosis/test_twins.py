@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.oracle.twins.faults import Fault, elastic, geometric, plain
 from tests.oracle.twins.generator import shown, twin
-from tests.oracle.twins.judge import judged
+from tests.oracle.twins.judge import judged, of_diagnosis
 from tests.oracle.twins.noise import KINDS
 
 import stiffmap as sm
@@ -60,4 +60,4 @@ def test_a_twin_is_diagnosed_right_and_one_without_a_fault_quietly(
 ) -> None:
     t = twin(number, kind="gaussian", faults=faults, poses=8, strength=3.0, spread=0.0)
     assert len(t.faults) == faults
-    assert judged(t, sm.diagnose(t.machine, t.experiment)).word == word
+    assert judged(t, of_diagnosis(sm.diagnose(t.machine, t.experiment))).word == word

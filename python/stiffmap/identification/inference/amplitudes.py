@@ -1,0 +1,301 @@
+"""All amplitudes of one model at once: restricted likelihood with priors, maximised by average information.
+
+The model of m residuals r in noise is r ~ N(0, V),
+
+    V = κ² N(w) + Z + Σ exp(t_k) M_k,   N(w) = Bᵀ diag(1/w) B,
+
+with B what unknown frames leave of the readings, w the weights of heavy tails, Z the declared zeros, and one M_k for each
+group of declared numbers, each gap and each effect. Gilmour, Thompson, Cullis, Biometrics 51 (1995) 1440; heavy tails as
+the bound of a scale mixture: Lange, Little, Taylor, JASA 84 (1989) 881.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.linalg.lapack import dpotri
+from scipy.special import gammaln
+
+from stiffmap.experiment.experiment import Floats
+from stiffmap.identification.inference.columns import Columns
+from stiffmap.identification.inference.constants import (
+    DEGREES,
+    FEWEST_REPEATS,
+    NOISE_SD,
+    NUMBERS_SD,
+    SHRINK,
+    SIZES,
+    STANDS_OUT,
+    WIDEST,
+)
+
+STEPS, LARGEST_STEP, ENOUGH = 30, 2.0, 0.01
+"""Newton steps, their length in ln variance, and the gain of evidence that ends them."""
+WEIGHINGS = 40
+"""Of heavy tails, at most, each followed by a few Newton steps."""
+OFF, SINKS = -14.0, -8.0
+"""ln variance of a part that the readings do not ask for, and below which one on its way down is taken out."""
+BEGIN = -2.0
+"""ln variance with which a part begins."""
+NOISE = "noise"
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of the covariance with an amplitude: `matrix` (m, m), or a factor F (m, p) of F Fᵀ."""
+
+    name: str
+    kind: str
+    """``number``, ``field``, ``pose``, ``time``, ``effect``."""
+    factor: Floats | None = None
+    full: Floats | None = None
+
+    @cached_property
+    def matrix(self) -> Floats:
+        """(m, m)."""
+        if self.full is not None:
+            return self.full
+        assert self.factor is not None
+        return np.asarray(self.factor @ self.factor.T)
+
+    @property
+    def sd(self) -> float:
+        """Prior standard deviation of ln variance; infinite where it is flat."""
+        return 2.0 * NUMBERS_SD if self.kind == "number" else np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model at its best amplitudes."""
+
+    columns: Columns
+    parts: tuple[Part, ...]
+    t: Floats
+    """(1 + k,) ln variances: of the noise, then of the parts."""
+    weights: Floats
+    """(N,) of heavy tails; all 1 without."""
+    root: Floats
+    """(m, m) lower Cholesky factor of V."""
+    solved: Floats
+    """(m,) V⁻¹ r."""
+    likelihood: float
+    """ln N(r | 0, V), with the bound of heavy tails."""
+    score: float
+    """Evidence: likelihood, priors, and the price of the amplitudes (Laplace)."""
+
+    @property
+    def noise(self) -> float:
+        """κ: noise over what is declared."""
+        return float(np.exp(0.5 * self.t[0]))
+
+    def amplitude(self, name: str) -> float:
+        """Standard deviation of a part; 0 where it is not in the model."""
+        return next(
+            (float(np.exp(0.5 * t)) for p, t in zip(self.parts, self.t[1:], strict=True) if p.name == name),
+            0.0,
+        )
+
+    def mean(self, part: Part) -> Floats:
+        """(m,) posterior mean of what a part of the model adds to the readings."""
+        k = [p.name for p in self.parts].index(part.name)
+        scale = float(np.exp(self.t[1 + k]))
+        if part.factor is not None:
+            return np.asarray(scale * (part.factor @ (part.factor.T @ self.solved)))
+        return np.asarray(scale * (part.matrix @ self.solved))
+
+    def white(self, values: Floats) -> Floats:
+        """(m, ...) L⁻¹ values."""
+        return np.asarray(solve_triangular(self.root, values, lower=True, check_finite=False))
+
+    def without(self, names: Sequence[str], noise: float | None = None) -> Fit:
+        """The same with some parts taken away, nothing fitted anew; `noise`: κ of the result."""
+        kept = [k for k, p in enumerate(self.parts) if p.name not in names]
+        parts = tuple(self.parts[k] for k in kept)
+        t = np.array([self.t[0] if noise is None else 2.0 * np.log(noise), *self.t[1:][kept]])
+        return evaluated(self.columns, parts, t, self.weights)
+
+
+@dataclass(eq=False)
+class Parts:
+    """The parts that every model of some columns can have; matrices are made once."""
+
+    columns: Columns
+    numbers: tuple[Part, ...] = field(init=False)
+    gaps: tuple[Part, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        c = self.columns
+        self.numbers = tuple(
+            Part(name, "number", full=c.numbers[:, index] @ c.numbers[:, index].T)
+            for name, index in c.groups.items()
+        )
+        self.gaps = tuple(Part(name, kind, full=k) for kind, name, k in c.gaps)
+
+
+def fitted(
+    columns: Columns,
+    parts: Sequence[Part],
+    start: Mapping[str, float] | None = None,
+    weights: Floats | None = None,
+) -> Fit:
+    """The amplitudes of the best evidence; heavy tails where a reading stands out and the bound is better without doubt.
+
+    start
+        ln variances to begin with, by the name of the part; others begin small.
+    """
+    given = start or {}
+    first = np.array([given.get(NOISE, 0.0), *(given.get(p.name, BEGIN) for p in parts)])
+    light = _optimum(columns, tuple(parts), first, np.ones(len(columns.rows)))
+    mean, sd = _noise_part(light)
+    typical = min(light.noise, 1.4826 * float(np.median(np.abs(mean))))
+    if weights is None and not np.any(np.abs(mean) > STANDS_OUT * typical):
+        return light
+    heavy = light
+    w = np.ones(len(columns.rows)) if weights is None else weights
+    for _ in range(WEIGHINGS):
+        mean, sd = _noise_part(heavy)
+        w = (DEGREES + 1.0) / (DEGREES + (mean**2 + sd**2) / heavy.noise**2)
+        before = heavy.score
+        begun = (
+            np.array([2.0 * np.log(typical), *first[1:]]) if heavy is light else heavy.t
+        )  # what sank may rise
+        heavy = _optimum(columns, tuple(parts), begun, w, steps=STEPS if heavy is light else 3)
+        if abs(heavy.score - before) < ENOUGH:
+            break
+    return heavy if heavy.score > light.score else light
+
+
+def evaluated(columns: Columns, parts: Sequence[Part], t: Floats, weights: Floats) -> Fit:
+    """The evidence at given amplitudes."""
+    return _evaluate(columns, tuple(parts), t, weights, _noise_matrix(columns, weights), True)[0]
+
+
+def noise_prior(columns: Columns) -> tuple[float, float]:
+    """Mean and standard deviation of ln κ² before the readings are compared with the machine: by repeats, or as declared."""
+    squares, freedom = columns.repeats
+    if freedom < FEWEST_REPEATS or not squares > 0.0:
+        return 0.0, 2.0 * NOISE_SD
+    return float(np.log(squares / freedom)), 2.0 / float(np.sqrt(2.0 * freedom))
+
+
+def _noise_part(f: Fit) -> tuple[Floats, Floats]:
+    """(N,) posterior mean and standard deviation of the noise of each reading."""
+    c = f.columns
+    variance = f.noise**2 / f.weights
+    back = c.free @ f.solved
+    spread = np.sum(f.white(c.free.T) ** 2, axis=0)
+    return variance * back, np.sqrt(np.maximum(variance - variance**2 * spread, 0.0))
+
+
+def _noise_matrix(columns: Columns, weights: Floats) -> Floats:
+    if np.all(weights == 1.0):
+        return np.eye(len(columns))
+    return np.asarray(columns.free.T @ (columns.free / weights[:, None]))
+
+
+def _evaluate(
+    columns: Columns, parts: tuple[Part, ...], t: Floats, weights: Floats, noise: Floats, price: bool
+) -> tuple[Fit, Floats, Floats]:
+    """The fit at these amplitudes, the gradient of its objective and the average information; parts that are off have none."""
+    matrices = [noise, *(p.matrix for p in parts)]
+    on = [k for k, x in enumerate(t) if k == 0 or x > OFF]
+    v = columns.zero.copy()
+    for k in on:
+        v += np.exp(t[k]) * matrices[k]
+    root = cholesky(v, lower=True, check_finite=False)
+    r = columns.residual
+    solved = cho_solve((root, True), r, check_finite=False)
+    m = len(r)
+    likelihood = -0.5 * float(r @ solved) - float(np.log(np.diag(root)).sum()) - 0.5 * m * np.log(2 * np.pi)
+    likelihood += _bound(weights)
+    lower = dpotri(root, lower=1)[0]
+    inverse = np.tril(lower) + np.tril(lower, -1).T
+    along, trace = np.zeros((m, len(t))), np.zeros(len(t))
+    for k in on:
+        along[:, k] = np.exp(t[k]) * (matrices[k] @ solved)
+        trace[k] = np.exp(t[k]) * float(np.vdot(inverse, matrices[k]))
+    gradient = 0.5 * (along.T @ solved - trace)
+    of_data = 0.5 * along.T @ (inverse @ along)
+    centre, own = noise_prior(columns)
+    sd = np.array([own, *(p.sd for p in parts)])
+    off = t - np.array([centre, *np.zeros(len(parts))])
+    score = likelihood - 0.5 * float(np.sum((off / sd) ** 2))
+    if price:
+        wide = np.minimum(sd, WIDEST)
+        counted = np.array([True, *(p.kind != "effect" for p in parts)])
+        some = (wide[:, None] * of_data * wide)[np.ix_(counted, counted)]
+        score -= 0.5 * float(np.linalg.slogdet(np.eye(int(counted.sum())) + some)[1])
+        for k, p in enumerate(parts):
+            if p.kind == "effect":
+                score += _of_size(p, root, solved, float(t[1 + k]))
+    fit = Fit(columns, parts, t, weights, root, solved, likelihood, score)
+    return fit, gradient - off / sd**2, of_data + np.diag(1.0 / sd**2)
+
+
+def _of_size(part: Part, root: Floats, solved: Floats, t: float) -> float:
+    """ln of the mean over sizes of an effect, of the likelihood relative to that at its amplitude in the model."""
+    assert part.factor is not None
+    white = solve_triangular(root, part.factor, lower=True, check_finite=False)
+    inside, vectors = np.linalg.eigh(white.T @ white)
+    z = vectors.T @ (part.factor.T @ solved)
+    # without the effect (Woodbury): 1/λ grows by the variance that the model gives it
+    b2 = np.exp(t)
+    share = np.maximum(1.0 - b2 * inside, 1e-12)
+    return float(
+        log_mean(gains(inside / share, z / share)) - gains(inside / share, z / share, np.array([b2]))[0]
+    )
+
+
+def gains(inside: Floats, z: Floats, squared: Floats = SIZES**2) -> Floats:
+    """(..., B) gain of ln likelihood by an effect of size b along directions (..., p) of information `inside`."""
+    a, s = inside[..., None], z[..., None] ** 2
+    return np.asarray((0.5 * s * squared / (1.0 + a * squared) - 0.5 * np.log1p(a * squared)).sum(axis=-2))
+
+
+def log_mean(values: Floats) -> Floats:
+    """ln of the mean of exponentials over the last axis."""
+    top = values.max(axis=-1, keepdims=True)
+    return np.asarray(top[..., 0] + np.log(np.mean(np.exp(values - top), axis=-1)))
+
+
+def _bound(w: Floats) -> float:
+    """What the bound of heavy tails adds to a Gaussian of variances κ²/w; 0 where all weights are 1."""
+    if np.all(w == 1.0):
+        return 0.0
+    n = DEGREES
+    constant = (
+        gammaln((n + 1.0) / 2.0) - gammaln(n / 2.0) - 0.5 * np.log(n * np.pi) + 0.5 * np.log(2.0 * np.pi)
+    )
+    each = (
+        constant - 0.5 * np.log(w) - 0.5 * (n + 1.0) * np.log((n + 1.0) / (w * n)) + 0.5 * (n + 1.0 - n * w)
+    )
+    return float(each.sum())
+
+
+def _optimum(
+    columns: Columns, parts: tuple[Part, ...], t: Floats, weights: Floats, steps: int = STEPS
+) -> Fit:
+    """Damped Newton steps on ln variances."""
+    damping, noise = SHRINK, _noise_matrix(columns, weights)
+    fit, gradient, information = _evaluate(columns, parts, t, weights, noise, False)
+    for _ in range(steps):
+        scale = np.maximum(np.diag(information), 1e-2)
+        step = np.linalg.solve(information + damping * np.diag(scale), gradient)
+        step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
+        sinks = (fit.t + step < SINKS) & (step < 0.0)
+        moved = _evaluate(columns, parts, np.where(sinks, OFF, fit.t + step), weights, noise, False)
+        gain = moved[0].score - fit.score
+        if gain < -1e-9:
+            damping *= 8.0
+            if damping > 1e6:
+                break
+            continue
+        fit, gradient, information = moved
+        damping = max(damping / 4.0, 1e-3)
+        if gain < ENOUGH:
+            break
+    return _evaluate(columns, parts, fit.t, weights, noise, True)[0]

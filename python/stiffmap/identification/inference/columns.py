@@ -1,0 +1,247 @@
+"""What each part of the model adds to the readings, in units of the noise: the only stage that asks the machine.
+
+Readings are taken as (y - f0) / σ, rotated into the space that unknown frames, tools and zeros leave free: what is
+integrated out with a flat prior is gone from everything that follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
+from stiffmap.experiment.noise.nuisance import nuisance_columns
+from stiffmap.experiment.noise.whitening import basis, readings_of
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.calibration.model import sensitivity
+from stiffmap.identification.calibration.unknowns import Unknown
+from stiffmap.identification.diagnosis.candidates.candidates import Candidate
+from stiffmap.identification.diagnosis.candidates.plan import Plan
+from stiffmap.identification.diagnosis.candidates.sensitivity import Variant
+from stiffmap.identification.inference.constants import LARGEST_ERROR, STANDS_OUT
+from stiffmap.identification.inference.kernels import gaps
+from stiffmap.model.effects import Parameter
+
+MOST_READINGS = 600
+"""Readings that are compared with each other; of more, whole poses are drawn. Effort only: an (N, N) matrix is factorised."""
+VISIBLE = 3.0
+"""Noise: a candidate whose largest plausible size shows less is left out."""
+LARGEST = 20.0
+"""Noise, rms: two places are one where even an effect of this size would differ by less than `VISIBLE`."""
+NULL = 1e-9
+"""Share of the longest column below which a direction is no direction."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One candidate at one shape: its directions U (m, p), orthonormal over the noise."""
+
+    variant: Variant
+    directions: Floats
+    sign: int
+    """+1 or -1 where a single strength can only have that sign along the direction, else 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A candidate that the plan separates from all others, at all its shapes; the others are its aliases."""
+
+    candidate: Candidate
+    shapes: tuple[Shape, ...]
+    aliases: tuple[Candidate, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """All parts of the model; N readings, of which unknown frames leave m."""
+
+    experiment: Experiment
+    rows: Integers
+    """(N,) row of each reading."""
+    channel: Integers
+    """(N,) channel of each reading."""
+    sigma: Floats
+    """(N,) m, rad: declared standard deviation of each reading."""
+    free: Floats
+    """(N, m) orthonormal directions that averaging over repeats and unknown frames, tools and zeros leave."""
+    residual: Floats
+    """(m,) reading less the declared prediction, in noise."""
+    zero: Floats
+    """(m, m) covariance of the declared zero that readings of one pose share."""
+    unknowns: tuple[Unknown, ...]
+    numbers: Floats
+    """(m, p) change of the readings per standard uncertainty of each declared number."""
+    gaps: tuple[tuple[str, str, Floats], ...]
+    """Kind, name and (m, m) covariance, of mean variance one, of what nobody can name."""
+    places: tuple[Place, ...]
+    use: Integers
+    """(N,) which of all readings these are, in the order of `readings_of`."""
+    repeats: tuple[float, float]
+    """Sum of squares within repeats that were averaged, in noise, and its degrees of freedom."""
+
+    def rotated(self, values: Floats) -> Floats:
+        """(m, ...) of the readings' (N, ...), m or rad: in noise, without what frames and zeros could be."""
+        return np.asarray(self.free.T @ (values / self.sigma.reshape(-1, *(1,) * (values.ndim - 1))))
+
+    def white_lines(self, variant: Variant) -> Floats:
+        """(m, p) columns of a candidate, per scale of its linear parameters."""
+        return self.rotated(variant.array()[:, self.use].T)
+
+    def __len__(self) -> int:
+        return len(self.residual)
+
+    @property
+    def groups(self) -> dict[str, Integers]:
+        """Numbers of the unknowns of each group and set-up."""
+        keys = [f"{u.group}, {u.setup}" if u.setup else u.group for u in self.unknowns]
+        return {k: np.flatnonzero([q == k for q in keys]) for k in dict.fromkeys(keys)}
+
+
+def columns(
+    predictor: Predictor, plan: Plan, sigma: Floats, unknowns: Sequence[Unknown], seed: int = 0
+) -> Columns:
+    """Columns of everything that the readings of an experiment can hold.
+
+    sigma
+        (n, c) standard deviation of each reading, m or rad.
+    """
+    e, base = predictor.experiment, plan.base
+    all_rows, all_channels = readings_of(e, base)
+    use = _drawn(e.groups[all_rows], seed)
+    rows, channel = all_rows[use], all_channels[use]
+    index = (rows, channel)
+    noise = sigma[index]
+    if not (noise > 0.0).all():
+        raise StiffmapError(
+            f"{e.name}: the noise of {e.ids[int(rows[~(noise > 0.0)][0])]} is zero or unknown"
+        )
+    raw = (e.reading - base)[index] / noise
+    mean = _averages(e, rows, channel, noise, raw)
+    frames = mean.T @ (nuisance_columns(e, base)[index] / noise[:, None])
+    q = basis(frames) if frames.shape[1] else frames
+    free = mean @ np.linalg.qr(q, mode="complete")[0][:, q.shape[1] :] if q.shape[1] else mean
+    within = raw - mean @ (mean.T @ raw)
+    s = sensitivity(predictor, unknowns)
+    numbers = free.T @ (s.columns[index] / noise[:, None])
+    seen = np.linalg.norm(numbers, axis=0) > NULL
+    found = tuple(
+        (kind, name, free.T @ k @ free) for kind, name, k in gaps(predictor.machine, e, rows, channel, noise)
+    )
+    return Columns(
+        e,
+        rows,
+        channel,
+        noise,
+        free,
+        free.T @ raw,
+        free.T @ _zeros(e, rows, channel, noise) @ free,
+        tuple(u for u, k in zip(s.unknowns, seen, strict=True) if k),
+        numbers[:, seen],
+        tuple((kind, name, k * len(k) / np.trace(k)) for kind, name, k in found if np.trace(k) > NULL),
+        _places(plan, free, noise, use),
+        use,
+        (float(within @ within), float(len(rows) - mean.shape[1])),
+    )
+
+
+def _drawn(pose: Integers, seed: int) -> Integers:
+    """Numbers of the readings in use: all of them, or those of poses drawn at random."""
+    if len(pose) <= MOST_READINGS:
+        return np.arange(len(pose))
+    order = np.random.default_rng(seed).permutation(np.unique(pose))
+    size = np.cumsum([np.sum(pose == k) for k in order])
+    chosen = order[: max(1, int(np.sum(size <= MOST_READINGS)))]
+    return np.flatnonzero(np.isin(pose, chosen))
+
+
+def _averages(e: Experiment, rows: Integers, channel: Integers, noise: Floats, raw: Floats) -> Floats:
+    """(N, k) orthonormal columns that average repeats of one condition; the identity where a reading stands out from its
+    repeats, or where loads are held over hours: creep is in the repeats."""
+    _, number = np.unique(np.stack([e.conditions[rows], channel, _level(noise)]), axis=1, return_inverse=True)
+    number = number.reshape(-1)
+    average = np.zeros((len(rows), int(number.max()) + 1))
+    average[np.arange(len(rows)), number] = 1.0 / np.sqrt(np.bincount(number))[number]
+    within = raw - average @ (average.T @ raw)
+    typical = np.sqrt(max(float(within @ within) / max(1, len(rows) - average.shape[1]), 1e-300))
+    if e.hours is not None or np.any(np.abs(within) > STANDS_OUT * max(typical, 1.0) / np.sqrt(2.0)):
+        return np.eye(len(rows))
+    return average
+
+
+def _level(noise: Floats) -> Integers:
+    """Readings of unlike noise are not averaged."""
+    return np.unique(noise, return_inverse=True)[1].reshape(-1)
+
+
+def _zeros(e: Experiment, rows: Integers, channel: Integers, noise: Floats) -> Floats:
+    if e.quantity != "deflection" or not e.zeros.any():
+        return np.zeros((len(rows), len(rows)))
+    size = e.zeros[channel] / noise
+    same = (e.groups[rows][:, None] == e.groups[rows]) & (channel[:, None] == channel)
+    return np.asarray(same * np.outer(size, size))
+
+
+def _places(plan: Plan, free: Floats, noise: Floats, use: Integers) -> tuple[Place, ...]:
+    """Candidates with their directions; those that show alike under one name, the coarsest first (as they come)."""
+    by: dict[int, list[Shape]] = {}
+    for v in plan.variants:
+        white = free.T @ (v.array()[:, use] / noise).T
+        found = _directions(white, v)
+        if found is not None:
+            by.setdefault(id(v.candidate), []).append(found)
+    tolerance = VISIBLE / (LARGEST * np.sqrt(free.shape[1]))
+    out: list[Place] = []
+    single: list[tuple[Floats, int, int]] = []
+    for shapes in sorted(by.values(), key=lambda s: (s[0].directions.shape[1], len(s) > 1)):
+        candidate, first = shapes[0].variant.candidate, shapes[0]
+        if len(shapes) == 1:
+            same = next((k for d, sign, k in single if _alike(d, sign, first, tolerance)), None)
+            if same is not None:
+                out[same] = Place(out[same].candidate, out[same].shapes, (*out[same].aliases, candidate))
+                continue
+            single.append((first.directions, first.sign, len(out)))
+        out.append(Place(candidate, tuple(shapes)))
+    return tuple(out)
+
+
+def _directions(white: Floats, v: Variant) -> Shape | None:
+    """(m, p) orthonormal directions of the columns (m, q) that a plausible size makes visible; None without any."""
+    length = np.linalg.norm(white, axis=0)
+    most = np.array([_reach(v, k) for k in range(white.shape[1])])
+    seen = length * most > VISIBLE
+    if not seen.any():
+        return None
+    u, s, _ = np.linalg.svd(white[:, seen] / length[seen], full_matrices=False)
+    kept = u[:, s > 1e-4 * s[0]]
+    sign = 0
+    if kept.shape[1] == 1 and seen.sum() == 1 and v.sign[seen][0]:
+        sign = int(np.sign(v.sign[seen][0]) * np.sign(float(kept[:, 0] @ white[:, seen][:, 0])))
+    return Shape(v, np.ascontiguousarray(kept), sign)
+
+
+def _reach(v: Variant, k: int) -> float:
+    """Largest plausible value of a column's parameter, in its scale."""
+    linear = v.candidate.linear
+    if k >= len(linear) or len(linear) != len(v.sign):
+        return np.inf
+    low, high = possible(linear[k])
+    null = float(linear[k].null or 0.0)
+    return max(high - null, null - low) / linear[k].scale
+
+
+def possible(p: Parameter) -> tuple[float, float]:
+    """Least and largest value of a parameter (SI) that a machine can have."""
+    null, most = float(p.null or 0.0), LARGEST_ERROR.get(p.unit, np.inf)
+    return max(p.lower, null - most), min(p.upper, null + most)
+
+
+def _alike(directions: Floats, sign: int, other: Shape, tolerance: float) -> bool:
+    if directions.shape != other.directions.shape:
+        return False
+    across = directions.T @ other.directions
+    if sign and other.sign and float(across[0, 0]) * sign * other.sign < 0.0:
+        return False
+    return bool(np.sum(other.directions**2) - np.sum(across**2) < tolerance**2)

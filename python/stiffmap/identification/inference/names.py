@@ -1,0 +1,289 @@
+"""Which effects have a name: a search over sets of effects by evidence, in two worlds.
+
+In the world "exact" declared numbers are as declared but for the effects, in "uncertain" each group of them has an
+amplitude of its own. Both are searched alike; "exact" is `ODDS` times as likely before any reading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from stiffmap.experiment.experiment import Floats
+from stiffmap.identification.diagnosis.candidates.candidates import clash
+from stiffmap.identification.inference.amplitudes import (
+    NOISE,
+    Fit,
+    Part,
+    Parts,
+    evaluated,
+    fitted,
+    gains,
+    log_mean,
+)
+from stiffmap.identification.inference.candidates import as_part, evidence, of_pairs
+from stiffmap.identification.inference.columns import Columns, Place, possible
+from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, REFITS, SIZES
+
+QUIET = -6.0
+"""ln variance with which gaps begin in a fit that goes on from one without gaps."""
+SETTLED = 0.3
+"""Noise: a correction that changes less is none."""
+PROGRESS = 0.1
+"""Gain of evidence, ln, below which one set is not better than another."""
+CORRECTIONS = 3
+"""Gauss-Newton corrections of the residual by whole predictions with the effects of a model."""
+SINGLES = 24
+"""Best single places of which pairs are tried; effort only."""
+Predict = Callable[[Sequence["Chosen"]], Floats]
+"""(m,) what effects of given strengths add to the readings, by the machine itself; NaN where it fails."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """A place that is in the model, at one of its shapes."""
+
+    place: Place
+    shape: int
+    part: Part
+    values: Floats
+    """(p,) strengths, in the scales of the linear parameters."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A set of effects in one world, at its best amplitudes."""
+
+    uncertain: bool
+    chosen: tuple[Chosen, ...]
+    fit: Fit
+    score: float
+    """Evidence of the set: that of the fit, mean over shapes, and what the world costs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What one search over sets of effects found."""
+
+    best: Model
+    null: Model
+    gain: tuple[float, ...]
+    """ln odds of each named effect against none, all places together, in the order of `best.chosen`."""
+    equivalents: tuple[tuple[tuple[Place, float], ...], ...]
+    """Per named effect, the places that would do in its stead, with their evidence less that of the best."""
+
+
+def searched(columns: Columns, predict: Predict | None = None) -> Search:
+    """The best set of effects over both worlds."""
+    parts = Parts(columns)
+    worlds = [_World(columns, parts, uncertain, predict).search() for uncertain in (False, True)]
+    return max(worlds, key=lambda s: s.best.score)
+
+
+class _World:
+    """The search in one world."""
+
+    def __init__(self, columns: Columns, parts: Parts, uncertain: bool, predict: Predict | None) -> None:
+        self.columns, self.uncertain, self.predict = columns, uncertain, predict
+        self.numbers = parts.numbers if uncertain else ()
+        self.gaps = parts.gaps
+        self.prior = 0.0 if uncertain else float(np.log(ODDS))
+
+    def search(self) -> Search:
+        """Forward steps with elimination and exchange after each."""
+        null = model = self._fit((), None)
+        limit = float(np.log(ODDS) + np.log(max(1, len(self.columns.places))))
+        while len(model.chosen) < MOST_EFFECTS:
+            trials = self._trials(model)
+            if not trials:
+                break
+            best, all_gains = trials
+            total = float(np.logaddexp.reduce(all_gains))
+            if total <= limit:
+                break  # the odds of all places together
+            better = self._exchanged(self._by_pairs(self._exchanged(best)))
+            if len(better.chosen) <= len(model.chosen) and better.score <= model.score + PROGRESS:
+                break
+            model = better
+        rivals = self._rivals(model)
+        return Search(model, null, tuple(o for o, _ in rivals), tuple(near for _, near in rivals))
+
+    def _trials(self, model: Model) -> tuple[Model, Floats] | None:
+        """The model with the best further effect, and the gain of each place."""
+        bounds = self._bounds(model)
+        if not bounds:
+            return None
+        order = sorted(bounds, key=lambda b: -b[0])
+        refits = [self._with(model, [place], anchor) for _, place, anchor in order[:REFITS]]
+        scores = {id(p): s for s, p, _ in order}
+        for m in refits:
+            key = id(m.chosen[-1].place)
+            scores[key] = max(scores[key], m.score) if np.isfinite(m.score) else -np.inf
+        best = max(refits, key=lambda m: m.score)
+        return (best, np.array(list(scores.values())) - model.score) if np.isfinite(best.score) else None
+
+    def _bounds(self, model: Model, more: tuple[Fit, ...] = ()) -> list[tuple[float, Place, Fit]]:
+        """Per place a lower bound of the evidence with it, and the anchor that gives it; `more` anchors than its own."""
+        taken = {id(c.place) for c in model.chosen}
+        others = [c.place.candidate for c in model.chosen]
+        free = tuple(p for p in self.columns.places if id(p) not in taken and not clash(p.candidate, others))
+        if not free:
+            return []
+        extra = model.score - model.fit.score
+        anchors = [*self._anchors(model), *more]
+        found = [[log_mean(g) + a.score + extra for g in evidence(a, free)] for a in anchors]
+        out = []
+        for k, place in enumerate(free):
+            which = int(np.argmax([f[k] for f in found]))
+            out.append((float(found[which][k]), place, anchors[which]))
+        return out
+
+    def _anchors(self, model: Model) -> list[Fit]:
+        """Amplitudes at which candidates are judged: as fitted; without gaps; the same at the declared noise."""
+        fit = model.fit
+        effects = tuple(c.part for c in model.chosen)
+        bare = fitted(fit.columns, (*self.numbers, *effects), amplitudes(fit), fit.weights)
+        at_rest = np.array([0.0, *bare.t[1:]])
+        return [fit, bare, evaluated(fit.columns, bare.parts, at_rest, bare.weights)]
+
+    def _with(self, model: Model, places: Sequence[Place], anchor: Fit) -> Model:
+        """The model with further effects, fitted from the anchor."""
+        chosen = list(model.chosen)
+        start = {**{g.name: QUIET for g in self.gaps}, **amplitudes(anchor)}
+        for place in places:
+            k = int(np.argmax(evidence(anchor, (place,))[0]))
+            part = as_part(self.columns, place.shapes[k], f"effect {place.candidate}")
+            chosen.append(Chosen(place, k, part, np.zeros(0)))
+            start[part.name] = _size(anchor, part)
+        return self._fit(tuple(chosen), start)
+
+    def _fit(self, chosen: tuple[Chosen, ...], start: dict[str, float] | None) -> Model:
+        """A set at its best amplitudes, on a residual that is corrected for what the effects' columns miss."""
+        columns = self.columns
+        parts = (*self.numbers, *self.gaps, *(c.part for c in chosen))
+        fit = fitted(columns, parts, start)
+        fit = self._corrected(fit, chosen) if self.predict and chosen else fit
+        chosen = tuple(replace(c, values=_values(fit, c)) for c in chosen)
+        shapes = 0.0
+        for c in chosen:
+            if len(c.place.shapes) > 1:
+                each = evidence(fit.without([c.part.name]), (c.place,))[0]
+                shapes += float(log_mean(each) - each[c.shape])
+        possible = all(map(is_possible, chosen))
+        return Model(self.uncertain, chosen, fit, fit.score + shapes + self.prior if possible else -np.inf)
+
+    def _corrected(self, fit: Fit, chosen: tuple[Chosen, ...]) -> Fit:
+        """The fit on a residual less what straight lines miss of the effects; the one given where that does not settle."""
+        assert self.predict
+        now, shown = fit, None
+        for _ in range(CORRECTIONS):
+            at = tuple(replace(c, values=_values(now, c)) for c in chosen)
+            line = np.sum([_columns(self.columns, c) @ c.values for c in at], axis=0)
+            if shown is not None and _near(line, shown):
+                return now
+            missed = self.predict(at) - line
+            if not np.isfinite(missed).all():
+                return fit
+            if shown is None and float(np.linalg.norm(missed)) < SETTLED:
+                return fit
+            shown = line
+            now = fitted(
+                replace(self.columns, residual=self.columns.residual - missed), now.parts, amplitudes(now)
+            )
+        at = tuple(replace(c, values=_values(now, c)) for c in chosen)
+        line = np.sum([_columns(self.columns, c) @ c.values for c in at], axis=0)
+        return now if shown is not None and _near(line, shown) else fit
+
+    def _exchanged(self, model: Model) -> Model:
+        """Each effect in turn left out where that costs less than odds, or given up for a better one."""
+        for _ in range(2):
+            before = model
+            for c in model.chosen if len(model.chosen) > 1 else ():
+                fewer = self._less(model, c)
+                if model.score - fewer.score < float(np.log(ODDS)):
+                    model = fewer
+                    break
+                found = self._trials(fewer)
+                if found and found[0].score > model.score + PROGRESS:
+                    model = found[0]
+                    break
+            if model is before:
+                return model
+        return model
+
+    def _by_pairs(self, model: Model) -> Model:
+        """Two effects at once given up for two others: one after the other they may never change."""
+        for first, second in combinations(model.chosen, 2):
+            fewer = self._less(self._less(model, first), second)
+            bounds = sorted(self._bounds(fewer), key=lambda b: -b[0])[:SINGLES]
+            if len(bounds) < 2:
+                continue
+            for anchor in self._anchors(fewer):
+                shapes = [p.shapes[int(np.argmax(evidence(anchor, (p,))[0]))] for _, p, _ in bounds]
+                gain = np.tril(of_pairs(anchor, shapes), -1)
+                for k in np.argsort(gain, axis=None)[::-1][:REFITS]:
+                    places = [bounds[int(i)][1] for i in np.unravel_index(int(k), gain.shape)]
+                    if clash(places[0].candidate, [places[1].candidate]):
+                        continue
+                    pair = self._with(fewer, places, anchor)
+                    if pair.score > model.score + PROGRESS:
+                        return pair
+        return model
+
+    def _less(self, model: Model, c: Chosen) -> Model:
+        return self._fit(tuple(o for o in model.chosen if o.part.name != c.part.name), amplitudes(model.fit))
+
+    def _rivals(self, model: Model) -> tuple[tuple[float, tuple[tuple[Place, float], ...]], ...]:
+        """Per effect its ln odds, all places that would do together, and those places."""
+        out = []
+        for c in model.chosen:
+            less = self._less(model, c)
+            at_best = model.fit.without([c.part.name])
+            scores = {id(p): (s - model.score, p) for s, p, _ in self._bounds(less, (at_best,))}
+            scores[id(c.place)] = (0.0, c.place)
+            together = float(np.logaddexp.reduce([s for s, _ in scores.values()]))
+            odds = model.score + together - less.score - float(np.log(len(self.columns.places)))
+            near = [(p, s) for s, p in scores.values() if p is not c.place and s > -np.log(ODDS)]
+            out.append((odds, tuple(sorted(near, key=lambda n: -n[1]))))
+        return tuple(out)
+
+
+def _near(one: Floats, other: Floats) -> bool:
+    """Whether two changes of the readings are the same within a tenth, or within the noise."""
+    return float(np.linalg.norm(one - other)) < max(SETTLED, 0.1 * float(np.linalg.norm(one)))
+
+
+def is_possible(c: Chosen) -> bool:
+    """Whether all strengths lie within what their parameters can be."""
+    linear = c.place.candidate.linear
+    if len(linear) != len(c.values):
+        return True
+    full = [float(p.null or 0.0) + float(v) * p.scale for p, v in zip(linear, c.values, strict=True)]
+    return all(low <= x <= high for (low, high), x in zip(map(possible, linear), full, strict=True))
+
+
+def amplitudes(fit: Fit) -> dict[str, float]:
+    """ln variances of a fit, by the names of its parts."""
+    return {NOISE: float(fit.t[0]), **{p.name: float(t) for p, t in zip(fit.parts, fit.t[1:], strict=True)}}
+
+
+def _size(anchor: Fit, part: Part) -> float:
+    """ln variance of an effect that gains most at the anchor's amplitudes."""
+    assert part.factor is not None
+    white = anchor.white(part.factor)
+    inside, vectors = np.linalg.eigh(white.T @ white)
+    best = int(np.argmax(gains(inside, vectors.T @ (part.factor.T @ anchor.solved))))
+    return float(2.0 * np.log(SIZES[best]))
+
+
+def _columns(columns: Columns, c: Chosen) -> Floats:
+    """(m, p) change of the readings per scale of each linear parameter."""
+    return columns.white_lines(c.place.shapes[c.shape].variant)
+
+
+def _values(fit: Fit, c: Chosen) -> Floats:
+    """(p,) strengths of the posterior mean of an effect."""
+    return np.asarray(np.linalg.lstsq(_columns(fit.columns, c), fit.mean(c.part), rcond=1e-9)[0])

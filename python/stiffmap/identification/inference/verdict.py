@@ -1,0 +1,218 @@
+"""What a search over effects may say: which names stand, which numbers are out of tolerance, what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
+from stiffmap.identification.calibration.unknowns import Unknown
+from stiffmap.identification.inference.amplitudes import OFF, Fit, noise_prior
+from stiffmap.identification.inference.columns import Columns, Place
+from stiffmap.identification.inference.constants import EQUAL_SHARE, ODDS, RARE, TOLERANCES
+from stiffmap.identification.inference.names import Chosen, Search
+
+DETERMINED = 0.5
+"""Posterior standard deviation, in standard uncertainties, of a number that the readings determine."""
+KAPPA_SDS = 4.0
+"""Prior standard deviations of ln κ beyond which the noise is no noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Named:
+    """An effect that stands: its place, what would do in its stead, how sure, how alike everywhere."""
+
+    chosen: Chosen
+    equivalents: tuple[Place, ...]
+    log_odds: float
+    scatter: float
+    """Of its strength from block to block, relative; 0: the same everywhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class Beyond:
+    """A declared number out of tolerance, in its standard uncertainties."""
+
+    unknown: Unknown
+    value: float
+    sd: float
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """The answer of the inference, before it is put into words."""
+
+    word: str
+    """``none``, ``effects``, ``ambiguous``, ``unattributed``."""
+    named: tuple[Named, ...]
+    refused: tuple[tuple[Chosen, str], ...]
+    """Effects of the model without a name, and why."""
+    beyond: tuple[Beyond, ...]
+    rest: str
+    """What is left that nobody can name; empty: nothing."""
+    time: str
+    """Correlation of the noise in time; empty: none."""
+
+
+def judged(columns: Columns, search: Search) -> Verdict:
+    """Names that stand, numbers out of tolerance, and the rest."""
+    model = search.best
+    named, refused = [], []
+    for c, odds, near in zip(model.chosen, search.gain, search.equivalents, strict=True):
+        scatter, why = refusal(columns, model.fit, c)
+        if why:
+            refused.append((c, why))
+        else:
+            named.append(Named(c, tuple(p for p, _ in near), odds, scatter))
+    beyond = tuple(out_of_tolerance(columns, model.fit)) if model.uncertain else ()
+    rest, time = left(model.fit)
+    if refused and not rest:
+        rest = refused[0][1]
+    if named:
+        word = "ambiguous" if any(n.equivalents for n in named) else "effects"
+    else:
+        word = "unattributed" if rest else "effects" if beyond else "none"
+    return Verdict(word, tuple(named), tuple(refused), beyond, rest, time)
+
+
+def refusal(columns: Columns, fit: Fit, c: Chosen) -> tuple[float, str]:
+    """Scatter of an effect's strength over the experiment, and why it has no name; empty where it may have one."""
+    size = fit.amplitude(c.part.name)
+    gaps = np.sqrt(
+        sum(np.exp(t) for p, t in zip(fit.parts, fit.t[1:], strict=True) if p.kind in ("field", "pose"))
+    )
+    if size < gaps:
+        return 0.0, "smaller than what nobody can name"
+    if without_a_pose(columns, fit.without([c.part.name]), c) < np.log(ODDS):
+        return 0.0, "it rests on the readings of one pose"
+    blocks = list(partitions(columns.experiment, columns.rows))
+    worst, scatter = "", 0.0
+    lowest = RARE / max(1, len(blocks))
+    rest = fit.without([c.part.name])
+    for name, block in blocks:
+        p, share = evenness(columns, rest, c, block)
+        if p < lowest:
+            scatter = max(scatter, share)
+            if share > EQUAL_SHARE:
+                worst = name
+    return scatter, f"its strength differs along {worst}" if worst else ""
+
+
+def without_a_pose(columns: Columns, rest: Fit, c: Chosen) -> float:
+    """Gain of ln likelihood by an effect of one strength, at its least over all poses left out in turn."""
+    raw = c.place.shapes[c.shape].variant.array()[:, columns.use].T @ c.values / columns.sigma
+    pattern, r = rest.white(columns.free.T @ raw), rest.white(rest.columns.residual)
+    pose = columns.experiment.groups[columns.rows]
+    out = []
+    for k in np.unique(pose):
+        gone = np.linalg.qr(rest.white(columns.free[pose == k].T))[0]
+        a, b = pattern - gone @ (gone.T @ pattern), r - gone @ (gone.T @ r)
+        out.append(0.5 * float(a @ b) ** 2 / max(float(a @ a), 1e-12))
+    return min(out)
+
+
+def evenness(columns: Columns, rest: Fit, c: Chosen, block: Integers) -> tuple[float, float]:
+    """p-value of one strength in all blocks (N,), and the scatter of strengths beyond chance, relative to their mean.
+
+    DerSimonian, Laird, Controlled Clinical Trials 7 (1986) 177.
+    """
+    raw = c.place.shapes[c.shape].variant.array()[:, columns.use].T @ c.values / columns.sigma
+    pattern = np.stack([columns.free.T @ np.where(block == b, raw, 0.0) for b in np.unique(block)], axis=1)
+    white, r = rest.white(pattern), rest.white(rest.columns.residual)
+    gram = white.T @ white
+    told = np.diag(gram) > 1e-6 * np.diag(gram).max()
+    white, gram = white[:, told], gram[np.ix_(told, told)]
+    if len(gram) < 2:
+        return 1.0, 0.0
+    together = white.sum(axis=1)
+    one = float(together @ r) ** 2 / float(together @ together)
+    strength, *_ = np.linalg.lstsq(white, r, rcond=1e-9)
+    drop = float(r @ (white @ strength)) - one
+    freedom = len(gram) - 1
+    precision = np.diag(gram)
+    spread = precision.sum() - float((precision**2).sum()) / precision.sum()
+    mean = float(together @ r) / float(together @ together)
+    scatter = np.sqrt(max(0.0, drop - freedom) / max(spread, 1e-12)) / max(abs(mean), 1e-12)
+    return float(chi2.sf(max(drop, 0.0), freedom)), float(scatter)
+
+
+def partitions(e: Experiment, rows: Integers) -> Iterator[tuple[str, Integers]]:
+    """Name and (N,) block of each reading, of every way to cut the experiment into parts."""
+    over: list[tuple[str, Floats | None]] = [(f"{a}", e.position[:, k]) for k, a in enumerate("xyz")]
+    over += [(f"the load's {a}", e.wrench[:, k]) for k, a in enumerate(("fx", "fy", "fz", "mx", "my", "mz"))]
+    over += [
+        ("the size of the load", np.linalg.norm(e.wrench[:, :3], axis=1)),
+        ("time", e.order),
+        ("hours", e.hours),
+    ]
+    for name, value in over:
+        if value is not None and np.ptp(value) > 0.0:
+            yield name, thirds(value)[rows]
+    if len(np.unique(e.runs)) > 1:
+        yield "set-ups", e.runs[rows].astype(np.intp)
+
+
+def thirds(value: Floats) -> Integers:
+    """(n,) 0, 1 or 2: the third of the rows, by size, that each belongs to; equal values stay together."""
+    low, high = np.quantile(value, [1 / 3, 2 / 3], method="nearest")
+    return np.asarray((value > low).astype(np.intp) + (value > high))
+
+
+def out_of_tolerance(columns: Columns, fit: Fit) -> Iterator[Beyond]:
+    """Declared numbers whose posterior lies beyond tolerance, and beyond what the largest of so many is by chance."""
+    found = [
+        Beyond(columns.unknowns[k], value, sd)
+        for name, index in columns.groups.items()
+        for k, value, sd in zip(index, *_posterior(columns, fit, name, index), strict=True)
+    ]
+    determined = sum(b.sd < DETERMINED for b in found)
+    largest = float(norm.isf(1.0 / (2.0 * ODDS * max(1, determined))))
+    for b in sorted(found, key=lambda b: -abs(b.value)):
+        if abs(b.value) - 2.0 * b.sd > TOLERANCES and abs(b.value) > largest:
+            yield b
+
+
+def _posterior(columns: Columns, fit: Fit, name: str, index: Integers) -> tuple[Floats, Floats]:
+    """Mean and standard deviation of the numbers of a group, in standard uncertainties."""
+    variance = fit.amplitude(name) ** 2
+    d = columns.numbers[:, index]
+    told = np.sum(fit.white(d) ** 2, axis=0)
+    return variance * (d.T @ fit.solved), np.sqrt(np.maximum(variance * (1.0 - variance * told), 0.0))
+
+
+def left(fit: Fit) -> tuple[str, str]:
+    """What is left unexplained by names and numbers, and the correlation of the noise in time; empty where there is none."""
+    gaps = [
+        (p, t)
+        for p, t in zip(fit.parts, fit.t[1:], strict=True)
+        if p.kind in ("field", "pose") and t > OFF + 1.0
+    ]
+    rest = ""
+    if gaps and _significant(fit, [p.name for p, _ in gaps]):
+        rest = max(gaps, key=lambda g: g[1])[0].name
+    centre, sd = noise_prior(fit.columns)
+    if float(fit.t[0]) - centre > KAPPA_SDS * sd:
+        rest = rest or "noise larger than declared"
+    over = [(p, t) for p, t in zip(fit.parts, fit.t[1:], strict=True) if p.kind == "time" and t > OFF + 1.0]
+    time = ""
+    if over and _significant(fit, [p.name for p, _ in over]):
+        time = max(over, key=lambda g: g[1])[0].name
+    return rest, time
+
+
+def _significant(fit: Fit, names: Sequence[str]) -> bool:
+    """Likelihood ratio of some parts against none of them, at `RARE`, half of it at the boundary."""
+    gain = 2.0 * (fit.likelihood - _refitted_noise(fit.without(names)).likelihood)
+    return float(0.5 * chi2.sf(max(gain, 0.0), max(1, len(names) // 2))) < RARE
+
+
+def _refitted_noise(fit: Fit) -> Fit:
+    """The same with the size of the noise at its best."""
+    best = fit
+    for factor in (1.1, 1.2, 1.35, 1.5, 2.0, 3.0):
+        trial = fit.without([], fit.noise * factor)
+        best = max(best, trial, key=lambda f: f.likelihood)
+    return best

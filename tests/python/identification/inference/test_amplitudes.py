@@ -1,0 +1,121 @@
+"""The evidence of one covariance against dense formulas, its slopes against differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal, norm, t
+from tests.python.identification.inference.synthetic import READINGS, columns, parts
+
+from stiffmap.identification.inference import amplitudes
+from stiffmap.identification.inference.constants import DEGREES, NOISE_SD, NUMBERS_SD
+
+
+def dense(c, some, ln_variance, weights):
+    """V by its definition."""
+    noise = c.free.T @ np.diag(1.0 / weights) @ c.free
+    v = c.zero + np.exp(ln_variance[0]) * noise
+    for p, x in zip(some, ln_variance[1:], strict=True):
+        v = v + np.exp(x) * (p.full if p.full is not None else p.factor @ p.factor.T)
+    return v
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("heavy", [False, True])
+def test_the_likelihood_is_that_of_the_covariance_and_its_gradient_that_of_differences(seed, heavy):
+    rng = np.random.default_rng(seed)
+    c, some = columns(rng), parts(rng)
+    w = rng.uniform(0.2, 1.2, READINGS) if heavy else np.ones(READINGS)
+    at = rng.uniform(-1.5, 1.0, 4)
+    noise = c.free.T @ (c.free / w[:, None])
+
+    def objective(x):
+        return amplitudes._evaluate(c, some, x, w, noise, False)
+
+    fit, gradient, information = objective(at)
+    expected = multivariate_normal(cov=dense(c, some, at, w)).logpdf(c.residual)
+    bound = sum(float(ln_bound(0.0, x)) - norm.logpdf(0.0, scale=x**-0.5) for x in w) if heavy else 0.0
+    assert fit.likelihood == pytest.approx(expected + bound, abs=1e-8)
+    errors = []
+    for h in (1e-2, 5e-3):
+        steps = h * np.eye(4)
+        differences = [(objective(at + s)[0].score - objective(at - s)[0].score) / (2 * h) for s in steps]
+        errors.append(np.abs(differences - gradient).max())
+    assert errors[1] < 1e-3
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
+    assert np.linalg.eigvalsh(information).min() > 0.0
+
+
+def ln_bound(e, w):
+    """Tangent of ln t at the deviation whose weight is w, as a Gaussian of variance 1/w."""
+    n = DEGREES
+    x0 = (n + 1) / w - n
+    tangent = t.logpdf(0.0, n) - (n + 1) / 2 * np.log1p(x0 / n) - w / 2 * (e**2 - x0)
+    return tangent
+
+
+def test_the_bound_of_heavy_tails_lies_below_them_and_touches_them():
+    e = np.linspace(-8, 8, 161)
+    for w in (0.1, 0.4, 1.0, 1.2):
+        ours = (
+            norm.logpdf(e, scale=w**-0.5) + amplitudes._bound(np.array([w, w])) / 2
+            if w != 1.0
+            else ln_bound(e, w)
+        )
+        assert np.all(ours <= t.logpdf(e, DEGREES) + 1e-9)
+        touched = np.sqrt(max((DEGREES + 1) / w - DEGREES, 0.0))
+        assert ln_bound(touched, w) == pytest.approx(t.logpdf(touched, DEGREES), abs=1e-9)
+
+
+def test_priors_are_those_of_the_table():
+    rng = np.random.default_rng(0)
+    c, some = columns(rng), parts(rng)
+    at, w = np.array([0.3, 0.8, -1.0, 0.5]), np.ones(READINGS)
+    fit = amplitudes._evaluate(c, some, at, w, np.eye(len(c)), False)[0]
+    prior = -0.5 * (0.3 / (2 * NOISE_SD)) ** 2 - 0.5 * (0.8 / (2 * NUMBERS_SD)) ** 2
+    assert fit.score - fit.likelihood == pytest.approx(prior, abs=1e-12)
+    told = columns(np.random.default_rng(0), repeats=1.44)
+    assert amplitudes.noise_prior(told) == pytest.approx((np.log(1.44), 2 / np.sqrt(20)))
+
+
+def test_the_price_of_an_effect_is_the_mean_over_its_sizes():
+    """Against determinants of the whole covariance at each size."""
+    rng = np.random.default_rng(3)
+    c, some = columns(rng), parts(rng)
+    at, w = np.array([0.1, -1.0, -0.5, 1.2]), np.ones(READINGS)
+    fit = amplitudes.evaluated(c, some[2:], at[[0, 3]], w)
+    bare = amplitudes._evaluate(c, some[2:], at[[0, 3]], w, np.eye(len(c)), True)[2]
+    sizes = [np.array([at[0], 2 * np.log(b)]) for b in amplitudes.SIZES]
+    each = [multivariate_normal(cov=dense(c, some[2:], x, w)).logpdf(c.residual) for x in sizes]
+    price = np.logaddexp.reduce(each) - np.log(len(each)) - fit.likelihood
+    kappa = -0.5 * np.log1p((2 * NOISE_SD) ** 2 * (bare[0, 0] - 1 / (2 * NOISE_SD) ** 2))
+    prior = -0.5 * (at[0] / (2 * NOISE_SD)) ** 2
+    assert fit.score == pytest.approx(fit.likelihood + prior + kappa + price, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_amplitudes_of_drawn_readings_are_found_and_what_is_not_there_is_off(seed):
+    rng = np.random.default_rng(seed)
+    c, some = columns(rng), parts(rng)
+    truth = np.array([0.0, -30.0, -30.0, 2 * np.log(6.0)])
+    drawn = np.linalg.cholesky(dense(c, some, truth, np.ones(READINGS))) @ rng.normal(size=len(c))
+    fit = amplitudes.fitted(columns(np.random.default_rng(seed), drawn), some)
+    assert fit.amplitude("effect") == pytest.approx(6.0, rel=0.9)
+    assert fit.amplitude("gap") < 0.7
+    assert fit.noise == pytest.approx(1.0, abs=0.35)
+
+
+def test_one_wild_reading_moves_nothing_under_heavy_tails():
+    rng = np.random.default_rng(5)
+    c, some = columns(rng), parts(rng)
+    drawn = np.linalg.cholesky(
+        dense(c, some, np.array([0.0, -30, -30, 1.0]), np.ones(READINGS))
+    ) @ rng.normal(size=len(c))
+    wild = np.zeros(READINGS)
+    wild[7] = 25.0
+    quiet = amplitudes.fitted(columns(np.random.default_rng(5), drawn), some)
+    loud = amplitudes.fitted(columns(np.random.default_rng(5), drawn + c.free.T @ wild), some)
+    assert np.all(quiet.weights == 1.0) and loud.weights[7] < 0.05
+    change = np.linalg.norm(loud.mean(some[2]) - quiet.mean(some[2]))
+    assert change < 0.5 * np.linalg.norm(quiet.mean(some[2])) + 0.5
+    assert loud.noise < 1.4

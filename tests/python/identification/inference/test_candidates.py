@@ -1,0 +1,69 @@
+"""What every candidate would add to the evidence, against determinants of the whole covariance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+from tests.python.identification.inference.synthetic import READINGS, columns, parts
+from tests.python.identification.inference.test_amplitudes import dense
+
+from stiffmap.identification.inference import amplitudes, candidates
+from stiffmap.identification.inference.columns import Place, Shape
+from stiffmap.identification.inference.constants import SIZES
+
+AT = np.array([0.1, -1.0, -0.5])
+
+
+def setting(seed: int, ranks: tuple[int, ...]) -> tuple[Any, ...]:
+    rng = np.random.default_rng(seed)
+    c = columns(rng)
+    some = parts(rng)[:2]
+    none: Any = None
+    shapes = tuple(Shape(none, np.linalg.qr(rng.normal(size=(len(c), r)))[0], 0) for r in ranks)
+    fit = amplitudes.evaluated(c, some, AT, np.ones(READINGS))
+    return c, fit, shapes, dense(c, some, AT, np.ones(READINGS))
+
+
+def likelihood(c, v, effects):
+    """ln N of the residual with effects (directions, size) added."""
+    for u, b in effects:
+        v = v + b**2 * (len(c) / u.shape[1]) * u @ u.T
+    return multivariate_normal(cov=v).logpdf(c.residual)
+
+
+@pytest.mark.parametrize("rank", [1, 2, 5])
+def test_one_effect_is_worth_the_mean_over_its_sizes(rank):
+    c, fit, shapes, v = setting(rank, (rank, rank, rank))
+    found = candidates.evidence(fit, (Place(None, shapes[:1]), Place(None, shapes[1:])))  # type: ignore[arg-type]
+    each = np.concatenate(found)
+    for s, gain in zip(shapes, each, strict=True):
+        sizes = [likelihood(c, v, [(s.directions, b)]) for b in SIZES]
+        expected = np.logaddexp.reduce(sizes) - np.log(len(SIZES)) - likelihood(c, v, [])
+        assert gain == pytest.approx(expected, abs=1e-8)
+
+
+def test_what_can_only_grow_is_worth_twice_as_much_one_way_and_little_the_other():
+    _, fit, shapes, _ = setting(7, (1,))
+    u = shapes[0].directions
+    both = [Shape(shapes[0].variant, u, s) for s in (0, 1, -1)]
+    free, up, down = np.exp(candidates._of_rank(fit, both, 1))
+    assert up + down == pytest.approx(2.0 * free, rel=1e-9)
+    assert (up > down) == (float(u[:, 0] @ fit.solved) > 0.0)
+
+
+def test_two_effects_together_are_worth_the_mean_over_both_sizes():
+    c, fit, shapes, v = setting(11, (1, 3, 2))
+    found = candidates.of_pairs(fit, shapes)
+    some = SIZES[:: candidates.PAIR_STRIDE]
+    for i, j in ((0, 1), (1, 2)):
+        sizes = [
+            likelihood(c, v, [(shapes[i].directions, a), (shapes[j].directions, b)])
+            for a in some
+            for b in some
+        ]
+        expected = np.logaddexp.reduce(sizes) - np.log(len(sizes)) - likelihood(c, v, [])
+        assert found[i, j] == found[j, i] == pytest.approx(expected, abs=1e-7)
+    assert np.all(np.isneginf(np.diag(found)))

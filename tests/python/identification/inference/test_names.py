@@ -1,0 +1,124 @@
+"""Which sets of effects are found: on columns whose truth is known, and on readings of machines."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.python.identification.inference.synthetic import READINGS, columns
+
+import stiffmap as sm
+from stiffmap.experiment import load_experiment, random_plan, simulate
+from stiffmap.identification.diagnosis.candidates.candidates import Candidate
+from stiffmap.identification.inference.columns import Place, Shape
+from stiffmap.identification.inference.constants import ODDS
+from stiffmap.identification.inference.inference import inferred, terms
+from stiffmap.identification.inference.names import searched
+from stiffmap.identification.inference.verdict import judged
+from stiffmap.model import effects
+from stiffmap.model.description import AppliedEffect
+
+DATA = Path(__file__).parents[3] / "data/experiments"
+
+
+def place(name: str, column: np.ndarray, free: np.ndarray) -> Place:
+    """One direction that is a candidate of its own."""
+    scale = effects.get("compliance").parameter("scale")
+    candidate = Candidate(
+        "compliance",
+        name,
+        ("a",),
+        (replace(scale, name="strength", lower=-np.inf, plausible=None, upper=np.inf),),
+    )
+    lines = (free @ column)[None]
+    variant: Any = SimpleNamespace(array=lambda: lines, candidate=candidate)
+    return Place(candidate, (Shape(variant, (column / np.linalg.norm(column))[:, None], 0),))
+
+
+def setting(seed: int, strengths: tuple[float, float, float]) -> Any:
+    """Three legs and all of them together as candidates, each leg with a strength in noise (norm)."""
+    rng = np.random.default_rng(seed)
+    c = columns(rng)
+    legs = np.linalg.qr(rng.normal(size=(len(c), 3)))[0] @ np.array([[1, 0.3, 0.3], [0, 1, 0.3], [0, 0, 1]])
+    legs /= np.linalg.norm(legs, axis=0)
+    names = [place(f"leg {k + 1}", legs[:, k], c.free) for k in range(3)]
+    every = place("all legs", legs.sum(axis=1), c.free)
+    residual = legs @ np.array(strengths) + rng.normal(size=len(c))
+    return replace(c, residual=residual, zero=np.zeros((len(c), len(c))), places=(*names, every))
+
+
+def found(c: Any) -> set[str]:
+    return {s.place.candidate.element for s in searched(c).best.chosen}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_legs_are_found_though_all_of_them_together_explain_more_than_each(seed):
+    """All legs less the third would be the end of single steps."""
+    assert found(setting(seed, (0.0, 40.0, 30.0))) == {"leg 2", "leg 3"}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_effect_is_one_and_nothing_is_nothing(seed):
+    assert found(setting(seed, (25.0, 25.0, 25.0))) == {"all legs"}
+    assert found(setting(seed, (0.0, 30.0, 0.0))) == {"leg 2"}
+    assert found(setting(seed, (0.0, 0.0, 0.0))) == set()
+
+
+def test_what_shows_the_same_is_an_equivalent():
+    c = setting(1, (0.0, 30.0, 0.0))
+    twin = place("twin of leg 2", c.places[1].shapes[0].directions[:, 0] + 1e-3, c.free)
+    s = searched(replace(c, places=(*c.places, twin)))
+    (near,) = s.equivalents
+    assert {s.best.chosen[0].place.candidate.element, *(p.candidate.element for p, _ in near)} == {
+        "leg 2",
+        "twin of leg 2",
+    }
+    assert all(abs(x) < np.log(ODDS) for _, x in near)
+    assert judged_word(s) == "ambiguous"
+
+
+def judged_word(s: Any) -> str:
+    return "ambiguous" if any(s.equivalents) else "effects"
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "element", "leg"),
+    [("A-servo", "compliance", "actuator", "z"), ("C-backlash", "dead_zone", "actuator", "y")],
+)
+def test_an_experiment_on_disk_has_its_cause(name, kind, element, leg):
+    folder = DATA / name
+    machine = sm.load_machine("orthoglide-revised")
+    c, s = inferred(machine, load_experiment(folder))
+    v = judged(c, s)
+    assert v.word in ("effects", "ambiguous") and not v.beyond and not v.rest
+    (one,) = v.named
+    places = [one.chosen.place, *one.equivalents]
+    assert (kind, element, (leg,)) in [a.place for p in places for a in (p.candidate, *p.aliases)]
+    assert s.best.fit.noise == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_machine_as_declared_gets_no_name_and_a_soft_drive_its_size():
+    machine = sm.load_machine("linear-delta")
+    plan = random_plan(machine, poses=5, loads=4, repeats=1, seed=2)
+    c, s = inferred(machine, simulate(machine, plan, seed=3))
+    assert judged(c, s).word == "none" and s.best.chosen == ()
+    soft = AppliedEffect("compliance", "carriage", ("b",), (("scale", 1.5),))
+    c, s = inferred(machine, simulate(machine, plan, [soft], seed=3))
+    v = judged(c, s)
+    (one,) = v.named
+    assert one.chosen.place.candidate.place == ("compliance", "carriage", ("b",))
+    assert dict(terms([one.chosen])[0].parameters)["scale"] == pytest.approx(1.5, abs=0.05)
+
+
+def test_readings_of_two_set_ups_whose_frames_are_unknown():
+    """What frames could be is gone from every column."""
+    machine = sm.load_machine("linear-delta")
+    plan = replace(random_plan(machine, "position", poses=8, repeats=1, seed=4), frame="unknown")
+    c, s = inferred(machine, simulate(machine, plan, seed=5))
+    assert len(c) == READINGS - 16 - 6  # eight poses of three readings, a frame of six
+    assert c.free.T @ c.free == pytest.approx(np.eye(len(c)), abs=1e-12)
+    assert judged(c, s).word == "none"

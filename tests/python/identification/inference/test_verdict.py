@@ -1,0 +1,110 @@
+"""What keeps a name and what takes it away, by cases worked by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+from tests.python.identification.inference.synthetic import READINGS, columns
+
+from stiffmap.identification.calibration.unknowns import Unknown
+from stiffmap.identification.inference import amplitudes, verdict
+from stiffmap.identification.inference.amplitudes import Part
+from stiffmap.identification.inference.columns import Place, Shape
+from stiffmap.identification.inference.names import Chosen
+
+FLAT = np.ones(READINGS)
+
+
+def flat(seed: int, strengths: np.ndarray, poses: int = 8) -> tuple[Any, Any, Any]:
+    """Columns, the fit without and with one effect that adds `strengths` (N,) where its pattern is one everywhere."""
+    rng = np.random.default_rng(seed)
+    c = columns(rng)
+    pose = np.arange(READINGS) * poses // READINGS
+    experiment: Any = SimpleNamespace(groups=pose)
+    residual = c.free.T @ (strengths + rng.normal(size=READINGS))
+    c = replace(c, residual=residual, zero=np.zeros((len(c), len(c))), experiment=experiment)
+    u = c.free.T @ FLAT
+    variant: Any = SimpleNamespace(array=lambda: FLAT[None])
+    shape = Shape(variant, (u / np.linalg.norm(u))[:, None], 0)
+    none: Any = None
+    part = Part("effect", "effect", factor=shape.directions * np.sqrt(len(c)))
+    chosen = Chosen(Place(none, (shape,)), 0, part, np.array([strengths.mean()]))
+    return c, amplitudes.fitted(c, [part]), chosen
+
+
+def test_one_strength_everywhere_passes_and_two_do_not():
+    block = (np.arange(READINGS) // 20).astype(np.intp)
+    c, fit, chosen = flat(0, np.full(READINGS, 6.0))
+    p, scatter = verdict.evenness(c, fit.without(["effect"]), chosen, block)
+    assert p > 1e-3 and scatter < 0.2
+    c, fit, chosen = flat(0, np.where(block == 0, 12.0, 0.0))
+    p, scatter = verdict.evenness(c, fit.without(["effect"]), chosen, block)
+    assert p < 1e-10
+    assert scatter == pytest.approx(
+        np.sqrt(2.0), rel=0.15
+    )  # strengths 2 and 0 of their mean: sd of two values √2
+
+
+def test_the_homogeneity_test_is_that_of_weighted_means():
+    """In white noise without frames: χ² of block means about their common mean."""
+    c, _, chosen = flat(3, np.full(READINGS, 2.0))
+    c = replace(c, free=np.eye(READINGS), residual=c.free @ c.residual, zero=np.zeros((READINGS, READINGS)))
+    plain = amplitudes.evaluated(c, (), np.zeros(1), np.ones(READINGS))
+    block = (np.arange(READINGS) % 3).astype(np.intp)
+    means = np.array([c.residual[block == b].mean() for b in range(3)])
+    count = np.bincount(block)
+    common = (count * means).sum() / count.sum()
+    expected = chi2.sf(float((count * (means - common) ** 2).sum()), 2)
+    assert verdict.evenness(c, plain, chosen, block)[0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_an_effect_that_one_pose_alone_shows_has_no_name():
+    c, fit, chosen = flat(1, np.full(READINGS, 5.0))
+    assert verdict.without_a_pose(c, fit.without(["effect"]), chosen) > 100.0
+    alone = np.where(np.arange(READINGS) < 5, 30.0, 0.0)
+    c, fit, chosen = flat(1, alone)
+    assert verdict.without_a_pose(c, fit.without(["effect"]), chosen) < np.log(20)
+    assert verdict.refusal(c, fit, chosen)[1] == "it rests on the readings of one pose"
+
+
+def test_thirds_keep_equal_values_together():
+    assert len(set(verdict.thirds(np.array([0.0, 0, 0, 0, 1, 2]))[:4])) == 1
+    assert np.ptp(np.bincount(verdict.thirds(np.arange(9.0)))) <= 2
+
+
+def numbers(values: tuple[float, ...], seed: int = 0) -> Any:
+    """Columns of numbers of one group, each told to a tenth of its uncertainty, off by `values`."""
+    rng = np.random.default_rng(seed)
+    c = columns(rng)
+    d = 10.0 * np.linalg.qr(rng.normal(size=(len(c), len(values))))[0]
+    unknowns = tuple(Unknown(f"number {k}", "zeros", "m", 1e-4) for k in range(len(values)))
+    residual = d @ np.array(values) + rng.normal(size=len(c))
+    return replace(c, residual=residual, numbers=d, unknowns=unknowns, zero=np.zeros((len(c), len(c))))
+
+
+def test_a_number_far_off_is_out_of_tolerance_and_others_are_not():
+    c = numbers((0.5, -8.0, 0.3, 1.2, -0.7))
+    fit = amplitudes.fitted(c, amplitudes.Parts(c).numbers)
+    (one,) = verdict.out_of_tolerance(c, fit)
+    assert one.unknown.name == "number 1" and one.value == pytest.approx(-8.0, abs=0.5) and one.sd < 0.2
+
+
+def test_the_largest_of_many_numbers_within_tolerance_is_not_out_of_it():
+    for seed in range(5):
+        rng = np.random.default_rng(100 + seed)
+        c = numbers(tuple(rng.normal(size=20)), seed)
+        assert not list(verdict.out_of_tolerance(c, amplitudes.fitted(c, amplitudes.Parts(c).numbers)))
+
+
+def test_noise_far_beyond_its_declaration_is_a_rest():
+    rng = np.random.default_rng(2)
+    c = columns(rng)
+    c = replace(c, residual=6.0 * rng.normal(size=len(c)), zero=np.zeros((len(c), len(c))))
+    assert verdict.left(amplitudes.fitted(c, ()))[0] == "noise larger than declared"
+    c = replace(c, residual=c.residual / 6.0)
+    assert verdict.left(amplitudes.fitted(c, ())) == ("", "")
