@@ -41,7 +41,7 @@ OFF, SINKS = -14.0, -8.0
 """ln variance of a part that the readings do not ask for, and below which one on its way down is taken out."""
 BEGIN = -2.0
 """ln variance with which a part begins."""
-NOISE = "noise"
+NOISE, ALL_NUMBERS = "noise", "declared numbers"
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +125,9 @@ class Parts:
 
     columns: Columns
     numbers: tuple[Part, ...] = field(init=False)
+    """One for each group."""
+    together: tuple[Part, ...] = field(init=False)
+    """One for all groups."""
     gaps: tuple[Part, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -133,6 +136,7 @@ class Parts:
             Part(name, "number", full=c.numbers[:, index] @ c.numbers[:, index].T)
             for name, index in c.groups.items()
         )
+        self.together = (Part(ALL_NUMBERS, "number", full=c.numbers @ c.numbers.T),) if c.unknowns else ()
         self.gaps = tuple(Part(name, kind, full=k) for kind, name, k in c.gaps)
 
 

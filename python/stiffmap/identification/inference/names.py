@@ -1,12 +1,12 @@
-"""Which effects have a name: a search over sets of effects by evidence, in two worlds.
+"""Which effects have a name: a search over sets of effects by evidence, in three worlds.
 
-In the world "exact" declared numbers are as declared but for the effects, in "uncertain" each group of them has an
-amplitude of its own. Both are searched alike; "exact" is `ODDS` times as likely before any reading.
+In the world "exact" declared numbers are as declared but for the effects; in "together" all are off by the same share of
+their uncertainties, in "groups" each group by its own. All are searched alike and as likely before any reading.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -28,6 +28,7 @@ from stiffmap.identification.inference.candidates import as_part, evidence, of_p
 from stiffmap.identification.inference.columns import Columns, Place, possible
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, REFITS, SIZES
 
+EXACT = "exact"
 QUIET = -6.0
 """ln variance with which gaps begin in a fit that goes on from one without gaps."""
 SETTLED = 0.3
@@ -57,7 +58,8 @@ class Chosen:
 class Model:
     """A set of effects in one world, at its best amplitudes."""
 
-    uncertain: bool
+    world: str
+    """``exact``, ``together`` or ``groups``."""
     chosen: tuple[Chosen, ...]
     fit: Fit
     score: float
@@ -74,23 +76,37 @@ class Search:
     """ln odds of each named effect against none, all places together, in the order of `best.chosen`."""
     equivalents: tuple[tuple[tuple[Place, float], ...], ...]
     """Per named effect, the places that would do in its stead, with their evidence less that of the best."""
+    without: tuple[float, ...] = ()
+    """Per named effect, evidence of the best model of another world in which it is not."""
 
 
 def searched(columns: Columns, predict: Predict | None = None) -> Search:
-    """The best set of effects over both worlds."""
+    """The best set of effects over all worlds."""
     parts = Parts(columns)
-    worlds = [_World(columns, parts, uncertain, predict).search() for uncertain in (False, True)]
-    return max(worlds, key=lambda s: s.best.score)
+    worlds: dict[str, tuple[Part, ...]] = {EXACT: (), "together": parts.together, "groups": parts.numbers}
+    searches = [_World(columns, parts, name, numbers, predict) for name, numbers in worlds.items()]
+    found = {w.name: w.search() for w in searches}
+    best = max(found.values(), key=lambda s: s.best.score)
+    others = [w for w in searches if w.name != best.best.world]
+    return replace(best, without=tuple(_without(c, best, others, found) for c in best.best.chosen))
+
+
+def _without(c: Chosen, best: Search, others: Sequence[_World], found: Mapping[str, Search]) -> float:
+    """Evidence of the best model of another world in which an effect, and what would do in its stead, is not."""
+    k = best.best.chosen.index(c)
+    same = {id(c.place), *(id(p) for p, _ in best.equivalents[k])}
+    models = [m for w in others for m in (w.less(best.best, c), found[w.name].null, found[w.name].best)]
+    return max((m.score for m in models if not same & {id(o.place) for o in m.chosen}), default=-np.inf)
 
 
 class _World:
     """The search in one world."""
 
-    def __init__(self, columns: Columns, parts: Parts, uncertain: bool, predict: Predict | None) -> None:
-        self.columns, self.uncertain, self.predict = columns, uncertain, predict
-        self.numbers = parts.numbers if uncertain else ()
+    def __init__(
+        self, columns: Columns, parts: Parts, name: str, numbers: tuple[Part, ...], predict: Predict | None
+    ) -> None:
+        self.columns, self.name, self.numbers, self.predict = columns, name, numbers, predict
         self.gaps = parts.gaps
-        self.prior = 0.0 if uncertain else float(np.log(ODDS))
 
     def search(self) -> Search:
         """Forward steps with elimination and exchange after each."""
@@ -173,7 +189,7 @@ class _World:
                 each = evidence(fit.without([c.part.name]), (c.place,))[0]
                 shapes += float(log_mean(each) - each[c.shape])
         possible = all(map(is_possible, chosen))
-        return Model(self.uncertain, chosen, fit, fit.score + shapes + self.prior if possible else -np.inf)
+        return Model(self.name, chosen, fit, fit.score + shapes if possible else -np.inf)
 
     def _corrected(self, fit: Fit, chosen: tuple[Chosen, ...]) -> Fit:
         """The fit on a residual less what straight lines miss of the effects; the one given where that does not settle."""
@@ -202,7 +218,7 @@ class _World:
         for _ in range(2):
             before = model
             for c in model.chosen if len(model.chosen) > 1 else ():
-                fewer = self._less(model, c)
+                fewer = self.less(model, c)
                 if model.score - fewer.score < float(np.log(ODDS)):
                     model = fewer
                     break
@@ -217,7 +233,7 @@ class _World:
     def _by_pairs(self, model: Model) -> Model:
         """Two effects at once given up for two others: one after the other they may never change."""
         for first, second in combinations(model.chosen, 2):
-            fewer = self._less(self._less(model, first), second)
+            fewer = self.less(self.less(model, first), second)
             bounds = sorted(self._bounds(fewer), key=lambda b: -b[0])[:SINGLES]
             if len(bounds) < 2:
                 continue
@@ -233,14 +249,15 @@ class _World:
                         return pair
         return model
 
-    def _less(self, model: Model, c: Chosen) -> Model:
+    def less(self, model: Model, c: Chosen) -> Model:
+        """The effects of a model but one, in this world."""
         return self._fit(tuple(o for o in model.chosen if o.part.name != c.part.name), amplitudes(model.fit))
 
     def _rivals(self, model: Model) -> tuple[tuple[float, tuple[tuple[Place, float], ...]], ...]:
         """Per effect its ln odds, all places that would do together, and those places."""
         out = []
         for c in model.chosen:
-            less = self._less(model, c)
+            less = self.less(model, c)
             at_best = model.fit.without([c.part.name])
             scores = {id(p): (s - model.score, p) for s, p, _ in self._bounds(less, (at_best,))}
             scores[id(c.place)] = (0.0, c.place)

@@ -10,13 +10,14 @@ from scipy.stats import chi2, norm
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.identification.calibration.unknowns import Unknown
-from stiffmap.identification.inference.amplitudes import OFF, Fit, noise_prior
+from stiffmap.identification.inference.amplitudes import ALL_NUMBERS, OFF, Fit, noise_prior
 from stiffmap.identification.inference.columns import Columns, Place
 from stiffmap.identification.inference.constants import EQUAL_SHARE, ODDS, RARE, TOLERANCES
-from stiffmap.identification.inference.names import Chosen, Search
+from stiffmap.identification.inference.names import EXACT, Chosen, Search
 
 DETERMINED = 0.5
 """Posterior standard deviation, in standard uncertainties, of a number that the readings determine."""
+TOLERABLE = "declared numbers within their tolerances show the same"
 KAPPA_SDS = 4.0
 """Prior standard deviations of ln κ beyond which the noise is no noise."""
 
@@ -61,16 +62,19 @@ def judged(columns: Columns, search: Search) -> Verdict:
     """Names that stand, numbers out of tolerance, and the rest."""
     model = search.best
     named, refused = [], []
-    for c, odds, near in zip(model.chosen, search.gain, search.equivalents, strict=True):
+    each = zip(model.chosen, search.gain, search.equivalents, search.without, strict=True)
+    for c, odds, near, without in each:
         scatter, why = refusal(columns, model.fit, c)
+        if model.score - without < np.log(ODDS):
+            why = TOLERABLE
         if why:
             refused.append((c, why))
         else:
             named.append(Named(c, tuple(p for p, _ in near), odds, scatter))
-    beyond = tuple(out_of_tolerance(columns, model.fit)) if model.uncertain else ()
+    beyond = tuple(out_of_tolerance(columns, model.fit)) if model.world != EXACT else ()
     rest, time = left(model.fit)
-    if refused and not rest:
-        rest = refused[0][1]
+    unexplained = [why for _, why in refused if why != TOLERABLE]
+    rest = rest or (unexplained[0] if unexplained else "")
     if named:
         word = "ambiguous" if any(n.equivalents for n in named) else "effects"
     else:
@@ -177,7 +181,7 @@ def out_of_tolerance(columns: Columns, fit: Fit) -> Iterator[Beyond]:
 
 def _posterior(columns: Columns, fit: Fit, name: str, index: Integers) -> tuple[Floats, Floats]:
     """Mean and standard deviation of the numbers of a group, in standard uncertainties."""
-    variance = fit.amplitude(name) ** 2
+    variance = fit.amplitude(ALL_NUMBERS) ** 2 or fit.amplitude(name) ** 2
     d = columns.numbers[:, index]
     told = np.sum(fit.white(d) ** 2, axis=0)
     return variance * (d.T @ fit.solved), np.sqrt(np.maximum(variance * (1.0 - variance * told), 0.0))

@@ -13,6 +13,7 @@ from tests.python.identification.inference.synthetic import READINGS, columns
 
 import stiffmap as sm
 from stiffmap.experiment import load_experiment, random_plan, simulate
+from stiffmap.identification.calibration.unknowns import Unknown
 from stiffmap.identification.diagnosis.candidates.candidates import Candidate
 from stiffmap.identification.inference.columns import Place, Shape
 from stiffmap.identification.inference.constants import ODDS
@@ -122,3 +123,25 @@ def test_readings_of_two_set_ups_whose_frames_are_unknown():
     assert len(c) == READINGS - 16 - 6  # eight poses of three readings, a frame of six
     assert c.free.T @ c.free == pytest.approx(np.eye(len(c)), abs=1e-12)
     assert judged(c, s).word == "none"
+
+
+@pytest.mark.parametrize(("strengths", "word"), [((8.0, -9.0, 7.0), "none"), ((0.0, 200.0, 0.0), "effects")])
+def test_what_numbers_within_their_tolerance_show_has_no_name(strengths, word):
+    """Each leg's column is ten times that of a number's uncertainty."""
+    c = setting(2, strengths)
+    d = 10.0 * np.stack([p.shapes[0].directions[:, 0] for p in c.places[:3]], axis=1)
+    unknowns = tuple(Unknown(f"length of leg {k}", "link lengths", "m", 1e-4) for k in range(3))
+    n = len(c.rows)
+    experiment: Any = SimpleNamespace(
+        position=np.zeros((n, 3)),
+        wrench=np.zeros((n, 6)),
+        order=None,
+        hours=None,
+        runs=np.zeros(n, int),
+        groups=np.arange(n) // 4,
+    )
+    c = replace(c, numbers=d, unknowns=unknowns, experiment=experiment)
+    v = judged(c, searched(c))
+    assert v.word == word
+    if word == "effects":
+        assert [x.chosen.place.candidate.element for x in v.named] == ["leg 2"] or v.beyond
