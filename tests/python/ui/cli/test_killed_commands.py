@@ -109,6 +109,10 @@ def _lines(path: Path) -> int:
 
 
 def _tried(name: str, folder: Path) -> None:
+    import matplotlib.pyplot  # noqa: F401 - here once, not in each process
+    import scipy.optimize
+    import scipy.stats  # noqa: F401
+
     import stiffmap.ui.cli.app as app
 
     app.load(next(c for c in app.COMMANDS if c.name == name))
