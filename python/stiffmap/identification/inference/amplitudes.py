@@ -243,15 +243,20 @@ def _evaluate(
 def _of_size(part: Part, root: Floats, solved: Floats, t: float) -> float:
     """ln of the mean over sizes of an effect, of the likelihood relative to that at its amplitude in the model."""
     assert part.factor is not None
-    white = solve_triangular(root, part.factor, lower=True, check_finite=False)
-    inside, vectors = np.linalg.eigh(white.T @ white)
-    z = vectors.T @ (part.factor.T @ solved)
+    inside, z = spectrum(root, solved, part.factor)
     # without the effect (Woodbury): 1/λ grows by the variance that the model gives it
     b2 = np.exp(t)
     share = np.maximum(1.0 - b2 * inside, 1e-12)
     return float(
         log_mean(gains(inside / share, z / share)) - gains(inside / share, z / share, np.array([b2]))[0]
     )
+
+
+def spectrum(root: Floats, solved: Floats, factor: Floats) -> tuple[Floats, Floats]:
+    """(p,) information of a covariance about the directions of a factor (m, p), and (p,) what the readings say along them."""
+    white = solve_triangular(root, factor, lower=True, check_finite=False)
+    inside, vectors = np.linalg.eigh(white.T @ white)
+    return inside, np.asarray(vectors.T @ (factor.T @ solved))
 
 
 def gains(inside: Floats, z: Floats, squared: Floats = SIZES**2) -> Floats:

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.stats import norm
 
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.inference.amplitudes import Fit, Part, gains, log_mean
-from stiffmap.identification.inference.columns import Columns, Place, Shape
+from stiffmap.identification.inference.amplitudes import Fit, gains, log_mean
+from stiffmap.identification.inference.columns import Place, Shape
 from stiffmap.identification.inference.constants import SIZES
 
 PAIR_STRIDE = 3
@@ -35,7 +35,7 @@ def evidence(fit: Fit, places: tuple[Place, ...]) -> list[Floats]:
 
 def _of_rank(fit: Fit, shapes: list[Shape], rank: int) -> Floats:
     m = len(fit.columns)
-    factor = np.hstack([s.directions for s in shapes]) * np.sqrt(m / rank)
+    factor = np.hstack([s.factor for s in shapes])
     white = fit.white(factor).reshape(m, len(shapes), rank)
     inside, vectors = np.linalg.eigh(np.einsum("mia,mib->iab", white, white))
     z = np.einsum("iab,ia->ib", vectors, (factor.T @ fit.solved).reshape(len(shapes), rank))
@@ -48,19 +48,13 @@ def _of_rank(fit: Fit, shapes: list[Shape], rank: int) -> Floats:
     return log_mean(gain)
 
 
-def as_part(columns: Columns, shape: Shape, name: str) -> Part:
-    """The part of a covariance that an effect of one shape is, of rms one in the noise."""
-    rank = shape.directions.shape[1]
-    return Part(name, "effect", factor=shape.directions * np.sqrt(len(columns) / rank))
-
-
 def of_pairs(fit: Fit, shapes: Sequence[Shape]) -> Floats:
     """(s, s) gain of evidence by every two of some shapes together, mean over both sizes; nothing of one with itself."""
     m, s = len(fit.columns), len(shapes)
     rank = max(v.directions.shape[1] for v in shapes)
     factor = np.zeros((m, s, rank))
     for k, v in enumerate(shapes):
-        factor[:, k, : v.directions.shape[1]] = v.directions * np.sqrt(m / v.directions.shape[1])
+        factor[:, k, : v.directions.shape[1]] = v.factor
     white = fit.white(factor.reshape(m, -1))
     gram = (white.T @ white).reshape(s, rank, s, rank)
     z = (factor.reshape(m, -1).T @ fit.solved).reshape(s, rank)

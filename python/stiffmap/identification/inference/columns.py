@@ -44,6 +44,12 @@ class Shape:
     sign: int
     """+1 or -1 where a single strength can only have that sign along the direction, else 0."""
 
+    @property
+    def factor(self) -> Floats:
+        """(m, p) F of the covariance F Fᵀ of an effect of rms one in the noise."""
+        m, p = self.directions.shape
+        return np.asarray(self.directions * np.sqrt(m / p))
+
 
 @dataclass(frozen=True, eq=False)
 class Place:
@@ -86,9 +92,9 @@ class Columns:
         """(m, ...) of the readings' (N, ...), m or rad: in noise, without what frames and zeros could be."""
         return np.asarray(self.free.T @ (values / self.sigma.reshape(-1, *(1,) * (values.ndim - 1))))
 
-    def white_lines(self, variant: Variant) -> Floats:
-        """(m, p) columns of a candidate, per scale of its linear parameters."""
-        return self.rotated(variant.array()[:, self.use].T)
+    def lines(self, variant: Variant) -> Floats:
+        """(N, p) m, rad: columns of a candidate, per scale of its linear parameters."""
+        return variant.array()[:, self.use].T
 
     def __len__(self) -> int:
         return len(self.residual)

@@ -49,11 +49,7 @@ def _term(c: Chosen) -> AppliedEffect:
     v = c.place.shapes[c.shape].variant
     candidate = c.place.candidate
     given = dict(v.shape)
-    linear = candidate.linear
-    if len(linear) == len(c.values):
-        for p, value in zip(linear, c.values, strict=True):
-            full = float(p.null or 0.0) + float(value) * p.scale
-            given[p.name] = float(np.clip(full, p.lower, p.upper))
+    given |= {p.name: float(np.clip(value, p.lower, p.upper)) for p, value in c.strengths}
     if v.start is not None:
         given |= v.start(c.values)
     return candidate.term([given.get(p.name, float(p.null or 0.0)) for p in candidate.parameters])

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
-from stiffmap.experiment.noise.field import free_position
+from stiffmap.experiment.noise.field import free_position, unit
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.solve.machine import Machine
 
@@ -71,13 +71,6 @@ def _spaces(machine: Machine, e: Experiment) -> Iterator[tuple[str, Floats]]:
         if len(drives) <= FEW_DRIVES:
             return
     yield "place", unit(free_position(e))
-
-
-def unit(x: Floats) -> Floats:
-    """(n, k) mapped to -1 ... 1, what does not vary to 0."""
-    low, high = x.min(axis=0), x.max(axis=0)
-    half = np.where(high > low, (high - low) / 2.0, 1.0)
-    return np.asarray((x - (low + high) / 2.0) / half)
 
 
 def _sessions(when: Floats, session: Integers) -> tuple[Floats, Integers]:

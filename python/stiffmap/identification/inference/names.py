@@ -23,10 +23,12 @@ from stiffmap.identification.inference.amplitudes import (
     fitted,
     gains,
     log_mean,
+    spectrum,
 )
-from stiffmap.identification.inference.candidates import as_part, evidence, of_pairs
+from stiffmap.identification.inference.candidates import evidence, of_pairs
 from stiffmap.identification.inference.columns import Columns, Place, possible
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, REFITS, SIZES
+from stiffmap.model.effects import Parameter
 
 EXACT = "exact"
 QUIET = -6.0
@@ -53,6 +55,20 @@ class Chosen:
     values: Floats
     """(p,) strengths, in the scales of the linear parameters."""
 
+    @property
+    def strengths(self) -> tuple[tuple[Parameter, float], ...]:
+        """Linear parameters with their values, SI; nothing where the strengths are not theirs."""
+        linear = self.place.candidate.linear
+        if len(linear) != len(self.values):
+            return ()
+        return tuple(
+            (p, float(p.null or 0.0) + float(v) * p.scale) for p, v in zip(linear, self.values, strict=True)
+        )
+
+    def lines(self, columns: Columns) -> Floats:
+        """(N, p) m, rad: its columns, per scale of each linear parameter."""
+        return columns.lines(self.place.shapes[self.shape].variant)
+
 
 @dataclass(frozen=True, eq=False)
 class Model:
@@ -63,7 +79,7 @@ class Model:
     chosen: tuple[Chosen, ...]
     fit: Fit
     score: float
-    """Evidence of the set: that of the fit, mean over shapes, and what the world costs."""
+    """Evidence of the set: that of the fit, mean over shapes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +187,7 @@ class _World:
         start = {**{g.name: QUIET for g in self.gaps}, **amplitudes(anchor)}
         for place in places:
             k = int(np.argmax(evidence(anchor, (place,))[0]))
-            part = as_part(self.columns, place.shapes[k], f"effect {place.candidate}")
+            part = Part(f"effect {place.candidate}", "effect", factor=place.shapes[k].factor)
             chosen.append(Chosen(place, k, part, np.zeros(0)))
             start[part.name] = _size(anchor, part)
         return self._fit(tuple(chosen), start)
@@ -275,11 +291,7 @@ def _near(one: Floats, other: Floats) -> bool:
 
 def is_possible(c: Chosen) -> bool:
     """Whether all strengths lie within what their parameters can be."""
-    linear = c.place.candidate.linear
-    if len(linear) != len(c.values):
-        return True
-    full = [float(p.null or 0.0) + float(v) * p.scale for p, v in zip(linear, c.values, strict=True)]
-    return all(low <= x <= high for (low, high), x in zip(map(possible, linear), full, strict=True))
+    return all(low <= x <= high for p, x in c.strengths for low, high in [possible(p)])
 
 
 def amplitudes(fit: Fit) -> dict[str, float]:
@@ -290,15 +302,13 @@ def amplitudes(fit: Fit) -> dict[str, float]:
 def _size(anchor: Fit, part: Part) -> float:
     """ln variance of an effect that gains most at the anchor's amplitudes."""
     assert part.factor is not None
-    white = anchor.white(part.factor)
-    inside, vectors = np.linalg.eigh(white.T @ white)
-    best = int(np.argmax(gains(inside, vectors.T @ (part.factor.T @ anchor.solved))))
+    best = int(np.argmax(gains(*spectrum(anchor.root, anchor.solved, part.factor))))
     return float(2.0 * np.log(SIZES[best]))
 
 
 def _columns(columns: Columns, c: Chosen) -> Floats:
     """(m, p) change of the readings per scale of each linear parameter."""
-    return columns.white_lines(c.place.shapes[c.shape].variant)
+    return columns.rotated(c.lines(columns))
 
 
 def _values(fit: Fit, c: Chosen) -> Floats:

@@ -90,12 +90,12 @@ def refusal(columns: Columns, fit: Fit, c: Chosen) -> tuple[float, str]:
     )
     if size < gaps:
         return 0.0, "smaller than what nobody can name"
-    if without_a_pose(columns, fit.without([c.part.name]), c) < np.log(ODDS):
+    rest = fit.without([c.part.name])
+    if without_a_pose(columns, rest, c) < np.log(ODDS):
         return 0.0, "it rests on the readings of one pose"
     blocks = list(partitions(columns.experiment, columns.rows))
     worst, scatter = "", 0.0
     lowest = RARE / max(1, len(blocks))
-    rest = fit.without([c.part.name])
     for name, block in blocks:
         p, share = evenness(columns, rest, c, block)
         if p < lowest:
@@ -107,7 +107,7 @@ def refusal(columns: Columns, fit: Fit, c: Chosen) -> tuple[float, str]:
 
 def without_a_pose(columns: Columns, rest: Fit, c: Chosen) -> float:
     """Gain of ln likelihood by an effect of one strength, at its least over all poses left out in turn."""
-    raw = c.place.shapes[c.shape].variant.array()[:, columns.use].T @ c.values / columns.sigma
+    raw = c.lines(columns) @ c.values / columns.sigma
     pattern, r = rest.white(columns.free.T @ raw), rest.white(rest.columns.residual)
     pose = columns.experiment.groups[columns.rows]
     out = []
@@ -123,12 +123,12 @@ def evenness(columns: Columns, rest: Fit, c: Chosen, block: Integers) -> tuple[f
 
     DerSimonian, Laird, Controlled Clinical Trials 7 (1986) 177.
     """
-    raw = c.place.shapes[c.shape].variant.array()[:, columns.use].T @ c.values / columns.sigma
+    raw = c.lines(columns) @ c.values / columns.sigma
     pattern = np.stack([columns.free.T @ np.where(block == b, raw, 0.0) for b in np.unique(block)], axis=1)
     white, r = rest.white(pattern), rest.white(rest.columns.residual)
     gram = white.T @ white
-    told = np.diag(gram) > 1e-6 * np.diag(gram).max()
-    white, gram = white[:, told], gram[np.ix_(told, told)]
+    seen = np.diag(gram) > 1e-6 * np.diag(gram).max()
+    white, gram = white[:, seen], gram[np.ix_(seen, seen)]
     if len(gram) < 2:
         return 1.0, 0.0
     together = white.sum(axis=1)
@@ -183,8 +183,8 @@ def _posterior(columns: Columns, fit: Fit, name: str, index: Integers) -> tuple[
     """Mean and standard deviation of the numbers of a group, in standard uncertainties."""
     variance = fit.amplitude(ALL_NUMBERS) ** 2 or fit.amplitude(name) ** 2
     d = columns.numbers[:, index]
-    told = np.sum(fit.white(d) ** 2, axis=0)
-    return variance * (d.T @ fit.solved), np.sqrt(np.maximum(variance * (1.0 - variance * told), 0.0))
+    information = np.sum(fit.white(d) ** 2, axis=0)
+    return variance * (d.T @ fit.solved), np.sqrt(np.maximum(variance * (1.0 - variance * information), 0.0))
 
 
 def left(fit: Fit) -> tuple[str, str]:

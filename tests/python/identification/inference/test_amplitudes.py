@@ -74,8 +74,8 @@ def test_priors_are_those_of_the_table():
     fit = amplitudes._evaluate(c, some, at, w, np.eye(len(c)), False)[0]
     prior = -0.5 * (0.3 / (2 * NOISE_SD)) ** 2 - 0.5 * (0.8 / (2 * NUMBERS_SD)) ** 2
     assert fit.score - fit.likelihood == pytest.approx(prior, abs=1e-12)
-    told = columns(np.random.default_rng(0), repeats=1.44)
-    assert amplitudes.noise_prior(told) == pytest.approx((np.log(1.44), 2 / np.sqrt(20)))
+    repeated = columns(np.random.default_rng(0), repeats=1.44)
+    assert amplitudes.noise_prior(repeated) == pytest.approx((np.log(1.44), 2 / np.sqrt(20)))
 
 
 def test_the_price_of_an_effect_is_the_mean_over_its_sizes():

@@ -78,7 +78,7 @@ def test_thirds_keep_equal_values_together():
 
 
 def numbers(values: tuple[float, ...], seed: int = 0) -> Any:
-    """Columns of numbers of one group, each told to a tenth of its uncertainty, off by `values`."""
+    """Columns of numbers of one group, each determined to a tenth of its uncertainty, off by `values`."""
     rng = np.random.default_rng(seed)
     c = columns(rng)
     d = 10.0 * np.linalg.qr(rng.normal(size=(len(c), len(values))))[0]
