@@ -19,7 +19,7 @@ from stiffmap.identification.inference.columns import Place, Shape
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.inference import inferred, terms
 from stiffmap.identification.inference.names import searched
-from stiffmap.identification.inference.verdict import judged
+from stiffmap.identification.inference.verdict import TOLERABLE, judged
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
 
@@ -131,8 +131,16 @@ def test_what_numbers_within_their_tolerance_show_has_no_name(strengths, word):
     c = setting(2, strengths)
     d = 10.0 * np.stack([p.shapes[0].directions[:, 0] for p in c.places[:3]], axis=1)
     unknowns = tuple(Unknown(f"length of leg {k}", "link lengths", "m", 1e-4) for k in range(3))
-    n = len(c.rows)
-    experiment: Any = SimpleNamespace(
+    c = replace(c, numbers=d, unknowns=unknowns, experiment=one_place(len(c.rows)))
+    v = judged(c, searched(c))
+    assert v.word == word
+    if word == "effects":
+        assert [x.chosen.place.candidate.element for x in v.named] == ["leg 2"] or v.beyond
+
+
+def one_place(n: int) -> Any:
+    """An experiment of poses of four readings each, with nothing to cut it into parts by."""
+    return SimpleNamespace(
         position=np.zeros((n, 3)),
         wrench=np.zeros((n, 6)),
         order=None,
@@ -140,8 +148,13 @@ def test_what_numbers_within_their_tolerance_show_has_no_name(strengths, word):
         runs=np.zeros(n, int),
         groups=np.arange(n) // 4,
     )
-    c = replace(c, numbers=d, unknowns=unknowns, experiment=experiment)
-    v = judged(c, searched(c))
-    assert v.word == word
-    if word == "effects":
-        assert [x.chosen.place.candidate.element for x in v.named] == ["leg 2"] or v.beyond
+
+
+def test_a_name_needs_odds_against_the_best_model_of_another_world_without_it():
+    c = setting(1, (0.0, 30.0, 0.0))
+    c = replace(c, experiment=one_place(len(c.rows)))
+    s = searched(c)
+    for odds, named in ((2.0 * ODDS, 1), (0.5 * ODDS, 0), (1.0, 0)):
+        v = judged(c, replace(s, without=(s.best.score - np.log(odds),)))
+        assert len(v.named) == named
+        assert [why for _, why in v.refused] == [TOLERABLE] * (1 - named)
