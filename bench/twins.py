@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Twins by an independent generator on all twelve machines: how often a diagnosis is right, silent, false.
 
-    OPENBLAS_NUM_THREADS=1 python -m bench.twins --out build/twins.jsonl [--twins 60] [--nulls 100] [--minutes 30] [--engine inference]
+    OPENBLAS_NUM_THREADS=1 python -m bench.twins --out build/twins.jsonl [--twins 60] [--nulls 100] [--minutes 30]
     python -m bench.twins --out build/twins.jsonl --table
 
 Readings by the energy minimiser of the tests' oracle (tests/oracle/twins). Singles of 2 to 3 noise floors (rms), pairs, other noise than
@@ -18,14 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tests.oracle.twins.generator import Twin, twin
-from tests.oracle.twins.judge import Claim, judged, of_diagnosis
+from tests.oracle.twins.generator import twin
+from tests.oracle.twins.judge import judged, of_diagnosis
 from tests.oracle.twins.noise import KINDS
 
 import stiffmap as sm
-from stiffmap.experiment import Predictor
-from stiffmap.identification.inference.inference import inferred, terms
-from stiffmap.identification.inference.verdict import judged as decided
 
 CASES: tuple[tuple[str, dict[str, Any]], ...] = (
     ("single", {"kind": "gaussian", "faults": 1}),
@@ -52,30 +49,7 @@ def case(number: int, null: bool) -> tuple[str, dict[str, Any]]:
     return word, {"spread": 0.0, "strength": float(rng.uniform(2.0, 3.0)), **given}
 
 
-def by_diagnosis(t: Twin) -> Claim:
-    """By the command's way."""
-    return of_diagnosis(sm.diagnose(t.machine, t.experiment))
-
-
-def by_inference(t: Twin) -> Claim:
-    """By one covariance."""
-    columns, search = inferred(t.machine, t.experiment)
-    v = decided(columns, search)
-    places = [[n.chosen.place, *n.equivalents] for n in v.named]
-    effects = [
-        [(c.kind, c.element, c.legs) for p in group for c in (p.candidate, *p.aliases)] for group in places
-    ]
-    predictor = Predictor(t.machine, t.experiment)
-    change = predictor(terms([n.chosen for n in v.named])) - predictor()
-    return Claim(
-        v.word, effects, [[b.unknown.name] for b in v.beyond], bool(v.rest), False, change[:, :3], []
-    )
-
-
-ENGINES = {"diagnosis": by_diagnosis, "inference": by_inference}
-
-
-def one(number: int, null: bool, engine: str) -> dict[str, Any]:
+def one(number: int, null: bool) -> dict[str, Any]:
     """A record."""
     word, given = case(number, null)
     position = (number // 12) % 2
@@ -85,13 +59,13 @@ def one(number: int, null: bool, engine: str) -> dict[str, Any]:
     t = twin(number + (1000 if null else 0), poses=poses, **given)
     made = time.perf_counter()
     try:
-        j = judged(t, ENGINES[engine](t))
+        j = judged(t, of_diagnosis(sm.diagnose(t.machine, t.experiment)))
         found, said, covered = j.word, j.said, list(j.covered)
     except sm.StiffmapError as problem:
         found, said, covered = "error", str(problem), []
     truth = [f"{f.kind} {f.at} {s:.4g}" for f, s in zip(t.faults, t.sizes, strict=True)]
     return {
-        "engine": engine, "twin": number, "null": null, "case": word, "name": t.name, "given": given, "truth": truth, "word": found,
+        "twin": number, "null": null, "case": word, "name": t.name, "given": given, "truth": truth, "word": found,
         "said": said, "covered": [bool(c) for c in covered], "seconds": [made - start, time.perf_counter() - made],
     }  # fmt: skip
 
@@ -116,31 +90,26 @@ def main() -> int:
     parser.add_argument("--twins", type=int, default=60)
     parser.add_argument("--nulls", type=int, default=100)
     parser.add_argument("--first", type=int, default=0, help="number of the first twin; its seed")
-    parser.add_argument("--engine", choices=[*ENGINES, "both"], default="diagnosis")
     parser.add_argument("--minutes", type=float, default=np.inf)
     parser.add_argument("--table", action="store_true")
     o = parser.parse_args()
     known = [json.loads(x) for x in o.out.read_text().splitlines()] if o.out.exists() else []
-    done = {(r["twin"], r["null"], r.get("engine", "diagnosis")) for r in known}
-    engines = list(ENGINES) if o.engine == "both" else [o.engine]
+    done = {(r["twin"], r["null"]) for r in known}
     sets = [(k, False) for k in range(o.first, o.first + o.twins)]
     sets += [(k, True) for k in range(o.first, o.first + o.nulls)]
-    asked = [(*s, name) for s in sorted(sets) for name in engines]
+    asked = sorted(sets)
     until = time.monotonic() + 60.0 * o.minutes
     with o.out.open("a", encoding="utf-8") as stream:
-        for number, null, engine in [] if o.table else [a for a in asked if a not in done]:
+        for number, null in [] if o.table else [a for a in asked if a not in done]:
             if time.monotonic() > until:
                 break
-            known.append(one(number, null, engine))
+            known.append(one(number, null))
             stream.write(json.dumps(known[-1]) + "\n")
             stream.flush()
             print(
                 known[-1]["name"], known[-1]["word"], known[-1]["truth"], known[-1]["said"][:200], flush=True
             )
-    for name in ENGINES:
-        mine = [r for r in known if r.get("engine", "diagnosis") == name]
-        if mine:
-            print(f"\n{name}\n\n{table(mine)}")
+    print(f"\n{table(known)}")
     return int(any(r["word"] in ("false", "error") for r in known))
 
 

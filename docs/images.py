@@ -18,9 +18,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import stiffmap as sm
-from stiffmap.model.description import Offset, Pose
+from stiffmap.experiment import Predictor, random_plan
+from stiffmap.identification.calibration import unknowns
+from stiffmap.identification.calibration.model import predicted
+from stiffmap.model.description import AppliedEffect, Offset, Pose
 from stiffmap.ui.cli import main as stiffmap
 from stiffmap.ui.plot import path_figure, save, stress_figure
+from stiffmap.ui.report.diagnosis.pictures import shared_out
 
 HERE = Path(__file__).parent
 TARGET = HERE / "img"
@@ -112,7 +116,22 @@ def swing_table_stress() -> Figure:
     )
 
 
+def shares_of_a_residual() -> Figure:
+    """A delta that is off everywhere, with a wrong pitch of one carriage and a pattern that no model holds."""
+    machine = sm.load_machine("linear-delta")
+    plan = random_plan(machine, "position", poses=40, seed=5)
+    p, rng = Predictor(machine, plan), np.random.default_rng(5)
+    wanted = unknowns(machine.description, p.experiment)
+    lead = AppliedEffect("lead_error", "carriage", ("a",), (("slope", 5e-3),))
+    exact = predicted(p, wanted, 0.15 * rng.standard_normal(len(wanted))) + p([lead]) - p()
+    exact[:, 2] += 6e-5 * np.sin(plan.position[:, 0] / 0.04) * np.cos(plan.position[:, 1] / 0.05)
+    noise = np.nan_to_num(plan.sigma) * rng.standard_normal(exact.shape)
+    found = sm.diagnose(machine, plan.with_readings(exact + noise), seed=1)
+    return shared_out(found)
+
+
 DRAWN: dict[str, Callable[[], Figure]] = {
+    "diagnosis/shares.png": shares_of_a_residual,
     "machines/snap-through.png": snap_through,
     "machines/column.png": column,
     "machines/swing-table-stress.png": swing_table_stress,

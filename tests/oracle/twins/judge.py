@@ -44,8 +44,6 @@ class Claim:
     """Per declared number that is called off: its name first, then those that would show the same."""
     missing: bool
     """Whether it says that something is missing that it cannot name."""
-    wide: bool
-    """Whether it calls numbers off without naming one."""
     change: np.ndarray
     """(n, 3) m: what it adds to the readings."""
     intervals: list[tuple[Named, dict[str, tuple[float, float]]]]
@@ -71,8 +69,7 @@ def of_diagnosis(d: Diagnosis) -> Claim:
         d.verdict,
         groups,
         [[b.name, *b.rivals] for b in c.beyond] if c else [],
-        d.verdict == "unattributed" or bool(c and c.verdict == "unattributed"),
-        bool(c and c.wider),
+        "unattributed" in d.verdict,
         (d.residual_before - d.residual_after)[:, :3],
         [
             (n, {k: (low, high) for k, (_, low, high, _) in e.parameters.items()})
@@ -85,7 +82,7 @@ def judged(twin: Twin, claim: Claim) -> Judgement:
     """The worst word of all that is named; silent where nothing is."""
     if not claim.effects and not claim.numbers:
         if not twin.faults:
-            return Judgement("false" if claim.wide else "quiet", claim.said, ())
+            return Judgement("quiet", claim.said, ())
         word = "within" if tolerable(twin) else "unattributed" if claim.missing else "silent"
         return Judgement(word, claim.said, ())
     if not twin.faults:

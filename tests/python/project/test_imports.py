@@ -20,15 +20,18 @@ PACKAGE = Path(__file__).parents[3] / "python/stiffmap"
 ROOMS = ("common", "model", "solve", "workspace", "experiment", "identification", "machining", "ui")
 # Packages inside a room or a package, each may import earlier ones only.
 INNER = {
-    "identification.diagnosis": (
-        "clock",
+    "identification": (("clock", "candidates", "calibration"), "inference", "diagnosis", "planning", "taps"),
+    "identification.inference": (
+        "constants",
+        "kernels",
+        "columns",
+        "amplitudes",
         "candidates",
-        "fitting",
-        "search",
-        ("rivals", "decision", "slips"),
-        "report",
-        "verdict",
+        ("names", "shares"),
+        ("verdict", "corrected"),
+        ("machines", "inference"),
     ),
+    "identification.diagnosis": ("slips", "report", "answer", "stages"),
     "experiment": (
         ("experiment", "channels", "notebook", "ramps", "setups"),
         "readings",

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.noise.level import Noise, noise_of
+from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 
 Mask = NDArray[np.bool_]
 FALSE = 0.01
@@ -118,3 +120,11 @@ def whole_stays(experiment: Experiment, found: Mask, *, poses: bool = True) -> M
         limit = np.where(total > 2, 0.5, 0.51)  # of two readings one may go
         out &= share[label] < limit[label]
     return out
+
+
+def noise_without_suspects(experiment: Experiment, base: Floats) -> Noise:
+    """The noise floor of readings that do not stand alone before any effect is known; `base` (n, c) is the declared prediction."""
+    rough = noise_of(experiment)
+    raw = experiment.reading - base
+    bare = raw - nuisance_part(Problem.of(experiment, rough.sigma, base), raw)
+    return noise_of(experiment, ~suspects(experiment, bare, rough.sigma))

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from stiffmap.experiment.prediction.equilibria import Work, motions
 from stiffmap.experiment.prediction.history import Drives, drives_of, history_motion
 from stiffmap.experiment.prediction.joints import check_joints
 from stiffmap.experiment.prediction.measurement import readings, true_wrench
-from stiffmap.experiment.prediction.nearby import FEW, Near, Nearby
+from stiffmap.experiment.prediction.nearby import Near, Nearby
 from stiffmap.experiment.prediction.recorded import at_records, records_of
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect, MachineDescription
@@ -28,29 +27,8 @@ from stiffmap.model.effects import apply_records
 from stiffmap.solve.machine import Machine
 
 Terms = tuple[AppliedEffect, ...]
-FAILURE = 20.0
-"""How much dearer an equilibrium is that is not found (measured: 10 to 30 times)."""
-DEAR = 100.0
-"""How much dearer one is that the kernels leave to the reference path (measured: 140 to 400 times)."""
-
 MACHINES = 4
 """Machines with terms that are kept."""
-
-
-@dataclass(eq=False)
-class Effort:
-    """What predictions have cost, in those of the declared machine."""
-
-    total: float = 0.0
-    own_share: float = 0.0
-    """Of the reference path, where the machine is as declared."""
-
-    def add(self, motion: Floats, slow_share: float, *, declared: bool) -> None:
-        """One prediction more, of motions (n, c)."""
-        if declared:
-            self.own_share = slow_share
-        failed = float(np.isnan(motion).all(axis=1).mean())
-        self.total += 1.0 + FAILURE * failed + DEAR * max(slow_share - self.own_share, 0.0)
 
 
 class Predictor:
@@ -66,15 +44,10 @@ class Predictor:
         self.threads = threads
         self.machine, self.experiment = resolved(machine, located(machine, experiment))
         self.solved = 0
-        self._effort = Effort()
-        self.patience = float("inf")
-        """Effort that one fit may cost before it is given up."""
         self._work = Work()
         self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._changes: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._machines: Recent[Machine] = Recent(MACHINES)
-        self.tangents: Kept[Hashable, Any] = Kept()
-        """Slopes of predictions by effects, kept by those who fit them."""
         self._drives: dict[tuple[Terms, Terms], Drives] = {}
         self._set_aside()
         self._close_from_here()
@@ -120,9 +93,6 @@ class Predictor:
             if seen is not None:
                 seen.flags.writeable = False
                 out[i] = self._changes.put(keys[i], seen, seen.nbytes)
-                self._effort.total += 1.0
-        if told.work.slow_share > FEW:
-            self._effort.add(motion, told.work.slow_share, declared=False)
         return out
 
     def _near(self, terms: Terms, unmoved: Terms | None) -> Near | None:
@@ -162,14 +132,8 @@ class Predictor:
         out.machine = machine or self.machine
         out.experiment = self.experiment if rows is None else self.experiment.rows(rows)
         out._memory, out._changes, out._machines = Kept(), Kept(), Recent(MACHINES)
-        out._effort, out._drives = Effort(), {}
+        out._drives = {}
         return out
-
-    @property
-    def effort(self) -> float:
-        """Predictions that were not known yet when they were asked for; those that fail, or that the kernels leave to the
-        reference path where they solve the declared machine, count more."""
-        return self._effort.total
 
     def under(self, wrench: Floats) -> Floats:
         """(n, c) m, rad: the same readings under other wrenches (n, 6); NaN where the machine fails under them."""
@@ -216,7 +180,6 @@ class Predictor:
             self._work = Work()
             motion = at_records(self._plan_under(load), mechanical, self._branches)
             self._memory.put((mechanical, load), motion, motion.nbytes)
-            self._effort.add(motion, self._work.slow_share, declared=not mechanical and not load)
         return motion
 
     def _plan_under(self, load: Terms) -> Experiment:

@@ -2,6 +2,6 @@
 
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.result import Diagnosis
-from stiffmap.identification.diagnosis.verdict import diagnose
+from stiffmap.identification.diagnosis.stages import diagnose
 
 __all__ = ["Diagnosis", "Effect", "diagnose"]

@@ -7,7 +7,7 @@ integrated out with a flat prior is gone from everything that follows.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,11 +18,13 @@ from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.calibration.model import sensitivity
 from stiffmap.identification.calibration.unknowns import Unknown
-from stiffmap.identification.diagnosis.candidates.candidates import Candidate
-from stiffmap.identification.diagnosis.candidates.plan import Plan
-from stiffmap.identification.diagnosis.candidates.sensitivity import Variant
+from stiffmap.identification.candidates.candidates import Candidate
+from stiffmap.identification.candidates.coarseness import coarseness
+from stiffmap.identification.candidates.plan import Plan
+from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.constants import LARGEST_ERROR, STANDS_OUT
 from stiffmap.identification.inference.kernels import gaps
+from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import Parameter
 
 MOST_READINGS = 600
@@ -58,6 +60,8 @@ class Place:
     candidate: Candidate
     shapes: tuple[Shape, ...]
     aliases: tuple[Candidate, ...] = ()
+    wider: tuple[Candidate, ...] = ()
+    """Candidates of more directions that contain its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +120,7 @@ def columns(
     """
     e, base = predictor.experiment, plan.base
     all_rows, all_channels = readings_of(e, base)
-    use = _drawn(e.groups[all_rows], seed)
+    use = drawn(e.groups[all_rows], seed)
     rows, channel = all_rows[use], all_channels[use]
     index = (rows, channel)
     noise = sigma[index]
@@ -143,23 +147,23 @@ def columns(
         noise,
         free,
         free.T @ raw,
-        free.T @ _zeros(e, rows, channel, noise) @ free,
+        free.T @ zeros(e, rows, channel, noise) @ free,
         tuple(u for u, k in zip(s.unknowns, seen, strict=True) if k),
         numbers[:, seen],
         tuple((kind, name, k * len(k) / np.trace(k)) for kind, name, k in found if np.trace(k) > NULL),
-        _places(plan, free, noise, use),
+        _places(plan, free, noise, use, predictor.machine.description),
         use,
         (float(within @ within), float(len(rows) - mean.shape[1])),
     )
 
 
-def _drawn(pose: Integers, seed: int) -> Integers:
+def drawn(pose: Integers, seed: int, most: int = MOST_READINGS) -> Integers:
     """Numbers of the readings in use: all of them, or those of poses drawn at random."""
-    if len(pose) <= MOST_READINGS:
+    if len(pose) <= most:
         return np.arange(len(pose))
     order = np.random.default_rng(seed).permutation(np.unique(pose))
     size = np.cumsum([np.sum(pose == k) for k in order])
-    chosen = order[: max(1, int(np.sum(size <= MOST_READINGS)))]
+    chosen = order[: max(1, int(np.sum(size <= most)))]
     return np.flatnonzero(np.isin(pose, chosen))
 
 
@@ -171,8 +175,10 @@ def _averages(e: Experiment, rows: Integers, channel: Integers, noise: Floats, r
     average = np.zeros((len(rows), int(number.max()) + 1))
     average[np.arange(len(rows)), number] = 1.0 / np.sqrt(np.bincount(number))[number]
     within = raw - average @ (average.T @ raw)
-    typical = np.sqrt(max(float(within @ within) / max(1, len(rows) - average.shape[1]), 1e-300))
-    if e.hours is not None or np.any(np.abs(within) > STANDS_OUT * max(typical, 1.0) / np.sqrt(2.0)):
+    shares = 1.0 - np.sum(average**2, axis=1)
+    own = np.abs(within[shares > 0.0]) / np.sqrt(shares[shares > 0.0])
+    typical = 1.4826 * float(np.median(own)) if len(own) else 1.0
+    if e.hours is not None or np.any(own > STANDS_OUT * max(typical, 1.0)):
         return np.eye(len(rows))
     return average
 
@@ -182,7 +188,7 @@ def _level(noise: Floats) -> Integers:
     return np.unique(noise, return_inverse=True)[1].reshape(-1)
 
 
-def _zeros(e: Experiment, rows: Integers, channel: Integers, noise: Floats) -> Floats:
+def zeros(e: Experiment, rows: Integers, channel: Integers, noise: Floats) -> Floats:
     if e.quantity != "deflection" or not e.zeros.any():
         return np.zeros((len(rows), len(rows)))
     size = e.zeros[channel] / noise
@@ -190,8 +196,10 @@ def _zeros(e: Experiment, rows: Integers, channel: Integers, noise: Floats) -> F
     return np.asarray(same * np.outer(size, size))
 
 
-def _places(plan: Plan, free: Floats, noise: Floats, use: Integers) -> tuple[Place, ...]:
-    """Candidates with their directions; those that show alike under one name, the coarsest first (as they come)."""
+def _places(
+    plan: Plan, free: Floats, noise: Floats, use: Integers, description: MachineDescription
+) -> tuple[Place, ...]:
+    """Candidates with their directions; those that show alike under one name, that of the coarsest part."""
     by: dict[int, list[Shape]] = {}
     for v in plan.variants:
         white = free.T @ (v.array()[:, use] / noise).T
@@ -199,17 +207,29 @@ def _places(plan: Plan, free: Floats, noise: Floats, use: Integers) -> tuple[Pla
         if found is not None:
             by.setdefault(id(v.candidate), []).append(found)
     tolerance = VISIBLE / (LARGEST * np.sqrt(free.shape[1]))
+
+    def order(shapes: list[Shape]) -> tuple[object, ...]:
+        rank = shapes[0].directions.shape[1]
+        return (rank, len(shapes) > 1, *coarseness(shapes[0].variant.candidate, rank, description))
+
     out: list[Place] = []
     single: list[tuple[Floats, int, int]] = []
-    for shapes in sorted(by.values(), key=lambda s: (s[0].directions.shape[1], len(s) > 1)):
+    for shapes in sorted(by.values(), key=order):
         candidate, first = shapes[0].variant.candidate, shapes[0]
         if len(shapes) == 1:
             same = next((k for d, sign, k in single if _alike(d, sign, first, tolerance)), None)
             if same is not None:
-                out[same] = Place(out[same].candidate, out[same].shapes, (*out[same].aliases, candidate))
+                out[same] = replace(out[same], aliases=(*out[same].aliases, candidate))
                 continue
             single.append((first.directions, first.sign, len(out)))
         out.append(Place(candidate, tuple(shapes)))
+    for d, _, k in single:
+        wider = tuple(
+            out[j].candidate
+            for other, _, j in single
+            if other.shape[1] > d.shape[1] and d.shape[1] - np.sum((other.T @ d) ** 2) < tolerance**2
+        )
+        out[k] = replace(out[k], wider=wider)
     return tuple(out)
 
 
@@ -217,7 +237,7 @@ def _directions(white: Floats, v: Variant) -> Shape | None:
     """(m, p) orthonormal directions of the columns (m, q) that a plausible size makes visible; None without any."""
     length = np.linalg.norm(white, axis=0)
     most = np.array([_reach(v, k) for k in range(white.shape[1])])
-    seen = length * most > VISIBLE
+    seen = (length > 0.0) & (length * np.where(length > 0.0, most, 1.0) > VISIBLE)
     if not seen.any():
         return None
     u, s, _ = np.linalg.svd(white[:, seen] / length[seen], full_matrices=False)

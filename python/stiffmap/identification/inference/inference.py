@@ -3,31 +3,65 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.noise.level import noise_of
+from stiffmap.experiment.noise.level import Noise
+from stiffmap.experiment.noise.outliers import noise_without_suspects
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.calibration.certificate import certified
-from stiffmap.identification.calibration.unknowns import unknowns
-from stiffmap.identification.diagnosis.candidates.plan import plan_of
+from stiffmap.identification.calibration.defaults import Tolerances
+from stiffmap.identification.calibration.unknowns import Unknown, unknowns
+from stiffmap.identification.candidates.plan import Plan, plan_of
+from stiffmap.identification.clock import Clock
 from stiffmap.identification.inference.columns import Columns, columns
 from stiffmap.identification.inference.names import Chosen, Search, searched
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine
 
 
+@dataclass(frozen=True, eq=False)
+class Inferred:
+    """What a search had, and what it found."""
+
+    plan: Plan
+    noise: Noise
+    uncertain: tuple[Unknown, ...]
+    """All declared numbers that have an uncertainty."""
+    columns: Columns
+    search: Search
+
+
 @on_one_thread
 def inferred(machine: Machine, experiment: Experiment) -> tuple[Columns, Search]:
     """The columns of an experiment, and the set of effects with the best evidence."""
     predictor = Predictor(machine, experiment)
-    e = predictor.experiment
-    plan = plan_of(predictor)
-    uncertain = unknowns(predictor.machine.description, e, certified(None, e))
-    found = columns(predictor, plan, noise_of(e).sigma, uncertain)
+    found = infer(predictor, plan_of(predictor))
+    return found.columns, found.search
+
+
+def infer(
+    predictor: Predictor,
+    plan: Plan,
+    tolerances: Tolerances | None = None,
+    exclude: Sequence[str] = (),
+    clock: Clock | None = None,
+    seed: int = 0,
+) -> Inferred:
+    """The set of effects with the best evidence; `exclude`: kinds of effects and groups of numbers that are known not to be."""
+    e, clock = predictor.experiment, clock or Clock()
+    noise = noise_without_suspects(e, plan.base)
+    kept = np.flatnonzero([v.candidate.kind not in exclude for v in plan.variants])
+    if len(kept) < len(plan.variants):
+        plan = replace(plan, stack=plan.stack.only(kept))
+    every = unknowns(predictor.machine.description, e, certified(tolerances, e))
+    uncertain = tuple(u for u in every if u.group not in exclude)
+    clock.say("columns of the declared numbers")
+    found = columns(predictor, plan, noise.sigma, uncertain, seed)
 
     def predict(chosen: Sequence[Chosen]) -> Floats:
         try:
@@ -37,7 +71,8 @@ def inferred(machine: Machine, experiment: Experiment) -> tuple[Columns, Search]
         change = (shown - plan.base)[found.rows, found.channel]
         return found.rotated(change)
 
-    return found, searched(found, predict)
+    clock.say("all effects at once")
+    return Inferred(plan, noise, uncertain, found, searched(found, predict, lambda: clock.over))
 
 
 def terms(chosen: Sequence[Chosen]) -> tuple[AppliedEffect, ...]:

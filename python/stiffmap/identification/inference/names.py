@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.diagnosis.candidates.candidates import clash
+from stiffmap.identification.candidates.candidates import clash
 from stiffmap.identification.inference.amplitudes import (
     NOISE,
     Fit,
@@ -94,17 +94,39 @@ class Search:
     """Per named effect, the places that would do in its stead, with their evidence less that of the best."""
     without: tuple[float, ...] = ()
     """Per named effect, evidence of the best model of another world in which it is not."""
+    calibrated: Fit | None = None
+    """The best fit without effects in a world where declared numbers are off; None where there are none."""
 
 
-def searched(columns: Columns, predict: Predict | None = None) -> Search:
-    """The best set of effects over all worlds."""
+def searched(
+    columns: Columns, predict: Predict | None = None, over: Callable[[], bool] = lambda: False
+) -> Search:
+    """The best set of effects over all worlds; no step begins once time is `over`."""
     parts = Parts(columns)
-    worlds: dict[str, tuple[Part, ...]] = {EXACT: (), "together": parts.together, "groups": parts.numbers}
-    searches = [_World(columns, parts, name, numbers, predict) for name, numbers in worlds.items()]
+    worlds: dict[str, tuple[Part, ...]] = {EXACT: ()}
+    if columns.unknowns and not over():
+        worlds |= {"together": parts.together, "groups": parts.numbers}
+    searches = [_World(columns, parts, name, numbers, predict, over) for name, numbers in worlds.items()]
     found = {w.name: w.search() for w in searches}
     best = max(found.values(), key=lambda s: s.best.score)
     others = [w for w in searches if w.name != best.best.world]
-    return replace(best, without=tuple(_without(c, best, others, found) for c in best.best.chosen))
+    off = [s.null.fit for name, s in found.items() if name != EXACT]
+    return replace(
+        best,
+        without=tuple(_without(c, best, others, found) for c in best.best.chosen),
+        calibrated=max(off, key=lambda f: f.score, default=None),
+    )
+
+
+def instead(columns: Columns, fit: Fit, c: Chosen, place: Place) -> Chosen:
+    """Another place in the stead of an effect of a fit, nothing else fitted anew."""
+    anchor = fit.without([c.part.name])
+    k = int(np.argmax(evidence(anchor, (place,))[0]))
+    part = Part(str(place.candidate), "effect", factor=place.shapes[k].factor)
+    t = np.append(anchor.t, _size(anchor, part))
+    found = evaluated(anchor.columns, (*anchor.parts, part), t, anchor.weights)
+    bare = Chosen(place, k, part, np.zeros(0))
+    return replace(bare, values=_values(found, bare))
 
 
 def _without(c: Chosen, best: Search, others: Sequence[_World], found: Mapping[str, Search]) -> float:
@@ -119,16 +141,23 @@ class _World:
     """The search in one world."""
 
     def __init__(
-        self, columns: Columns, parts: Parts, name: str, numbers: tuple[Part, ...], predict: Predict | None
+        self,
+        columns: Columns,
+        parts: Parts,
+        name: str,
+        numbers: tuple[Part, ...],
+        predict: Predict | None,
+        over: Callable[[], bool],
     ) -> None:
         self.columns, self.name, self.numbers, self.predict = columns, name, numbers, predict
+        self.over = over
         self.gaps = parts.gaps
 
     def search(self) -> Search:
         """Forward steps with elimination and exchange after each."""
         null = model = self._fit((), None)
         limit = float(np.log(ODDS) + np.log(max(1, len(self.columns.places))))
-        while len(model.chosen) < MOST_EFFECTS:
+        while len(model.chosen) < MOST_EFFECTS and not self.over():
             trials = self._trials(model)
             if not trials:
                 break
@@ -187,7 +216,7 @@ class _World:
         start = {**{g.name: QUIET for g in self.gaps}, **amplitudes(anchor)}
         for place in places:
             k = int(np.argmax(evidence(anchor, (place,))[0]))
-            part = Part(f"effect {place.candidate}", "effect", factor=place.shapes[k].factor)
+            part = Part(str(place.candidate), "effect", factor=place.shapes[k].factor)
             chosen.append(Chosen(place, k, part, np.zeros(0)))
             start[part.name] = _size(anchor, part)
         return self._fit(tuple(chosen), start)

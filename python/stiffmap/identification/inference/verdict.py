@@ -10,10 +10,11 @@ from scipy.stats import chi2, norm
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.identification.calibration.unknowns import Unknown
-from stiffmap.identification.inference.amplitudes import ALL_NUMBERS, OFF, Fit, noise_prior
+from stiffmap.identification.inference.amplitudes import OFF, Fit, noise_prior
 from stiffmap.identification.inference.columns import Columns, Place
 from stiffmap.identification.inference.constants import EQUAL_SHARE, ODDS, RARE, TOLERANCES
 from stiffmap.identification.inference.names import EXACT, Chosen, Search
+from stiffmap.identification.inference.shares import of_numbers
 
 DETERMINED = 0.5
 """Posterior standard deviation, in standard uncertainties, of a number that the readings determine."""
@@ -167,24 +168,13 @@ def thirds(value: Floats) -> Integers:
 
 def out_of_tolerance(columns: Columns, fit: Fit) -> Iterator[Beyond]:
     """Declared numbers whose posterior lies beyond tolerance, and beyond what the largest of so many is by chance."""
-    found = [
-        Beyond(columns.unknowns[k], value, sd)
-        for name, index in columns.groups.items()
-        for k, value, sd in zip(index, *_posterior(columns, fit, name, index), strict=True)
-    ]
+    said = zip(columns.unknowns, of_numbers(columns, fit), strict=True)
+    found = [Beyond(u, value, sd) for u, (value, sd, _) in said]
     determined = sum(b.sd < DETERMINED for b in found)
     largest = float(norm.isf(1.0 / (2.0 * ODDS * max(1, determined))))
     for b in sorted(found, key=lambda b: -abs(b.value)):
         if abs(b.value) - 2.0 * b.sd > TOLERANCES and abs(b.value) > largest:
             yield b
-
-
-def _posterior(columns: Columns, fit: Fit, name: str, index: Integers) -> tuple[Floats, Floats]:
-    """Mean and standard deviation of the numbers of a group, in standard uncertainties."""
-    variance = fit.amplitude(ALL_NUMBERS) ** 2 or fit.amplitude(name) ** 2
-    d = columns.numbers[:, index]
-    information = np.sum(fit.white(d) ** 2, axis=0)
-    return variance * (d.T @ fit.solved), np.sqrt(np.maximum(variance * (1.0 - variance * information), 0.0))
 
 
 def left(fit: Fit) -> tuple[str, str]:
@@ -208,15 +198,19 @@ def left(fit: Fit) -> tuple[str, str]:
 
 
 def _significant(fit: Fit, names: Sequence[str]) -> bool:
-    """Likelihood ratio of some parts against none of them, at `RARE`, half of it at the boundary."""
-    gain = 2.0 * (fit.likelihood - _refitted_noise(fit.without(names)).likelihood)
+    """Likelihood ratio of some parts against none of them and noise of any size that its prior allows, at `RARE`, half of it
+    at the boundary."""
+    gain = 2.0 * (_supported(fit) - max(map(_supported, _noisier(fit.without(names)))))
     return float(0.5 * chi2.sf(max(gain, 0.0), max(1, len(names) // 2))) < RARE
 
 
-def _refitted_noise(fit: Fit) -> Fit:
-    """The same with the size of the noise at its best."""
-    best = fit
-    for factor in (1.1, 1.2, 1.35, 1.5, 2.0, 3.0):
-        trial = fit.without([], fit.noise * factor)
-        best = max(best, trial, key=lambda f: f.likelihood)
-    return best
+def _noisier(fit: Fit) -> Iterator[Fit]:
+    """The same with more noise."""
+    for factor in (1.0, 1.1, 1.2, 1.35, 1.5, 2.0, 3.0):
+        yield fit.without([], fit.noise * factor)
+
+
+def _supported(fit: Fit) -> float:
+    """ln likelihood, with the prior of the noise: what repeats say of it."""
+    centre, sd = noise_prior(fit.columns)
+    return fit.likelihood - 0.5 * ((float(fit.t[0]) - centre) / sd) ** 2

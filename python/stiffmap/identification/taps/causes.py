@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.identification.diagnosis.candidates.candidates import Candidate, of_kind
+from stiffmap.identification.candidates.candidates import Candidate, of_kind
 from stiffmap.identification.taps.predict import predict_taps
 from stiffmap.identification.taps.problem import Problem, Term
 from stiffmap.identification.taps.table import TapTest

@@ -16,7 +16,7 @@ from scipy.stats import chi2
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import Experiment
-from stiffmap.identification.diagnosis.candidates.candidates import Candidate
+from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.taps.causes import causes, scaled, term
 from stiffmap.identification.taps.predict import predict_taps
 from stiffmap.identification.taps.problem import LEAST, STEPS, Problem, slopes_of

@@ -21,7 +21,7 @@ def diagnose_command(
     machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
     data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
     output: Annotated[Path | None, written(help="Folder for report and files.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of folds and simulated noise.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the folds, and of the poses drawn of many.")] = 0,
     threads: Annotated[int | None, typer.Option(help="Threads; default: all cores.")] = None,
     exclude: Annotated[
         list[str] | None, typer.Option(help="Kind of effect or group of numbers known not to be; repeatable.")
@@ -33,9 +33,6 @@ def diagnose_command(
         float, typer.Option(min=1e-3, help="Factor on the default standard uncertainties of the machine.")
     ] = 1.0,
     date: Annotated[str | None, typer.Option(help="Date that the report bears, as you write it.")] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Address of a dask scheduler whose workers do the bootstrap.")
-    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing of what is being tried.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -61,7 +58,6 @@ def diagnose_command(
         threads=threads,
         exclude=exclude or (),
         time_limit=budget,
-        scheduler=scheduler,
         tolerances=Tolerances().scaled(tolerance),
         progress=None if silent else _say,
     )

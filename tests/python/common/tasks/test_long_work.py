@@ -13,9 +13,6 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.common.tasks.cluster import OnCluster
-from stiffmap.experiment import Predictor, random_plan
-from stiffmap.identification.diagnosis.search.significance import effective_number_of_trials
-from stiffmap.identification.diagnosis.search.study import study
 from stiffmap.machining.milling.placement import placements
 from stiffmap.machining.milling.redundancy import redundancy
 from stiffmap.machining.milling.setting import Setting, setting
@@ -72,19 +69,6 @@ def workspace(scheduler: Any) -> dict[str, Any]:
     return {"volume": found.volume, "proven": found.proven}
 
 
-def bootstrap(scheduler: Any) -> dict[str, Any]:
-    trials = effective_number_of_trials(screened().whole[1], seed=3, draws=2000, scheduler=scheduler)
-    return {"trials": trials}
-
-
-@lru_cache
-def screened() -> Any:
-    machine = sm.load_machine(GLIDE)
-    return study(
-        Predictor(machine, random_plan(machine, "deflection", poses=12, loads=3, repeats=2, seed=1)), 0
-    )
-
-
 def null_study(scheduler: Any) -> dict[str, Any]:
     from bench.null_study import twin
 
@@ -128,7 +112,7 @@ def cluster() -> Iterator[Any]:
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(
     "work",
-    [lobes, vibration, placing, turning, box, workspace, bootstrap, null_study, monte_carlo, oracle],
+    [lobes, vibration, placing, turning, box, workspace, null_study, monte_carlo, oracle],
 )
 def test_a_worker_is_killed(work: Work, cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     here = work(None)
@@ -150,7 +134,7 @@ def test_a_worker_is_killed(work: Work, cluster: Any, monkeypatch: pytest.Monkey
         np.testing.assert_equal(there[name], value, err_msg=name)
 
 
-@pytest.mark.parametrize("work", [lobes, placing, turning, box, workspace, bootstrap])
+@pytest.mark.parametrize("work", [lobes, placing, turning, box, workspace])
 def test_a_scheduler_that_is_none_is_said(work: Work) -> None:
     pytest.importorskip("distributed")
     with pytest.raises(sm.StiffmapError, match="expected the address of a running dask scheduler"):

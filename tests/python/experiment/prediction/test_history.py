@@ -11,11 +11,9 @@ from scipy.optimize import minimize_scalar
 import stiffmap as sm
 from stiffmap.experiment import Predictor, load_experiment, random_plan
 from stiffmap.experiment.calls import placed
-from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.history import drives_of
 from stiffmap.experiment.ramps import directions
-from stiffmap.identification.diagnosis.decision.patterns import features
 from stiffmap.identification.planning import estimate
 from stiffmap.model.description.tree import joints
 from stiffmap.model.effects.library.hysteresis import deflection, spring_force
@@ -240,14 +238,6 @@ def test_one_element_and_many_alike() -> None:
         np.testing.assert_array_equal(
             spring_force(force, 2.0, breakaway), spring_force(force, np.array([2.0, 2.0]), breakaway)[:, 1]
         )
-
-
-def test_one_pose_has_no_waves_over_the_workspace(gear: sm.Machine, tmp_path: Path) -> None:
-    """A wave needs a coordinate that changes; one that is constant made the diagnosis fail."""
-    e = Predictor(gear, load_experiment(ramp_folder(tmp_path / "a"))).experiment
-    names = [name for name, _ in features(Problem.of(e, e.sigma, np.zeros_like(e.reading)))]
-    assert "waves over order" in names
-    assert not any(name.startswith("waves along") for name in names)
 
 
 @pytest.mark.parametrize("name", ["orthoglide-revised", "linear-delta", "ur10"])

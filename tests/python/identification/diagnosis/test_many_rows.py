@@ -9,18 +9,15 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, random_plan, simulate
-from stiffmap.experiment.noise.field import covariance
-from stiffmap.experiment.noise.folds import folds
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import Problem, readings_of
-from stiffmap.identification.diagnosis.candidates import sensitivity
-from stiffmap.identification.diagnosis.candidates.candidates import Candidate
-from stiffmap.identification.diagnosis.candidates.fourier import Fourier
-from stiffmap.identification.diagnosis.candidates.sensitivity import Variant
-from stiffmap.identification.diagnosis.candidates.stack import Dense, Stack
-from stiffmap.identification.diagnosis.candidates.waves import Wave, Waves
-from stiffmap.identification.diagnosis.decision import empirical, patterns
-from stiffmap.identification.diagnosis.search.screen import Screen
+from stiffmap.identification.candidates import sensitivity
+from stiffmap.identification.candidates.candidates import Candidate
+from stiffmap.identification.candidates.fourier import Fourier
+from stiffmap.identification.candidates.sensitivity import Variant
+from stiffmap.identification.candidates.stack import Dense, Stack
+from stiffmap.identification.candidates.waves import Wave, Waves
+from stiffmap.identification.diagnosis.slips.screen import Screen
 
 N = 40
 
@@ -115,32 +112,3 @@ def test_a_diagnosis_is_the_same_whether_periods_are_stored_or_not(monkeypatch: 
     )
     assert [str(e) for e in other.effects] == [str(e) for e in stored.effects]
     assert stored.verdict == other.verdict == "effects"
-
-
-def test_wide_patterns_take_away_what_their_columns_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    data = positions()
-    problem = problem_of(data, True)
-    rng = np.random.default_rng(8)
-    tangent = np.linalg.qr(problem.white(rng.standard_normal((*data.reading.shape, 2))))[0]
-    residual = problem.residual(np.zeros_like(data.reading))
-    for columns in (data.groups, rng.standard_normal((len(data), 5))):
-        direct = patterns._reduction(problem, residual, tangent, 1, columns)
-        monkeypatch.setattr(patterns, "WIDE", 0)
-        found = patterns._reduction(problem, residual, tangent, 1, columns)
-        monkeypatch.undo()
-        assert found[1] == direct[1]
-        assert found[0] == pytest.approx(direct[0], rel=1e-9)
-
-
-def test_a_field_of_shapes_is_the_field() -> None:
-    """With all shapes kept, the same correction of held-out rows as by the covariance itself."""
-    data = positions()
-    rng = np.random.default_rng(9)
-    residual = 1e-5 * (np.sin(4.0 * data.position[:, :1]) + 0.1 * rng.standard_normal((len(data), 6)))
-    residual[3, 1] = np.nan
-    sigma = np.full_like(residual, 1e-6)
-    label, _ = folds(data, 1)
-    whole = empirical._held(data, residual, sigma, label, 1.0)
-    shape = np.linalg.cholesky(covariance(data, 1.0) + 1e-12 * np.eye(len(data)))
-    parts = empirical._held_by_shapes(residual, sigma, label, shape)
-    assert parts == pytest.approx(whole, abs=1e-3 * np.abs(whole).max())

@@ -4,13 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 import stiffmap as sm
 from stiffmap.experiment import Experiment, random_plan, simulate
-from stiffmap.experiment.channels import Channel
-from stiffmap.experiment.noise.whitening import Problem
-from stiffmap.identification.diagnosis.decision.patterns import features
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects import registry
@@ -50,27 +45,3 @@ def test_play_read_under_both_signs_is_play() -> None:
 def test_kinds_that_a_reversal_shows() -> None:
     reversing = {k for k in registry.kinds() if registry.get(k).reverses}
     assert reversing == {"dead_zone", "friction", "joint_clearance", "joint_friction", "hysteresis"}
-
-
-def test_a_touched_height_is_no_pattern_of_itself() -> None:
-    """hh = -z exactly: a trend along z is the reading again, trends along x and y stay."""
-    machine = sm.load_machine("linear-delta")
-    plan = random_plan(machine, "position", poses=30, repeats=1, seed=4)
-    rng = np.random.default_rng(1)
-    position = plan.position.copy()
-    position[:, 2] = 0.3 + 1e-4 * rng.standard_normal(len(plan))
-    reading = plan.reading.copy()
-    names = [c.name for c in plan.channels]
-    assert "hh" not in names
-
-    hh = Channel("hh", "m")
-    heights = -(position[:, 2:] - 0.3)
-    reading = np.hstack([np.full_like(reading, np.nan), heights])
-    sigma = np.hstack([np.full_like(plan.sigma, np.nan), np.full_like(heights, 1e-5)])
-    touched = replace(plan, position=position, reading=reading, sigma=sigma, extra=(hh,))
-    found = dict(features(Problem.of(touched, np.nan_to_num(sigma, nan=1.0), np.zeros_like(reading))))
-    trend = found["linear trend over the workspace"]
-    assert np.ptp(trend, axis=0)[:2].min() > 0.5 and not trend[:, 2].any()
-    commanded = replace(touched, reading=np.where(np.isfinite(reading), 1e-5, np.nan))
-    whole = dict(features(Problem.of(commanded, np.nan_to_num(sigma, nan=1.0), np.zeros_like(reading))))
-    assert whole["linear trend over the workspace"][:, 2].any()

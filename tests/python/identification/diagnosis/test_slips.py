@@ -14,12 +14,12 @@ from stiffmap.common.number_text import within
 from stiffmap.experiment import random_plan, simulate
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.candidates.plan import plan_of
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.sentences import aliases, measured, next_step, opening
-from stiffmap.identification.diagnosis.search.study import study
-from stiffmap.identification.diagnosis.slips.find import Found, find_slip
+from stiffmap.identification.diagnosis.slips.find import Found, Readings, find_slip
 from stiffmap.identification.diagnosis.slips.slip import Slip
-from stiffmap.identification.diagnosis.verdict import by_gain
+from stiffmap.identification.diagnosis.stages import by_gain
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
 
@@ -39,7 +39,8 @@ def readings(name: str, soft: bool = False) -> Experiment:
 
 
 def found(name: str, e: Experiment) -> Found | None:
-    return find_slip(study(Predictor(sm.load_machine(name), e), 0))
+    predictor = Predictor(sm.load_machine(name), e)
+    return find_slip(Readings.of(predictor, plan_of(predictor)))
 
 
 def gauges(factor: float, axes: tuple[int, ...] = (0, 1, 2)) -> Change:

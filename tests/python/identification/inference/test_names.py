@@ -14,7 +14,7 @@ from tests.python.identification.inference.synthetic import READINGS, columns
 import stiffmap as sm
 from stiffmap.experiment import load_experiment, random_plan, simulate
 from stiffmap.identification.calibration.unknowns import Unknown
-from stiffmap.identification.diagnosis.candidates.candidates import Candidate
+from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference.columns import Place, Shape
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.inference import inferred, terms

@@ -11,8 +11,8 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan, simulate
-from stiffmap.identification.diagnosis.candidates.candidates import candidates, of_kind
-from stiffmap.identification.diagnosis.candidates.sensitivity import variants
+from stiffmap.identification.candidates.candidates import candidates, of_kind
+from stiffmap.identification.candidates.sensitivity import variants
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects.registry import load_effects, register, unregister

@@ -12,12 +12,9 @@ from stiffmap.experiment.comparison.summary import Summary
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.experiment.noise.level import Mask
-from stiffmap.identification.calibration import Calibration
-from stiffmap.identification.diagnosis.decision.cross_validation import HeldOut
-from stiffmap.identification.diagnosis.decision.empirical import Empirical
-from stiffmap.identification.diagnosis.decision.patterns import Pattern
-from stiffmap.identification.diagnosis.rivals.separation import Separation
+from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.slip import Slip
+from stiffmap.identification.inference.machines import HeldOut
 from stiffmap.solve.machine import Machine
 
 Place = Mapping[str, Any]
@@ -55,6 +52,57 @@ class Effect:
 
 
 @dataclass(frozen=True)
+class Rest:
+    """What nobody can name: smooth gaps, common errors of a pose, noise that is larger than declared."""
+
+    what: str
+    share: float
+    """Of the squares of all readings' difference from the declared machine."""
+    axis: str = ""
+    """Where it is largest, in noise."""
+    position: tuple[float, float, float] | None = None
+    """Commanded position of the pose where it is largest, m."""
+    size: float = float("nan")
+    """rms of it there, m or rad."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A declared number as the readings have it, SI."""
+
+    name: str
+    group: str
+    leg: str
+    unit: str
+    value: float
+    """What it is off by."""
+    sigma: float
+    """Its standard uncertainty before any reading."""
+    u: float
+    """After them."""
+    share: float
+    """Of the squares of the difference from the declared machine."""
+    rivals: tuple[str, ...] = ()
+    """Other numbers that show nearly the same."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What the readings say of all declared numbers together."""
+
+    verdict: str
+    """``adjusted within tolerance`` or ``beyond tolerance: NAME, ...``."""
+    beyond: tuple[Number, ...]
+    """Those that no tolerance allows, the largest share first."""
+    table: tuple[Number, ...]
+    """All that the readings show."""
+
+    def as_plain(self) -> dict[str, Any]:
+        """JSON data."""
+        return {"verdict": self.verdict, "beyond": plain(self.beyond), "table": plain(self.table)}
+
+
+@dataclass(frozen=True)
 class NoiseReport:
     """SI, per axis read."""
 
@@ -66,6 +114,8 @@ class NoiseReport:
     lack_of_fit_before: float
     lack_of_fit_after: float
     rms: float
+    scale: float = 1.0
+    """Noise of the readings over `floor`, as the inference has it."""
 
 
 @dataclass(frozen=True)
@@ -100,34 +150,38 @@ class Findings:
     outliers: list[str]
     checks_before: list[Check]
     checks_after: list[Check]
-    unexplained: list[Pattern]
+    unexplained: list[Rest]
+    """What is left that has no name; nothing where noise is all."""
     limitations: list[str]
-    significance: dict[str, float]
+    shares: dict[str, float]
+    """How the squares of the readings' difference from the declared machine are shared out: noise, declared numbers, each effect,
+    gaps, poses, time; together 1."""
     machine: Machine
-    """The corrected machine: its effects, and what a calibration below them found; `after` is what it does."""
+    """The machine that is handed over: corrected, calibrated or as declared, whichever predicts readings best that it has not
+    seen; `after` is what it does."""
     declared: Machine
     experiment: Experiment
     residual_before: Floats = field(repr=False)
     residual_after: Floats = field(repr=False)
     set_aside: Mask = field(repr=False)
-    empirical: Empirical | None = None
-    calibration: Calibration | None = None
-    """Below the effects, where many small errors explain the readings better than exact numbers do; its own
-    machine has no effects."""
+    gap: Floats | None = field(repr=False, default=None)
+    """(n, c) m, rad: what nobody can name, at the readings that were compared; NaN elsewhere."""
+    calibration: Numbers | None = None
+    """Declared numbers, where the readings say that they are off; None where they are as declared."""
     refused: list[str] = field(default_factory=list)
     """Effects that the readings seemed to demand and that are not named, and why."""
+    which: str = "declared"
+    """What `machine` is: ``declared``, ``calibrated`` or ``corrected``."""
     stopped: bool = False
-    """Whether a time budget, the bound on what is tried, or Ctrl-C ended it early: the answer is the best so far."""
+    """Whether a time budget or Ctrl-C ended it early: the answer is the best so far."""
     not_tried: list[str] = field(default_factory=list)
-    """What the bound left out."""
-    explained: float = 0.0
-    """Share of the misfit beyond noise (and calibration) that the effects take away."""
+    """What was left out for that."""
     slips: list[Slip] = field(default_factory=list)
     """Mistakes of writing or mounting that the readings show, named before any cause."""
     seed: int | None = None
     """Of folds and simulated noise."""
     seconds: dict[str, float] = field(default_factory=dict)
-    """What each step took; ``null bootstrap`` is done once per plan and kept while the process lives."""
+    """What each step took."""
 
     def to_json(self) -> str:
         """All fields but arrays and machines, SI; NaN is null."""
@@ -151,12 +205,12 @@ class Findings:
             "checks_after",
             "unexplained",
             "limitations",
-            "significance",
+            "shares",
             "seconds",
             "refused",
+            "which",
             "stopped",
             "not_tried",
-            "explained",
             "slips",
         )
         out: dict[str, Any] = {"verdict": self.verdict, "units": "SI (m, rad, N, N·m, kg), base axes"}
@@ -164,11 +218,6 @@ class Findings:
         out |= {n: plain(getattr(self, n)) for n in (*names, *more)}
         if self.held_out:
             h = self.held_out
-            out["held_out"] = {"folds": h.folds, "by": h.by, "chosen": h.chosen}
+            out["held_out"] = {"folds": h.folds, "by": h.by}
         out["calibration"] = self.calibration.as_plain() if self.calibration else None
-        if self.empirical:
-            e = self.empirical
-            out["empirical_correction"] = plain(
-                {"rms_before": e.before, "rms_after": e.after, "length": e.length}
-            )
         return out

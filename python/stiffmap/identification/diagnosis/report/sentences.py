@@ -8,7 +8,7 @@ from typing import Any
 
 from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.identification.diagnosis.report.findings import Effect
-from stiffmap.identification.diagnosis.report.wording import noise_size, separation_text
+from stiffmap.identification.diagnosis.report.wording import noise_size, number_text, separation_text
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.model.effects import registry
 
@@ -98,7 +98,7 @@ def slip_sentence(s: Slip) -> str:
 
 def inner_verdict(d: Any) -> str:
     """The verdict on readings without their mistakes."""
-    if d.effects:
+    if d.effects or (d.calibration and d.calibration.beyond):
         return "ambiguous" if d.alternatives else "effects+unattributed" if d.unexplained else "effects"
     return "unattributed" if d.unexplained else "none"
 
@@ -128,11 +128,13 @@ def alias_words(a: Mapping[str, Any]) -> str:
 
 
 def _of_machine(d: Any, verdict: str) -> str:
-    """The verdict on the machine."""
+    """The verdict on the machine; the largest share of the difference first, be it an effect or a number."""
     before, unit = d.before.size
     size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * noise_size(d):.1f} µ{unit}"
-    named = "; ".join(sentence(e) + aliases(e) for e in d.effects)
-    if verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
+    found = [(e.evidence.get("share", 0.0), sentence(e) + aliases(e)) for e in d.effects]
+    found += [(n.share, number_text(n)) for n in (d.calibration.beyond if d.calibration else ())]
+    named = "; ".join(text for _, text in sorted(found, key=lambda f: -f[0]))
+    if verdict == "none" and d.calibration is not None:
         return (
             f"No cause apart from the machine's uncertain numbers; they are {d.calibration.verdict} ({size})."
         )
@@ -146,12 +148,10 @@ def _of_machine(d: Any, verdict: str) -> str:
         return (
             f"The machine differs from its file ({size}), and no single cause known to stiffmap explains how."
         )
-    if verdict == "ambiguous" and not d.effects:
-        return f"No single number of the machine stands out; {d.calibration.verdict} ({size})."
     if verdict == "ambiguous":
         return f"The readings are explained by more than one cause. First of them: {named}."
     rest = " Part of the difference remains unexplained." if "unattributed" in verdict else ""
-    return f"{named}.{rest}"
+    return f"{_upper(named)}.{rest}"
 
 
 def next_step(d: Any) -> str:
@@ -161,17 +161,12 @@ def next_step(d: Any) -> str:
             "Check this at the machine and in the sheet, correct the readings and diagnose again; look for no cause in the "
             "machine before."
         )
-    if d.verdict == "none" and d.calibration is not None and d.calibration.beyond:
-        return "Inspect the number that is beyond tolerance; machine.yaml has it."
-    if d.verdict == "none" and d.calibration is not None and d.calibration.verdict != "as declared":
-        return "Nothing to mend. machine.yaml holds the calibrated numbers and predicts this machine better than the declared file."
+    if d.verdict == "none" and d.calibration is not None:
+        return "Nothing to mend. machine.yaml holds the machine that predicts readings best which it has not seen."
     if d.verdict == "none" and d.stopped:
         return "Let it come to its end."
     if d.verdict == "none":
         return "Nothing to correct. Keep the readings as the record of this state."
-    if d.verdict == "ambiguous" and not d.effects:
-        tilt = "" if d.experiment.axis_read[3:6].any() else ", the tilt of the tool as well (rx, ry, rz)"
-        return f"Read what distinguishes these groups{tilt}; the command stiffmap plan proposes poses."
     if d.verdict == "unattributed":
         return (
             "Look at where the difference is largest (What is left), check the instrument's frame and the tool "
@@ -186,4 +181,6 @@ def next_step(d: Any) -> str:
             "Inspect this place and those which these readings cannot distinguish from it (the report names them); the corrected "
             "machine file predicts the tool equally well whichever it is."
         )
+    if d.which == "declared":
+        return "Inspect this place, and read more poses: no corrected machine predicts unseen readings better than the declared one yet."
     return "Inspect this place; until it is mended, plan and compensate with the corrected machine file."

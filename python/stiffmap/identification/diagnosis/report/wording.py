@@ -6,18 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiffmap.common.number_text import within
-from stiffmap.identification.diagnosis.decision.patterns import Pattern
-from stiffmap.identification.diagnosis.report.findings import Effect, Findings
-from stiffmap.identification.diagnosis.rivals.separation import Separation
+from stiffmap.common.number_text import with_uncertainty, within
+from stiffmap.identification.diagnosis.report.findings import Effect, Findings, Number, Rest
+from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.slip import Slip
+from stiffmap.solve.validity import Validity
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
 LISTED = 5
-"""Steps left out that are named."""
+"""Steps left out, and numbers, that are named."""
 VERDICTS = {
     "none": "no effect above the limits of this experiment",
-    "effects": "the nominal model lacks the effects below",
+    "effects": "the declared machine lacks what is named below",
     "ambiguous": "explained, but not by one explanation alone",
     "unattributed": "real structure that no known effect explains",
     "effects+unattributed": "explained in part; real structure remains",
@@ -31,8 +31,9 @@ def five_lines(d: Findings) -> list[str]:
         f"verdict: {d.verdict} - {VERDICTS[d.verdict]}",
         *(f"readings: {s.check}: {s.seen}{_undone(s)}{_also(s)}" for s in d.slips),
         "effects: " + ("; ".join(effect_text(e) for e in d.effects) or "none") + _others(d),
+        *(f"number: {number_text(n)}" for n in (d.calibration.beyond if d.calibration else ())[:LISTED]),
         f"held-out readings: rms {_thousandth(*d.before.size)} before, {_thousandth(*d.after.size)} after "
-        f"(noise floor {_thousandth(noise_size(d), d.before.size[1])}, ratio {_ratio(d):.3f}, n = {d.after.n})",
+        f"(noise floor {_thousandth(noise_size(d), d.before.size[1])}, ratio {d.after.size[0] / noise_size(d):.3f}, n = {d.after.n}){_promise(d)}",
         _left(d),
         _limits(d),
         *_more(d),
@@ -49,17 +50,10 @@ def _also(s: Slip) -> str:
 
 
 def noise_size(d: Findings) -> float:
-    """Noise floor in the unit of the readings' sizes, m or rad; what no model explains is not in it."""
-    if d.calibration is not None:
-        return d.calibration.noise
+    """Noise of the readings in the unit of their sizes, m or rad; what no model explains is not in it."""
     floors = np.array(list(d.noise.floor.values()))
-    return d.noise.rms if d.before.size[1] == "m" else float(np.sqrt(np.mean(floors**2)))
-
-
-def _ratio(d: Findings) -> float:
-    if d.calibration is not None:
-        return d.after.size[0] / noise_size(d)
-    return d.after.ratio
+    size = d.noise.rms if d.before.size[1] == "m" else float(np.sqrt(np.mean(floors**2)))
+    return d.noise.scale * size
 
 
 def _thousandth(value: float, unit: str) -> str:
@@ -68,30 +62,39 @@ def _thousandth(value: float, unit: str) -> str:
 
 
 def _more(d: Findings) -> list[str]:
-    """Share explained where an unexplained residual remains, the calibration below the effects, what is not named and why."""
+    """How the difference is shared out, which machine is handed over, what is not named and why."""
     out = []
-    if d.unexplained:
-        h = d.held_out
-        gain = ""
-        if h is not None and h.gain is not None and d.effects:
-            gain = f"; held-out gain {h.gain[0]:.3g} ± {h.gain[1]:.2g} noise variances per reading"
-        before, after = d.before.size[0], d.after.size[0]
-        all_ = 1.0 - (after / before) ** 2 if before > 0 else 0.0
+    largest = [(name, s) for name, s in sorted(d.shares.items(), key=lambda s: -s[1]) if s > 0.005]
+    if d.verdict != "none" and len(largest) > 1:
+        out.append("shares of the squares: " + ", ".join(f"{name} {100 * s:.2g} %" for name, s in largest))
+    if d.which == "declared" and d.effects:
         out.append(
-            f"explained: {100 * all_:.1f} % of the squares against your file, {100 * d.explained:.1f} % of the misfit "
-            f"by effects{gain}"
+            "machine.yaml is the declared machine: none that was corrected predicts unseen readings better"
         )
     if d.calibration is not None:
-        c = d.calibration
-        out += [
-            f"calibration: {c.verdict}, {c.rank} directions determined",
-            *c.lines()[1 : 1 + len(c.beyond) + len(c.wider) + len(c.refused)],
-        ]
-        out += [line for line in c.lines() if line.startswith(("groups:", "model-form"))]
+        out.append(f"declared numbers: {d.calibration.verdict}")
     out += [f"not named: {why}" for why in d.refused]
     if d.stopped:
         out.append("stopped early: this is the best so far" + _not_tried(d.not_tried))
     return out
+
+
+def _promise(d: Findings) -> str:
+    """What a reading at a pose that was not read will differ by from the machine that is handed over."""
+    v = Validity.of_machine(d.machine)
+    if d.which == "declared" or v is None or v.error is None:
+        return ""
+    return f"; machine.yaml ({d.which}) promises {with_uncertainty(1e3 * v.error, 1e3 * v.error_u)} m{v.unit}"
+
+
+def number_text(n: Number) -> str:
+    """``zero of j4: 0.81 ± 0.02 mrad off (8.1 standard uncertainties)``."""
+    factor, label = DISPLAY_UNITS.get(n.unit, (1.0, n.unit))
+    off = with_uncertainty(factor * n.value, factor * n.u)
+    many = abs(n.value) / n.sigma
+    return f"{n.name}: {off} {'' if label == '1' else label} off ({many:.2g} standard uncertainties)".replace(
+        "  ", " "
+    )
 
 
 def _not_tried(what: Sequence[str]) -> str:
@@ -145,26 +148,19 @@ def _others(d: Findings) -> str:
 def _left(d: Findings) -> str:
     if d.unexplained:
         p = d.unexplained[0]
-        more = (
-            f"; an empirical correction would leave {_thousandth(d.empirical.after, d.before.size[1])}"
-            if d.empirical
-            else ""
-        )
-        detail = f", {p.detail}" if p.detail else ""
-        return f"unexplained: {p.what} in {p.axis} (p = {p.p:.1g}){detail}{_place(p)}{more}"
+        return f"unexplained: {p.what}, {100 * p.share:.2g} % of the squares{_place(p)}"
     if d.separations:
         return f"to separate: {separation_text(d.separations[0])}"
     out = f"{len(d.outliers)} outliers listed" if d.outliers else "no outliers"
     return f"nothing unexplained: lack of fit p = {d.noise.lack_of_fit_after:.2g}; {out}"
 
 
-def _place(p: Pattern) -> str:
+def _place(p: Rest) -> str:
     if p.position is None:
         return ""
     where = ", ".join(f"{1e3 * v:.0f}" for v in p.position)
-    return (
-        f"; largest at ({where}) mm, {in_display_units(p.size, 'rad' if p.axis.startswith('r') else 'm')} rms"
-    )
+    size = in_display_units(p.size, "rad" if p.axis.startswith("r") else "m")
+    return f"; largest in {p.axis} at ({where}) mm, {size} rms"
 
 
 def _limits(d: Findings) -> str:

@@ -16,12 +16,13 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Noise, noise_of
+from stiffmap.experiment.noise.outliers import noise_without_suspects
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.diagnosis.search.screen import Screen
-from stiffmap.identification.diagnosis.search.study import Study
+from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.diagnosis.slips.axes import coordinates, gauges, loads, moved, shifts, steps
 from stiffmap.identification.diagnosis.slips.factors import factors
+from stiffmap.identification.diagnosis.slips.screen import Screen
 from stiffmap.identification.diagnosis.slips.slip import Hypothesis, Slip
 from stiffmap.model.effects import get
 
@@ -58,8 +59,32 @@ class Judged:
     """What stays with it and the best single part of the machine."""
 
 
-def find_slip(s: Study) -> Found | None:
-    """The mistake in the readings of a study, or nothing."""
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings, and what each single part of the machine would change in them."""
+
+    predictor: Predictor
+    plan: Plan
+    noise: Noise
+    problem: Problem
+    screen: Screen
+
+    @staticmethod
+    def of(predictor: Predictor, plan: Plan) -> Readings:
+        """With the noise of readings that do not stand alone."""
+        e = predictor.experiment
+        noise = noise_without_suspects(e, plan.base)
+        problem = Problem.of(e, noise.sigma, plan.base)
+        return Readings(predictor, plan, noise, problem, Screen.of(problem, plan.stack))
+
+    @property
+    def experiment(self) -> Experiment:
+        """The experiment."""
+        return self.predictor.experiment
+
+
+def find_slip(s: Readings) -> Found | None:
+    """The mistake in the readings, or nothing."""
     e = s.experiment
     plain = e.frame != "unknown" and e.tool != "unknown" and e.seen is None and not e.absolute
     if not plain or not np.isfinite(s.plan.base[e.read]).any():
@@ -80,7 +105,7 @@ def find_slip(s: Study) -> Found | None:
     )
     first = near[0]
     h = first.hypothesis
-    # shifted rows look like noise where they are repeats: of that the study's own noise holds too much
+    # shifted rows look like noise where they are repeats: of that the noise of the readings holds too much
     noise = float(np.nanmedian((sigma / s.noise.sigma) ** 2))
     if (h.physical or h.kind != "factor") and first.beside > BETTER * best_part(
         s, noise * problem.freedom
@@ -105,7 +130,7 @@ def find_slip(s: Study) -> Found | None:
     return Found(slip, after)
 
 
-def _judged(s: Study, e: Experiment, sigma: Floats, base: Floats) -> list[Judged]:
+def _judged(s: Readings, e: Experiment, sigma: Floats, base: Floats) -> list[Judged]:
     """Mistakes that take away enough to be one, jointly with a fault that the machine may have as well."""
     predictor = s.predictor
     if len(e) > ROWS:
@@ -121,9 +146,9 @@ def _judged(s: Study, e: Experiment, sigma: Floats, base: Floats) -> list[Judged
     return out
 
 
-def _beside(s: Study, h: Hypothesis) -> float:
+def _beside(s: Readings, h: Hypothesis) -> float:
     """Share of the misfit beyond noise that stays with a mistake in the readings and the best part of the machine."""
-    problem, e = s.whole[0], s.experiment
+    problem, e = s.problem, s.experiment
     if h.kind == "factor" and h.factor is not None and h.undo is None:
         return 1.0
     there = h.undo(e) if h.undo is not None else e
@@ -156,7 +181,7 @@ def quiet(e: Experiment, noise: Noise) -> Floats:
     return np.asarray(noise.sigma * np.where(noise.floor > 0, least / noise.floor, 1.0))
 
 
-def _all(s: Study, predictor: Predictor, problem: Problem, base: Floats) -> Iterator[Hypothesis]:
+def _all(s: Readings, predictor: Predictor, problem: Problem, base: Floats) -> Iterator[Hypothesis]:
     e = predictor.experiment
     shown = coordinates(e, base)
     if e.quantity == "deflection" or _orthogonal(e):
@@ -183,35 +208,32 @@ def _left(e: Experiment, sigma: Floats, base: Floats, h: Hypothesis, problem: Pr
     return _excess(values[0], values[1], own.freedom)
 
 
-def best_part(s: Study, freedom: float) -> float:
+def best_part(s: Readings, freedom: float) -> float:
     """Share of the misfit beyond noise that the best single part of the machine leaves."""
-    residual = s.whole[0].residual(s.plan.base)
+    residual = s.problem.residual(s.plan.base)
     of = float(residual @ residual)
     return _excess(of - _gain(s, residual), of, freedom)
 
 
-def left_beside(s: Study, factor: float, axes: tuple[int, ...]) -> float:
+def left_beside(s: Readings, factor: float, axes: tuple[int, ...]) -> float:
     """Chi-square that the best single part of the machine leaves where some channels read `factor` times too much."""
     prediction = s.plan.base.copy()
     prediction[:, axes] *= factor
-    residual = s.whole[0].residual(prediction)
+    residual = s.problem.residual(prediction)
     return float(residual @ residual) - _gain(s, residual)
 
 
-def _gain(s: Study, residual: Floats) -> float:
+def _gain(s: Readings, residual: Floats) -> float:
     """What the best single part of the machine takes from chi-square, by linear screening within its bounds."""
-    screen = s.whole[1]
-    parts = {
-        id(c.representative)
-        for c in s.classes
-        if not all(get(m.kind).measurement for m in (c.representative, *c.members))
-    }
+    screen = s.screen
     if not len(screen.variants):
         return 0.0
     gains = screen.delta_chi2(residual[:, None])[:, 0]
     for i in np.argsort(-gains):
         v = screen.variants[int(i)]
-        if id(v.candidate) in parts and (v.start is not None or _possible(screen, int(i), residual)):
+        if get(v.candidate.kind).measurement:
+            continue
+        if v.start is not None or _possible(screen, int(i), residual):
             return float(gains[i])
     return 0.0
 

@@ -13,8 +13,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.fingerprints import digest
 from stiffmap.common.outputs import write_text
 from stiffmap.experiment.noise.checks import Check
-from stiffmap.identification.diagnosis.decision.patterns import Pattern
-from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Findings
+from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Findings, Number, Rest
 from stiffmap.identification.diagnosis.report.sentences import (
     UNITS,
     alias_words,
@@ -90,11 +89,11 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
         f"{p_text(d.noise.lack_of_fit_after)} after. "
         f"Outliers listed (rows): {', '.join(d.outliers) or 'none'}.",
         checks=_checks(d.checks_before, d.checks_after),
-        left=[(p.axis, p.what, p.detail, _at(p), f"{p.p:.2g}") for p in d.unexplained[:12]],
-        empirical=d.unexplained
-        and d.empirical
-        and f"would bring held-out readings from {1e6 * d.empirical.before:.2f} µ{d.before.size[1]} to "
-        f"{1e6 * d.empirical.after:.2f} µ{d.before.size[1]} rms.",
+        left=[(p.what, f"{100 * p.share:.0f} %", p.axis, _at(p)) for p in d.unexplained],
+        numbers=[
+            (n.name, *in_number_units(n), f"{abs(n.value) / n.sigma:.1f}")
+            for n in (d.calibration.beyond if d.calibration else ())
+        ],
         seen=_seen(d),
         shown=SHOWN,
         unseen=[in_shop_words(u).replace("_", " ") for u in d.unobservable],
@@ -140,8 +139,8 @@ def _effect(e: Effect) -> dict[str, Any]:
         "rows": [(n.replace("_", " "), *interval(*v)) for n, v in e.parameters.items()],
         "same": "; ".join(alias_words(a) for a in e.aliases),
         "definition": in_shop_words(e.definition),
-        "evidence": f"Chi-square falls by {e.evidence['delta_chi2']:.0f}; p-value over the whole search "
-        f"{p_text(e.evidence['p_global'])}.",
+        "evidence": f"The odds for it, over all places together, are e^{e.evidence['ln_odds']:.0f} to 1; it is "
+        f"{100 * e.evidence['share']:.0f} % of the squares, and the same everywhere to {100 * e.evidence['same_everywhere']:.0f} %.",
     }
 
 
@@ -169,8 +168,7 @@ def _budget(d: Findings) -> dict[str, Any] | None:
 def _folds(d: Findings) -> str:
     if d.held_out is None:
         return "Not held out."
-    chosen = ", ".join(f"{k} in {v}" for k, v in d.held_out.chosen.items())
-    return f"{d.held_out.folds} folds by {d.held_out.by}; chosen in the folds: {chosen or 'nothing'}."
+    return f"{d.held_out.folds} folds by {d.held_out.by}, each predicted by the machine that the others make in the same way."
 
 
 def _noise(d: Findings) -> list[tuple[str, ...]]:
@@ -196,7 +194,7 @@ def _pair(b: Check, a: Check) -> tuple[str, str, str, str]:
     return (f"{b.rms:.2f}", f"{b.p:.2g}", f"{a.rms:.2f}", f"{a.p:.2g}")
 
 
-def _at(p: Pattern) -> str:
+def _at(p: Rest) -> str:
     if p.position is None:
         return ""
     where = ", ".join(f"{1e3 * v:.0f}" for v in p.position)
@@ -250,6 +248,12 @@ def in_shop_units(value: float, unit: str) -> str:
     """A number of an effect: µm, µm/N, mrad."""
     factor, name = UNITS.get(unit, (1.0, unit))
     return f"{factor * value:.4g} {name}".rstrip()
+
+
+def in_number_units(n: Number) -> tuple[str, str]:
+    """What a number is off by, and its standard uncertainty, with units."""
+    factor, name = UNITS.get(n.unit, (1.0, n.unit))
+    return f"{factor * n.value:.4g} {name}".rstrip(), f"{factor * n.u:.2g} {name}".rstrip()
 
 
 def p_text(p: float) -> str:

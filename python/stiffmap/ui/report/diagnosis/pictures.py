@@ -32,8 +32,12 @@ CAPTIONS = {
     "maps": "Error of the tool over a plane of the workspace: the machine of your file, the corrected one, and what the finding changes.",
     "loaded": "The corrected machine where it deflects most in that plane: without load (dashed), under it (enlarged), and the part "
     "of each spring and drive.",
-    "unexplained": "What no effect explains, over the workspace, and the empirical field that would remove it.",
+    "shares": "How the squares of the difference from your file are shared out among noise, declared numbers, effects, and what "
+    "nobody can name.",
+    "unexplained": "What no effect explains, over the workspace.",
 }
+LEAST_SHARE = 1e-5
+"""Smaller parts are not drawn."""
 
 
 def figures(d: Findings) -> dict[str, Figure]:
@@ -58,7 +62,9 @@ def _wanted(d: Findings) -> dict[str, Callable[[Findings], Figure]]:
         made["maps"] = maps
         if d.experiment.wrench[:, :3].any():
             made["loaded"] = loaded
-    if d.unexplained and d.empirical and d.experiment.groups.max() > 0:
+    if d.verdict != "none":
+        made["shares"] = shared_out
+    if d.unexplained and d.experiment.groups.max() > 0:
         made["unexplained"] = left
     return made
 
@@ -111,27 +117,37 @@ def loops(d: Findings) -> Figure:
     return figure
 
 
+def shared_out(d: Findings) -> Figure:
+    """Bars of the shares, the largest first, on a logarithmic scale."""
+    found = [(name, 100 * s) for name, s in sorted(d.shares.items(), key=lambda s: s[1]) if s >= LEAST_SHARE]
+    figure = Figure(figsize=(7, 0.8 + 0.35 * len(found)), layout="constrained")
+    ax = figure.subplots()
+    effects = {str(e).partition(":")[0] for e in d.effects}
+    colours = [AFTER if name in effects else "0.7" for name, _ in found]
+    bars = ax.barh([name for name, _ in found], [s for _, s in found], color=colours)
+    ax.bar_label(bars, [f"{s:.2g} %" for _, s in found], padding=3)
+    ax.set_xscale("log")
+    ax.set(xlabel="share of the squares, %", xlim=(50 * LEAST_SHARE, 400))
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    return figure
+
+
 def left(d: Findings) -> Figure:
-    """What is left of the worst axis over the workspace, and the empirical field that would remove it."""
-    assert d.empirical is not None
+    """What is left over the workspace that nobody can name, in the axis where it is largest."""
+    assert d.gap is not None
     names = [c.name for c in d.experiment.channels]
     seen = [n for n, read in zip(names, d.experiment.axis_read, strict=True) if read]
-    named = [p.axis for p in d.unexplained if p.axis in seen]
-    axis = names.index(named[0] if named else seen[0])
-    figure = Figure(figsize=(11, 6.4), layout="constrained")
+    axis = names.index(d.unexplained[0].axis or seen[0])
     at = pose_means(d.experiment, d.experiment.position) * MM
-    shown = [
-        pose_means(d.experiment, kept(d, v))[:, axis] * UM for v in (d.residual_after, d.empirical.field)
-    ]
-    top = max(float(np.nanmax(np.abs(v))) for v in shown)
-    titles = (f"left in {names[axis]}, mean of each pose", "empirical field, from the other poses")
-    grid = figure.subplots(2, 3)
-    for row, (title, values) in enumerate(zip(titles, shown, strict=True)):
-        for column, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
-            ax = grid[row, column]
-            dots = ax.scatter(at[:, a], at[:, b], c=values, cmap="coolwarm", vmin=-top, vmax=top, s=36)
-            ax.set(xlabel=f"{'xyz'[a]}, mm", ylabel=f"{'xyz'[b]}, mm", title=title if column == 1 else "")
-        figure.colorbar(dots, ax=list(grid[row]), label=f"{names[axis]}, µm")
+    values = pose_means(d.experiment, kept(d, d.gap))[:, axis] * UM
+    top = float(np.nanmax(np.abs(values))) or 1.0
+    figure = Figure(figsize=(11, 3.4), layout="constrained")
+    row = figure.subplots(1, 3)
+    for ax, (a, b) in zip(row, ((0, 1), (0, 2), (1, 2)), strict=True):
+        dots = ax.scatter(at[:, a], at[:, b], c=values, cmap="coolwarm", vmin=-top, vmax=top, s=36)
+        ax.set(xlabel=f"{'xyz'[a]}, mm", ylabel=f"{'xyz'[b]}, mm")
+    figure.colorbar(dots, ax=list(row), label=f"{names[axis]}, µm")
     return figure
 
 

@@ -10,11 +10,11 @@ from stiffmap.common.kept import Kept
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.diagnosis.candidates.candidates import Candidate, candidates
-from stiffmap.identification.diagnosis.candidates.sensitivity import Variant, variants
-from stiffmap.identification.diagnosis.candidates.slopes import Slopes
-from stiffmap.identification.diagnosis.candidates.stack import Stack
-from stiffmap.identification.diagnosis.clock import Clock
+from stiffmap.identification.candidates.candidates import Candidate, candidates
+from stiffmap.identification.candidates.sensitivity import Variant, variants
+from stiffmap.identification.candidates.slopes import Slopes
+from stiffmap.identification.candidates.stack import Stack
+from stiffmap.identification.clock import Clock
 from stiffmap.model.effects import get, kinds
 
 

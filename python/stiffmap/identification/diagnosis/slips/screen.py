@@ -15,10 +15,11 @@ from scipy.stats import chi2
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
-from stiffmap.identification.diagnosis.candidates.sensitivity import Variant
-from stiffmap.identification.diagnosis.candidates.stack import Stack
-from stiffmap.identification.diagnosis.fitting.model import VISIBLE
+from stiffmap.identification.candidates.sensitivity import Variant
+from stiffmap.identification.candidates.stack import Stack
 
+VISIBLE = 0.03
+"""Whitened length per scale below which a parameter is not seen: 100 scales would make 3 sigma."""
 RANK = 1e-5
 FREED = 1e-3
 """Share of a column's length below which a model's directions leave nothing of it."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Mask, Problem
-from stiffmap.identification.diagnosis.candidates.fourier import Complex, Fourier
+from stiffmap.identification.candidates.fourier import Complex, Fourier
 
 Numbers = NDArray[np.intp]
 AT_ONCE = 64

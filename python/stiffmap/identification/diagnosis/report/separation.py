@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +11,7 @@ from stiffmap.common.broadcasting import random_numbers
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.experiment.readings import kind_of
-from stiffmap.identification.diagnosis.fitting.model import Model
-from stiffmap.identification.diagnosis.search.study import Study
+from stiffmap.model.description import AppliedEffect, MachineDescription
 
 WANTED = 5.0
 """Standard deviations between the two predictions that the measurement must reach."""
@@ -30,12 +30,22 @@ class Separation:
     """How many give five standard deviations; None: more than 10 000, not worth trying."""
 
 
-def separation(study: Study, one: Model, other: Model, seed: int) -> Separation:
-    """Best reading of a trial plan: workspace corners, centre and random poses, six force directions."""
-    trial = _trial(study, seed)
-    predictor = Predictor(study.predictor.machine, trial, threads=study.predictor.threads)
-    gap = predictor(one.terms()) - predictor(other.terms())
-    floor = study.noise.floor[_kept(study.experiment)]
+def separation(
+    predictor: Predictor,
+    floor: Floats,
+    one: Sequence[AppliedEffect],
+    other: Sequence[AppliedEffect],
+    seed: int,
+) -> Separation:
+    """Best reading, of those that the machine can reach, of a trial plan: workspace corners, centre and random poses, six force
+    directions; `floor` (c,) is the noise of each channel."""
+    e = predictor.experiment
+    at = Predictor(
+        predictor.machine, _trial(e, predictor.machine.description, seed), threads=predictor.threads
+    )
+    trial = at.experiment
+    gap = at(one) - at(other)
+    floor = floor[_kept(e)]
     sigma = np.where(np.isfinite(floor), floor, np.inf)
     clear = np.nan_to_num(np.abs(gap) / sigma)
     row, axis = np.unravel_index(int(np.argmax(clear)), clear.shape)
@@ -47,11 +57,10 @@ def separation(study: Study, one: Model, other: Model, seed: int) -> Separation:
     return Separation((x, y, z), (fx, fy, fz), name, float(gap[row, axis]), number)
 
 
-def _trial(study: Study, seed: int) -> Experiment:
-    e = study.experiment
+def _trial(e: Experiment, description: MachineDescription, seed: int) -> Experiment:
     low, high = e.position.min(axis=0), e.position.max(axis=0)
-    if study.description.workspace is not None:
-        low, high = np.array(study.description.workspace)
+    if description.workspace is not None:
+        low, high = np.array(description.workspace)
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     middle = np.vstack([corners * 0.98 + 0.02 * (low + high) / 2, (low + high) / 2])
     random = random_numbers(seed).uniform(low, high, (15, 3))

@@ -14,9 +14,9 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.whitening import readings_of
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.diagnosis.candidates.candidates import Candidate
-from stiffmap.identification.diagnosis.candidates.slopes import Slopes, side
-from stiffmap.identification.diagnosis.candidates.waves import Wave, Waves
+from stiffmap.identification.candidates.candidates import Candidate
+from stiffmap.identification.candidates.slopes import Slopes, side
+from stiffmap.identification.candidates.waves import Wave, Waves
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects import Parameter, get
 from stiffmap.model.effects.evidence import Periods, Tried, signatures_on_a_grid

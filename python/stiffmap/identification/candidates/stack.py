@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Mask, Problem
-from stiffmap.identification.diagnosis.candidates.sensitivity import Variant
-from stiffmap.identification.diagnosis.candidates.waves import Wave
+from stiffmap.identification.candidates.sensitivity import Variant
+from stiffmap.identification.candidates.waves import Wave
 
 Numbers = NDArray[np.intp]
 AT_ONCE = 64

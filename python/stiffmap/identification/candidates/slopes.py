@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.prediction.ahead import Ahead
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.diagnosis.candidates.candidates import Candidate
+from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.model.effects import Parameter, get
 
 AT_ONCE = 48

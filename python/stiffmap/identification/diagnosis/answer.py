@@ -1,0 +1,334 @@
+"""From what the inference found to a diagnosis: machines, effects with intervals, numbers, what is left, before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment.comparison.limitations import limitations
+from stiffmap.experiment.comparison.summary import Summary, summary
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.noise.checks import checks
+from stiffmap.experiment.noise.nuisance import nuisance_columns
+from stiffmap.experiment.noise.over_time import over_time
+from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.calibration.validity import covered
+from stiffmap.identification.candidates.candidates import Candidate
+from stiffmap.identification.clock import Clock
+from stiffmap.identification.diagnosis.report.detectability import detectable
+from stiffmap.identification.diagnosis.report.effects import effects_of
+from stiffmap.identification.diagnosis.report.findings import Effect, NoiseReport, Number, Numbers, Rest
+from stiffmap.identification.diagnosis.report.result import Diagnosis
+from stiffmap.identification.diagnosis.report.separation import separation
+from stiffmap.identification.inference.amplitudes import Fit
+from stiffmap.identification.inference.columns import Columns, Place
+from stiffmap.identification.inference.constants import RARE, STANDS_OUT
+from stiffmap.identification.inference.corrected import Corrected, Readings, Term, corrected, readings
+from stiffmap.identification.inference.inference import Inferred, terms
+from stiffmap.identification.inference.machines import CORRECTED, DECLARED, Written, written
+from stiffmap.identification.inference.names import instead
+from stiffmap.identification.inference.shares import gap_of, of_numbers, shares
+from stiffmap.identification.inference.verdict import Verdict, judged
+from stiffmap.solve.machine import Machine
+
+RIVALS = 3
+"""Places in an effect's stead that are fitted; all are named."""
+CLEARLY = 1.15
+"""Noise over what was declared, or under it, from which it is said."""
+
+
+def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross_validate: bool) -> Diagnosis:
+    """The diagnosis of an experiment."""
+    e, columns, fit = predictor.experiment, found.columns, found.search.best.fit
+    v = judged(columns, found.search)
+    base, sigma = found.plan.base, found.noise.sigma
+    listed = stands_out(columns, fit)
+    clock.say("corrected machine")
+    nameless = [predictor(terms([c])) - base for c, _ in v.refused]
+    given = readings(predictor, found.uncertain, columns, fit, sigma, nameless)
+    models, notes = _models(predictor, found, v, given)
+    clock.say("readings that no fit saw")
+    made = written(models, base, given, listed, seed, lambda: clock.over or not cross_validate)
+    best = models.get(CORRECTED, (given, None))[1]
+    each = shares(columns, fit)
+    effects = _effects(predictor, v, best, each, fit)
+    others = _alternatives(predictor, found, v, given, best, clock) if effects else []
+    before, after = (_left(e, sigma, p, ~listed) for p in (base, made.prediction))
+    held = made.held_out
+    noise = _noise(found, before, after, best, listed)
+    rest = _rest(columns, fit, v, each)
+    return Diagnosis(
+        verdict=_word(v, effects, rest, clock.stopped and noise.lack_of_fit_before < RARE),
+        effects=effects,
+        alternatives=[effects_ for effects_, _ in others],
+        separations=[
+            separation(predictor, found.noise.floor, best.effects if best else (), other.effects, seed)
+            for _, other in others
+        ],
+        before=held.before if held else _sum(before, sigma, e, listed),
+        after=held.after if held else _sum(after, sigma, e, listed),
+        held_out=held,
+        noise=noise,
+        detectable=detectable(columns, fit),
+        unobservable=_unobservable(found),
+        outliers=[e.ids[i] for i in np.flatnonzero(listed)],
+        checks_before=checks(e, e.reading, sigma, ~listed),
+        checks_after=checks(e, e.reading - made.prediction, sigma, ~listed),
+        unexplained=rest,
+        limitations=[
+            *_first(fit, v),
+            *notes,
+            *limitations(e, found.noise, predictor.machine),
+            *_over_time(Problem.of(e, sigma, made.prediction, ~listed), made.prediction),
+        ],
+        shares=each,
+        machine=_machine(predictor, made, effects, columns, ~listed),
+        declared=predictor.machine,
+        experiment=e,
+        residual_before=before,
+        residual_after=after,
+        set_aside=listed,
+        gap=gap_of(columns, fit, e),
+        calibration=_numbers(found, v, best, given, each),
+        refused=[f"{c.place.candidate}: {why}" for c, why in v.refused],
+        which=made.which,
+        stopped=clock.stopped or bool(clock.left_out),
+        not_tried=list(clock.left_out),
+        seed=seed,
+    )
+
+
+def stands_out(columns: Columns, fit: Fit) -> Mask:
+    """(n,) rows with a reading that heavy tails give less than a quarter of its weight."""
+    out = np.zeros(len(columns.experiment), bool)
+    out[columns.rows[fit.weights < 1.0 / STANDS_OUT]] = True
+    return out
+
+
+def _models(
+    predictor: Predictor, found: Inferred, v: Verdict, given: Readings
+) -> tuple[dict[str, tuple[Readings, Corrected]], list[str]]:
+    """The machines that may be handed over besides the declared one, by name, the corrected one last."""
+    chosen = [n.chosen for n in v.named]
+    starts = [Term.of(c.place.candidate, t) for c, t in zip(chosen, terms(chosen), strict=True)]
+    plain = found.search.calibrated
+    out: dict[str, tuple[Readings, Corrected]] = {}
+    if starts and plain is not None:
+        own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma)
+        if len(own.spread):
+            out["calibrated"] = (own, corrected(own, ()))
+    if not starts and not len(given.spread):
+        return out, []
+    try:
+        out[CORRECTED] = (given, corrected(given, starts))
+    except StiffmapError as problem:
+        return out, [f"the effects have no corrected machine: {problem}"]
+    return out, []
+
+
+def _effects(
+    predictor: Predictor, v: Verdict, best: Corrected | None, each: dict[str, float], fit: Fit
+) -> list[Effect]:
+    if best is None or not v.named:
+        return []
+    evidence = [
+        {
+            "ln_odds": n.log_odds,
+            "share": each.get(n.chosen.part.name, 0.0),
+            "same_everywhere": 1.0 - n.scatter,
+        }
+        for n in v.named
+    ]
+    same = [shows_same(n.chosen.place) for n in v.named]
+    return effects_of(predictor.machine.description, best, same, evidence)
+
+
+def shows_same(place: Place) -> tuple[Candidate, ...]:
+    """What these readings cannot distinguish from a place whatever its size."""
+    return (*place.aliases, *place.wider)
+
+
+def _alternatives(
+    predictor: Predictor,
+    found: Inferred,
+    v: Verdict,
+    given: Readings,
+    best: Corrected | None,
+    clock: Clock,
+) -> list[tuple[list[Effect], Corrected]]:
+    """Each other place of each effect, all else refitted; those that are likeliest first, at most `RIVALS` of an effect."""
+    out: list[tuple[list[Effect], Corrected]] = []
+    if best is None:
+        return out
+    for k, n in enumerate(v.named):
+        for place in n.equivalents[:RIVALS]:
+            if clock.over:
+                clock.leave_out("other places of the effects, fitted")
+                return out
+            other = instead(found.columns, found.search.best.fit, n.chosen, place)
+            start = Term.of(place.candidate, terms([other])[0])
+            kept = [start if i == k else t for i, t in enumerate(best.terms)]
+            try:
+                fitted = corrected(given, kept)
+            except StiffmapError:
+                continue
+            aliases = [shows_same(m.chosen.place if i != k else place) for i, m in enumerate(v.named)]
+            none = [dict[str, float]() for _ in v.named]
+            out.append((effects_of(predictor.machine.description, fitted, aliases, none), fitted))
+    return out
+
+
+def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], cut_short: bool) -> str:
+    """`cut_short`: whether the search could not come to an end though the readings are no noise."""
+    named = bool(effects or v.beyond)
+    if v.word == "ambiguous" and effects:
+        return "ambiguous"
+    if named:
+        return "effects+unattributed" if rest else "effects"
+    return "unattributed" if rest or v.word == "unattributed" or cut_short else "none"
+
+
+def _left(e: Experiment, sigma: Floats, prediction: Floats, keep: Mask) -> Floats:
+    """(n, c) reading minus prediction, less the frames, tools and zeros that fit best where that machine stands."""
+    raw = e.reading - prediction
+    return np.asarray(raw - nuisance_part(Problem.of(e, sigma, prediction, keep), raw))
+
+
+def _sum(residual: Floats, sigma: Floats, e: Experiment, listed: Mask) -> Summary:
+    return summary(np.where(listed[:, None], np.nan, residual), sigma, e.channels)
+
+
+def _noise(
+    found: Inferred, before: Floats, after: Floats, best: Corrected | None, listed: Mask
+) -> NoiseReport:
+    n, e = found.noise, found.columns.experiment
+    scale = found.search.best.fit.noise
+
+    def per_axis(values: Floats) -> dict[str, float]:
+        return {c.name: float(v) for c, v, read in zip(e.channels, values, e.axis_read, strict=True) if read}
+
+    def lack(left: Floats, values: int) -> float:
+        z = (np.where(listed[:, None], np.nan, left) / n.sigma).ravel()
+        z = z[np.isfinite(z)]
+        return float(chi2.sf(float(z @ z), max(1, len(z) - frames - values)))
+
+    frames = nuisance_columns(e, found.plan.base).shape[-1]
+    values = 0 if best is None else sum(len(t.values) for t in best.terms)
+    return NoiseReport(
+        per_axis(n.floor),
+        per_axis(n.repeats),
+        per_axis(n.declared),
+        per_axis(n.consistency),
+        lack(before, 0),
+        lack(after, values),
+        n.rms,
+        scale,
+    )
+
+
+def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float]) -> list[Rest]:
+    """What is left that has no name, the largest part first."""
+    if not v.rest:
+        return []
+    e = columns.experiment
+    gap = np.abs(np.nan_to_num(gap_of(columns, fit, e))) / np.where(e.read, 1.0, np.inf)
+    share = sum(
+        s
+        for name, s in each.items()
+        if any(p.name == name and p.kind in ("field", "pose") for p in fit.parts)
+    )
+    noise = np.full(gap.shape, np.inf)
+    noise[columns.rows, columns.channel] = columns.sigma
+    in_noise = gap / noise
+    if not in_noise.any():
+        return [Rest(v.rest, share)]
+    pose = e.groups
+    number = int(pose.max()) + 1
+    count = np.maximum(np.bincount(pose, minlength=number), 1)
+    each_pose = np.stack(
+        [np.bincount(pose, in_noise[:, a] ** 2, number) / count for a in range(gap.shape[1])]
+    )
+    axis, k = np.unravel_index(int(np.argmax(each_pose)), each_pose.shape)
+    x, y, z = (float(c) for c in e.position[pose == k][0])
+    size = float(np.sqrt(np.mean(gap[pose == k][:, axis] ** 2)))
+    return [Rest(v.rest, share, e.channels[int(axis)].name, (x, y, z), size)]
+
+
+def _first(fit: Fit, v: Verdict) -> list[str]:
+    """What must be known of the noise before anything else."""
+    out = []
+    if not 1.0 / CLEARLY < fit.noise < CLEARLY:
+        out.append(f"the noise is {fit.noise:.2g} times what is stated, and is taken so")
+    if np.any(fit.weights != 1.0):
+        out.append("some readings stand out: all are weighed by heavy-tailed noise")
+    if v.time:
+        out.append(f"the noise goes on from reading to reading ({v.time})")
+    return out
+
+
+def _over_time(problem: Problem, prediction: Floats) -> list[str]:
+    """What is left over time, in words; nothing where no times were recorded."""
+    found = over_time(problem, problem.residual(prediction))
+    return [] if found is None else [str(found)]
+
+
+def _numbers(
+    found: Inferred, v: Verdict, best: Corrected | None, given: Readings, each: dict[str, float]
+) -> Numbers | None:
+    if best is None or not len(best.numbers):
+        return None
+    said = of_numbers(found.columns, found.search.best.fit)
+    at = {u.name: k for k, u in enumerate(given.sensitivity.unknowns)}
+    table, beyond = [], []
+    off = {b.unknown.name for b in v.beyond}
+    for u, (value, sd, share) in zip(found.columns.unknowns, said, strict=True):
+        if u.name not in at:
+            continue
+        value = float(best.numbers[at[u.name]])
+        row = Number(u.name, u.group, u.leg, u.unit, value * u.u, u.u, sd * u.u, share)
+        table.append(row)
+        if u.name in off:
+            beyond.append(row)
+    beyond.sort(key=lambda n: -n.share)
+    names = ", ".join(n.name for n in beyond)
+    word = f"beyond tolerance: {names}" if beyond else "adjusted within tolerance"
+    return Numbers(word, tuple(beyond), tuple(table))
+
+
+def _unobservable(found: Inferred) -> list[str]:
+    seen = {id(c) for p in found.columns.places for c in (p.candidate, *p.aliases)}
+    all_ = {id(v.candidate): v.candidate for v in found.plan.variants}
+    failed = [f"{c} ({why})" for c, why in found.plan.failed]
+    return [str(c) for k, c in all_.items() if k not in seen] + failed
+
+
+def _machine(
+    predictor: Predictor,
+    made: Written,
+    effects: Sequence[Effect],
+    columns: Columns,
+    keep: Mask,
+) -> Machine:
+    """The machine that is handed over; its file says what it has from which experiment, what the readings in `keep` (n,) covered,
+    and by how much its prediction of others is off."""
+    if made.which == DECLARED:
+        return predictor.machine
+    e, d = predictor.experiment, made.machine.description
+    source = d.source
+    if made.which == CORRECTED and effects:
+        names = "; ".join(f"{x.kind} of {x.element} {' '.join(x.legs)}".strip() for x in effects)
+        source = f"{source} Effects added by a diagnosis: {names}, from experiment {e.name}."
+    else:
+        source = f"{source} Numbers calibrated by experiment {e.name}."
+    declared = None if d.declared is None else replace(d.declared, source=source.strip())
+    valid = covered(predictor.machine, e, keep)
+    error, u = made.promise or (np.nan, np.nan)
+    if np.isfinite(error):
+        unit = "m" if any(c.unit == "m" for c in np.array(e.channels)[np.unique(columns.channel)]) else "rad"
+        valid = replace(valid, error=error, error_u=u, unit=unit)
+    return valid.kept_by(Machine(replace(d, source=source.strip(), declared=declared)))

@@ -1,0 +1,128 @@
+"""`diagnose`: from readings to a verdict."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from os import PathLike
+
+from stiffmap.common.broadcasting import whole_number
+from stiffmap.common.number_text import within
+from stiffmap.common.one_thread import on_one_thread
+from stiffmap.experiment.comparison.limitations import refuse
+from stiffmap.experiment.experiment import Experiment
+from stiffmap.experiment.files.load import load_experiment
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.calibration import GROUPS, Tolerances
+from stiffmap.identification.candidates.candidates import check_kinds
+from stiffmap.identification.candidates.plan import plan_of
+from stiffmap.identification.clock import Clock, Progress
+from stiffmap.identification.diagnosis.answer import answer
+from stiffmap.identification.diagnosis.report.findings import Effect
+from stiffmap.identification.diagnosis.report.result import Diagnosis
+from stiffmap.identification.diagnosis.slips.factors import named_within
+from stiffmap.identification.diagnosis.slips.find import Readings, find_slip
+from stiffmap.identification.diagnosis.slips.slip import Slip
+from stiffmap.identification.inference.inference import infer
+from stiffmap.solve.machine import Machine, load_machine
+
+SLIPS = 2
+"""Mistakes in the readings that are undone one after the other."""
+GAINS = ("load_gain", "sensor_gain")
+
+
+@on_one_thread
+def diagnose(
+    machine: Machine | str | PathLike[str],
+    experiment: Experiment | str | PathLike[str],
+    *,
+    seed: int = 0,
+    threads: int | None = None,
+    cross_validate: bool = True,
+    tolerances: Tolerances | None = None,
+    exclude: Sequence[str] = (),
+    time_limit: float | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Which physical effect the declared machine lacks, where, how large, and how sure that is.
+
+    Parameters
+    ----------
+    machine
+        Declared machine, the name of a shipped one, or a machine file.
+    experiment
+        An experiment, its folder or its YAML file.
+    seed
+        Of the folds, and of the poses that are drawn of many; the same seed gives the same answer.
+    threads
+        None: all cores that this process may use.
+    cross_validate
+        False leaves out the folds: `before` and `after` are then not held out.
+    tolerances
+        Standard uncertainties of what the machine file declares, where it gives none (docs/calibration.md).
+    exclude
+        Kinds of effects, or groups of declared numbers, that are known not to be.
+    time_limit
+        Seconds after which no new step begins; the answer is then the best so far, `stopped` is set, and so it
+        is after Ctrl-C, also among the sensitivities (`not_tried` lists the effects that have none).
+    progress
+        Called with a text on what is tried.
+
+    Raises
+    ------
+    StiffmapError
+        For files that cannot be used, poses out of reach, and noise that is unknown. docs/diagnosis.md
+        describes the method.
+    """
+    whole_number(seed, "seed", 0)
+    machine = machine if isinstance(machine, Machine) else load_machine(machine)
+    data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
+    clock = Clock.of(time_limit, progress)
+    check_kinds(n for n in exclude if n not in GROUPS)
+    with clock.on_interrupt():
+        predictor = Predictor(machine, data, threads=threads)
+        refuse(predictor.experiment, predictor())
+        times = [time.perf_counter()]
+        slips: list[Slip] = []
+        plan = plan_of(predictor, clock)
+        clock.say("units, signs, swaps and shifted rows")
+        while len(slips) < SLIPS and not clock.over:
+            found = find_slip(Readings.of(predictor, plan))
+            if found is None:
+                break
+            slips.append(found.slip)
+            if not found.slip.undone:
+                break
+            predictor = Predictor(machine, found.experiment, threads=threads)
+            refuse(predictor.experiment, predictor())
+            plan = plan_of(predictor, clock)
+        times.append(time.perf_counter())
+        inferred = infer(predictor, plan, tolerances, exclude, clock, seed)
+        times.append(time.perf_counter())
+        d = answer(predictor, inferred, clock, seed, cross_validate)
+    steps = ("sensitivities and slips", "search", "machines and folds")
+    times.append(time.perf_counter())
+    seconds = {s: b - a for s, a, b in zip(steps, times, times[1:], strict=False)}
+    d = replace(d, seconds=seconds)
+    return with_slips(d, slips) if slips else d
+
+
+def with_slips(d: Diagnosis, slips: Sequence[Slip]) -> Diagnosis:
+    """The answer that names mistakes in the readings before any cause."""
+    return replace(d, slips=[by_gain(s, d.effects) for s in slips], verdict="readings")
+
+
+def by_gain(s: Slip, effects: Sequence[Effect]) -> Slip:
+    """A common factor that no known one is, named by the gain that the diagnosis found jointly with a part of the machine."""
+    gains = [e.parameters["gain"] for e in effects if e.kind in GAINS and "gain" in e.parameters]
+    if s.kind != "factor" or s.undone or len(gains) != 1:
+        return s
+    value, low, high, _ = gains[0]
+    names = named_within(low, high)
+    if not names:
+        return s
+    seen = (
+        f"{s.seen}, {within(value, (high - low) / 3.92)} times jointly with the cause that is found as well"
+    )
+    return replace(s, check=f"check first: {', '.join(names)}", seen=seen)

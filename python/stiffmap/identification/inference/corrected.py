@@ -1,0 +1,352 @@
+"""The corrected machine: named effects and uncertain numbers together, at their own nonlinear optimum.
+
+With readings y, the prediction f of a machine with effects and numbers θ, frames and tools Φ where that machine stands,
+and the covariance C = L Lᵀ of noise and of what nobody can name, the optimum is the least of
+
+    |Q(θ) L⁻¹ (y - f(θ))|² + |z|²,   Q = 1 - projection onto L⁻¹ Φ(θ),
+
+z the numbers in standard deviations of the search. Bounded least squares with a trust region: scipy.optimize.least_squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import least_squares
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment.experiment import Floats, Integers, Mask
+from stiffmap.experiment.noise.nuisance import nuisance_columns
+from stiffmap.experiment.noise.whitening import basis, readings_of
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.calibration.certificate import INSTRUMENT
+from stiffmap.identification.calibration.model import Sensitivity, predicted, sensitivity, sensitivity_at
+from stiffmap.identification.calibration.slopes import moves_of
+from stiffmap.identification.calibration.unknowns import Unknown
+from stiffmap.identification.candidates.candidates import Candidate
+from stiffmap.identification.inference.amplitudes import ALL_NUMBERS, OFF, Fit
+from stiffmap.identification.inference.columns import Columns, drawn, possible, zeros
+from stiffmap.identification.inference.constants import DEGREES
+from stiffmap.identification.inference.kernels import gaps
+from stiffmap.model.description import AppliedEffect
+from stiffmap.model.with_errors import edited
+from stiffmap.solve.machine import Machine
+
+MOST_FITTED = 3000
+"""Readings that a machine is fitted to; of more, whole poses are drawn. Effort only: one (N, N) matrix is factorised."""
+STEP = 1e-3
+"""Of a parameter's scale, for differences."""
+STEPS, STEPS_OF_A_FOLD = 30, 6
+"""Evaluations at most, of all readings and of those outside a fold."""
+BENT = 0.05
+"""Share of the numbers' change that a straight line misses, beyond which their columns are taken anew at the optimum."""
+WEIGHINGS = 3
+"""Fits with weights of heavy tails."""
+Effects = Callable[[Floats], Sequence[AppliedEffect]]
+"""Effects with the values (k + p,) of an optimum."""
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """An effect that is fitted: all its parameters, in their scales."""
+
+    candidate: Candidate
+    values: Floats
+    """(q,)."""
+
+    @staticmethod
+    def of(candidate: Candidate, term: AppliedEffect) -> Term:
+        """With the values (SI) of an effect."""
+        given = dict(term.parameters)
+        found = [float(given.get(p.name, p.null or 0.0)) / p.scale for p in candidate.parameters]
+        return Term(candidate, np.clip(np.array(found), *Term(candidate, np.zeros(0)).bounds))
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """(q,) least and largest values."""
+        both = [possible(p) if p.null is not None else (p.lower, p.upper) for p in self.candidate.parameters]
+        scale = np.array([p.scale for p in self.candidate.parameters])
+        low, high = (np.array(side, dtype=float) / scale for side in zip(*both, strict=True))
+        return low, high
+
+    def effect(self, values: Floats) -> AppliedEffect:
+        """With other values."""
+        p = self.candidate.parameters
+        return self.candidate.term([float(v) * q.scale for v, q in zip(values, p, strict=True)])
+
+
+@dataclass(frozen=True, eq=False)
+class Corrected:
+    """A machine at the optimum, and what it shows."""
+
+    terms: tuple[Term, ...]
+    """At the optimum."""
+    numbers: Floats
+    """(p,) declared numbers, in standard uncertainties."""
+    covariance: Floats
+    """(k, k) of all values of the terms, in scales, one term after the other; numbers integrated out."""
+    prediction: Floats
+    """(n, c) m, rad."""
+    cost: float
+    """What the optimum is the least of."""
+    freedom: int
+    """Readings less frames, effects' values and numbers that the readings determine."""
+    misfit: float
+    """Chi-square of the readings alone, under the noise and what nobody can name."""
+    columns: Floats
+    """(N, k + p + q) change of the readings, in noise, per unit of each effect's value, number and frame, at the optimum."""
+    prior: Floats
+    """(k + p + q,) prior precision of these."""
+
+    @property
+    def effects(self) -> tuple[AppliedEffect, ...]:
+        """With their values, SI."""
+        return tuple(t.effect(t.values) for t in self.terms)
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings that a machine is fitted to, with the covariance of what it does not explain."""
+
+    predictor: Predictor
+    sigma: Floats
+    """(n, c) m, rad."""
+    rows: Integers
+    """(N,)."""
+    channel: Integers
+    """(N,)."""
+    noise: Floats
+    """(N,) variance of the noise, in declared ones: κ², over the weights of heavy tails."""
+    rest: Floats
+    """(N, N) covariance of what nobody can name, of common zeros and of effects without a name, in declared noise."""
+    heavy: bool
+    sensitivity: Sensitivity
+    spread: Floats
+    """(p,) standard deviation of each number, in standard uncertainties."""
+
+    def only(self, keep: Mask) -> Readings:
+        """Those of some rows (n,)."""
+        own = keep[self.rows]
+        rest = self.rest[np.ix_(own, own)]
+        return replace(self, rows=self.rows[own], channel=self.channel[own], noise=self.noise[own], rest=rest)
+
+    def white(self, root: Floats, values: Floats) -> Floats:
+        """(N, ...) L⁻¹ of (n, c, ...)."""
+        picked = values[self.rows, self.channel]
+        scaled = picked / self.sigma[self.rows, self.channel].reshape(-1, *(1,) * (picked.ndim - 1))
+        return np.asarray(solve_triangular(root, scaled, lower=True, check_finite=False))
+
+    def predicted(self, numbers: Floats, effects: Sequence[AppliedEffect]) -> Floats:
+        """(n, c) m, rad; NaN where the machine cannot be."""
+        try:
+            return predicted(self.predictor, self.sensitivity.unknowns, numbers, effects)
+        except StiffmapError:
+            return np.full_like(self.sigma, np.nan)
+
+
+def readings(
+    predictor: Predictor,
+    uncertain: Sequence[Unknown],
+    columns: Columns,
+    fit: Fit,
+    sigma: Floats,
+    without_name: Sequence[Floats] = (),
+) -> Readings:
+    """The readings of an experiment under the amplitudes of a fit.
+
+    uncertain
+        The numbers of the columns, and those that no reading shows.
+    without_name
+        (n, c) m, rad: what effects of the fit that have no name add to the readings.
+    """
+    e = predictor.experiment
+    rows, channel = readings_of(e, predictor())
+    some = drawn(e.groups[rows], 0, MOST_FITTED)
+    rows, channel = rows[some], channel[some]
+    own = sigma[rows, channel]
+    seen = {(int(r), int(c)): k for k, (r, c) in enumerate(zip(rows, channel, strict=True))}
+    used = np.array(
+        [seen.get((int(r), int(c)), -1) for r, c in zip(columns.rows, columns.channel, strict=True)]
+    )
+    inside = used >= 0
+    free = columns.free[inside]
+    amplitude = {p.name: np.exp(t) for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF}
+    rest = zeros(e, rows, channel, own)
+    for _, name, k in gaps(predictor.machine, e, rows, channel, own):
+        if name in amplitude:
+            part = k[np.ix_(used[inside], used[inside])]
+            rest += amplitude[name] * len(columns) / float(np.sum(free * (part @ free))) * k
+    for change in without_name:
+        pattern = np.nan_to_num(change[rows, channel]) / own
+        rest += np.outer(pattern, pattern)
+    weights = np.ones(len(rows))
+    weights[used[inside]] = fit.weights[inside]
+    spread = {ALL_NUMBERS: fit.amplitude(ALL_NUMBERS)}
+    known = [(u, spread[ALL_NUMBERS] or fit.amplitude(_group(u.group, u.setup))) for u in columns.unknowns]
+    unknowns = tuple(u for u, s in known if s > 0.0)
+    s = sensitivity(predictor, uncertain)
+    index = [s.unknowns.index(u) for u in unknowns]
+    s = replace(s, unknowns=unknowns, columns=s.columns[..., index])
+    return Readings(
+        predictor,
+        sigma,
+        rows,
+        channel,
+        fit.noise**2 / weights,
+        rest,
+        not np.all(fit.weights == 1.0),
+        s,
+        np.array([size for _, size in known if size > 0.0]),
+    )
+
+
+def _group(group: str, setup: str) -> str:
+    return f"{group}, {setup}" if setup else group
+
+
+def corrected(
+    given: Readings, terms: Sequence[Term], start: Corrected | None = None, steps: int = STEPS
+) -> Corrected:
+    """The optimum, from the values of the terms and the declared numbers, or from another optimum."""
+    noise = float(np.min(given.noise))
+    for _ in range(WEIGHINGS if given.heavy and start is None else 1):
+        found = _optimum(given, terms, start, steps)
+        if start is None and _bends(given, found):
+            anew = sensitivity_at(given.predictor, given.sensitivity, found.numbers)
+            given = replace(given, sensitivity=anew)
+            found = _optimum(given, terms, found, steps)
+        if given.heavy and start is None:
+            root = _root(given)
+            left = given.white(root, np.nan_to_num(given.predictor.experiment.reading - found.prediction))
+            q = _frames(given, root, found.prediction)
+            left = root @ (left - q @ (q.T @ left))
+            weights = (DEGREES + 1.0) / (DEGREES + left**2 / noise)
+            given = replace(given, noise=noise / np.minimum(weights, 1.0))
+    return found
+
+
+def _root(given: Readings) -> Floats:
+    return np.asarray(cholesky(given.rest + np.diag(given.noise), lower=True, check_finite=False))
+
+
+def _frames(given: Readings, root: Floats, prediction: Floats) -> Floats:
+    """(N, q) orthonormal directions of frames, tools and zeros where the machine stands."""
+    found = nuisance_columns(given.predictor.experiment, prediction)
+    return basis(given.white(root, found)) if found.shape[-1] else np.zeros((len(given.rows), 0))
+
+
+def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, steps: int) -> Corrected:
+    root, e = _root(given), given.predictor.experiment
+    terms = tuple(terms) if start is None else start.terms
+    ends = np.cumsum([0, *(len(t.values) for t in terms)])
+    k, p = int(ends[-1]), len(given.spread)
+    columns = given.white(root, given.sensitivity.columns) * given.spread
+    known: dict[bytes, Floats] = {}
+
+    def effects(x: Floats) -> list[AppliedEffect]:
+        return [t.effect(x[a:b]) for t, a, b in zip(terms, ends[:-1], ends[1:], strict=True)]
+
+    def shown(x: Floats) -> Floats:
+        key = x.tobytes()
+        if key not in known:
+            known.clear()
+            known[key] = given.predicted(x[k:] * given.spread, effects(x))
+        return known[key]
+
+    def off(x: Floats, values: Floats) -> Floats:
+        q = _frames(given, root, np.nan_to_num(shown(x)))
+        return np.asarray(values - q @ (q.T @ values))
+
+    def residual(x: Floats) -> Floats:
+        left = given.white(root, e.reading - shown(x))
+        if not np.isfinite(left).all():
+            return np.full(len(left) + p, np.inf)
+        return np.append(off(x, left), x[k:])
+
+    def jacobian(x: Floats) -> Floats:
+        whole = off(x, -np.column_stack([*_slopes(given, root, x, high, effects, k), columns]))
+        return np.vstack([whole, np.hstack([np.zeros((p, k)), np.eye(p)])])
+
+    low = np.concatenate([*(t.bounds[0] for t in terms), np.full(p, -np.inf)])
+    high = np.concatenate([*(t.bounds[1] for t in terms), np.full(p, np.inf)])
+    begin = np.concatenate([*(t.values for t in terms), np.zeros(p)])
+    if start is not None:
+        begin[k:] = start.numbers / given.spread
+    inside = np.where(np.isfinite(high - low), 1e-9 * np.nan_to_num(high - low, posinf=0.0), 0.0)
+    begin = np.clip(begin, low + inside, high - inside)
+    if not len(begin):
+        x = begin
+    elif not np.isfinite(residual(begin)).all():
+        raise StiffmapError("the machine has no equilibrium with the effects that were found")
+    else:
+        x = least_squares(
+            residual, begin, jacobian, (low, high), x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=steps
+        ).x
+    r = residual(x)
+    j = jacobian(x)
+    information = j.T @ j
+    covariance = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
+    determined = float(np.sum(1.0 - np.diag(covariance)[k:])) if p else 0.0
+    frames = _frames(given, root, shown(x))
+    q = frames.shape[1]
+    own = root @ np.hstack(
+        [*(c[:, None] for c in _slopes(given, root, x, high, effects, k)), columns, frames]
+    )
+    return Corrected(
+        tuple(replace(t, values=x[a:b]) for t, a, b in zip(terms, ends[:-1], ends[1:], strict=True)),
+        x[k:] * given.spread,
+        np.asarray(covariance[:k, :k]),
+        shown(x),
+        float(r @ r),
+        max(1, len(given.rows) - q - k - round(determined)),
+        float(r[: len(given.rows)] @ r[: len(given.rows)]),
+        own,
+        np.concatenate([np.zeros(k), np.ones(p), np.zeros(q)]),
+    )
+
+
+def _slopes(given: Readings, root: Floats, x: Floats, high: Floats, effects: Effects, k: int) -> list[Floats]:
+    """(N,) whitened change of the readings per scale of each of the first k values."""
+    here = given.predicted(x[k:] * given.spread, effects(x))
+    return [given.white(root, _change(given, x, j, high, here, effects, k)) for j in range(k)]
+
+
+def _change(
+    given: Readings, x: Floats, j: int, high: Floats, here: Floats, effects: Effects, k: int
+) -> Floats:
+    """(n, c) per scale of value j, by a one-sided difference; zero where the machine fails on both sides."""
+    step = STEP * max(1.0, abs(float(x[j])))
+    for h in (step, -step) if x[j] + step <= high[j] else (-step, step):
+        moved = x.copy()
+        moved[j] += h
+        there = given.predicted(x[k:] * given.spread, effects(moved))
+        if np.isfinite(there[given.rows, given.channel]).all():
+            return np.asarray((there - here) / h)
+    return np.zeros_like(here)
+
+
+def _bends(given: Readings, found: Corrected) -> bool:
+    """Whether the numbers' columns at the optimum differ so much from those in use that its standard deviations would be wrong."""
+    if not len(found.numbers):
+        return False
+    root = _root(given)
+    line = given.sensitivity.columns @ found.numbers
+    alone = given.predicted(found.numbers, ())
+    if not np.isfinite(alone[given.rows, given.channel]).all():
+        return False
+    straight = given.white(root, line)
+    missed = given.white(root, alone - given.sensitivity.base) - straight
+    return 2.0 * float(np.linalg.norm(missed)) > max(BENT * float(np.linalg.norm(straight)), 1.0)
+
+
+def machine_of(given: Readings, found: Corrected) -> Machine:
+    """The machine that a file has: effects, and numbers that are not of a set-up or of the instrument."""
+    names = given.sensitivity.unknowns
+    pairs = [(u, float(v)) for u, v in zip(names, found.numbers, strict=True) if not u.setup]
+    own = {(at, what): by for (at, what), by in moves_of(pairs).items() if at != INSTRUMENT}
+    p = given.predictor
+    description = p.with_terms(found.effects).description
+    return Machine(edited(description, own) if own else description, like=p.machine)

@@ -1,0 +1,144 @@
+"""Which machine file is handed over: as declared, calibrated, or corrected; by readings that no fit saw, never a worse one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from stiffmap.experiment.channels import metres
+from stiffmap.experiment.comparison.summary import Summary, summary
+from stiffmap.experiment.experiment import Floats, Mask
+from stiffmap.experiment.noise.folds import folds
+from stiffmap.experiment.noise.unseen import left_unseen
+from stiffmap.identification.inference.columns import drawn
+from stiffmap.identification.inference.corrected import (
+    STEPS_OF_A_FOLD,
+    Corrected,
+    Readings,
+    corrected,
+    machine_of,
+)
+from stiffmap.solve.machine import Machine
+
+FOLDS = 10
+"""Groups of poses of which the promise is the mean."""
+DECLARED, CALIBRATED, CORRECTED = "declared", "calibrated", "corrected"
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Readings that no fit saw."""
+
+    before: Summary
+    after: Summary
+    residual: Floats
+    """(n, c) reading minus what the machine file made without the row's group says of it, less unknown frames and zeros as
+    the other groups determine them."""
+    folds: int
+    by: str
+    """``poses`` or ``set-ups``."""
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """The machine of the three that predicts best."""
+
+    which: str
+    """``declared``, ``calibrated`` or ``corrected``."""
+    machine: Machine
+    prediction: Floats
+    """(n, c) m, rad."""
+    held_out: HeldOut | None
+    """None where there are not two groups of readings, or time is over."""
+    promise: tuple[float, float] | None = None
+    """By how much a reading of another pose will differ, m or rad, and its standard uncertainty."""
+
+
+def written(
+    models: dict[str, tuple[Readings, Corrected]],
+    declared: Floats,
+    given: Readings,
+    listed: Mask,
+    seed: int,
+    over: Callable[[], bool],
+) -> Written:
+    """The best of some machines and the declared one, each fold of readings predicted from all others.
+
+    models
+        By name, the readings that a machine was fitted to and its optimum.
+    declared
+        (n, c) prediction of the declared machine.
+    listed
+        (n,) rows that stand alone: no measure of a prediction.
+    """
+    e, sigma = given.predictor.experiment, given.sigma
+    label, by = folds(e, seed)
+    number = int(label.max()) + 1
+    last = list(models)[-1] if models else DECLARED
+    if number < 2 or over():
+        return _made(last, models, given, declared, None)
+    left = {name: np.full_like(e.reading, np.nan) for name in (DECLARED, *models)}
+    for k in range(number):
+        test = label == k
+        seen, own = ~test & ~listed, test & ~listed
+        left[DECLARED][own] = left_unseen(e, sigma, declared, seen, own)[own]
+        for name, (readings, whole) in models.items():
+            part = corrected(readings.only(~test), (), whole, STEPS_OF_A_FOLD)
+            left[name][own] = left_unseen(e, sigma, part.prediction, seen, own)[own]
+    sums = {name: summary(r, sigma, e.channels) for name, r in left.items()}
+    best = min(sums, key=lambda name: sums[name].ratio if np.isfinite(sums[name].ratio) else np.inf)
+    held = HeldOut(sums[DECLARED], sums[best], left[best], number, by)
+    return _made(best, models, given, declared, held)
+
+
+def _made(
+    which: str,
+    models: dict[str, tuple[Readings, Corrected]],
+    given: Readings,
+    declared: Floats,
+    held: HeldOut | None,
+) -> Written:
+    if which == DECLARED:
+        return Written(which, given.predictor.machine, declared, held)
+    readings, found = models[which]
+    return Written(which, machine_of(readings, found), found.prediction, held, promised(readings, found))
+
+
+def promised(given: Readings, found: Corrected) -> tuple[float, float]:
+    """Standard deviation by which a reading of a pose that was not read differs from a machine file, m (rad where no length is
+    read), noise and what nobody can name in it; and the standard uncertainty of that.
+
+    With the columns B of numbers, effects and frames, their coefficients' posterior covariance P by the readings T of all other
+    poses, and W the inverse of the covariance C of the rest: the error at poses F is B_F (β - β̂) + ε_F, of variance
+    B P Bᵀ + C_FF - 2 B P B_TᵀW C_TF, since what nobody can name goes on from pose to pose and the file has none of it.
+    """
+    e = given.predictor.experiment
+    use = drawn(e.groups[given.rows], 0)
+    rows, channel = given.rows[use], given.channel[use]
+    length = metres(e.channels)[channel]
+    seen = length if length.any() else ~length
+    rest = given.rest[np.ix_(use, use)] + np.diag(given.noise[use])
+    columns, prior = found.columns[use], found.prior
+    pose = e.groups[rows]
+    number = len(np.unique(pose))
+    label = np.random.default_rng(0).permutation(int(pose.max()) + 1)[pose] % max(2, min(FOLDS, number))
+    total, count = 0.0, 0
+    for k in np.unique(label):
+        test = (label == k) & seen & (given.noise[use] <= 4.0 * np.min(given.noise))
+        train = label != k
+        if not test.any() or not train.any():
+            continue
+        root = cholesky(rest[np.ix_(train, train)], lower=True, check_finite=False)
+        white = solve_triangular(root, columns[train], lower=True, check_finite=False)
+        posterior = np.linalg.pinv(white.T @ white + np.diag(prior), rcond=1e-13, hermitian=True)
+        cross = solve_triangular(root, rest[np.ix_(train, test)], lower=True, check_finite=False)
+        b = columns[test]
+        variance = np.sum((b @ posterior) * b, axis=1) + np.diag(rest)[test]
+        variance = variance - 2.0 * np.sum((b @ posterior) * (cross.T @ white), axis=1)
+        total += float(np.sum(variance * given.sigma[rows[test], channel[test]] ** 2))
+        count += int(test.sum())
+    size = float(np.sqrt(max(total, 0.0) / count)) if count else float("nan")
+    return size, size / float(np.sqrt(2.0 * number))

@@ -1,0 +1,46 @@
+"""How a residual is shared out: posterior means of noise, declared numbers, effects, gaps, poses and time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.identification.inference.amplitudes import ALL_NUMBERS, NOISE, OFF, Fit
+from stiffmap.identification.inference.columns import Columns
+
+
+def shares(columns: Columns, fit: Fit) -> dict[str, float]:
+    """Share of each part: |E[part | r]|² over the sum of all of them, r the readings' difference from the declared machine."""
+    means = {p.name: fit.mean(p) for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF}
+    means[NOISE] = fit.columns.residual - sum(means.values(), np.zeros(len(columns)))
+    squares = {name: float(m @ m) for name, m in means.items()}
+    whole = max(sum(squares.values()), 1e-300)
+    return {name: s / whole for name, s in squares.items()}
+
+
+def of_numbers(columns: Columns, fit: Fit) -> list[tuple[float, float, float]]:
+    """Per declared number its posterior mean and standard deviation, in standard uncertainties, and the squares of what it
+    shows over those of all readings."""
+    whole = max(float(np.sum(fit.columns.residual**2)), 1e-300)
+    out = [(0.0, 1.0, 0.0)] * len(columns.unknowns)
+    for name, index in columns.groups.items():
+        variance = fit.amplitude(ALL_NUMBERS) ** 2 or fit.amplitude(name) ** 2
+        d = columns.numbers[:, index]
+        information = np.sum(fit.white(d) ** 2, axis=0)
+        mean = variance * (d.T @ fit.solved)
+        sd = np.sqrt(np.maximum(variance * (1.0 - variance * information), 0.0))
+        share = mean**2 * np.sum(d**2, axis=0) / whole
+        for k, m, s, part in zip(index, mean, sd, share, strict=True):
+            out[int(k)] = (float(m), float(s), float(part))
+    return out
+
+
+def gap_of(columns: Columns, fit: Fit, e: Experiment) -> Floats:
+    """(n, c) m, rad: what nobody can name, at the readings that were compared; NaN elsewhere."""
+    out = np.full(e.reading.shape, np.nan)
+    whole = np.zeros(len(columns))
+    for p, t in zip(fit.parts, fit.t[1:], strict=True):
+        if p.kind in ("field", "pose") and t > OFF:
+            whole = whole + fit.mean(p)
+    out[columns.rows, columns.channel] = columns.sigma * (columns.free @ whole)
+    return out
