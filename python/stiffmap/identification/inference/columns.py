@@ -216,7 +216,7 @@ def _places(plan: Plan, free: Floats, noise: Floats, use: Integers) -> tuple[Pla
 def _directions(white: Floats, v: Variant) -> Shape | None:
     """(m, p) orthonormal directions of the columns (m, q) that a plausible size makes visible; None without any."""
     length = np.linalg.norm(white, axis=0)
-    most = np.array([_reach(v, k) for k in range(white.shape[1])])
+    most = np.minimum([_reach(v, k) for k in range(white.shape[1])], 1.0 / NULL)
     seen = length * most > VISIBLE
     if not seen.any():
         return None

@@ -92,8 +92,8 @@ class Search:
     """ln odds of each named effect against none, all places together, in the order of `best.chosen`."""
     equivalents: tuple[tuple[tuple[Place, float], ...], ...]
     """Per named effect, the places that would do in its stead, with their evidence less that of the best."""
-    without: tuple[float, ...] = ()
-    """Per named effect, evidence of the best model of another world in which it is not."""
+    instead: tuple[Model | None, ...] = ()
+    """Per named effect, the best model of another world in which it is not."""
 
 
 def searched(columns: Columns, predict: Predict | None = None) -> Search:
@@ -104,15 +104,16 @@ def searched(columns: Columns, predict: Predict | None = None) -> Search:
     found = {w.name: w.search() for w in searches}
     best = max(found.values(), key=lambda s: s.best.score)
     others = [w for w in searches if w.name != best.best.world]
-    return replace(best, without=tuple(_without(c, best, others, found) for c in best.best.chosen))
+    return replace(best, instead=tuple(_without(c, best, others, found) for c in best.best.chosen))
 
 
-def _without(c: Chosen, best: Search, others: Sequence[_World], found: Mapping[str, Search]) -> float:
-    """Evidence of the best model of another world in which an effect, and what would do in its stead, is not."""
+def _without(c: Chosen, best: Search, others: Sequence[_World], found: Mapping[str, Search]) -> Model | None:
+    """The best model of another world in which an effect, and what would do in its stead, is not."""
     k = best.best.chosen.index(c)
     same = {id(c.place), *(id(p) for p, _ in best.equivalents[k])}
     models = [m for w in others for m in (w.less(best.best, c), found[w.name].null, found[w.name].best)]
-    return max((m.score for m in models if not same & {id(o.place) for o in m.chosen}), default=-np.inf)
+    allowed = (m for m in models if not same & {id(o.place) for o in m.chosen})
+    return max(allowed, key=lambda m: m.score, default=None)
 
 
 class _World:
