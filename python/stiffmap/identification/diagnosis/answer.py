@@ -31,9 +31,9 @@ from stiffmap.identification.inference.constants import RARE, STANDS_OUT
 from stiffmap.identification.inference.corrected import Corrected, Readings, Term, corrected, readings
 from stiffmap.identification.inference.inference import Inferred, terms
 from stiffmap.identification.inference.machines import CORRECTED, DECLARED, Written, written
-from stiffmap.identification.inference.names import instead
+from stiffmap.identification.inference.names import put_instead
 from stiffmap.identification.inference.shares import gap_of, of_numbers, shares
-from stiffmap.identification.inference.verdict import Verdict, judged
+from stiffmap.identification.inference.verdict import Named, Verdict, judged
 from stiffmap.solve.machine import Machine
 
 RIVALS = 3
@@ -83,6 +83,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         limitations=[
             *_first(fit, v),
             *notes,
+            *(_or_number(n) for n in v.named if n.numbers),
             *limitations(e, found.noise, predictor.machine),
             *_over_time(Problem.of(e, sigma, made.prediction, ~listed), made.prediction),
         ],
@@ -170,7 +171,7 @@ def _alternatives(
             if clock.over:
                 clock.leave_out("other places of the effects, fitted")
                 return out
-            other = instead(found.columns, found.search.best.fit, n.chosen, place)
+            other = put_instead(found.columns, found.search.best.fit, n.chosen, place)
             start = Term.of(place.candidate, terms([other])[0])
             kept = [start if i == k else t for i, t in enumerate(best.terms)]
             try:
@@ -269,6 +270,11 @@ def _first(fit: Fit, v: Verdict) -> list[str]:
     if v.time:
         out.append(f"the noise goes on from reading to reading ({v.time})")
     return out
+
+
+def _or_number(n: Named) -> str:
+    names = " or ".join(b.unknown.name for b in n.numbers[:RIVALS])
+    return f"instead of {n.chosen.place.candidate} these declared numbers may be out of tolerance: {names}"
 
 
 def _over_time(problem: Problem, prediction: Floats) -> list[str]:

@@ -236,8 +236,8 @@ def _places(
 def _directions(white: Floats, v: Variant) -> Shape | None:
     """(m, p) orthonormal directions of the columns (m, q) that a plausible size makes visible; None without any."""
     length = np.linalg.norm(white, axis=0)
-    most = np.array([_reach(v, k) for k in range(white.shape[1])])
-    seen = (length > 0.0) & (length * np.where(length > 0.0, most, 1.0) > VISIBLE)
+    most = np.minimum([_reach(v, k) for k in range(white.shape[1])], 1.0 / NULL)
+    seen = length * most > VISIBLE
     if not seen.any():
         return None
     u, s, _ = np.linalg.svd(white[:, seen] / length[seen], full_matrices=False)

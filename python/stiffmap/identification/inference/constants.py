@@ -31,6 +31,6 @@ REFITS = 2
 EQUAL_SHARE = 0.5
 """Scatter of an effect's strength from block to block, relative, beyond which it has no name."""
 TOLERANCES = 2.0
-"""Standard uncertainties, with two standard deviations, beyond which a declared number is out of tolerance."""
+"""Standard uncertainties beyond which a declared number is out of tolerance."""
 LARGEST_ERROR = {"m": 0.01, "rad": 0.05}
 """Of a length or an angle: what is off by more was seen when the machine was built."""

@@ -40,12 +40,7 @@ def gaps(
                 yield "field", f"field of {what} over {over}, {length:g}", k
                 if deflects:
                     yield "field", f"compliance of {what} over {over}, {length:g}", k * carried
-    pose = e.groups[rows][:, None] == e.groups[rows]
-    if pose.sum() > len(rows):
-        yield "pose", "pose", (same & pose).astype(float)
-    condition = same & (e.conditions[rows][:, None] == e.conditions[rows])
-    if condition.sum() > len(rows):  # else it is the noise itself
-        yield "pose", "condition", condition.astype(float)
+    yield from shared(e, rows, channel)
     when = e.hours if e.hours is not None else e.order
     if when is not None:
         t, session = _sessions(when, e.runs)
@@ -53,6 +48,17 @@ def gaps(
         together = same & (session[rows][:, None] == session[rows])
         for length in SESSIONS:
             yield "time", f"wander over {length:g} session", together * np.exp(-apart / length)
+
+
+def shared(e: Experiment, rows: Integers, channel: Integers) -> Iterator[tuple[str, str, Floats]]:
+    """What readings of one condition and of one pose share; nothing where that is the noise, or the one before, itself."""
+    same = channel[:, None] == channel
+    pairs = len(rows)
+    for name, of in (("condition", e.conditions[rows]), ("pose", e.groups[rows])):
+        own = same & (of[:, None] == of)
+        if own.sum() > pairs:
+            yield "pose", name, own.astype(float)
+            pairs = own.sum()
 
 
 def matern(distance: Floats) -> Floats:

@@ -92,8 +92,8 @@ class Search:
     """ln odds of each named effect against none, all places together, in the order of `best.chosen`."""
     equivalents: tuple[tuple[tuple[Place, float], ...], ...]
     """Per named effect, the places that would do in its stead, with their evidence less that of the best."""
-    without: tuple[float, ...] = ()
-    """Per named effect, evidence of the best model of another world in which it is not."""
+    instead: tuple[Model | None, ...] = ()
+    """Per named effect, the best model of another world in which it is not."""
     calibrated: Fit | None = None
     """The best fit without effects in a world where declared numbers are off; None where there are none."""
 
@@ -113,12 +113,12 @@ def searched(
     off = [s.null.fit for name, s in found.items() if name != EXACT]
     return replace(
         best,
-        without=tuple(_without(c, best, others, found) for c in best.best.chosen),
+        instead=tuple(_without(c, best, others, found) for c in best.best.chosen),
         calibrated=max(off, key=lambda f: f.score, default=None),
     )
 
 
-def instead(columns: Columns, fit: Fit, c: Chosen, place: Place) -> Chosen:
+def put_instead(columns: Columns, fit: Fit, c: Chosen, place: Place) -> Chosen:
     """Another place in the stead of an effect of a fit, nothing else fitted anew."""
     anchor = fit.without([c.part.name])
     k = int(np.argmax(evidence(anchor, (place,))[0]))
@@ -129,12 +129,13 @@ def instead(columns: Columns, fit: Fit, c: Chosen, place: Place) -> Chosen:
     return replace(bare, values=_values(found, bare))
 
 
-def _without(c: Chosen, best: Search, others: Sequence[_World], found: Mapping[str, Search]) -> float:
-    """Evidence of the best model of another world in which an effect, and what would do in its stead, is not."""
+def _without(c: Chosen, best: Search, others: Sequence[_World], found: Mapping[str, Search]) -> Model | None:
+    """The best model of another world in which an effect, and what would do in its stead, is not."""
     k = best.best.chosen.index(c)
     same = {id(c.place), *(id(p) for p, _ in best.equivalents[k])}
     models = [m for w in others for m in (w.less(best.best, c), found[w.name].null, found[w.name].best)]
-    return max((m.score for m in models if not same & {id(o.place) for o in m.chosen}), default=-np.inf)
+    allowed = (m for m in models if not same & {id(o.place) for o in m.chosen})
+    return max(allowed, key=lambda m: m.score, default=None)
 
 
 class _World:

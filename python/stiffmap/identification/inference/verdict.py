@@ -13,12 +13,14 @@ from stiffmap.identification.calibration.unknowns import Unknown
 from stiffmap.identification.inference.amplitudes import OFF, Fit, noise_prior
 from stiffmap.identification.inference.columns import Columns, Place
 from stiffmap.identification.inference.constants import EQUAL_SHARE, ODDS, RARE, TOLERANCES
-from stiffmap.identification.inference.names import EXACT, Chosen, Search
+from stiffmap.identification.inference.names import EXACT, Chosen, Model, Search
 from stiffmap.identification.inference.shares import of_numbers
 
 DETERMINED = 0.5
 """Posterior standard deviation, in standard uncertainties, of a number that the readings determine."""
 TOLERABLE = "declared numbers within their tolerances show the same"
+GAPS = ("field", "pose")
+"""Kinds of parts that nobody can name."""
 KAPPA_SDS = 4.0
 """Prior standard deviations of ln κ beyond which the noise is no noise."""
 
@@ -32,6 +34,10 @@ class Named:
     log_odds: float
     scatter: float
     """Of its strength from block to block, relative; 0: the same everywhere."""
+    share: float
+    """rms of what it adds to the readings, in noise."""
+    numbers: tuple[Beyond, ...] = ()
+    """Declared numbers that would do in its stead, but out of tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +47,8 @@ class Beyond:
     unknown: Unknown
     value: float
     sd: float
+    share: float
+    """rms of what it adds to the readings, in noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +61,7 @@ class Verdict:
     refused: tuple[tuple[Chosen, str], ...]
     """Effects of the model without a name, and why."""
     beyond: tuple[Beyond, ...]
+    """As the names, the largest share of the readings first."""
     rest: str
     """What is left that nobody can name; empty: nothing."""
     time: str
@@ -63,33 +72,34 @@ def judged(columns: Columns, search: Search) -> Verdict:
     """Names that stand, numbers out of tolerance, and the rest."""
     model = search.best
     named, refused = [], []
-    each = zip(model.chosen, search.gain, search.equivalents, search.without, strict=True)
-    for c, odds, near, without in each:
+    beyond = tuple(_out_of_tolerance(columns, model))
+    each = zip(model.chosen, search.gain, search.equivalents, search.instead, strict=True)
+    for c, odds, near, other in each:
         scatter, why = refusal(columns, model.fit, c)
-        if model.score - without < np.log(ODDS):
-            why = TOLERABLE
+        numbers: tuple[Beyond, ...] = ()
+        if other and model.score - other.score < np.log(ODDS):
+            known = [b.unknown.name for b in beyond]
+            numbers = tuple(b for b in _out_of_tolerance(columns, other) if b.unknown.name not in known)
+            why = why if numbers else TOLERABLE
         if why:
             refused.append((c, why))
         else:
-            named.append(Named(c, tuple(p for p, _ in near), odds, scatter))
-    beyond = tuple(out_of_tolerance(columns, model.fit)) if model.world != EXACT else ()
+            share = float(np.linalg.norm(model.fit.mean(c.part)) / np.sqrt(len(columns)))
+            named.append(Named(c, tuple(p for p, _ in near), odds, scatter, share, numbers))
     rest, time = left(model.fit)
     unexplained = [why for _, why in refused if why != TOLERABLE]
     rest = rest or (unexplained[0] if unexplained else "")
     if named:
-        word = "ambiguous" if any(n.equivalents for n in named) else "effects"
+        word = "ambiguous" if any(n.equivalents or n.numbers for n in named) else "effects"
     else:
         word = "unattributed" if rest else "effects" if beyond else "none"
+    named.sort(key=lambda n: -n.share)
     return Verdict(word, tuple(named), tuple(refused), beyond, rest, time)
 
 
 def refusal(columns: Columns, fit: Fit, c: Chosen) -> tuple[float, str]:
     """Scatter of an effect's strength over the experiment, and why it has no name; empty where it may have one."""
-    size = fit.amplitude(c.part.name)
-    gaps = np.sqrt(
-        sum(np.exp(t) for p, t in zip(fit.parts, fit.t[1:], strict=True) if p.kind in ("field", "pose"))
-    )
-    if size < gaps:
+    if fit.amplitude(c.part.name) < by_chance(columns, fit, c):
         return 0.0, "smaller than what nobody can name"
     rest = fit.without([c.part.name])
     if without_a_pose(columns, rest, c) < np.log(ODDS):
@@ -106,17 +116,32 @@ def refusal(columns: Columns, fit: Fit, c: Chosen) -> tuple[float, str]:
     return scatter, f"its strength differs along {worst}" if worst else ""
 
 
+def by_chance(columns: Columns, fit: Fit, c: Chosen) -> float:
+    """rms, in noise, of the largest effect that the gaps would show by chance: as large as all of them together where they
+    are as smooth as its pattern, less where they spread over many directions (a short wave in a rough field).
+
+    Of S patterns the largest squared coefficient, in variances of the gaps along the pattern, is less than 2 ln(S odds).
+    """
+    parts = [(p, np.exp(t)) for p, t in zip(fit.parts, fit.t[1:], strict=True) if p.kind in GAPS]
+    pattern = fit.mean(c.part)
+    along = sum(v * float(pattern @ p.matrix @ pattern) for p, v in parts) / float(pattern @ pattern)
+    shapes = sum(len(p.shapes) for p in columns.places)
+    largest = 2.0 * np.log(ODDS * max(1, shapes)) * along / len(pattern)
+    return float(np.sqrt(min(sum(v for _, v in parts), largest)))
+
+
 def without_a_pose(columns: Columns, rest: Fit, c: Chosen) -> float:
-    """Gain of ln likelihood by an effect of one strength, at its least over all poses left out in turn."""
+    """Gain of ln likelihood by an effect of one strength, at its least over all poses left out in turn; infinite where all
+    readings are of one."""
     raw = c.lines(columns) @ c.values / columns.sigma
     pattern, r = rest.white(columns.free.T @ raw), rest.white(rest.columns.residual)
     pose = columns.experiment.groups[columns.rows]
-    out = []
-    for k in np.unique(pose):
+    out: list[float] = []
+    for k in np.unique(pose) if np.ptp(pose) > 0 else ():
         gone = np.linalg.qr(rest.white(columns.free[pose == k].T))[0]
         a, b = pattern - gone @ (gone.T @ pattern), r - gone @ (gone.T @ r)
         out.append(0.5 * float(a @ b) ** 2 / max(float(a @ a), 1e-12))
-    return min(out)
+    return min(out, default=np.inf)
 
 
 def evenness(columns: Columns, rest: Fit, c: Chosen, block: Integers) -> tuple[float, float]:
@@ -148,6 +173,8 @@ def partitions(e: Experiment, rows: Integers) -> Iterator[tuple[str, Integers]]:
     """Name and (N,) block of each reading, of every way to cut the experiment into parts."""
     over: list[tuple[str, Floats | None]] = [(f"{a}", e.position[:, k]) for k, a in enumerate("xyz")]
     over += [(f"the load's {a}", e.wrench[:, k]) for k, a in enumerate(("fx", "fy", "fz", "mx", "my", "mz"))]
+    if e.command is not None:
+        over += [(f"drive {c.joint or c.name}", e.command[:, k]) for k, c in enumerate(e.command_of)]
     over += [
         ("the size of the load", np.linalg.norm(e.wrench[:, :3], axis=1)),
         ("time", e.order),
@@ -166,24 +193,25 @@ def thirds(value: Floats) -> Integers:
     return np.asarray((value > low).astype(np.intp) + (value > high))
 
 
+def _out_of_tolerance(columns: Columns, model: Model) -> Iterator[Beyond]:
+    return out_of_tolerance(columns, model.fit) if model.world != EXACT else iter(())
+
+
 def out_of_tolerance(columns: Columns, fit: Fit) -> Iterator[Beyond]:
-    """Declared numbers whose posterior lies beyond tolerance, and beyond what the largest of so many is by chance."""
-    said = zip(columns.unknowns, of_numbers(columns, fit), strict=True)
-    found = [Beyond(u, value, sd) for u, (value, sd, _) in said]
+    """Declared numbers beyond tolerance, and beyond what the largest of so many, and its error, are by chance."""
+    size = np.linalg.norm(columns.numbers, axis=0) / np.sqrt(len(columns))
+    said = zip(columns.unknowns, of_numbers(columns, fit), size, strict=True)
+    found = [Beyond(u, value, sd, float(abs(value) * s)) for u, (value, sd, _), s in said]
     determined = sum(b.sd < DETERMINED for b in found)
-    largest = float(norm.isf(1.0 / (2.0 * ODDS * max(1, determined))))
-    for b in sorted(found, key=lambda b: -abs(b.value)):
-        if abs(b.value) - 2.0 * b.sd > TOLERANCES and abs(b.value) > largest:
+    largest, doubt = (float(norm.isf(1.0 / (2.0 * ODDS * max(1, n)))) for n in (determined, len(found)))
+    for b in sorted(found, key=lambda b: -b.share):
+        if abs(b.value) - doubt * b.sd > TOLERANCES and abs(b.value) > largest:
             yield b
 
 
 def left(fit: Fit) -> tuple[str, str]:
     """What is left unexplained by names and numbers, and the correlation of the noise in time; empty where there is none."""
-    gaps = [
-        (p, t)
-        for p, t in zip(fit.parts, fit.t[1:], strict=True)
-        if p.kind in ("field", "pose") and t > OFF + 1.0
-    ]
+    gaps = [(p, t) for p, t in zip(fit.parts, fit.t[1:], strict=True) if p.kind in GAPS and t > OFF + 1.0]
     rest = ""
     if gaps and _significant(fit, [p.name for p, _ in gaps]):
         rest = max(gaps, key=lambda g: g[1])[0].name

@@ -15,10 +15,11 @@ import stiffmap as sm
 from stiffmap.experiment import load_experiment, random_plan, simulate
 from stiffmap.identification.calibration.unknowns import Unknown
 from stiffmap.identification.candidates.candidates import Candidate
+from stiffmap.identification.inference.amplitudes import Parts, fitted
 from stiffmap.identification.inference.columns import Place, Shape
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.inference import inferred, terms
-from stiffmap.identification.inference.names import searched
+from stiffmap.identification.inference.names import Model, searched
 from stiffmap.identification.inference.verdict import TOLERABLE, judged
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
@@ -143,6 +144,7 @@ def one_place(n: int) -> Any:
     return SimpleNamespace(
         position=np.zeros((n, 3)),
         wrench=np.zeros((n, 6)),
+        command=None,
         order=None,
         hours=None,
         runs=np.zeros(n, int),
@@ -155,6 +157,22 @@ def test_a_name_needs_odds_against_the_best_model_of_another_world_without_it():
     c = replace(c, experiment=one_place(len(c.rows)))
     s = searched(c)
     for odds, named in ((2.0 * ODDS, 1), (0.5 * ODDS, 0), (1.0, 0)):
-        v = judged(c, replace(s, without=(s.best.score - np.log(odds),)))
+        v = judged(c, replace(s, instead=(replace(s.null, score=s.best.score - np.log(odds)),)))
         assert len(v.named) == named
         assert [why for _, why in v.refused] == [TOLERABLE] * (1 - named)
+
+
+def test_declared_numbers_out_of_tolerance_in_the_stead_of_a_name_do_not_take_it_away():
+    c = setting(1, (0.0, 30.0, 0.0))
+    d = 10.0 * c.places[1].shapes[0].directions[:, :1]
+    unknown = Unknown("zero of a drive", "zeros", "m", 1e-4)
+    s = searched(c)
+    c = replace(c, experiment=one_place(len(c.rows)), numbers=d, unknowns=(unknown,))
+    part = Parts(c).together
+    none = fitted(c, part)
+    for other, named in ((none, 1), (none.without([part[0].name]), 0)):
+        instead = Model("together", (), other, s.best.score)
+        v = judged(c, replace(s, instead=(instead,) * len(s.best.chosen)))
+        assert len(v.named) == named
+        assert [b.unknown.name for n in v.named for b in n.numbers] == ["zero of a drive"] * named
+        assert v.word == ("ambiguous" if named else "none")

@@ -11,6 +11,7 @@ import pytest
 from scipy.stats import chi2
 from tests.python.identification.inference.synthetic import READINGS, columns
 
+from stiffmap.experiment.channels import Channel
 from stiffmap.identification.calibration.unknowns import Unknown
 from stiffmap.identification.inference import amplitudes, verdict
 from stiffmap.identification.inference.amplitudes import Part
@@ -77,6 +78,16 @@ def test_thirds_keep_equal_values_together():
     assert np.ptp(np.bincount(verdict.thirds(np.arange(9.0)))) <= 2
 
 
+def test_a_strength_is_compared_along_the_travel_of_each_drive_that_is_commanded():
+    n = 9
+    e: Any = SimpleNamespace(
+        position=np.zeros((n, 3)), wrench=np.zeros((n, 6)), order=None, hours=None, runs=np.zeros(n, int)
+    )
+    e.command, e.command_of = np.arange(n)[:, None] * [1.0, 0.0], (Channel("q1", "rad"), Channel("q2", "rad"))
+    ((name, block),) = verdict.partitions(e, np.arange(n))
+    assert name == "drive q1" and list(np.unique(block)) == [0, 1, 2] and np.all(np.diff(block) >= 0)
+
+
 def numbers(values: tuple[float, ...], seed: int = 0) -> Any:
     """Columns of numbers of one group, each determined to a tenth of its uncertainty, off by `values`."""
     rng = np.random.default_rng(seed)
@@ -108,3 +119,39 @@ def test_noise_far_beyond_its_declaration_is_a_rest():
     assert verdict.left(amplitudes.fitted(c, ()))[0] == "noise larger than declared"
     c = replace(c, residual=c.residual / 6.0)
     assert verdict.left(amplitudes.fitted(c, ())) == ("", "")
+
+
+@pytest.mark.parametrize(("width", "wave"), [(0.5, 1.0), (0.05, 1.0), (0.05, 60.0)])
+def test_gaps_take_a_name_only_as_far_as_they_would_show_its_pattern_by_chance(width, wave):
+    """Ten patterns, a gap of rms 4: along a wave its share is that of the spectrum of a Gaussian kernel."""
+    c, _, chosen = flat(0, np.full(READINGS, 3.0))
+    m = 400
+    x = np.linspace(-1.0, 1.0, m)
+    gap = Part("gap", "field", full=np.exp(-0.5 * ((x[:, None] - x) / width) ** 2))
+    pattern = np.cos(wave * x)
+    some = (chosen.place,) * 10
+    c = replace(c, free=np.eye(m), residual=2.0 * pattern, zero=np.zeros((m, m)), places=some)
+    part = replace(chosen.part, factor=pattern[:, None])
+    fit = amplitudes.evaluated(c, [gap, part], 2.0 * np.log([1.0, 4.0, 2.0]), np.ones(m))
+    share = width * np.sqrt(np.pi / 2.0) * np.exp(-0.5 * (wave * width) ** 2)
+    expected = 4.0 * np.sqrt(min(1.0, 2.0 * np.log(200.0) * share))
+    assert verdict.by_chance(c, fit, replace(chosen, part=part)) == pytest.approx(expected, rel=0.1)
+
+
+def test_the_largest_share_of_the_readings_comes_first():
+    c = numbers((-9.0, 7.0))
+    c = replace(c, numbers=c.numbers * [1.0, 10.0], residual=c.numbers @ [-9.0, 70.0])
+    found = list(verdict.out_of_tolerance(c, amplitudes.fitted(c, amplitudes.Parts(c).numbers)))
+    assert [b.unknown.name for b in found] == ["number 1", "number 0"]
+    assert found[0].share == pytest.approx(700.0 / np.sqrt(len(c)), rel=0.02)
+
+
+@pytest.mark.parametrize(("many", "beyond"), [(1, 1), (25, 0)])
+def test_one_of_many_weakly_determined_numbers_is_not_out_of_tolerance(many, beyond):
+    """5 ± 1.2: beyond 2 by 2.5 sd, more than the error of one number, less than the largest error of 25."""
+    c = numbers((0.0,) * many)
+    d = c.numbers / 12.0
+    c = replace(c, numbers=d, residual=5.0 * d[:, 0])
+    t = np.array([0.0, 2 * np.log(50.0)])
+    fit = amplitudes.evaluated(c, amplitudes.Parts(c).numbers, t, np.ones(READINGS))
+    assert len(list(verdict.out_of_tolerance(c, fit))) == beyond
