@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.candidates import clash
@@ -41,6 +42,8 @@ CORRECTIONS = 3
 """Gauss-Newton corrections of the residual by whole predictions with the effects of a model."""
 SINGLES = 24
 """Best single places of which pairs are tried; effort only."""
+AT_MOST, FAR = 25, 1e6
+"""Steps to the optimum of effects that bend; the misfit of a machine that fails."""
 Predict = Callable[[Sequence["Chosen"]], Floats]
 """(m,) what effects of given strengths add to the readings, by the machine itself; NaN where it fails."""
 
@@ -106,7 +109,8 @@ def searched(
     worlds: dict[str, tuple[Part, ...]] = {EXACT: ()}
     if columns.unknowns and not over():
         worlds |= {"together": parts.together, "groups": parts.numbers}
-    searches = [_World(columns, parts, name, numbers, predict, over) for name, numbers in worlds.items()]
+    optima: dict[tuple[tuple[int, int], ...], Floats] = {}
+    searches = [_World(columns, parts, name, own, predict, over, optima) for name, own in worlds.items()]
     found = {w.name: w.search() for w in searches}
     best = max(found.values(), key=lambda s: s.best.score)
     others = [w for w in searches if w.name != best.best.world]
@@ -149,9 +153,10 @@ class _World:
         numbers: tuple[Part, ...],
         predict: Predict | None,
         over: Callable[[], bool],
+        optima: dict[tuple[tuple[int, int], ...], Floats],
     ) -> None:
         self.columns, self.name, self.numbers, self.predict = columns, name, numbers, predict
-        self.over = over
+        self.over, self.optima = over, optima
         self.gaps = parts.gaps
 
     def search(self) -> Search:
@@ -175,10 +180,10 @@ class _World:
 
     def _trials(self, model: Model) -> tuple[Model, Floats] | None:
         """The model with the best further effect, and the gain of each place."""
-        bounds = self._bounds(model)
-        if not bounds:
+        found = self._bounds(model) if np.isfinite(model.score) else []
+        if not found:
             return None
-        order = sorted(bounds, key=lambda b: -b[0])
+        order = sorted(found, key=lambda b: -b[0])
         refits = [self._with(model, [place], anchor) for _, place, anchor in order[:REFITS]]
         scores = {id(p): s for s, p, _ in order}
         for m in refits:
@@ -227,8 +232,9 @@ class _World:
         columns = self.columns
         parts = (*self.numbers, *self.gaps, *(c.part for c in chosen))
         fit = fitted(columns, parts, start)
-        fit = self._corrected(fit, chosen) if self.predict and chosen else fit
-        chosen = tuple(replace(c, values=_values(fit, c)) for c in chosen)
+        if self.predict and chosen:
+            fit, chosen = self._corrected(fit, chosen)
+        chosen = tuple(c if len(c.values) else replace(c, values=_values(fit, c)) for c in chosen)
         shapes = 0.0
         for c in chosen:
             if len(c.place.shapes) > 1:
@@ -237,27 +243,67 @@ class _World:
         possible = all(map(is_possible, chosen))
         return Model(self.name, chosen, fit, fit.score + shapes if possible else -np.inf)
 
-    def _corrected(self, fit: Fit, chosen: tuple[Chosen, ...]) -> Fit:
-        """The fit on a residual less what straight lines miss of the effects; the one given where that does not settle."""
+    def _corrected(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Fit, tuple[Chosen, ...]]:
+        """The fit on a residual less what straight lines miss of the effects; where that does not settle, at their own optimum,
+        with their values there."""
         assert self.predict
         now, shown = fit, None
-        for _ in range(CORRECTIONS):
+        for _ in range(CORRECTIONS + 1):
             at = tuple(replace(c, values=_values(now, c)) for c in chosen)
-            line = np.sum([_columns(self.columns, c) @ c.values for c in at], axis=0)
+            line = self._line(at)
             if shown is not None and _near(line, shown):
-                return now
+                return now, chosen
             missed = self.predict(at) - line
             if not np.isfinite(missed).all():
-                return fit
+                break
             if shown is None and float(np.linalg.norm(missed)) < SETTLED:
-                return fit
+                return fit, chosen
             shown = line
-            now = fitted(
-                replace(self.columns, residual=self.columns.residual - missed), now.parts, amplitudes(now)
+            now = self._without(missed, now)
+        at = self._optimum(fit, chosen)
+        missed = self.predict(at) - self._line(at)
+        if not all(len(c.strengths) for c in at) or not np.isfinite(missed).all():
+            return fit, chosen
+        line = np.hstack([_columns(self.columns, c) for c in at])
+        missed = self.predict(at)
+        missed = missed - line @ np.linalg.lstsq(line, missed, rcond=1e-9)[0]
+        return self._without(missed, fit), at
+
+    def _line(self, chosen: Sequence[Chosen]) -> Floats:
+        return np.asarray(np.sum([_columns(self.columns, c) @ c.values for c in chosen], axis=0))
+
+    def _without(self, missed: Floats, fit: Fit) -> Fit:
+        residual = self.columns.residual - missed
+        return fitted(replace(self.columns, residual=residual), fit.parts, amplitudes(fit))
+
+    def _optimum(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Chosen, ...]:
+        """The effects at the least squares of whole predictions, all else of the fit as it is; found once for each set."""
+        assert self.predict
+        predict, key = self.predict, tuple((id(c.place), c.shape) for c in chosen)
+        if key not in self.optima:
+            rest = fit.without([c.part.name for c in chosen])
+            ends = np.cumsum([0, *(c.place.shapes[c.shape].variant.array().shape[0] for c in chosen)])
+
+            def at(x: Floats) -> tuple[Chosen, ...]:
+                each = zip(chosen, ends[:-1], ends[1:], strict=True)
+                return tuple(replace(c, values=x[a:b]) for c, a, b in each)
+
+            begin = np.concatenate([_values(fit, c) for c in chosen])
+            low, high = (np.concatenate([bounds(c)[k] for c in at(begin)]) for k in (0, 1))
+            inside = 1e-6 * np.minimum(np.nan_to_num(high - low, posinf=1.0), 1.0)
+            begin = np.clip(begin, low + inside, high - inside)
+
+            def residual(x: Floats) -> Floats:
+                left = rest.white(self.columns.residual - predict(at(x)))
+                return np.where(np.isfinite(left), left, FAR)
+
+            found = least_squares(
+                residual, begin, "2-point", (low, high), x_scale="jac", diff_step=1e-3, max_nfev=AT_MOST
             )
-        at = tuple(replace(c, values=_values(now, c)) for c in chosen)
-        line = np.sum([_columns(self.columns, c) @ c.values for c in at], axis=0)
-        return now if shown is not None and _near(line, shown) else fit
+            self.optima[key] = found.x
+        x = self.optima[key]
+        ends = np.cumsum([0, *(c.place.shapes[c.shape].variant.array().shape[0] for c in chosen)])
+        return tuple(replace(c, values=x[a:b]) for c, a, b in zip(chosen, ends[:-1], ends[1:], strict=True))
 
     def _exchanged(self, model: Model) -> Model:
         """Each effect in turn left out where that costs less than odds, or given up for a better one."""
@@ -322,6 +368,14 @@ def _near(one: Floats, other: Floats) -> bool:
 def is_possible(c: Chosen) -> bool:
     """Whether all strengths lie within what their parameters can be."""
     return all(low <= x <= high for p, x in c.strengths for low, high in [possible(p)])
+
+
+def bounds(c: Chosen) -> tuple[Floats, Floats]:
+    """(p,) least and largest strengths, in scales; infinite where they are no parameters."""
+    if not c.strengths:
+        return np.full(len(c.values), -np.inf), np.full(len(c.values), np.inf)
+    both = [(possible(p), float(p.null or 0.0), p.scale) for p, _ in c.strengths]
+    return np.array([(b[0] - n) / s for b, n, s in both]), np.array([(b[1] - n) / s for b, n, s in both])
 
 
 def amplitudes(fit: Fit) -> dict[str, float]:
