@@ -30,7 +30,7 @@ from stiffmap.identification.inference.columns import Columns, Place
 from stiffmap.identification.inference.constants import RARE, STANDS_OUT
 from stiffmap.identification.inference.corrected import Corrected, Readings, Term, corrected, readings
 from stiffmap.identification.inference.inference import Inferred, terms
-from stiffmap.identification.inference.machines import CORRECTED, DECLARED, Written, written
+from stiffmap.identification.inference.machines import CALIBRATED, CORRECTED, DECLARED, Written, written
 from stiffmap.identification.inference.names import put_instead
 from stiffmap.identification.inference.shares import gap_of, of_numbers, shares
 from stiffmap.identification.inference.verdict import Named, Verdict, judged
@@ -51,7 +51,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     clock.say("corrected machine")
     nameless = [predictor(terms([c])) - base for c, _ in v.refused]
     given = readings(predictor, found.uncertain, columns, fit, sigma, nameless)
-    models, notes = _models(predictor, found, v, given)
+    models, v, notes = _models(predictor, found, v, given)
     clock.say("readings that no fit saw")
     made = written(models, base, given, listed, seed, lambda: clock.over or not cross_validate)
     best = models.get(CORRECTED, (given, None))[1]
@@ -113,23 +113,30 @@ def stands_out(columns: Columns, fit: Fit) -> Mask:
 
 def _models(
     predictor: Predictor, found: Inferred, v: Verdict, given: Readings
-) -> tuple[dict[str, tuple[Readings, Corrected]], list[str]]:
-    """The machines that may be handed over besides the declared one, by name, the corrected one last."""
-    chosen = [n.chosen for n in v.named]
-    starts = [Term.of(c.place.candidate, t) for c, t in zip(chosen, terms(chosen), strict=True)]
-    plain = found.search.calibrated
+) -> tuple[dict[str, tuple[Readings, Corrected]], Verdict, list[str]]:
+    """The machines that may be handed over besides the declared one, by name, the corrected one last; the verdict without effects
+    that are nothing at the optimum; and what must be said."""
     out: dict[str, tuple[Readings, Corrected]] = {}
-    if starts and plain is not None:
+    plain = found.search.calibrated
+    if v.named and plain is not None:
         own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma)
         if len(own.spread):
-            out["calibrated"] = (own, corrected(own, ()))
-    if not starts and not len(given.spread):
-        return out, []
-    try:
-        out[CORRECTED] = (given, corrected(given, starts))
-    except StiffmapError as problem:
-        return out, [f"the effects have no corrected machine: {problem}"]
-    return out, []
+            out[CALIBRATED] = (own, corrected(own, ()))
+    while v.named or len(given.spread):
+        chosen = [n.chosen for n in v.named]
+        starts = [Term.of(c.place.candidate, t) for c, t in zip(chosen, terms(chosen), strict=True)]
+        try:
+            best = corrected(given, starts)
+        except StiffmapError as problem:
+            return out, v, [f"the effects have no corrected machine: {problem}"]
+        nothing = best.nothing
+        if nothing is None:
+            out[CORRECTED] = (given, best)
+            break
+        gone = v.named[nothing]
+        kept = tuple(n for n in v.named if n is not gone)
+        v = replace(v, named=kept, refused=(*v.refused, (gone.chosen, "its interval holds nothing at all")))
+    return out, v, []
 
 
 def _effects(

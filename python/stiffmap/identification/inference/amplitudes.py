@@ -37,6 +37,8 @@ STEPS, LARGEST_STEP, ENOUGH = 30, 2.0, 0.01
 """Newton steps, their length in ln variance, and the gain of evidence that ends them."""
 WEIGHINGS = 40
 """Of heavy tails, at most, each followed by a few Newton steps."""
+WEIGHED = 0.1
+"""Gain of evidence that ends the weighings."""
 OFF, SINKS = -14.0, -8.0
 """ln variance of a part that the readings do not ask for, and below which one on its way down is taken out."""
 BEGIN = -2.0
@@ -99,6 +101,12 @@ class Fit:
             0.0,
         )
 
+    def spread(self, group: str) -> float:
+        """Standard deviation of the numbers of a group, in standard uncertainties: its own, or that of all together."""
+        return self.amplitude(group) or (
+            0.0 if any(p.name == group for p in self.parts) else self.amplitude(ALL_NUMBERS)
+        )
+
     def mean(self, part: Part) -> Floats:
         """(m,) posterior mean of what a part of the model adds to the readings."""
         k = [p.name for p in self.parts].index(part.name)
@@ -127,7 +135,7 @@ class Parts:
     numbers: tuple[Part, ...] = field(init=False)
     """One for each group."""
     together: tuple[Part, ...] = field(init=False)
-    """One for all groups."""
+    """One for all groups, and one for each that a set-up has for itself."""
     gaps: tuple[Part, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -136,7 +144,9 @@ class Parts:
             Part(name, "number", full=c.numbers[:, index] @ c.numbers[:, index].T)
             for name, index in c.groups.items()
         )
-        self.together = (Part(ALL_NUMBERS, "number", full=c.numbers @ c.numbers.T),) if c.unknowns else ()
+        shared = c.numbers[:, [not u.setup for u in c.unknowns]]
+        alone = [p for p, i in zip(self.numbers, c.groups.values(), strict=True) if c.unknowns[i[0]].setup]
+        self.together = (Part(ALL_NUMBERS, "number", full=shared @ shared.T), *alone) if c.unknowns else ()
         self.gaps = tuple(Part(name, kind, full=k) for kind, name, k in c.gaps)
 
 
@@ -168,7 +178,7 @@ def fitted(
             np.array([2.0 * np.log(typical), *first[1:]]) if heavy is light else heavy.t
         )  # what sank may rise
         heavy = _optimum(columns, tuple(parts), begun, w, steps=STEPS if heavy is light else 3)
-        if abs(heavy.score - before) < ENOUGH:
+        if abs(heavy.score - before) < WEIGHED:
             break
     return heavy if heavy.score > light.score else light
 

@@ -16,6 +16,7 @@ from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.calibration.homing import zeros_anew
 from stiffmap.identification.calibration.model import sensitivity
 from stiffmap.identification.calibration.unknowns import Unknown
 from stiffmap.identification.candidates.candidates import Candidate
@@ -120,7 +121,7 @@ def columns(
     """
     e, base = predictor.experiment, plan.base
     all_rows, all_channels = readings_of(e, base)
-    use = drawn(e.groups[all_rows], seed)
+    use = drawn(e.groups[all_rows], seed, MOST_READINGS)
     rows, channel = all_rows[use], all_channels[use]
     index = (rows, channel)
     noise = sigma[index]
@@ -135,6 +136,7 @@ def columns(
     free = mean @ np.linalg.qr(q, mode="complete")[0][:, q.shape[1] :] if q.shape[1] else mean
     within = raw - mean @ (mean.T @ raw)
     s = sensitivity(predictor, unknowns)
+    s = zeros_anew(s, e) or s
     numbers = free.T @ (s.columns[index] / noise[:, None])
     seen = np.linalg.norm(numbers, axis=0) > NULL
     found = tuple(
@@ -157,7 +159,7 @@ def columns(
     )
 
 
-def drawn(pose: Integers, seed: int, most: int = MOST_READINGS) -> Integers:
+def drawn(pose: Integers, seed: int, most: int) -> Integers:
     """Numbers of the readings in use: all of them, or those of poses drawn at random."""
     if len(pose) <= most:
         return np.arange(len(pose))

@@ -28,7 +28,7 @@ MOST_EFFECTS = 4
 """Effects that are named."""
 REFITS = 2
 """Candidates that are fitted anew in a step; effort only."""
-EQUAL_SHARE = 0.5
+EQUAL_SHARE = 1.0
 """Scatter of an effect's strength from block to block, relative, beyond which it has no name."""
 TOLERANCES = 2.0
 """Standard uncertainties beyond which a declared number is out of tolerance."""

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import least_squares
+from scipy.stats import norm
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats, Integers, Mask
@@ -23,11 +24,12 @@ from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.calibration.certificate import INSTRUMENT
+from stiffmap.identification.calibration.homing import zeros_anew
 from stiffmap.identification.calibration.model import Sensitivity, predicted, sensitivity, sensitivity_at
 from stiffmap.identification.calibration.slopes import moves_of
 from stiffmap.identification.calibration.unknowns import Unknown
 from stiffmap.identification.candidates.candidates import Candidate
-from stiffmap.identification.inference.amplitudes import ALL_NUMBERS, OFF, Fit
+from stiffmap.identification.inference.amplitudes import OFF, Fit
 from stiffmap.identification.inference.columns import Columns, drawn, possible, zeros
 from stiffmap.identification.inference.constants import DEGREES
 from stiffmap.identification.inference.kernels import gaps
@@ -37,6 +39,8 @@ from stiffmap.solve.machine import Machine
 
 MOST_FITTED = 3000
 """Readings that a machine is fitted to; of more, whole poses are drawn. Effort only: one (N, N) matrix is factorised."""
+WIDE = float(norm.isf(0.025))
+"""Standard deviations of a 95 % interval to either side."""
 STEP = 1e-3
 """Of a parameter's scale, for differences."""
 STEPS, STEPS_OF_A_FOLD = 30, 6
@@ -100,6 +104,22 @@ class Corrected:
     """(N, k + p + q) change of the readings, in noise, per unit of each effect's value, number and frame, at the optimum."""
     prior: Floats
     """(k + p + q,) prior precision of these."""
+
+    @property
+    def nothing(self) -> int | None:
+        """Number of the effect that is least in its standard deviations, if the 95 % intervals of all its strengths hold their null."""
+        sd = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
+        size, k = [], 0
+        for t in self.terms:
+            far = [
+                abs(v - p.null / p.scale) / s
+                for p, v, s in zip(t.candidate.parameters, t.values, sd[k:], strict=False)
+                if p.null is not None
+            ]
+            size.append(max(far, default=np.inf))
+            k += len(t.values)
+        least = int(np.argmin(size)) if size else 0
+        return least if size and size[least] < WIDE else None
 
     @property
     def effects(self) -> tuple[AppliedEffect, ...]:
@@ -184,10 +204,11 @@ def readings(
         rest += np.outer(pattern, pattern)
     weights = np.ones(len(rows))
     weights[used[inside]] = fit.weights[inside]
-    spread = {ALL_NUMBERS: fit.amplitude(ALL_NUMBERS)}
-    known = [(u, spread[ALL_NUMBERS] or fit.amplitude(_group(u.group, u.setup))) for u in columns.unknowns]
+    size = {k: fit.spread(group) for group, index in columns.groups.items() for k in index}
+    known = [(u, size[k]) for k, u in enumerate(columns.unknowns)]
     unknowns = tuple(u for u, s in known if s > 0.0)
     s = sensitivity(predictor, uncertain)
+    s = zeros_anew(s, e) or s
     index = [s.unknowns.index(u) for u in unknowns]
     s = replace(s, unknowns=unknowns, columns=s.columns[..., index])
     return Readings(
@@ -201,10 +222,6 @@ def readings(
         s,
         np.array([size for _, size in known if size > 0.0]),
     )
-
-
-def _group(group: str, setup: str) -> str:
-    return f"{group}, {setup}" if setup else group
 
 
 def corrected(

@@ -10,10 +10,10 @@ from scipy.linalg import cholesky, solve_triangular
 
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.summary import Summary, summary
-from stiffmap.experiment.experiment import Floats, Mask
+from stiffmap.experiment.experiment import Floats, Integers, Mask
 from stiffmap.experiment.noise.folds import folds
 from stiffmap.experiment.noise.unseen import left_unseen
-from stiffmap.identification.inference.columns import drawn
+from stiffmap.identification.inference.columns import MOST_READINGS, drawn
 from stiffmap.identification.inference.corrected import (
     STEPS_OF_A_FOLD,
     Corrected,
@@ -65,7 +65,8 @@ def written(
     seed: int,
     over: Callable[[], bool],
 ) -> Written:
-    """The best of some machines and the declared one, each fold of readings predicted from all others.
+    """The last of some machines, unless another of them or the declared one is clearly better, each fold of readings predicted from
+    all others.
 
     models
         By name, the readings that a machine was fitted to and its optimum.
@@ -88,10 +89,23 @@ def written(
         for name, (readings, whole) in models.items():
             part = corrected(readings.only(~test), (), whole, STEPS_OF_A_FOLD)
             left[name][own] = left_unseen(e, sigma, part.prediction, seen, own)[own]
-    sums = {name: summary(r, sigma, e.channels) for name, r in left.items()}
-    best = min(sums, key=lambda name: sums[name].ratio if np.isfinite(sums[name].ratio) else np.inf)
-    held = HeldOut(sums[DECLARED], sums[best], left[best], number, by)
+    best = _best(left, last, sigma, e.groups)
+    before, after = (summary(left[name], sigma, e.channels) for name in (DECLARED, best))
+    held = HeldOut(before, after, left[best], number, by)
     return _made(best, models, given, declared, held)
+
+
+def _best(left: dict[str, Floats], wanted: str, sigma: Floats, pose: Integers) -> str:
+    """The machine that is wanted, unless another leaves less of the poses by more than one standard error of the difference."""
+    each = {}
+    for name, r in left.items():
+        squares = np.nansum((r / sigma) ** 2, axis=1)
+        each[name] = np.bincount(pose, np.where(np.isfinite(squares), squares, np.inf))
+    best = min(each, key=lambda name: float(each[name].sum()))
+    worse = each[wanted] - each[best]
+    if not np.isfinite(worse).all():
+        return best
+    return best if worse.mean() > worse.std() / np.sqrt(len(worse)) else wanted
 
 
 def _made(
@@ -116,7 +130,7 @@ def promised(given: Readings, found: Corrected) -> tuple[float, float]:
     B P Bᵀ + C_FF - 2 B P B_TᵀW C_TF, since what nobody can name goes on from pose to pose and the file has none of it.
     """
     e = given.predictor.experiment
-    use = drawn(e.groups[given.rows], 0)
+    use = drawn(e.groups[given.rows], 0, MOST_READINGS)
     rows, channel = given.rows[use], given.channel[use]
     length = metres(e.channels)[channel]
     seen = length if length.any() else ~length

@@ -42,6 +42,8 @@ CORRECTIONS = 3
 """Gauss-Newton corrections of the residual by whole predictions with the effects of a model."""
 SINGLES = 24
 """Best single places of which pairs are tried; effort only."""
+SHORT = 10.0
+"""Evidence, ln, by which a bound may fall short of the fit: what is further below is not fitted; effort only."""
 AT_MOST, FAR = 25, 1e6
 """Steps to the optimum of effects that bend; the misfit of a machine that fails."""
 Predict = Callable[[Sequence["Chosen"]], Floats]
@@ -57,6 +59,14 @@ class Chosen:
     part: Part
     values: Floats
     """(p,) strengths, in the scales of the linear parameters."""
+    refined: tuple[tuple[str, float], ...] = ()
+    """Values (SI) of parameters of the shape, where an optimum has others than the grid."""
+
+    @property
+    def shaped(self) -> tuple[tuple[Parameter, float], ...]:
+        """Parameters of the shape with their values on the grid, SI."""
+        given = dict(self.place.shapes[self.shape].variant.shape)
+        return tuple((p, given[p.name]) for p in self.place.candidate.shape if p.name in given)
 
     @property
     def strengths(self) -> tuple[tuple[Parameter, float], ...]:
@@ -157,6 +167,7 @@ class _World:
     ) -> None:
         self.columns, self.name, self.numbers, self.predict = columns, name, numbers, predict
         self.over, self.optima = over, optima
+        self.known: dict[frozenset[tuple[int, int]], Model] = {}
         self.gaps = parts.gaps
 
     def search(self) -> Search:
@@ -178,16 +189,18 @@ class _World:
         rivals = self._rivals(model)
         return Search(model, null, tuple(o for o, _ in rivals), tuple(near for _, near in rivals))
 
-    def _trials(self, model: Model) -> tuple[Model, Floats] | None:
-        """The model with the best further effect, and the gain of each place."""
+    def _trials(self, model: Model, beat: float = -np.inf) -> tuple[Model, Floats] | None:
+        """The model with the best further effect, and the gain of each place; None where none comes near the evidence to `beat`."""
         found = self._bounds(model) if np.isfinite(model.score) else []
         if not found:
             return None
         order = sorted(found, key=lambda b: -b[0])
+        if order[0][0] < beat - SHORT:
+            return None
         refits = [self._with(model, [place], anchor) for _, place, anchor in order[:REFITS]]
         scores = {id(p): s for s, p, _ in order}
-        for m in refits:
-            key = id(m.chosen[-1].place)
+        for m, (_, place, _) in zip(refits, order, strict=False):
+            key = id(place)
             scores[key] = max(scores[key], m.score) if np.isfinite(m.score) else -np.inf
         best = max(refits, key=lambda m: m.score)
         return (best, np.array(list(scores.values())) - model.score) if np.isfinite(best.score) else None
@@ -228,7 +241,15 @@ class _World:
         return self._fit(tuple(chosen), start)
 
     def _fit(self, chosen: tuple[Chosen, ...], start: dict[str, float] | None) -> Model:
-        """A set at its best amplitudes, on a residual that is corrected for what the effects' columns miss."""
+        """A set at its best amplitudes, on a residual that is corrected for what the effects' columns miss; fitted once."""
+        key = frozenset((id(c.place), c.shape) for c in chosen)
+        if key not in self.known:
+            self.known[key] = self._made(
+                tuple(replace(c, values=np.zeros(0), refined=()) for c in chosen), start
+            )
+        return self.known[key]
+
+    def _made(self, chosen: tuple[Chosen, ...], start: dict[str, float] | None) -> Model:
         columns = self.columns
         parts = (*self.numbers, *self.gaps, *(c.part for c in chosen))
         fit = fitted(columns, parts, start)
@@ -282,28 +303,19 @@ class _World:
         predict, key = self.predict, tuple((id(c.place), c.shape) for c in chosen)
         if key not in self.optima:
             rest = fit.without([c.part.name for c in chosen])
-            ends = np.cumsum([0, *(c.place.shapes[c.shape].variant.array().shape[0] for c in chosen)])
-
-            def at(x: Floats) -> tuple[Chosen, ...]:
-                each = zip(chosen, ends[:-1], ends[1:], strict=True)
-                return tuple(replace(c, values=x[a:b]) for c, a, b in each)
-
-            begin = np.concatenate([_values(fit, c) for c in chosen])
-            low, high = (np.concatenate([bounds(c)[k] for c in at(begin)]) for k in (0, 1))
+            begin = np.concatenate([_whole(replace(c, values=_values(fit, c))) for c in chosen])
+            low, high = (np.concatenate([_bounds(c)[k] for c in chosen]) for k in (0, 1))
             inside = 1e-6 * np.minimum(np.nan_to_num(high - low, posinf=1.0), 1.0)
-            begin = np.clip(begin, low + inside, high - inside)
 
             def residual(x: Floats) -> Floats:
-                left = rest.white(self.columns.residual - predict(at(x)))
+                left = rest.white(self.columns.residual - predict(_at(chosen, x)))
                 return np.where(np.isfinite(left), left, FAR)
 
-            found = least_squares(
+            begin = np.clip(begin, low + inside, high - inside)
+            self.optima[key] = least_squares(
                 residual, begin, "2-point", (low, high), x_scale="jac", diff_step=1e-3, max_nfev=AT_MOST
-            )
-            self.optima[key] = found.x
-        x = self.optima[key]
-        ends = np.cumsum([0, *(c.place.shapes[c.shape].variant.array().shape[0] for c in chosen)])
-        return tuple(replace(c, values=x[a:b]) for c, a, b in zip(chosen, ends[:-1], ends[1:], strict=True))
+            ).x
+        return _at(chosen, self.optima[key])
 
     def _exchanged(self, model: Model) -> Model:
         """Each effect in turn left out where that costs less than odds, or given up for a better one."""
@@ -314,7 +326,7 @@ class _World:
                 if model.score - fewer.score < float(np.log(ODDS)):
                     model = fewer
                     break
-                found = self._trials(fewer)
+                found = self._trials(fewer, model.score)
                 if found and found[0].score > model.score + PROGRESS:
                     model = found[0]
                     break
@@ -370,12 +382,39 @@ def is_possible(c: Chosen) -> bool:
     return all(low <= x <= high for p, x in c.strengths for low, high in [possible(p)])
 
 
-def bounds(c: Chosen) -> tuple[Floats, Floats]:
-    """(p,) least and largest strengths, in scales; infinite where they are no parameters."""
-    if not c.strengths:
-        return np.full(len(c.values), -np.inf), np.full(len(c.values), np.inf)
-    both = [(possible(p), float(p.null or 0.0), p.scale) for p, _ in c.strengths]
-    return np.array([(b[0] - n) / s for b, n, s in both]), np.array([(b[1] - n) / s for b, n, s in both])
+def _bounds(c: Chosen) -> tuple[Floats, Floats]:
+    """(p + q,) least and largest values of strengths, in scales, and of the shape; infinite for strengths that are no parameters."""
+    number = c.place.shapes[c.shape].variant.array().shape[0]
+    low, high = np.full(number, -np.inf), np.full(number, np.inf)
+    if len(c.place.candidate.linear) == number:
+        both = [(*possible(p), float(p.null or 0.0), p.scale) for p in c.place.candidate.linear]
+        low = np.array([(a - null) / scale for a, _, null, scale in both])
+        high = np.array([(b - null) / scale for _, b, null, scale in both])
+    shape = [p for p, _ in c.shaped]
+    return (
+        np.append(low, [p.lower / p.scale for p in shape]),
+        np.append(high, [p.upper / p.scale for p in shape]),
+    )
+
+
+def _whole(c: Chosen) -> Floats:
+    """(p + q,) strengths and shape, in scales."""
+    return np.append(c.values, [v / p.scale for p, v in c.shaped])
+
+
+def _at(chosen: Sequence[Chosen], x: Floats) -> tuple[Chosen, ...]:
+    """The effects with strengths and shapes x, one after the other."""
+    out, k = [], 0
+    for c in chosen:
+        number, shape = c.place.shapes[c.shape].variant.array().shape[0], [p for p, _ in c.shaped]
+        refined = zip(shape, x[k + number :], strict=False)
+        out.append(
+            replace(
+                c, values=x[k : k + number], refined=tuple((p.name, float(v) * p.scale) for p, v in refined)
+            )
+        )
+        k += number + len(shape)
+    return tuple(out)
 
 
 def amplitudes(fit: Fit) -> dict[str, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.identification.inference.amplitudes import ALL_NUMBERS, NOISE, OFF, Fit
+from stiffmap.identification.inference.amplitudes import NOISE, OFF, Fit
 from stiffmap.identification.inference.columns import Columns
 
 
@@ -24,7 +24,7 @@ def of_numbers(columns: Columns, fit: Fit) -> list[tuple[float, float, float]]:
     whole = max(float(np.sum(fit.columns.residual**2)), 1e-300)
     out = [(0.0, 1.0, 0.0)] * len(columns.unknowns)
     for name, index in columns.groups.items():
-        variance = fit.amplitude(ALL_NUMBERS) ** 2 or fit.amplitude(name) ** 2
+        variance = fit.spread(name) ** 2
         d = columns.numbers[:, index]
         information = np.sum(fit.white(d) ** 2, axis=0)
         mean = variance * (d.T @ fit.solved)

@@ -104,16 +104,20 @@ def refusal(columns: Columns, fit: Fit, c: Chosen) -> tuple[float, str]:
     rest = fit.without([c.part.name])
     if without_a_pose(columns, rest, c) < np.log(ODDS):
         return 0.0, "it rests on the readings of one pose"
+    scatter, worst = unevenness(columns, rest, c.lines(columns) @ c.values / columns.sigma)
+    return scatter, f"its strength differs along {worst}" if worst else ""
+
+
+def unevenness(columns: Columns, rest: Fit, pattern: Floats) -> tuple[float, str]:
+    """Largest scatter, relative, of the strength of a pattern (N,) over the experiment beyond chance, and along what it is larger
+    than `EQUAL_SHARE`; empty: nowhere."""
     blocks = list(partitions(columns.experiment, columns.rows))
     worst, scatter = "", 0.0
-    lowest = RARE / max(1, len(blocks))
     for name, block in blocks:
-        p, share = evenness(columns, rest, c, block)
-        if p < lowest:
-            scatter = max(scatter, share)
-            if share > EQUAL_SHARE:
-                worst = name
-    return scatter, f"its strength differs along {worst}" if worst else ""
+        p, share = evenness(columns, rest, pattern, block)
+        if p < RARE / len(blocks) and share > scatter:
+            scatter, worst = share, name
+    return scatter, worst if scatter > EQUAL_SHARE else ""
 
 
 def by_chance(columns: Columns, fit: Fit, c: Chosen) -> float:
@@ -144,12 +148,12 @@ def without_a_pose(columns: Columns, rest: Fit, c: Chosen) -> float:
     return min(out, default=np.inf)
 
 
-def evenness(columns: Columns, rest: Fit, c: Chosen, block: Integers) -> tuple[float, float]:
-    """p-value of one strength in all blocks (N,), and the scatter of strengths beyond chance, relative to their mean.
+def evenness(columns: Columns, rest: Fit, raw: Floats, block: Integers) -> tuple[float, float]:
+    """p-value of one strength of a pattern (N,) in all blocks (N,), and the scatter of strengths beyond chance, relative to their
+    mean.
 
     DerSimonian, Laird, Controlled Clinical Trials 7 (1986) 177.
     """
-    raw = c.lines(columns) @ c.values / columns.sigma
     pattern = np.stack([columns.free.T @ np.where(block == b, raw, 0.0) for b in np.unique(block)], axis=1)
     white, r = rest.white(pattern), rest.white(rest.columns.residual)
     gram = white.T @ white
@@ -198,14 +202,17 @@ def _out_of_tolerance(columns: Columns, model: Model) -> Iterator[Beyond]:
 
 
 def out_of_tolerance(columns: Columns, fit: Fit) -> Iterator[Beyond]:
-    """Declared numbers beyond tolerance, and beyond what the largest of so many, and its error, are by chance."""
+    """Declared numbers beyond tolerance, beyond what the largest of so many, and its error, are by chance, and the same over all
+    of the experiment."""
     size = np.linalg.norm(columns.numbers, axis=0) / np.sqrt(len(columns))
     said = zip(columns.unknowns, of_numbers(columns, fit), size, strict=True)
     found = [Beyond(u, value, sd, float(abs(value) * s)) for u, (value, sd, _), s in said]
+    number = {id(b): k for k, b in enumerate(found)}
     determined = sum(b.sd < DETERMINED for b in found)
     largest, doubt = (float(norm.isf(1.0 / (2.0 * ODDS * max(1, n)))) for n in (determined, len(found)))
     for b in sorted(found, key=lambda b: -b.share):
-        if abs(b.value) - doubt * b.sd > TOLERANCES and abs(b.value) > largest:
+        far = abs(b.value) - doubt * b.sd > TOLERANCES and abs(b.value) > largest
+        if far and not unevenness(columns, fit, columns.free @ columns.numbers[:, number[id(b)]])[1]:
             yield b
 
 

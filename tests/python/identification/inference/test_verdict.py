@@ -40,11 +40,11 @@ def flat(seed: int, strengths: np.ndarray, poses: int = 8) -> tuple[Any, Any, An
 
 def test_one_strength_everywhere_passes_and_two_do_not():
     block = (np.arange(READINGS) // 20).astype(np.intp)
-    c, fit, chosen = flat(0, np.full(READINGS, 6.0))
-    p, scatter = verdict.evenness(c, fit.without(["effect"]), chosen, block)
+    c, fit, _ = flat(0, np.full(READINGS, 6.0))
+    p, scatter = verdict.evenness(c, fit.without(["effect"]), FLAT, block)
     assert p > 1e-3 and scatter < 0.2
-    c, fit, chosen = flat(0, np.where(block == 0, 12.0, 0.0))
-    p, scatter = verdict.evenness(c, fit.without(["effect"]), chosen, block)
+    c, fit, _ = flat(0, np.where(block == 0, 12.0, 0.0))
+    p, scatter = verdict.evenness(c, fit.without(["effect"]), FLAT, block)
     assert p < 1e-10
     assert scatter == pytest.approx(
         np.sqrt(2.0), rel=0.15
@@ -53,7 +53,7 @@ def test_one_strength_everywhere_passes_and_two_do_not():
 
 def test_the_homogeneity_test_is_that_of_weighted_means():
     """In white noise without frames: χ² of block means about their common mean."""
-    c, _, chosen = flat(3, np.full(READINGS, 2.0))
+    c, _, _ = flat(3, np.full(READINGS, 2.0))
     c = replace(c, free=np.eye(READINGS), residual=c.free @ c.residual, zero=np.zeros((READINGS, READINGS)))
     plain = amplitudes.evaluated(c, (), np.zeros(1), np.ones(READINGS))
     block = (np.arange(READINGS) % 3).astype(np.intp)
@@ -61,7 +61,7 @@ def test_the_homogeneity_test_is_that_of_weighted_means():
     count = np.bincount(block)
     common = (count * means).sum() / count.sum()
     expected = chi2.sf(float((count * (means - common) ** 2).sum()), 2)
-    assert verdict.evenness(c, plain, chosen, block)[0] == pytest.approx(expected, rel=1e-9)
+    assert verdict.evenness(c, plain, FLAT, block)[0] == pytest.approx(expected, rel=1e-9)
 
 
 def test_an_effect_that_one_pose_alone_shows_has_no_name():
@@ -95,7 +95,17 @@ def numbers(values: tuple[float, ...], seed: int = 0) -> Any:
     d = 10.0 * np.linalg.qr(rng.normal(size=(len(c), len(values))))[0]
     unknowns = tuple(Unknown(f"number {k}", "zeros", "m", 1e-4) for k in range(len(values)))
     residual = d @ np.array(values) + rng.normal(size=len(c))
-    return replace(c, residual=residual, numbers=d, unknowns=unknowns, zero=np.zeros((len(c), len(c))))
+    n, nothing = READINGS, np.zeros((READINGS, 6))
+    e: Any = SimpleNamespace(
+        position=np.arange(n)[:, None] * np.ones(3),
+        wrench=nothing,
+        order=None,
+        hours=None,
+        runs=np.zeros(n, int),
+        command=None,
+    )
+    zero = np.zeros((len(c), len(c)))
+    return replace(c, residual=residual, numbers=d, unknowns=unknowns, zero=zero, experiment=e)
 
 
 def test_a_number_far_off_is_out_of_tolerance_and_others_are_not():
@@ -103,6 +113,16 @@ def test_a_number_far_off_is_out_of_tolerance_and_others_are_not():
     fit = amplitudes.fitted(c, amplitudes.Parts(c).numbers)
     (one,) = verdict.out_of_tolerance(c, fit)
     assert one.unknown.name == "number 1" and one.value == pytest.approx(-8.0, abs=0.5) and one.sd < 0.2
+
+
+def test_a_number_that_only_a_part_of_the_experiment_shows_is_not_out_of_tolerance():
+    c = numbers((0.5, -8.0, 0.3))
+    shown = c.free @ c.numbers[:, 1]
+    third = c.free.T @ np.where(np.arange(READINGS) < READINGS // 3, -24.0 * shown, 0.0)
+    for residual, beyond in ((c.residual, 1), (c.residual + 8.0 * c.numbers[:, 1] + third, 0)):
+        part = replace(c, residual=residual)
+        fit = amplitudes.fitted(part, amplitudes.Parts(part).numbers)
+        assert len(list(verdict.out_of_tolerance(part, fit))) == beyond
 
 
 def test_the_largest_of_many_numbers_within_tolerance_is_not_out_of_it():

@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.diagnosis.report.findings import Effect
-from stiffmap.identification.inference.corrected import Corrected, Term
+from stiffmap.identification.inference.corrected import WIDE, Corrected, Term
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import Placed, registry
-
-WIDE = float(norm.isf(0.025))
 
 
 def effects_of(
