@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.linalg import LinAlgError
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.linalg.lapack import dpotri
 from scipy.special import gammaln
@@ -41,6 +42,8 @@ WEIGHED = 0.1
 """Gain of evidence that ends the weighings."""
 OFF, SINKS = -14.0, -8.0
 """ln variance of a part that the readings do not ask for, and below which one on its way down is taken out."""
+ROUND_OFF = 1e-13
+"""Of the largest variance: what is added to the diagonal where a covariance cannot be factorised."""
 BEGIN = -2.0
 """ln variance with which a part begins."""
 NOISE, ALL_NUMBERS = "noise", "declared numbers"
@@ -220,7 +223,7 @@ def _evaluate(
     v = columns.zero.copy()
     for k in on:
         v += np.exp(t[k]) * matrices[k]
-    root = cholesky(v, lower=True, check_finite=False)
+    root = _root(v)
     r = columns.residual
     solved = cho_solve((root, True), r, check_finite=False)
     m = len(r)
@@ -248,6 +251,16 @@ def _evaluate(
                 score += _of_size(p, root, solved, float(t[1 + k]))
     fit = Fit(columns, parts, t, weights, root, solved, likelihood, score)
     return fit, gradient - off / sd**2, of_data + np.diag(1.0 / sd**2)
+
+
+def _root(v: Floats) -> Floats:
+    """Lower Cholesky factor; with as little more on the diagonal as round-off needs where one part is far larger than the noise."""
+    more = 0.0
+    while True:
+        try:
+            return np.asarray(cholesky(v + more * np.eye(len(v)), lower=True, check_finite=False))
+        except LinAlgError:
+            more = max(10.0 * more, ROUND_OFF * float(np.diag(v).max()))
 
 
 def _of_size(part: Part, root: Floats, solved: Floats, t: float) -> float:

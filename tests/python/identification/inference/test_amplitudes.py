@@ -119,3 +119,10 @@ def test_one_wild_reading_moves_nothing_under_heavy_tails():
     change = np.linalg.norm(loud.mean(some[2]) - quiet.mean(some[2]))
     assert change < 0.5 * np.linalg.norm(quiet.mean(some[2])) + 0.5
     assert loud.noise < 1.4
+
+
+def test_a_part_far_larger_than_the_noise_is_factorised_all_the_same():
+    smooth = np.exp(-0.5 * (np.arange(40.0)[:, None] - np.arange(40.0)) ** 2 / 400.0)
+    v = np.eye(40) + 1e17 * smooth
+    root = amplitudes._root(v)
+    assert np.abs(root @ root.T - v).max() < 1e-10 * v.max()
