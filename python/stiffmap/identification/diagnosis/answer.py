@@ -50,7 +50,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     listed = stands_out(columns, fit)
     clock.say("corrected machine")
     nameless = [predictor(terms([c])) - base for c, _ in v.refused]
-    given = readings(predictor, found.uncertain, columns, fit, sigma, nameless)
+    given = readings(predictor, found.uncertain, columns, fit, sigma, nameless, v.as_effects)
     models, v, notes = _models(predictor, found, v, given)
     clock.say("readings that no fit saw")
     made = written(models, base, given, listed, seed, lambda: clock.over or not cross_validate)
@@ -144,10 +144,11 @@ def _effects(
 ) -> list[Effect]:
     if best is None or not v.named:
         return []
+    total = float(np.sum(fit.columns.residual**2))
     evidence = [
         {
             "ln_odds": n.log_odds,
-            "share": each.get(n.chosen.part.name, 0.0),
+            "share": each.get(n.chosen.part.name) or n.share**2 * len(fit.columns) / total,
             "same_everywhere": 1.0 - n.scatter,
         }
         for n in v.named

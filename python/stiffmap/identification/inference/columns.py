@@ -30,6 +30,8 @@ from stiffmap.model.effects import Parameter
 
 MOST_READINGS = 600
 """Readings that are compared with each other; of more, whole poses are drawn. Effort only: an (N, N) matrix is factorised."""
+FEWEST_POSES = 10
+"""Poses that are kept where readings are drawn, if there are so many."""
 VISIBLE = 3.0
 """Noise: a candidate whose largest plausible size shows less is left out."""
 LARGEST = 20.0
@@ -160,13 +162,16 @@ def columns(
 
 
 def drawn(pose: Integers, seed: int, most: int) -> Integers:
-    """Numbers of the readings in use: all of them, or those of poses drawn at random."""
+    """Numbers of the readings in use: all of them; or those of poses drawn at random, evenly many of poses that have so many that
+    fewer than `FEWEST_POSES` would be left."""
     if len(pose) <= most:
         return np.arange(len(pose))
-    order = np.random.default_rng(seed).permutation(np.unique(pose))
-    size = np.cumsum([np.sum(pose == k) for k in order])
-    chosen = order[: max(1, int(np.sum(size <= most)))]
-    return np.flatnonzero(np.isin(pose, chosen))
+    poses = np.unique(pose)
+    share = most // min(len(poses), FEWEST_POSES)
+    own = [np.flatnonzero(pose == k) for k in np.random.default_rng(seed).permutation(poses)]
+    own = [k[np.linspace(0, len(k) - 1, share).astype(np.intp)] if len(k) > share else k for k in own]
+    chosen = int(np.sum(np.cumsum([len(k) for k in own]) <= most))
+    return np.sort(np.concatenate(own[: max(1, chosen)]))
 
 
 def _averages(e: Experiment, rows: Integers, channel: Integers, noise: Floats, raw: Floats) -> Floats:

@@ -34,3 +34,5 @@ TOLERANCES = 2.0
 """Standard uncertainties beyond which a declared number is out of tolerance."""
 LARGEST_ERROR = {"m": 0.01, "rad": 0.05}
 """Of a length or an angle: what is off by more was seen when the machine was built."""
+ALIKE = 0.99
+"""Squared cosine from which a declared number shows the same as an effect."""

@@ -174,6 +174,7 @@ def readings(
     fit: Fit,
     sigma: Floats,
     without_name: Sequence[Floats] = (),
+    exact: Sequence[Unknown] = (),
 ) -> Readings:
     """The readings of an experiment under the amplitudes of a fit.
 
@@ -181,6 +182,8 @@ def readings(
         The numbers of the columns, and those that no reading shows.
     without_name
         (n, c) m, rad: what effects of the fit that have no name add to the readings.
+    exact
+        Numbers that are as declared, since an effect speaks of them.
     """
     e = predictor.experiment
     rows, channel = readings_of(e, predictor())
@@ -205,7 +208,7 @@ def readings(
     weights = np.ones(len(rows))
     weights[used[inside]] = fit.weights[inside]
     size = {k: fit.spread(group) for group, index in columns.groups.items() for k in index}
-    known = [(u, size[k]) for k, u in enumerate(columns.unknowns)]
+    known = [(u, size[k]) for k, u in enumerate(columns.unknowns) if u not in exact]
     unknowns = tuple(u for u, s in known if s > 0.0)
     s = sensitivity(predictor, uncertain)
     s = zeros_anew(s, e) or s

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.field import free_position, unit
@@ -27,14 +28,14 @@ def gaps(
     angle = np.array([c.unit == "rad" for c in e.channels])[channel]
     per = 1.0 / sigma
     load = e.wrench / max(float(np.abs(e.wrench).max(initial=0.0)), 1e-300)
-    carried = (load @ load.T)[np.ix_(rows, rows)]
+    carried = load[rows] @ load[rows].T
     deflects = e.quantity == "deflection"
     for what, here in (("lengths", ~angle), ("angles", angle)):
         if not here.any():
             continue
         own = same & np.outer(here, here)
         for over, x in _spaces(machine, e):
-            distance = np.linalg.norm(x[:, None] - x[None], axis=-1)[np.ix_(rows, rows)]
+            distance = cdist(x[rows], x[rows])
             for length in LENGTHS:
                 k = own * matern(distance / length) * np.outer(per, per)
                 yield "field", f"field of {what} over {over}, {length:g}", k

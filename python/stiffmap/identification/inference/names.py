@@ -44,6 +44,10 @@ SINGLES = 24
 """Best single places of which pairs are tried; effort only."""
 SHORT = 10.0
 """Evidence, ln, by which a bound may fall short of the fit: what is further below is not fitted; effort only."""
+RIVALS_FITTED = 4
+"""Places in an effect's stead that are fitted; effort only."""
+SAME_EVIDENCE = 2.0
+"""Evidence, ln, within which the coarsest part has the name."""
 AT_MOST, FAR = 25, 1e6
 """Steps to the optimum of effects that bend; the misfit of a machine that fails."""
 Predict = Callable[[Sequence["Chosen"]], Floats]
@@ -124,6 +128,10 @@ def searched(
     found = {w.name: w.search() for w in searches}
     best = max(found.values(), key=lambda s: s.best.score)
     others = [w for w in searches if w.name != best.best.world]
+    own = next(w for w in searches if w.name == best.best.world)
+    best = replace(best, best=own.coarsest(best.best))
+    rivals = own.rivals(best.best)
+    best = replace(best, gain=tuple(o for o, _ in rivals), equivalents=tuple(near for _, near in rivals))
     off = [s.null.fit for name, s in found.items() if name != EXACT]
     return replace(
         best,
@@ -186,8 +194,7 @@ class _World:
             if len(better.chosen) <= len(model.chosen) and better.score <= model.score + PROGRESS:
                 break
             model = better
-        rivals = self._rivals(model)
-        return Search(model, null, tuple(o for o, _ in rivals), tuple(near for _, near in rivals))
+        return Search(self._refined(model), null, (), ())
 
     def _trials(self, model: Model, beat: float = -np.inf) -> tuple[Model, Floats] | None:
         """The model with the best further effect, and the gain of each place; None where none comes near the evidence to `beat`."""
@@ -290,6 +297,23 @@ class _World:
         missed = missed - line @ np.linalg.lstsq(line, missed, rcond=1e-9)[0]
         return self._without(missed, fit), at
 
+    def _refined(self, model: Model) -> Model:
+        """The set with its shapes (periods, knees) where they fit best, between those of the grid; the same where that is no better."""
+        if not self.predict or not any(c.shaped for c in model.chosen) or self.over():
+            return model
+        at = self._optimum(model.fit, model.chosen)
+        shown = self.predict(at)
+        if not np.isfinite(shown).all():
+            return model
+        lines = np.hstack([_columns(self.columns, c) for c in at])
+        fit = self._without(shown - lines @ np.linalg.lstsq(lines, shown, rcond=1e-9)[0], model.fit)
+        better = fit.score > model.fit.score + PROGRESS and all(map(is_possible, at))
+        return (
+            replace(model, chosen=at, fit=fit, score=model.score + fit.score - model.fit.score)
+            if better
+            else model
+        )
+
     def _line(self, chosen: Sequence[Chosen]) -> Floats:
         return np.asarray(np.sum([_columns(self.columns, c) @ c.values for c in chosen], axis=0))
 
@@ -357,13 +381,34 @@ class _World:
         """The effects of a model but one, in this world."""
         return self._fit(tuple(o for o in model.chosen if o.part.name != c.part.name), amplitudes(model.fit))
 
-    def _rivals(self, model: Model) -> tuple[tuple[float, tuple[tuple[Place, float], ...]], ...]:
-        """Per effect its ln odds, all places that would do together, and those places."""
+    def coarsest(self, model: Model) -> Model:
+        """The set with the coarsest part in each effect's place, of those whose evidence is the same."""
+        order = {id(p): k for k, p in enumerate(self.columns.places)}
+        for c in model.chosen:
+            found = [
+                (order[id(p)], m) for p, m in self._fitted(model, c) if m.score > model.score - SAME_EVIDENCE
+            ]
+            first = min(found, key=lambda f: f[0], default=None)
+            if first is not None and first[0] < order[id(c.place)]:
+                model = first[1]
+        return model
+
+    def _fitted(self, model: Model, c: Chosen) -> list[tuple[Place, Model]]:
+        """The likeliest places in an effect's stead, fitted."""
+        less = self.less(model, c)
+        bounds = sorted(self._bounds(less, (model.fit.without([c.part.name]),)), key=lambda b: -b[0])
+        likely = [b for b in bounds if b[1] is not c.place and b[0] > model.score - SHORT]
+        return [(p, self._with(less, [p], anchor)) for _, p, anchor in likely[:RIVALS_FITTED]]
+
+    def rivals(self, model: Model) -> tuple[tuple[float, tuple[tuple[Place, float], ...]], ...]:
+        """Per effect its ln odds, all places that would do together, and those places; the likeliest are fitted."""
         out = []
         for c in model.chosen:
             less = self.less(model, c)
             at_best = model.fit.without([c.part.name])
             scores = {id(p): (s - model.score, p) for s, p, _ in self._bounds(less, (at_best,))}
+            for p, m in self._fitted(model, c):
+                scores[id(p)] = (max(scores[id(p)][0], m.score - model.score), p)
             scores[id(c.place)] = (0.0, c.place)
             together = float(np.logaddexp.reduce([s for s, _ in scores.values()]))
             odds = model.score + together - less.score - float(np.log(len(self.columns.places)))

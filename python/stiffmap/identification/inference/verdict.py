@@ -10,10 +10,10 @@ from scipy.stats import chi2, norm
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.identification.calibration.unknowns import Unknown
-from stiffmap.identification.inference.amplitudes import OFF, Fit, noise_prior
+from stiffmap.identification.inference.amplitudes import OFF, Fit, Part, noise_prior
 from stiffmap.identification.inference.columns import Columns, Place
-from stiffmap.identification.inference.constants import EQUAL_SHARE, ODDS, RARE, TOLERANCES
-from stiffmap.identification.inference.names import EXACT, Chosen, Model, Search
+from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, ODDS, RARE, TOLERANCES
+from stiffmap.identification.inference.names import EXACT, Chosen, Model, Search, is_possible
 from stiffmap.identification.inference.shares import of_numbers
 
 DETERMINED = 0.5
@@ -66,6 +66,8 @@ class Verdict:
     """What is left that nobody can name; empty: nothing."""
     time: str
     """Correlation of the noise in time; empty: none."""
+    as_effects: tuple[Unknown, ...] = ()
+    """Numbers out of tolerance that are named as the effect that shows the same."""
 
 
 def judged(columns: Columns, search: Search) -> Verdict:
@@ -86,6 +88,13 @@ def judged(columns: Columns, search: Search) -> Verdict:
         else:
             share = float(np.linalg.norm(model.fit.mean(c.part)) / np.sqrt(len(columns)))
             named.append(Named(c, tuple(p for p, _ in near), odds, scatter, share, numbers))
+    called = {id(b): effect_of(columns, b, model.chosen) for b in beyond}
+    for b in beyond:
+        effect = called[id(b)]
+        if effect is not None and effect.place not in [n.chosen.place for n in named]:
+            named.append(Named(effect, (), 0.5 * (b.value / b.sd) ** 2, 0.0, b.share))
+    as_effects = tuple(b.unknown for b in beyond if called[id(b)] is not None)
+    beyond = tuple(b for b in beyond if called[id(b)] is None)
     rest, time = left(model.fit)
     unexplained = [why for _, why in refused if why != TOLERABLE]
     rest = rest or (unexplained[0] if unexplained else "")
@@ -94,7 +103,24 @@ def judged(columns: Columns, search: Search) -> Verdict:
     else:
         word = "unattributed" if rest else "effects" if beyond else "none"
     named.sort(key=lambda n: -n.share)
-    return Verdict(word, tuple(named), tuple(refused), beyond, rest, time)
+    return Verdict(word, tuple(named), tuple(refused), beyond, rest, time, as_effects)
+
+
+def effect_of(columns: Columns, b: Beyond, taken: Sequence[Chosen]) -> Chosen | None:
+    """The effect of fewest directions in whose span a number out of tolerance lies; None where there is none, or it is taken."""
+    d = columns.numbers[:, columns.unknowns.index(b.unknown)]
+    for place in sorted(columns.places, key=lambda p: p.shapes[0].directions.shape[1]):
+        q = place.shapes[0].directions
+        if len(place.shapes) > 1 or float(np.sum((q.T @ d) ** 2)) < ALIKE * float(d @ d):
+            continue
+        if any(c.place is place for c in taken):
+            return None
+        part = Part(str(place.candidate), "effect", factor=place.shapes[0].factor)
+        lines = columns.rotated(columns.lines(place.shapes[0].variant))
+        values = np.linalg.lstsq(lines, b.value * d, rcond=1e-9)[0]
+        found = Chosen(place, 0, part, np.asarray(values, dtype=float))
+        return found if is_possible(found) else None
+    return None
 
 
 def refusal(columns: Columns, fit: Fit, c: Chosen) -> tuple[float, str]:

@@ -151,7 +151,7 @@ def _of_machine(d: Any, verdict: str) -> str:
     if verdict == "ambiguous":
         return f"The readings are explained by more than one cause. First of them: {named}."
     rest = " Part of the difference remains unexplained." if "unattributed" in verdict else ""
-    return f"{_upper(named)}.{rest}"
+    return f"{named}.{rest}"
 
 
 def next_step(d: Any) -> str:

@@ -1,0 +1,29 @@
+"""Which readings are compared, and in which order places have their names."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stiffmap.identification.inference.columns import drawn
+
+
+@pytest.mark.parametrize(
+    ("pose", "most", "number"), [(np.arange(40) // 4, 40, 40), (np.arange(80) // 4, 50, 48)]
+)
+def test_whole_poses_are_drawn(pose: np.ndarray, most: int, number: int) -> None:
+    found = drawn(pose, 0, most)
+    assert len(found) == number and all(np.sum(pose[found] == k) == 4 for k in np.unique(pose[found]))
+    assert np.array_equal(found, drawn(pose, 0, most))
+
+
+def test_of_one_pose_with_too_many_readings_evenly_many_are_taken() -> None:
+    found = drawn(np.zeros(10_000, dtype=np.intp), 0, 600)
+    assert len(found) == 600 and found[0] == 0 and found[-1] == 9999
+    assert np.ptp(np.diff(found)) <= 1
+
+
+def test_of_few_poses_with_many_readings_each_all_are_kept() -> None:
+    pose = np.arange(2112) // 264
+    found = drawn(pose, 0, 600)
+    assert len(found) == 600 and np.array_equal(np.bincount(pose[found]), np.full(8, 75))
