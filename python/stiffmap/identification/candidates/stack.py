@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.experiment.experiment import Floats
-from stiffmap.experiment.noise.whitening import Mask, Problem
+from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.candidates.waves import Wave
 
@@ -34,9 +34,6 @@ class Part(Protocol):
     def only(self, chosen: Numbers) -> Part:
         """Some of the variants."""
 
-    def on(self, rows: Mask, readings: Mask) -> Part:
-        """All of them on some of the rows (n,), which have some of the readings (R,)."""
-
 
 @dataclass(frozen=True, eq=False)
 class Dense:
@@ -59,9 +56,6 @@ class Dense:
 
     def only(self, chosen: Numbers) -> Dense:
         return Dense(self.lines[chosen])
-
-    def on(self, rows: Mask, readings: Mask) -> Dense:
-        return Dense(self.lines[:, :, readings])
 
 
 def gram_of(problem: Problem, lines: Floats) -> Floats:
@@ -115,10 +109,6 @@ class Stack:
             tuple(self.parts[k].only(chosen[k]) for k in some),
             self.owner[which],
         )
-
-    def on(self, rows: Mask, readings: Mask) -> Stack:
-        """The stack on some of the rows (n,), which have some of the readings (R,)."""
-        return replace(self, parts=tuple(p.on(rows, readings) for p in self.parts))
 
     def place(self, i: int) -> tuple[int, int]:
         """Part of variant i, and its number there."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.experiment.experiment import Floats
-from stiffmap.experiment.noise.whitening import Mask, Problem
+from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.identification.candidates.fourier import Complex, Fourier
 
 Numbers = NDArray[np.intp]
@@ -46,17 +46,6 @@ class Waves:
     def only(self, chosen: Numbers) -> Waves:
         """Some of them; what was prepared is shared."""
         return replace(self, chosen=self.chosen[chosen])
-
-    def on(self, rows: Mask, readings: Mask) -> Waves:
-        """All of them on some of the rows (n,), which have some of the readings (R,)."""
-        place = np.cumsum(rows) - 1
-        return Waves(
-            place[self.rows[readings]].astype(np.intp),
-            tuple(t[rows] for t in self.travels),
-            tuple(s[readings] for s in self.slopes),
-            self.frequencies,
-            self.chosen,
-        )
 
     def along(self, y: Floats) -> Floats:
         """(V, 2, S) products of the columns with (R, S)."""

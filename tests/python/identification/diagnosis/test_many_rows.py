@@ -81,12 +81,11 @@ def test_a_screen_of_either_says_the_same() -> None:
     rng = np.random.default_rng(6)
     residual = rng.standard_normal((len(problem), 4))
     tangent = np.linalg.qr(rng.standard_normal((len(problem), 2)))[0]
-    screens = [Screen.of(problem, s).only(np.array([2, 5, 11])).beside(tangent) for s in both]
+    screens = [Screen.of(problem, s.only(np.array([2, 5, 11]))).beside(tangent) for s in both]
     first, second = screens
     assert first.rank.tolist() == second.rank.tolist() == [2, 2, 2]
     assert first.delta_chi2(residual) == pytest.approx(second.delta_chi2(residual), rel=1e-8)
     assert first.columns(1) == pytest.approx(second.columns(1), abs=1e-9)
-    assert first.lengths(1) == pytest.approx(np.linalg.norm(first.columns(1), axis=0), rel=1e-9)
 
 
 @pytest.mark.parametrize("zeros", [False, True])

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
-from scipy.stats import chi2
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
@@ -55,22 +53,6 @@ class Screen:
         """The screen with the directions `tangent` (N, k), orthonormal, of a model projected out."""
         return _screen(self.problem, self.stack, self.grams, tangent) if tangent.size else self
 
-    def only(self, which: NDArray[np.intp]) -> Screen:
-        """The screen of some of the variants, in their order."""
-        kept = np.isin(np.arange(len(self.variants)), which)
-        chosen = [np.flatnonzero(kept[m]) for m in self.stack.members]
-        some = [k for k, c in enumerate(chosen) if len(c)]
-        return Screen(
-            self.problem,
-            self.stack.only(which),
-            tuple(self.grams[k][chosen[k]] for k in some),
-            self.tangent,
-            tuple(self.along[k][chosen[k]] for k in some),
-            tuple(self.roots[k][chosen[k]] for k in some),
-            tuple(self.sizes[k][chosen[k]] for k in some),
-            self.rank[which],
-        )
-
     @property
     def variants(self) -> tuple[Variant, ...]:
         """All of them."""
@@ -94,11 +76,6 @@ class Screen:
         rest = white - self.tangent @ self.along[g][k].T
         return np.asarray(np.where(np.any(self.roots[g][k] != 0.0, axis=1), rest, 0.0))
 
-    def lengths(self, i: int) -> Floats:
-        """(p,) lengths of the columns of variant i, zero where nothing is left of them."""
-        g, k = self.stack.place(i)
-        return np.asarray(np.where(np.any(self.roots[g][k] != 0.0, axis=1), self.sizes[g][k], 0.0))
-
     def delta_chi2(self, residual: Floats) -> Floats:
         """(V, S) reduction of chi-square of each variant for residuals (N, S); nothing for one-parameter
         effects that would have to grow backwards."""
@@ -113,31 +90,9 @@ class Screen:
             out[m] = reduction
         return out
 
-    def minus_log_p(self, delta_chi2: Floats) -> Floats:
-        """(V,) -ln p of such reductions (V,) of chi-square without the effects."""
-        return chi2_minus_log_p(delta_chi2, np.maximum(self.rank, 1))
-
-    def largest_minus_log_p(self, residual: Floats) -> Floats:
-        """(S,) -ln p of the best variant for residuals (N, S)."""
-        delta_chi2 = self.delta_chi2(residual)
-        best = [
-            chi2_minus_log_p(delta_chi2[self.rank == r].max(axis=0), np.full(residual.shape[1], r))
-            for r in np.unique(self.rank[self.rank > 0])
-        ]
-        return np.asarray(np.max(best, axis=0)) if best else np.zeros(residual.shape[1])
-
     def estimate(self, i: int, residual: Floats) -> Floats:
         """(p,) least-squares values of variant i in units of the parameters' scales."""
         return np.asarray(np.linalg.lstsq(self.columns(i), residual, rcond=RANK)[0])
-
-
-def chi2_minus_log_p(delta_chi2: Floats, freedom: NDArray[np.intp]) -> Floats:
-    """-ln p(chi-square >= delta_chi2); by its asymptote where p is below the smallest double."""
-    with np.errstate(divide="ignore"):
-        out = -chi2.logsf(delta_chi2, freedom)
-    half = np.maximum(delta_chi2, 1.0) / 2
-    far = half - (freedom / 2 - 1) * np.log(half) + gammaln(freedom / 2)
-    return np.asarray(np.where(np.isfinite(out), out, far))
 
 
 def _felt(gram: Floats) -> Floats:
