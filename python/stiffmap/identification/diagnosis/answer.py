@@ -31,7 +31,7 @@ from stiffmap.identification.inference.constants import RARE, STANDS_OUT
 from stiffmap.identification.inference.corrected import Corrected, Readings, Term, corrected, readings
 from stiffmap.identification.inference.inference import Inferred, terms
 from stiffmap.identification.inference.machines import CALIBRATED, CORRECTED, DECLARED, Written, written
-from stiffmap.identification.inference.names import put_instead
+from stiffmap.identification.inference.names import Chosen, put_instead
 from stiffmap.identification.inference.shares import gap_of, of_numbers, shares
 from stiffmap.identification.inference.verdict import Named, Verdict, judged
 from stiffmap.solve.machine import Machine
@@ -49,7 +49,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     base, sigma = found.plan.base, found.noise.sigma
     listed = stands_out(columns, fit)
     clock.say("corrected machine")
-    nameless = [predictor(terms([c])) - base for c, _ in v.refused]
+    nameless = [_change(predictor, c) for c, _ in v.refused]
     given = readings(predictor, found.uncertain, columns, fit, sigma, nameless, v.as_effects)
     models, v, notes = _models(predictor, found, v, given)
     clock.say("readings that no fit saw")
@@ -111,6 +111,14 @@ def stands_out(columns: Columns, fit: Fit) -> Mask:
     return out
 
 
+def _change(predictor: Predictor, c: Chosen) -> Floats:
+    """(n, c) m, rad: what an effect adds to the readings; nothing where the machine cannot have it."""
+    try:
+        return predictor(terms([c])) - predictor()
+    except StiffmapError:
+        return np.zeros_like(predictor.experiment.reading)
+
+
 def _models(
     predictor: Predictor, found: Inferred, v: Verdict, given: Readings
 ) -> tuple[dict[str, tuple[Readings, Corrected]], Verdict, list[str]]:
@@ -135,7 +143,10 @@ def _models(
             break
         gone = v.named[nothing]
         kept = tuple(n for n in v.named if n is not gone)
-        v = replace(v, named=kept, refused=(*v.refused, (gone.chosen, "its interval holds nothing at all")))
+        why = "its interval holds nothing at all"
+        v = replace(
+            v, named=kept, refused=(*v.refused, (gone.chosen, why)), rest=v.rest or ("" if kept else why)
+        )
     return out, v, []
 
 

@@ -1,0 +1,35 @@
+"""From what the inference found to an answer: effects that a machine cannot have end nothing."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.experiment import Predictor, random_plan
+from stiffmap.identification.candidates.candidates import candidates
+from stiffmap.identification.diagnosis.answer import _change
+from stiffmap.identification.inference.inference import terms
+from stiffmap.identification.inference.names import Chosen
+
+
+@pytest.mark.parametrize(("slope", "there"), [(0.5, True), (40.0, False)])
+def test_an_effect_that_the_machine_cannot_have_adds_nothing(slope: float, there: bool) -> None:
+    machine = sm.load_machine("hexapod")
+    p = Predictor(machine, random_plan(machine, "deflection", poses=6, loads=4, seed=1))
+    candidate = next(
+        c
+        for c in candidates(machine.description, p.experiment)
+        if c.kind == "position_dependent_compliance" and c.legs == ("3",)
+    )
+    variant: Any = SimpleNamespace(shape=(), start=None)
+    place: Any = SimpleNamespace(candidate=candidate, shapes=[SimpleNamespace(variant=variant)])
+    part: Any = None
+    c = Chosen(place, 0, part, np.array([slope / candidate.linear[0].scale]))
+    if not there:
+        with pytest.raises(sm.StiffmapError):
+            p(terms([c]))
+    assert bool(np.abs(_change(p, c)).max() > 0.0) is there
