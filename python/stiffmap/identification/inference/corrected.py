@@ -37,7 +37,7 @@ from stiffmap.model.description import AppliedEffect
 from stiffmap.model.with_errors import edited
 from stiffmap.solve.machine import Machine
 
-MOST_FITTED = 3000
+MOST_FITTED = 1500
 """Readings that a machine is fitted to; of more, whole poses are drawn. Effort only: one (N, N) matrix is factorised."""
 WIDE = float(norm.isf(0.025))
 """Standard deviations of a 95 % interval to either side."""

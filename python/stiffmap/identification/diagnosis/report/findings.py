@@ -205,7 +205,6 @@ class Findings:
             "checks_after",
             "unexplained",
             "limitations",
-            "shares",
             "seconds",
             "refused",
             "which",
@@ -216,6 +215,7 @@ class Findings:
         out: dict[str, Any] = {"verdict": self.verdict, "units": "SI (m, rad, N, N·m, kg), base axes"}
         out |= {"machine": self.declared.name, "experiment": self.experiment.name}
         out |= {n: plain(getattr(self, n)) for n in (*names, *more)}
+        out["shares"] = [{"part": name, "share": share} for name, share in self.shares.items()]
         if self.held_out:
             h = self.held_out
             out["held_out"] = {"folds": h.folds, "by": h.by}
