@@ -68,7 +68,7 @@ def of_diagnosis(d: Diagnosis) -> Claim:
     return Claim(
         d.verdict,
         groups,
-        [[b.name, *b.rivals] for b in c.beyond] if c else [],
+        [[b.name] for b in c.beyond] if c else [],
         "unattributed" in d.verdict,
         (d.residual_before - d.residual_after)[:, :3],
         [

@@ -37,11 +37,6 @@ class Work:
     def __add__(self, other: Work) -> Work:
         return Work(self.solved + other.solved, self.slow + other.slow)
 
-    @property
-    def slow_share(self) -> float:
-        """Share of the reference path; 0 where nothing was solved."""
-        return self.slow / max(self.solved, 1)
-
 
 def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> tuple[Floats, Work]:
     """(n, c) m, rad of every row and channel, and the equilibria solved for it.

@@ -85,7 +85,7 @@ class Calibrator:
             s = more
             found = Calibrator._on(predictor, s, noise, out, until, seconds, start=begin)
         fit = found.fit
-        bent = not fit.converged or bends(found.problem, s, fit.values, fit.prediction)
+        bent = not fit.converged or bends(found.problem.white, s, fit.values, fit.prediction)
         if time.monotonic() < until and bent:
             s = sensitivity_at(predictor, s, fit.values, until)
             found = Calibrator._on(predictor, s, noise, out, until, seconds, fit)

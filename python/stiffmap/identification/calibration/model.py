@@ -116,14 +116,17 @@ def sensitivity(
     return _KEPT[key]
 
 
-def bends(problem: Problem, s: Sensitivity, values: Floats, prediction: Floats) -> bool:
+def bends(
+    white: Callable[[Floats], Floats], s: Sensitivity, values: Floats, prediction: Floats, least: float = 0.0
+) -> bool:
     """Whether the columns at the fit differ so much from `s.columns` that standard deviations would be wrong.
 
-    Along the fit's own direction they differ by twice what the straight line misses.
+    Along the fit's own direction they differ by twice what the straight line misses; `white` (n, c) -> (N,), and `least`, in
+    noise, is no difference.
     """
     straight = s.columns @ values
-    missed = problem.white(prediction - s.base - straight)
-    return 2.0 * float(np.linalg.norm(missed)) > BENT * float(np.linalg.norm(problem.white(straight)))
+    missed = white(prediction - s.base - straight)
+    return 2.0 * float(np.linalg.norm(missed)) > max(BENT * float(np.linalg.norm(white(straight))), least)
 
 
 def sensitivity_at(

@@ -34,10 +34,11 @@ def moves_of(pairs: Iterable[tuple[Unknown, float]]) -> dict[tuple[str, str], fl
 
 def built(predictor: Predictor, moves: Moves) -> Machine:
     """The machine with its own numbers off; the instrument's are left out."""
-    return Machine(_edited(predictor.machine.description, moves), like=predictor.machine)
+    return Machine(with_moves(predictor.machine.description, moves), like=predictor.machine)
 
 
-def _edited(description: MachineDescription, moves: Moves) -> MachineDescription:
+def with_moves(description: MachineDescription, moves: Moves) -> MachineDescription:
+    """The description with its own numbers off; the instrument's are left out."""
     own = {(at, what): by for (at, what), by in moves.items() if at != INSTRUMENT}
     return edited(description, own) if own else description
 
@@ -84,4 +85,4 @@ class Slopes:
 
     def _moved(self, u: Unknown, by: float) -> MachineDescription:
         more = {place: self._here.get(place, 0.0) + weight * u.u * by for place, weight in u.moves}
-        return _edited(self._predictor.machine.description, {**self._here, **more})
+        return with_moves(self._predictor.machine.description, {**self._here, **more})

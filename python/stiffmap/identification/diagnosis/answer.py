@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.limitations import limitations
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
@@ -25,7 +26,7 @@ from stiffmap.identification.diagnosis.report.effects import effects_of
 from stiffmap.identification.diagnosis.report.findings import Effect, NoiseReport, Number, Numbers, Rest
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.separation import separation
-from stiffmap.identification.inference.amplitudes import Fit
+from stiffmap.identification.inference.amplitudes import GAPS, Fit
 from stiffmap.identification.inference.columns import Columns, Place
 from stiffmap.identification.inference.constants import RARE, STANDS_OUT
 from stiffmap.identification.inference.corrected import Corrected, Readings, Term, corrected, readings
@@ -55,13 +56,13 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     clock.say("readings that no fit saw")
     made = written(models, base, given, listed, seed, lambda: clock.over or not cross_validate)
     best = models.get(CORRECTED, (given, None))[1]
-    each = shares(columns, fit)
+    each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(predictor, v, best, each, fit)
     others = _alternatives(predictor, found, v, given, best, clock) if effects else []
     before, after = (_left(e, sigma, p, ~listed) for p in (base, made.prediction))
     held = made.held_out
     noise = _noise(found, before, after, best, listed)
-    rest = _rest(columns, fit, v, each)
+    rest = _rest(columns, fit, v, each, gap)
     return Diagnosis(
         verdict=_word(v, effects, rest, clock.stopped and noise.lack_of_fit_before < RARE),
         effects=effects,
@@ -94,8 +95,8 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         residual_before=before,
         residual_after=after,
         set_aside=listed,
-        gap=gap_of(columns, fit, e),
-        calibration=_numbers(found, v, best, given, each),
+        gap=gap,
+        calibration=_numbers(found, v, best, given),
         refused=[f"{c.place.candidate}: {why}" for c, why in v.refused],
         which=made.which,
         stopped=clock.stopped or bool(clock.left_out),
@@ -190,7 +191,7 @@ def _alternatives(
             if clock.over:
                 clock.leave_out("other places of the effects, fitted")
                 return out
-            other = put_instead(found.columns, found.search.best.fit, n.chosen, place)
+            other = put_instead(found.search.best.fit, n.chosen, place)
             start = Term.of(place.candidate, terms([other])[0])
             kept = [start if i == k else t for i, t in enumerate(best.terms)]
             try:
@@ -251,17 +252,13 @@ def _noise(
     )
 
 
-def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float]) -> list[Rest]:
-    """What is left that has no name, the largest part first."""
+def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: Floats) -> list[Rest]:
+    """What is left that has no name, and where what nobody can name, `gap` (n, c), is largest."""
     if not v.rest:
         return []
     e = columns.experiment
-    gap = np.abs(np.nan_to_num(gap_of(columns, fit, e))) / np.where(e.read, 1.0, np.inf)
-    share = sum(
-        s
-        for name, s in each.items()
-        if any(p.name == name and p.kind in ("field", "pose") for p in fit.parts)
-    )
+    gap = np.abs(np.nan_to_num(gap))
+    share = sum(each.get(p.name, 0.0) for p in fit.parts if p.kind in GAPS)
     noise = np.full(gap.shape, np.inf)
     noise[columns.rows, columns.channel] = columns.sigma
     in_noise = gap / noise
@@ -302,9 +299,7 @@ def _over_time(problem: Problem, prediction: Floats) -> list[str]:
     return [] if found is None else [str(found)]
 
 
-def _numbers(
-    found: Inferred, v: Verdict, best: Corrected | None, given: Readings, each: dict[str, float]
-) -> Numbers | None:
+def _numbers(found: Inferred, v: Verdict, best: Corrected | None, given: Readings) -> Numbers | None:
     if best is None or not len(best.numbers):
         return None
     said = of_numbers(found.columns, found.search.best.fit)
@@ -354,6 +349,6 @@ def _machine(
     valid = covered(predictor.machine, e, keep)
     error, u = made.promise or (np.nan, np.nan)
     if np.isfinite(error):
-        unit = "m" if any(c.unit == "m" for c in np.array(e.channels)[np.unique(columns.channel)]) else "rad"
+        unit = "m" if metres(e.channels)[columns.channel].any() else "rad"
         valid = replace(valid, error=error, error_u=u, unit=unit)
     return valid.kept_by(Machine(replace(d, source=source.strip(), declared=declared)))

@@ -46,6 +46,8 @@ ROUND_OFF = 1e-13
 """Of the largest variance: what is added to the diagonal where a covariance cannot be factorised."""
 BEGIN = -2.0
 """ln variance with which a part begins."""
+GAPS = ("field", "pose")
+"""Kinds of parts that nobody can name."""
 NOISE, ALL_NUMBERS = "noise", "declared numbers"
 
 

@@ -196,6 +196,7 @@ def _level(noise: Floats) -> Integers:
 
 
 def zeros(e: Experiment, rows: Integers, channel: Integers, noise: Floats) -> Floats:
+    """(N, N) covariance, in noise, of the declared zero that readings of one pose share."""
     if e.quantity != "deflection" or not e.zeros.any():
         return np.zeros((len(rows), len(rows)))
     size = e.zeros[channel] / noise
@@ -260,9 +261,14 @@ def _reach(v: Variant, k: int) -> float:
     linear = v.candidate.linear
     if k >= len(linear) or len(linear) != len(v.sign):
         return np.inf
-    low, high = possible(linear[k])
-    null = float(linear[k].null or 0.0)
-    return max(high - null, null - low) / linear[k].scale
+    return reach(linear[k])
+
+
+def reach(p: Parameter) -> float:
+    """Largest change from its null that a parameter can have, in its scale."""
+    low, high = possible(p)
+    null = float(p.null or 0.0)
+    return max(high - null, null - low) / p.scale
 
 
 def possible(p: Parameter) -> tuple[float, float]:

@@ -23,10 +23,15 @@ from stiffmap.experiment.experiment import Floats, Integers, Mask
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.certificate import INSTRUMENT
 from stiffmap.identification.calibration.homing import zeros_anew
-from stiffmap.identification.calibration.model import Sensitivity, predicted, sensitivity, sensitivity_at
-from stiffmap.identification.calibration.slopes import moves_of
+from stiffmap.identification.calibration.model import (
+    Sensitivity,
+    bends,
+    predicted,
+    sensitivity,
+    sensitivity_at,
+)
+from stiffmap.identification.calibration.slopes import moves_of, with_moves
 from stiffmap.identification.calibration.unknowns import Unknown
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference.amplitudes import OFF, Fit
@@ -34,7 +39,6 @@ from stiffmap.identification.inference.columns import Columns, drawn, possible, 
 from stiffmap.identification.inference.constants import DEGREES
 from stiffmap.identification.inference.kernels import gaps
 from stiffmap.model.description import AppliedEffect
-from stiffmap.model.with_errors import edited
 from stiffmap.solve.machine import Machine
 
 MOST_FITTED = 1500
@@ -45,8 +49,6 @@ STEP = 1e-3
 """Of a parameter's scale, for differences."""
 STEPS, STEPS_OF_A_FOLD = 30, 6
 """Evaluations at most, of all readings and of those outside a fold."""
-BENT = 0.05
-"""Share of the numbers' change that a straight line misses, beyond which their columns are taken anew at the optimum."""
 WEIGHINGS = 3
 """Fits with weights of heavy tails."""
 Effects = Callable[[Floats], Sequence[AppliedEffect]]
@@ -94,16 +96,6 @@ class Corrected:
     """(k, k) of all values of the terms, in scales, one term after the other; numbers integrated out."""
     prediction: Floats
     """(n, c) m, rad."""
-    cost: float
-    """What the optimum is the least of."""
-    freedom: int
-    """Readings less frames, effects' values and numbers that the readings determine."""
-    misfit: float
-    """Chi-square of the readings alone, under the noise and what nobody can name."""
-    columns: Floats
-    """(N, k + p + q) change of the readings, in noise, per unit of each effect's value, number and frame, at the optimum."""
-    prior: Floats
-    """(k + p + q,) prior precision of these."""
 
     @property
     def nothing(self) -> int | None:
@@ -190,23 +182,22 @@ def readings(
     some = drawn(e.groups[rows], 0, MOST_FITTED)
     rows, channel = rows[some], channel[some]
     own = sigma[rows, channel]
-    seen = {(int(r), int(c)): k for k, (r, c) in enumerate(zip(rows, channel, strict=True))}
-    used = np.array(
-        [seen.get((int(r), int(c)), -1) for r, c in zip(columns.rows, columns.channel, strict=True)]
-    )
+    place = np.full(sigma.shape, -1)
+    place[rows, channel] = np.arange(len(rows))
+    used = place[columns.rows, columns.channel]
     inside = used >= 0
-    free = columns.free[inside]
+    used, free = used[inside], columns.free[inside]
     amplitude = {p.name: np.exp(t) for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF}
     rest = zeros(e, rows, channel, own)
     for _, name, k in gaps(predictor.machine, e, rows, channel, own):
         if name in amplitude:
-            part = k[np.ix_(used[inside], used[inside])]
+            part = k[np.ix_(used, used)]
             rest += amplitude[name] * len(columns) / float(np.sum(free * (part @ free))) * k
     for change in without_name:
         pattern = np.nan_to_num(change[rows, channel]) / own
         rest += np.outer(pattern, pattern)
     weights = np.ones(len(rows))
-    weights[used[inside]] = fit.weights[inside]
+    weights[used] = fit.weights[inside]
     size = {k: fit.spread(group) for group, index in columns.groups.items() for k in index}
     known = [(u, size[k]) for k, u in enumerate(columns.unknowns) if u not in exact]
     unknowns = tuple(u for u, s in known if s > 0.0)
@@ -258,16 +249,21 @@ def _frames(given: Readings, root: Floats, prediction: Floats) -> Floats:
     return basis(given.white(root, found)) if found.shape[-1] else np.zeros((len(given.rows), 0))
 
 
+def _parts(terms: Sequence[Term], x: Floats) -> tuple[Term, ...]:
+    """The terms with the values at the head of x, one term after the other."""
+    ends = np.cumsum([0, *(len(t.values) for t in terms)])
+    return tuple(replace(t, values=x[a:b]) for t, a, b in zip(terms, ends[:-1], ends[1:], strict=True))
+
+
 def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, steps: int) -> Corrected:
     root, e = _root(given), given.predictor.experiment
     terms = tuple(terms) if start is None else start.terms
-    ends = np.cumsum([0, *(len(t.values) for t in terms)])
-    k, p = int(ends[-1]), len(given.spread)
+    k, p = sum(len(t.values) for t in terms), len(given.spread)
     columns = given.white(root, given.sensitivity.columns) * given.spread
     known: dict[bytes, Floats] = {}
 
     def effects(x: Floats) -> list[AppliedEffect]:
-        return [t.effect(x[a:b]) for t, a, b in zip(terms, ends[:-1], ends[1:], strict=True)]
+        return [t.effect(t.values) for t in _parts(terms, x)]
 
     def shown(x: Floats) -> Floats:
         key = x.tobytes()
@@ -287,7 +283,8 @@ def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, st
         return np.append(off(x, left), x[k:])
 
     def jacobian(x: Floats) -> Floats:
-        whole = off(x, -np.column_stack([*_slopes(given, root, x, high, effects, k), columns]))
+        each = [_change(given, x, j, high, shown(x), effects, k) for j in range(k)]
+        whole = off(x, -np.column_stack([*(given.white(root, c) for c in each), columns]))
         return np.vstack([whole, np.hstack([np.zeros((p, k)), np.eye(p)])])
 
     low = np.concatenate([*(t.bounds[0] for t in terms), np.full(p, -np.inf)])
@@ -305,33 +302,27 @@ def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, st
         x = least_squares(
             residual, begin, jacobian, (low, high), x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=steps
         ).x
-    r = residual(x)
     j = jacobian(x)
-    information = j.T @ j
-    covariance = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
-    determined = float(np.sum(1.0 - np.diag(covariance)[k:])) if p else 0.0
-    frames = _frames(given, root, shown(x))
-    q = frames.shape[1]
-    own = root @ np.hstack(
-        [*(c[:, None] for c in _slopes(given, root, x, high, effects, k)), columns, frames]
-    )
-    return Corrected(
-        tuple(replace(t, values=x[a:b]) for t, a, b in zip(terms, ends[:-1], ends[1:], strict=True)),
-        x[k:] * given.spread,
-        np.asarray(covariance[:k, :k]),
-        shown(x),
-        float(r @ r),
-        max(1, len(given.rows) - q - k - round(determined)),
-        float(r[: len(given.rows)] @ r[: len(given.rows)]),
-        own,
-        np.concatenate([np.zeros(k), np.ones(p), np.zeros(q)]),
-    )
+    covariance = np.linalg.pinv(j.T @ j, rcond=1e-12, hermitian=True)
+    return Corrected(_parts(terms, x), x[k:] * given.spread, np.asarray(covariance[:k, :k]), shown(x))
 
 
-def _slopes(given: Readings, root: Floats, x: Floats, high: Floats, effects: Effects, k: int) -> list[Floats]:
-    """(N,) whitened change of the readings per scale of each of the first k values."""
-    here = given.predicted(x[k:] * given.spread, effects(x))
-    return [given.white(root, _change(given, x, j, high, here, effects, k)) for j in range(k)]
+def columns_of(given: Readings, found: Corrected) -> tuple[Floats, Floats]:
+    """(N, k + p + q) change of the readings, in noise, per unit of each effect's value, number and frame at an optimum, and (k + p +
+    q,) the prior precision of these."""
+    root = _root(given)
+    x = np.concatenate([*(t.values for t in found.terms), found.numbers / given.spread])
+    k = len(x) - len(given.spread)
+    high = np.concatenate([*(t.bounds[1] for t in found.terms), np.full(len(given.spread), np.inf)])
+
+    def effects(at: Floats) -> list[AppliedEffect]:
+        return [t.effect(t.values) for t in _parts(found.terms, at)]
+
+    each = [_change(given, x, j, high, found.prediction, effects, k) for j in range(k)]
+    columns = given.white(root, given.sensitivity.columns) * given.spread
+    frames = _frames(given, root, found.prediction)
+    whole = root @ np.hstack([*(given.white(root, c)[:, None] for c in each), columns, frames])
+    return whole, np.concatenate([np.zeros(k), np.ones(columns.shape[1]), np.zeros(frames.shape[1])])
 
 
 def _change(
@@ -349,24 +340,19 @@ def _change(
 
 
 def _bends(given: Readings, found: Corrected) -> bool:
-    """Whether the numbers' columns at the optimum differ so much from those in use that its standard deviations would be wrong."""
+    """Whether the numbers' columns at the optimum are others than those in use."""
     if not len(found.numbers):
         return False
-    root = _root(given)
-    line = given.sensitivity.columns @ found.numbers
     alone = given.predicted(found.numbers, ())
     if not np.isfinite(alone[given.rows, given.channel]).all():
         return False
-    straight = given.white(root, line)
-    missed = given.white(root, alone - given.sensitivity.base) - straight
-    return 2.0 * float(np.linalg.norm(missed)) > max(BENT * float(np.linalg.norm(straight)), 1.0)
+    root = _root(given)
+    return bends(lambda v: given.white(root, v), given.sensitivity, found.numbers, alone, 1.0)
 
 
 def machine_of(given: Readings, found: Corrected) -> Machine:
     """The machine that a file has: effects, and numbers that are not of a set-up or of the instrument."""
     names = given.sensitivity.unknowns
     pairs = [(u, float(v)) for u, v in zip(names, found.numbers, strict=True) if not u.setup]
-    own = {(at, what): by for (at, what), by in moves_of(pairs).items() if at != INSTRUMENT}
     p = given.predictor
-    description = p.with_terms(found.effects).description
-    return Machine(edited(description, own) if own else description, like=p.machine)
+    return Machine(with_moves(p.with_terms(found.effects).description, moves_of(pairs)), like=p.machine)

@@ -81,7 +81,7 @@ def terms(chosen: Sequence[Chosen]) -> tuple[AppliedEffect, ...]:
 
 
 def _term(c: Chosen) -> AppliedEffect:
-    v = c.place.shapes[c.shape].variant
+    v = c.variant
     candidate = c.place.candidate
     given = dict(v.shape) | dict(c.refined)
     given |= {p.name: float(np.clip(value, p.lower, p.upper)) for p, value in c.strengths}

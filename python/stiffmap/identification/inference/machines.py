@@ -18,6 +18,7 @@ from stiffmap.identification.inference.corrected import (
     STEPS_OF_A_FOLD,
     Corrected,
     Readings,
+    columns_of,
     corrected,
     machine_of,
 )
@@ -34,9 +35,6 @@ class HeldOut:
 
     before: Summary
     after: Summary
-    residual: Floats
-    """(n, c) reading minus what the machine file made without the row's group says of it, less unknown frames and zeros as
-    the other groups determine them."""
     folds: int
     by: str
     """``poses`` or ``set-ups``."""
@@ -91,7 +89,7 @@ def written(
             left[name][own] = left_unseen(e, sigma, part.prediction, seen, own)[own]
     best = _best(left, last, sigma, e.groups)
     before, after = (summary(left[name], sigma, e.channels) for name in (DECLARED, best))
-    held = HeldOut(before, after, left[best], number, by)
+    held = HeldOut(before, after, number, by)
     return _made(best, models, given, declared, held)
 
 
@@ -135,7 +133,8 @@ def promised(given: Readings, found: Corrected) -> tuple[float, float]:
     length = metres(e.channels)[channel]
     seen = length if length.any() else ~length
     rest = given.rest[np.ix_(use, use)] + np.diag(given.noise[use])
-    columns, prior = found.columns[use], found.prior
+    columns, prior = columns_of(given, found)
+    columns = columns[use]
     pose = e.groups[rows]
     number = len(np.unique(pose))
     label = np.random.default_rng(0).permutation(int(pose.max()) + 1)[pose] % max(2, min(FOLDS, number))

@@ -15,6 +15,7 @@ from scipy.optimize import least_squares
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.candidates import clash
+from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.amplitudes import (
     NOISE,
     Fit,
@@ -66,10 +67,21 @@ class Chosen:
     refined: tuple[tuple[str, float], ...] = ()
     """Values (SI) of parameters of the shape, where an optimum has others than the grid."""
 
+    @staticmethod
+    def at(place: Place, shape: int) -> Chosen:
+        """At one of the shapes, of no strength yet."""
+        part = Part(str(place.candidate), "effect", factor=place.shapes[shape].factor)
+        return Chosen(place, shape, part, np.zeros(0))
+
+    @property
+    def variant(self) -> Variant:
+        """Its columns."""
+        return self.place.shapes[self.shape].variant
+
     @property
     def shaped(self) -> tuple[tuple[Parameter, float], ...]:
         """Parameters of the shape with their values on the grid, SI."""
-        given = dict(self.place.shapes[self.shape].variant.shape)
+        given = dict(self.variant.shape)
         return tuple((p, given[p.name]) for p in self.place.candidate.shape if p.name in given)
 
     @property
@@ -84,7 +96,7 @@ class Chosen:
 
     def lines(self, columns: Columns) -> Floats:
         """(N, p) m, rad: its columns, per scale of each linear parameter."""
-        return columns.lines(self.place.shapes[self.shape].variant)
+        return columns.lines(self.variant)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,14 +152,12 @@ def searched(
     )
 
 
-def put_instead(columns: Columns, fit: Fit, c: Chosen, place: Place) -> Chosen:
+def put_instead(fit: Fit, c: Chosen, place: Place) -> Chosen:
     """Another place in the stead of an effect of a fit, nothing else fitted anew."""
     anchor = fit.without([c.part.name])
-    k = int(np.argmax(evidence(anchor, (place,))[0]))
-    part = Part(str(place.candidate), "effect", factor=place.shapes[k].factor)
-    t = np.append(anchor.t, _size(anchor, part))
-    found = evaluated(anchor.columns, (*anchor.parts, part), t, anchor.weights)
-    bare = Chosen(place, k, part, np.zeros(0))
+    bare = Chosen.at(place, _best_shape(anchor, place))
+    t = np.append(anchor.t, _size(anchor, bare.part))
+    found = evaluated(anchor.columns, (*anchor.parts, bare.part), t, anchor.weights)
     return replace(bare, values=_values(found, bare))
 
 
@@ -241,10 +251,8 @@ class _World:
         chosen = list(model.chosen)
         start = {**{g.name: QUIET for g in self.gaps}, **amplitudes(anchor)}
         for place in places:
-            k = int(np.argmax(evidence(anchor, (place,))[0]))
-            part = Part(str(place.candidate), "effect", factor=place.shapes[k].factor)
-            chosen.append(Chosen(place, k, part, np.zeros(0)))
-            start[part.name] = _size(anchor, part)
+            chosen.append(Chosen.at(place, _best_shape(anchor, place)))
+            start[chosen[-1].part.name] = _size(anchor, chosen[-1].part)
         return self._fit(tuple(chosen), start)
 
     def _fit(self, chosen: tuple[Chosen, ...], start: dict[str, float] | None) -> Model:
@@ -287,37 +295,39 @@ class _World:
             if shown is None and float(np.linalg.norm(missed)) < SETTLED:
                 return fit, chosen
             shown = line
-            now = self._without(missed, now)
+            now = self._less(missed, now)
+        found = self._at_optimum(fit, chosen)
+        return found if found and all(len(c.strengths) for c in found[1]) else (fit, chosen)
+
+    def _at_optimum(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Fit, tuple[Chosen, ...]] | None:
+        """The fit on a residual less what the effects' columns miss at their own optimum, and the effects there; None where the
+        machine fails."""
+        assert self.predict
         at = self._optimum(fit, chosen)
-        missed = self.predict(at) - self._line(at)
-        if not all(len(c.strengths) for c in at) or not np.isfinite(missed).all():
-            return fit, chosen
-        line = np.hstack([_columns(self.columns, c) for c in at])
-        missed = self.predict(at)
-        missed = missed - line @ np.linalg.lstsq(line, missed, rcond=1e-9)[0]
-        return self._without(missed, fit), at
+        shown = self.predict(at)
+        if not np.isfinite(shown).all():
+            return None
+        lines = np.hstack([_columns(self.columns, c) for c in at])
+        return self._less(shown - lines @ np.linalg.lstsq(lines, shown, rcond=1e-9)[0], fit), at
 
     def _refined(self, model: Model) -> Model:
         """The set with its shapes (periods, knees) where they fit best, between those of the grid; the same where that is no better."""
         if not self.predict or not any(c.shaped for c in model.chosen) or self.over():
             return model
-        at = self._optimum(model.fit, model.chosen)
-        shown = self.predict(at)
-        if not np.isfinite(shown).all():
+        found = self._at_optimum(model.fit, model.chosen)
+        if not found:
             return model
-        lines = np.hstack([_columns(self.columns, c) for c in at])
-        fit = self._without(shown - lines @ np.linalg.lstsq(lines, shown, rcond=1e-9)[0], model.fit)
-        better = fit.score > model.fit.score + PROGRESS and all(map(is_possible, at))
-        return (
-            replace(model, chosen=at, fit=fit, score=model.score + fit.score - model.fit.score)
-            if better
-            else model
-        )
+        fit, at = found
+        gain = fit.score - model.fit.score
+        if gain <= PROGRESS or not all(map(is_possible, at)):
+            return model
+        return replace(model, chosen=at, fit=fit, score=model.score + gain)
 
     def _line(self, chosen: Sequence[Chosen]) -> Floats:
         return np.asarray(np.sum([_columns(self.columns, c) @ c.values for c in chosen], axis=0))
 
-    def _without(self, missed: Floats, fit: Fit) -> Fit:
+    def _less(self, missed: Floats, fit: Fit) -> Fit:
+        """The fit on a residual less something."""
         residual = self.columns.residual - missed
         return fitted(replace(self.columns, residual=residual), fit.parts, amplitudes(fit))
 
@@ -328,7 +338,7 @@ class _World:
         if key not in self.optima:
             rest = fit.without([c.part.name for c in chosen])
             begin = np.concatenate([_whole(replace(c, values=_values(fit, c))) for c in chosen])
-            low, high = (np.concatenate([_bounds(c)[k] for c in chosen]) for k in (0, 1))
+            low, high = (np.concatenate([_limits(c)[k] for c in chosen]) for k in (0, 1))
             inside = 1e-6 * np.minimum(np.nan_to_num(high - low, posinf=1.0), 1.0)
 
             def residual(x: Floats) -> Floats:
@@ -366,7 +376,7 @@ class _World:
             if len(bounds) < 2:
                 continue
             for anchor in self._anchors(fewer):
-                shapes = [p.shapes[int(np.argmax(evidence(anchor, (p,))[0]))] for _, p, _ in bounds]
+                shapes = [p.shapes[_best_shape(anchor, p)] for _, p, _ in bounds]
                 gain = np.tril(of_pairs(anchor, shapes), -1)
                 for k in np.argsort(gain, axis=None)[::-1][:REFITS]:
                     places = [bounds[int(i)][1] for i in np.unravel_index(int(k), gain.shape)]
@@ -385,29 +395,33 @@ class _World:
         """The set with the coarsest part in each effect's place, of those whose evidence is the same."""
         order = {id(p): k for k, p in enumerate(self.columns.places)}
         for c in model.chosen:
-            found = [
-                (order[id(p)], m) for p, m in self._fitted(model, c) if m.score > model.score - SAME_EVIDENCE
-            ]
+            fitted = self._fitted(model, c, self._steads(model, c))
+            found = [(order[id(p)], m) for p, m in fitted if m.score > model.score - SAME_EVIDENCE]
             first = min(found, key=lambda f: f[0], default=None)
             if first is not None and first[0] < order[id(c.place)]:
                 model = first[1]
         return model
 
-    def _fitted(self, model: Model, c: Chosen) -> list[tuple[Place, Model]]:
+    def _steads(self, model: Model, c: Chosen) -> list[tuple[float, Place, Fit]]:
+        """Bounds of all places in an effect's stead, the likeliest first."""
+        at_best = model.fit.without([c.part.name])
+        return sorted(self._bounds(self.less(model, c), (at_best,)), key=lambda b: -b[0])
+
+    def _fitted(
+        self, model: Model, c: Chosen, steads: list[tuple[float, Place, Fit]]
+    ) -> list[tuple[Place, Model]]:
         """The likeliest places in an effect's stead, fitted."""
         less = self.less(model, c)
-        bounds = sorted(self._bounds(less, (model.fit.without([c.part.name]),)), key=lambda b: -b[0])
-        likely = [b for b in bounds if b[1] is not c.place and b[0] > model.score - SHORT]
+        likely = [b for b in steads if b[1] is not c.place and b[0] > model.score - SHORT]
         return [(p, self._with(less, [p], anchor)) for _, p, anchor in likely[:RIVALS_FITTED]]
 
     def rivals(self, model: Model) -> tuple[tuple[float, tuple[tuple[Place, float], ...]], ...]:
         """Per effect its ln odds, all places that would do together, and those places; the likeliest are fitted."""
         out = []
         for c in model.chosen:
-            less = self.less(model, c)
-            at_best = model.fit.without([c.part.name])
-            scores = {id(p): (s - model.score, p) for s, p, _ in self._bounds(less, (at_best,))}
-            for p, m in self._fitted(model, c):
+            less, steads = self.less(model, c), self._steads(model, c)
+            scores = {id(p): (s - model.score, p) for s, p, _ in steads}
+            for p, m in self._fitted(model, c, steads):
                 scores[id(p)] = (max(scores[id(p)][0], m.score - model.score), p)
             scores[id(c.place)] = (0.0, c.place)
             together = float(np.logaddexp.reduce([s for s, _ in scores.values()]))
@@ -427,9 +441,9 @@ def is_possible(c: Chosen) -> bool:
     return all(low <= x <= high for p, x in c.strengths for low, high in [possible(p)])
 
 
-def _bounds(c: Chosen) -> tuple[Floats, Floats]:
+def _limits(c: Chosen) -> tuple[Floats, Floats]:
     """(p + q,) least and largest values of strengths, in scales, and of the shape; infinite for strengths that are no parameters."""
-    number = c.place.shapes[c.shape].variant.array().shape[0]
+    number = len(c.variant.sign)
     low, high = np.full(number, -np.inf), np.full(number, np.inf)
     if len(c.place.candidate.linear) == number:
         both = [(*possible(p), float(p.null or 0.0), p.scale) for p in c.place.candidate.linear]
@@ -451,7 +465,7 @@ def _at(chosen: Sequence[Chosen], x: Floats) -> tuple[Chosen, ...]:
     """The effects with strengths and shapes x, one after the other."""
     out, k = [], 0
     for c in chosen:
-        number, shape = c.place.shapes[c.shape].variant.array().shape[0], [p for p, _ in c.shaped]
+        number, shape = len(c.variant.sign), [p for p, _ in c.shaped]
         refined = zip(shape, x[k + number :], strict=False)
         out.append(
             replace(
@@ -465,6 +479,11 @@ def _at(chosen: Sequence[Chosen], x: Floats) -> tuple[Chosen, ...]:
 def amplitudes(fit: Fit) -> dict[str, float]:
     """ln variances of a fit, by the names of its parts."""
     return {NOISE: float(fit.t[0]), **{p.name: float(t) for p, t in zip(fit.parts, fit.t[1:], strict=True)}}
+
+
+def _best_shape(anchor: Fit, place: Place) -> int:
+    """Number of the shape that gains most at the anchor's amplitudes."""
+    return int(np.argmax(evidence(anchor, (place,))[0]))
 
 
 def _size(anchor: Fit, part: Part) -> float:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.identification.inference.amplitudes import NOISE, OFF, Fit
+from stiffmap.experiment.experiment import Floats
+from stiffmap.identification.inference.amplitudes import GAPS, NOISE, OFF, Fit
 from stiffmap.identification.inference.columns import Columns
 
 
@@ -35,12 +35,12 @@ def of_numbers(columns: Columns, fit: Fit) -> list[tuple[float, float, float]]:
     return out
 
 
-def gap_of(columns: Columns, fit: Fit, e: Experiment) -> Floats:
+def gap_of(columns: Columns, fit: Fit) -> Floats:
     """(n, c) m, rad: what nobody can name, at the readings that were compared; NaN elsewhere."""
-    out = np.full(e.reading.shape, np.nan)
+    out = np.full(columns.experiment.reading.shape, np.nan)
     whole = np.zeros(len(columns))
     for p, t in zip(fit.parts, fit.t[1:], strict=True):
-        if p.kind in ("field", "pose") and t > OFF:
+        if p.kind in GAPS and t > OFF:
             whole = whole + fit.mean(p)
     out[columns.rows, columns.channel] = columns.sigma * (columns.free @ whole)
     return out

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2, norm
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.identification.calibration.unknowns import Unknown
-from stiffmap.identification.inference.amplitudes import OFF, Fit, Part, noise_prior
+from stiffmap.identification.inference.amplitudes import GAPS, OFF, Fit, noise_prior
 from stiffmap.identification.inference.columns import Columns, Place
 from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, ODDS, RARE, TOLERANCES
 from stiffmap.identification.inference.names import EXACT, Chosen, Model, Search, is_possible
@@ -19,8 +19,6 @@ from stiffmap.identification.inference.shares import of_numbers
 DETERMINED = 0.5
 """Posterior standard deviation, in standard uncertainties, of a number that the readings determine."""
 TOLERABLE = "declared numbers within their tolerances show the same"
-GAPS = ("field", "pose")
-"""Kinds of parts that nobody can name."""
 KAPPA_SDS = 4.0
 """Prior standard deviations of ln κ beyond which the noise is no noise."""
 
@@ -115,10 +113,9 @@ def effect_of(columns: Columns, b: Beyond, taken: Sequence[Chosen]) -> Chosen | 
             continue
         if any(c.place is place for c in taken):
             return None
-        part = Part(str(place.candidate), "effect", factor=place.shapes[0].factor)
-        lines = columns.rotated(columns.lines(place.shapes[0].variant))
-        values = np.linalg.lstsq(lines, b.value * d, rcond=1e-9)[0]
-        found = Chosen(place, 0, part, np.asarray(values, dtype=float))
+        bare = Chosen.at(place, 0)
+        values = np.linalg.lstsq(columns.rotated(bare.lines(columns)), b.value * d, rcond=1e-9)[0]
+        found = replace(bare, values=np.asarray(values, dtype=float))
         return found if is_possible(found) else None
     return None
 

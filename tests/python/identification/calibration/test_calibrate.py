@@ -154,8 +154,8 @@ def test_columns_are_those_of_the_machine_that_is_found() -> None:
     problem = Problem.of(plan, plan.sigma, s.base)
     size = [float(np.linalg.norm(problem.white(c.columns))) for c in (s, moved)]
     assert size[1] / size[0] == pytest.approx(2.0, rel=0.05)
-    assert bends(problem, s, values, predicted(predictor, s.unknowns, values))
-    assert not bends(problem, s, values * 0.01, predicted(predictor, s.unknowns, values * 0.01))
+    assert bends(problem.white, s, values, predicted(predictor, s.unknowns, values))
+    assert not bends(problem.white, s, values * 0.01, predicted(predictor, s.unknowns, values * 0.01))
 
 
 def test_a_calibration_of_compliances_ends_at_their_most_likely_values() -> None:

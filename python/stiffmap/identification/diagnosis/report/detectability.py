@@ -9,7 +9,7 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.diagnosis.report.effects import as_place
 from stiffmap.identification.diagnosis.report.findings import Detectability
 from stiffmap.identification.inference.amplitudes import Fit
-from stiffmap.identification.inference.columns import Columns, Place, possible
+from stiffmap.identification.inference.columns import Columns, Place, reach
 from stiffmap.identification.inference.constants import ODDS
 
 POWER = 0.95
@@ -39,7 +39,5 @@ def _sizes(columns: Columns, fit: Fit, place: Place, needed: float) -> dict[str,
             each.append(needed / np.linalg.norm(white, axis=0))
     out: dict[str, float | None] = {}
     for p, size in zip(linear, np.median(each, axis=0), strict=True):
-        low, high = possible(p)
-        most = max(high - float(p.null or 0.0), float(p.null or 0.0) - low)
-        out[p.name] = float(size) * p.scale if float(size) * p.scale < most else None
+        out[p.name] = float(size) * p.scale if float(size) < reach(p) else None
     return out

@@ -82,8 +82,6 @@ class Number:
     """After them."""
     share: float
     """Of the squares of the difference from the declared machine."""
-    rivals: tuple[str, ...] = ()
-    """Other numbers that show nearly the same."""
 
 
 @dataclass(frozen=True)
