@@ -1,0 +1,79 @@
+"""The machine that is handed over: its optimum, which of three it is, and what it promises."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.experiment import Predictor, random_plan
+from stiffmap.experiment.channels import AXIS_CHANNELS
+from stiffmap.identification.calibration import unknowns
+from stiffmap.identification.calibration.model import predicted, sensitivity
+from stiffmap.identification.inference import machines
+from stiffmap.identification.inference.corrected import Readings, corrected
+
+NOBODY: Any = None
+
+
+def test_a_promise_is_what_estimates_from_other_poses_are_off_by(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Against draws: numbers from their prior, a frame, a smooth gap that goes on from pose to pose, and noise."""
+    rng = np.random.default_rng(0)
+    n, p = 40, 4
+    x = np.linspace(0.0, 1.0, n)
+    columns = np.column_stack([rng.normal(size=(n, p - 1)), np.ones(n)])
+    prior = np.array([1.0, 1.0, 1.0, 0.0])
+    rest = 4.0 * np.exp(-(((x[:, None] - x) / 0.3) ** 2))
+    e = SimpleNamespace(groups=np.arange(n), channels=AXIS_CHANNELS)
+    given: Any = SimpleNamespace(
+        predictor=SimpleNamespace(experiment=e), rows=np.arange(n), channel=np.zeros(n, np.intp),
+        sigma=np.full((n, 6), 2.0), noise=np.ones(n), rest=rest,
+    )  # fmt: skip
+    monkeypatch.setattr(machines, "columns_of", lambda *_: (columns, prior))
+    size, u = machines.promised(given, NOBODY)
+    covariance = rest + np.eye(n)
+    label = np.random.default_rng(0).permutation(n) % machines.FOLDS
+    draws = 4000
+    beta = rng.normal(size=(p, draws)) * np.array([1.0, 1.0, 1.0, 5.0])[:, None]
+    error = np.linalg.cholesky(covariance) @ rng.normal(size=(n, draws))
+    squares = []
+    for k in range(machines.FOLDS):
+        seen, out = label != k, label == k
+        w = np.linalg.inv(covariance[np.ix_(seen, seen)])
+        b = columns[seen]
+        found = np.linalg.solve(b.T @ w @ b + np.diag(prior), b.T @ w @ (b @ beta + error[seen]))
+        squares.append((columns[out] @ (beta - found) + error[out]) ** 2)
+    assert size == pytest.approx(2.0 * np.sqrt(np.mean(np.concatenate(squares))), rel=0.02)
+    assert u == pytest.approx(size / np.sqrt(2.0 * n))
+
+
+@pytest.mark.parametrize(("declared", "best"), [(1.0, "corrected"), (0.97, "corrected"), (0.5, "declared")])
+def test_the_corrected_machine_is_handed_over_unless_another_is_clearly_better(
+    declared: float, best: str
+) -> None:
+    rng = np.random.default_rng(3)
+    left = {"corrected": rng.normal(size=(30, 3)), "declared": declared * rng.normal(size=(30, 3))}
+    assert machines._best(left, "corrected", np.ones((30, 3)), np.arange(30)) == best
+
+
+@pytest.mark.parametrize("spread", [1e-6, 0.01, 100.0])
+def test_numbers_move_as_far_as_their_spread_allows(spread: float) -> None:
+    """One zero of a drive off by two uncertainties, read without noise: the posterior mean of a straight line, worked out here."""
+    machine = sm.load_machine("orthoglide-revised")
+    p = Predictor(machine, random_plan(machine, "position", poses=8, seed=1))
+    wanted = [u for u in unknowns(machine.description, p.experiment) if u.group == "zeros"]
+    off = np.array([2.0, 0.0, 0.0])
+    p = Predictor(machine, p.experiment.with_readings(predicted(p, wanted, off)))
+    e, s = p.experiment, sensitivity(p, wanted)
+    rows, channel = np.nonzero(e.read)
+    n = len(rows)
+    given = Readings(
+        p, e.sigma, rows, channel, np.ones(n), np.zeros((n, n)), False, replace(s), np.full(3, spread)
+    )
+    a = s.columns[rows, channel] / e.sigma[rows, channel][:, None]
+    expected = np.linalg.solve(a.T @ a + np.eye(3) / spread**2, a.T @ (a @ off))
+    assert corrected(given, ()).numbers == pytest.approx(expected, abs=0.01)
