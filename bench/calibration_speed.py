@@ -20,9 +20,8 @@ import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.virtual.plans import plan_of_joints
-from stiffmap.identification.calibration import Calibrator, unknowns
-from stiffmap.identification.calibration.conclude import conclude
-from stiffmap.identification.calibration.model import predicted
+from stiffmap.identification.numbers import unknowns
+from stiffmap.identification.numbers.sensitivity import predicted
 
 NOISE, ANGLE = 3e-5, 1e-4
 
@@ -57,21 +56,16 @@ def main() -> int:
     machine, data, truth = twin(a.poses, a.seed)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
     wall, cpu = time.perf_counter(), time.process_time()
-    predictor = Predictor(machine, data)
-    found = Calibrator.of(predictor, unknowns(machine.description, predictor.experiment))
-    c = conclude(found)
+    c = sm.calibrate(machine, data)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-    spread = np.sqrt(np.diag(found.sums.covariance))
-    true = np.array([truth[u.name] for u in found.sensitivity.unknowns])
-    told = spread < 0.7
-    inside = np.abs(found.fit.values - true)[told] <= 1.96 * spread[told]
+    known = [r for r in c.rows if r.identifiable]
+    inside = np.array([abs(r.value - truth[r.name] * r.u) <= 1.96 * r.sigma for r in known])
     print(
-        f"{a.poses} poses, {data.read.sum()} readings, {len(c.rows)} unknowns, {c.rank} directions told: {c.verdict}"
+        f"{a.poses} poses, {data.read.sum()} readings, {len(c.rows)} unknowns, {c.rank} directions determined: {c.verdict}"
     )
-    print(", ".join(f"{k} {v:.1f} s" for k, v in c.seconds.items()))
     print(f"{wall:.1f} s, {cpu:.1f} s of CPU; peak memory {peak:.0f} MB ({before:.0f} MB before)")
-    print(f"{inside.sum()} of {told.sum()} numbers that are told are inside their 95 % intervals")
+    print(f"{inside.sum()} of {len(known)} numbers that are determined are inside their 95 % intervals")
     return int(inside.mean() < 0.8)
 
 

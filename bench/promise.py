@@ -15,8 +15,8 @@ import numpy as np
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
-from stiffmap.identification.calibration import unknowns
-from stiffmap.identification.calibration.model import predicted
+from stiffmap.identification.numbers import unknowns
+from stiffmap.identification.numbers.sensitivity import predicted
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.validity import Validity
 

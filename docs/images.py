@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan
-from stiffmap.identification.calibration import unknowns
-from stiffmap.identification.calibration.model import predicted
+from stiffmap.identification.numbers import unknowns
+from stiffmap.identification.numbers.sensitivity import predicted
 from stiffmap.model.description import AppliedEffect, Offset, Pose
 from stiffmap.ui.cli import main as stiffmap
 from stiffmap.ui.plot import path_figure, save, stress_figure

@@ -14,7 +14,6 @@ import argparse
 import csv
 import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -24,8 +23,9 @@ import stiffmap as sm
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
-from stiffmap.identification.calibration import Calibration, Tolerances
-from stiffmap.identification.calibration.travel import Profile
+from stiffmap.identification.calibration import Calibration
+from stiffmap.identification.inference.travel import Profile
+from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli.calibrate import write as write_calibration
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "measured" / "ipa_ur10_accuracy"
@@ -104,11 +104,9 @@ def calibrated(series: str, folder: Path, tolerance: float) -> Calibration:
     if c.held_out is None or geometry.held_out is None:
         return c
     print(f"  held-out {c.held_out.by}, rms of the position error's length, mm")
-    print(f"    as declared (frame and tool fitted)  {LENGTH * c.held_out.before:.3f}")
-    print(f"    geometry                             {LENGTH * geometry.held_out.after:.3f}")
-    print(f"    geometry, drives and masses          {LENGTH * c.held_out.after:.3f}")
-    if c.travel:
-        print(f"    and a profile of each drive          {LENGTH * c.travel.after:.3f}")
+    print(f"    as declared (frame and tool fitted)  {LENGTH * c.held_out.before.rms:.3f}")
+    print(f"    geometry                             {LENGTH * geometry.held_out.after.rms:.3f}")
+    print(f"    geometry, drives and masses          {LENGTH * c.held_out.after.rms:.3f}")
     return c
 
 
@@ -117,12 +115,8 @@ def elsewhere(first: str, c: Calibration, series: str, folder: Path, own: Calibr
     aside = np.isin(own.experiment.ids, own.outliers)
     print(f"\nseries {series} predicted by series {first}, rms of the position error's length, mm")
     declared = Predictor(sm.load_machine("ur10"), own.experiment)
-    numbers = replace(c.correction, hats=None).of(np.ones(len(c.experiment), bool)).machine
-    machines = [(f"calibrated on {first}", numbers)]
-    if c.travel:
-        machines.append((f"and the drives' profiles of {first}", c.machine))
-    predictions = [(name, Predictor(m, own.experiment)()) for name, m in machines]
-    for name, prediction in [("as declared", declared()), *predictions]:
+    found = Predictor(c.machine, own.experiment)()
+    for name, prediction in (("as declared", declared()), (f"calibrated on {first}", found)):
         problem = Problem.of(own.experiment, declared.experiment.sigma, prediction, ~aside)
         raw = own.experiment.reading - prediction
         left = (raw - nuisance_part(problem, raw))[~aside, :3]
@@ -132,8 +126,8 @@ def elsewhere(first: str, c: Calibration, series: str, folder: Path, own: Calibr
 def alike(found: dict[str, Calibration]) -> None:
     """How far the profiles of two series, each found by itself, are the same where both have been."""
     for one, other in combinations(found, 2):
-        a, b = found[one].travel, found[other].travel
-        for p, q in zip(a.profiles, b.profiles, strict=True) if a and b else ():
+        others = {q.drive: q for q in found[other].profiles}
+        for p, q in [(p, others[p.drive]) for p in found[one].profiles if p.drive in others]:
             at = np.radians(np.arange(0.0, 360.0))
             both = [standing(np.array(x.at), at) for x in (p, q)]
             x = at[both[0] & both[1]]

@@ -4,7 +4,8 @@
     python examples/measured_delta_files.py [DATA] [OUT] [EVERY]
     stiffmap calibrate OUT/flsun.yaml OUT/heights -o OUT/calibration
 
-DATA as in measured_delta.py; OUT (default: delta) gets flsun.yaml, heights/ and both/ (the same heights and 24 distances); EVERY (default 7) takes every so manyth height.
+DATA is the folder with heights.csv, distances.csv and sessions.csv (not part of stiffmap; without it the script says so and ends);
+ OUT (default: delta) gets flsun.yaml, heights/ and both/ (the same heights and 24 distances); EVERY (default 7) takes every so manyth height.
 One machine stands for all sessions: what each firmware believed is in its commands only. docs/measured_delta.md tells the result.
 """
 

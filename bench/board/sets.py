@@ -18,7 +18,8 @@ import stiffmap as sm
 from board.peers import beside_arm, plain_places
 from board.row import Row
 from stiffmap.experiment.files.load import load_experiment
-from stiffmap.identification.calibration import Calibration, Tolerances
+from stiffmap.identification.calibration import Calibration
+from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli.calibrate import write as write_calibration
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

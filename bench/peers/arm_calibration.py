@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 import stiffmap as sm
 from stiffmap.experiment import Predictor, load_experiment
 from stiffmap.experiment.noise.folds import folds
-from stiffmap.identification.calibration import Tolerances
+from stiffmap.identification.numbers import Tolerances
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
 import measured_arm

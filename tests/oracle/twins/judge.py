@@ -9,8 +9,8 @@ import numpy as np
 from tests.oracle.twins.faults import Fault
 from tests.oracle.twins.generator import Twin
 
-from stiffmap.identification.calibration import Tolerances
 from stiffmap.identification.diagnosis import Diagnosis
+from stiffmap.identification.numbers import Tolerances
 from stiffmap.model.description.tree import joints
 
 ALIKE = 0.98

@@ -20,10 +20,17 @@ PACKAGE = Path(__file__).parents[3] / "python/stiffmap"
 ROOMS = ("common", "model", "solve", "workspace", "experiment", "identification", "machining", "ui")
 # Packages inside a room or a package, each may import earlier ones only.
 INNER = {
-    "identification": (("clock", "candidates", "calibration"), "inference", "diagnosis", "planning", "taps"),
+    "identification": (
+        ("clock", "validity", "candidates", "numbers"),
+        "inference",
+        ("calibration", "diagnosis"),
+        "planning",
+        "taps",
+    ),
     "identification.inference": (
         "constants",
         "kernels",
+        "travel",
         "columns",
         "amplitudes",
         "candidates",

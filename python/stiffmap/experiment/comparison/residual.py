@@ -14,8 +14,8 @@ from stiffmap.experiment.comparison.limitations import limitations, refuse_unrea
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import Check, checks
-from stiffmap.experiment.noise.level import Mask, Noise, noise_of
-from stiffmap.experiment.noise.outliers import suspects
+from stiffmap.experiment.noise.level import Mask, Noise
+from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.noise.over_time import over_time
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.notebook import residual_html
@@ -99,10 +99,8 @@ def residual(
     predictor = Predictor(machine, experiment, threads=threads)
     e, base = predictor.experiment, predictor(tuple(effects))
     refuse_unreachable(e, base)
-    rough = noise_of(e)
     raw = e.reading - base
-    out = suspects(e, raw - nuisance_part(Problem.of(e, rough.sigma, base), raw), rough.sigma)
-    noise = noise_of(e, ~out)
+    noise, out = without_suspects(e, base)
     problem = Problem.of(e, noise.sigma, base, ~out)
     part = nuisance_part(problem, raw)
     kept = np.where(out[:, None], np.nan, raw - part)

@@ -44,12 +44,17 @@ def _frames(experiment: Experiment, base: Floats) -> Iterator[Floats]:
 
 def _turns(here: Floats, experiment: Experiment, base: Floats) -> Iterator[Floats]:
     position = experiment.quantity == "position"
-    place = experiment.position + _levers(experiment)
+    place = target_positions(experiment)
     at, turned = np.nan_to_num(base[:, :3]), np.nan_to_num(base[:, 3:6])
     for axis in np.eye(3):
         linear = np.cross(axis, place + at if position else at)
         angular = _of_rotation_vector(turned, axis) if position else np.cross(axis, turned)
         yield _wide(experiment, here[:, None] * np.hstack([linear, angular]))
+
+
+def target_positions(experiment: Experiment) -> Floats:
+    """(n, 3) m, base axes: where the targets were commanded."""
+    return np.asarray(experiment.position + _levers(experiment))
 
 
 def _levers(experiment: Experiment) -> Floats:

@@ -2,57 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.level import Noise, noise_of
+from stiffmap.experiment.noise.nuisance import target_positions
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 
 Mask = NDArray[np.bool_]
-FALSE = 0.01
-"""Probability of listing any row of a clean experiment."""
-FEW = 0.02
-"""Largest share of the poses that were read once and may be outliers: more of them are structure."""
 MANY, LEAST_MANY = 0.1, 2
 """Share and number of rows beyond which those that stand alone before any effect is known are an effect."""
+NAMED = 12
+"""Rows that a line names."""
 GROSS = 8.0
 """Robust standard deviations beyond which a reading is an outlier before any effect is known; a pose that was
 read once is beyond them as a whole."""
-
-
-def row_scores(residual: Floats, sigma: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """(n,) squared length of each row's residual in standard deviations, and its readings."""
-    z = residual / sigma
-    count = np.isfinite(z).sum(axis=1)
-    return np.nansum(z**2, axis=1), count
-
-
-def outliers(experiment: Experiment, residual: Floats, sigma: Floats, *, lone: bool = False) -> Mask:
-    """(n,) rows whose residual (n, 6) to a model that fits is too long for noise.
-
-    A pose, or a branch, of which half or more would go is no outlier: it stays whole. With `lone`, poses that were read
-    once may go beyond `GROSS`, if they are `FEW`: the model is then held by all the others.
-    """
-    score, count = row_scores(residual, sigma)
-    p = chi2.sf(score, np.maximum(count, 1))
-    found = np.asarray((p < FALSE / max(len(experiment), 1)) & (count > 0))
-    out = whole_stays(experiment, found)
-    if lone:
-        once = np.bincount(experiment.groups)[experiment.groups] == 1
-        gross = score > GROSS**2 + np.maximum(count - 1, 0)
-        alone = gross & once & whole_stays(experiment, gross, poses=False)
-        if alone.sum() <= FEW * once.sum():
-            out |= alone
-    return out
 
 
 def suspects(experiment: Experiment, residual: Floats, sigma: Floats) -> Mask:
     """(n,) outliers before any effect is known, when residuals are structured.
 
     Repeats that contradict each other, the one farther from its condition's or the model's middle;
-    and rows beyond `GROSS` robust standard deviations of all residuals of their axis.
+    and rows beyond `GROSS` robust standard deviations of all residuals of their axis, poses that were read once among them.
     """
     residual, sigma = residual[:, experiment.axis_read], sigma[:, experiment.axis_read]
     away = np.abs(residual - np.nanmedian(residual, axis=0))
@@ -108,23 +83,64 @@ def _middle(z: Floats, read: Mask) -> Floats:
     return np.asarray(np.where(count > 0, (low + high) / 2, 0.0)[:, 0])
 
 
-def whole_stays(experiment: Experiment, found: Mask, *, poses: bool = True) -> Mask:
-    """`found` without the rows of (poses and) branches that would lose half or more of their rows."""
+def swapped(experiment: Experiment, left: Floats, sigma: Floats, out: Mask) -> list[tuple[int, int]]:
+    """Pairs of outliers `out` (n,) that fit where each has the reading of the other; `left` (n, c) is what the model leaves of the
+    readings."""
+    where = np.zeros_like(left)
+    if experiment.quantity == "position":
+        where[:, :3] = target_positions(experiment)
+    shown = where + experiment.reading - left
+    rows = list(np.flatnonzero(out))
+    pairs: list[tuple[int, int]] = []
+    if len(rows) < 2:
+        return pairs
+    typical = [np.median(np.abs(v[np.isfinite(v)])) if np.isfinite(v).any() else np.nan for v in left[~out].T]
+    limit = GROSS * np.fmax(1.4826 * np.array(typical), sigma)
+    for k, i in enumerate(rows):
+        for j in rows[k + 1 :]:
+            moved = shown[j] - shown[i]
+            both = np.stack([left[j] + moved, left[i] - moved]) / limit[[i, j]]
+            read = np.isfinite(both)
+            if read.any() and (np.abs(both[read]) < 1.0).all():
+                pairs.append((int(i), int(j)))
+    return pairs
+
+
+def set_aside(ids: Sequence[str], pairs: Sequence[tuple[str, str]]) -> list[str]:
+    """Outliers in words, and which of them look swapped."""
+    if not ids:
+        return []
+    more = f" and {len(ids) - NAMED} more" if len(ids) > NAMED else ""
+    plural = "s" if len(ids) > 1 else ""
+    out = [f"set aside as outlier{plural}: row{plural} {', '.join(ids[:NAMED])}{more}"]
+    return out + [f"rows {a} and {b} fit as swapped: each as the reading of the other" for a, b in pairs]
+
+
+def whole_stays(experiment: Experiment, found: Mask) -> Mask:
+    """`found` without the rows of branches, and of poses that were read more than once, that would lose half or more of their
+    rows."""
     out = found.copy()
-    labels = [experiment.groups] if poses else []
+    labels = [experiment.groups]
     if experiment.branch:
         labels.append(np.unique(experiment.branch, return_inverse=True)[1])
     for label in labels:
         total = np.bincount(label)
         share = np.bincount(label, found, len(total)) / total
         limit = np.where(total > 2, 0.5, 0.51)  # of two readings one may go
+        limit = np.where(total > 1, limit, np.inf)
         out &= share[label] < limit[label]
     return out
 
 
-def noise_without_suspects(experiment: Experiment, base: Floats) -> Noise:
-    """The noise floor of readings that do not stand alone before any effect is known; `base` (n, c) is the declared prediction."""
-    rough = noise_of(experiment)
-    raw = experiment.reading - base
-    bare = raw - nuisance_part(Problem.of(experiment, rough.sigma, base), raw)
-    return noise_of(experiment, ~suspects(experiment, bare, rough.sigma))
+def without_suspects(experiment: Experiment, base: Floats) -> tuple[Noise, Mask]:
+    """The noise floor of readings that do not stand alone before any effect is known, and (n,) those that do; `base` (n, c) is the
+    declared prediction. One that is far off hides another one, so they are looked for until there is none."""
+    out, raw = np.zeros(len(experiment), bool), experiment.reading - base
+    while True:
+        noise = noise_of(experiment, ~out)
+        problem = Problem.of(experiment, noise.sigma, base, ~out)
+        bare = np.where(out[:, None], np.nan, raw - nuisance_part(problem, raw, robust=True))
+        more = whole_stays(experiment, out | suspects(experiment, bare, noise.sigma))
+        if not (more & ~out).any():
+            return noise, out
+        out |= more

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.nuisance import nuisance_columns
+from stiffmap.experiment.noise.robust import fitted
 
 Mask = NDArray[np.bool_]
 FELT = 1e-3
@@ -164,17 +165,20 @@ def readings_of(experiment: Experiment, base: Floats) -> tuple[NDArray[np.intp],
     return at.astype(np.intp), axis.astype(np.intp)
 
 
-def nuisance_part(problem: Problem, values: Floats) -> Floats:
+def nuisance_part(problem: Problem, values: Floats, *, robust: bool = False) -> Floats:
     """(n, c) what the nuisances of best fit say of `values` (n, c); NaN where they are."""
-    return best_fit(problem, nuisance_columns(problem.experiment, problem.base), values)
+    return best_fit(problem, nuisance_columns(problem.experiment, problem.base), values, robust=robust)
 
 
-def best_fit(problem: Problem, columns: Floats, values: Floats) -> Floats:
-    """(n, c) what columns (n, c, q) of best fit to the kept readings say of `values` (n, c), nothing else fitted."""
+def best_fit(problem: Problem, columns: Floats, values: Floats, *, robust: bool = False) -> Floats:
+    """(n, c) what columns (n, c, q) of best fit to the kept readings say of `values` (n, c), nothing else fitted; `robust`:
+    readings that are far off do not count."""
     if not columns.shape[-1]:
         return np.zeros_like(values)
     bare = replace(problem.exact, nuisance=np.zeros((len(problem), 0)))
     white = np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])])
+    if robust:
+        return np.asarray(columns @ fitted(white, bare.white(np.nan_to_num(values)))[0])
     size = np.linalg.norm(white, axis=0)
     scaled = white / np.where(size > 0, size, 1.0)
     found = np.linalg.lstsq(scaled, bare.white(np.nan_to_num(values)), rcond=1e-9)[0]

@@ -12,16 +12,27 @@ from stiffmap.common.broadcasting import whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.comparison.limitations import refuse
+from stiffmap.experiment.comparison.summary import summary
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
+from stiffmap.experiment.noise.outliers import swapped
+from stiffmap.experiment.noise.over_time import over_time
+from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.calibrator import Calibrator
-from stiffmap.identification.calibration.certificate import certified
-from stiffmap.identification.calibration.conclude import conclude
-from stiffmap.identification.calibration.defaults import Tolerances
-from stiffmap.identification.calibration.model import Progress
 from stiffmap.identification.calibration.result import Calibration
-from stiffmap.identification.calibration.unknowns import GROUPS, unknowns
+from stiffmap.identification.calibration.table import table_of, too_wide
+from stiffmap.identification.candidates.plan import Plan
+from stiffmap.identification.clock import Clock, Progress
+from stiffmap.identification.inference.amplitudes import GAPS, NOISE
+from stiffmap.identification.inference.constants import ODDS
+from stiffmap.identification.inference.corrected import Corrected, Readings, corrected, readings
+from stiffmap.identification.inference.inference import Inferred, infer
+from stiffmap.identification.inference.machines import CALIBRATED, left_by, stands_out, vouched, written
+from stiffmap.identification.inference.names import EXACT
+from stiffmap.identification.inference.shares import shares
+from stiffmap.identification.inference.verdict import judged
+from stiffmap.identification.numbers import GROUPS, Tolerances
+from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine, load_machine
 
 
@@ -50,11 +61,11 @@ def calibrate(
     exclude
         Groups that are left out (`GROUPS`): what is known to be right.
     seed
-        Of the folds.
+        Of the folds, and of the poses that are drawn of many.
     time_limit
         Seconds after which no new step begins; the answer is then the best so far, and says so.
     progress
-        Called with what is being tried, its number, and of how many.
+        Called with a text on what is being tried.
 
     Raises
     ------
@@ -68,12 +79,71 @@ def calibrate(
     for name in exclude:
         if name not in GROUPS:
             raise StiffmapError(f"calibration: unknown group '{name}'; there are: {', '.join(GROUPS)}")
-    predictor = Predictor(machine, data, threads=threads)
-    refuse(predictor.experiment, predictor())
-    wanted = [
-        p
-        for p in unknowns(machine.description, predictor.experiment, certified(tolerances, data))
-        if p.group not in exclude
-    ]
-    until = time.monotonic() + time_limit if time_limit else np.inf
-    return conclude(Calibrator.of(predictor, wanted, until, progress), seed)
+    clock, start = Clock.of(time_limit, progress), time.perf_counter()
+    with clock.on_interrupt():
+        predictor = Predictor(machine, data, threads=threads)
+        refuse(predictor.experiment, predictor())
+        empty = Plan.empty(predictor())
+        found = infer(predictor, empty, tolerances, exclude, clock, seed, travel=True)
+        return _answer(predictor, found, clock, seed, start)
+
+
+def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, start: float) -> Calibration:
+    e, columns, best = predictor.experiment, found.columns, found.search.best
+    base, sigma = found.plan.base, found.noise.sigma
+    listed = stands_out(columns, best.fit)
+    exact = best.score - found.search.exact < np.log(ODDS)
+    fit = best.fit if best.world == EXACT else found.search.calibrated or best.fit
+    clock.say("calibrated machine")
+    given = readings(predictor, found.uncertain, columns, fit, sigma)
+    models: dict[str, tuple[Readings, Corrected]] = {}
+    if given.drives or (len(given.spread) and not exact):
+        models[CALIBRATED] = (given, corrected(given, ()))
+    clock.say("readings that no fit saw")
+    made = written(models, base, given, listed, seed, lambda: clock.over)
+    at = models[CALIBRATED][1] if models else None
+    left = [np.where(listed[:, None], np.nan, left_by(e, sigma, p, ~listed)) for p in (base, made.prediction)]
+    before, after = (summary(v, sigma, e.channels) for v in left)
+    pairs = swapped(e, left_by(e, sigma, made.prediction, ~listed), sigma, listed)
+    rows, rank = table_of(columns, found.search.calibrated or fit, given, at)
+    verdict, wide = judged(columns, found.search), too_wide(fit)
+    at_name = {r.name: r for r in rows}
+    beyond = tuple(at_name[b.unknown.name] for b in verdict.beyond)
+    each = shares(columns, best.fit)
+    gap = sum(each.get(p.name, 0.0) for p in best.fit.parts if p.kind in (*GAPS, "time"))
+    problem = Problem.of(e, sigma, made.prediction, ~listed)
+    if beyond:
+        word = f"beyond tolerance: {', '.join(r.name for r in beyond)}"
+    elif (verdict.rest or verdict.time) and gap > 1.0 - gap - each[NOISE]:
+        word = "unattributed"
+    elif exact:
+        word = "as declared"
+    else:
+        word = f"adjusted {'beyond' if wide else 'within'} tolerance"
+    return Calibration(
+        verdict=word,
+        rows=rows,
+        rank=rank,
+        beyond=beyond,
+        wide=wide,
+        which=made.which,
+        before=before,
+        after=after,
+        held_out=made.held_out,
+        promise=made.promise,
+        noise=found.noise.rms,
+        scale=best.fit.noise,
+        shares=each,
+        rest=verdict.rest or verdict.time,
+        profiles=at.profiles if at and made.which == CALIBRATED else (),
+        outliers=tuple(e.ids[i] for i in np.flatnonzero(listed)),
+        swapped=tuple((e.ids[i], e.ids[j]) for i, j in pairs),
+        failed=given.sensitivity.failed,
+        stopped=clock.stopped,
+        machine=vouched(predictor, made, f"Numbers calibrated by experiment {e.name}.", columns, ~listed),
+        validity=covered(predictor.machine, e, ~listed),
+        over_time=over_time(problem, problem.residual(made.prediction)),
+        experiment=e,
+        residual=left[1],
+        seconds=time.perf_counter() - start,
+    )

@@ -1,30 +1,160 @@
-"""The answer of a calibration, with its words."""
+"""The answer of a calibration."""
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
+from stiffmap.common.plain import plain
 from stiffmap.common.short import short_repr
-from stiffmap.identification.calibration.corrected import Correction
-from stiffmap.identification.calibration.facts import Facts
-from stiffmap.identification.calibration.wording import lines, table
+from stiffmap.experiment.comparison.summary import Summary
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.noise.outliers import set_aside
+from stiffmap.experiment.noise.over_time import OverTime
+from stiffmap.identification.calibration.table import Row
+from stiffmap.identification.calibration.wording import in_display_units, measured, table
+from stiffmap.identification.inference.machines import HeldOut
+from stiffmap.identification.inference.travel import Profile
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.validity import Validity
+
+CLEARLY = 1.15
+"""Noise over what was declared, or under it, from which it is said."""
+LEAST, MOST = 0.005, 6
+"""Share from which a line names a part, and how many."""
 
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class Calibration(Facts):
+class Calibration:
     """What a machine's numbers are, given their uncertainties and the readings; SI."""
 
-    correction: Correction = field(repr=False, kw_only=True)
-    """How some of the readings, with effects besides, make such a machine."""
+    verdict: str
+    """``as declared``, ``adjusted within tolerance``, ``adjusted beyond tolerance``, ``beyond tolerance: NAME, ...`` or
+    ``unattributed``."""
+    rows: tuple[Row, ...]
+    rank: int
+    """Directions that the readings determine, of `len(rows)`."""
+    beyond: tuple[Row, ...]
+    """Numbers that no tolerance allows."""
+    wide: Mapping[str, float]
+    """Groups whose numbers are off by so many times their standard uncertainties (rms), where that is beyond doubt."""
+    which: str
+    """What `machine` is: ``calibrated``, or ``declared`` where that predicts as well."""
+    before: Summary
+    """The declared machine on all readings."""
+    after: Summary
+    """`machine` on all readings."""
+    held_out: HeldOut | None
+    """Both on readings that no fit saw; None where there are not two folds, or time was over."""
+    promise: tuple[float, float] | None
+    """By how much a reading of another pose will differ from `machine`, m or rad, and its standard uncertainty."""
+    noise: float
+    """Noise floor, m (NaN where only angles are read)."""
+    scale: float
+    """Noise of the readings over the floor."""
+    shares: Mapping[str, float]
+    """How the squares of the readings' difference from the declared machine are shared out."""
+    rest: str
+    """What is left that nobody can name; empty: nothing."""
+    profiles: tuple[Profile, ...]
+    """Errors along the drives' travel, which `machine` has."""
+    outliers: tuple[str, ...]
+    """Rows that stand alone."""
+    swapped: tuple[tuple[str, str], ...]
+    """Pairs of them that fit where each has the reading of the other."""
+    failed: tuple[tuple[str, str], ...]
+    """Unknowns that the machine cannot be built or solved with, and why."""
+    stopped: bool
+    """Whether the time budget ended it early: the answer is the best so far."""
+    machine: Machine = field(repr=False)
+    """The machine that is handed over; its controller keeps the declared numbers."""
+    validity: Validity
+    """What the readings covered; beyond it nothing vouches for `machine`."""
+    over_time: OverTime | None
+    """What `machine` leaves over time; None where no times were recorded."""
+    experiment: Experiment = field(repr=False)
+    residual: Floats = field(repr=False)
+    """(n, c) reading minus prediction of `machine`, less fitted frames and zeros; NaN of outliers."""
+    seconds: float
 
     def lines(self) -> list[str]:
         """The verdict in a few lines."""
-        return lines(self)
+        unit = self.before.size[1]
+
+        def size(s: Summary) -> str:
+            return in_display_units(s.size[0], unit)
+
+        out = [f"calibration: {self.verdict}{' (stopped early)' if self.stopped else ''}"]
+        out += [f"  {b.name}: {measured(b.value, b.sigma, b.unit)}" for b in self.beyond]
+        if not 1.0 / CLEARLY < self.scale < CLEARLY:
+            out.append(f"the noise is {self.scale:.2g} times what is stated, and is taken so")
+        out += [
+            f"{group}: {factor:.2g} times as far off (rms) as their standard uncertainties say; give those that this machine has "
+            f"(u in its file), or --tolerance {factor:.2g}"
+            for group, factor in self.wide.items()
+        ]
+        out.append(f"identifiable from the readings: {self.rank} directions of {len(self.rows)} unknowns")
+        parts = ", ".join(f"{p} {100 * s:.2g} %" for p, s in _largest(self.shares))
+        out.append(f"shares of the squares: {parts}")
+        noise = "" if math.isnan(self.noise) else f" (noise {in_display_units(self.noise, 'm')})"
+        out.append(f"misfit: rms {size(self.before)} as declared, {size(self.after)} {self.which}{noise}")
+        if self.held_out:
+            h = self.held_out
+            out.append(
+                f"machine file on {h.by} that no fit saw: rms {size(h.before)} as declared, {size(h.after)} {self.which}"
+            )
+        if self.promise:
+            out.append(f"machine file promises {measured(*self.promise, unit)} at other poses")
+        out.append(f"holds where it was read: {self.validity}")
+        if self.over_time is not None:
+            out.append(str(self.over_time))
+        if self.rest:
+            out.append(f"left: {self.rest}")
+        return out + set_aside(self.outliers, self.swapped)
 
     def table(self, most: int | None = None) -> list[str]:
         """The unknowns, one a line, those first that the readings determine best."""
-        return table(self, most)
+        return table(self.rows, most)
+
+    def to_json(self) -> str:
+        """All but arrays and machines, SI; NaN is null."""
+        return json.dumps(self.as_plain(), indent=2, ensure_ascii=False, allow_nan=False)
+
+    def as_plain(self) -> dict[str, Any]:
+        """JSON data."""
+        names = (
+            "verdict",
+            "rank",
+            "which",
+            "before",
+            "after",
+            "noise",
+            "scale",
+            "rest",
+            "outliers",
+            "swapped",
+            "stopped",
+        )
+        out = {n: plain(getattr(self, n)) for n in (*names, "seconds", "promise", "held_out", "over_time")}
+        v = self.validity
+        out["validity"] = plain(
+            {"poses": v.poses, "drives": dict(v.drives), "loads": dict(v.loads), "temperature": v.temperature}
+        )
+        out["shares"] = [{"part": name, "share": share} for name, share in self.shares.items()]
+        out["wide"] = [{"group": name, "factor": factor} for name, factor in self.wide.items()]
+        out["beyond"], out["table"] = plain(self.beyond), plain(self.rows)
+        out["travel"] = plain(self.profiles)
+        out["failed"] = [list(f) for f in self.failed]
+        return out
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
+
+
+def _largest(shares: Mapping[str, float]) -> list[tuple[str, float]]:
+    """The largest parts, largest first."""
+    return [(p, s) for p, s in sorted(shares.items(), key=lambda x: -x[1]) if s >= LEAST][:MOST]

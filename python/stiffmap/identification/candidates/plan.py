@@ -30,6 +30,11 @@ class Plan:
     digest: str = ""
     """Of the machine and the plan."""
 
+    @staticmethod
+    def empty(base: Floats) -> Plan:
+        """Without any effect."""
+        return Plan(base, Stack.of([]), ())
+
     @property
     def variants(self) -> tuple[Variant, ...]:
         """All of them."""

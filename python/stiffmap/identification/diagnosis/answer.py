@@ -9,16 +9,14 @@ import numpy as np
 from scipy.stats import chi2
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.limitations import limitations
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.over_time import over_time
-from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.validity import covered
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.clock import Clock
 from stiffmap.identification.diagnosis.report.detectability import detectable
@@ -28,14 +26,21 @@ from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.separation import separation
 from stiffmap.identification.inference.amplitudes import GAPS, Fit
 from stiffmap.identification.inference.columns import Columns, Place
-from stiffmap.identification.inference.constants import RARE, STANDS_OUT
+from stiffmap.identification.inference.constants import RARE
 from stiffmap.identification.inference.corrected import Corrected, Readings, Term, corrected, readings
 from stiffmap.identification.inference.inference import Inferred, terms
-from stiffmap.identification.inference.machines import CALIBRATED, CORRECTED, DECLARED, Written, written
+from stiffmap.identification.inference.machines import (
+    CALIBRATED,
+    CORRECTED,
+    Written,
+    left_by,
+    stands_out,
+    vouched,
+    written,
+)
 from stiffmap.identification.inference.names import Chosen, put_instead
 from stiffmap.identification.inference.shares import gap_of, of_numbers, shares
 from stiffmap.identification.inference.verdict import Named, Verdict, judged
-from stiffmap.solve.machine import Machine
 
 RIVALS = 3
 """Places in an effect's stead that are fitted; all are named."""
@@ -59,7 +64,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(predictor, v, best, each, fit)
     others = _alternatives(predictor, found, v, given, best, clock) if effects else []
-    before, after = (_left(e, sigma, p, ~listed) for p in (base, made.prediction))
+    before, after = (left_by(e, sigma, p, ~listed) for p in (base, made.prediction))
     held = made.held_out
     noise = _noise(found, before, after, best, listed)
     rest = _rest(columns, fit, v, each, gap)
@@ -89,7 +94,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
             *_over_time(Problem.of(e, sigma, made.prediction, ~listed), made.prediction),
         ],
         shares=each,
-        machine=_machine(predictor, made, effects, columns, ~listed),
+        machine=vouched(predictor, made, _said(made, effects, e), columns, ~listed),
         declared=predictor.machine,
         experiment=e,
         residual_before=before,
@@ -103,13 +108,6 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         not_tried=list(clock.left_out),
         seed=seed,
     )
-
-
-def stands_out(columns: Columns, fit: Fit) -> Mask:
-    """(n,) rows with a reading that heavy tails give less than a quarter of its weight."""
-    out = np.zeros(len(columns.experiment), bool)
-    out[columns.rows[fit.weights < 1.0 / STANDS_OUT]] = True
-    return out
 
 
 def _change(predictor: Predictor, c: Chosen) -> Floats:
@@ -212,12 +210,6 @@ def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], cut_short
     if named:
         return "effects+unattributed" if rest else "effects"
     return "unattributed" if rest or v.word == "unattributed" or cut_short else "none"
-
-
-def _left(e: Experiment, sigma: Floats, prediction: Floats, keep: Mask) -> Floats:
-    """(n, c) reading minus prediction, less the frames, tools and zeros that fit best where that machine stands."""
-    raw = e.reading - prediction
-    return np.asarray(raw - nuisance_part(Problem.of(e, sigma, prediction, keep), raw))
 
 
 def _sum(residual: Floats, sigma: Floats, e: Experiment, listed: Mask) -> Summary:
@@ -327,28 +319,9 @@ def _unobservable(found: Inferred) -> list[str]:
     return [str(c) for k, c in all_.items() if k not in seen] + failed
 
 
-def _machine(
-    predictor: Predictor,
-    made: Written,
-    effects: Sequence[Effect],
-    columns: Columns,
-    keep: Mask,
-) -> Machine:
-    """The machine that is handed over; its file says what it has from which experiment, what the readings in `keep` (n,) covered,
-    and by how much its prediction of others is off."""
-    if made.which == DECLARED:
-        return predictor.machine
-    e, d = predictor.experiment, made.machine.description
-    source = d.source
+def _said(made: Written, effects: Sequence[Effect], e: Experiment) -> str:
+    """What the file of the machine says that it has."""
     if made.which == CORRECTED and effects:
         names = "; ".join(f"{x.kind} of {x.element} {' '.join(x.legs)}".strip() for x in effects)
-        source = f"{source} Effects added by a diagnosis: {names}, from experiment {e.name}."
-    else:
-        source = f"{source} Numbers calibrated by experiment {e.name}."
-    declared = None if d.declared is None else replace(d.declared, source=source.strip())
-    valid = covered(predictor.machine, e, keep)
-    error, u = made.promise or (np.nan, np.nan)
-    if np.isfinite(error):
-        unit = "m" if metres(e.channels)[columns.channel].any() else "rad"
-        valid = replace(valid, error=error, error_u=u, unit=unit)
-    return valid.kept_by(Machine(replace(d, source=source.strip(), declared=declared)))
+        return f"Effects added by a diagnosis: {names}, from experiment {e.name}."
+    return f"Numbers calibrated by experiment {e.name}."

@@ -14,7 +14,6 @@ from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration import GROUPS, Tolerances
 from stiffmap.identification.candidates.candidates import check_kinds
 from stiffmap.identification.candidates.plan import plan_of
 from stiffmap.identification.clock import Clock, Progress
@@ -25,6 +24,7 @@ from stiffmap.identification.diagnosis.slips.factors import named_within
 from stiffmap.identification.diagnosis.slips.find import Readings, find_slip
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.identification.inference.inference import infer
+from stiffmap.identification.numbers import GROUPS, Tolerances
 from stiffmap.solve.machine import Machine, load_machine
 
 SLIPS = 2

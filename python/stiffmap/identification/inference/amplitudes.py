@@ -38,6 +38,8 @@ STEPS, LARGEST_STEP, ENOUGH = 30, 2.0, 0.01
 """Newton steps, their length in ln variance, and the gain of evidence that ends them."""
 WEIGHINGS = 40
 """Of heavy tails, at most, each followed by a few Newton steps."""
+NOTHING = 1e-6
+"""Weight of a reading that stands alone, to begin with."""
 WEIGHED = 0.1
 """Gain of evidence that ends the weighings."""
 OFF, SINKS = -14.0, -8.0
@@ -57,7 +59,7 @@ class Part:
 
     name: str
     kind: str
-    """``number``, ``field``, ``pose``, ``time``, ``effect``."""
+    """``number``, ``field``, ``pose``, ``time``, ``travel``, ``effect``."""
     factor: Floats | None = None
     full: Floats | None = None
 
@@ -152,7 +154,8 @@ class Parts:
         shared = c.numbers[:, [not u.setup for u in c.unknowns]]
         alone = [p for p, i in zip(self.numbers, c.groups.values(), strict=True) if c.unknowns[i[0]].setup]
         self.together = (Part(ALL_NUMBERS, "number", full=shared @ shared.T), *alone) if c.unknowns else ()
-        self.gaps = tuple(Part(name, kind, full=k) for kind, name, k in c.gaps)
+        along = (Part(name, "travel", factor=f) for name, f, _ in c.travel)
+        self.gaps = (*(Part(name, kind, full=k) for kind, name, k in c.gaps), *along)
 
 
 def fitted(
@@ -161,7 +164,8 @@ def fitted(
     start: Mapping[str, float] | None = None,
     weights: Floats | None = None,
 ) -> Fit:
-    """The amplitudes of the best evidence; heavy tails where a reading stands out and the bound is better without doubt.
+    """The amplitudes of the best evidence; heavy tails where a reading stands out and the bound is better without doubt. A reading
+    that is far off may be all that a gap explains, so those that stand alone of a robust fit begin with no weight.
 
     start
         ln variances to begin with, by the name of the part; others begin small.
@@ -169,23 +173,30 @@ def fitted(
     given = start or {}
     first = np.array([given.get(NOISE, 0.0), *(given.get(p.name, BEGIN) for p in parts)])
     light = _optimum(columns, tuple(parts), first, np.ones(len(columns.rows)))
-    mean, sd = _noise_part(light)
+    mean, _ = noise_part(light)
     typical = min(light.noise, 1.4826 * float(np.median(np.abs(mean))))
-    if weights is None and not np.any(np.abs(mean) > STANDS_OUT * typical):
-        return light
-    heavy = light
-    w = np.ones(len(columns.rows)) if weights is None else weights
-    for _ in range(WEIGHINGS):
-        mean, sd = _noise_part(heavy)
-        w = (DEGREES + 1.0) / (DEGREES + (mean**2 + sd**2) / heavy.noise**2)
-        before = heavy.score
-        begun = (
-            np.array([2.0 * np.log(typical), *first[1:]]) if heavy is light else heavy.t
-        )  # what sank may rise
-        heavy = _optimum(columns, tuple(parts), begun, w, steps=STEPS if heavy is light else 3)
-        if abs(heavy.score - before) < WEIGHED:
-            break
-    return heavy if heavy.score > light.score else light
+    starts = []
+    if weights is not None or np.any(np.abs(mean) > STANDS_OUT * typical):
+        starts.append(_heavy(light))
+    if columns.alone.any():
+        starts.append(np.where(columns.alone, NOTHING, 1.0))
+    best = light
+    for w in starts:
+        begun, heavy = np.array([2.0 * np.log(typical), *first[1:]]), light  # what sank may rise
+        for k in range(WEIGHINGS):
+            before, heavy = heavy.score, _optimum(columns, tuple(parts), begun, w, steps=3 if k else STEPS)
+            if k and abs(heavy.score - before) < WEIGHED:
+                break
+            begun, w = heavy.t, _heavy(heavy)
+        if heavy.score > best.score:
+            best = heavy
+    return best
+
+
+def _heavy(fit: Fit) -> Floats:
+    """(N,) weights of heavy tails at the posterior of the noise."""
+    mean, sd = noise_part(fit)
+    return np.asarray((DEGREES + 1.0) / (DEGREES + (mean**2 + sd**2) / fit.noise**2))
 
 
 def evaluated(columns: Columns, parts: Sequence[Part], t: Floats, weights: Floats) -> Fit:
@@ -201,7 +212,7 @@ def noise_prior(columns: Columns) -> tuple[float, float]:
     return float(np.log(squares / freedom)), 2.0 / float(np.sqrt(2.0 * freedom))
 
 
-def _noise_part(f: Fit) -> tuple[Floats, Floats]:
+def noise_part(f: Fit) -> tuple[Floats, Floats]:
     """(N,) posterior mean and standard deviation of the noise of each reading."""
     c = f.columns
     variance = f.noise**2 / f.weights

@@ -6,25 +6,30 @@ integrated out with a flat prior is gone from everything that follows.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.nuisance import nuisance_columns
+from stiffmap.experiment.noise.outliers import GROSS, MANY
+from stiffmap.experiment.noise.robust import fitted
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.homing import zeros_anew
-from stiffmap.identification.calibration.model import sensitivity
-from stiffmap.identification.calibration.unknowns import Unknown
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.candidates.coarseness import coarseness
 from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.constants import LARGEST_ERROR, STANDS_OUT
 from stiffmap.identification.inference.kernels import gaps
+from stiffmap.identification.inference.travel import drives_of
+from stiffmap.identification.numbers.homing import zeros_anew
+from stiffmap.identification.numbers.sensitivity import Sensitivity, sensitivity
+from stiffmap.identification.numbers.unknowns import Unknown
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import Parameter
 
@@ -80,6 +85,8 @@ class Columns:
     """(N,) m, rad: declared standard deviation of each reading."""
     free: Floats
     """(N, m) orthonormal directions that averaging over repeats and unknown frames, tools and zeros leave."""
+    frames: Floats
+    """(N, q) orthonormal directions of unknown frames, tools and zeros."""
     residual: Floats
     """(m,) reading less the declared prediction, in noise."""
     zero: Floats
@@ -92,8 +99,35 @@ class Columns:
     places: tuple[Place, ...]
     use: Integers
     """(N,) which of all readings these are, in the order of `readings_of`."""
+    travel: tuple[tuple[str, Floats, float], ...]
+    """Name, (m, k) factor F of a covariance F Fᵀ of mean variance one, of errors along the travel of each drive, and their
+    standard deviation in m or rad."""
     repeats: tuple[float, float]
     """Sum of squares within repeats that were averaged, in noise, and its degrees of freedom."""
+
+    @staticmethod
+    def bare(e: Experiment, rows: Integers, channel: Integers, free: Floats, residual: Floats) -> Columns:
+        """Of N readings in noise and a residual (m,) in what is free of them, (N, m): without numbers, gaps and effects."""
+        n, m = free.shape
+        zero, none = np.zeros((m, m)), np.zeros((m, 0))
+        empty = np.zeros((n, 0))
+        return Columns(
+            e,
+            rows,
+            channel,
+            np.ones(n),
+            free,
+            empty,
+            residual,
+            zero,
+            (),
+            none,
+            (),
+            (),
+            np.arange(n),
+            (),
+            (0.0, 0.0),
+        )
 
     def rotated(self, values: Floats) -> Floats:
         """(m, ...) of the readings' (N, ...), m or rad: in noise, without what frames and zeros could be."""
@@ -106,6 +140,16 @@ class Columns:
     def __len__(self) -> int:
         return len(self.residual)
 
+    @cached_property
+    def alone(self) -> NDArray[np.bool_]:
+        """(N,) readings far from what frames and declared numbers, robustly fitted, make of all others; none where there are many:
+        they are structure."""
+        values, p, q = self.free @ self.residual, self.numbers.shape[1], self.frames.shape[1]
+        prior = np.hstack([np.zeros((p, q)), np.eye(p)])
+        whole = np.vstack([np.hstack([self.frames, self.free @ self.numbers]), prior])
+        far = np.asarray(fitted(whole, np.append(values, np.zeros(p)))[1][: len(values)] > GROSS)
+        return far if far.mean() <= MANY else np.zeros(len(values), bool)
+
     @property
     def groups(self) -> dict[str, Integers]:
         """Numbers of the unknowns of each group and set-up."""
@@ -114,12 +158,20 @@ class Columns:
 
 
 def columns(
-    predictor: Predictor, plan: Plan, sigma: Floats, unknowns: Sequence[Unknown], seed: int = 0
+    predictor: Predictor,
+    plan: Plan,
+    sigma: Floats,
+    unknowns: Sequence[Unknown],
+    seed: int = 0,
+    *,
+    travel: bool = False,
 ) -> Columns:
     """Columns of everything that the readings of an experiment can hold.
 
     sigma
         (n, c) standard deviation of each reading, m or rad.
+    travel
+        Whether drives may err along their travel in any smooth way.
     """
     e, base = predictor.experiment, plan.base
     all_rows, all_channels = readings_of(e, base)
@@ -150,6 +202,7 @@ def columns(
         channel,
         noise,
         free,
+        mean @ q,
         free.T @ raw,
         free.T @ zeros(e, rows, channel, noise) @ free,
         tuple(u for u, k in zip(s.unknowns, seen, strict=True) if k),
@@ -157,8 +210,21 @@ def columns(
         tuple((kind, name, k * len(k) / np.trace(k)) for kind, name, k in found if np.trace(k) > NULL),
         _places(plan, free, noise, use, predictor.machine.description),
         use,
+        tuple(_along_travel(predictor, s, index, noise, free)) if travel else (),
         (float(within @ within), float(len(rows) - mean.shape[1])),
     )
+
+
+def _along_travel(
+    predictor: Predictor, s: Sensitivity, index: tuple[Integers, Integers], noise: Floats, free: Floats
+) -> Iterator[tuple[str, Floats, float]]:
+    for drive in drives_of(predictor, s):
+        shown = free.T @ (drive.columns(*index) / noise[:, None])
+        for name, _ in drive.names():
+            factor = shown @ drive.root({name: 1.0})
+            size = float(np.linalg.norm(factor) / np.sqrt(len(factor)))
+            if size > NULL:
+                yield name, factor / size, 1.0 / size
 
 
 def drawn(pose: Integers, seed: int, most: int) -> Integers:

@@ -10,8 +10,8 @@ z the numbers in standard deviations of the search. Bounded least squares with a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -23,22 +23,25 @@ from stiffmap.experiment.experiment import Floats, Integers, Mask
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.homing import zeros_anew
-from stiffmap.identification.calibration.model import (
+from stiffmap.identification.candidates.candidates import Candidate
+from stiffmap.identification.inference.amplitudes import OFF, Fit
+from stiffmap.identification.inference.columns import Columns, drawn, possible, zeros
+from stiffmap.identification.inference.constants import DEGREES
+from stiffmap.identification.inference.kernels import gaps
+from stiffmap.identification.inference.travel import Drive, Profile, drives_of, knots_of, profiles
+from stiffmap.identification.numbers.homing import zeros_anew
+from stiffmap.identification.numbers.sensitivity import (
     Sensitivity,
     bends,
     predicted,
     sensitivity,
     sensitivity_at,
 )
-from stiffmap.identification.calibration.slopes import moves_of, with_moves
-from stiffmap.identification.calibration.unknowns import Unknown
-from stiffmap.identification.candidates.candidates import Candidate
-from stiffmap.identification.inference.amplitudes import OFF, Fit
-from stiffmap.identification.inference.columns import Columns, drawn, possible, zeros
-from stiffmap.identification.inference.constants import DEGREES
-from stiffmap.identification.inference.kernels import gaps
+from stiffmap.identification.numbers.slopes import moves_of, with_moves
+from stiffmap.identification.numbers.unknowns import Unknown, joint_name
 from stiffmap.model.description import AppliedEffect
+from stiffmap.model.description.tree import joints
+from stiffmap.model.with_errors import Knots, edited
 from stiffmap.solve.machine import Machine
 
 MOST_FITTED = 1500
@@ -49,6 +52,9 @@ STEP = 1e-3
 """Of a parameter's scale, for differences."""
 STEPS, STEPS_OF_A_FOLD = 30, 6
 """Evaluations at most, of all readings and of those outside a fold."""
+FRAMINGS, SETTLED = 4, 0.3
+"""Fits with frames and tools where the machine of the last one stands, and their change, in noise, that ends them: within a fit
+they are held, since a tool that hardly turns takes up another pattern with every small turn of the machine."""
 WEIGHINGS = 3
 """Fits with weights of heavy tails."""
 Effects = Callable[[Floats], Sequence[AppliedEffect]]
@@ -96,6 +102,10 @@ class Corrected:
     """(k, k) of all values of the terms, in scales, one term after the other; numbers integrated out."""
     prediction: Floats
     """(n, c) m, rad."""
+    travel: Floats = field(default_factory=lambda: np.zeros(0))
+    """(K,) errors along the drives' travel, along the directions of their roots."""
+    profiles: tuple[Profile, ...] = ()
+    """The same over each drive's coordinate."""
 
     @property
     def nothing(self) -> int | None:
@@ -138,6 +148,20 @@ class Readings:
     sensitivity: Sensitivity
     spread: Floats
     """(p,) standard deviation of each number, in standard uncertainties."""
+    drives: tuple[tuple[Drive, Floats], ...] = ()
+    """Drives that err along their travel, and the root (k, k) of the covariance at their knots, m² or rad²."""
+
+    def along(self, root: Floats) -> Floats:
+        """(N, K) L⁻¹ of the errors along the travel of all drives."""
+        own = self.sigma[self.rows, self.channel][:, None]
+        parts = [d.columns(self.rows, self.channel) @ r / own for d, r in self.drives]
+        wide = np.hstack([np.zeros((len(own), 0)), *parts])
+        return np.asarray(solve_triangular(root, wide, lower=True, check_finite=False))
+
+    def knots(self, found: Sequence[Profile]) -> dict[str, Knots]:
+        """Axis positioning errors as a machine file has them."""
+        of = joints(self.predictor.machine.description)
+        return {p.drive: knots_of(of[joint_name(p.drive)], p) for p in found}
 
     def only(self, keep: Mask) -> Readings:
         """Those of some rows (n,)."""
@@ -151,10 +175,15 @@ class Readings:
         scaled = picked / self.sigma[self.rows, self.channel].reshape(-1, *(1,) * (picked.ndim - 1))
         return np.asarray(solve_triangular(root, scaled, lower=True, check_finite=False))
 
-    def predicted(self, numbers: Floats, effects: Sequence[AppliedEffect]) -> Floats:
+    def predicted(
+        self, numbers: Floats, effects: Sequence[AppliedEffect], travel: Mapping[str, Knots] | None = None
+    ) -> Floats:
         """(n, c) m, rad; NaN where the machine cannot be."""
+        p = self.predictor
         try:
-            return predicted(self.predictor, self.sensitivity.unknowns, numbers, effects)
+            if travel:
+                p = p.beside(machine=Machine(edited(p.machine.description, {}, travel), like=p.machine))
+            return predicted(p, self.sensitivity.unknowns, numbers, effects)
         except StiffmapError:
             return np.full_like(self.sigma, np.nan)
 
@@ -203,6 +232,7 @@ def readings(
     unknowns = tuple(u for u, s in known if s > 0.0)
     s = sensitivity(predictor, uncertain)
     s = zeros_anew(s, e) or s
+    drives = tuple(_erring(predictor, s, columns, amplitude)) if columns.travel else ()
     index = [s.unknowns.index(u) for u in unknowns]
     s = replace(s, unknowns=unknowns, columns=s.columns[..., index])
     return Readings(
@@ -215,7 +245,18 @@ def readings(
         not np.all(fit.weights == 1.0),
         s,
         np.array([size for _, size in known if size > 0.0]),
+        drives,
     )
+
+
+def _erring(
+    predictor: Predictor, s: Sensitivity, columns: Columns, amplitude: Mapping[str, float]
+) -> Iterator[tuple[Drive, Floats]]:
+    """Drives that err along their travel in a fit, with the roots at their knots; `amplitude`: variances of its parts, in noise."""
+    variance = {name: amplitude[name] * sd**2 for name, _, sd in columns.travel if name in amplitude}
+    for drive in drives_of(predictor, s):
+        if any(name in variance for name, _ in drive.names()):
+            yield drive, drive.root(variance)
 
 
 def corrected(
@@ -260,51 +301,67 @@ def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, st
     terms = tuple(terms) if start is None else start.terms
     k, p = sum(len(t.values) for t in terms), len(given.spread)
     columns = given.white(root, given.sensitivity.columns) * given.spread
+    along = given.along(root)
+    m = along.shape[1]
     known: dict[bytes, Floats] = {}
 
     def effects(x: Floats) -> list[AppliedEffect]:
         return [t.effect(t.values) for t in _parts(terms, x)]
 
     def shown(x: Floats) -> Floats:
+        x = x[: k + p]
         key = x.tobytes()
         if key not in known:
             known.clear()
             known[key] = given.predicted(x[k:] * given.spread, effects(x))
         return known[key]
 
-    def off(x: Floats, values: Floats) -> Floats:
-        q = _frames(given, root, np.nan_to_num(shown(x)))
-        return np.asarray(values - q @ (q.T @ values))
+    def raw(x: Floats) -> Floats:
+        return given.white(root, e.reading - shown(x)) - along @ x[k + p :]
 
-    def residual(x: Floats) -> Floats:
-        left = given.white(root, e.reading - shown(x))
+    def residual(x: Floats, q: Floats) -> Floats:
+        left = raw(x)
         if not np.isfinite(left).all():
-            return np.full(len(left) + p, np.inf)
-        return np.append(off(x, left), x[k:])
+            return np.full(len(left) + p + m, np.inf)
+        return np.append(left - q @ (q.T @ left), x[k:])
 
-    def jacobian(x: Floats) -> Floats:
-        each = [_change(given, x, j, high, shown(x), effects, k) for j in range(k)]
-        whole = off(x, -np.column_stack([*(given.white(root, c) for c in each), columns]))
-        return np.vstack([whole, np.hstack([np.zeros((p, k)), np.eye(p)])])
+    def jacobian(x: Floats, q: Floats) -> Floats:
+        each = [_change(given, x[: k + p], j, high, shown(x), effects, k) for j in range(k)]
+        whole = -np.column_stack([*(given.white(root, c) for c in each), columns, along])
+        whole -= q @ (q.T @ whole)
+        return np.vstack([whole, np.hstack([np.zeros((p + m, k)), np.eye(p + m)])])
 
-    low = np.concatenate([*(t.bounds[0] for t in terms), np.full(p, -np.inf)])
-    high = np.concatenate([*(t.bounds[1] for t in terms), np.full(p, np.inf)])
-    begin = np.concatenate([*(t.values for t in terms), np.zeros(p)])
+    low = np.concatenate([*(t.bounds[0] for t in terms), np.full(p + m, -np.inf)])
+    high = np.concatenate([*(t.bounds[1] for t in terms), np.full(p + m, np.inf)])
+    begin = np.concatenate([*(t.values for t in terms), np.zeros(p + m)])
     if start is not None:
-        begin[k:] = start.numbers / given.spread
+        begin[k:] = np.append(start.numbers / given.spread, start.travel)
     inside = np.where(np.isfinite(high - low), 1e-9 * np.nan_to_num(high - low, posinf=0.0), 0.0)
-    begin = np.clip(begin, low + inside, high - inside)
-    if not len(begin):
-        x = begin
-    elif not np.isfinite(residual(begin)).all():
+    x = np.clip(begin, low + inside, high - inside)
+    if not np.isfinite(raw(x)).all():
         raise StiffmapError("the machine has no equilibrium with the effects that were found")
-    else:
+    q = _frames(given, root, np.nan_to_num(shown(x)))
+    for _ in range(FRAMINGS if len(x) else 0):
         x = least_squares(
-            residual, begin, jacobian, (low, high), x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=steps
+            lambda x, q=q: residual(x, q),
+            x,
+            lambda x, q=q: jacobian(x, q),
+            (low, high),
+            x_scale="jac",
+            ftol=1e-6,
+            xtol=1e-6,
+            max_nfev=steps,
         ).x
-    j = jacobian(x)
-    covariance = np.linalg.pinv(j.T @ j, rcond=1e-12, hermitian=True)
-    return Corrected(_parts(terms, x), x[k:] * given.spread, np.asarray(covariance[:k, :k]), shown(x))
+        left, before = raw(x), q
+        q = _frames(given, root, np.nan_to_num(shown(x)))
+        if np.linalg.norm(before @ (before.T @ left) - q @ (q.T @ left)) < SETTLED:
+            break
+    j = jacobian(x, q)
+    covariance: Floats = np.asarray(np.linalg.pinv(j.T @ j, rcond=1e-12, hermitian=True))
+    numbers, travel = x[k : k + p] * given.spread, x[k + p :]
+    found = profiles(given.drives, travel, covariance[k + p :, k + p :])
+    shows = given.predicted(numbers, effects(x), given.knots(found)) if found else shown(x)
+    return Corrected(_parts(terms, x), numbers, np.asarray(covariance[:k, :k]), shows, travel, found)
 
 
 def columns_of(given: Readings, found: Corrected) -> tuple[Floats, Floats]:
@@ -319,7 +376,8 @@ def columns_of(given: Readings, found: Corrected) -> tuple[Floats, Floats]:
         return [t.effect(t.values) for t in _parts(found.terms, at)]
 
     each = [_change(given, x, j, high, found.prediction, effects, k) for j in range(k)]
-    columns = given.white(root, given.sensitivity.columns) * given.spread
+    numbers = given.white(root, given.sensitivity.columns) * given.spread
+    columns = np.hstack([numbers, given.along(root)])
     frames = _frames(given, root, found.prediction)
     whole = root @ np.hstack([*(given.white(root, c)[:, None] for c in each), columns, frames])
     return whole, np.concatenate([np.zeros(k), np.ones(columns.shape[1]), np.zeros(frames.shape[1])])
@@ -355,4 +413,5 @@ def machine_of(given: Readings, found: Corrected) -> Machine:
     names = given.sensitivity.unknowns
     pairs = [(u, float(v)) for u, v in zip(names, found.numbers, strict=True) if not u.setup]
     p = given.predictor
-    return Machine(with_moves(p.with_terms(found.effects).description, moves_of(pairs)), like=p.machine)
+    whole = with_moves(p.with_terms(found.effects).description, moves_of(pairs), given.knots(found.profiles))
+    return Machine(whole, like=p.machine)

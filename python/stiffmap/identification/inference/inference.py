@@ -11,15 +11,15 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.level import Noise
-from stiffmap.experiment.noise.outliers import noise_without_suspects
+from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.certificate import certified
-from stiffmap.identification.calibration.defaults import Tolerances
-from stiffmap.identification.calibration.unknowns import Unknown, unknowns
 from stiffmap.identification.candidates.plan import Plan, plan_of
 from stiffmap.identification.clock import Clock
 from stiffmap.identification.inference.columns import Columns, columns
 from stiffmap.identification.inference.names import Chosen, Search, searched
+from stiffmap.identification.numbers.certificate import certified
+from stiffmap.identification.numbers.tolerances import Tolerances
+from stiffmap.identification.numbers.unknowns import Unknown, unknowns
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine
 
@@ -51,17 +51,20 @@ def infer(
     exclude: Sequence[str] = (),
     clock: Clock | None = None,
     seed: int = 0,
+    *,
+    travel: bool = False,
 ) -> Inferred:
-    """The set of effects with the best evidence; `exclude`: kinds of effects and groups of numbers that are known not to be."""
+    """The set of effects with the best evidence; `exclude`: kinds of effects and groups of numbers that are known not to be;
+    `travel`: whether drives may err along their travel in any smooth way."""
     e, clock = predictor.experiment, clock or Clock()
-    noise = noise_without_suspects(e, plan.base)
+    noise, _ = without_suspects(e, plan.base)
     kept = np.flatnonzero([v.candidate.kind not in exclude for v in plan.variants])
     if len(kept) < len(plan.variants):
         plan = replace(plan, stack=plan.stack.only(kept))
     every = unknowns(predictor.machine.description, e, certified(tolerances, e))
     uncertain = tuple(u for u in every if u.group not in exclude)
     clock.say("columns of the declared numbers")
-    found = columns(predictor, plan, noise.sigma, uncertain, seed)
+    found = columns(predictor, plan, noise.sigma, uncertain, seed, travel=travel)
 
     def predict(chosen: Sequence[Chosen]) -> Floats:
         try:

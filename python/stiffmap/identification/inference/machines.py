@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.summary import Summary, summary
-from stiffmap.experiment.experiment import Floats, Integers, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.folds import folds
 from stiffmap.experiment.noise.unseen import left_unseen
-from stiffmap.identification.inference.columns import MOST_READINGS, drawn
+from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.inference.amplitudes import Fit
+from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn
+from stiffmap.identification.inference.constants import STANDS_OUT
 from stiffmap.identification.inference.corrected import (
     STEPS_OF_A_FOLD,
     Corrected,
@@ -22,6 +26,7 @@ from stiffmap.identification.inference.corrected import (
     corrected,
     machine_of,
 )
+from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine
 
 FOLDS = 10
@@ -86,11 +91,32 @@ def written(
         left[DECLARED][own] = left_unseen(e, sigma, declared, seen, own)[own]
         for name, (readings, whole) in models.items():
             part = corrected(readings.only(~test), (), whole, STEPS_OF_A_FOLD)
-            left[name][own] = left_unseen(e, sigma, part.prediction, seen, own)[own]
+            shown = part.prediction + own_zeros(readings, part, own)
+            left[name][own] = left_unseen(e, sigma, shown, seen, own)[own]
     best = _best(left, last, sigma, e.groups)
     before, after = (summary(left[name], sigma, e.channels) for name in (DECLARED, best))
     held = HeldOut(before, after, number, by)
     return _made(best, models, given, declared, held)
+
+
+def own_zeros(given: Readings, found: Corrected, own: Mask) -> Floats:
+    """(n, c) m, rad: what zeros of drives add that a set-up has for itself, by the readings of the rows `own` (n,), whole set-ups:
+    no other set-up says anything of them."""
+    e = given.predictor.experiment
+    names = np.array(e.setup)
+    if not len(names):
+        return np.zeros_like(found.prediction)
+    inside = set(np.unique(names[own])) - set(np.unique(names[~own]))
+    mine = [k for k, u in enumerate(given.sensitivity.unknowns) if u.setup in inside and u.setup]
+    if not mine:
+        return np.zeros_like(found.prediction)
+    columns = np.nan_to_num(given.sensitivity.columns[..., mine]) * given.spread[mine]
+    problem = Problem.of(e, given.sigma, found.prediction, own)
+    white = problem.white(columns)
+    values = np.linalg.solve(
+        white.T @ white + np.eye(len(mine)), white.T @ problem.residual(found.prediction)
+    )
+    return np.asarray(columns @ values)
 
 
 def _best(left: dict[str, Floats], wanted: str, sigma: Floats, pose: Integers) -> str:
@@ -155,3 +181,33 @@ def promised(given: Readings, found: Corrected) -> tuple[float, float]:
         count += int(test.sum())
     size = float(np.sqrt(max(total, 0.0) / count)) if count else float("nan")
     return size, size / float(np.sqrt(2.0 * number))
+
+
+def vouched(predictor: Predictor, made: Written, said: str, columns: Columns, keep: Mask) -> Machine:
+    """The machine that is handed over; its file says what it has from which experiment (`said`), what the readings in `keep` (n,)
+    covered, and by how much its prediction of others is off."""
+    if made.which == DECLARED:
+        return predictor.machine
+    e, d = predictor.experiment, made.machine.description
+    source = f"{d.source} {said}".strip()
+    declared = None if d.declared is None else replace(d.declared, source=source)
+    valid = covered(predictor.machine, e, keep)
+    error, u = made.promise or (np.nan, np.nan)
+    if np.isfinite(error):
+        unit = "m" if metres(e.channels)[columns.channel].any() else "rad"
+        valid = replace(valid, error=error, error_u=u, unit=unit)
+    return valid.kept_by(Machine(replace(d, source=source, declared=declared)))
+
+
+def stands_out(columns: Columns, fit: Fit) -> Mask:
+    """(n,) rows with a reading that heavy tails give less than a quarter of its weight."""
+    out = np.zeros(len(columns.experiment), bool)
+    out[columns.rows[fit.weights < 1.0 / STANDS_OUT]] = True
+    return out
+
+
+def left_by(e: Experiment, sigma: Floats, prediction: Floats, keep: Mask) -> Floats:
+    """(n, c) reading minus prediction, less the frames, tools and zeros that fit the rows in `keep` (n,) best where that machine
+    stands."""
+    raw = e.reading - prediction
+    return np.asarray(raw - nuisance_part(Problem.of(e, sigma, prediction, keep), raw))

@@ -123,6 +123,8 @@ class Search:
     """Per named effect, the places that would do in its stead, with their evidence less that of the best."""
     instead: tuple[Model | None, ...] = ()
     """Per named effect, the best model of another world in which it is not."""
+    exact: float = -np.inf
+    """Evidence without any effect where all declared numbers are as declared."""
     calibrated: Fit | None = None
     """The best fit without effects in a world where declared numbers are off; None where there are none."""
 
@@ -148,6 +150,7 @@ def searched(
     return replace(
         best,
         instead=tuple(_without(c, best, others, found) for c in best.best.chosen),
+        exact=found[EXACT].null.score,
         calibrated=max(off, key=lambda f: f.score, default=None),
     )
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.inference.amplitudes import GAPS, NOISE, OFF, Fit
+from stiffmap.identification.inference.amplitudes import GAPS, NOISE, OFF, Fit, noise_part
 from stiffmap.identification.inference.columns import Columns
+from stiffmap.identification.inference.constants import STANDS_OUT
 
 
 def shares(columns: Columns, fit: Fit) -> dict[str, float]:
-    """Share of each part: |E[part | r]|² over the sum of all of them, r the readings' difference from the declared machine."""
+    """Share of each part: |E[part | r]|² over the sum of all of them, r the readings' difference from the declared machine; readings
+    that stand alone are not counted."""
+    kept = columns.free[fit.weights >= 1.0 / STANDS_OUT]
     means = {p.name: fit.mean(p) for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF}
-    means[NOISE] = fit.columns.residual - sum(means.values(), np.zeros(len(columns)))
-    squares = {name: float(m @ m) for name, m in means.items()}
+    squares = {name: float(np.sum((kept @ m) ** 2)) for name, m in means.items()}
+    squares[NOISE] = float(np.sum(noise_part(fit)[0][fit.weights >= 1.0 / STANDS_OUT] ** 2))
     whole = max(sum(squares.values()), 1e-300)
     return {name: s / whole for name, s in squares.items()}
 

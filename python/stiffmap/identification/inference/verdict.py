@@ -9,12 +9,12 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
-from stiffmap.identification.calibration.unknowns import Unknown
 from stiffmap.identification.inference.amplitudes import GAPS, OFF, Fit, noise_prior
 from stiffmap.identification.inference.columns import Columns, Place
 from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, ODDS, RARE, TOLERANCES
 from stiffmap.identification.inference.names import EXACT, Chosen, Model, Search, is_possible
 from stiffmap.identification.inference.shares import of_numbers
+from stiffmap.identification.numbers.unknowns import Unknown
 
 DETERMINED = 0.5
 """Posterior standard deviation, in standard uncertainties, of a number that the readings determine."""
@@ -252,6 +252,9 @@ def left(fit: Fit) -> tuple[str, str]:
     time = ""
     if over and _significant(fit, [p.name for p, _ in over]):
         time = max(over, key=lambda g: g[1])[0].name
+    both = [*gaps, *over]
+    if not rest and not time and gaps and over and _significant(fit, [p.name for p, _ in both]):
+        rest = max(both, key=lambda g: g[1])[0].name  # either may be the noise, not both
     return rest, time
 
 

@@ -6,18 +6,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag, cholesky, solve_triangular
 from scipy.stats import chi2
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import PER_ROW, Experiment
-from stiffmap.identification.calibration.claims import LENGTHS, SIZES, field_columns
-from stiffmap.identification.calibration.floor import Blocks, likeliest
+from stiffmap.experiment.noise.whitening import basis, readings_of
+from stiffmap.identification.inference.amplitudes import Fit, Part, fitted
+from stiffmap.identification.inference.columns import Columns, drawn
+from stiffmap.identification.inference.kernels import gaps
 from stiffmap.identification.planning.estimate import Estimate, estimate
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine
 
+MOST = 750
+"""Readings of each experiment. Effort only: an (N, N) matrix is factorised."""
 ALPHA = 0.01
 """Probability of naming a change in any number where there is none."""
 
@@ -77,88 +82,78 @@ def compare(
 ) -> Comparison:
     """Numbers of `terms` in two experiments: before and after, or one specimen and another.
 
-    Each is fitted on its own; differences are judged against what the model leaves of both: a smooth field that they share
-    and a variance per pose, as large as the readings make likeliest, since neither is a change.
+    Each is fitted on its own; differences are judged against what the model leaves of both: smooth gaps that they share and errors
+    of each pose, as large as the readings make likeliest, since neither is a change. Of more than some 1500 readings whole poses
+    are drawn.
     Raises StiffmapError as `estimate` does.
     """
-    a, b = (estimate(machine, e, terms) for e in (first, second))
-    step, covariance = difference(a, b)
+    a, b = (estimate(machine, _some(e), terms) for e in (first, second))
+    step, covariance = difference(machine, a, b)
     u = np.sqrt(np.diag(covariance))
     single = chi2.sf((step / u) ** 2, 1)
-    told = np.flatnonzero(np.isfinite(u))
-    scaled, pull = covariance[np.ix_(told, told)] / np.outer(u[told], u[told]), step[told] / u[told]
+    known = np.flatnonzero(np.isfinite(u))
+    scaled, pull = covariance[np.ix_(known, known)] / np.outer(u[known], u[known]), step[known] / u[known]
     together = float(pull @ np.linalg.pinv(scaled) @ pull)
     changes = tuple(
         Change(n, s, float(x), float(x + d), float(w), float(min(1.0, len(step) * p)))
         for n, s, x, d, w, p in zip(a.names, a.units, a.values, step, u, single, strict=True)
     )
-    return Comparison(a, b, changes, float(chi2.sf(together, max(len(told), 1))))
+    return Comparison(a, b, changes, float(chi2.sf(together, max(len(known), 1))))
 
 
-# The difference of fitted numbers between two experiments, judged against the residual of their model.
+# The difference of fitted numbers between two experiments, judged against what their model leaves.
 #
-# What a model of the machine leaves is no noise: it is smooth over the workspace, shared by the readings of a pose, and the
-# same in both experiments where they stand at the same poses. Both are fitted at once, each with numbers of its own, jointly with
-# one smooth field and one variance per pose, as large as the readings make likeliest (docs/theory.md I2, I3).
-
-WIDE = 1e3
-"""Of a number's standard uncertainty by noise alone: a prior that says nothing."""
-NATS = 1.0
-"""By which a floor must be likelier than none."""
+# That is no noise: it is smooth over the workspace, shared by the readings of a pose, and the same in both experiments where they
+# stand at the same poses. Both are fitted at once, each with numbers of its own, under the covariance of all gaps that a diagnosis
+# knows, as large as the readings make likeliest (docs/diagnosis.md).
 
 
-def difference(a: Estimate, b: Estimate) -> tuple[Floats, Floats]:
+def difference(machine: Machine, a: Estimate, b: Estimate) -> tuple[Floats, Floats]:
     """(k,) second minus first value, SI, and (k, k) its covariance; infinite variances of numbers that either does not
-    tell."""
+    determine."""
     k = len(a.values)
-    told = np.flatnonzero(np.isfinite(a.sigma) & np.isfinite(b.sigma))
+    known = np.flatnonzero(np.isfinite(a.sigma) & np.isfinite(b.sigma))
     shift, covariance = b.values - a.values, np.diag(np.full(k, np.inf))
-    if not told.size:
+    if not known.size:
         return shift, covariance
-    scale = np.concatenate([WIDE * e.misfit * e.sigma[told] for e in (a, b)])
-    first, second = (e.jacobian[:, told] for e in (a, b))
-    numbers = np.block(
-        [
-            [first, np.zeros((len(first), len(told)))],
-            [np.zeros((len(second), len(told))), second],
-        ]
-    )
+    numbers = block_diag(a.jacobian[:, known], b.jacobian[:, known])
     residual = np.concatenate([a.residual, b.residual])
-    e = _together(a.experiment, b.experiment)
-    label = _labels(e, a, b)
-    best, where = -np.inf, Blocks.of(numbers * scale, residual, label)
-    rho = 0.0
-    for size, columns in _fields(e, a, b):
-        blocks = Blocks.of(np.hstack([numbers * scale, size * columns]), residual, label)
-        for share, nats in ((0.0, blocks.log_likelihood(0.0) + NATS), likeliest(blocks, 1e-3)):
-            if nats > best:
-                best, where, rho = nats, blocks, share
-    sums = where.beside(rho)
-    m = 2 * len(told)
-    values, spread = sums.estimate[:m] * scale, sums.covariance[:m, :m] * np.outer(scale, scale)
-    spread = spread * max(1.0, sums.chi2 / max(a.freedom + b.freedom, 1))
-    step = np.hstack([-np.eye(len(told)), np.eye(len(told))])
-    shift[told] += step @ values
-    covariance[np.ix_(told, told)] = step @ spread @ step.T
+    fit, kernels = _gaps(machine, a, b, numbers, residual)
+    v = fit.noise**2 * np.eye(len(residual))
+    for name, kernel in kernels.items():
+        v += fit.amplitude(name) ** 2 * kernel
+    white = solve_triangular(cholesky(v, lower=True), np.column_stack([numbers, residual]), lower=True)
+    columns, left = white[:, :-1], white[:, -1]
+    spread = np.linalg.inv(columns.T @ columns)
+    m = len(known)
+    step = np.hstack([-np.eye(m), np.eye(m)])
+    shift[known] += step @ (spread @ (columns.T @ left))
+    covariance[np.ix_(known, known)] = step @ spread @ step.T
     return shift, covariance
 
 
-def _fields(e: Experiment, a: Estimate, b: Estimate) -> list[tuple[float, Floats]]:
-    """Sizes and whitened columns (N, m) of the fields that are tried; none at first."""
-    n = len(a.experiment)
-    out = [(0.0, np.zeros((len(a.residual) + len(b.residual), 0)))]
-    for length in LENGTHS:
-        field = field_columns(e, np.concatenate([a.left, b.left]), length)
-        white = np.vstack([a.problem.white(field[:n]), b.problem.white(field[n:])])
-        out += [(size, white) for size in SIZES]
-    return out
-
-
-def _labels(e: Experiment, a: Estimate, b: Estimate) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
-    """(N,) number of the pose and channel of each reading of both."""
-    row = np.concatenate([a.problem.index[0], b.problem.index[0] + len(a.experiment)])
-    channel = np.concatenate([a.problem.index[1], b.problem.index[1]])
-    return np.asarray(e.groups[row] * len(e.channels) + channel, dtype=np.intp)
+def _gaps(
+    machine: Machine, a: Estimate, b: Estimate, numbers: Floats, residual: Floats
+) -> tuple[Fit, dict[str, Floats]]:
+    """The amplitudes of all gaps that whitened readings (N,) of both can hold, numbers (N, 2 k) left open, and the covariance (N, N)
+    that each is of."""
+    e = _together(a.experiment, b.experiment)
+    read = [readings_of(x.experiment, x.problem.base) for x in (a, b)]
+    rows = np.concatenate([read[0][0], read[1][0] + len(a.experiment)])
+    channel = np.concatenate([read[0][1], read[1][1]])
+    white = block_diag(*(x.problem.white_lines(np.eye(len(r[0]))) for x, r in zip((a, b), read, strict=True)))
+    frames = block_diag(a.problem.nuisance, b.problem.nuisance)
+    known = basis(np.hstack([frames, numbers]))
+    free = np.linalg.qr(known, mode="complete")[0][:, known.shape[1] :]
+    kernels, parts = {}, []
+    for kind, name, kernel in gaps(machine, e, rows, channel, np.ones(len(rows))):
+        shown = white @ kernel @ white.T
+        size = float(np.sum(free * (shown @ free))) / free.shape[1]
+        if size > 0.0:
+            kernels[name] = shown / size
+            parts.append(Part(name, kind, full=free.T @ kernels[name] @ free))
+    columns = Columns.bare(e, rows, channel, free, free.T @ residual)
+    return fitted(columns, parts), kernels
 
 
 def _together(a: Experiment, b: Experiment) -> Experiment:
@@ -173,3 +168,9 @@ def _together(a: Experiment, b: Experiment) -> Experiment:
         return np.concatenate([one, other])
 
     return replace(a, **{name: joined(name) for name in PER_ROW}, absolute={})  # type: ignore[arg-type]
+
+
+def _some(e: Experiment) -> Experiment:
+    """The rows of poses drawn at random, where there are many readings."""
+    per_row = max(1, int(e.axis_read.sum()))
+    return e if len(e) * per_row <= MOST else e.rows(drawn(e.groups, 0, MOST // per_row))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,8 +11,9 @@ import typer
 
 from stiffmap.common.outputs import make_folder, write_rows, write_text
 from stiffmap.common.outputs.option import written
-from stiffmap.identification.calibration import Calibration, Tolerances, calibrate
-from stiffmap.identification.calibration.travel import Travel
+from stiffmap.identification.calibration import Calibration, calibrate
+from stiffmap.identification.inference.travel import Profile
+from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli.output import JsonOption
 
 
@@ -63,15 +65,15 @@ def write(result: Calibration, folder: Path) -> None:
     """All files of a calibration; raises `FileError` where the folder cannot be written."""
     write_text(make_folder(folder) / "calibration.json", result.to_json())
     write_text(folder / "table.txt", "\n".join([*result.lines(), "", *result.table()]) + "\n")
-    if result.travel:
-        write_rows(folder / "travel.csv", *profiles(result.travel))
+    if result.profiles:
+        write_rows(folder / "travel.csv", *profiles(result.profiles))
     result.machine.save(folder / "machine.yaml")
 
 
-def profiles(travel: Travel) -> tuple[list[str], list[list[str]]]:
+def profiles(found: Sequence[Profile]) -> tuple[list[str], list[list[str]]]:
     """Header and rows of the errors along the drives' travel, in mm and degrees."""
     out = []
-    for p in travel.profiles:
+    for p in found:
         factor, unit = (1e3, "mm") if p.unit == "m" else (180.0 / math.pi, "deg")
         for values in zip(p.at, p.error, p.sigma, strict=True):
             out.append([p.drive, *(f"{factor * v:.6g}" for v in values), unit])

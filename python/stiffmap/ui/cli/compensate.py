@@ -17,7 +17,7 @@ from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.files.plan_file import load_plan
 from stiffmap.experiment.poses.orientation import against_base
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.validity import beyond
+from stiffmap.identification.validity import beyond
 from stiffmap.machining.compensation import (
     axis_errors,
     axis_errors_of_map,

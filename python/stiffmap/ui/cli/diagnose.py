@@ -11,9 +11,9 @@ import typer
 
 from stiffmap.common.outputs import make_folder, write_picture, write_text
 from stiffmap.common.outputs.option import written
-from stiffmap.identification.calibration import Tolerances
 from stiffmap.identification.diagnosis import Diagnosis, diagnose
 from stiffmap.identification.diagnosis.report.sentences import next_step
+from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli.output import JsonOption
 
 

@@ -15,7 +15,7 @@ from stiffmap.experiment import Experiment, Residual, load_experiment
 from stiffmap.experiment import residual as compute
 from stiffmap.experiment.calls import placed
 from stiffmap.experiment.channels import Channel
-from stiffmap.identification.calibration.validity import beyond
+from stiffmap.identification.validity import beyond
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli.inputs import EffectsOption, FolderOption, ThreadsOption
 from stiffmap.ui.cli.output import JsonOption, print_json

@@ -69,16 +69,6 @@ def workspace(scheduler: Any) -> dict[str, Any]:
     return {"volume": found.volume, "proven": found.proven}
 
 
-def null_study(scheduler: Any) -> dict[str, Any]:
-    from bench.null_study import twin
-
-    from stiffmap.common.tasks import workers
-
-    with workers(twin, (None, 0), scheduler=scheduler) as hands:
-        records = hands.in_order([0, 3, 9, 12])
-    return {str(r["twin"]): {k: v for k, v in r.items() if "second" not in k} for r in records}
-
-
 def monte_carlo(scheduler: Any) -> dict[str, Any]:
     from bench.link_monte_carlo import run
 
@@ -112,7 +102,7 @@ def cluster() -> Iterator[Any]:
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(
     "work",
-    [lobes, vibration, placing, turning, box, workspace, null_study, monte_carlo, oracle],
+    [lobes, vibration, placing, turning, box, workspace, monte_carlo, oracle],
 )
 def test_a_worker_is_killed(work: Work, cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     here = work(None)

@@ -11,7 +11,7 @@ import stiffmap as sm
 from stiffmap.experiment import Predictor, predict, random_plan, simulate
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import noise_of
-from stiffmap.experiment.noise.outliers import outliers, suspects
+from stiffmap.experiment.noise.outliers import suspects, without_suspects
 from stiffmap.experiment.prediction.measurement import readings, true_wrench
 from stiffmap.model.description import AppliedEffect
 
@@ -85,9 +85,10 @@ def test_outliers_are_found_and_never_a_whole_pose(machine: sm.Machine, plan: sm
     reading[[5, 40]] += 4e-5
     reading[twin.groups == twin.groups[70]] += 4e-5
     residual = reading - predict(machine, plan)
-    found = outliers(twin, residual, twin.sigma)
+    noise, found = without_suspects(twin.with_readings(reading), predict(machine, plan))
     assert np.flatnonzero(found).tolist() == [5, 40]
     assert set(np.flatnonzero(suspects(twin.with_readings(reading), residual, twin.sigma))) >= {5, 40}
+    assert noise.repeats[:3] == pytest.approx(noise.declared[:3], rel=0.2)
 
 
 def test_model_free_checks_see_what_they_should(machine: sm.Machine, plan: sm.Experiment) -> None:

@@ -15,8 +15,8 @@ from stiffmap.experiment.noise.unseen import unseen_nuisances
 from stiffmap.experiment.noise.whitening import Problem, best_fit
 from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.calibration import Calibration, calibrate
-from stiffmap.identification.calibration.corrected import at_every_turn
 from stiffmap.identification.calibration.wording import in_display_units
+from stiffmap.identification.inference.travel import Profile, knots_of
 from stiffmap.model.description.tree import joints
 
 NOISE = 1e-5
@@ -61,13 +61,11 @@ def test_the_file_does_on_new_readings_what_was_said(
     c.machine.save(tmp_path / "machine.yaml")
     _, plan = plan_of(300, 99)
     fresh = read(plan, true_machine(declared), 2)
-    assert c.travel is not None and c.unseen is not None
+    assert c.profiles and c.held_out is not None and c.promise is not None
     before, after = (left_by(m, fresh) for m in (declared, sm.load_machine(tmp_path / "machine.yaml")))
-    ratio = after / before
-    assert ratio == pytest.approx(c.unseen.after / c.unseen.before, rel=0.15)
-    assert c.unseen.u < 0.15 * c.unseen.after
-    # numbers alone, without the errors along the drives' travel, leave far more
-    assert c.unseen.after < 0.6 * c.held_out.after  # type: ignore[union-attr]
+    assert after / before == pytest.approx(c.held_out.after.rms / c.held_out.before.rms, rel=0.15)
+    assert after == pytest.approx(c.promise[0], rel=0.15)
+    assert after < 3.0 * NOISE < 0.2 * before
 
 
 def test_frames_are_not_fitted_to_what_is_held_out() -> None:
@@ -89,13 +87,15 @@ def test_frames_are_not_fitted_to_what_is_held_out() -> None:
 def test_errors_of_a_turning_drive_return_with_its_turns() -> None:
     (joint,) = (j for n, j in joints(sm.load_machine("ur10").description).items() if n.endswith("elbow"))
     knots = ((-1.0, 1e-4), (0.5, 3e-4), (2.0, -1e-4))
-    made = at_every_turn(joint, knots)  # its range is a turn to either side
+    at, error = np.array(knots).T
+    profile = Profile("arm.elbow", "rad", at, error, np.zeros(3))
+    made = knots_of(joint, profile)  # its range is a turn to either side
     u = np.array([-0.3, 0.7, 1.9])
     error = np.interp(u, *np.array(knots).T)
     for turns in (-1, 0, 1):
         assert np.interp(u + 2 * np.pi * turns, *np.array(made).T) == pytest.approx(error)
     sliding = next(iter(joints(sm.load_machine("linear-delta").description).values()))
-    assert at_every_turn(sliding, knots) == knots
+    assert knots_of(sliding, profile) == knots
 
 
 def test_per_cent_are_per_cent() -> None:

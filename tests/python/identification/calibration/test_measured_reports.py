@@ -13,7 +13,6 @@ import pytest
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
 REPORTS = (
-    "measured_delta",
     "measured_delta_files",
     "measured_arm",
     "measured_ur5",
@@ -36,20 +35,6 @@ def test_without_data_it_says_so(name: str, tmp_path: Path) -> None:
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     assert run.stdout.startswith("skipped: no measured data")
-
-
-def test_the_delta_of_the_report_is_three_spheres() -> None:
-    """Without errors the effector stays level where three spheres about the carriages meet."""
-    delta = loaded("measured_delta")
-    session = {f"arm_{t}_mm": "345" for t in "abc"} | {f"endstop_{t}_mm": "420" for t in "abc"}
-    session |= {"delta_radius_mm": "160", "angle_a_deg": "210", "angle_b_deg": "330", "angle_c_deg": "90"}
-    travel = np.array([[400.0, 410.0, 395.0], [300.0, 300.0, 300.0]])
-    pose = delta.effector(travel, session, {})
-    assert pose[:, 3:] == pytest.approx(np.zeros((2, 3)), abs=1e-9)
-    for row, t in zip(pose, travel, strict=True):
-        for angle, h in zip((210, 330, 90), np.sqrt(345.0**2 - 160.0**2) + 420.0 - t, strict=True):
-            tower = [160 * np.cos(np.radians(angle)), 160 * np.sin(np.radians(angle)), h]
-            assert np.linalg.norm(row[:3] - tower) == pytest.approx(345.0, abs=1e-8)
 
 
 def test_the_play_operator_remembers() -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.calibration import unknowns
-from stiffmap.identification.calibration.model import predicted
+from stiffmap.identification.numbers import unknowns
+from stiffmap.identification.numbers.sensitivity import predicted
 
 
 def wandering(e: Experiment, size: float, seed: int) -> Floats:

@@ -10,8 +10,8 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.comparison.prediction_error import left_by
-from stiffmap.identification.calibration import unknowns
-from stiffmap.identification.calibration.model import predicted
+from stiffmap.identification.numbers import unknowns
+from stiffmap.identification.numbers.sensitivity import predicted
 from stiffmap.model.description import AppliedEffect
 from stiffmap.ui.cli.diagnose import write
 

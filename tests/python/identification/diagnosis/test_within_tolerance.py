@@ -9,12 +9,12 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan
-from stiffmap.identification.calibration import unknowns
-from stiffmap.identification.calibration.model import predicted
+from stiffmap.identification.numbers import unknowns
+from stiffmap.identification.numbers.sensitivity import predicted
 
 
 def diagnosed(name: str, quantity: str, poses: int, seed: int) -> sm.Diagnosis:
-    """Of a twin whose every number is drawn from 0.3 times its uncertainty, as in bench/null_study.py."""
+    """Of a twin whose every number is drawn from 0.3 times its uncertainty."""
     machine = sm.load_machine(name)
     plan = random_plan(machine, quantity, poses=poses, loads=6, repeats=2, seed=1)
     predictor = Predictor(machine, plan)

@@ -24,6 +24,7 @@ def columns(rng: np.random.Generator, residual: np.ndarray | None = None, repeat
         channel=np.zeros(READINGS, dtype=np.intp),
         sigma=np.ones(READINGS),
         free=free,
+        frames=np.zeros((READINGS, 0)),
         residual=rng.normal(size=m) * 2.0 if residual is None else residual,
         zero=0.1 * zero @ zero.T,
         unknowns=(),
@@ -31,6 +32,7 @@ def columns(rng: np.random.Generator, residual: np.ndarray | None = None, repeat
         gaps=(),
         places=(),
         use=np.arange(READINGS),
+        travel=(),
         repeats=(repeats * 10.0, 10.0 if repeats else 0.0),
     )
 

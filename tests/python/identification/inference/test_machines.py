@@ -12,10 +12,10 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan
 from stiffmap.experiment.channels import AXIS_CHANNELS
-from stiffmap.identification.calibration import unknowns
-from stiffmap.identification.calibration.model import predicted, sensitivity
 from stiffmap.identification.inference import machines
 from stiffmap.identification.inference.corrected import Readings, corrected
+from stiffmap.identification.numbers import unknowns
+from stiffmap.identification.numbers.sensitivity import predicted, sensitivity
 
 NOBODY: Any = None
 

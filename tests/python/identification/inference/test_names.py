@@ -13,7 +13,6 @@ from tests.python.identification.inference.synthetic import READINGS, columns
 
 import stiffmap as sm
 from stiffmap.experiment import load_experiment, random_plan, simulate
-from stiffmap.identification.calibration.unknowns import Unknown
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference.amplitudes import Parts, fitted
 from stiffmap.identification.inference.columns import Place, Shape
@@ -21,6 +20,7 @@ from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.inference import inferred, terms
 from stiffmap.identification.inference.names import Model, searched
 from stiffmap.identification.inference.verdict import TOLERABLE, judged
+from stiffmap.identification.numbers.unknowns import Unknown
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
 

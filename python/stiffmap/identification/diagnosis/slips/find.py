@@ -16,7 +16,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Noise, noise_of
-from stiffmap.experiment.noise.outliers import noise_without_suspects
+from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.plan import Plan
@@ -73,7 +73,7 @@ class Readings:
     def of(predictor: Predictor, plan: Plan) -> Readings:
         """With the noise of readings that do not stand alone."""
         e = predictor.experiment
-        noise = noise_without_suspects(e, plan.base)
+        noise, _ = without_suspects(e, plan.base)
         problem = Problem.of(e, noise.sigma, plan.base)
         return Readings(predictor, plan, noise, problem, Screen.of(problem, plan.stack))
 

@@ -10,7 +10,7 @@ import numpy as np
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.setups import setups_of
-from stiffmap.identification.calibration.defaults import Tolerances
+from stiffmap.identification.numbers.tolerances import Tolerances
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import get, kinds
 

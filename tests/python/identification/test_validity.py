@@ -12,7 +12,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, save_experiment
 from stiffmap.experiment.virtual.plans import plan_of_joints
-from stiffmap.identification.calibration.validity import beyond, covered
+from stiffmap.identification.validity import beyond, covered
 from stiffmap.machining.compensation import compensate
 from stiffmap.solve.validity import KEY, Validity
 from stiffmap.ui.cli.app import main

@@ -10,10 +10,10 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.prediction.ahead import Ahead
 from stiffmap.experiment.prediction.nearby import Near
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.certificate import INSTRUMENT, SCALE, scaled
-from stiffmap.identification.calibration.unknowns import Unknown
+from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, scaled
+from stiffmap.identification.numbers.unknowns import Unknown
 from stiffmap.model.description import MachineDescription
-from stiffmap.model.with_errors import edited
+from stiffmap.model.with_errors import Knots, edited
 from stiffmap.solve.machine import Machine
 
 SMALL = 2e-4
@@ -37,10 +37,12 @@ def built(predictor: Predictor, moves: Moves) -> Machine:
     return Machine(with_moves(predictor.machine.description, moves), like=predictor.machine)
 
 
-def with_moves(description: MachineDescription, moves: Moves) -> MachineDescription:
-    """The description with its own numbers off; the instrument's are left out."""
+def with_moves(
+    description: MachineDescription, moves: Moves, travel: Mapping[str, Knots] | None = None
+) -> MachineDescription:
+    """The description with its own numbers off, and with axis positioning errors of its drives; the instrument's are left out."""
     own = {(at, what): by for (at, what), by in moves.items() if at != INSTRUMENT}
-    return edited(description, own) if own else description
+    return edited(description, own, travel) if own or travel else description
 
 
 class Slopes:

@@ -1,4 +1,4 @@
-"""How readings change with what may be off, and Gauss-Newton with priors on it."""
+"""How readings change with what may be off."""
 
 from __future__ import annotations
 
@@ -11,25 +11,22 @@ import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats
-from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.certificate import INSTRUMENT, SCALE, frame_columns, scaled
-from stiffmap.identification.calibration.slopes import Slopes, built, moves_of
-from stiffmap.identification.calibration.unknowns import Unknown
+from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, frame_columns, scaled
+from stiffmap.identification.numbers.slopes import Slopes, built, moves_of
+from stiffmap.identification.numbers.unknowns import Unknown
 from stiffmap.model.description import AppliedEffect
 
 STEP = 0.1
 """Of a standard uncertainty, for differences."""
-STEPS, FIRST, CLOSE = 30, 8, 1e-3
-"""Gauss-Newton steps at most, and before columns are taken anew; change (in standard uncertainties, or posterior ones) that ends them."""
 
 Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """What the readings feel of each unknown."""
+    """How the readings depend on each unknown."""
 
     unknowns: tuple[Unknown, ...]
     columns: Floats
@@ -196,85 +193,3 @@ def _differences(
             columns.append(column)
     stack = np.stack(columns, axis=-1) if columns else np.zeros((*base.shape, 0))
     return Sensitivity(tuple(found), stack, base, tuple(failed), stopped)
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """Unknowns at their best."""
-
-    values: Floats
-    """(p,) in standard uncertainties."""
-    prediction: Floats
-    """(n, c)."""
-    residual: Floats
-    """(N,) whitened, at `values`."""
-    linear: Floats
-    """(N,) the residual as seen from zero: residual + A values."""
-    converged: bool
-
-
-def fitted(
-    predictor: Predictor,
-    problem: Problem,
-    s: Sensitivity,
-    columns: Floats,
-    weigh: Callable[[Floats, Floats], tuple[Floats, float]],
-    *,
-    start: Floats | None = None,
-    until: float = np.inf,
-    steps: int = STEPS,
-) -> Fitted:
-    """Gauss-Newton with one Jacobian, which small errors hardly change.
-
-    columns
-        (N, p) whitened `s.columns`.
-    start
-        (p,) values to begin with; default: the declared ones.
-    weigh
-        (columns, linear residual) -> the posterior mean under the priors, and the variance of one
-        reading's misfit in noise variances.
-    """
-    values = np.zeros(columns.shape[1]) if start is None else start
-    prediction = s.base if start is None else predicted(predictor, s.unknowns, start)
-    residual = problem.residual(prediction)
-    converged = not columns.shape[1]
-    for _ in range(steps if columns.shape[1] else 0):
-        wanted, variance = weigh(columns, residual + columns @ values)
-        step = wanted - values
-        if float(np.abs(step).max()) < CLOSE or float(np.linalg.norm(columns @ step)) < CLOSE * np.sqrt(
-            variance
-        ):
-            converged = True
-            break
-        moved = _step(predictor, problem, s, values, step, residual, variance)
-        if moved is None:
-            break
-        values, prediction, residual = moved
-        if time.monotonic() > until:
-            break
-    return Fitted(values, prediction, residual, residual + columns @ values, converged)
-
-
-def _step(
-    predictor: Predictor,
-    problem: Problem,
-    s: Sensitivity,
-    values: Floats,
-    step: Floats,
-    residual: Floats,
-    variance: float,
-) -> tuple[Floats, Floats, Floats] | None:
-    """The step, halved while the machine cannot be solved with it or the misfit and prior grow."""
-    before = float(residual @ residual) / variance + float(values @ values)
-    for _ in range(4):
-        moved = values + step
-        try:
-            prediction = predicted(predictor, s.unknowns, moved)
-            here = problem.residual(prediction)
-        except StiffmapError:
-            step = step / 2
-            continue
-        if float(here @ here) / variance + float(moved @ moved) <= before * (1.0 + 1e-6):
-            return moved, prediction, here
-        step = step / 2
-    return None

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.identification.calibration.certificate import INSTRUMENT, SCALE, frame_names
-from stiffmap.identification.calibration.declared import Declared, Run
-from stiffmap.identification.calibration.defaults import Tolerances
+from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, frame_names
+from stiffmap.identification.numbers.declared import Declared, Run
+from stiffmap.identification.numbers.tolerances import Tolerances
 from stiffmap.model.description import Block, Body, Element, Joint, MachineDescription, Offset, Spring
 from stiffmap.model.with_errors import END, FRAME
 

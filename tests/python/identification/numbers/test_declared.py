@@ -11,8 +11,9 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, load_experiment, save_experiment
 from stiffmap.experiment.virtual.plans import plan_of_poses, random_poses
-from stiffmap.identification.calibration import Calibrator, Tolerances, Unknown, certified, unknowns
-from stiffmap.identification.calibration.model import predicted
+from stiffmap.identification.calibration import calibrate
+from stiffmap.identification.numbers import Tolerances, Unknown, certified, unknowns
+from stiffmap.identification.numbers.sensitivity import predicted
 
 SHIPPED = Path(sm.__file__).parent / "model/machines" / "linear-delta.yaml"
 
@@ -120,8 +121,8 @@ def test_known_frame_is_found_within_its_uncertainty() -> None:
     shift, turn = np.array([1e-4, -5e-5, 8e-5]), np.array([2e-4, 3e-4, -1e-4])
     reading = e.reading.copy()
     reading[:, :3] = predictor()[:, :3] + shift + np.cross(turn, e.position)
-    found = Calibrator.of(Predictor(machine, replace(e, reading=reading, joints=None)), names)
-    value = {u.name: v * u.u for u, v in zip(found.sensitivity.unknowns, found.fit.values, strict=True)}
+    found = calibrate(machine, replace(e, reading=reading, joints=None), tolerances=t)
+    value = {r.name: r.value for r in found.rows}
     got = np.array([value[u.name] for u in frame])
     assert got[:3] == pytest.approx(shift, abs=4e-6)
     assert got[3:] == pytest.approx(turn, abs=2e-5)

@@ -10,10 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
-from stiffmap.identification.calibration.model import Sensitivity
-from stiffmap.identification.calibration.statistics import Sums
-from stiffmap.identification.calibration.unknowns import Unknown
+from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.identification.numbers.sensitivity import Sensitivity
+from stiffmap.identification.numbers.unknowns import Unknown
 
 
 def zeros_anew(s: Sensitivity, experiment: Experiment) -> Sensitivity | None:
@@ -33,16 +32,3 @@ def zeros_anew(s: Sensitivity, experiment: Experiment) -> Sensitivity | None:
     at = None if s.at is None else np.append(s.at, np.zeros(len(more)))
     stack = np.concatenate([s.columns, np.stack(columns, axis=-1)], axis=-1)
     return replace(s, unknowns=(*s.unknowns, *more), columns=stack, at=at)
-
-
-def own_part(unknowns: tuple[Unknown, ...], columns: Floats, residual: Floats, test: Mask) -> Floats:
-    """(N,) what the rows `test` (N,), whole set-ups, say themselves of zeros that are theirs alone.
-
-    `columns` (N, p) and `residual` (N,) are whitened.
-    """
-    out = np.zeros(len(residual))
-    mine = [i for i, u in enumerate(unknowns) if u.setup and np.any(columns[test][:, i] != 0.0)]
-    if mine:
-        own = columns[test][:, mine]
-        out[test] = own @ Sums.of(own, residual[test]).estimate
-    return out

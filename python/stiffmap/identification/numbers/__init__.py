@@ -1,0 +1,7 @@
+"""Numbers of a machine and its instrument that may be off: their uncertainties, and how readings depend on them."""
+
+from stiffmap.identification.numbers.certificate import certified
+from stiffmap.identification.numbers.tolerances import Tolerances
+from stiffmap.identification.numbers.unknowns import GEOMETRY, GROUPS, Unknown, unknowns
+
+__all__ = ["GEOMETRY", "GROUPS", "Tolerances", "Unknown", "certified", "unknowns"]
