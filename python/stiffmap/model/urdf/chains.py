@@ -12,7 +12,7 @@ from stiffmap.common.errors import FileError
 from stiffmap.common.rotations import rotation_about
 from stiffmap.model.description import Body, Drive, Element, Joint, Law, Offset, Pose, Spring
 from stiffmap.model.description.pose import Vector
-from stiffmap.model.urdf.model import UrdfJoint, UrdfModel, tensor
+from stiffmap.model.urdf.model import DUST, UrdfJoint, UrdfModel, tensor
 from stiffmap.model.urdf.sidecar import Elasticity, LinkSpring, Sidecar
 
 XYZ = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -106,7 +106,12 @@ class Chains:
             at = self.between(head, link)
             turned = at.r @ np.array(body.inertia) @ at.r.T
             com = at.p + at.r @ np.array(body.com)
-            out.append(Body(plain_name(link), body.mass, Pose.of(com).translation, tensor(turned)))
+            rows = tensor(turned, body.mass)
+            least = float(np.linalg.eigvalsh(rows)[0])
+            if least < -DUST * np.abs(rows).max():
+                raise FileError(f"the inertia has a negative principal moment ({least:.3g} kg m^2)",
+                                file=self.model.file, key=f"link {link}")  # fmt: skip
+            out.append(Body(plain_name(link), body.mass, Pose.of(com).translation, rows))
         return out
 
     def between(self, head: str, link: str) -> Pose:

@@ -12,14 +12,16 @@ from stiffmap.model.description import Body, Pose
 from stiffmap.model.description.pose import Rows, Vector
 from stiffmap.model.files.schema.base import suggestion
 
-DUST = 1e-12
-"""Of the largest term of a tensor: what turning it leaves where there is nothing."""
+DUST, POINT = 1e-12, 1e-15
+"""Of the largest term of a tensor: what turning it leaves where there is nothing. m²: a tensor less than this times its mass
+is that of a point, which exporters write with rounding."""
 
 
-def tensor(values: Floats) -> Rows:
-    """Symmetric tensor (kg·m²) as rows, without numerical dust."""
+def tensor(values: Floats, mass: float) -> Rows:
+    """Symmetric tensor (kg·m²) of a body (kg) as rows, without numerical dust."""
     even = (values + values.T) / 2
-    return Pose.of(rotation=np.where(np.abs(even) < DUST * np.abs(even).max(), 0.0, even)).rotation
+    size = np.abs(even)
+    return Pose.of(rotation=np.where(size < max(DUST * size.max(), POINT * mass), 0.0, even)).rotation
 
 
 @dataclass(frozen=True)

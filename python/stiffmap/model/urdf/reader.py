@@ -125,7 +125,7 @@ def _body(e: xml.Element, file: str) -> Body | None:
         _number(given, k, file, key) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
     about_com = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return Body(name, mass, at.translation, tensor(at.r @ about_com @ at.r.T))
+    return Body(name, mass, at.translation, tensor(at.r @ about_com @ at.r.T, mass))
 
 
 def _origin(e: xml.Element, file: str, key: str) -> Pose:

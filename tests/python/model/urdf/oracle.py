@@ -26,7 +26,7 @@ def moved(joint: Any, q: float) -> Any:
     """4x4 of a joint's motion, as a matrix exponential by its series."""
     a = joint.find("axis")
     x, y, z = np.array([float(v) for v in (a.get("xyz") if a is not None else "1 0 0").split()])
-    x, y, z = np.array([x, y, z]) / np.linalg.norm([x, y, z])
+    x, y, z = np.array([x, y, z]) / (np.linalg.norm([x, y, z]) or 1.0)
     out = np.eye(4)
     if joint.get("type") == "prismatic":
         out[:3, 3] = q * np.array([x, y, z])

@@ -134,7 +134,9 @@ BAD = {
     "nothing moves": (robot(joint("m", "base", "x")), "no joint moves"),
     "limits": (robot(arm(), joint("m", "c", "x", "revolute", '<limit lower="2" upper="1"/>')),
                "joint m: the lower limit 2 lies above the upper one, 1"),
-    "too small a mass": (robot(arm()).replace('ixx="0.002"', 'ixx="x"', 1), "link a: ixx: expected a number, found 'x'"),
+    "no inertia of a body": (robot(arm()).replace('ixx="0.002"', 'ixx="-0.002"', 1),
+                             "link a: the inertia has a negative principal moment (-0.00"),
+    "no number": (robot(arm()).replace('ixx="0.002"', 'ixx="x"', 1), "link a: ixx: expected a number, found 'x'"),
 }  # fmt: skip
 
 
@@ -216,6 +218,11 @@ def test_dust_of_a_tensor_is_zero(tmp_path: Path) -> None:
     for dust in ("1e-20", "-4.2e-90", "6.6e-17", "5e-324"):
         again = imported(tmp_path, DUST.replace("3.1e-114", dust))
         assert bodies(again)["shoulder"][0].inertia == wanted
+    point = 'ixx="2.7e-20" iyy="5.4e-20" izz="-1.1e-18" ixy="0" ixz="1.3e-20" iyz="3.4e-21"'
+    heavy = imported(
+        tmp_path, DUST.replace('ixx="0.004" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"', point)
+    )
+    assert not np.any(bodies(heavy)["elbow"][0].inertia)
     real = bodies(imported(tmp_path, DUST.replace("3.1e-114", "1e-9")))["shoulder"][0].inertia
     assert real is not None and real[0][1] == real[1][0] == 1e-9
     turned = bodies(
