@@ -118,3 +118,16 @@ def test_frames_that_lie_far_off() -> None:
     straight = machine(CALIBRATED, [0.3, -0.9, 1.1, -0.5, 0, 0.4])
     assert "home is nearly singular" in singular_words(straight, True)
     assert singular_words(far, True) == ""
+
+
+def test_forward_kinematics_is_of_the_declared_geometry() -> None:
+    """And the displacement without load leads from there to where the machine stands."""
+    m = sm.load_machine("ur10")
+    q = np.array([0.1, -1.0, 1.2, -0.3, 0.8, 0.2])
+    bent = m.with_effect("zero_offset", element="shoulder", error=0.002)
+    declared, there = (sm.forward_kinematics(m, v) for v in (q, q + [0, 0.002, 0, 0, 0, 0]))
+    np.testing.assert_array_equal(sm.forward_kinematics(bent, q).position, declared.position)
+    moved = bent.solve_joints(q).displacement
+    np.testing.assert_allclose(declared.position + moved[:3], there.position, rtol=0, atol=1e-12)
+    turned = Rotation.from_rotvec(moved[3:]).as_matrix() @ declared.rotation
+    np.testing.assert_allclose(turned, there.rotation, rtol=0, atol=1e-12)
