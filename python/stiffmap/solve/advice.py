@@ -18,6 +18,7 @@ from stiffmap.model.files.shipped import find
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.free_motions import direction, free_motions
 from stiffmap.solve.machine import Machine
+from stiffmap.solve.singular_home import serial_home, singular_words
 from stiffmap.solve.trial import tried
 
 TRIAL = 0.01
@@ -57,14 +58,19 @@ def _freedoms(machine: Machine) -> list[str]:
 
 def _reach(machine: Machine) -> list[str]:
     """Home and box against what can be reached."""
-    d, length = machine.description, machine.compiled.length
+    d = machine.description
+    home = serial_home(d)
+    length = (home.arm if home else 0.0) or machine.compiled.length
     task = d.task or ("x", "y", "z")
     moved = [i for i, a in enumerate(NAMES) if a in task]
     steps = [s * TRIAL * length * np.eye(3)[i] for i in moved for s in (1, -1)]
     out = []
     lost = [k for k in steps if int(machine.solve(d.home.p + k, np.zeros(6)).status) == Status.UNREACHABLE]
     both = [NAMES[i] for i in moved if sum(bool(k[i]) for k in lost) == 2]
-    if both:
+    singular = singular_words(d, bool(lost))
+    if singular:
+        out.append(singular)
+    elif both:
         out.append(
             f"the machine cannot move along {', '.join(both)}: {len(machine.actuators)} drives, {len(d.task) or 6} "
             "components commanded; name those that are, such as task: [x, y]"

@@ -44,7 +44,12 @@ def inverse_kinematics(
 def forward_kinematics(
     machine: Machine, actuators: ArrayLike, *, start: Start | None = None, threads: int | None = None
 ) -> Kinematics:
-    """TCP pose at actuator coordinates (..., actuators) m or rad, by continuation from home or from `start`."""
+    """TCP pose at actuator coordinates (..., actuators) m or rad, by continuation from home or from `start`.
+
+    It is where the declared geometry puts the TCP, which is what a controller knows. Effects on the geometry, such as those that
+    `calibrate` writes into a machine file, do not enter: where the machine really stands is this pose moved by
+    `machine.solve_joints(actuators).displacement` (no load; TCP translation m, rotation vector rad, base axes).
+    """
     return close_actuators(machine.compiled, actuators, start, threads)
 
 

@@ -9,7 +9,11 @@ from stiffmap.solve.machine import Machine
 
 
 def import_urdf(
-    urdf: str | PathLike[str], sidecar: str | PathLike[str] | None = None, *, meshes: bool = True
+    urdf: str | PathLike[str],
+    sidecar: str | PathLike[str] | None = None,
+    *,
+    tip: str | None = None,
+    meshes: bool = True,
 ) -> Machine:
     """Machine (SI) of a URDF file: a serial chain from the root link to the tip, or legs in parallel with a sidecar.
 
@@ -17,9 +21,13 @@ def import_urdf(
         The URDF file.
     sidecar
         YAML file with what a URDF lacks: closed loops, motors, compliances, workspace. None: all motors are rigid.
+    tip
+        Link that is the tool. None: that of the sidecar, or the one that has the name of a tool (tool0, tcp, tool, ee,
+        flange), or the only end; `machine.description.source` says which.
     meshes
-        False: meshes are not looked for.
+        Has no effect: meshes are never read.
 
-    `stiffmap.model.urdf.import_urdf` returns the description and what was left out. Raises FileError, one line, for what cannot be used.
+    Joints that are not on the way to the tip are left out, and stand at zero; what they carry stays as a mass on the
+    body that they hang on. `stiffmap.model.urdf.import_urdf` returns the description and what was left out. Raises FileError, one line, for what cannot be used.
     """
-    return Machine(description_of(urdf, sidecar, meshes=meshes).description)
+    return Machine(description_of(urdf, sidecar, tip=tip).description)

@@ -49,6 +49,8 @@ TO_SI = {
 LEG = "arm"
 STEP, TRIES = math.radians(30.0), 200
 """Of the coordinates among which a home is looked for, and how many are tried."""
+LEVERS = 1.5
+"""Longest lever arms, among some positions, that the lengths of an arm add up to at most."""
 ROOM = 0.2
 """Half of the workspace, of the arm's reach."""
 
@@ -119,8 +121,7 @@ def arm(
         if np.any(behind - np.eye(4)):
             elements.append(Offset(f"link_{i + 1}" if standard else f"{r.name}_end", _pose(behind)))
     at = forward(rows, standard, q)
-    reach = sum(abs(r.a) + abs(r.d) for r in rows) or 1.0
-    room = ROOM * reach
+    room = ROOM * _reach(rows, standard)
     low, high = (tuple(float(v) for v in at[:3, 3] + side * room) for side in (-1.0, 1.0))
     return MachineDescription(
         name, (Leg(LEG, tuple(elements)),), home=_pose(at), workspace=(low, high), source=source,  # type: ignore[arg-type]
@@ -141,7 +142,7 @@ def forward(rows: Sequence[Row], standard: bool, q: Floats) -> Floats:
 def _home(rows: Sequence[Row], standard: bool) -> Floats:
     """Of coordinates in steps of 30 degrees those whose slopes are farthest from losing a direction."""
     rng = np.random.default_rng(0)
-    reach = sum(abs(r.a) + abs(r.d) for r in rows) or 1.0
+    reach = _reach(rows, standard)
     best, where = -1.0, np.zeros(len(rows))
     for k in range(TRIES):
         q = np.array([_within(r, STEP * int(rng.integers(-4, 5)) if k else 0.0, reach) for r in rows])
@@ -150,6 +151,17 @@ def _home(rows: Sequence[Row], standard: bool) -> Floats:
         if told > 1.05 * best:
             best, where = told, q
     return where
+
+
+def _reach(rows: Sequence[Row], standard: bool) -> float:
+    """Of the tool, m: at most the sum of all lengths. Between nearly parallel axes these are hundreds of metres to and fro,
+    and the lever arms about the axes say how large the arm is."""
+    total = sum(abs(r.a) + abs(r.d) for r in rows) or 1.0
+    turning = [i for i, r in enumerate(rows) if not r.slides]
+    draws = np.random.default_rng(0).uniform(-math.pi, math.pi, (TRIES // 10, len(rows)))
+    draws[:, [i for i, r in enumerate(rows) if r.slides]] = 0.0
+    arms = [np.linalg.norm(_slopes(rows, standard, q, 1.0)[:3, turning], axis=0) for q in draws]
+    return min(total, LEVERS * float(np.max(arms, initial=0.0))) if turning else total
 
 
 def _within(r: Row, turn: float, reach: float) -> float:

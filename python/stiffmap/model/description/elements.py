@@ -97,6 +97,10 @@ class Joint:
     limits: tuple[float, float] | None = interval("limits", "Range of the coordinate.", passive=True)
     drive: Drive | None = None
 
+    def __post_init__(self) -> None:
+        if self.drive == Drive():  # nothing known of the motor, as in a file that names none of its numbers
+            object.__setattr__(self, "drive", None)
+
     @property
     def laws(self) -> tuple[Law | None, ...]:
         """Law of each axis; ``None``: free, or rigid where it is actuated."""

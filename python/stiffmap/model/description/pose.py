@@ -7,14 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stiffmap.common.number_text import SMALLEST
+
 Vector = tuple[float, float, float]
 Rows = tuple[Vector, Vector, Vector]
 IDENTITY: Rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def vector(values: ArrayLike) -> Vector:
-    """Three floats as a hashable tuple."""
-    x, y, z = (float(v) for v in np.asarray(values, dtype=float).reshape(3))
+    """Three floats as a hashable tuple; products of dust, which no file holds, are 0."""
+    x, y, z = (float(v) if abs(v) >= SMALLEST else 0.0 for v in np.asarray(values, dtype=float).reshape(3))
     return (x, y, z)
 
 

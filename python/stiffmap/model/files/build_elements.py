@@ -219,7 +219,7 @@ def _actuator(model: ActuatorModel, context: Context) -> Joint:
         law=_law(model, angular, context),
         command_errors=tuple(_command_error(e, coordinate, context) for e in model.command_errors or []),
         **build_numbers(model, Joint, angular, context),
-        drive=None if drive == Drive() else drive,
+        drive=drive,
     )
 
 
@@ -234,7 +234,7 @@ def _cable(model: CableModel, context: Context) -> Cable:
         at=build_vector(model.at, LENGTH, context, "at") if model.at else (0.0, 0.0, 0.0),
         guide=model.guide or (0.0, 0.0, 1.0),
         command_errors=tuple(_command_error(e, LENGTH, context) for e in model.command_errors or []),
-        drive=None if drive == Drive() else drive,
+        drive=drive,
         **numbers,
     )
 

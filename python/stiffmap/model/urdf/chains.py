@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from stiffmap.common.errors import FileError
 from stiffmap.common.rotations import rotation_about
 from stiffmap.model.description import Body, Drive, Element, Joint, Law, Offset, Pose, Spring
-from stiffmap.model.urdf.model import UrdfJoint, UrdfModel
+from stiffmap.model.description.pose import Vector
+from stiffmap.model.urdf.model import DUST, UrdfJoint, UrdfModel, tensor
 from stiffmap.model.urdf.sidecar import Elasticity, LinkSpring, Sidecar
 
 XYZ = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -29,14 +31,14 @@ class Chains:
     model: UrdfModel
     side: Sidecar
     motors: set[str]
-    used: set[str] = field(default_factory=set)
+    heads: set[str]
+    """First links of the bodies on the ways; what else moves stays with the one that it hangs on."""
 
     def sequence(self, way: list[UrdfJoint], end: str | None = None) -> tuple[Element, ...]:
         """Elements along joints; the spring of a link stands at its end, before the joint that leaves
         it, that of `end` at the last frame."""
         out: list[Element] = []
         for joint in way:
-            self.used.add(joint.child)
             if joint.origin != Pose():
                 out.append(Offset(plain_name(f"{joint.name}_origin"), joint.origin))
             out += self._spring(joint.parent, end)
@@ -50,7 +52,8 @@ class Chains:
         return () if given is None or link == end else (link_spring(plain_name(link), given),)
 
     def _joint(self, joint: UrdfJoint) -> Joint:
-        home = self.side.home.get(joint.name, 0.0)
+        self._check(joint)
+        home = self.coordinate(joint)
         name = plain_name(joint.name)
         if joint.name in self.side.joint_name:
             return Joint(name, "spherical", XYZ, (0.0, 0.0, 0.0))
@@ -62,27 +65,62 @@ class Chains:
             drive=Drive(range=joint.limits, speed=joint.velocity, force=joint.effort),
         )  # fmt: skip
 
+    def _check(self, joint: UrdfJoint) -> None:
+        """FileError, one line, for a joint that no way to the tip may hold."""
+        problem = ""
+        if joint.mimic:
+            problem = (f"mimics joint '{joint.mimic.joint}' and lies on the way to the tip: coupled joints cannot "
+                       "be imported; make it fixed, or choose a tip before it")  # fmt: skip
+        elif joint.kind not in ("revolute", "prismatic"):
+            problem = (f"type '{joint.kind}' cannot be imported on the way to the tip; known are revolute, "
+                       "continuous, prismatic, fixed")  # fmt: skip
+        elif joint.limits and joint.limits[0] > joint.limits[1]:
+            problem = f"the lower limit {joint.limits[0]:g} lies above the upper one, {joint.limits[1]:g}"
+        if problem:
+            raise FileError(problem, file=self.model.file, key=f"joint {joint.name}")
+
+    def coordinate(self, joint: UrdfJoint) -> float:
+        """Of a joint at home, m or rad: the sidecar's, or what the joint that it mimics makes of it, or 0."""
+        seen, slope, start = [joint], 1.0, 0.0
+        while joint.name not in self.side.home and joint.mimic:
+            start, slope = start + slope * joint.mimic.offset, slope * joint.mimic.multiplier
+            followed = [j for j in self.model.moving if j.name == joint.mimic.joint and j not in seen]
+            if not followed:
+                return start
+            joint = followed[0]
+            seen.append(joint)
+        return start + slope * self.side.home.get(joint.name, 0.0)
+
+    def carrier(self, link: str) -> str:
+        """First link of the body on the ways, or of the base, that a link stays with."""
+        while link not in self.heads and link in self.model.above:
+            link = self.model.above[link].parent
+        return link
+
     def _bodies(self, head: str) -> list[Body]:
-        """Bodies of all links that move with `head`, seen from its frame."""
+        """Bodies of all links that stay with `head`, seen from its frame, turned about their own centres."""
         out = []
         for link, body in self.model.links.items():
-            if body is None or self.model.body_of(link) != head:
+            if body is None or self.carrier(link) != head:
                 continue
-            self.used.add(link)
             at = self.between(head, link)
             turned = at.r @ np.array(body.inertia) @ at.r.T
             com = at.p + at.r @ np.array(body.com)
-            out.append(
-                Body(plain_name(link), body.mass, Pose.of(com).translation, Pose.of(rotation=turned).rotation)
-            )
+            rows = tensor(turned, body.mass)
+            least = float(np.linalg.eigvalsh(rows)[0])
+            if least < -DUST * np.abs(rows).max():
+                raise FileError(f"the inertia has a negative principal moment ({least:.3g} kg m^2)",
+                                file=self.model.file, key=f"link {link}")  # fmt: skip
+            out.append(Body(plain_name(link), body.mass, Pose.of(com).translation, rows))
         return out
 
     def between(self, head: str, link: str) -> Pose:
-        """A link's frame seen from that of a link below which it hangs by fixed joints."""
+        """A link's frame at home, seen from that of a link below which it hangs."""
         out = Pose()
         while link != head:
-            out = self.model.above[link].origin @ out
-            link = self.model.above[link].parent
+            joint = self.model.above[link]
+            moved = moved_by(joint.kind, joint.axis, self.coordinate(joint))
+            out, link = joint.origin @ moved @ out, joint.parent
         return out
 
 
@@ -115,7 +153,13 @@ def end_pose(elements: tuple[Element, ...]) -> Pose:
             out = out @ e.nominal
         elif isinstance(e, Joint):
             for axis, q in zip(e.axes, e.home, strict=True):
-                step = Pose.of(q * np.array(axis)) if e.kind == "prismatic" else Pose.of(
-                    rotation=rotation_about(np.array(axis), q))  # fmt: skip
-                out = out @ step
+                out = out @ moved_by(e.kind, axis, q)
     return out
+
+
+def moved_by(kind: str, axis: Vector, q: float) -> Pose:
+    """What a joint's coordinate (m, rad) moves: about or along its axis."""
+    if q == 0:
+        return Pose()
+    along = np.array(axis)
+    return Pose.of(q * along) if kind == "prismatic" else Pose.of(rotation=rotation_about(along, q))

@@ -6,13 +6,15 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.model.description import TASK, Leg, MachineDescription, Offset
+from stiffmap.model.files.save import description_text
 from stiffmap.model.files.schema.base import suggestion
 from stiffmap.model.urdf.chains import Chains, ball, end_pose, plain_name
 from stiffmap.model.urdf.model import UrdfJoint, UrdfModel
 from stiffmap.model.urdf.reader import read_urdf
 from stiffmap.model.urdf.sidecar import Sidecar, read_sidecar
+from stiffmap.model.urdf.tip import find_tip
 
 
 @dataclass(frozen=True)
@@ -21,9 +23,13 @@ class Imported:
 
     description: MachineDescription
     left_out: tuple[str, ...]
-    """Links that lie on no way between base and tip."""
+    """Links that move on no way between base and tip; their masses stay with the body that carries them."""
     rigid: tuple[str, ...]
     """Motors without a compliance."""
+    tip: str = ""
+    """The link that is the tool."""
+    choice: str = ""
+    """The ends that it was chosen from, in words; empty where it was named, or is the only one."""
 
 
 @dataclass(frozen=True)
@@ -36,22 +42,25 @@ class Loop:
 
 
 def import_urdf(
-    urdf: str | PathLike[str], sidecar: str | PathLike[str] | None = None, *, meshes: bool = True
+    urdf: str | PathLike[str], sidecar: str | PathLike[str] | None = None, *, tip: str | None = None
 ) -> Imported:
     """Machine description (SI) of a URDF file: a serial chain from the root link to the tip, or, with the
     `closed_loop` of a sidecar, legs in parallel between one base and one platform.
 
-    Raises FileError, one line, for what cannot be used: coupled (mimic) joints, missing meshes (unless
-    `meshes` is False), unknown frames and joints, loops of another topology.
+    `tip` is the link that is the tool, before what a sidecar says; None: the link that has the name of a tool
+    (tool0, tcp, tool, ee, flange), or the only end. Raises FileError, one line, for what cannot be used: coupled
+    (mimic), floating and planar joints on the way to the tip, several possible tools, unknown frames and joints,
+    loops of another topology, and what no machine file holds.
     """
-    model = read_urdf(Path(urdf), meshes)
+    model = read_urdf(Path(urdf))
     side = read_sidecar(None if sidecar is None else Path(sidecar))
     file = str(urdf) if sidecar is None else fspath(sidecar)
     _check_names(model, side, file)
-    tip = model.link(side.tip, "tip", file) if side.tip else _only_leaf(model, side, file)
-    motors = _motors(model, side, tip, file)
-    chains = Chains(model, side, motors)
-    legs, platform = _legs(model, side, chains, tip, file)
+    end, choice = _tip(model, side, tip, file)
+    motors = _motors(model, side, end, file)
+    ways = [end, *(model.link(f, "closed_loop", file) for pair in side.closed_loop for f in pair)]
+    chains = Chains(model, side, motors, {j.child for n in ways for j in model.way(n) if j.kind != "fixed"})
+    legs, platform = _legs(model, side, chains, end, file)
     home = end_pose(legs[0].elements) @ end_pose(platform)
     box = side.workspace
     description = MachineDescription(
@@ -63,10 +72,21 @@ def import_urdf(
         workspace=None if box is None else tuple(  # type: ignore[arg-type]
             tuple(float(box[a][k]) for a in "xyz") for k in (0, 1)),  # type: ignore[index]
         title=f"{model.name}, imported",
-        source=f"imported from {Path(urdf).name}" + (f" with {Path(file).name}" if sidecar else ""),
+        source=f"imported from {Path(urdf).name}" + (f" with {Path(file).name}" if sidecar else "") + f" to {end}",
     )  # fmt: skip
-    left_out = tuple(n for n in model.links if n not in chains.used and model.body_of(n) != model.root)
-    return Imported(description, left_out, tuple(sorted(motors - set(side.actuators))))
+    _check_file(description, model.file)
+    left_out = tuple(n for n in model.links if model.body_of(n) not in {*chains.heads, model.root})
+    return Imported(description, left_out, tuple(sorted(motors - set(side.actuators))), end, choice)
+
+
+def _check_file(description: MachineDescription, file: str) -> None:
+    """FileError, about the URDF, for a machine that could be made but not saved."""
+    try:
+        description_text(description)
+    except FileError as error:
+        raise FileError(error.reason, file=file, key=error.key) from None
+    except StiffmapError as error:
+        raise FileError(str(error), file=file) from None
 
 
 def _check_names(model: UrdfModel, side: Sidecar, file: str) -> None:
@@ -90,15 +110,18 @@ def _check_names(model: UrdfModel, side: Sidecar, file: str) -> None:
             raise FileError(f"no link '{name}' in {model.file}{near}", file=file, key="springs")
 
 
-def _only_leaf(model: UrdfModel, side: Sidecar, file: str) -> str:
-    """The tip where none is named: the platform of the loops, or the only leaf."""
-    if side.closed_loop:
-        return model.link(side.closed_loop[0][0], "closed_loop", file)
-    if len(model.leaves) != 1:
-        ends = ", ".join(model.leaves)
-        raise FileError(f"the tree has {len(model.leaves)} ends ({ends}); say in a sidecar "
-                        "which one is the tool, `tip: ...`", file=file)  # fmt: skip
-    return model.leaves[0]
+def _tip(model: UrdfModel, side: Sidecar, tip: str | None, file: str) -> tuple[str, str]:
+    """The tool: as named, the platform of the loops, or the one that is found; and what it was chosen from."""
+    found, choice = "", ""
+    if tip or side.tip:
+        found = model.link(tip or side.tip or "", "tip", model.file if tip else file)
+    elif side.closed_loop:
+        found = model.link(side.closed_loop[0][0], "closed_loop", file)
+    else:
+        found, choice = find_tip(model)
+    if model.body_of(found) == model.root:
+        raise FileError(f"no joint moves link '{found}'", file=model.file if tip else file, key="tip")
+    return found, choice
 
 
 def _motors(model: UrdfModel, side: Sidecar, tip: str, file: str) -> set[str]:

@@ -4,10 +4,33 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
 from stiffmap.model.description import Body, Pose
-from stiffmap.model.description.pose import Vector
+from stiffmap.model.description.pose import Rows, Vector
 from stiffmap.model.files.schema.base import suggestion
+
+DUST, POINT = 1e-12, 1e-15
+"""Of the largest term of a tensor: what turning it leaves where there is nothing. m²: a tensor less than this times its mass
+is that of a point, which exporters write with rounding."""
+
+
+def tensor(values: Floats, mass: float) -> Rows:
+    """Symmetric tensor (kg·m²) of a body (kg) as rows, without numerical dust."""
+    even = (values + values.T) / 2
+    size = np.abs(even)
+    return Pose.of(rotation=np.where(size < max(DUST * size.max(), POINT * mass), 0.0, even)).rotation
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """The joint that another follows: coordinate = multiplier · its coordinate + offset."""
+
+    joint: str
+    multiplier: float
+    offset: float
 
 
 @dataclass(frozen=True)
@@ -15,7 +38,7 @@ class UrdfJoint:
     """A joint: its frame in the parent link's frame, then its motion."""
 
     name: str
-    kind: str  # revolute, prismatic, fixed
+    kind: str  # revolute, prismatic, fixed; others as written, and never on a way to the tip
     parent: str
     child: str
     origin: Pose
@@ -23,6 +46,7 @@ class UrdfJoint:
     limits: tuple[float, float] | None = None
     effort: float | None = None
     velocity: float | None = None
+    mimic: Mimic | None = None
 
 
 @dataclass(frozen=True)
@@ -44,6 +68,15 @@ class UrdfModel:
         """Links that carry no other link."""
         parents = {joint.parent for joint in self.above.values()}
         return [link for link in self.links if link not in parents]
+
+    @property
+    def moving(self) -> list[UrdfJoint]:
+        """Joints that are not fixed, in the file's order."""
+        return [joint for joint in self.above.values() if joint.kind != "fixed"]
+
+    def joint(self, name: str) -> UrdfJoint:
+        """The joint of a name."""
+        return next(joint for joint in self.above.values() if joint.name == name)
 
     def way(self, link: str) -> list[UrdfJoint]:
         """Joints from the root to a link."""

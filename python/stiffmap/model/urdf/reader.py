@@ -1,7 +1,8 @@
-"""Reading a URDF file: geometry, limits and masses; meshes are looked for, not read."""
+"""Reading a URDF file: geometry, limits and masses; what is drawn is not read."""
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
@@ -9,21 +10,21 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
-from stiffmap.common.number_text import number_in
+from stiffmap.common.number_text import LARGEST, number_in
 from stiffmap.common.rotations import rotation_about
 from stiffmap.model.description import Body, Pose
 from stiffmap.model.description.pose import vector
-from stiffmap.model.urdf.model import UrdfJoint, UrdfModel
+from stiffmap.model.urdf.model import Mimic, UrdfJoint, UrdfModel, tensor
 
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
 X, Y, Z = np.eye(3)
 
 
-def read_urdf(path: Path, meshes: bool = True) -> UrdfModel:
+def read_urdf(path: Path) -> UrdfModel:
     """Model of a URDF file; FileError for what cannot be used, one line each."""
     file = str(path)
     try:
-        robot = xml.parse(path).getroot()
+        robot = xml.fromstring(_with_prefixes(path.read_bytes()))
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=file) from None
     except (
@@ -32,14 +33,33 @@ def read_urdf(path: Path, meshes: bool = True) -> UrdfModel:
         ValueError,
     ) as error:  # the latter two: an encoding that there is not
         raise FileError(f"not XML: {error}", file=file) from None
+    if path.suffix == ".xacro" or any(_is_xacro(e) for e in robot.iter()):
+        raise _unexpanded(path)
     if robot.tag != "robot":
         raise FileError(f"expected a URDF, whose root element is <robot>; found <{robot.tag}>", file=file)
-    if meshes:
-        _check_meshes(robot, path)
     links = {_name(e, file): _body(e, file) for e in robot.findall("link")}
     joints = [_joint(e, file) for e in robot.findall("joint")]
     _check_tree(links, joints, file)
     return UrdfModel(file, robot.get("name", path.stem), links, {j.child: j for j in joints})
+
+
+def _with_prefixes(text: bytes) -> bytes:
+    """The file with every prefix of an element explained, which XML asks for and readers of URDF do not."""
+    missing = {*re.findall(rb"<([A-Za-z_][\w.-]*):", text)} - {*re.findall(rb"xmlns:([\w.-]+)", text)}
+    names = b"".join(b' xmlns:%b="%b"' % (n, n) for n in sorted(missing))
+    return re.sub(rb"<robot\b", b"<robot" + names, text, count=1)
+
+
+def _is_xacro(e: xml.Element) -> bool:
+    """An element of xacro, or a number or name that xacro fills in."""
+    texts = [str(v) for k, v in e.attrib.items() if k != "filename"]
+    return "xacro" in str(e.tag).partition("}")[0] or any("${" in t or "$(" in t for t in texts)
+
+
+def _unexpanded(path: Path) -> FileError:
+    plain = path.name.removesuffix(".xacro").removesuffix(".urdf")
+    out = f"{plain}.urdf" if f"{plain}.urdf" != path.name else f"{plain}_expanded.urdf"
+    return FileError(f"this is xacro, expand it with: xacro {path.name} > {out}", file=str(path))
 
 
 def _name(element: xml.Element, file: str) -> str:
@@ -68,28 +88,24 @@ def _check_tree(links: dict[str, Body | None], joints: list[UrdfJoint], file: st
 def _joint(e: xml.Element, file: str) -> UrdfJoint:
     name = _name(e, file)
     key, kind = f"joint {name}", e.get("type", "")
-    if e.find("mimic") is not None:
-        of = e.find("mimic").get("joint", "?")  # type: ignore[union-attr]
-        raise FileError(f"mimics joint '{of}': coupled joints cannot be imported; write the loop that "
-                        "couples them, or make the joint fixed", file=file, key=key)  # fmt: skip
-    if kind not in KINDS:
-        known = ", ".join(KINDS)
-        raise FileError(f"type '{kind}' cannot be imported; known are {known}", file=file, key=key)
     parent, child = (_link(e, tag, file, key) for tag in ("parent", "child"))
     axis = _numbers(e.find("axis"), "xyz", X, file, key)
     largest = float(np.abs(axis).max())  # taken out first: the square of 1e308 overflows
     axis = axis / (largest or 1.0)
     length = float(np.linalg.norm(axis))
-    if KINDS[kind] != "fixed" and length == 0:
+    if KINDS.get(kind) in ("revolute", "prismatic") and length == 0:
         raise FileError("a zero-length axis has no direction", file=file, key=key)
-    limit = e.find("limit")
-    both = limit is not None and limit.get("lower") is not None and limit.get("upper") is not None
+    limit, mimic = e.find("limit"), e.find("mimic")
+    lower, upper = (_limit(limit, k, file, key) for k in ("lower", "upper"))
+    ranged = kind != "continuous" and lower != upper and max(abs(lower), abs(upper)) < LARGEST
     return UrdfJoint(
-        name, KINDS[kind], parent, child, _origin(e, file, key),
+        name, KINDS.get(kind, kind), parent, child, _origin(e, file, key),
         axis=vector(axis / (length or 1.0)),
-        limits=(_number(limit, "lower", file, key), _number(limit, "upper", file, key)) if both else None,
-        effort=_number(limit, "effort", file, key) or None,
-        velocity=_number(limit, "velocity", file, key) or None,
+        limits=(lower, upper) if ranged else None,
+        effort=_largest(limit, "effort", file, key),
+        velocity=_largest(limit, "velocity", file, key),
+        mimic=None if mimic is None else Mimic(mimic.get("joint", "?"), _number(
+            mimic, "multiplier", file, key, 1.0), _number(mimic, "offset", file, key)),
     )  # fmt: skip
 
 
@@ -110,13 +126,12 @@ def _body(e: xml.Element, file: str) -> Body | None:
         return None
     if mass < 0:
         raise FileError(f"the mass is negative: {mass}", file=file, key=key)
-    at, tensor = _origin(inertial, file, key), inertial.find("inertia")
+    at, given = _origin(inertial, file, key), inertial.find("inertia")
     xx, yy, zz, xy, xz, yz = (
-        _number(tensor, k, file, key) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+        _number(given, k, file, key) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
-    turned = at.r @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ at.r.T
-    rows = Pose.of(rotation=turned).rotation
-    return Body(name, mass, at.translation, rows)
+    about_com = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return Body(name, mass, at.translation, tensor(at.r @ about_com @ at.r.T, mass))
 
 
 def _origin(e: xml.Element, file: str, key: str) -> Pose:
@@ -139,32 +154,27 @@ def _numbers(e: xml.Element | None, attribute: str, default: Floats, file: str, 
     return values
 
 
-def _number(e: xml.Element | None, attribute: str, file: str, key: str) -> float:
+def _limit(e: xml.Element | None, attribute: str, file: str, key: str) -> float:
+    """A limit as it is written; endless where it is too large for a machine, as exporters write 'none'."""
+    try:
+        value = abs(float((e.get(attribute) if e is not None else None) or 0.0))
+    except ValueError:
+        value = 0.0
+    return np.inf if value >= LARGEST else _number(e, attribute, file, key)
+
+
+def _largest(e: xml.Element | None, attribute: str, file: str, key: str) -> float | None:
+    """The largest effort or speed; None where it is not given: 0, negative, or endless."""
+    value = _limit(e, attribute, file, key)
+    return value if 0 < value < LARGEST else None
+
+
+def _number(e: xml.Element | None, attribute: str, file: str, key: str, default: float = 0.0) -> float:
     text = None if e is None else e.get(attribute)
     try:
-        value = number_in(text) if text is not None else 0.0
+        value = number_in(text) if text is not None else default
     except ValueError:
         raise FileError(f"{attribute}: expected a number, found '{text}'", file=file, key=key) from None
     if not np.isfinite(value):
         raise FileError(f"{attribute}: expected a finite number, found '{text}'", file=file, key=key)
     return value
-
-
-def _check_meshes(robot: xml.Element, path: Path) -> None:
-    for link in robot.findall("link"):
-        for mesh in link.iter("mesh"):
-            given = mesh.get("filename", "")
-            if not _found(given, path.parent):
-                raise FileError(
-                    f"mesh '{given}' is missing; stiffness does not need it: import with --without-meshes",
-                    file=str(path), key=f"link {link.get('name')}",
-                )  # fmt: skip
-
-
-def _found(given: str, folder: Path) -> bool:
-    """A mesh next to the file, or, for package://, below any folder above it."""
-    if given.startswith("package://"):
-        rest = given.removeprefix("package://")
-        tails = [Path(rest), *([Path(rest.split("/", 1)[1])] if "/" in rest else [])]
-        return any((up / t).is_file() for up in (folder, *folder.resolve().parents) for t in tails)
-    return (folder / given.removeprefix("file://")).is_file()

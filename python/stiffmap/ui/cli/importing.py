@@ -38,7 +38,15 @@ def import_urdf(
     unit: Annotated[
         list[str] | None, typer.Option(help="Unit of a column of the table without one, e.g. a=mm.")
     ] = None,
-    without_meshes: Annotated[bool, typer.Option("--without-meshes", help="Do not look for meshes.")] = False,
+    tip: Annotated[
+        str | None,
+        typer.Option(
+            help="Link of the URDF that is the tool. [default: tool0 and the like, or the only end]"
+        ),
+    ] = None,
+    without_meshes: Annotated[
+        bool, typer.Option("--without-meshes", help="Has no effect: meshes are never read.", hidden=True)
+    ] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing file.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -53,7 +61,9 @@ def import_urdf(
 
       [cyan]stiffmap import arm_dh.csv --dh-convention modified -o craig.yaml[/cyan]
 
-      [cyan]stiffmap import delta.urdf --sidecar robot.yaml --without-meshes[/cyan]
+      [cyan]stiffmap import delta.urdf --sidecar robot.yaml[/cyan]
+
+      [cyan]stiffmap import arm.urdf --tip tool -o tool.yaml[/cyan]
     """
     from stiffmap.model.urdf import import_urdf as read
     from stiffmap.solve.machine import Machine
@@ -61,7 +71,7 @@ def import_urdf(
     if urdf.suffix.lower() in TABLES:
         found = _of_table(urdf, dh_convention, unit)
     else:
-        found = read(urdf, sidecar, meshes=not without_meshes)
+        found = read(urdf, sidecar, tip=tip)
     machine = Machine(found.description)
     file = output or urdf.with_name(f"{machine.name}.yaml")
     if file.exists() and not overwrite:
@@ -71,15 +81,22 @@ def import_urdf(
     machine.save(file)
     if as_json:
         print_json({"file": str(file), "name": machine.name, "legs": list(machine.legs),
-                    "actuators": list(machine.actuators), "left_out": list(found.left_out),
+                    "actuators": list(machine.actuators), "tip": found.tip, "left_out": list(found.left_out),
                     "rigid": list(found.rigid)})  # fmt: skip
         return
     console = Console(highlight=False, soft_wrap=True)
     console.print(
         f"wrote {escape(str(file))}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"
     )
+    if found.choice:
+        console.print(
+            f"[yellow]tip[/yellow] {escape(found.tip)}, {escape(found.choice)}; --tip LINK takes another"
+        )
     if found.left_out:
-        console.print(f"[yellow]left out[/yellow] (not on the way to the tip): {', '.join(found.left_out)}")
+        console.print(
+            "[yellow]left out[/yellow] (not on the way to the tip; masses stay on what carries them): "
+            f"{escape(', '.join(found.left_out))}"
+        )
     if found.rigid:
         console.print(f"[yellow]rigid[/yellow] (no compliance in the sidecar): {', '.join(found.rigid)}")
 

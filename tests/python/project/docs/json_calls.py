@@ -30,7 +30,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         "wrench five-bar --by 0.1,0,0",
     ),
     "stress": ("stress orthoglide-revised", "stress hexapod"),
-    "import": ("import arm.urdf --without-meshes -o a.yaml --overwrite",),
+    "import": ("import arm.urdf -o a.yaml --overwrite",),
     "sweep": (
         "sweep orthoglide-revised --direction 1,0,0",
         "sweep orthoglide-revised --direction 1,0,0 --to 500 --points 4",

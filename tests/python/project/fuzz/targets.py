@@ -75,7 +75,7 @@ def _link(text: str, folder: Path) -> None:
 def _urdf(text: str, folder: Path) -> None:
     path = folder / "m.urdf"
     path.write_text(text, encoding="utf-8", errors="surrogatepass")
-    import_urdf(path, None, meshes=False)
+    import_urdf(path)
 
 
 def _gcode(text: str, folder: Path) -> None:
