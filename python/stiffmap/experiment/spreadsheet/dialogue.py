@@ -13,7 +13,7 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.fingerprints import digest
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import make_folder, write_text
-from stiffmap.common.sheet_units import known, quantity_of, unit_of
+from stiffmap.common.units import known, quantity_of, unit_of
 from stiffmap.common.yaml_text import read, text_of
 from stiffmap.experiment.spreadsheet.convert import Imported, Question, understand
 from stiffmap.experiment.spreadsheet.guess import READINGS

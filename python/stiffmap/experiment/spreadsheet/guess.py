@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.sheet_units import unit_of
+from stiffmap.common.units import unit_of
 
 PATTERNS: tuple[tuple[str, str], ...] = (
     ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?"),

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 
-from stiffmap.common.sheet_units import unit_of
+from stiffmap.common.units import unit_of
 from stiffmap.experiment.spreadsheet.guess import meaning_of, split_unit
 
 Line = tuple[int, list[str]]

@@ -10,14 +10,12 @@ from pathlib import Path
 
 from stiffmap.common.cells import Cells
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.sheet_units import known, unit_of
+from stiffmap.common.units import known, unit_of
 from stiffmap.common.yaml_text import read
 from stiffmap.experiment.spreadsheet.guess import split_unit
 from stiffmap.experiment.spreadsheet.sheet import Sheet
 
 FOLDER = Path(__file__).parent / "instruments"
-TO_MM = {"m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3, "in": 25.4}
-TO_RAD = {"rad": 1.0, "deg": math.pi / 180, "mrad": 1e-3}
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}
 CIRCLE = ("centre_x", "centre_y", "centre_z", "radius")
 
@@ -155,7 +153,7 @@ def _named(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> fl
         raise StiffmapError(
             f"{sheet.file}: column '{sheet.header[index]}': expected a unit of {quantity} ({known(quantity)}); found '{text}'"
         )
-    return found.factor * (TO_RAD if quantity == "angle" else TO_MM)[found.name]
+    return found.size if quantity == "angle" else 1e3 * found.size
 
 
 def _unit(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> dict[str, str]:

@@ -12,9 +12,9 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.sheet_units import unit_of
+from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.spreadsheet.guess import SEEN, Column, guess, split_unit
-from stiffmap.experiment.spreadsheet.instrument import TO_MM, with_column
+from stiffmap.experiment.spreadsheet.instrument import with_column
 from stiffmap.experiment.spreadsheet.sheet import Sheet
 from stiffmap.solve.machine import Machine
 
@@ -43,8 +43,7 @@ class Commanded:
         out = []
         for meaning, (_, unit) in self.columns.items():
             header = self.chosen[meaning][0]
-            scale = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}.get(unit) or TO_MM[unit] / 1e3
-            out.append(scale * self.sheet.numbers(self.sheet.header.index(header)))
+            out.append(Unit(unit).size * self.sheet.numbers(self.sheet.header.index(header)))
         return np.column_stack(out)
 
     def middle(self) -> Floats:
@@ -204,7 +203,7 @@ def _in_mm(
                 f"column '{column.name}' ({column.meaning}) has no unit: write it in the header, as in '{column.name} [mm]', or say "
                 f"--unit {column.meaning}=mm (--unit length=mm: of all lengths)"
             )
-        total = total + sign * TO_MM[unit.name] * unit.factor * sheet.numbers(column.index)
+        total = total + sign * 1e3 * unit.size * sheet.numbers(column.index)
     name = f"{meaning} [mm]"
     if name not in sheet.header:
         sheet = with_column(sheet, name, [float(v) for v in total])

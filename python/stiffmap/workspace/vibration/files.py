@@ -12,9 +12,9 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, MissingPartError
 from stiffmap.common.pose_tables import cell_number, rows_of
+from stiffmap.common.units import ACCELERATIONS, LENGTHS, size_of
 from stiffmap.workspace.vibration.poles import Complex
 
-UNITS = {"m/N": 1.0, "um/N": 1e-6, "µm/N": 1e-6, "mm/N": 1e-3}
 KINDS = {"m/N": 0, "um/N": 0, "µm/N": 0, "mm/N": 0, "m/s/N": 1, "m/s2/N": 2, "m/s²/N": 2, "g/N": 2}
 HEAD = "frequency_Hz, real_UNIT, imag_UNIT and, where there is one, coherence"
 
@@ -78,7 +78,8 @@ def _csv(path: Path) -> MeasuredResponse:
     )
     f = values[:, 0]
     coherence = values[:, 3] if len(head) == 4 else np.full(len(f), np.nan)
-    scale = UNITS.get(unit, 9.80665 if unit == "g/N" else 1.0)
+    motion = unit.removesuffix("/N")
+    scale = 1.0 if motion == "m/s" else size_of(motion, LENGTHS, ACCELERATIONS)
     complex_ = np.asarray(scale * (values[:, 1] + 1j * values[:, 2]), complex)
     return MeasuredResponse(path.stem, f, _receptance(f, complex_, KINDS[unit]), coherence)
 
