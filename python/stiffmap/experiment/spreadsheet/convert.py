@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.cells import row_numbers
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
+from stiffmap.common.tables.cells import row_numbers
+from stiffmap.common.tables.sheet import Sheet, column_letter
 from stiffmap.common.units import Unit, known, quantity_of, unit_of
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
-from stiffmap.experiment.spreadsheet.sheet import Sheet, column_letter
 
 WORDS = ("id", "setup", "branch")
 POSE = ("x", "y", "z")

@@ -17,9 +17,9 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.sheet import Sheet
 from stiffmap.common.units import unit_of
-from stiffmap.experiment.spreadsheet.guess import split_unit
-from stiffmap.experiment.spreadsheet.sheet import Sheet
 from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
 
 CONVENTIONS = ("standard", "modified")

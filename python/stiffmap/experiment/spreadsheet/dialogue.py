@@ -13,12 +13,12 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.fingerprints import digest
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import make_folder, write_text
+from stiffmap.common.tables.sheet import Sheet, column_letter
 from stiffmap.common.units import known, quantity_of, unit_of
 from stiffmap.common.yaml_text import read, text_of
 from stiffmap.experiment.spreadsheet.convert import Imported, Question, understand
 from stiffmap.experiment.spreadsheet.guess import READINGS
 from stiffmap.experiment.spreadsheet.joints import Commanded
-from stiffmap.experiment.spreadsheet.sheet import Sheet, column_letter
 
 Ask = Callable[[str], str]
 MOST = 30

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.units import unit_of
+from stiffmap.common.tables.header import split_unit
 
 PATTERNS: tuple[tuple[str, str], ...] = (
     ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?"),
@@ -43,35 +43,6 @@ class Column:
     """From 1, of repeats side by side; 0: none."""
 
 
-def split_unit(header: str) -> tuple[str, str]:
-    """``Uhr 1 [µm]`` is ``Uhr 1`` in ``µm``; also round brackets, and ``x / mm``, ``x, mm``, ``x in mm``, ``x_mm``,
-    ``x 1/100 mm``."""
-    match = re.match(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$", header)
-    if match:
-        return match[1].strip(), match[2].strip()
-    part = re.match(
-        r"^(.*?\S)(?:\s+in)?[\s,;]+((?:1/|0[.,]0*1\s?)\d*\s?(?:mm|in)?|(?:mm|in)/1\d+)\s*$", header
-    )
-    if part and known_unit(part[2]):
-        return part[1].strip(), part[2].strip()
-    said = re.match(r"^(.*?)(?:\s*[/,;]\s*|\s+in\s+)(\S+)\s*$", header)
-    bare = re.match(r"^(.*\S)[\s_](\S{2,})\s*$", header)
-    newton = re.match(r"^(.*?[^\s,;/])(?:\s+in)?\s(k?N)\s*$", header)
-    if newton:
-        return newton[1].strip(), newton[2]
-    if said and said[1] and known_unit(said[2]) and not known_unit(header):
-        return said[1].strip(), said[2]
-    if bare and bare[2].lower() != "in" and known_unit(bare[2]):
-        return bare[1].strip(), bare[2]
-    return header.strip(), ""
-
-
-def known_unit(unit: str) -> str:
-    """The unit as experiment files write it; empty for an unknown one."""
-    found = unit_of(unit)
-    return found.name if found else ""
-
-
 def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[Column]:
     """Meaning of every column; ``chosen`` (meaning -> headers) goes before any guess.
 
@@ -102,9 +73,9 @@ def _find(wanted: str, headers: Sequence[str]) -> int:
     return found[0]
 
 
-def meaning_of(name: str) -> str:
-    """Column of an experiment that a name without its unit stands for; ``note`` for none."""
-    return _meaning(name)[0]
+def has_meaning(name: str) -> bool:
+    """Whether a name without its unit stands for a column of an experiment."""
+    return _meaning(name)[0] != "note"
 
 
 def _meaning(name: str) -> tuple[str, int]:

@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from stiffmap.common.cells import Cells
 from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.tables.cells import Cells
+from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.sheet import Sheet
 from stiffmap.common.units import known, unit_of
 from stiffmap.common.yaml_text import read
-from stiffmap.experiment.spreadsheet.guess import split_unit
-from stiffmap.experiment.spreadsheet.sheet import Sheet
 
 FOLDER = Path(__file__).parent / "instruments"
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}

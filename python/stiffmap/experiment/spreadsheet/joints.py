@@ -12,10 +12,11 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.sheet import Sheet
 from stiffmap.common.units import Unit, unit_of
-from stiffmap.experiment.spreadsheet.guess import SEEN, Column, guess, split_unit
+from stiffmap.experiment.spreadsheet.guess import SEEN, Column, guess
 from stiffmap.experiment.spreadsheet.instrument import with_column
-from stiffmap.experiment.spreadsheet.sheet import Sheet
 from stiffmap.solve.machine import Machine
 
 NUMBERED = r"(joint|axis|achse|gelenk|theta|q|j|a)[ _.-]?{}"

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.workbook import sheet_names
+from stiffmap.common.tables.lines import EXCEL
+from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
+from stiffmap.common.tables.workbook import sheet_names
 from stiffmap.experiment.spreadsheet.convert import Imported
 from stiffmap.experiment.spreadsheet.dialogue import Answers, Ask, ask_all, profile_file, remember, remembered
-from stiffmap.experiment.spreadsheet.guess import guess
+from stiffmap.experiment.spreadsheet.guess import guess, has_meaning
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings
 from stiffmap.experiment.spreadsheet.joints import Commanded, as_seen, commanded, turned
-from stiffmap.experiment.spreadsheet.sheet import EXCEL, Sheet, read_sheet
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class Reading:
     wrote: Instrument | None
     drives: Mapping[str, bool]
     difference: str
+    layout: Layout = field(default_factory=lambda: Layout(has_meaning))
 
 
 def read_and_ask(
@@ -34,7 +36,7 @@ def read_and_ask(
     def one(
         name: str | None, ask: Ask | None
     ) -> tuple[Sheet, Imported, Answers, list[str], Commanded | None]:
-        table, answers, told = read_sheet(file, name), given, list[str]()
+        table, answers, told = read_sheet(file, name, how.layout), given, list[str]()
         form = table
         if (kept := remembered(form)) is not None:
             answers = kept.below(given)

@@ -115,13 +115,13 @@ def experiment(
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
     from stiffmap.common.fingerprints import file_digest
+    from stiffmap.common.tables.sheet import read_sheet
     from stiffmap.experiment.spreadsheet.dh import LEG, arm, read_dh
     from stiffmap.experiment.spreadsheet.dialogue import Answers
     from stiffmap.experiment.spreadsheet.folder import make_experiment
     from stiffmap.experiment.spreadsheet.instrument import load_instrument
     from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, drives_of
     from stiffmap.experiment.spreadsheet.reading import Reading, read_and_ask
-    from stiffmap.experiment.spreadsheet.sheet import read_sheet
     from stiffmap.solve.machine import Machine, load_machine
 
     if action != "new":

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.cells import BETWEEN, BLOCK, Cells, filled, packed, row_numbers
 from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import number_in
-from stiffmap.common.workbook import workbook_lines
-from stiffmap.experiment.spreadsheet.header import header_of, record_of
+from stiffmap.common.tables.cells import Cells, filled, packed, row_numbers
+from stiffmap.common.tables.header import Line, fits, header_of, record_of, split_unit
+from stiffmap.common.tables.lines import (
+    COMMENTS,
+    decimal_comma,
+    kept,
+    lines_of,
+    plain,
+    with_point,
+    with_points,
+)
 
-Lines = Callable[[], Iterable[tuple[int, list[str]]]]
-"""Number and cells of each line, from the first one whenever it is called."""
-EXCEL = (".xlsx", ".xlsm")
 NOTHING = {
     *(
         "",
@@ -66,16 +68,7 @@ STATISTICS = re.compile(
     re.IGNORECASE,
 )
 """First cell of a row that is no reading but what a spreadsheet computed of them."""
-COMMENTS = ("#", "%", "//")
 LONGEST_HEADER, MOST_COLUMNS = 300, 1000
-SEPARATORS = ";\t|,"
-THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+")
-"""``1.000`` is a thousand in a table with decimal commas."""
-COMMA = re.compile(r"^[ \t]*[+-]?[\d.]*,\d+[ \t]*$", re.M)
-POINT = re.compile(r"^[ \t]*[+-]?\d*\.\d+[ \t]*$", re.M)
-SAMPLE = 2_000
-"""Lines by which the separator is found."""
-NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?\s*")
 
 
 @dataclass(frozen=True)
@@ -102,7 +95,7 @@ class Sheet:
     def numbers(self, column: int) -> Floats:
         """A column; NaN where nothing was read. FileError names the line of what is no number."""
         if column not in self._read:
-            cells = _with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
+            cells = with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
             self._read[column] = cells.numbers(lambda cell, row: self._number(cell, column, self.lines[row]))
         return self._read[column]
 
@@ -128,11 +121,11 @@ class Sheet:
 
 def number(cell: str, decimal_comma: bool) -> float | None:
     """The number in a cell; NaN for nothing, None for text."""
-    text = _plain(cell.strip())
+    text = plain(cell.strip())
     if text.lower() in NOTHING or DASHES.fullmatch(text):
         return math.nan
     if decimal_comma:
-        text = _with_point(text)
+        text = with_point(text)
     try:
         value = number_in(text)
     except ValueError:
@@ -140,24 +133,49 @@ def number(cell: str, decimal_comma: bool) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def read_sheet(path: Path, sheet: str | None = None) -> Sheet:
+@dataclass(frozen=True)
+class Layout:
+    """What a person says of where a table lies, and what its names may be."""
+
+    known: Callable[[str], bool] = lambda name: False
+    """Whether a name without its unit has a meaning of its own."""
+    header: Sequence[str] = ()
+    """Names of the columns, in place of those that the table has, or has not."""
+    numbered: bool = False
+    """Columns are given by their numbers: a table without a header is read."""
+    table: int | None = None
+    """Which of several tables on a sheet, from 1."""
+
+
+PLAIN = Layout()
+
+
+def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> Sheet:
     """Cells of an Excel workbook (its first sheet, or the named one) or of a text table.
 
-    Text: separators ; tab | , and decimal points or commas are found out, UTF-8, UTF-16 and Latin-1 are read.
-    Comment lines are skipped; the header is the line before the first row of mostly numbers. Raises FileError.
+    Text: separators ; tab | , blanks and decimal points or commas are found out, UTF-8, UTF-16 and Latin-1 are read.
+    Comment lines are skipped; the header is the line before the first row of mostly numbers. Raises FileError, also where
+    several tables are on a sheet and `layout` does not say which.
     """
-    page = ""
-    if path.suffix.lower() in EXCEL:
-        page, lines = workbook_lines(path, sheet)
-    else:
-        lines = _text(path)
-    comma = _decimal_comma(c for _, c in _kept(lines()))
-    above: list[tuple[int, list[str]]] = []
+    page, lines, _ = lines_of(path, sheet)
+    comma = decimal_comma(c for _, c in kept(lines()))
+    if layout.table is not None:
+        chosen = _one_table(lines(), comma, layout, str(path))
+        lines = lambda: chosen  # noqa: E731
+    above: list[Line] = []
     rows = iter(lines())
     first = next((row for row in _above(rows, comma, above)), None)
-    found = None if first is None else header_of(above, first[1])
+    found = None if first is None else header_of(above, first[1], layout.known)
+    if first is not None and (layout.header or (found is None and layout.numbered)):
+        found = first[0], _names(first[1], layout.header, str(path), first[0])
     if first is None or found is None:
-        raise FileError("no header line with rows of numbers below it was found", file=str(path))
+        way = (
+            "; if the table has none, name its columns: --header id,x,y,z,dx,dy,dz (nothing between two commas for a column "
+            "that is not used), or by their numbers, as in --map x=2"
+        )
+        raise FileError(
+            f"no header line with rows of numbers below it was found{way if first else ''}", file=str(path)
+        )
     number_, header = found
     endless = next((c for c in header if len(c) > LONGEST_HEADER), None)
     if endless is not None or len(header) > MOST_COLUMNS:
@@ -173,20 +191,57 @@ def read_sheet(path: Path, sheet: str | None = None) -> Sheet:
     if twice:
         raise FileError(f"column '{twice[0]}' occurs twice", file=str(path), line=number_)
     numbered, aside = row_numbers(), list[str]()
-    data = _data(chain([first], _kept(rows)), header, comma, aside)
+    data = _data(chain([first], kept(rows)), header, comma, aside, layout, str(path))
     columns = packed(_even(data, width, numbered), width)
     file = f"{path}, sheet '{page}'" if page else str(path)
     return Sheet(file, tuple(names), columns, numbered, comma, record_of(above), tuple(aside))
 
 
-def _kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
-    """Lines with something in them that are no comments."""
-    return ((n, c) for n, c in lines if filled(c) and not c[0].strip().startswith(COMMENTS))
+def _names(first: Sequence[str], given: Sequence[str], file: str, line: int) -> list[str]:
+    """Names of columns that a person says, or their numbers."""
+    if len(given) > len(first):
+        raise FileError(
+            f"--header: expected at most {len(first)} names, one for each column; found {len(given)}",
+            file=file,
+            line=line,
+        )
+    names = [*given, *[""] * (len(first) - len(given))]
+    return [n.strip() or f"column {i}" for i, n in enumerate(names, 1)]
 
 
-def _above(
-    rows: Iterator[tuple[int, list[str]]], comma: bool, above: list[tuple[int, list[str]]]
-) -> Iterator[tuple[int, list[str]]]:
+def _begins_table(cells: Sequence[str], header: Sequence[str], comma: bool, layout: Layout) -> bool:
+    """Whether a line within a table is the header of another one."""
+    names = [split_unit(c)[0] for c in cells if c.strip()]
+    return (
+        fits(cells, len(header))
+        and [c.strip() for c in cells[:2]] != list(header[:2])
+        and not any(_finite(c, comma) for c in cells)
+        and sum(map(layout.known, names)) >= 2
+    )
+
+
+def _one_table(lines: Iterable[Line], comma: bool, layout: Layout, file: str) -> list[Line]:
+    """Lines of one of the tables of a sheet; a table begins with its header."""
+    tables: list[list[Line]] = [[]]
+    header: Sequence[str] = ()
+    numbers = False
+    for n, cells in kept(lines):
+        if numbers and _begins_table(cells, header, comma, layout):
+            tables.append([])
+            numbers = False
+        if not numbers and not _is_data(cells, comma):
+            header = [c.strip() for c in cells]
+        numbers = numbers or _is_data(cells, comma)
+        tables[-1].append((n, cells))
+    assert layout.table is not None
+    if not 1 <= layout.table <= len(tables):
+        raise FileError(
+            f"--table: expected a number from 1 to {len(tables)}; found {layout.table}", file=file
+        )
+    return tables[layout.table - 1]
+
+
+def _above(rows: Iterator[Line], comma: bool, above: list[Line]) -> Iterator[Line]:
     """The rows of data; `above` gathers the last lines before the first one."""
     for n, cells in rows:
         if not filled(cells):
@@ -200,14 +255,20 @@ def _above(
 
 
 def _data(
-    rows: Iterable[tuple[int, list[str]]], header: Sequence[str], comma: bool, aside: list[str]
-) -> Iterator[tuple[int, list[str]]]:
+    rows: Iterable[Line], header: Sequence[str], comma: bool, aside: list[str], layout: Layout, file: str
+) -> Iterator[Line]:
     """Rows of readings: without rows of means, headers that are repeated and remarks, of which `aside` says so."""
     for n, cells in rows:
         first = next(c.strip() for c in cells if c.strip())
         if STATISTICS.fullmatch(first) and number(first, comma) is None:
             aside.append(f"row {n}, '{first}', is no reading")
         elif not any(_finite(c, comma) for c in cells):
+            if _begins_table(cells, header, comma, layout):
+                raise FileError(
+                    "another table begins here: say --table 1 for the one above, --table 2 for this one",
+                    file=file,
+                    line=n,
+                )
             again = [c.strip() for c in cells[:2]] == list(header[:2])
             aside.append(f"row {n} {'repeats the header' if again else f'is a remark: {first[:40]}'}")
         else:
@@ -236,88 +297,8 @@ def _even(rows: Iterable[tuple[int, list[str]]], width: int, numbers: Any) -> It
         yield cells if len(cells) == width else [*cells, *[""] * width][:width]
 
 
-def _with_points(cells: Cells) -> Cells:
-    """Numbers with decimal commas and points for thousands, as numbers with a decimal point."""
-    blocks = []
-    for block in cells.blocks:
-        text = _plain(block)
-        if "." in text:
-            text = BETWEEN.join(_with_point(c) for c in text.split(BETWEEN))
-        blocks.append(text.replace(",", "."))
-    return Cells(blocks, len(cells))
-
-
-def _plain(text: str) -> str:
-    return text.replace("\u00a0", "").replace("−", "-")
-
-
-def _with_point(text: str) -> str:
-    return text.replace(".", "").replace(",", ".") if "," in text or THOUSANDS.fullmatch(text) else text
-
-
 def _is_data(cells: list[str], comma: bool) -> bool:
     """Whether at least half of the cells that are filled are numbers, two of them or more."""
     filled = [c for c in cells if c.strip()]
     numeric = [c for c in filled if (v := number(c, comma)) is not None and math.isfinite(v)]
     return len(numeric) >= 2 and 2 * len(numeric) >= len(filled)
-
-
-def _decimal_comma(rows: Iterable[list[str]]) -> bool:
-    """Whether numbers have commas and none has a point."""
-    commas = points = False
-    while block := list(islice(rows, BLOCK)):
-        text = "\n".join(chain.from_iterable(block))
-        if text.count("\n") != sum(map(len, block)) - 1:
-            text = "\n".join(c.replace("\n", " ") for row in block for c in row)
-        text = _plain(text)
-        commas = commas or ("," in text and COMMA.search(text) is not None)
-        points = points or (
-            "." in text and any(not THOUSANDS.fullmatch(m[0].strip()) for m in POINT.finditer(text))
-        )
-        if points:
-            return False
-    return commas
-
-
-def _text(path: Path) -> Lines:
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
-    text = _decoded(raw, path).replace("\r\n", "\n").replace("\r", "\n")
-    del raw
-    lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
-    sample = list(islice(lines_, SAMPLE))
-    best = max(SEPARATORS, key=lambda s: _numbers_between(s, sample))  # the first of equals
-
-    def lines() -> Iterator[tuple[int, list[str]]]:
-        reader = csv.reader(io.StringIO(text), delimiter=best)
-        try:
-            for row in reader:
-                yield reader.line_num, row
-        except csv.Error as error:
-            raise FileError(f"is no table: {error}", file=str(path), line=reader.line_num) from error
-
-    return lines
-
-
-def _numbers_between(separator: str, lines: Sequence[str]) -> tuple[int, int]:
-    """How well it parts the cells: quotations that it breaks, negative, and cells that are numbers then."""
-    with suppress(csv.Error):  # the reader of the whole says where
-        cells = list(chain.from_iterable(csv.reader(lines, delimiter=separator)))
-        return -sum('"' in c for c in cells), sum(NUMBER.fullmatch(c) is not None for c in cells)
-    return -len(lines), 0
-
-
-def _decoded(raw: bytes, path: Path) -> str:
-    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        try:
-            return raw.decode("utf-16")
-        except UnicodeDecodeError as error:
-            raise FileError(
-                f"begins as UTF-16 and is none ({error.reason} at byte {error.start})", file=str(path)
-            ) from error
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")  # never fails
