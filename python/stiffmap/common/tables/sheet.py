@@ -190,8 +190,9 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     twice = sorted(h for h, n in Counter(names).items() if n > 1)
     if twice:
         raise FileError(f"column '{twice[0]}' occurs twice", file=str(path), line=number_)
+    said = [*header, *(c.strip() for _, cells in above for c in cells)]
     numbered, aside = row_numbers(), list[str]()
-    data = _data(chain([first], kept(rows)), header, comma, aside, layout, str(path))
+    data = _data(chain([first], kept(rows)), header, said, comma, aside, layout, str(path))
     columns = packed(_even(data, width, numbered), width)
     file = f"{path}, sheet '{page}'" if page else str(path)
     return Sheet(file, tuple(names), columns, numbered, comma, record_of(above), tuple(aside))
@@ -209,29 +210,34 @@ def _names(first: Sequence[str], given: Sequence[str], file: str, line: int) -> 
     return [n.strip() or f"column {i}" for i, n in enumerate(names, 1)]
 
 
-def _begins_table(cells: Sequence[str], header: Sequence[str], comma: bool, layout: Layout) -> bool:
-    """Whether a line within a table is the header of another one."""
-    names = [split_unit(c)[0] for c in cells if c.strip()]
+def _begins_table(
+    cells: Sequence[str], names: Sequence[str], width: int, comma: bool, layout: Layout
+) -> bool:
+    """Whether a line within a table is the header of another one: it has a known name that is none of this one's."""
+    here = [c.strip() for c in cells if c.strip()]
+    known = [c for c in here if layout.known(split_unit(c)[0])]
     return (
-        fits(cells, len(header))
-        and [c.strip() for c in cells[:2]] != list(header[:2])
+        fits(cells, width)
+        and len(known) >= 2
+        and not set(known) <= set(names)
         and not any(_finite(c, comma) for c in cells)
-        and sum(map(layout.known, names)) >= 2
     )
 
 
 def _one_table(lines: Iterable[Line], comma: bool, layout: Layout, file: str) -> list[Line]:
     """Lines of one of the tables of a sheet; a table begins with its header."""
     tables: list[list[Line]] = [[]]
-    header: Sequence[str] = ()
-    numbers = False
+    names: list[str] = []
+    width = 0
     for n, cells in kept(lines):
-        if numbers and _begins_table(cells, header, comma, layout):
+        data = _is_data(cells, comma)
+        if width and not data and _begins_table(cells, names, width, comma, layout):
             tables.append([])
-            numbers = False
-        if not numbers and not _is_data(cells, comma):
-            header = [c.strip() for c in cells]
-        numbers = numbers or _is_data(cells, comma)
+            names, width = [], 0
+        if data:
+            width = len(cells)
+        else:
+            names += map(str.strip, cells)
         tables[-1].append((n, cells))
     assert layout.table is not None
     if not 1 <= layout.table <= len(tables):
@@ -255,15 +261,24 @@ def _above(rows: Iterator[Line], comma: bool, above: list[Line]) -> Iterator[Lin
 
 
 def _data(
-    rows: Iterable[Line], header: Sequence[str], comma: bool, aside: list[str], layout: Layout, file: str
+    rows: Iterable[Line],
+    header: Sequence[str],
+    names: Sequence[str],
+    comma: bool,
+    aside: list[str],
+    layout: Layout,
+    file: str,
 ) -> Iterator[Line]:
-    """Rows of readings: without rows of means, headers that are repeated and remarks, of which `aside` says so."""
+    """Rows of readings: without rows of means, headers that are repeated and remarks, of which `aside` says so.
+
+    `names`: all that stands above the rows.
+    """
     for n, cells in rows:
         first = next(c.strip() for c in cells if c.strip())
         if STATISTICS.fullmatch(first) and number(first, comma) is None:
             aside.append(f"row {n}, '{first}', is no reading")
         elif not any(_finite(c, comma) for c in cells):
-            if _begins_table(cells, header, comma, layout):
+            if _begins_table(cells, names, len(header), comma, layout):
                 raise FileError(
                     "another table begins here: say --table 1 for the one above, --table 2 for this one",
                     file=file,

@@ -50,7 +50,9 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
     header that is not there.
     """
     given = {
-        _find(h, headers): (meaning, i) for meaning, many in chosen.items() for i, h in enumerate(many, 1)
+        find_column(h, headers): (meaning, i)
+        for meaning, many in chosen.items()
+        for i, h in enumerate(many, 1)
     }
     out = []
     for index, header in enumerate(headers):
@@ -64,10 +66,13 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
     return _one_each(out)
 
 
-def _find(wanted: str, headers: Sequence[str]) -> int:
+def find_column(wanted: str, headers: Sequence[str]) -> int:
+    """Index of a column by its header, with or without its unit, by how that begins, or by its number from 1; StiffmapError."""
     exact = [i for i, h in enumerate(headers) if wanted in (h, split_unit(h)[0])]
     loose = [i for i, h in enumerate(headers) if h.lower().startswith(wanted.lower())]
     found = exact or (loose if len(loose) == 1 else [])
+    if not found and wanted.isdigit() and 1 <= int(wanted) <= len(headers):
+        return int(wanted) - 1
     if not found:
         raise StiffmapError(f"--map: no column '{wanted}'; there are: {', '.join(headers)}")
     return found[0]
@@ -75,7 +80,12 @@ def _find(wanted: str, headers: Sequence[str]) -> int:
 
 def has_meaning(name: str) -> bool:
     """Whether a name without its unit stands for a column of an experiment."""
-    return _meaning(name)[0] != "note"
+    return guessed(name) != "note"
+
+
+def guessed(name: str) -> str:
+    """Column of an experiment that a name without its unit stands for; ``note`` for none."""
+    return _meaning(name)[0]
 
 
 def _meaning(name: str) -> tuple[str, int]:

@@ -15,7 +15,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.sheet import Sheet
 from stiffmap.common.units import Unit, unit_of
-from stiffmap.experiment.spreadsheet.guess import SEEN, Column, guess
+from stiffmap.experiment.spreadsheet.guess import SEEN, Column, find_column, guess
 from stiffmap.experiment.spreadsheet.instrument import with_column
 from stiffmap.solve.machine import Machine
 
@@ -110,10 +110,7 @@ def _given(chosen: Mapping[str, list[str]], drives: Mapping[str, bool]) -> dict[
 def _find(sheet: Sheet, name: str, number: int, header: str | None) -> int | None:
     names = [split_unit(h)[0].strip().lower() for h in sheet.header]
     if header is not None:
-        exact = [i for i, h in enumerate(sheet.header) if header in (h, split_unit(h)[0])]
-        if not exact:
-            raise StiffmapError(f"--map: no column '{header}'; there are: {', '.join(sheet.header)}")
-        return exact[0]
+        return find_column(header, sheet.header)
     for wanted in (name.lower(), name.split(".")[-1].lower()):
         if wanted in names and wanted not in ("x", "y", "z"):
             return names.index(wanted)
