@@ -68,7 +68,7 @@ class NamedTable:
     def fail(self, message: str, name: str = "", row: int | None = None) -> NoReturn:
         """Raise FileError at a column and, where one is given, a row."""
         line = self.first or None if row is None else self.lines[row]
-        raise FileError(message, file=self.file, line=line, key=self.header.get(name, name) or None)
+        raise FileError(message, file=self.file, line=line, key=self.header.get(name, name))
 
     def block(self, names: Sequence[str], missing: float = 0.0) -> Floats:
         """(n, names); `missing` where there is no column."""

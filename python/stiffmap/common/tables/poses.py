@@ -6,14 +6,12 @@ time, feed the speed along the path. Order and case are free; common/tables/name
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.tables.named import Known, read_named
+from stiffmap.common.tables.named import Known, NamedTable, read_named
 
 COLUMNS = {
     **dict.fromkeys(("x", "y", "z"), "m"),
@@ -27,13 +25,8 @@ USUAL = {"m": "mm", "m/s": "mm/min", "rad": "deg"}
 KNOWN = Known(COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, {})
 
 
-@dataclass(frozen=True, eq=False)
-class PoseTable:
+class PoseTable(NamedTable):
     """Columns (n,) in SI by name, and the line of each row in the file."""
-
-    file: str
-    columns: dict[str, Floats]
-    lines: list[int]
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -51,15 +44,11 @@ class PoseTable:
     @property
     def loaded(self) -> bool:
         """Whether a column is a force or a moment."""
-        return any(c in self.columns for c in ("fx", "fy", "fz", "mx", "my", "mz"))
-
-    def block(self, names: Sequence[str]) -> Floats:
-        """(n, names); zero where there is no column."""
-        return np.stack([self.columns.get(c, np.zeros(len(self))) for c in names], axis=1)
+        return any(c in self.values for c in ("fx", "fy", "fz", "mx", "my", "mz"))
 
     def rotation(self, home: Floats) -> Floats | None:
         """(n, 3, 3) commanded orientations, turned from `home` about base axes; None: as at home."""
-        if not {"rx", "ry", "rz"} & set(self.columns):
+        if not {"rx", "ry", "rz"} & set(self.values):
             return None
         from scipy.spatial.transform import Rotation
 
@@ -73,7 +62,7 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
     `at_home` (3,) m stands in for x, y or z that have no column, along which a planar machine is not commanded; None: all three
     are wanted. Raises FileError naming file, line, column, what was expected and what was found.
     """
-    table = read_named(place, KNOWN)
+    table = PoseTable(**vars(read_named(place, KNOWN)))
     missing = [c for c in "xyz" if c not in table.values]
     if missing and (at_home is None or len(missing) == 3):
         table.fail(
@@ -83,4 +72,4 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
     for c in missing:
         assert at_home is not None  # refused before
         table.values[c] = np.full(len(table.lines), at_home["xyz".index(c)])
-    return PoseTable(table.file, table.values, table.lines)
+    return table

@@ -27,40 +27,9 @@ from stiffmap.common.tables.lines import (
 )
 
 NOTHING = {
-    *(
-        "",
-        "na",
-        "n/a",
-        "n.a.",
-        "nan",
-        "none",
-        "null",
-        "#n/a",
-        "#nv",
-        "n.m.",
-        "k.a.",
-        "k. a.",
-        "ka",
-        "?",
-        "x",
-        "./.",
-        "*",
-    ),
-    *(
-        "#div/0!",
-        "#value!",
-        "#wert!",
-        "#ref!",
-        "#bezug!",
-        "#name?",
-        "#num!",
-        "#zahl!",
-        "fehlt",
-        "missing",
-        "entfällt",
-    ),
-    *("out", "off", "ausreißer", "leer", "empty", "nicht gemessen", "not read", "not measured"),
-}
+    "", *["na", "n/a", "n.a.", "nan", "none", "null", "#n/a", "#nv", "n.m.", "k.a.", "ka", "?", "x", "./.", "*", "out", "off", "leer", "empty", "fehlt", "missing", "entfällt", "ausreißer"],
+    *["#div/0!", "#value!", "#wert!", "#ref!", "#bezug!", "#name?", "#num!", "#zahl!"], "k. a.", "nicht gemessen", "not read", "not measured",
+}  # fmt: skip
 DASHES = re.compile(r"[-–—_.· ]+")
 STATISTICS = re.compile(
     r"(mean|average|avg|mittel(wert)?e?|mw|ø|sum|summe|total|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|min(imum)?|"

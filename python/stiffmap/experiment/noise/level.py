@@ -97,6 +97,30 @@ def contradictions(experiment: Experiment) -> list[str]:
     ]
 
 
+def against_the_load(experiment: Experiment) -> str:
+    """What to say where most readings of a deflection go against a force along their own axis; empty where they do not.
+
+    A machine yields along the force: another sign is one of the load's or of the readings'.
+    """
+    e = experiment
+    alone = np.count_nonzero(e.wrench, axis=1) == 1
+    work = e.wrench[:, :3] * np.where(np.isfinite(e.reading[:, :3]), e.reading[:, :3], 0.0)
+    clear = (
+        (np.abs(work) > 5.0 * np.abs(e.wrench[:, :3]) * np.nan_to_num(e.sigma[:, :3]))
+        & alone[:, None]
+        & (work != 0)
+    )
+    wrong = clear & (work < 0)
+    if e.quantity != "deflection" or 2 * wrong.sum() <= clear.sum():
+        return ""
+    row, axis = np.argwhere(wrong)[0]
+    return (
+        f"{wrong.sum()} of {clear.sum()} readings go against their force (row {e.ids[row]}: {e.wrench[row, axis]:.4g} N along "
+        f'{"xyz"[axis]} and {1e6 * e.reading[row, axis]:.4g} µm): give the other sign, as in --map "f{"xyz"[axis]}=-HEADER" or '
+        "--difference target-minus-actual"
+    )
+
+
 def _mean(values: Floats) -> Floats:
     count = np.isfinite(values).sum(axis=0)
     return np.asarray(np.where(count > 0, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan))

@@ -17,7 +17,7 @@ from stiffmap.common.tables.sheet import Sheet, column_letter
 from stiffmap.common.units import Unit, known, quantity_of, unit_of
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
-from stiffmap.experiment.spreadsheet.together import check_mass
+from stiffmap.experiment.spreadsheet.together import weight
 
 WORDS = ("id", "setup", "branch", "target")
 POSE = ("x", "y", "z")
@@ -87,8 +87,8 @@ def understand(
         _ask_load(sheet)
     said = []
     for c in used:
-        if c.meaning in found and found[c.meaning].mass:
-            sign, why = check_mass(sheet, c.index, c.name[:1] in ("+", "-"), c.meaning, sheet.header[c.index])
+        if c.meaning in FORCE:
+            sign, why = weight(sheet, c.index, c.name[:1] in ("+", "-"), c.meaning, found[c.meaning])
             found[c.meaning] = found[c.meaning]._replace(factor=sign * found[c.meaning].factor)
             said += [why] if why else []
     named = {m: u.name for m, u in found.items()}

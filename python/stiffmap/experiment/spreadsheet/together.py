@@ -13,7 +13,7 @@ import numpy as np
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.sheet import Sheet, column_letter
-from stiffmap.common.units import unit_of
+from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.spreadsheet.guess import READINGS, find_column, guess, guessed
 from stiffmap.experiment.spreadsheet.instrument import with_column
 
@@ -22,6 +22,7 @@ LOAD = re.compile(
     r"zuladung|anhängelast|charge|f|m|p)( hung| applied)?",
     re.IGNORECASE,
 )
+HUNG = re.compile(r"\b(hung|hanging|mass|masse|weight|gewicht|anhängelast|angehängt)\b", re.IGNORECASE)
 DIRECTION = re.compile(
     r"(load|force|last|kraft)?[ _-]?(direction|dir\.?|richtung|axis|achse)( of (the )?(load|force))?|"
     r"richtung der (last|kraft)",
@@ -189,7 +190,12 @@ def _hung(m: Meant) -> None:
     for i, header in enumerate(m.sheet.header):
         name, unit = split_unit(header)
         found = unit_of(unit, "force") if unit else None
-        if found is not None and found.mass and LOAD.fullmatch(name) and m.sheet.is_numeric(i):
+        if (
+            found is not None
+            and (found.mass or HUNG.search(name))
+            and LOAD.fullmatch(name)
+            and m.sheet.is_numeric(i)
+        ):
             m.chosen.setdefault("fz", [header])
             return
 
@@ -248,15 +254,16 @@ def _targets(m: Meant, commands: Sequence[str]) -> None:
             return
 
 
-def check_mass(sheet: Sheet, index: int, explicit: bool, meaning: str, header: str) -> tuple[float, str]:
-    """Sign of a mass as a load along an axis, and what to say of it."""
-    values = sheet.numbers(index)
+def weight(sheet: Sheet, index: int, explicit: bool, meaning: str, unit: Unit) -> tuple[float, str]:
+    """Sign of a load along an axis, and what to say of it: a mass, and what is called a weight, pulls down."""
+    values, header = sheet.numbers(index), sheet.header[index]
+    if not (unit.mass or HUNG.search(split_unit(header)[0])):
+        return 1.0, ""
     if explicit or meaning[0] != "f" or np.nanmin(values, initial=0.0) < 0:
         return 1.0, ""
     sign = -1.0 if meaning == "fz" else 1.0
     way = f"{'-' if sign < 0 else '+'}{meaning[1]}"
     other = f'--map "{meaning}={"+" if sign < 0 else "-"}{header}"'
-    return (
-        sign,
-        f"'{header}' is a mass: its weight pulls along {way} (9.80665 N per kg); {other} says the other way",
-    )
+    what = "a mass: its weight pulls" if unit.mass else "a weight: it pulls"
+    said = f"'{header}' is {what} along {way}{' (9.80665 N per kg)' if unit.mass else ''}; {other} says the other way"
+    return sign, said

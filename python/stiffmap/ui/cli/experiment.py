@@ -126,7 +126,7 @@ def experiment(
     """
     from stiffmap.common.fingerprints import file_digest
     from stiffmap.common.tables.sheet import Layout, read_sheet
-    from stiffmap.experiment.noise.level import contradictions
+    from stiffmap.experiment.noise.level import against_the_load, contradictions
     from stiffmap.experiment.spreadsheet.dh import LEG, arm, read_dh
     from stiffmap.experiment.spreadsheet.dialogue import Answers
     from stiffmap.experiment.spreadsheet.folder import make_experiment
@@ -180,7 +180,7 @@ def experiment(
         print_json({"folder": str(output), "rows": len(made), "repeats": found.repeats,
                     "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units})  # fmt: skip
         return
-    for line in contradictions(made):
+    for line in filter(None, (against_the_load(made), *contradictions(made))):
         Console(highlight=False, soft_wrap=True).print(f"[bold red]WARNING: {escape(line)}[/bold red]")
     for line in (*told, *(f"left out: {text}" for text in table.aside)):
         Console(highlight=False, soft_wrap=True).print(escape(line))

@@ -191,8 +191,8 @@ def _described(document: Document, file: str) -> Motion:
 def _table(place: FilePath) -> Motion:
     table = read_pose_table(place)
     file, p, f = table.file, table.position, table.wrench[:, :3]
-    feed = table.columns.get("feed")
-    if "t" not in table.columns:
+    feed = table.values.get("feed")
+    if "t" not in table.values:
         if len(p) < 2:
             raise FileError(f"expected two or more rows, found {len(p)}", file=file)
         if feed is not None and not (feed > 0).all():
@@ -208,7 +208,7 @@ def _table(place: FilePath) -> Motion:
                 "expected one feed for the whole path (or times, a column t [s])", file=file, key="feed"
             )
         return Motion(place.stem, path, None, None, np.inf, force, feed=float(feed[0]))
-    t = table.columns["t"]
+    t = table.values["t"]
     if feed is not None:
         raise FileError("give times or a feed, not both", file=file, line=1)
     if len(t) < LEAST_ROWS:
