@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.cells import Cells, filled, packed, row_numbers
 from stiffmap.common.tables.header import Line, fits, header_of, record_of, split_unit
@@ -25,6 +25,7 @@ from stiffmap.common.tables.lines import (
     with_point,
     with_points,
 )
+from stiffmap.common.units import known, unit_of
 
 NOTHING = {
     "", *["na", "n/a", "n.a.", "nan", "none", "null", "#n/a", "#nv", "n.m.", "k.a.", "ka", "?", "x", "./.", "*", "out", "off", "leer", "empty", "fehlt", "missing", "entfällt", "ausreißer"],
@@ -67,6 +68,18 @@ class Sheet:
             cells = with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
             self._read[column] = cells.numbers(lambda cell, row: self._number(cell, column, self.lines[row]))
         return self._read[column]
+
+    def size(self, column: int, meaning: str, quantity: str, said: str = "") -> float:
+        """SI size of a column's unit: `said`, else that of its header. StiffmapError names the column and the way to say it."""
+        name, own = split_unit(self.header[column])
+        unit = unit_of(said or own, quantity)
+        if unit is None:
+            usual = "mm" if quantity == "length" else "deg"
+            raise StiffmapError(
+                f"{self.file}: column '{self.header[column]}' ({meaning}) has no unit of {quantity}s ({known(quantity)}): write it in "
+                f"the header, as in '{name} [{usual}]', or say --unit {meaning}={usual} (--unit {quantity}={usual}: of all {quantity}s)"
+            )
+        return unit.size
 
     def _number(self, cell: str, column: int, line: int) -> float:
         value = number(cell, False)

@@ -19,7 +19,6 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.sheet import Sheet
-from stiffmap.common.units import unit_of
 from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
 
 CONVENTIONS = ("standard", "modified")
@@ -182,16 +181,9 @@ def _columns(sheet: Sheet) -> dict[str, int]:
 
 
 def _factor(sheet: Sheet, index: int, name: str, units: Mapping[str, str]) -> float:
-    header = sheet.header[index]
     quantity = "length" if name in LENGTH else "angle"
-    unit = unit_of(units.get(name, split_unit(header)[1]) or units.get(quantity, ""), quantity)
-    if unit is None:
-        kind = "mm" if name in LENGTH else "deg"
-        raise StiffmapError(
-            f"{sheet.file}: column '{header}' has no unit of {quantity}s: write it in the header, as in '{name} [{kind}]', or say "
-            f"--unit {name}={kind}"
-        )
-    return unit.size
+    own = split_unit(sheet.header[index])[1]
+    return sheet.size(index, name, quantity, units.get(name, own) or units.get(quantity, ""))
 
 
 def _named(text: str, number: int) -> str:

@@ -12,7 +12,6 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.sheet import Sheet
-from stiffmap.common.units import known, unit_of
 from stiffmap.common.yaml_text import read
 
 FOLDER = Path(__file__).parent / "instruments"
@@ -146,14 +145,10 @@ def _find(sheet: Sheet, pattern: str) -> int | None:
 
 def _named(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> float:
     """mm or rad that one of a column's unit is: its header's, else the instrument's."""
-    text = split_unit(sheet.header[index])[1] or instrument.units.get(meaning, "")
+    own = split_unit(sheet.header[index])[1]
     quantity = "angle" if meaning == "angle" else "length"
-    found = unit_of(text, quantity)
-    if found is None:
-        raise StiffmapError(
-            f"{sheet.file}: column '{sheet.header[index]}': expected a unit of {quantity} ({known(quantity)}); found '{text}'"
-        )
-    return found.size if quantity == "angle" else 1e3 * found.size
+    size = sheet.size(index, meaning, quantity, own or instrument.units.get(meaning, ""))
+    return size if quantity == "angle" else 1e3 * size
 
 
 def _unit(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> dict[str, str]:

@@ -195,13 +195,9 @@ def _in_mm(
 ) -> tuple[Sheet, dict[str, list[str]]]:
     total = np.zeros(len(sheet.lines))
     for sign, column in parts:
-        unit = unit_of(units.get(column.meaning, column.unit) or units.get("length", ""), "length")
-        if unit is None:
-            raise StiffmapError(
-                f"column '{column.name}' ({column.meaning}) has no unit: write it in the header, as in '{column.name} [mm]', or say "
-                f"--unit {column.meaning}=mm (--unit length=mm: of all lengths)"
-            )
-        total = total + sign * 1e3 * unit.size * sheet.numbers(column.index)
+        said = units.get(column.meaning, column.unit) or units.get("length", "")
+        size = sheet.size(column.index, column.meaning, "length", said)
+        total = total + sign * 1e3 * size * sheet.numbers(column.index)
     name = f"{meaning} [mm]"
     if name not in sheet.header:
         sheet = with_column(sheet, name, [float(v) for v in total])
