@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.sheet import Sheet
 from stiffmap.common.yaml_text import read
+from stiffmap.experiment.spreadsheet.guess import SEEN, guess
 
 FOLDER = Path(__file__).parent / "instruments"
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}
@@ -65,9 +66,11 @@ def load_instrument(name_or_path: str) -> Instrument:
 
 
 def as_readings(
-    sheet: Sheet, instrument: Instrument, constants: Mapping[str, float]
+    sheet: Sheet, instrument: Instrument, constants: Mapping[str, float], given: Mapping[str, Sequence[str]]
 ) -> tuple[Sheet, dict[str, list[str]], dict[str, str], dict[str, float]]:
     """The sheet with columns of readings, the columns' meanings, units of those without, and constants left over.
+
+    `given`: what a person says of columns. Where these or the headers name px, py, pz, nothing is taken off the places seen.
 
     Raises StiffmapError where the sheet lacks a column that the instrument needs.
     """
@@ -80,7 +83,13 @@ def as_readings(
         if index is not None:
             chosen[meaning] = [sheet.header[index]]
             units |= _unit(sheet, index, meaning, instrument)
-    for reading, pattern in instrument.measured.items():
+    said = guess(sheet.header, given)
+    seen = any(c.meaning in SEEN for c in said)
+    for c in said:
+        unit = instrument.units.get(c.meaning.replace("p", "d") if c.meaning in SEEN else c.meaning)
+        if unit and not c.unit and (seen or c.meaning in given):
+            units[c.meaning] = unit
+    for reading, pattern in ({} if seen else instrument.measured).items():
         axis = reading[-1]
         own = _find(sheet, pattern)
         if own is None:

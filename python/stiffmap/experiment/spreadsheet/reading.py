@@ -61,7 +61,9 @@ def read_and_ask(
             table, answers = joints.sheet, replace(answers, chosen=joints.chosen)
             told += joints.told
         elif how.wrote is not None:
-            table, mapped, assumed, constants = as_readings(table, how.wrote, answers.constants)
+            table, mapped, assumed, constants = as_readings(
+                table, how.wrote, answers.constants, answers.chosen
+            )
             answers = replace(
                 answers, chosen=mapped | answers.chosen, units=assumed | answers.units, constants=constants
             )

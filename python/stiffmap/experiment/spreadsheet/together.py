@@ -1,4 +1,4 @@
-"""Columns that mean something only together: a load and its direction, a gauge before and after, angles beside a position,
+"""Columns that mean something only together: a load and its direction, a gauge before and after, angles next to a position,
 names of targets, and headers with a sign."""
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ LOAD = re.compile(
     r"zuladung|anhängelast|charge|f|m|p)( hung| applied)?",
     re.IGNORECASE,
 )
-HUNG = re.compile(r"\b(hung|hanging|mass|masse|weight|gewicht|anhängelast|angehängt)\b", re.IGNORECASE)
+HUNG = re.compile(r"hung|hanging|\bmass|masse\b|weight\b|gewicht\b|anhängelast|angehängt", re.IGNORECASE)
+WEIGHS = re.compile(r"load|last|mass|weight|gewicht|kraft|force|charge|^m$", re.IGNORECASE)
 DIRECTION = re.compile(
     r"(load|force|last|kraft)?[ _-]?(direction|dir\.?|richtung|axis|achse)( of (the )?(load|force))?|"
     r"richtung der (last|kraft)",
@@ -77,7 +78,7 @@ def together(
 
 
 def oriented(m: Meant, commands: Sequence[str], noise: Mapping[str, float]) -> None:
-    """KUKA's A B C beside X Y Z, and names of targets; `commands`: headers of commanded joints."""
+    """KUKA's A B C next to X Y Z, and names of targets; `commands`: headers of commanded joints."""
     _abc(m, noise)
     _targets(m, commands)
 
@@ -111,7 +112,11 @@ def _differences(m: Meant) -> None:
     header = [h.replace("_", " ") for h in m.sheet.header]
     states = [_stateless(h) for h in header]
     for i, (name, state) in enumerate(states):
-        if state != "after" or (name, "before") not in states or not m.sheet.is_numeric(i):
+        if state == "before" and not {(name, "after"), (name, "")} & set(states):
+            m.said.append(
+                f"'{m.sheet.header[i]}' is in no reading; if it was read without the load, call the other one the same but 'loaded'"
+            )
+        if state == "before" or (name, "before") not in states or not m.sheet.is_numeric(i):
             continue
         j = states.index((name, "before"))
         mapped = next(
@@ -178,10 +183,10 @@ def _directions(m: Meant) -> None:
     for axis, values in zip("xyz", parts.T, strict=True):
         m.chosen.pop(f"f{axis}", None)
         if values.any():
-            m.add(f"{names[load]} along {axis}" + (f" [{unit}]" if unit else ""), values, f"f{axis}")
+            m.add(f"+{names[load]} along {axis}" + (f" [{unit}]" if unit else ""), values, f"f{axis}")
             m.units.pop(f"f{axis}", None)
     if not parts.any():
-        m.add(f"{names[load]} along z" + (f" [{unit}]" if unit else ""), parts[:, 2], "fz")
+        m.add(f"+{names[load]} along z" + (f" [{unit}]" if unit else ""), parts[:, 2], "fz")
     m.said.append(f"the load is '{m.sheet.header[load]}' along '{m.sheet.header[way]}'")
 
 
@@ -208,6 +213,9 @@ def _abc(m: Meant, noise: Mapping[str, float]) -> None:
     meanings = {c.meaning for c in guess(m.sheet.header, m.chosen)}
     columns = [i for i in at if i is not None and i not in taken and m.sheet.is_numeric(i)]
     seen = {"px", "py", "pz"} <= meanings
+    units = [split_unit(m.sheet.header[i])[1] for i in columns]
+    if any(u and unit_of(u, "angle") is None for u in units):
+        return  # gauges A, B and C
     if len(columns) < 3 or not (seen or {"x", "y", "z"} <= meanings):
         return
     shown = ", ".join(f"'{m.sheet.header[i]}'" for i in columns)

@@ -176,11 +176,13 @@ def experiment(
     made = make_experiment(found, table, output, machine, quantity, answers.noise, title, kept)
     if rows is not None and joints is not None and dh is not None:
         Machine(arm(rows, dh_convention, output.name, f"from {dh.name}", joints.middle())).save(machine)
+    warnings = [line for line in (against_the_load(made), *contradictions(made)) if line]
     if as_json:
         print_json({"folder": str(output), "rows": len(made), "repeats": found.repeats,
-                    "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units})  # fmt: skip
+                    "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units,
+                    "warnings": warnings})  # fmt: skip
         return
-    for line in filter(None, (against_the_load(made), *contradictions(made))):
+    for line in warnings:
         Console(highlight=False, soft_wrap=True).print(f"[bold red]WARNING: {escape(line)}[/bold red]")
     for line in (*told, *(f"left out: {text}" for text in table.aside)):
         Console(highlight=False, soft_wrap=True).print(escape(line))
