@@ -198,7 +198,7 @@ def _hung(m: Meant) -> None:
         if (
             found is not None
             and (found.mass or HUNG.search(name))
-            and LOAD.fullmatch(name)
+            and WEIGHS.search(name)
             and m.sheet.is_numeric(i)
         ):
             m.chosen.setdefault("fz", [header])

@@ -226,7 +226,7 @@ def tell(
         console.print(f"'{escape(header[c.index])}': {where}")
     for name, value in found.constants.items():
         console.print(f"{name} = {value:g} in every row")
-    if commands:
+    if commands or made.seen is not None:  # what was seen is no deviation before the frame is known
         _show_cells(console, found)
     else:
         _show(console, made)
