@@ -120,7 +120,7 @@ def experiment(
 
       [cyan]stiffmap experiment new joints.csv --dh arm_dh.csv --unit joints=deg --noise dx=0.03 -o arm_readings[/cyan]
 
-      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue --noise dx=1 -o asked[/cyan]
+      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue --noise dx=1 --noise dy=1 -o asked[/cyan]
 
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
