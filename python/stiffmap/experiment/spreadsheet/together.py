@@ -243,18 +243,17 @@ def _targets(m: Meant, commands: Sequence[str]) -> None:
     poses = list(zip(*joints, strict=True)) if joints else []
     for i, header in enumerate(m.sheet.header):
         name = split_unit(header)[0].strip()
+        sure = TARGET.fullmatch(name) is not None
+        if i in taken or not (sure or (poses and POINT.fullmatch(name))):
+            continue
         cells = list(m.sheet.columns[i])
         words = {c for c in cells if c}
-        each_pose = (
-            len(set(zip(poses, cells, strict=True))) == len(poses) > len(set(poses)) if poses else False
-        )
         many = 1 < len(words) < len(cells) and len(words) * 2 <= len(cells) + 1
         plain = not m.sheet.is_numeric(i) or all(re.fullmatch(r"\d+", w) for w in words)
-        lettered = all(re.search(r"[^\W\d]", w) for w in words)
-        named = TARGET.fullmatch(name) is not None or (
-            POINT.fullmatch(name) is not None and each_pose and lettered
-        )
-        if i not in taken and many and plain and named:
+        if not sure:  # names, each once at every pose
+            each_pose = len(set(zip(poses, cells, strict=True))) == len(poses) > len(set(poses))
+            sure = each_pose and all(re.search(r"[^\W\d]", w) for w in words)
+        if many and plain and sure:
             m.chosen["target"] = [header]
             m.said.append(
                 f"'{header}' names the target that was read: {', '.join(sorted(words)[:6])}; --map note='{header}' where it does not"
