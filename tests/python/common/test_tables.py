@@ -9,6 +9,7 @@ import pytest
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.poses import read_pose_table
+from stiffmap.experiment.files.table import read_table
 from stiffmap.machining.toolpath.load import load_path
 from stiffmap.workspace.performance.motion.trajectory import read_points
 
@@ -51,3 +52,26 @@ def test_every_command_names_line_and_column(text: str, words: str, tmp_path: Pa
     for read in (read_pose_table, load_path, read_points):
         with pytest.raises(FileError, match=words):
             read(file)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "id,x,dx\n1,50.5,1\n2,-1.25,\n",
+        "id;x;dx\n1;50,5;1\n2;-1,25;\n",
+        "\ufeffid\tx\tdx\n1\t50.5\t1\n2\t-1.25\t\n",
+    ],
+)
+def test_readings_are_the_same_in_every_spelling(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "data.csv"
+    file.write_text(text, encoding="utf-8")
+    table = read_table(file)
+    np.testing.assert_array_equal(table.numbers("x"), [50.5, -1.25])
+    np.testing.assert_array_equal(table.numbers("dx", blank=True), [1.0, np.nan])
+
+
+def test_a_thousand_in_quotes_is_no_decimal_comma(tmp_path: Path) -> None:
+    file = tmp_path / "data.csv"
+    file.write_text('id,x,dx\n1,"1,000",1\n', encoding="utf-8")
+    with pytest.raises(FileError, match="line 2: column 'x': expected a number; found '1,000'"):
+        read_table(file).numbers("x")
