@@ -1,4 +1,4 @@
-"""Units of length, force, mass and angle, and their exact conversion to SI."""
+"""Units of length, force, moment, mass, angle, time and acceleration: their sizes in SI, and how sheets spell them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LENGTHS = {
     "um": Fraction(1, 10**6),
     "in": Fraction(254, 10**4),
 }
-SYNONYMS = {"inch": "in", "µm": "um", "μm": "um", "Nm": "N*m", "Nmm": "N*mm"}
+SYNONYMS = {"inch": "in", "µm": "um", "μm": "um", "µrad": "urad", "Nm": "N*m", "Nmm": "N*mm"}
 """Other ways to write a unit."""
 FORCES = {"N": Fraction(1), "kN": Fraction(1000), "MN": Fraction(10**6)}
 MASSES = {"kg": Fraction(1), "g": Fraction(1, 1000), "t": Fraction(1000)}
@@ -34,11 +34,97 @@ PLANE_ANGLES: dict[str, Fraction | float] = {
 }
 ANGLES = ("rad", "deg")
 """Those of a machine file."""
+TIMES = {"s": Fraction(1), "min": Fraction(60)}
+GRAVITY = Fraction("9.80665")
+"""Standard acceleration of gravity, m/s²: the weight of a kilogram in N."""
+POUND = Fraction("4.4482216152605")
+"""A pound-force, N."""
+ACCELERATIONS = {"m/s2": Fraction(1), "m/s²": Fraction(1), "g": GRAVITY}
+
+
+class Unit(NamedTuple):
+    """A unit of experiment files, and how many of it one of a sheet's is."""
+
+    name: str
+    factor: float = 1.0
+    mass: bool = False
+    """Of a mass that stands for its weight."""
+
+    @property
+    def size(self) -> float:
+        """In SI."""
+        return self.factor * size_of(self.name, LENGTHS, FORCES, MOMENTS, PLANE_ANGLES)
+
+
+def _table(*rows: tuple[str, str, Fraction | float]) -> dict[str, Unit]:
+    return {word: Unit(name, float(size)) for words, name, size in rows for word in words.split("|")}
+
+
+SPELLINGS = {
+    "length": _table(
+        *((n, n, 1) for n in ("m", "cm", "mm")),
+        ("um|µm|μm|micron|microns|1/1000mm|0.001mm|mm/1000", "um", 1),
+        ("in|inch|inches|zoll|\"|''", "in", 1),
+        ("mil|mils|thou|in/1000|1/1000in|0.001in|thousandths", "in", 1e-3),
+        ("tenth|tenths|0.0001in|1/10000in", "in", 1e-4),
+        ("1/100mm|0.01mm|mm/100|hundertstel|1/100|0.01", "um", 10),
+        ("1/10mm|0.1mm|mm/10|zehntel", "um", 100),
+    ),
+    "force": _table(
+        ("n|newton", "N", 1), ("kn", "kN", 1), ("dan", "N", 10), ("kgf|kp|kilopond", "N", GRAVITY),
+        ("gf|p", "N", GRAVITY / 1000), ("lbf|lb|lbs|pound", "N", POUND), ("kip", "kN", POUND),
+        ("ozf|oz", "N", POUND / 16),
+    )
+    | {w: Unit("N", float(GRAVITY * MASSES[w]), True) for w in MASSES},
+    "angle": _table(
+        ("rad", "rad", 1), ("mrad|mm/m", "mrad", 1), ("urad|µrad|μrad|um/m|µm/m", "mrad", 1e-3),
+        ("deg|°|grad|degree|degrees", "deg", 1), ("arcmin|'", "deg", 1 / 60), ("arcsec|sec", "deg", 1 / 3600),
+    ),
+    "moment": _table(
+        ("nm|n*m|n·m", "N*m", 1), ("nmm|n*mm|n·mm", "N*mm", 1), ("knm|kn*m|kn·m", "kN*m", 1),
+        ("kgfm|kpm|kgf*m|kp*m|mkp", "N*m", GRAVITY),
+        ("lbfft|ftlbf|lbf*ft|ft*lbf|ft-lb|ft·lb|lbf·ft", "N*m", float(POUND) * 0.3048),
+        ("lbfin|lbf*in|in*lbf|in-lb|lbf·in", "N*m", float(POUND) * 0.0254),
+    ),
+    "temperature": _table(("°c|degc|c|celsius", "degC", 1), ("k|kelvin", "K", 1)),
+}  # fmt: skip
+"""Quantity -> units as workshops write them, in small letters."""
+SHOWN = {
+    "length": "m, cm, mm, µm, in, mil, thou, in/1000, 1/100 mm, 1/1000 mm",
+    "force": "N, daN, kN, kgf, kp, lbf, and kg of a mass that hangs",
+    "angle": "rad, mrad, µrad, deg, arcmin, arcsec",
+    "moment": "N*m, N*mm, kN*m, kgf*m, lbf*ft, lbf*in",
+    "temperature": "°C, K",
+}
+
+
+def quantity_of(meaning: str) -> str:
+    """Length, force, angle, moment or temperature of a column of an experiment."""
+    plain = meaning.removeprefix("u_")
+    if plain == "temperature":
+        return "temperature"
+    if plain.startswith(("euler", "rot", "pr")):
+        return "angle"
+    return {"f": "force", "m": "moment", "r": "angle"}.get(plain[0], "length")
+
+
+def unit_of(text: str, quantity: str | None = None) -> Unit | None:
+    """A unit as a sheet writes it, of one quantity or of any; None for what is none."""
+    if text.strip() in ("MN", "mN"):  # a factor of 1e9 between the two: here the case decides
+        return Unit("MN") if text.strip() == "MN" and quantity in (None, "force") else None
+    key = re.sub(r"\s+|^\[|\]$", "", text.strip().lower()).replace(",", ".").rstrip(".")
+    tables = SPELLINGS.values() if quantity is None else (SPELLINGS[quantity],)
+    return next((t[key] for t in tables if key in t), None)
+
+
+def known(quantity: str | None = None) -> str:
+    """The units that are understood, of one quantity or of all."""
+    return SHOWN[quantity] if quantity else "; ".join(SHOWN.values())
 
 
 def name_and_unit(header: str) -> tuple[str, str]:
-    """``x [mm]`` is x in mm; an empty unit where none stands in square brackets."""
-    match = re.fullmatch(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", header)
+    """``x [mm]`` is x in mm; an empty unit where none stands in brackets."""
+    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*", header)
     assert match is not None  # any text is a name
     return match[1], match[2] or ""
 

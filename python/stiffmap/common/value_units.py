@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import bounded, number_in
-from stiffmap.common.units import FORCES, LENGTHS, MASSES, PLANE_ANGLES
+from stiffmap.common.units import FORCES, LENGTHS, MASSES, PLANE_ANGLES, SYNONYMS, TIMES
 
 _MICRO = Fraction(1, 10**6)
 _PLAIN = {"1": Fraction(1), "%": Fraction(1, 100), "ppm": _MICRO}
@@ -24,20 +24,13 @@ Dimension = tuple[tuple[str, int], ...]
 
 
 def _atoms() -> dict[str, tuple[Fraction | float, str]]:
-    table: dict[str, tuple[Fraction | float, str]] = {}
-    for units, dimension in (
-        (LENGTHS, "m"),
-        (FORCES, "N"),
-        (MASSES, "kg"),
-        (PLANE_ANGLES, "rad"),
-    ):
-        table.update({name: (factor, dimension) for name, factor in units.items()})
-    table.update({name: (factor, "") for name, factor in _PLAIN.items()})
-    table.update(
-        {"µm": (_MICRO, "m"), "μm": (_MICRO, "m"), "nm": (_MICRO / 1000, "m"), "µrad": (_MICRO, "rad")}
-    )
-    table.update({"K": (Fraction(1), "K"), "s": (Fraction(1), "s"), "mN": (Fraction(1, 1000), "N")})
-    return table
+    small = {"nm": _MICRO / 1000}, {"mN": Fraction(1, 1000)}  # too easily taken for N·m and MN in a table
+    units = (
+        (LENGTHS | small[0], "m"), (FORCES | small[1], "N"), (MASSES, "kg"), (PLANE_ANGLES, "rad"), (TIMES, "s"),
+        ({"K": Fraction(1)}, "K"), (_PLAIN, ""),
+    )  # fmt: skip
+    table = {name: (size, dimension) for sizes, dimension in units for name, size in sizes.items()}
+    return table | {other: table[name] for other, name in SYNONYMS.items() if name in table}
 
 
 ATOMS = _atoms()

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from stiffmap.common import yaml_text
-from stiffmap.common.cells import Cells
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import LARGEST, SMALLEST, bounded, number_in
+from stiffmap.common.tables.cells import Cells
+from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.value_units import read_value
-from stiffmap.experiment.spreadsheet.sheet import read_sheet
 from stiffmap.ui.cli import main
 from stiffmap.ui.view.state import State, from_permalink, permalink
 

@@ -9,7 +9,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import pytest
 
 from stiffmap.common.errors import FileError
-from stiffmap.common.workbook import sheet_names, workbook_lines
+from stiffmap.common.tables.workbook import sheet_names, workbook_lines
 
 openpyxl = pytest.importorskip("openpyxl")
 

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.cells import Cells, filled, packed, row_numbers
 from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import unguarded
+from stiffmap.common.tables.cells import Cells, filled, packed, row_numbers
+from stiffmap.common.tables.header import Line
+from stiffmap.common.tables.lines import decimal_comma, lines_of, with_points
 from stiffmap.model.files.schema.base import suggestion
 
 
@@ -70,17 +71,14 @@ class Table:
 
 
 def read_table(path: Path, expected: int | None = None) -> Table:
-    """Cells of a CSV file with a header line and, where it is known, an expected number of rows; raises `FileError`."""
-    lines = row_numbers()
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.reader(stream)
-            header = tuple(c.strip() for c in next((row for row in reader if filled(row)), ()))
-            columns = packed(_rows(reader, header, lines, str(path)), len(header))
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise FileError(f"not a CSV file in UTF-8 ({error})", file=str(path)) from error
+    """Cells of a text or workbook with a header line and, where it is known, an expected number of rows; raises `FileError`."""
+    source, lines = lines_of(path), row_numbers()
+    comma = source.separator not in ("", ",") and decimal_comma(row for _, row in source.lines())
+    rows = ((n, row) for n, row in source.lines() if filled(row))
+    header = tuple(c.strip() for c in next(rows, (0, []))[1])
+    columns = packed(_rows(rows, header, lines, str(path)), len(header))
+    if comma:
+        columns = tuple(map(with_points, columns))
     if not lines:
         raise FileError("expected a header line and at least one row", file=str(path))
     if expected is not None:
@@ -88,18 +86,16 @@ def read_table(path: Path, expected: int | None = None) -> Table:
     return Table(str(path), header, columns, lines)
 
 
-def _rows(reader: Any, header: Sequence[str], lines: Any, file: str) -> Iterator[list[str]]:
+def _rows(rows: Iterable[Line], header: Sequence[str], lines: Any, file: str) -> Iterator[list[str]]:
     """Rows with something in them, as long as the header; `lines` gathers their numbers."""
     twice = sorted(c for c, times in Counter(header).items() if times > 1)
     if twice:
         raise FileError(f"column '{twice[0]}' occurs twice", file=file, line=1)
     width = len(header)
-    for row in reader:
-        if not filled(row):
-            continue
+    for n, row in rows:
         if len(row) != width:
-            raise FileError(f"expected {width} cells; found {len(row)}", file=file, line=reader.line_num)
-        lines.append(reader.line_num)
+            raise FileError(f"expected {width} cells; found {len(row)}", file=file, line=n)
+        lines.append(n)
         yield row
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,14 +70,67 @@ def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
     )
 
 
+LOUD = 10.0
+"""Times the declared noise: repeats that scatter by more were not taken as the declaration says."""
+
+
+def contradictions(experiment: Experiment) -> list[str]:
+    """Channels whose declared noise is far below what repeats of the same command and load show, in words.
+
+    Coordinates in the instrument's own frame are compared as they are; no machine is needed.
+    """
+    e = experiment
+    if e.seen is not None:
+        reading = e.reading.copy()
+        reading[:, :3] = np.where(np.isfinite(e.seen), e.seen, reading[:, :3])
+        e = replace(e, reading=reading)
+    words = [np.unique(w or [""] * len(e), return_inverse=True)[1] for w in (e.target, e.instrument, e.setup)]
+    alike = np.unique(np.column_stack([e.conditions, *words]), axis=0, return_inverse=True)[1].reshape(-1)
+    squares, freedom = _within(e, np.ones(len(e), bool), alike)
+    repeats, declared = np.sqrt(squares / np.maximum(freedom, 1)), np.sqrt(_mean(e.sigma**2))
+    return [
+        f"the declared noise of {c.name} is {1e3 * d:.3g} {unit}, and readings of the same command and load scatter by "
+        f"{1e3 * s:.3g} {unit}, {s / d:.2g} times as much: are they of one target, one set-up and one load?"
+        for c, s, d, n in zip(e.channels, repeats, declared, freedom, strict=True)
+        for unit in ("mm" if c.unit == "m" else "mrad",)
+        if n > 0 and s > LOUD * d > 0
+    ]
+
+
+def against_the_load(experiment: Experiment) -> str:
+    """What to say where most readings of a deflection go against a force along their own axis; empty where they do not.
+
+    A machine yields along the force: another sign is one of the load's or of the readings'.
+    """
+    e = experiment
+    alone = np.count_nonzero(e.wrench, axis=1) == 1
+    work = e.wrench[:, :3] * np.where(np.isfinite(e.reading[:, :3]), e.reading[:, :3], 0.0)
+    clear = (
+        (np.abs(work) > 5.0 * np.abs(e.wrench[:, :3]) * np.nan_to_num(e.sigma[:, :3]))
+        & alone[:, None]
+        & (work != 0)
+    )
+    wrong = clear & (work < 0)
+    if e.quantity != "deflection" or 2 * wrong.sum() <= clear.sum():
+        return ""
+    row, axis = np.argwhere(wrong)[0]
+    return (
+        f"{wrong.sum()} of {clear.sum()} readings go against their force (row {e.ids[row]}: {e.wrench[row, axis]:.4g} N along "
+        f'{"xyz"[axis]} and {1e6 * e.reading[row, axis]:.4g} µm): give the other sign, as in --map "f{"xyz"[axis]}=-HEADER" or '
+        "--difference target-minus-actual"
+    )
+
+
 def _mean(values: Floats) -> Floats:
     count = np.isfinite(values).sum(axis=0)
     return np.asarray(np.where(count > 0, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan))
 
 
-def _within(experiment: Experiment, rows: Mask) -> tuple[Floats, NDArray[np.intp]]:
+def _within(
+    experiment: Experiment, rows: Mask, alike: NDArray[np.intp] | None = None
+) -> tuple[Floats, NDArray[np.intp]]:
     """Sum of squares within conditions, and its degrees of freedom, per axis."""
-    condition = experiment.conditions
+    condition = experiment.conditions if alike is None else alike
     number = int(condition.max()) + 1
     read = experiment.read & rows[:, None]
     values = np.where(read, experiment.reading, 0.0)

@@ -10,17 +10,18 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.cells import row_numbers
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
-from stiffmap.common.sheet_units import Unit, known, quantity_of, unit_of
+from stiffmap.common.tables.cells import row_numbers
+from stiffmap.common.tables.sheet import Sheet, column_letter
+from stiffmap.common.units import Unit, known, quantity_of, unit_of
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
-from stiffmap.experiment.spreadsheet.sheet import Sheet, column_letter
+from stiffmap.experiment.spreadsheet.together import weight
 
-WORDS = ("id", "setup", "branch")
+WORDS = ("id", "setup", "branch", "target")
 POSE = ("x", "y", "z")
-FORCE = ("fx", "fy", "fz")
+FORCE, MOMENT = ("fx", "fy", "fz"), ("mx", "my", "mz")
 POSE2 = ("x2", "y2", "z2")
 COUNTED = ("order", "repeat")
 
@@ -48,6 +49,8 @@ class Imported:
     notes: list[Column]
     head: dict[str, Any] = field(default_factory=dict)
     """Further keys of experiment.yaml."""
+    said: tuple[str, ...] = ()
+    """What the reader must know, in words."""
 
 
 def understand(
@@ -57,12 +60,13 @@ def understand(
     constants: Mapping[str, float],
     commands: Mapping[str, tuple[str, str]] | None = None,
     head: Mapping[str, Any] | None = None,
+    loaded: bool = False,
 ) -> Imported:
     """Columns, units and rows of data.csv; raises StiffmapError that asks for what cannot be guessed.
 
     ``units`` (meaning -> unit) for columns without brackets; ``constants`` (meaning -> number) for what the
     sheet has no column of, in mm and N. ``commands`` (column -> drive, unit) for columns of commanded joints, which stand for
-    poses; ``head`` holds further keys of experiment.yaml.
+    poses; ``head`` holds further keys of experiment.yaml. ``loaded``: whether a load must be there.
     """
     drives = dict(commands or {})
     columns = guess(sheet.header, chosen)
@@ -79,6 +83,14 @@ def understand(
     beside = _beside(sheet, columns)
     plain = (*WORDS, *COUNTED, *drives)
     found = {c.meaning: _unit(sheet, c, units, beside) for c in used if c.meaning not in plain}
+    if loaded and not known & {*FORCE, *MOMENT}:
+        _ask_load(sheet)
+    said = []
+    for c in used:
+        if c.meaning in FORCE:
+            sign, why = weight(sheet, c.index, c.name[:1] in ("+", "-"), c.meaning, found[c.meaning])
+            found[c.meaning] = found[c.meaning]._replace(factor=sign * found[c.meaning].factor)
+            said += [why] if why else []
     named = {m: u.name for m, u in found.items()}
     factors = {m: u.factor for m, u in found.items() if u.factor != 1.0}
     repeats = max([c.repeat for c in used], default=0) or 1
@@ -86,7 +98,7 @@ def understand(
     told = {"command": {k: {"actuator": a, "unit": u} for k, (a, u) in drives.items()}} if drives else {}
     further = told | dict(head or {})
     return Imported(columns, named, factors, header, rows, repeats, dict(constants),
-                    [c for c in columns if c.meaning == "note"], further)  # fmt: skip
+                    [c for c in columns if c.meaning == "note"], further, tuple(said))  # fmt: skip
 
 
 def _ask(sheet: Sheet, known_: set[str]) -> None:
@@ -106,6 +118,17 @@ def _ask(sheet: Sheet, known_: set[str]) -> None:
             "column",
             "reading",
         )
+
+
+def _ask_load(sheet: Sheet) -> None:
+    there = ", ".join(f"'{h}'" for h in sheet.header)
+    raise Question(
+        f"{sheet.file}: missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, "
+        f"mz; --map fz='-HEADER' where it pulls against the axis), or --set fx=NUMBER (N) where it is the same in every row; "
+        f"columns: {there}",
+        "column",
+        "load",
+    )
 
 
 def _beside(sheet: Sheet, columns: Sequence[Column]) -> dict[int, str]:
@@ -182,7 +205,7 @@ class Rows:
     ) -> None:
         self._sheet, self._repeats = sheet, repeats
         numbers = {
-            c.index: sheet.numbers(c.index) * factors.get(c.meaning, 1.0)
+            c.index: sheet.numbers(c.index) * factors.get(c.meaning, 1.0) + 0.0  # no -0
             if c.meaning in factors
             else sheet.numbers(c.index)
             for c in used
@@ -272,7 +295,8 @@ def write_folder(
         "units": head_units(found),
     }
     if noise:
-        head["noise"] = {n: v * found.factors.get(n, 1.0) for n, v in noise.items()}
+        factors = {n.replace("p", "d"): f for n, f in found.factors.items()}
+        head["noise"] = {n: v * factors.get(n, 1.0) for n, v in noise.items()}
     head |= found.head
     told = {**dict(sheet.record), **(record or {})}
     if "notes" in told:
@@ -295,6 +319,8 @@ def head_units(found: Imported) -> dict[str, str]:
         base = meaning.removeprefix("u_")
         if meaning == "temperature":
             out["temperature"] = unit
+        elif meaning.startswith(("euler", "pr")):
+            out["angle"] = unit
         elif meaning.startswith("u_"):
             if found.units.get(base) != unit:
                 raise StiffmapError(

@@ -17,9 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.sheet_units import unit_of
-from stiffmap.experiment.spreadsheet.guess import split_unit
-from stiffmap.experiment.spreadsheet.sheet import Sheet
+from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.sheet import Sheet
 from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
 
 CONVENTIONS = ("standard", "modified")
@@ -36,16 +35,6 @@ WORDS = {
     "high": r"high|max|upper",
 }
 LENGTH, ANGLE = ("d", "a"), ("theta", "alpha")
-TO_SI = {
-    "m": 1.0,
-    "cm": 1e-2,
-    "mm": 1e-3,
-    "um": 1e-6,
-    "in": 0.0254,
-    "rad": 1.0,
-    "mrad": 1e-3,
-    "deg": math.pi / 180.0,
-}
 LEG = "arm"
 STEP, TRIES = math.radians(30.0), 200
 """Of the coordinates among which a home is looked for, and how many are tried."""
@@ -204,16 +193,9 @@ def _columns(sheet: Sheet) -> dict[str, int]:
 
 
 def _factor(sheet: Sheet, index: int, name: str, units: Mapping[str, str]) -> float:
-    header = sheet.header[index]
     quantity = "length" if name in LENGTH else "angle"
-    unit = unit_of(units.get(name, split_unit(header)[1]) or units.get(quantity, ""), quantity)
-    if unit is None:
-        kind = "mm" if name in LENGTH else "deg"
-        raise StiffmapError(
-            f"{sheet.file}: column '{header}' has no unit of {quantity}s: write it in the header, as in '{name} [{kind}]', or say "
-            f"--unit {name}={kind}"
-        )
-    return TO_SI[unit.name] * unit.factor
+    own = split_unit(sheet.header[index])[1]
+    return sheet.size(index, name, quantity, units.get(name, own) or units.get(quantity, ""))
 
 
 def _named(text: str, number: int) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,13 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.fingerprints import digest
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import make_folder, write_text
-from stiffmap.common.sheet_units import known, quantity_of, unit_of
+from stiffmap.common.tables.sheet import Sheet, column_letter
+from stiffmap.common.units import known, quantity_of, unit_of
 from stiffmap.common.yaml_text import read, text_of
-from stiffmap.experiment.spreadsheet.convert import Imported, Question, understand
-from stiffmap.experiment.spreadsheet.guess import READINGS
+from stiffmap.experiment.spreadsheet.convert import FORCE, MOMENT, Imported, Question, understand
+from stiffmap.experiment.spreadsheet.guess import READINGS, SEEN
 from stiffmap.experiment.spreadsheet.joints import Commanded
-from stiffmap.experiment.spreadsheet.sheet import Sheet, column_letter
+from stiffmap.experiment.spreadsheet.together import together
 
 Ask = Callable[[str], str]
 MOST = 30
@@ -42,6 +43,18 @@ class Answers:
             {k: v for k, v in self.constants.items() if k not in other.chosen} | other.constants,
             self.noise | other.noise,
         )
+
+    def of(self, sheet: Sheet, given: Answers) -> Answers:
+        """These without columns that were made, which the next sheet of this form has not got, but as `given`."""
+        there = {*sheet.header, *(f"{sign}{h}" for h in sheet.header for sign in "+-")}
+        own = {k: v for k, v in self.chosen.items() if set(v) <= there}
+        return Answers(own | given.chosen, self.units, self.constants, self.noise)
+
+
+class Unanswered(StiffmapError):
+    """Nobody answers a question; `answers` are those that were given before."""
+
+    answers = Answers()
 
 
 def profile_file(sheet: Sheet) -> Path:
@@ -80,22 +93,36 @@ def remember(sheet: Sheet, a: Answers) -> Path:
 
 
 def ask_all(
-    sheet: Sheet, a: Answers, ask: Ask | None, joints: Commanded | None = None
-) -> tuple[Imported, Answers]:
-    """The sheet understood with the answers to every question that it leaves; raises StiffmapError."""
-    commands, head = (joints.columns, joints.head) if joints else ({}, {})
+    sheet: Sheet,
+    a: Answers,
+    ask: Ask | None,
+    joints: Commanded | None = None,
+    head: Mapping[str, Any] | None = None,
+    loaded: bool = False,
+) -> tuple[Sheet, Imported, Answers]:
+    """The sheet, with columns of the other sign where an answer wants them, understood with the answers to every question that it leaves; raises StiffmapError."""
+    commands, further = (joints.columns, joints.head) if joints else ({}, {})
+    further = further | dict(head or {})
     for _ in range(MOST):
         try:
-            found = understand(sheet, a.chosen, a.units, a.constants, commands, head)
+            signed = together(sheet, a.chosen, a.units, False)
+            sheet, a = signed.sheet, replace(a, chosen=signed.chosen)
+            found = understand(sheet, a.chosen, a.units, a.constants, commands, further, loaded)
         except Question as question:
             if ask is None:
                 raise
-            a = _answered(sheet, question, a, ask)
+            try:
+                a = _answered(sheet, question, a, ask)
+            except StiffmapError as nobody:
+                left = Unanswered(str(nobody))
+                left.answers = a
+                raise left from None
             continue
-        lost = [m for m in READINGS if m in found.units and m not in a.noise]
-        if ask is not None and lost and not a.noise and found.repeats < 2:
-            a = _noise(found, lost, a, ask)
-        return found, a
+        read = dict.fromkeys(f"d{m[1]}" if m in SEEN else m for m in READINGS if m in found.units)
+        lost = [m for m in read if m not in a.noise]
+        if ask is not None and lost and found.repeats < 2:
+            a = _noise(lost, a, ask)
+        return sheet, found, a
     raise StiffmapError(f"{sheet.file}: the sheet is not understood after {MOST} answers")
 
 
@@ -118,6 +145,23 @@ def _answered(sheet: Sheet, question: Question, a: Answers, ask: Ask) -> Answers
         if meaning not in READINGS or None in found:
             return a
         return Answers(a.chosen | {meaning: [str(f) for f in found]}, a.units, a.constants, a.noise)
+    if question.meaning == "load":
+        said = ask(
+            f"{columns}\nWhich column is the load, and along which axis? For example fx={column_letter(0)}, fz=-{column_letter(0)} "
+            "against the axis, or fx=100 N in all rows"
+        )
+        meaning, _, where = said.partition("=")
+        meaning, sign = meaning.strip().lower(), where.strip()[:1] if where.strip()[:1] in ("+", "-") else ""
+        if meaning not in (*FORCE, *MOMENT):
+            return a
+        column = _column(sheet, where.strip().removeprefix(sign))
+        if column is not None:
+            return Answers(a.chosen | {meaning: [f"{sign}{column}"]}, a.units, a.constants, a.noise)
+        try:
+            value = number_in(where.lower().removesuffix("n").strip().replace(",", "."))
+        except ValueError:
+            return a
+        return Answers(a.chosen, a.units, a.constants | {meaning: value}, a.noise)
     said = ask(
         f"{columns}\nWhich column is the position {question.meaning}? A letter, or a number in mm that holds in all rows"
     ).strip()
@@ -136,7 +180,7 @@ def _header_of(sheet: Sheet, meaning: str, a: Answers) -> str:
     return f"'{a.chosen[meaning][0]}'" if meaning in a.chosen else meaning
 
 
-def _noise(found: Imported, lost: list[str], a: Answers, ask: Ask) -> Answers:
+def _noise(lost: list[str], a: Answers, ask: Ask) -> Answers:
     noise: Mapping[str, float] = {}
     for m in lost:
         said = ask(f"One standard deviation of a reading of {m}, in its unit? Empty: repeats show it").strip()

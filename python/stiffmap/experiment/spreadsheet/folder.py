@@ -9,9 +9,9 @@ from pathlib import Path
 
 from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.outputs import putting
+from stiffmap.common.tables.sheet import Sheet, column_letter
 from stiffmap.experiment import Experiment, load_experiment
 from stiffmap.experiment.spreadsheet.convert import Imported, write_folder
-from stiffmap.experiment.spreadsheet.sheet import Sheet, column_letter
 
 
 def make_experiment(

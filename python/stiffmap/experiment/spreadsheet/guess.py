@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.sheet_units import unit_of
+from stiffmap.common.tables.header import split_unit
 
 PATTERNS: tuple[tuple[str, str], ...] = (
     ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?"),
@@ -43,35 +43,6 @@ class Column:
     """From 1, of repeats side by side; 0: none."""
 
 
-def split_unit(header: str) -> tuple[str, str]:
-    """``Uhr 1 [µm]`` is ``Uhr 1`` in ``µm``; also round brackets, and ``x / mm``, ``x, mm``, ``x in mm``, ``x_mm``,
-    ``x 1/100 mm``."""
-    match = re.match(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$", header)
-    if match:
-        return match[1].strip(), match[2].strip()
-    part = re.match(
-        r"^(.*?\S)(?:\s+in)?[\s,;]+((?:1/|0[.,]0*1\s?)\d*\s?(?:mm|in)?|(?:mm|in)/1\d+)\s*$", header
-    )
-    if part and known_unit(part[2]):
-        return part[1].strip(), part[2].strip()
-    said = re.match(r"^(.*?)(?:\s*[/,;]\s*|\s+in\s+)(\S+)\s*$", header)
-    bare = re.match(r"^(.*\S)[\s_](\S{2,})\s*$", header)
-    newton = re.match(r"^(.*?[^\s,;/])(?:\s+in)?\s(k?N)\s*$", header)
-    if newton:
-        return newton[1].strip(), newton[2]
-    if said and said[1] and known_unit(said[2]) and not known_unit(header):
-        return said[1].strip(), said[2]
-    if bare and bare[2].lower() != "in" and known_unit(bare[2]):
-        return bare[1].strip(), bare[2]
-    return header.strip(), ""
-
-
-def known_unit(unit: str) -> str:
-    """The unit as experiment files write it; empty for an unknown one."""
-    found = unit_of(unit)
-    return found.name if found else ""
-
-
 def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[Column]:
     """Meaning of every column; ``chosen`` (meaning -> headers) goes before any guess.
 
@@ -79,7 +50,9 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
     header that is not there.
     """
     given = {
-        _find(h, headers): (meaning, i) for meaning, many in chosen.items() for i, h in enumerate(many, 1)
+        find_column(h, headers): (meaning, i)
+        for meaning, many in chosen.items()
+        for i, h in enumerate(many, 1)
     }
     out = []
     for index, header in enumerate(headers):
@@ -93,16 +66,24 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
     return _one_each(out)
 
 
-def _find(wanted: str, headers: Sequence[str]) -> int:
+def find_column(wanted: str, headers: Sequence[str]) -> int:
+    """Index of a column by its header, with or without its unit, by how that begins, or by its number from 1; StiffmapError."""
     exact = [i for i, h in enumerate(headers) if wanted in (h, split_unit(h)[0])]
     loose = [i for i, h in enumerate(headers) if h.lower().startswith(wanted.lower())]
     found = exact or (loose if len(loose) == 1 else [])
+    if not found and wanted.isdigit() and 1 <= int(wanted) <= len(headers):
+        return int(wanted) - 1
     if not found:
         raise StiffmapError(f"--map: no column '{wanted}'; there are: {', '.join(headers)}")
     return found[0]
 
 
-def meaning_of(name: str) -> str:
+def has_meaning(name: str) -> bool:
+    """Whether a name without its unit stands for a column of an experiment."""
+    return guessed(name) != "note"
+
+
+def guessed(name: str) -> str:
     """Column of an experiment that a name without its unit stands for; ``note`` for none."""
     return _meaning(name)[0]
 

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from stiffmap.common.cells import Cells
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.sheet_units import known, unit_of
+from stiffmap.common.tables.cells import Cells
+from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.sheet import Sheet
 from stiffmap.common.yaml_text import read
-from stiffmap.experiment.spreadsheet.guess import split_unit
-from stiffmap.experiment.spreadsheet.sheet import Sheet
+from stiffmap.experiment.spreadsheet.guess import SEEN, guess
 
 FOLDER = Path(__file__).parent / "instruments"
-TO_MM = {"m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3, "in": 25.4}
-TO_RAD = {"rad": 1.0, "deg": math.pi / 180, "mrad": 1e-3}
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}
 CIRCLE = ("centre_x", "centre_y", "centre_z", "radius")
 
@@ -68,9 +66,11 @@ def load_instrument(name_or_path: str) -> Instrument:
 
 
 def as_readings(
-    sheet: Sheet, instrument: Instrument, constants: Mapping[str, float]
+    sheet: Sheet, instrument: Instrument, constants: Mapping[str, float], given: Mapping[str, Sequence[str]]
 ) -> tuple[Sheet, dict[str, list[str]], dict[str, str], dict[str, float]]:
     """The sheet with columns of readings, the columns' meanings, units of those without, and constants left over.
+
+    `given`: what a person says of columns. Where these or the headers name px, py, pz, nothing is taken off the places seen.
 
     Raises StiffmapError where the sheet lacks a column that the instrument needs.
     """
@@ -83,7 +83,13 @@ def as_readings(
         if index is not None:
             chosen[meaning] = [sheet.header[index]]
             units |= _unit(sheet, index, meaning, instrument)
-    for reading, pattern in instrument.measured.items():
+    said = guess(sheet.header, given)
+    seen = any(c.meaning in SEEN for c in said)
+    for c in said:
+        unit = instrument.units.get(c.meaning.replace("p", "d") if c.meaning in SEEN else c.meaning)
+        if unit and not c.unit and (seen or c.meaning in given):
+            units[c.meaning] = unit
+    for reading, pattern in ({} if seen else instrument.measured).items():
         axis = reading[-1]
         own = _find(sheet, pattern)
         if own is None:
@@ -148,14 +154,10 @@ def _find(sheet: Sheet, pattern: str) -> int | None:
 
 def _named(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> float:
     """mm or rad that one of a column's unit is: its header's, else the instrument's."""
-    text = split_unit(sheet.header[index])[1] or instrument.units.get(meaning, "")
+    own = split_unit(sheet.header[index])[1]
     quantity = "angle" if meaning == "angle" else "length"
-    found = unit_of(text, quantity)
-    if found is None:
-        raise StiffmapError(
-            f"{sheet.file}: column '{sheet.header[index]}': expected a unit of {quantity} ({known(quantity)}); found '{text}'"
-        )
-    return found.factor * (TO_RAD if quantity == "angle" else TO_MM)[found.name]
+    size = sheet.size(index, meaning, quantity, own or instrument.units.get(meaning, ""))
+    return size if quantity == "angle" else 1e3 * size
 
 
 def _unit(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> dict[str, str]:

@@ -12,10 +12,11 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.sheet_units import unit_of
-from stiffmap.experiment.spreadsheet.guess import SEEN, Column, guess, split_unit
-from stiffmap.experiment.spreadsheet.instrument import TO_MM, with_column
-from stiffmap.experiment.spreadsheet.sheet import Sheet
+from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.sheet import Sheet
+from stiffmap.common.units import Unit, unit_of
+from stiffmap.experiment.spreadsheet.guess import SEEN, Column, find_column, guess
+from stiffmap.experiment.spreadsheet.instrument import with_column
 from stiffmap.solve.machine import Machine
 
 NUMBERED = r"(joint|axis|achse|gelenk|theta|q|j|a)[ _.-]?{}"
@@ -43,8 +44,7 @@ class Commanded:
         out = []
         for meaning, (_, unit) in self.columns.items():
             header = self.chosen[meaning][0]
-            scale = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}.get(unit) or TO_MM[unit] / 1e3
-            out.append(scale * self.sheet.numbers(self.sheet.header.index(header)))
+            out.append(Unit(unit).size * self.sheet.numbers(self.sheet.header.index(header)))
         return np.column_stack(out)
 
     def middle(self) -> Floats:
@@ -110,10 +110,7 @@ def _given(chosen: Mapping[str, list[str]], drives: Mapping[str, bool]) -> dict[
 def _find(sheet: Sheet, name: str, number: int, header: str | None) -> int | None:
     names = [split_unit(h)[0].strip().lower() for h in sheet.header]
     if header is not None:
-        exact = [i for i, h in enumerate(sheet.header) if header in (h, split_unit(h)[0])]
-        if not exact:
-            raise StiffmapError(f"--map: no column '{header}'; there are: {', '.join(sheet.header)}")
-        return exact[0]
+        return find_column(header, sheet.header)
     for wanted in (name.lower(), name.split(".")[-1].lower()):
         if wanted in names and wanted not in ("x", "y", "z"):
             return names.index(wanted)
@@ -198,13 +195,9 @@ def _in_mm(
 ) -> tuple[Sheet, dict[str, list[str]]]:
     total = np.zeros(len(sheet.lines))
     for sign, column in parts:
-        unit = unit_of(units.get(column.meaning, column.unit) or units.get("length", ""), "length")
-        if unit is None:
-            raise StiffmapError(
-                f"column '{column.name}' ({column.meaning}) has no unit: write it in the header, as in '{column.name} [mm]', or say "
-                f"--unit {column.meaning}=mm (--unit length=mm: of all lengths)"
-            )
-        total = total + sign * TO_MM[unit.name] * unit.factor * sheet.numbers(column.index)
+        said = units.get(column.meaning, column.unit) or units.get("length", "")
+        size = sheet.size(column.index, column.meaning, "length", said)
+        total = total + sign * 1e3 * size * sheet.numbers(column.index)
     name = f"{meaning} [mm]"
     if name not in sheet.header:
         sheet = with_column(sheet, name, [float(v) for v in total])

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.workbook import sheet_names
+from stiffmap.common.tables.lines import EXCEL
+from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
+from stiffmap.common.tables.workbook import sheet_names
 from stiffmap.experiment.spreadsheet.convert import Imported
-from stiffmap.experiment.spreadsheet.dialogue import Answers, Ask, ask_all, profile_file, remember, remembered
-from stiffmap.experiment.spreadsheet.guess import guess
+from stiffmap.experiment.spreadsheet.dialogue import (
+    Answers,
+    Ask,
+    Unanswered,
+    ask_all,
+    profile_file,
+    remember,
+    remembered,
+)
+from stiffmap.experiment.spreadsheet.guess import guess, has_meaning
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings
 from stiffmap.experiment.spreadsheet.joints import Commanded, as_seen, commanded, turned
-from stiffmap.experiment.spreadsheet.sheet import EXCEL, Sheet, read_sheet
+from stiffmap.experiment.spreadsheet.together import Meant, oriented, together
 
 
 @dataclass(frozen=True)
@@ -23,6 +33,9 @@ class Reading:
     wrote: Instrument | None
     drives: Mapping[str, bool]
     difference: str
+    deflection: bool = True
+    """Loaded less unloaded: rows need a load."""
+    layout: Layout = field(default_factory=lambda: Layout(has_meaning))
 
 
 def read_and_ask(
@@ -34,28 +47,47 @@ def read_and_ask(
     def one(
         name: str | None, ask: Ask | None
     ) -> tuple[Sheet, Imported, Answers, list[str], Commanded | None]:
-        table, answers, told = read_sheet(file, name), given, list[str]()
+        table, answers, told = read_sheet(file, name, how.layout), given, list[str]()
         form = table
         if (kept := remembered(form)) is not None:
             answers = kept.below(given)
             told.append(f"answers of an earlier sheet of this form are used: {profile_file(form)}")
+        meant = together(table, answers.chosen, answers.units, how.deflection)
+        table, told = meant.sheet, told + meant.said
+        answers = replace(answers, chosen=meant.chosen, units=meant.units)
         joints = commanded(table, how.drives, answers.chosen, answers.units)
         if joints is not None:
             joints = as_seen(joints, answers.units, how.difference)
             table, answers = joints.sheet, replace(answers, chosen=joints.chosen)
             told += joints.told
         elif how.wrote is not None:
-            table, meant, assumed, constants = as_readings(table, how.wrote, answers.constants)
+            table, mapped, assumed, constants = as_readings(
+                table, how.wrote, answers.constants, answers.chosen
+            )
             answers = replace(
-                answers, chosen=meant | answers.chosen, units=assumed | answers.units, constants=constants
+                answers, chosen=mapped | answers.chosen, units=assumed | answers.units, constants=constants
             )
         if joints is None or not joints.head:
             table, other = turned(table, guess(table.header, answers.chosen), how.difference)
             answers = replace(answers, chosen=answers.chosen | other)
-        found, final = ask_all(table, answers, ask, joints)
-        if ask is not None and final != answers and joints is None:
-            told.append(f"the answers are remembered for sheets of this form: {remember(form, final)}")
-        return table, found, final, told, joints
+        commands = [c for m in joints.columns for c in joints.chosen[m]] if joints else []
+        beside = Meant(table, dict(answers.chosen), dict(answers.units))
+        oriented(beside, commands, answers.noise)
+        answers = replace(answers, chosen=beside.chosen, units=beside.units)
+        loaded = how.deflection and not (joints and joints.head)
+        try:
+            table, found, final = ask_all(table, answers, ask, joints, beside.head, loaded)
+        except Unanswered as left:
+            said = left.answers.of(form, given)
+            if said != given:
+                raise StiffmapError(
+                    f"{left}; the answers so far are remembered: {remember(form, said)}"
+                ) from None
+            raise
+        if ask is not None and final != answers:
+            said = final.of(form, given)
+            told.append(f"the answers are remembered for sheets of this form: {remember(form, said)}")
+        return table, found, final, [*told, *beside.said, *found.said], joints
 
     names = sheet_names(file) if sheet is None and file.suffix.lower() in EXCEL else [sheet]
     if len(names) == 1:

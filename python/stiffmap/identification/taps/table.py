@@ -11,15 +11,19 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
-from stiffmap.common.pose_tables import cell_number, rows_of
+from stiffmap.common.tables.named import WORD, Known, NamedTable, read_named
 from stiffmap.identification.taps.responses import NOISE, Measured, modes_of
 from stiffmap.solve.machine import Machine
 
-POSE = ("x_mm", "y_mm", "z_mm")
-WAY = ("dir_x", "dir_y", "dir_z")
-ABOVE_ZERO = ("frequency_Hz", "u_Hz", "u_damping_percent", "u_dir")
-NUMBERS = (*POSE, *ABOVE_ZERO, "damping_percent", *WAY)
-WORDS = ("response", "along", "hammer")
+POSE, WAY = ("x", "y", "z"), ("dir_x", "dir_y", "dir_z")
+ABOVE_ZERO = ("frequency", "u", "u_damping", "u_dir")
+NUMBERS = (*POSE, *ABOVE_ZERO, "damping", *WAY)
+UNITS = {
+    **dict.fromkeys(POSE, "m"), "frequency": "Hz", "u": "Hz", "u_damping": "percent", "u_dir": "", "damping": "percent",
+    **dict.fromkeys(WAY, ""), **dict.fromkeys(("response", "along", "hammer"), WORD),
+}  # fmt: skip
+USUAL = {n: f"{n}_{ {'m': 'mm'}.get(u, u) }" for n, u in UNITS.items() if u not in ("", WORD)}
+KNOWN = Known(UNITS, USUAL, {}, blank=True)
 SHARE = 0.01
 """Standard uncertainty of a frequency where none is given, relative."""
 DAMPING_SHARE = 0.2
@@ -86,73 +90,63 @@ def load_taps(path: str | PathLike[str], machine: Machine | None = None) -> TapT
     p, file = Path(path), str(path)
     if not p.is_file():
         raise FileError("no such table of tap tests", file=file)
-    (first, names), *rows = rows_of(p) if p.stat().st_size else [(1, [])]
-    head = [h.strip() for h in names]
-    missing, unknown = [c for c in POSE if c not in head], [c for c in head if c not in NUMBERS + WORDS]
-    if not {"frequency_Hz", "response"} & set(head):
+    t = read_named(p, KNOWN)
+    missing = [USUAL[c] for c in POSE if c not in t.values]
+    if not {"frequency", "response"} & set(t.values):
         missing.append("frequency_Hz or response")
-    if missing or unknown or not rows:
-        what = (
-            f"missing {', '.join(missing)}"
-            if missing
-            else f"unknown {', '.join(unknown)}"
-            if unknown
-            else "no rows"
+    if missing:
+        t.fail(
+            f"expected the columns {', '.join(USUAL.get(c, c) for c in UNITS)}, all but the pose where known; missing "
+            f"{', '.join(missing)}"
         )
-        raise FileError(
-            f"expected the columns {', '.join(NUMBERS + WORDS)}, all but the pose where known; {what}",
-            file=file, line=first,
-        )  # fmt: skip
+    for name in ABOVE_ZERO:
+        if name in t.values:
+            t.check(name, t.values[name] > 0, "a number above zero")
+    if "damping" in t.values:
+        t.check(
+            "damping",
+            (t.values["damping"] >= 0) & (t.values["damping"] < 100),
+            "a number from 0 to below 100",
+        )
     typed: list[dict[str, object]] = []
     measured: list[Measured] = []
-    places = []
-    for line, cells in rows:
-        if len(cells) != len(head):
-            raise FileError(f"expected {len(head)} cells, found {len(cells)}", file=file, line=line)
-        row = dict(zip(head, map(str.strip, cells), strict=True))
-        n = _numbers(row, file, line)
-        at = (1e-3 * n["x_mm"], 1e-3 * n["y_mm"], 1e-3 * n["z_mm"])
-        places.append(at)
-        if row.get("response"):
-            given = [c for c in NUMBERS[3:] if row.get(c)]
-            if given:
-                raise FileError(f"expected no {given[0]} with a response", file=file, line=line, key=given[0])
-            place = p.parent / row["response"]
-            measured.append(Measured(at, place, row.get("along", ""), row.get("hammer", ""), file, line))
+    places = [(float(x), float(y), float(z)) for x, y, z in t.block(POSE)]
+    for i, at in enumerate(places):
+        n, response = _numbers(t, i)
+        along, hammer = (t.values[c][i] if c in t.values else "" for c in ("along", "hammer"))
+        if response:
+            measured.append(Measured(at, p.parent / response, along, hammer, file, t.lines[i]))
         else:
             typed.append(_typed(n, at))
     if machine is not None:
-        _check_unit(np.array(places), machine, file, [line for line, _ in rows])
+        _check_unit(np.array(places), machine, file, t.lines)
     found = typed + modes_of(measured)
     return TapTest(**{f.name: np.array([row[f.name] for row in found], float) for f in fields(TapTest)})
 
 
-def _numbers(row: dict[str, str], file: str, line: int) -> dict[str, float]:
-    """Numbers of a row by column, NaN where a cell that may be empty is."""
-    needed = {*POSE} if row.get("response") else {*POSE, "frequency_Hz"}
-    if any(row.get(c) for c in WAY):
+def _numbers(t: NamedTable, i: int) -> tuple[dict[str, float], str]:
+    """Numbers of a row by column, NaN where a cell that may be empty is, and the file of its response."""
+    n = {c: float(t.values[c][i]) if c in t.values else np.nan for c in NUMBERS}
+    response = str(t.values["response"][i]) if "response" in t.values else ""
+    needed = {*POSE} if response else {*POSE, "frequency"}
+    if not all(np.isnan(n[c]) for c in WAY):
         needed |= {*WAY}
-    n = {
-        c: cell_number(row.get(c, ""), c, file, line) if c in needed or row.get(c) else np.nan
-        for c in NUMBERS
-    }
-    wrong = [c for c in ABOVE_ZERO if n[c] <= 0]
-    if not 0 <= n["damping_percent"] < 100 and not np.isnan(n["damping_percent"]):
-        wrong.append("damping_percent")
-    if wrong:
-        what = "a number from 0 to below 100" if wrong[0] == "damping_percent" else "a number above zero"
-        raise FileError(f"expected {what}, found {n[wrong[0]]:g}", file=file, line=line, key=wrong[0])
-    return n
+    for c in NUMBERS:
+        if c in needed and np.isnan(n[c]):
+            t.fail("expected a number, found an empty cell", c, i)
+        if response and c not in POSE and not np.isnan(n[c]):
+            t.fail(f"expected no {t.header[c]} with a response", c, i)
+    return n, response
 
 
 def _typed(n: dict[str, float], at: tuple[float, float, float]) -> dict[str, object]:
-    f, way = n["frequency_Hz"], np.array([n[c] for c in WAY])
-    size, ratio = float(np.linalg.norm(way)), n["damping_percent"] / 100 or np.nan
+    f, way = n["frequency"], np.array([n[c] for c in WAY])
+    size, ratio = float(np.linalg.norm(way)), n["damping"] / 100 or np.nan
     shape = size > 0 and not size < NOISE * n["u_dir"]
-    share = n["u_damping_percent"] / 100
+    share = n["u_damping"] / 100
     unknown = np.full(3, np.nan)
     return {
-        "position": at, "frequency": f, "u": SHARE * f if np.isnan(n["u_Hz"]) else n["u_Hz"], "ratio": ratio,
+        "position": at, "frequency": f, "u": SHARE * f if np.isnan(n["u"]) else n["u"], "ratio": ratio,
         "direction": way / size if shape else unknown,
         "u_ratio": DAMPING_SHARE * ratio if np.isnan(share) else share,
         "flexibility": unknown, "u_flexibility": unknown, "hammer": unknown, "lever": np.zeros(3),
@@ -175,7 +169,7 @@ def _check_unit(position: Floats, machine: Machine, file: str, lines: list[int])
             )
             raise FileError(
                 f"expected a pose in mm near the workspace ({box}); found {x:g}, {y:g}, {z:g}, which are {unit}",
-                file=file, line=lines[i], key=", ".join(POSE),
+                file=file, line=lines[i], key="x_mm, y_mm, z_mm",
             )  # fmt: skip
 
 

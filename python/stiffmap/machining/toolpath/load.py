@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import re
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite, nan, pi
 from os import PathLike
@@ -14,6 +12,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import number_in
+from stiffmap.common.tables.named import Known, read_named
 from stiffmap.machining.toolpath.gcode.load import lines_of, load_gcode
 from stiffmap.machining.toolpath.outlines import outline, outline_names
 from stiffmap.machining.toolpath.path import Toolpath, path_of
@@ -60,88 +59,46 @@ def load_path(
     raise FileError(f"unknown kind of path {suffix!r}; known: {known}", file=str(path))
 
 
-LENGTHS = {"mm": 1e-3, "m": 1.0, "in": 25.4e-3, "inch": 25.4e-3}
-FEEDS = {"mm/min": 1e-3 / 60, "m/min": 1 / 60, "mm/s": 1e-3, "m/s": 1.0, "in/min": 25.4e-3 / 60}
-FILE_FEEDS = {"mm_min": "mm/min", "m_min": "m/min", "mm_s": "mm/s", "m_s": "m/s"}
+COLUMNS = {
+    **dict.fromkeys("xyz", "m"), "feed": "m/s", "spindle": "rad/s", **dict.fromkeys("ijk", ""), "turn": "rad",
+}  # fmt: skip
+USUAL = {**{a: f"{a}_mm" for a in "xyz"}, "feed": "feed_mm_min", "spindle": "spindle_rpm", "turn": "turn_deg"}
 
 
 def read_points(path: Path) -> Toolpath:
-    """Rows x_mm, y_mm, z_mm (or ``x [mm]`` …), and where given feed_mm_min, spindle_rpm, i, j, k (tool axis).
+    """Rows x_mm, y_mm, z_mm (or ``x [mm]`` …), and where given feed_mm_min, spindle_rpm, i, j, k (tool axis), turn_deg.
 
     Raises FileError naming the column or the line.
     """
-    file = str(path)
-    rows = list(csv.reader(r for r in lines_of(path) if not r.lstrip().startswith("#") and r.strip()))
-    if len(rows) < 3:
-        raise FileError("expected a line of names and two or more points", file=file)
-    columns = [_column(n, file) for n in rows[0]]
-    names = [n for n, _ in columns]
-    missing = [a for a in "xyz" if a not in names]
-    if missing:
-        raise FileError(f"missing column {missing[0]}_mm", file=file, line=1)
-    if len(set(names)) < len(names):
-        raise FileError("a column is given twice", file=file, line=1)
-    values = np.full((len(rows) - 1, len(names)), nan)
-    for i, row in enumerate(rows[1:]):
-        if len(row) != len(names):
-            raise FileError(f"expected {len(names)} values, found {len(row)}", file=file, line=i + 2)
-        for k, cell in enumerate(row):
-            values[i, k] = _number(cell, rows[0][k], file, i + 2) * columns[k][1]
-    got = dict(zip(names, values.T, strict=True))
-    feed = got.get("feed", np.full(len(values), nan))
-    if (feed <= 0).any():
-        raise FileError("expected a feed above zero", file=file, line=int(np.argmax(feed <= 0)) + 2)
-    spindle = got.get("spindle", np.full(len(values), nan))
-    if (spindle <= 0).any():
-        raise FileError("the spindle is off in a cut", file=file, line=int(np.argmax(spindle <= 0)) + 2)
-    axes = [a for a in "ijk" if a in got]
+    t = read_named(path, Known(COLUMNS, USUAL, {}))
+    n = len(t.lines)
+    if n < 2:
+        t.fail("expected a line of names and two or more points")
+    if missing := [a for a in "xyz" if a not in t.values]:
+        t.fail(f"missing column {missing[0]}_mm")
+    for name in "xyz":
+        t.check(name, np.abs(t.values[name]) <= 1e9 * t.size[name], "a number of at most 1e9")
+    for name, expected in (
+        ("feed", "a feed above zero"),
+        ("spindle", "a speed above zero: the spindle is off in a cut"),
+    ):
+        if name in t.values:
+            t.check(name, t.values[name] > 0, expected)
+    axes = [a for a in "ijk" if a in t.values]
     if axes and len(axes) < 3:
-        raise FileError("the tool's axis needs the columns i, j and k", file=file, line=1)
-    tool: Floats = np.stack([got[a] for a in "ijk"], axis=1) if axes else np.array([0.0, 0.0, 1.0])
+        t.fail("the tool's axis needs the columns i, j and k")
+    tool: Floats = t.block("ijk") if axes else np.array([0.0, 0.0, 1.0])
     if axes and not (np.linalg.norm(tool, axis=1) > 0).all():
-        where = int(np.argmin(np.linalg.norm(tool, axis=1))) + 2
-        raise FileError("expected a direction of the tool that is not zero", file=file, line=where)
-    points = np.stack([got[a] for a in "xyz"], axis=1)
+        t.fail(
+            "expected a direction of the tool that is not zero",
+            "i",
+            int(np.argmin(np.linalg.norm(tool, axis=1))),
+        )
+    unknown = np.full(n, nan)
     return path_of(
-        points, feed=feed, spindle=spindle, tool=tool, lines=np.arange(2, len(values) + 2), name=path.stem,
-        turn=got.get("turn"),
+        t.block("xyz"), feed=t.values.get("feed", unknown), spindle=t.values.get("spindle", unknown), tool=tool,
+        lines=np.array(t.lines), name=path.stem, turn=t.values.get("turn"),
     )  # fmt: skip
-
-
-def _column(header: str, file: str) -> tuple[str, float]:
-    """Name and SI size of a column: ``x_mm``, ``x [mm]``, ``feed_mm_min``, ``spindle_rpm``, ``i``."""
-    text = header.strip()
-    match = re.fullmatch(r"(\w+?)(?:_(mm_min|m_min|mm_s|m_s|mm|m|in|rpm|deg)|\s*\[\s*([\w/]+)\s*\])?", text)
-    if match is None:
-        raise FileError(
-            f"column {text!r}: expected such as x_mm, feed_mm_min, spindle_rpm, i", file=file, line=1
-        )
-    name, unit = match[1], match[2] or match[3] or ""
-    unit = FILE_FEEDS.get(unit, unit)
-    if name in "ijk" and len(name) == 1 and not unit:
-        return name, 1.0
-    tables = {
-        "x": LENGTHS,
-        "y": LENGTHS,
-        "z": LENGTHS,
-        "feed": FEEDS,
-        "spindle": {"rpm": pi / 30},
-        "turn": {"deg": pi / 180},
-    }
-    if name not in tables:
-        raise FileError(
-            f"unknown column {text!r}; known: x_mm, y_mm, z_mm, feed_mm_min, spindle_rpm, i, j, k, turn_deg",
-            file=file,
-            line=1,
-        )
-    if unit not in tables[name]:
-        what = "the unit is missing" if not unit else f"unknown unit {unit!r}"
-        raise FileError(
-            f"column {text!r}: {what}; expected such as {name}_{'mm' if name in 'xyz' else {'feed': 'mm_min', 'turn': 'deg'}.get(name, 'rpm')}",
-            file=file,
-            line=1,
-        )
-    return name, tables[name][unit]
 
 
 def _number(text: str, column: str, file: str, line: int) -> float:

@@ -7,6 +7,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import typer
 from rich import box
 from rich.console import Console
@@ -69,7 +70,9 @@ def experiment(
     mapped: Annotated[
         list[str] | None,
         typer.Option(
-            "--map", help="What a column is, e.g. dx='Uhr 1 [µm]'; repeats: dx='Uhr 1|Uhr 2'; repeatable."
+            "--map",
+            help="What a column is, by header or number, e.g. dx='Uhr 1 [µm]', x=2; repeats: dx='Uhr 1|Uhr 2'; "
+            "the other sign: fz='-Last [kg]'; repeatable.",
         ),
     ] = None,
     unit: Annotated[
@@ -84,6 +87,13 @@ def experiment(
     ] = None,
     sheet: Annotated[
         str | None, typer.Option(help="Sheet of the workbook. [default: the first that fits]")
+    ] = None,
+    header: Annotated[
+        str | None,
+        typer.Option(help="Names of the columns of a table that has none, e.g. id,x,y,z,dx,dy,dz."),
+    ] = None,
+    which: Annotated[
+        int | None, typer.Option("--table", help="Which of several tables on a sheet, from 1.")
     ] = None,
     record: Annotated[
         list[str] | None,
@@ -110,18 +120,20 @@ def experiment(
 
       [cyan]stiffmap experiment new joints.csv --dh arm_dh.csv --unit joints=deg --noise dx=0.03 -o arm_readings[/cyan]
 
-      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue --noise dx=1 -o asked[/cyan]
+      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue --noise dx=1 --noise dy=1 -o asked[/cyan]
 
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
     from stiffmap.common.fingerprints import file_digest
+    from stiffmap.common.tables.sheet import Layout, read_sheet
+    from stiffmap.experiment.noise.level import against_the_load, contradictions
     from stiffmap.experiment.spreadsheet.dh import LEG, arm, read_dh
     from stiffmap.experiment.spreadsheet.dialogue import Answers
     from stiffmap.experiment.spreadsheet.folder import make_experiment
+    from stiffmap.experiment.spreadsheet.guess import has_meaning
     from stiffmap.experiment.spreadsheet.instrument import load_instrument
     from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, drives_of
     from stiffmap.experiment.spreadsheet.reading import Reading, read_and_ask
-    from stiffmap.experiment.spreadsheet.sheet import read_sheet
     from stiffmap.solve.machine import Machine, load_machine
 
     if action != "new":
@@ -147,7 +159,10 @@ def experiment(
     ask = _prompt if dialogue else None
     rows = None if dh is None else read_dh(read_sheet(dh), given.units)
     drives = {f"{LEG}.{r.name}": r.slides for r in rows} if rows else drives_of(load_machine(str(machine)))
-    read = Reading(wrote, drives, difference)
+    numbered = any(h.strip("+-").isdigit() for many in given.chosen.values() for h in many)
+    names = header.split(",") if header else ()
+    layout = Layout(has_meaning, names, numbered, which)
+    read = Reading(wrote, drives, difference, quantity == "deflection", layout)
     table, found, answers, told, joints = read_and_ask(file, sheet, read, given, ask)
     if rows is not None and joints is None:
         raise StiffmapError(f"{file}: no column commands a joint; the arm has {', '.join(drives)}")
@@ -161,10 +176,14 @@ def experiment(
     made = make_experiment(found, table, output, machine, quantity, answers.noise, title, kept)
     if rows is not None and joints is not None and dh is not None:
         Machine(arm(rows, dh_convention, output.name, f"from {dh.name}", joints.middle())).save(machine)
+    warnings = [line for line in (against_the_load(made), *contradictions(made)) if line]
     if as_json:
         print_json({"folder": str(output), "rows": len(made), "repeats": found.repeats,
-                    "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units})  # fmt: skip
+                    "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units,
+                    "warnings": warnings})  # fmt: skip
         return
+    for line in warnings:
+        Console(highlight=False, soft_wrap=True).print(f"[bold red]WARNING: {escape(line)}[/bold red]")
     for line in (*told, *(f"left out: {text}" for text in table.aside)):
         Console(highlight=False, soft_wrap=True).print(escape(line))
     tell(found, table.header, made, machine, output, joints.columns if joints else {})
@@ -207,7 +226,7 @@ def tell(
         console.print(f"'{escape(header[c.index])}': {where}")
     for name, value in found.constants.items():
         console.print(f"{name} = {value:g} in every row")
-    if commands:
+    if commands or made.seen is not None:  # what was seen is no deviation before the frame is known
         _show_cells(console, found)
     else:
         _show(console, made)
@@ -215,8 +234,16 @@ def tell(
     console.print(
         f"{output}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
     )
-    if not (made.sigma[made.read] > 0).all():
-        console.print("no noise is declared: repeats must show it (five or more), or say --noise dx=…")
+    declared = np.all(~made.read | (made.sigma > 0), axis=0)
+    silent = [
+        c.name
+        for c, known, read in zip(made.channels, declared, made.axis_read, strict=True)
+        if read and not known
+    ]
+    if silent:
+        console.print(
+            f"no noise of {', '.join(silent)} is declared: repeats must show it (five or more), or say --noise {silent[0]}=…"
+        )
     console.print(
         f"next: [cyan]stiffmap residual {escape(machine)} {escape(str(output))}[/cyan]", soft_wrap=True
     )

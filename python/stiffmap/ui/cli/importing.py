@@ -103,8 +103,8 @@ def import_urdf(
 
 def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
     """The arm of a table of Denavit and Hartenberg."""
+    from stiffmap.common.tables.sheet import read_sheet
     from stiffmap.experiment.spreadsheet.dh import arm, read_dh
-    from stiffmap.experiment.spreadsheet.sheet import read_sheet
     from stiffmap.model.urdf import Imported
     from stiffmap.ui.cli.experiment import pairs
 

@@ -16,7 +16,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.outputs.option import written
 from stiffmap.common.plain import plain
-from stiffmap.common.pose_tables import PoseTable, read_pose_table
+from stiffmap.common.tables.poses import PoseTable, read_pose_table
 from stiffmap.solve.free_motions import free_motions
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import re
-
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.value_units import read_value
 from stiffmap.common.yaml_text import Document
 from stiffmap.model.files.report import key_text
-
-_RATE = re.compile(r"^(.*?)/min$")
 
 
 def quantity(value: object, unit: str) -> float:
@@ -26,8 +22,6 @@ def quantity(value: object, unit: str) -> float:
         if not text.endswith("Hz"):
             raise StiffmapError(f"the unit is missing or wrong: expected such as 12 Hz, found {text!r}")
         return read_value(text.removesuffix("Hz").strip(), "1")
-    if match := _RATE.match(text):
-        return read_value(f"{match[1]}/s", unit) / 60
     return read_value(text, unit)
 
 

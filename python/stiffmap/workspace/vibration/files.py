@@ -11,11 +11,14 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, MissingPartError
-from stiffmap.common.pose_tables import cell_number, rows_of
+from stiffmap.common.tables.named import Known, read_named
+from stiffmap.common.units import ACCELERATIONS, LENGTHS, size_of
 from stiffmap.workspace.vibration.poles import Complex
 
-UNITS = {"m/N": 1.0, "um/N": 1e-6, "µm/N": 1e-6, "mm/N": 1e-3}
 KINDS = {"m/N": 0, "um/N": 0, "µm/N": 0, "mm/N": 0, "m/s/N": 1, "m/s2/N": 2, "m/s²/N": 2, "g/N": 2}
+COLUMNS = Known(
+    {"frequency": "Hz", "real": "", "imag": "", "coherence": ""}, {"frequency": "frequency_Hz"}, {}
+)
 HEAD = "frequency_Hz, real_UNIT, imag_UNIT and, where there is one, coherence"
 
 
@@ -56,31 +59,20 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
 
 
 def _csv(path: Path) -> MeasuredResponse:
-    (first, head), *rows = rows_of(path)
-    head = [h.strip() for h in head]
-    unit = head[1].removeprefix("real_") if len(head) > 1 else ""
-    if (
-        unit not in KINDS
-        or head[:3] != ["frequency_Hz", f"real_{unit}", f"imag_{unit}"]
-        or head[3:] not in ([], ["coherence"])
-    ):
-        raise FileError(
-            f"expected the columns {HEAD}, UNIT one of {', '.join(KINDS)}; found {', '.join(head)}",
-            file=str(path), line=first,
-        )  # fmt: skip
-    if len(rows) < 2:
-        raise FileError("expected two rows or more below the header", file=str(path), line=first)
-    for line, row in rows:
-        if len(row) != len(head):
-            raise FileError(f"expected {len(head)} cells; found {len(row)}", file=str(path), line=line)
-    values = np.array(
-        [[cell_number(c, n, str(path), line) for n, c in zip(head, row, strict=True)] for line, row in rows]
-    )
-    f = values[:, 0]
-    coherence = values[:, 3] if len(head) == 4 else np.full(len(f), np.nan)
-    scale = UNITS.get(unit, 9.80665 if unit == "g/N" else 1.0)
-    complex_ = np.asarray(scale * (values[:, 1] + 1j * values[:, 2]), complex)
-    return MeasuredResponse(path.stem, f, _receptance(f, complex_, KINDS[unit]), coherence)
+    t = read_named(path, COLUMNS)
+    unit = t.units.get("real", "")
+    if unit not in KINDS or t.units.get("imag") != unit or "frequency" not in t.values:
+        t.fail(
+            f"expected the columns {HEAD}, UNIT one of {', '.join(KINDS)}; found {', '.join(t.header.values())}"
+        )
+    if len(t.lines) < 2:
+        t.fail("expected two rows or more below the header")
+    f, real, imag = (t.values[n] for n in ("frequency", "real", "imag"))
+    motion = unit.removesuffix("/N")
+    scale = 1.0 if motion == "m/s" else size_of(motion, LENGTHS, ACCELERATIONS)
+    values = np.asarray(scale * (real + 1j * imag), complex)
+    coherence = t.values.get("coherence", np.full(len(f), np.nan))
+    return MeasuredResponse(path.stem, f, _receptance(f, values, KINDS[unit]), coherence)
 
 
 def _receptance(frequency: Floats, values: Complex, derivatives: int) -> Complex:

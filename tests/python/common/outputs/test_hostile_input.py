@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stiffmap.common.cells import BETWEEN, BLOCK, Cells, packed
 from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import number_in
-from stiffmap.experiment.spreadsheet.sheet import read_sheet
+from stiffmap.common.tables.cells import BETWEEN, BLOCK, Cells, packed
+from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.ui.cli import main
 
 DATA = Path(__file__).parents[4] / "tests/data/experiments/C-backlash"

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.experiment.spreadsheet.guess import guess, split_unit
-from stiffmap.experiment.spreadsheet.sheet import number, read_sheet
+from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.sheet import number, read_sheet
+from stiffmap.experiment.spreadsheet.guess import guess
 from stiffmap.ui.cli import main
 
 GERMAN = """# Messprotokoll Fünfgelenk

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.common.sheet_units import unit_of
+from stiffmap.common.units import unit_of
 from stiffmap.ui.cli import main
 
 from .ugly import LATER, STILL, UGLY, Ugly

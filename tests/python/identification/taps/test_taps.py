@@ -104,16 +104,16 @@ def test_statics_and_frequencies_must_say_the_same(arm, static_scale, agree):
     ("text", "message"),
     [
         ("x_mm,y_mm,z_mm\n1,2,3\n", "missing frequency_Hz"),
-        ("x_mm,y_mm,z_mm,frequency_Hz,tone\n1,2,3,4,5\n", "unknown tone"),
+        ("x_mm,y_mm,z_mm,frequency_Hz,tone\n1,2,3,4,5\n", "unknown column 'tone'"),
         (
             "x_mm,y_mm,z_mm,frequency_Hz\n1,2,3,-4\n",
             "line 2.*frequency_Hz: expected a number above zero, found -4",
         ),
         ("x_mm,y_mm,z_mm,frequency_Hz\n1,2,3,low\n", "frequency_Hz: expected a number, found 'low'"),
         ("x_mm,y_mm,z_mm,frequency_Hz,u_Hz\n1,2,3,9,0\n", "u_Hz: expected a number above zero"),
-        ("x_mm,y_mm,z_mm,frequency_Hz\n1,2,3\n", "expected 4 cells, found 3"),
-        ("", "no rows|missing"),
-        ("x_mm,y_mm,z_mm,frequency_rad_s\n1,2,3,60\n", "missing frequency_Hz"),
+        ("x_mm,y_mm,z_mm,frequency_Hz\n1,2,3\n", "expected 4 values, found 3"),
+        ("", "the file is empty"),
+        ("x_mm,y_mm,z_mm,frequency_rad_s\n1,2,3,60\n", "expected a unit such as in frequency_Hz, found rad"),
         ("# by hand\nx_mm,y_mm,z_mm,frequency_Hz\n1,2,3,9\n\n1,2,3,-9\n", "line 5.*found -9"),
     ],
 )

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 import stiffmap as sm
+from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment import load_experiment
 from stiffmap.experiment.spreadsheet.convert import understand, write_folder
-from stiffmap.experiment.spreadsheet.sheet import read_sheet
 from stiffmap.machining.toolpath import load_path, outline_text, sampled
 from stiffmap.model.link.linkfile import load_link
 from stiffmap.model.link.readers import read_field

@@ -16,7 +16,7 @@ from scipy.interpolate import make_interp_spline
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.pose_tables import read_pose_table
+from stiffmap.common.tables.poses import read_pose_table
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
@@ -126,7 +126,7 @@ def _with_force(run: Trajectory, motion: Motion) -> Trajectory:
 def load_motion(file: str | PathLike[str]) -> Motion:
     """A motion of the tool from a CSV or YAML file, or a shipped one by name: ``trim`` (docs/measures.md).
 
-    CSV (`stiffmap.common.pose_tables`): columns ``x [mm]``, ``y [mm]``, ``z [mm]``, perhaps ``fx [N]`` …, which may vary; with ``t [s]`` a
+    CSV (`stiffmap.common.tables.poses`): columns ``x [mm]``, ``y [mm]``, ``z [mm]``, perhaps ``fx [N]`` …, which may vary; with ``t [s]`` a
     motion over time, with ``feed [mm/min]`` a path at this speed, without either a path. YAML: ``line``, ``circle`` or ``points``, ``duration`` or ``speed``, ``force``.
     Raises FileError naming file, line, what was expected and what was found.
     """
@@ -191,8 +191,8 @@ def _described(document: Document, file: str) -> Motion:
 def _table(place: FilePath) -> Motion:
     table = read_pose_table(place)
     file, p, f = table.file, table.position, table.wrench[:, :3]
-    feed = table.columns.get("feed")
-    if "t" not in table.columns:
+    feed = table.values.get("feed")
+    if "t" not in table.values:
         if len(p) < 2:
             raise FileError(f"expected two or more rows, found {len(p)}", file=file)
         if feed is not None and not (feed > 0).all():
@@ -208,7 +208,7 @@ def _table(place: FilePath) -> Motion:
                 "expected one feed for the whole path (or times, a column t [s])", file=file, key="feed"
             )
         return Motion(place.stem, path, None, None, np.inf, force, feed=float(feed[0]))
-    t = table.columns["t"]
+    t = table.values["t"]
     if feed is not None:
         raise FileError("give times or a feed, not both", file=file, line=1)
     if len(t) < LEAST_ROWS:

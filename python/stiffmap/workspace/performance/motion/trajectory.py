@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from stiffmap.common.broadcasting import Floats, real_array
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import StiffmapError
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,24 +142,14 @@ def at_feed(path: Path, feed: float) -> Trajectory:
     )
 
 
-def read_points(file: str | PathLike[str], unit: float = 1e-3) -> Path:
-    """Path through the rows x,y,z (mm) of a CSV file with that header; FileError names row and column."""
-    import csv
+def read_points(file: str | PathLike[str], unit: str = "mm") -> Path:
+    """Path through the rows x, y, z of a table; `unit` of columns that name none. FileError names row and column."""
     from pathlib import Path as FilePath
 
-    try:
-        with FilePath(file).open(newline="", encoding="utf-8") as stream:
-            rows = list(csv.DictReader(stream))
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=str(file)) from error
-    points = []
-    for number, row in enumerate(rows, 2):
-        try:
-            points.append([unit * float(row[c]) for c in ("x", "y", "z")])
-        except (KeyError, TypeError, ValueError):
-            raise FileError(
-                f"expected numbers in the columns x, y, z (mm); found {dict(row)}",
-                file=str(file),
-                line=number,
-            ) from None
-    return through(points)
+    from stiffmap.common.tables.named import Known, read_named
+
+    axes = dict.fromkeys("xyz", "m")
+    table = read_named(FilePath(file), Known(axes, {}, {}, assumed=dict.fromkeys("xyz", unit)))
+    if lost := [a for a in axes if a not in table.values]:
+        table.fail(f"no column {lost[0]}; expected x, y, z ({unit})")
+    return through(table.block("xyz"))

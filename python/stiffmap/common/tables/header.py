@@ -4,24 +4,28 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from stiffmap.common.sheet_units import unit_of
-from stiffmap.experiment.spreadsheet.guess import meaning_of, split_unit
+from stiffmap.common.units import unit_of
 
 Line = tuple[int, list[str]]
 MOST_LINES = 4
 """Lines above the data that may be of the header."""
 
 
-def header_of(above: Sequence[Line], first: Sequence[str]) -> tuple[int, list[str]] | None:
-    """Line number and names of the columns, from the lines above the first row of data; None where none is a header."""
+def header_of(
+    above: Sequence[Line], first: Sequence[str], known: Callable[[str], bool]
+) -> tuple[int, list[str]] | None:
+    """Line number and names of the columns, from the lines above the first row of data; None where none is a header.
+
+    `known`: whether a name without its unit has a meaning of its own, without the group that stands over it.
+    """
     width = _width(first)
     lines = [(n, [_plain(c) for c in cells]) for n, cells in above]
     lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)][-MOST_LINES:]
     units: list[str] = []
-    while lines and not _fits(lines[-1][1], width):
+    while lines and not fits(lines[-1][1], width):
         if _units(lines[-1][1]):
             break
         if len(lines) == 1 and sum(map(bool, lines[-1][1])) >= 1 and not _commented(above, lines[-1][0]):
@@ -34,7 +38,7 @@ def header_of(above: Sequence[Line], first: Sequence[str]) -> tuple[int, list[st
     number, names = lines[-1]
     names = [*names, *[""] * (len(units) - len(names))]
     if len(lines) > 1 and _needs_group(names, lines[-2][1], first):
-        names = _grouped(lines[-2][1], names)
+        names = _grouped(lines[-2][1], names, known)
     if units:
         names = [_with_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
     return number, names
@@ -78,7 +82,7 @@ def _width(cells: Sequence[str]) -> int:
     return sum(bool(c.strip()) for c in cells)
 
 
-def _fits(cells: Sequence[str], width: int) -> bool:
+def fits(cells: Sequence[str], width: int) -> bool:
     """Whether a line names at least half of the columns that hold data."""
     return sum(map(bool, cells)) >= max(2, (width + 1) // 2)
 
@@ -109,7 +113,7 @@ def _needs_group(names: Sequence[str], group: Sequence[str], first: Sequence[str
     return sum(map(bool, group)) >= 2 and bool(twice or nameless)
 
 
-def _grouped(group: Sequence[str], names: Sequence[str]) -> list[str]:
+def _grouped(group: Sequence[str], names: Sequence[str], known: Callable[[str], bool]) -> list[str]:
     """``Force [N]`` over ``x`` is ``Force x [N]``; a group reaches to the next one, as merged cells do."""
     out, current = [], ""
     once = Counter(split_unit(n)[0].lower() for n in names)
@@ -120,7 +124,30 @@ def _grouped(group: Sequence[str], names: Sequence[str]) -> list[str]:
         title, unit = split_unit(current)
         plain, own = split_unit(name)
         text = " ".join(p for p in (title, plain) if p)
-        if once[plain.lower()] == 1 and meaning_of(plain) != "note" and meaning_of(text) == "note":
+        if once[plain.lower()] == 1 and known(plain) and not known(text):
             text = plain  # Force over Fx
         out.append(f"{text} [{own or unit}]" if own or unit else text)
     return out
+
+
+def split_unit(header: str) -> tuple[str, str]:
+    """``Uhr 1 [µm]`` is ``Uhr 1`` in ``µm``; also round brackets, and ``x / mm``, ``x, mm``, ``x in mm``, ``x_mm``,
+    ``x 1/100 mm``."""
+    match = re.match(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$", header)
+    if match:
+        return match[1].strip(), match[2].strip()
+    part = re.match(
+        r"^(.*?\S)(?:\s+in)?[\s,;]+((?:1/|0[.,]0*1\s?)\d*\s?(?:mm|in)?|(?:mm|in)/1\d+)\s*$", header
+    )
+    if part and unit_of(part[2]):
+        return part[1].strip(), part[2].strip()
+    said = re.match(r"^(.*?)(?:\s*[/,;]\s*|\s+in\s+)(\S+)\s*$", header)
+    bare = re.match(r"^(.*\S)[\s_](\S{2,})\s*$", header)
+    newton = re.match(r"^(.*?[^\s,;/])(?:\s+in)?\s(k?N)\s*$", header)
+    if newton:
+        return newton[1].strip(), newton[2]
+    if said and said[1] and unit_of(said[2]) and not unit_of(header):
+        return said[1].strip(), said[2]
+    if bare and bare[2].lower() != "in" and unit_of(bare[2]):
+        return bare[1].strip(), bare[2]
+    return header.strip(), ""

@@ -1,0 +1,1 @@
+"""Tables of text and workbooks: one reader for all commands."""

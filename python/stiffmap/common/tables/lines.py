@@ -1,0 +1,144 @@
+"""Lines of a table, from a text or a workbook: separators, decimal signs and encodings are found out."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from itertools import chain, islice
+from pathlib import Path
+from typing import NamedTuple
+
+from stiffmap.common.errors import FileError
+from stiffmap.common.tables.cells import BETWEEN, BLOCK, Cells, filled
+from stiffmap.common.tables.workbook import workbook_lines
+
+Lines = Callable[[], Iterable[tuple[int, list[str]]]]
+"""Number and cells of each line, from the first one whenever it is called."""
+EXCEL = (".xlsx", ".xlsm")
+COMMENTS = ("#", "%", "//")
+SEPARATORS = ";\t|, "
+BLANKS = re.compile(r"[ \t]+(?![\[(])")
+"""Between cells, but not before a unit in brackets."""
+THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+")
+"""``1.000`` is a thousand in a table with decimal commas."""
+COMMA = re.compile(r"^[ \t]*[+-]?[\d.]*,\d+[ \t]*$", re.M)
+POINT = re.compile(r"^[ \t]*[+-]?\d*\.\d+[ \t]*$", re.M)
+SAMPLE = 2_000
+"""Lines by which the separator is found."""
+NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?\s*")
+
+
+class Source(NamedTuple):
+    """Where lines come from."""
+
+    page: str
+    """Of a workbook; empty for a text."""
+    lines: Lines
+    separator: str
+    """Empty for a workbook."""
+
+
+def lines_of(path: Path, sheet: str | None = None) -> Source:
+    """Lines of a text, or of a workbook's first or named sheet.
+
+    Text: cells are separated by ; tab | , or blanks; UTF-8, UTF-16 and Latin-1 are read. Raises FileError.
+    """
+    return Source(*workbook_lines(path, sheet), "") if path.suffix.lower() in EXCEL else _text(path)
+
+
+def kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
+    """Lines with something in them that are no comments."""
+    return ((n, c) for n, c in lines if filled(c) and not c[0].strip().startswith(COMMENTS))
+
+
+def plain(text: str) -> str:
+    return text.replace("\u00a0", "").replace("−", "-")
+
+
+def with_point(text: str) -> str:
+    return text.replace(".", "").replace(",", ".") if "," in text or THOUSANDS.fullmatch(text) else text
+
+
+def with_points(cells: Cells) -> Cells:
+    """Numbers with decimal commas and points for thousands, as numbers with a decimal point."""
+    blocks = []
+    for block in cells.blocks:
+        text = plain(block)
+        if "." in text:
+            text = BETWEEN.join(with_point(c) for c in text.split(BETWEEN))
+        blocks.append(text.replace(",", "."))
+    return Cells(blocks, len(cells))
+
+
+def decimal_comma(rows: Iterable[list[str]]) -> bool:
+    """Whether numbers have commas and none has a point."""
+    commas = points = False
+    while block := list(islice(rows, BLOCK)):
+        text = "\n".join(chain.from_iterable(block))
+        if text.count("\n") != sum(map(len, block)) - 1:
+            text = "\n".join(c.replace("\n", " ") for row in block for c in row)
+        text = plain(text)
+        commas = commas or ("," in text and COMMA.search(text) is not None)
+        points = points or (
+            "." in text and any(not THOUSANDS.fullmatch(m[0].strip()) for m in POINT.finditer(text))
+        )
+        if points:
+            return False
+    return commas
+
+
+def _text(path: Path) -> Source:
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
+    text = _decoded(raw, path).replace("\r\n", "\n").replace("\r", "\n")
+    del raw
+    lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
+    sample = list(islice(lines_, SAMPLE))
+    best = max(SEPARATORS, key=lambda s: _numbers_between(s, sample))  # the first of equals
+
+    def lines() -> Iterator[tuple[int, list[str]]]:
+        if best == " ":
+            yield from ((n, _cut(line)) for n, line in enumerate(io.StringIO(text), 1))
+            return
+        reader = csv.reader(io.StringIO(text), delimiter=best)
+        try:
+            for row in reader:
+                yield reader.line_num, row
+        except csv.Error as error:
+            raise FileError(f"is no table: {error}", file=str(path), line=reader.line_num) from error
+
+    return Source("", lines, best)
+
+
+def _numbers_between(separator: str, lines: Sequence[str]) -> tuple[int, int]:
+    """How well it parts the cells: quotations that it breaks, negative, and cells that are numbers then."""
+    with suppress(csv.Error):  # the reader of the whole says where
+        rows = map(_cut, lines) if separator == " " else csv.reader(lines, delimiter=separator)
+        cells = list(chain.from_iterable(rows))
+        return -sum('"' in c for c in cells), sum(NUMBER.fullmatch(c) is not None for c in cells)
+    return -len(lines), 0
+
+
+def _cut(line: str) -> list[str]:
+    if len(line) > csv.field_size_limit():
+        raise csv.Error("field larger than field limit")
+    return BLANKS.split(line.strip())
+
+
+def _decoded(raw: bytes, path: Path) -> str:
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        try:
+            return raw.decode("utf-16")
+        except UnicodeDecodeError as error:
+            raise FileError(
+                f"begins as UTF-16 and is none ({error.reason} at byte {error.start})", file=str(path)
+            ) from error
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")  # never fails

@@ -1,0 +1,301 @@
+"""A spreadsheet or text table as it lies in a workshop: cells as text, header found, numbers read."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.number_text import number_in
+from stiffmap.common.tables.cells import Cells, filled, packed, row_numbers
+from stiffmap.common.tables.header import Line, fits, header_of, record_of, split_unit
+from stiffmap.common.tables.lines import (
+    COMMENTS,
+    decimal_comma,
+    kept,
+    lines_of,
+    plain,
+    with_point,
+    with_points,
+)
+from stiffmap.common.units import known, unit_of
+
+NOTHING = {
+    "", *["na", "n/a", "n.a.", "nan", "none", "null", "#n/a", "#nv", "n.m.", "k.a.", "ka", "?", "x", "./.", "*", "out", "off", "leer", "empty", "fehlt", "missing", "entfällt", "ausreißer"],
+    *["#div/0!", "#value!", "#wert!", "#ref!", "#bezug!", "#name?", "#num!", "#zahl!"], "k. a.", "nicht gemessen", "not read", "not measured",
+}  # fmt: skip
+DASHES = re.compile(r"[-–—_.· ]+")
+STATISTICS = re.compile(
+    r"(mean|average|avg|mittel(wert)?e?|mw|ø|sum|summe|total|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|min(imum)?|"
+    r"max(imum)?|median|range|spannweite|rms|durchschnitt|standardabweichung|streuung)\.?:?( .*)?",
+    re.IGNORECASE,
+)
+"""First cell of a row that is no reading but what a spreadsheet computed of them."""
+LONGEST_HEADER, MOST_COLUMNS = 300, 1000
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Header and rows of a table; cells are text, numbers with a decimal point."""
+
+    file: str
+    header: tuple[str, ...]
+    columns: tuple[Cells, ...]
+    lines: Sequence[int]
+    """Line of each row in the file, from 1."""
+    decimal_comma: bool
+    record: tuple[tuple[str, str], ...] = ()
+    """Operator, instrument and the like, from the lines above the table."""
+    aside: tuple[str, ...] = ()
+    """What was left out: rows of means, remarks below the table."""
+    _read: dict[int, Floats] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    @property
+    def rows(self) -> Iterator[tuple[str, ...]]:
+        """The rows, one by one."""
+        return zip(*self.columns, strict=True)
+
+    def numbers(self, column: int) -> Floats:
+        """A column; NaN where nothing was read. FileError names the line of what is no number."""
+        if column not in self._read:
+            cells = with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
+            self._read[column] = cells.numbers(lambda cell, row: self._number(cell, column, self.lines[row]))
+        return self._read[column]
+
+    def size(self, column: int, meaning: str, quantity: str, said: str = "") -> float:
+        """SI size of a column's unit: `said`, else that of its header. StiffmapError names the column and the way to say it."""
+        name, own = split_unit(self.header[column])
+        unit = unit_of(said or own, quantity)
+        if unit is None:
+            usual = "mm" if quantity == "length" else "deg"
+            raise StiffmapError(
+                f"{self.file}: column '{self.header[column]}' ({meaning}) has no unit of {quantity}s ({known(quantity)}): write it in "
+                f"the header, as in '{name} [{usual}]', or say --unit {meaning}={usual} (--unit {quantity}={usual}: of all {quantity}s)"
+            )
+        return unit.size
+
+    def _number(self, cell: str, column: int, line: int) -> float:
+        value = number(cell, False)
+        if value is None:
+            raise FileError(
+                f"column '{self.header[column]}': expected a number; found {cell!r} "
+                f"(cell {column_letter(column)}{line})",
+                file=self.file,
+                line=line,
+            )
+        return value
+
+    def is_numeric(self, column: int) -> bool:
+        """Whether all cells of a column are numbers or say that nothing was read."""
+        try:
+            self.numbers(column)
+        except FileError:
+            return False
+        return True
+
+
+def number(cell: str, decimal_comma: bool) -> float | None:
+    """The number in a cell; NaN for nothing, None for text."""
+    text = plain(cell.strip())
+    if text.lower() in NOTHING or DASHES.fullmatch(text):
+        return math.nan
+    if decimal_comma:
+        text = with_point(text)
+    try:
+        value = number_in(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a person says of where a table lies, and what its names may be."""
+
+    known: Callable[[str], bool] = lambda name: False
+    """Whether a name without its unit has a meaning of its own."""
+    header: Sequence[str] = ()
+    """Names of the columns, in place of those that the table has, or has not."""
+    numbered: bool = False
+    """Columns are given by their numbers: a table without a header is read."""
+    table: int | None = None
+    """Which of several tables on a sheet, from 1."""
+
+
+PLAIN = Layout()
+
+
+def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> Sheet:
+    """Cells of an Excel workbook (its first sheet, or the named one) or of a text table.
+
+    Text: separators ; tab | , blanks and decimal points or commas are found out, UTF-8, UTF-16 and Latin-1 are read.
+    Comment lines are skipped; the header is the line before the first row of mostly numbers. Raises FileError, also where
+    several tables are on a sheet and `layout` does not say which.
+    """
+    page, lines, _ = lines_of(path, sheet)
+    comma = decimal_comma(c for _, c in kept(lines()))
+    if layout.table is not None:
+        chosen = _one_table(lines(), comma, layout, str(path))
+        lines = lambda: chosen  # noqa: E731
+    above: list[Line] = []
+    rows = iter(lines())
+    first = next((row for row in _above(rows, comma, above)), None)
+    found = None if first is None else header_of(above, first[1], layout.known)
+    if first is not None and (layout.header or (found is None and layout.numbered)):
+        found = first[0], _names(first[1], layout.header, str(path), first[0])
+    if first is None or found is None:
+        way = (
+            "; if the table has none, name its columns: --header id,x,y,z,dx,dy,dz (nothing between two commas for a column "
+            "that is not used), or by their numbers, as in --map x=2"
+        )
+        raise FileError(
+            f"no header line with rows of numbers below it was found{way if first else ''}", file=str(path)
+        )
+    number_, header = found
+    endless = next((c for c in header if len(c) > LONGEST_HEADER), None)
+    if endless is not None or len(header) > MOST_COLUMNS:
+        what = f"{len(header)} columns" if endless is None else f"one of {len(endless)} characters"
+        raise FileError(
+            f"expected a header of at most {MOST_COLUMNS} columns of {LONGEST_HEADER} characters each; found {what}",
+            file=str(path),
+            line=number_,
+        )
+    width = max(i for i, c in enumerate(header) if c) + 1
+    names = [h or f"column {i + 1}" for i, h in enumerate(header[:width])]
+    twice = sorted(h for h, n in Counter(names).items() if n > 1)
+    if twice:
+        raise FileError(f"column '{twice[0]}' occurs twice", file=str(path), line=number_)
+    said = [*header, *(c.strip() for _, cells in above for c in cells)]
+    numbered, aside = row_numbers(), list[str]()
+    data = _data(chain([first], kept(rows)), header, said, comma, aside, layout, str(path))
+    columns = packed(_even(data, width, numbered), width)
+    file = f"{path}, sheet '{page}'" if page else str(path)
+    return Sheet(file, tuple(names), columns, numbered, comma, record_of(above), tuple(aside))
+
+
+def _names(first: Sequence[str], given: Sequence[str], file: str, line: int) -> list[str]:
+    """Names of columns that a person says, or their numbers."""
+    if len(given) > len(first):
+        raise FileError(
+            f"--header: expected at most {len(first)} names, one for each column; found {len(given)}",
+            file=file,
+            line=line,
+        )
+    names = [*given, *[""] * (len(first) - len(given))]
+    return [n.strip() or f"column {i}" for i, n in enumerate(names, 1)]
+
+
+def _begins_table(
+    cells: Sequence[str], names: Sequence[str], width: int, comma: bool, layout: Layout
+) -> bool:
+    """Whether a line within a table is the header of another one: it has a known name that is none of this one's."""
+    here = [c.strip() for c in cells if c.strip()]
+    known = [c for c in here if layout.known(split_unit(c)[0])]
+    return (
+        fits(cells, width)
+        and len(known) >= 2
+        and not set(known) <= set(names)
+        and not any(_finite(c, comma) for c in cells)
+    )
+
+
+def _one_table(lines: Iterable[Line], comma: bool, layout: Layout, file: str) -> list[Line]:
+    """Lines of one of the tables of a sheet; a table begins with its header."""
+    tables: list[list[Line]] = [[]]
+    names: list[str] = []
+    width = 0
+    for n, cells in kept(lines):
+        data = _is_data(cells, comma)
+        if width and not data and _begins_table(cells, names, width, comma, layout):
+            tables.append([])
+            names, width = [], 0
+        if data:
+            width = len(cells)
+        else:
+            names += map(str.strip, cells)
+        tables[-1].append((n, cells))
+    assert layout.table is not None
+    if not 1 <= layout.table <= len(tables):
+        raise FileError(
+            f"--table: expected a number from 1 to {len(tables)}; found {layout.table}", file=file
+        )
+    return tables[layout.table - 1]
+
+
+def _above(rows: Iterator[Line], comma: bool, above: list[Line]) -> Iterator[Line]:
+    """The rows of data; `above` gathers the last lines before the first one."""
+    for n, cells in rows:
+        if not filled(cells):
+            continue
+        data = _is_data(cells, comma)
+        if data and not cells[0].strip().startswith(COMMENTS):
+            yield n, cells
+        elif not data:
+            above.append((n, cells))
+            del above[:-8]
+
+
+def _data(
+    rows: Iterable[Line],
+    header: Sequence[str],
+    names: Sequence[str],
+    comma: bool,
+    aside: list[str],
+    layout: Layout,
+    file: str,
+) -> Iterator[Line]:
+    """Rows of readings: without rows of means, headers that are repeated and remarks, of which `aside` says so.
+
+    `names`: all that stands above the rows.
+    """
+    for n, cells in rows:
+        first = next(c.strip() for c in cells if c.strip())
+        if STATISTICS.fullmatch(first) and number(first, comma) is None:
+            aside.append(f"row {n}, '{first}', is no reading")
+        elif not any(_finite(c, comma) for c in cells):
+            if _begins_table(cells, names, len(header), comma, layout):
+                raise FileError(
+                    "another table begins here: say --table 1 for the one above, --table 2 for this one",
+                    file=file,
+                    line=n,
+                )
+            again = [c.strip() for c in cells[:2]] == list(header[:2])
+            aside.append(f"row {n} {'repeats the header' if again else f'is a remark: {first[:40]}'}")
+        else:
+            yield n, cells
+
+
+def _finite(cell: str, comma: bool) -> bool:
+    value = number(cell, comma)
+    return value is not None and math.isfinite(value)
+
+
+def column_letter(index: int) -> str:
+    """``A`` for 0, ``AB`` for 27, as spreadsheets name columns."""
+    name = ""
+    index += 1
+    while index:
+        index, rest = divmod(index - 1, 26)
+        name = chr(65 + rest) + name
+    return name
+
+
+def _even(rows: Iterable[tuple[int, list[str]]], width: int, numbers: Any) -> Iterator[list[str]]:
+    """Rows as long as the header; `numbers` gathers those of their lines."""
+    for n, cells in rows:
+        numbers.append(n)
+        yield cells if len(cells) == width else [*cells, *[""] * width][:width]
+
+
+def _is_data(cells: list[str], comma: bool) -> bool:
+    """Whether at least half of the cells that are filled are numbers, two of them or more."""
+    filled = [c for c in cells if c.strip()]
+    numeric = [c for c in filled if (v := number(c, comma)) is not None and math.isfinite(v)]
+    return len(numeric) >= 2 and 2 * len(numeric) >= len(filled)

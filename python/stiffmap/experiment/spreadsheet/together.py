@@ -1,0 +1,276 @@
+"""Columns that mean something only together: a load and its direction, a gauge before and after, angles next to a position,
+names of targets, and headers with a sign."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from stiffmap.common.errors import FileError
+from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.sheet import Sheet, column_letter
+from stiffmap.common.units import Unit, unit_of
+from stiffmap.experiment.spreadsheet.guess import READINGS, find_column, guess, guessed
+from stiffmap.experiment.spreadsheet.instrument import with_column
+
+LOAD = re.compile(
+    r"(applied |test |hanging |hung )?(load|force|mass|weight|payload|last|prüflast|kraft|prüfkraft|masse|gewicht|belastung|"
+    r"zuladung|anhängelast|charge|f|m|p)( hung| applied)?",
+    re.IGNORECASE,
+)
+HUNG = re.compile(r"hung|hanging|\bmass|masse\b|weight\b|gewicht\b|anhängelast|angehängt", re.IGNORECASE)
+WEIGHS = re.compile(r"load|last|mass|weight|gewicht|kraft|force|charge|^m$", re.IGNORECASE)
+DIRECTION = re.compile(
+    r"(load|force|last|kraft)?[ _-]?(direction|dir\.?|richtung|axis|achse)( of (the )?(load|force))?|"
+    r"richtung der (last|kraft)",
+    re.IGNORECASE,
+)
+WAY = re.compile(r"([+-]?)\s*([xyz])|([xyz])\s*([+-])", re.IGNORECASE)
+BEFORE = r"unloaded|no[ -]load|without load|before|unbelastet|ohne last|vorher|leer|entlastet|initial|zero"
+AFTER = r"loaded|with load|under load|after|belastet|mit last|unter last|nachher|final"
+STATES = {"before": re.compile(rf"\b({BEFORE})\b", re.I), "after": re.compile(rf"\b({AFTER})\b", re.I)}
+TARGET = re.compile(
+    r"(target|reflector|reflektor|smr|srm|nest|tooling ball|ball|sphere|kugel|marker|marke|prism|prisma|zielmarke|ziel|zielpunkt)"
+    r"[ _.-]?(id|name|no\.?|nr\.?|number|nummer)?",
+    re.IGNORECASE,
+)
+POINT = re.compile(
+    r"(mess)?(point|punkt|stelle|position|name|id)[ _.-]?(id|name|no\.?|nr\.?)?", re.IGNORECASE
+)
+ANGLE = r"(tcp|pos|ist|soll|nominal|cmd|orientation|ori|rot)?[ _.-]?{}"
+
+
+@dataclass
+class Meant:
+    """A sheet with the columns that were made of others, and what they mean."""
+
+    sheet: Sheet
+    chosen: dict[str, list[str]]
+    units: dict[str, str]
+    said: list[str] = field(default_factory=list)
+    """What the reader must know, in words."""
+    head: dict[str, Any] = field(default_factory=dict)
+    """Further keys of experiment.yaml."""
+
+    def add(self, name: str, values: np.ndarray[Any, Any], meaning: str) -> None:
+        """A column more, the only one of its meaning."""
+        if name not in self.sheet.header:
+            self.sheet = with_column(self.sheet, name, [float(v) for v in values])
+        self.chosen[meaning] = [name]
+
+
+def together(
+    sheet: Sheet, chosen: Mapping[str, Sequence[str]], units: Mapping[str, str], deflection: bool
+) -> Meant:
+    """Signs in `chosen`, gauges before and after a load, loads with their direction. Raises StiffmapError."""
+    m = Meant(sheet, {k: list(v) for k, v in chosen.items()}, dict(units))
+    _signs(m)
+    if deflection:
+        _differences(m)
+    _directions(m)
+    if not any(re.fullmatch("[fm][xyz]", c.meaning) for c in guess(m.sheet.header, m.chosen)):
+        _hung(m)
+    return m
+
+
+def oriented(m: Meant, commands: Sequence[str], noise: Mapping[str, float]) -> None:
+    """KUKA's A B C next to X Y Z, and names of targets; `commands`: headers of commanded joints."""
+    _abc(m, noise)
+    _targets(m, commands)
+
+
+def _signs(m: Meant) -> None:
+    """``fz=-Last [kg]``: the column with the other sign; ``+``: as it is, whatever its unit would say."""
+    for meaning, headers in m.chosen.items():
+        for k, wanted in enumerate(headers):
+            if wanted[:1] not in ("+", "-", "−") or wanted in m.sheet.header:
+                continue
+            index = find_column(wanted[1:].strip(), m.sheet.header)
+            name = f"{wanted[0].replace('−', '-')}{m.sheet.header[index]}"
+            values = m.sheet.numbers(index)
+            if name not in m.sheet.header:
+                m.sheet = with_column(m.sheet, name, [float(-v if name[0] == "-" else v) for v in values])
+            headers[k] = name
+            m.said.append(f"{meaning} is {name[0]}'{m.sheet.header[index]}'")
+
+
+def _stateless(header: str) -> tuple[str, str]:
+    """What a header names without the word for its state, and that state."""
+    name = split_unit(header)[0]
+    for state, words in STATES.items():
+        if words.search(name):
+            return re.sub(r"[\s_()-]+", " ", words.sub(" ", name)).strip().lower(), state
+    return name.lower(), ""
+
+
+def _differences(m: Meant) -> None:
+    """A gauge's reading with the load less that without it."""
+    header = [h.replace("_", " ") for h in m.sheet.header]
+    states = [_stateless(h) for h in header]
+    for i, (name, state) in enumerate(states):
+        if state == "before" and not {(name, "after"), (name, "")} & set(states):
+            m.said.append(
+                f"'{m.sheet.header[i]}' is in no reading; if it was read without the load, call the other one the same but 'loaded'"
+            )
+        if state == "before" or (name, "before") not in states or not m.sheet.is_numeric(i):
+            continue
+        j = states.index((name, "before"))
+        mapped = next(
+            (k for k, v in m.chosen.items() if any(find_column(h, m.sheet.header) == i for h in v)), ""
+        )
+        meaning = mapped or guessed(name)
+        meaning = f"d{meaning}" if meaning in ("x", "y", "z") and not mapped else meaning
+        after, before = m.sheet.header[i], m.sheet.header[j]
+        if meaning not in READINGS:
+            continue
+        units = [split_unit(h)[1] for h in (after, before)]
+        unit = m.units.get(meaning) or units[0] or units[1]
+        sizes = [unit_of(u or unit) for u in units]
+        if None in sizes or not unit:
+            scale = 1.0
+        else:
+            assert sizes[0] is not None and sizes[1] is not None
+            scale = sizes[1].size / sizes[0].size
+        values = m.sheet.numbers(i) - scale * m.sheet.numbers(j)
+        m.add(
+            f"{split_unit(after)[0]} less {split_unit(before)[0]}" + (f" [{unit}]" if unit else ""),
+            values,
+            meaning,
+        )
+        m.said.append(f"{meaning} is '{after}' less '{before}'")
+
+
+def _way(cell: str) -> tuple[str, float] | None:
+    match = WAY.fullmatch(cell.strip().replace("−", "-"))
+    if match is None:
+        return None
+    return (match[2] or match[3]).lower(), -1.0 if "-" in (match[1] or "", match[4] or "") else 1.0
+
+
+def _directions(m: Meant) -> None:
+    """Components of a load whose size and direction stand in columns of their own."""
+    names = [split_unit(h)[0].strip() for h in m.sheet.header]
+    at = [i for i, n in enumerate(names) if DIRECTION.fullmatch(n) and any(map(_way, m.sheet.columns[i]))]
+    loads = [
+        i
+        for i, n in enumerate(names)
+        if LOAD.fullmatch(n) and i not in at and unit_of(split_unit(m.sheet.header[i])[1] or "N", "force")
+    ]
+    mapped = {find_column(v[0], m.sheet.header): k for k, v in m.chosen.items() if re.fullmatch("f[xyz]", k)}
+    loads = [i for i in loads if i in mapped] or loads or [i for i in mapped if i < len(names)]
+    if len(at) != 1 or len(loads) != 1 or len(mapped) > 1:
+        return
+    way, load = at[0], loads[0]
+    sizes = m.sheet.numbers(load)
+    parts = np.zeros((len(sizes), 3))
+    for row, (cell, size) in enumerate(zip(m.sheet.columns[way], sizes, strict=True)):
+        found = _way(cell)
+        if found is not None:
+            parts[row, "xyz".index(found[0])] = found[1] * size
+        elif size and not np.isnan(size):
+            raise FileError(
+                f"column '{m.sheet.header[way]}': expected the direction of the load, as +x, -Z or y; found {cell.strip()!r} "
+                f"(cell {column_letter(way)}{m.sheet.lines[row]})",
+                file=m.sheet.file, line=m.sheet.lines[row],
+            )  # fmt: skip
+    unit = split_unit(m.sheet.header[load])[1] or m.units.get(
+        mapped.get(load, "force"), m.units.get("force", "")
+    )
+    for axis, values in zip("xyz", parts.T, strict=True):
+        m.chosen.pop(f"f{axis}", None)
+        if values.any():
+            m.add(f"+{names[load]} along {axis}" + (f" [{unit}]" if unit else ""), values, f"f{axis}")
+            m.units.pop(f"f{axis}", None)
+    if not parts.any():
+        m.add(f"+{names[load]} along z" + (f" [{unit}]" if unit else ""), parts[:, 2], "fz")
+    m.said.append(f"the load is '{m.sheet.header[load]}' along '{m.sheet.header[way]}'")
+
+
+def _hung(m: Meant) -> None:
+    """A mass that no column gives a direction hangs."""
+    for i, header in enumerate(m.sheet.header):
+        name, unit = split_unit(header)
+        found = unit_of(unit, "force") if unit else None
+        if (
+            found is not None
+            and (found.mass or HUNG.search(name))
+            and WEIGHS.search(name)
+            and m.sheet.is_numeric(i)
+        ):
+            m.chosen.setdefault("fz", [header])
+            return
+
+
+def _abc(m: Meant, noise: Mapping[str, float]) -> None:
+    """Euler angles A B C (about z, the new y, the new x) where they stand with X Y Z."""
+    names = [split_unit(h)[0].strip().lower() for h in m.sheet.header]
+    at = [next((i for i, n in enumerate(names) if re.fullmatch(ANGLE.format(a), n)), None) for a in "abc"]
+    taken = {find_column(h, m.sheet.header) for v in m.chosen.values() for h in v}
+    meanings = {c.meaning for c in guess(m.sheet.header, m.chosen)}
+    columns = [i for i in at if i is not None and i not in taken and m.sheet.is_numeric(i)]
+    seen = {"px", "py", "pz"} <= meanings
+    units = [split_unit(m.sheet.header[i])[1] for i in columns]
+    if any(u and unit_of(u, "angle") is None for u in units):
+        return  # gauges A, B and C
+    if len(columns) < 3 or not (seen or {"x", "y", "z"} <= meanings):
+        return
+    shown = ", ".join(f"'{m.sheet.header[i]}'" for i in columns)
+    if seen and not {"rx", "ry", "rz"} <= set(noise):
+        m.said.append(f"{shown} are not used; as the orientation seen they need --noise rx=… ry=… rz=…")
+        return
+    for i, meaning in zip(
+        columns, ("prx", "pry", "prz") if seen else ("euler1", "euler2", "euler3"), strict=True
+    ):
+        m.chosen[meaning] = [m.sheet.header[i]]
+        if not split_unit(m.sheet.header[i])[1]:
+            m.units.setdefault(meaning, m.units.get("angle", "deg"))
+    m.head |= {"target_orientation": "ZYX"} if seen else {"orientation": {"against": "base", "euler": "ZYX"}}
+    m.said.append(
+        f"{shown} are the orientation: turns about z, the new y, the new x (KUKA's A, B, C; degrees where no unit is given)"
+    )
+
+
+def _targets(m: Meant, commands: Sequence[str]) -> None:
+    """A column of names of reflectors; also one of points that are read at every pose of the joints."""
+    if "target" in m.chosen:
+        return
+    taken = {find_column(h, m.sheet.header) for v in m.chosen.values() for h in v}
+    joints = [list(m.sheet.columns[m.sheet.header.index(h)]) for h in commands]
+    poses = list(zip(*joints, strict=True)) if joints else []
+    for i, header in enumerate(m.sheet.header):
+        name = split_unit(header)[0].strip()
+        sure = TARGET.fullmatch(name) is not None
+        if i in taken or not (sure or (poses and POINT.fullmatch(name))):
+            continue
+        cells = list(m.sheet.columns[i])
+        words = {c for c in cells if c}
+        many = 1 < len(words) < len(cells) and len(words) * 2 <= len(cells) + 1
+        plain = not m.sheet.is_numeric(i) or all(re.fullmatch(r"\d+", w) for w in words)
+        if not sure:  # names, each once at every pose
+            each_pose = len(set(zip(poses, cells, strict=True))) == len(poses) > len(set(poses))
+            sure = each_pose and all(re.search(r"[^\W\d]", w) for w in words)
+        if many and plain and sure:
+            m.chosen["target"] = [header]
+            m.said.append(
+                f"'{header}' names the target that was read: {', '.join(sorted(words)[:6])}; --map note='{header}' where it does not"
+            )
+            return
+
+
+def weight(sheet: Sheet, index: int, explicit: bool, meaning: str, unit: Unit) -> tuple[float, str]:
+    """Sign of a load along an axis, and what to say of it: a mass, and what is called a weight, pulls down."""
+    values, header = sheet.numbers(index), sheet.header[index]
+    if not (unit.mass or HUNG.search(split_unit(header)[0])):
+        return 1.0, ""
+    if explicit or meaning[0] != "f" or np.nanmin(values, initial=0.0) < 0:
+        return 1.0, ""
+    sign = -1.0 if meaning == "fz" else 1.0
+    way = f"{'-' if sign < 0 else '+'}{meaning[1]}"
+    other = f'--map "{meaning}={"+" if sign < 0 else "-"}{header}"'
+    what = "a mass: its weight pulls" if unit.mass else "a weight: it pulls"
+    said = f"'{header}' is {what} along {way}{' (9.80665 N per kg)' if unit.mass else ''}; {other} says the other way"
+    return sign, said

@@ -1,0 +1,77 @@
+"""One reader for all commands: a table is the same in every spelling, for a path, a pose table and a list of points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stiffmap.common.errors import FileError
+from stiffmap.common.tables.poses import read_pose_table
+from stiffmap.experiment.files.table import read_table
+from stiffmap.machining.toolpath.load import load_path
+from stiffmap.workspace.performance.motion.trajectory import read_points
+
+SPELLINGS = {
+    "commas": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-8"),
+    "underscores": ("x_mm,y_mm,z_mm\n50.5,0,700\n0,-20.25,700\n", "utf-8"),
+    "round brackets and tabs": ("X (mm)\tY (mm)\tZ (mm)\n50.5\t0\t700\n0\t-20.25\t700\n", "utf-8"),
+    "semicolons, decimal commas": ("x [mm];y [mm];z [mm]\n50,5;0;700\n0;-20,25;700\n", "utf-8-sig"),
+    "decimal commas, thousands": ("x [um];y [mm];z [mm]\n50.500;0,0;700\n0;-20,25;700\n", "utf-8"),
+    "blanks": ("x [mm] y [mm]  z [mm]\n50.5 0   700\n0 -20.25 700\n", "utf-8"),
+    "UTF-16": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-16"),
+    "Latin-1 with a remark": ("# gemessen in Köln\nx [µm],y [cm],z [m]\n50500,0,0.7\n0,-2.025,0.7\n", "latin-1"),
+    "inches and thou": (f"x [thou],y [in],z [inch]\n{50.5 / 0.0254},0,{700 / 25.4}\n0,{-20.25 / 25.4},{700 / 25.4}\n", "utf-8"),
+}  # fmt: skip
+POINTS = [[0.0505, 0.0, 0.7], [0.0, -0.02025, 0.7]]
+
+
+@pytest.mark.parametrize("name", SPELLINGS)
+def test_a_table_is_the_same_in_every_spelling_and_command(name: str, tmp_path: Path) -> None:
+    text, encoding = SPELLINGS[name]
+    file = tmp_path / "points.csv"
+    file.write_text(text, encoding=encoding)
+    np.testing.assert_allclose(read_pose_table(file).position, POINTS, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(load_path(file).end[-1], POINTS[-1], rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(read_points(file).position[[0, -1]], POINTS, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x [mm];y [mm];z [mm]\n1;2;3\n1;zwei;3\n", r"line 3: y \[mm\]: expected a number, found 'zwei'"),
+        ("x [kg],y [mm],z [mm]\n1,2,3\n1,2,4\n", r"line 1: x \[kg\]: expected a unit such as in x.*, found kg"),
+        ("# one\n\nx [mm],y [mm],z [mm]\n1,2,3\n\n1,2\n", "line 6: expected 3 values, found 2"),
+        ("x [mm],y [mm],X (mm)\n1,2,3\n1,2,4\n", r"line 1: a column is given twice, as 'x \[mm\]' and 'X \(mm\)'"),
+    ],
+)  # fmt: skip
+def test_every_command_names_line_and_column(text: str, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "points.csv"
+    file.write_text(text, encoding="utf-8")
+    for read in (read_pose_table, load_path, read_points):
+        with pytest.raises(FileError, match=words):
+            read(file)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "id,x,dx\n1,50.5,1\n2,-1.25,\n",
+        "id;x;dx\n1;50,5;1\n2;-1,25;\n",
+        "\ufeffid\tx\tdx\n1\t50.5\t1\n2\t-1.25\t\n",
+    ],
+)
+def test_readings_are_the_same_in_every_spelling(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "data.csv"
+    file.write_text(text, encoding="utf-8")
+    table = read_table(file)
+    np.testing.assert_array_equal(table.numbers("x"), [50.5, -1.25])
+    np.testing.assert_array_equal(table.numbers("dx", blank=True), [1.0, np.nan])
+
+
+def test_a_thousand_in_quotes_is_no_decimal_comma(tmp_path: Path) -> None:
+    file = tmp_path / "data.csv"
+    file.write_text('id,x,dx\n1,"1,000",1\n', encoding="utf-8")
+    with pytest.raises(FileError, match="line 2: column 'x': expected a number; found '1,000'"):
+        read_table(file).numbers("x")
