@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import csv
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -78,9 +77,10 @@ def write(machine: sm.Machine, t: dict[str, Floats], seen: int, folder: Path) ->
 
 
 def lengths(left: Floats) -> str:
-    """Mean and largest length of position errors (n, 3) m, in mm."""
+    """Mean and largest length of position errors (n, 3) m, and rms of one coordinate, in mm."""
     d = 1e3 * np.linalg.norm(left[:, :3], axis=1)
-    return f"{d.mean():.4f} mean, {d.max():.4f} largest"
+    one = float(np.sqrt(np.mean(d**2) / 3.0))
+    return f"{d.mean():.4f} mean, {d.max():.4f} largest, {one:.4f} rms of one coordinate"
 
 
 def unseen(machine: sm.Machine, whole: Experiment, new: Mask) -> Floats:
@@ -116,10 +116,9 @@ def report(data: Path, poses: int, tolerance: float, folder: Path) -> None:
     c = sm.calibrate(declared, whole.rows(~new), tolerances=Tolerances().scaled(tolerance))
     print(*c.lines(), sep="\n")
     write_calibration(c, folder / "calibration")
-    numbers = replace(c.correction, hats=None).of(np.ones(seen, bool)).machine
     file = sm.load_machine(folder / "calibration" / "machine.yaml")
     print(f"\n{new.sum()} poses that no fit saw, length of the position error in mm")
-    for name, machine in (("as declared", declared), ("calibrated numbers", numbers), ("machine file", file)):
+    for name, machine in (("as declared", declared), ("machine file", file)):
         print(f"  {name:20} {lengths(unseen(machine, whole, new))}")
 
 

@@ -30,7 +30,7 @@ INNER = {
     "identification.inference": (
         "constants",
         "kernels",
-        "travel",
+        ("travel", "covariance"),
         "columns",
         "amplitudes",
         "candidates",

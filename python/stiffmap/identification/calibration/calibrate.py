@@ -25,7 +25,7 @@ from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.clock import Clock, Progress
 from stiffmap.identification.inference.amplitudes import GAPS, NOISE
 from stiffmap.identification.inference.constants import ODDS
-from stiffmap.identification.inference.corrected import Corrected, Readings, corrected, readings
+from stiffmap.identification.inference.corrected import Corrected, corrected, readings
 from stiffmap.identification.inference.inference import Inferred, infer
 from stiffmap.identification.inference.machines import CALIBRATED, left_by, stands_out, vouched, written
 from stiffmap.identification.inference.names import EXACT
@@ -91,17 +91,17 @@ def calibrate(
 def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, start: float) -> Calibration:
     e, columns, best = predictor.experiment, found.columns, found.search.best
     base, sigma = found.plan.base, found.noise.sigma
-    listed = stands_out(columns, best.fit)
     exact = best.score - found.search.exact < np.log(ODDS)
     fit = best.fit if best.world == EXACT else found.search.calibrated or best.fit
     clock.say("calibrated machine")
-    given = readings(predictor, found.uncertain, columns, fit, sigma)
-    models: dict[str, tuple[Readings, Corrected]] = {}
+    given = readings(predictor, found.uncertain, columns, fit, sigma, found.suspects)
+    models: dict[str, Corrected] = {}
     if given.drives or (len(given.spread) and not exact):
-        models[CALIBRATED] = (given, corrected(given, ()))
+        models[CALIBRATED] = corrected(given, ())
+    listed = stands_out(columns, best.fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
     made = written(models, base, given, listed, seed, lambda: clock.over)
-    at = models[CALIBRATED][1] if models else None
+    at = models.get(CALIBRATED)
     left = [np.where(listed[:, None], np.nan, left_by(e, sigma, p, ~listed)) for p in (base, made.prediction)]
     before, after = (summary(v, sigma, e.channels) for v in left)
     pairs = swapped(e, left_by(e, sigma, made.prediction, ~listed), sigma, listed)

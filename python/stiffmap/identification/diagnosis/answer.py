@@ -53,14 +53,14 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     e, columns, fit = predictor.experiment, found.columns, found.search.best.fit
     v = judged(columns, found.search)
     base, sigma = found.plan.base, found.noise.sigma
-    listed = stands_out(columns, fit)
     clock.say("corrected machine")
     nameless = [_change(predictor, c) for c, _ in v.refused]
-    given = readings(predictor, found.uncertain, columns, fit, sigma, nameless, v.as_effects)
+    given = readings(predictor, found.uncertain, columns, fit, sigma, found.suspects, nameless, v.as_effects)
     models, v, notes = _models(predictor, found, v, given)
+    listed = stands_out(columns, fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
     made = written(models, base, given, listed, seed, lambda: clock.over or not cross_validate)
-    best = models.get(CORRECTED, (given, None))[1]
+    best = models.get(CORRECTED)
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(predictor, v, best, each, fit)
     others = _alternatives(predictor, found, v, given, best, clock) if effects else []
@@ -120,15 +120,15 @@ def _change(predictor: Predictor, c: Chosen) -> Floats:
 
 def _models(
     predictor: Predictor, found: Inferred, v: Verdict, given: Readings
-) -> tuple[dict[str, tuple[Readings, Corrected]], Verdict, list[str]]:
+) -> tuple[dict[str, Corrected], Verdict, list[str]]:
     """The machines that may be handed over besides the declared one, by name, the corrected one last; the verdict without effects
     that are nothing at the optimum; and what must be said."""
-    out: dict[str, tuple[Readings, Corrected]] = {}
+    out: dict[str, Corrected] = {}
     plain = found.search.calibrated
     if v.named and plain is not None:
-        own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma)
+        own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
         if len(own.spread):
-            out[CALIBRATED] = (own, corrected(own, ()))
+            out[CALIBRATED] = corrected(own, ())
     while v.named or len(given.spread):
         chosen = [n.chosen for n in v.named]
         starts = [Term.of(c.place.candidate, t) for c, t in zip(chosen, terms(chosen), strict=True)]
@@ -138,7 +138,7 @@ def _models(
             return out, v, [f"the effects have no corrected machine: {problem}"]
         nothing = best.nothing
         if nothing is None:
-            out[CORRECTED] = (given, best)
+            out[CORRECTED] = best
             break
         gone = v.named[nothing]
         kept = tuple(n for n in v.named if n is not gone)

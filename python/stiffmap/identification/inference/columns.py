@@ -25,7 +25,7 @@ from stiffmap.identification.candidates.coarseness import coarseness
 from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.constants import LARGEST_ERROR, STANDS_OUT
-from stiffmap.identification.inference.kernels import gaps
+from stiffmap.identification.inference.kernels import Kernel, Points, gaps
 from stiffmap.identification.inference.travel import drives_of
 from stiffmap.identification.numbers.homing import zeros_anew
 from stiffmap.identification.numbers.sensitivity import Sensitivity, sensitivity
@@ -104,6 +104,12 @@ class Columns:
     standard deviation in m or rad."""
     repeats: tuple[float, float]
     """Sum of squares within repeats that were averaged, in noise, and its degrees of freedom."""
+
+    def scale_of(self, kernel: Kernel) -> float:
+        """Variance of a kernel in a part of mean variance one."""
+        points = Points(self.rows, self.channel, self.sigma)
+        size = float(np.sum(self.free * (kernel.between(points, points) @ self.free)))
+        return len(self) / size if size > 0.0 else 0.0
 
     @staticmethod
     def bare(e: Experiment, rows: Integers, channel: Integers, free: Floats, residual: Floats) -> Columns:
@@ -193,8 +199,10 @@ def columns(
     s = zeros_anew(s, e) or s
     numbers = free.T @ (s.columns[index] / noise[:, None])
     seen = np.linalg.norm(numbers, axis=0) > NULL
+    points = Points(rows, channel, noise)
     found = tuple(
-        (kind, name, free.T @ k @ free) for kind, name, k in gaps(predictor.machine, e, rows, channel, noise)
+        (k.kind, k.name, free.T @ k.between(points, points) @ free)
+        for k in gaps(predictor.machine, e, points)
     )
     return Columns(
         e,
@@ -204,7 +212,7 @@ def columns(
         free,
         mean @ q,
         free.T @ raw,
-        free.T @ zeros(e, rows, channel, noise) @ free,
+        _square(free.T @ zeros(e, points)),
         tuple(u for u, k in zip(s.unknowns, seen, strict=True) if k),
         numbers[:, seen],
         tuple((kind, name, k * len(k) / np.trace(k)) for kind, name, k in found if np.trace(k) > NULL),
@@ -225,6 +233,10 @@ def _along_travel(
             size = float(np.linalg.norm(factor) / np.sqrt(len(factor)))
             if size > NULL:
                 yield name, factor / size, 1.0 / size
+
+
+def _square(factor: Floats) -> Floats:
+    return np.asarray(factor @ factor.T)
 
 
 def drawn(pose: Integers, seed: int, most: int) -> Integers:
@@ -261,13 +273,13 @@ def _level(noise: Floats) -> Integers:
     return np.unique(noise, return_inverse=True)[1].reshape(-1)
 
 
-def zeros(e: Experiment, rows: Integers, channel: Integers, noise: Floats) -> Floats:
-    """(N, N) covariance, in noise, of the declared zero that readings of one pose share."""
+def zeros(e: Experiment, points: Points) -> Floats:
+    """(N, k) factor of the covariance, in noise, of the declared zero that readings of one pose share."""
     if e.quantity != "deflection" or not e.zeros.any():
-        return np.zeros((len(rows), len(rows)))
-    size = e.zeros[channel] / noise
-    same = (e.groups[rows][:, None] == e.groups[rows]) & (channel[:, None] == channel)
-    return np.asarray(same * np.outer(size, size))
+        return np.zeros((len(points), 0))
+    label = e.groups[points.rows] * len(e.channels) + points.channel
+    size = e.zeros[points.channel] / points.sigma
+    return np.asarray((label[:, None] == np.unique(label)) * size[:, None])
 
 
 def _places(

@@ -12,22 +12,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import least_squares
 from scipy.stats import norm
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats, Integers, Mask
 from stiffmap.experiment.noise.nuisance import nuisance_columns
+from stiffmap.experiment.noise.outliers import MANY
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import Candidate
-from stiffmap.identification.inference.amplitudes import OFF, Fit
+from stiffmap.identification.inference.amplitudes import NOTHING, OFF, Fit
 from stiffmap.identification.inference.columns import Columns, drawn, possible, zeros
-from stiffmap.identification.inference.constants import DEGREES
-from stiffmap.identification.inference.kernels import gaps
+from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
+from stiffmap.identification.inference.covariance import Covariance, covariance
+from stiffmap.identification.inference.kernels import Points, gaps
 from stiffmap.identification.inference.travel import Drive, Profile, drives_of, knots_of, profiles
 from stiffmap.identification.numbers.homing import zeros_anew
 from stiffmap.identification.numbers.sensitivity import (
@@ -44,8 +46,8 @@ from stiffmap.model.description.tree import joints
 from stiffmap.model.with_errors import Knots, edited
 from stiffmap.solve.machine import Machine
 
-MOST_FITTED = 1500
-"""Readings that a machine is fitted to; of more, whole poses are drawn. Effort only: one (N, N) matrix is factorised."""
+MOST_FITTED = 9000
+"""Readings that a machine is fitted to; of more, whole poses are drawn. Effort only."""
 WIDE = float(norm.isf(0.025))
 """Standard deviations of a 95 % interval to either side."""
 STEP = 1e-3
@@ -102,6 +104,8 @@ class Corrected:
     """(k, k) of all values of the terms, in scales, one term after the other; numbers integrated out."""
     prediction: Floats
     """(n, c) m, rad."""
+    given: Readings
+    """What it was fitted to, with the weights and the columns at the optimum."""
     travel: Floats = field(default_factory=lambda: np.zeros(0))
     """(K,) errors along the drives' travel, along the directions of their roots."""
     profiles: tuple[Profile, ...] = ()
@@ -140,23 +144,29 @@ class Readings:
     """(N,)."""
     channel: Integers
     """(N,)."""
-    noise: Floats
-    """(N,) variance of the noise, in declared ones: κ², over the weights of heavy tails."""
-    rest: Floats
-    """(N, N) covariance of what nobody can name, of common zeros and of effects without a name, in declared noise."""
-    heavy: bool
+    kappa: float
+    """Noise over the declared one."""
+    weights: Floats
+    """(N,) of heavy tails."""
+    rest: Covariance
+    """Of what nobody can name, of common zeros and of effects without a name, and of the noise."""
     sensitivity: Sensitivity
     spread: Floats
     """(p,) standard deviation of each number, in standard uncertainties."""
     drives: tuple[tuple[Drive, Floats], ...] = ()
     """Drives that err along their travel, and the root (k, k) of the covariance at their knots, m² or rad²."""
 
-    def along(self, root: Floats) -> Floats:
-        """(N, K) L⁻¹ of the errors along the travel of all drives."""
+    @cached_property
+    def along(self) -> Floats:
+        """(N, K) errors along the travel of all drives, whitened."""
         own = self.sigma[self.rows, self.channel][:, None]
         parts = [d.columns(self.rows, self.channel) @ r / own for d, r in self.drives]
-        wide = np.hstack([np.zeros((len(own), 0)), *parts])
-        return np.asarray(solve_triangular(root, wide, lower=True, check_finite=False))
+        return self.rest.white(np.hstack([np.zeros((len(own), 0)), *parts]))
+
+    @cached_property
+    def columns(self) -> Floats:
+        """(N, p) change of the readings per prior standard deviation of each number, whitened."""
+        return self.white(self.sensitivity.columns) * self.spread
 
     def knots(self, found: Sequence[Profile]) -> dict[str, Knots]:
         """Axis positioning errors as a machine file has them."""
@@ -166,14 +176,30 @@ class Readings:
     def only(self, keep: Mask) -> Readings:
         """Those of some rows (n,)."""
         own = keep[self.rows]
-        rest = self.rest[np.ix_(own, own)]
-        return replace(self, rows=self.rows[own], channel=self.channel[own], noise=self.noise[own], rest=rest)
+        return replace(
+            self,
+            rows=self.rows[own],
+            channel=self.channel[own],
+            weights=self.weights[own],
+            rest=self.rest.only(own),
+        )
 
-    def white(self, root: Floats, values: Floats) -> Floats:
-        """(N, ...) L⁻¹ of (n, c, ...)."""
+    def weighed(self, weights: Floats) -> Readings:
+        """With other weights (N,)."""
+        more = self.kappa**2 * (1.0 / weights - 1.0 / self.weights)
+        return replace(self, weights=weights, rest=Covariance(self.rest.noise + more, self.rest.factor))
+
+    def white(self, values: Floats) -> Floats:
+        """(N, ...) of (n, c, ...), m or rad: whitened."""
         picked = values[self.rows, self.channel]
-        scaled = picked / self.sigma[self.rows, self.channel].reshape(-1, *(1,) * (picked.ndim - 1))
-        return np.asarray(solve_triangular(root, scaled, lower=True, check_finite=False))
+        return self.rest.white(
+            picked / self.sigma[self.rows, self.channel].reshape(-1, *(1,) * (picked.ndim - 1))
+        )
+
+    def frames(self, prediction: Floats) -> Floats:
+        """(N, q) orthonormal directions, whitened, of frames, tools and zeros where a machine stands that shows `prediction` (n, c)."""
+        found = nuisance_columns(self.predictor.experiment, np.nan_to_num(prediction))
+        return basis(self.white(found)) if found.shape[-1] else np.zeros((len(self.rows), 0))
 
     def predicted(
         self, numbers: Floats, effects: Sequence[AppliedEffect], travel: Mapping[str, Knots] | None = None
@@ -194,6 +220,7 @@ def readings(
     columns: Columns,
     fit: Fit,
     sigma: Floats,
+    suspects: Mask,
     without_name: Sequence[Floats] = (),
     exact: Sequence[Unknown] = (),
 ) -> Readings:
@@ -201,6 +228,8 @@ def readings(
 
     uncertain
         The numbers of the columns, and those that no reading shows.
+    suspects
+        (n,) rows that stand alone before any cause is known.
     without_name
         (n, c) m, rad: what effects of the fit that have no name add to the readings.
     exact
@@ -208,25 +237,23 @@ def readings(
     """
     e = predictor.experiment
     rows, channel = readings_of(e, predictor())
-    some = drawn(e.groups[rows], 0, MOST_FITTED)
-    rows, channel = rows[some], channel[some]
+    kept = drawn(e.groups[rows], 0, MOST_FITTED)
+    rows, channel = rows[kept], channel[kept]
     own = sigma[rows, channel]
-    place = np.full(sigma.shape, -1)
-    place[rows, channel] = np.arange(len(rows))
-    used = place[columns.rows, columns.channel]
-    inside = used >= 0
-    used, free = used[inside], columns.free[inside]
-    amplitude = {p.name: np.exp(t) for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF}
-    rest = zeros(e, rows, channel, own)
-    for _, name, k in gaps(predictor.machine, e, rows, channel, own):
-        if name in amplitude:
-            part = k[np.ix_(used, used)]
-            rest += amplitude[name] * len(columns) / float(np.sum(free * (part @ free))) * k
-    for change in without_name:
-        pattern = np.nan_to_num(change[rows, channel]) / own
-        rest += np.outer(pattern, pattern)
-    weights = np.ones(len(rows))
-    weights[used] = fit.weights[inside]
+    points = Points(rows, channel, own)
+    some = Points(columns.rows, columns.channel, columns.sigma)
+    amplitude = {p.name: float(np.exp(t)) for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF}
+    kernels = [
+        (k, amplitude[k.name] * scale)
+        for k in gaps(predictor.machine, e, some)
+        if k.name in amplitude and (scale := columns.scale_of(k)) > 0.0
+    ]
+    patterns = [np.nan_to_num(change[rows, channel])[:, None] / own[:, None] for change in without_name]
+    weights = np.full(sigma.shape, 1.0)
+    weights[suspects] = NOTHING
+    weights[columns.rows, columns.channel] = fit.weights
+    weights = weights[rows, channel]
+    rest = covariance(points, some, kernels, fit.noise**2 / weights, np.hstack([zeros(e, points), *patterns]))
     size = {k: fit.spread(group) for group, index in columns.groups.items() for k in index}
     known = [(u, size[k]) for k, u in enumerate(columns.unknowns) if u not in exact]
     unknowns = tuple(u for u, s in known if s > 0.0)
@@ -240,9 +267,9 @@ def readings(
         sigma,
         rows,
         channel,
-        fit.noise**2 / weights,
+        fit.noise,
+        weights,
         rest,
-        not np.all(fit.weights == 1.0),
         s,
         np.array([size for _, size in known if size > 0.0]),
         drives,
@@ -263,31 +290,26 @@ def corrected(
     given: Readings, terms: Sequence[Term], start: Corrected | None = None, steps: int = STEPS
 ) -> Corrected:
     """The optimum, from the values of the terms and the declared numbers, or from another optimum."""
-    noise = float(np.min(given.noise))
-    for _ in range(WEIGHINGS if given.heavy and start is None else 1):
-        found = _optimum(given, terms, start, steps)
-        if start is None and _bends(given, found):
+    found = _optimum(given, terms, start, steps)
+    if start is not None:
+        return found
+    for _ in range(WEIGHINGS):
+        if _bends(given, found):
             anew = sensitivity_at(given.predictor, given.sensitivity, found.numbers)
             given = replace(given, sensitivity=anew)
             found = _optimum(given, terms, found, steps)
-        if given.heavy and start is None:
-            root = _root(given)
-            left = given.white(root, np.nan_to_num(given.predictor.experiment.reading - found.prediction))
-            q = _frames(given, root, found.prediction)
-            left = root @ (left - q @ (q.T @ left))
-            weights = (DEGREES + 1.0) / (DEGREES + left**2 / noise)
-            given = replace(given, noise=noise / np.minimum(weights, 1.0))
+        left = given.white(np.nan_to_num(given.predictor.experiment.reading - found.prediction))
+        q = given.frames(found.prediction)
+        noise = (
+            given.rest.noise_part(left - q @ (q.T @ left)) * given.kappa**2 / given.weights / given.rest.noise
+        )
+        far = np.abs(noise) > STANDS_OUT * given.kappa
+        if np.all(given.weights == 1.0) and not 0.0 < far.mean() <= MANY:  # many are no outliers
+            break
+        weights = (DEGREES + 1.0) / (DEGREES + (noise / given.kappa) ** 2)
+        given = given.weighed(np.minimum(weights, 1.0))
+        found = _optimum(given, terms, found, steps)
     return found
-
-
-def _root(given: Readings) -> Floats:
-    return np.asarray(cholesky(given.rest + np.diag(given.noise), lower=True, check_finite=False))
-
-
-def _frames(given: Readings, root: Floats, prediction: Floats) -> Floats:
-    """(N, q) orthonormal directions of frames, tools and zeros where the machine stands."""
-    found = nuisance_columns(given.predictor.experiment, prediction)
-    return basis(given.white(root, found)) if found.shape[-1] else np.zeros((len(given.rows), 0))
 
 
 def _parts(terms: Sequence[Term], x: Floats) -> tuple[Term, ...]:
@@ -297,11 +319,10 @@ def _parts(terms: Sequence[Term], x: Floats) -> tuple[Term, ...]:
 
 
 def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, steps: int) -> Corrected:
-    root, e = _root(given), given.predictor.experiment
+    e = given.predictor.experiment
     terms = tuple(terms) if start is None else start.terms
     k, p = sum(len(t.values) for t in terms), len(given.spread)
-    columns = given.white(root, given.sensitivity.columns) * given.spread
-    along = given.along(root)
+    columns, along = given.columns, given.along
     m = along.shape[1]
     known: dict[bytes, Floats] = {}
 
@@ -317,7 +338,7 @@ def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, st
         return known[key]
 
     def raw(x: Floats) -> Floats:
-        return given.white(root, e.reading - shown(x)) - along @ x[k + p :]
+        return given.white(e.reading - shown(x)) - along @ x[k + p :]
 
     def residual(x: Floats, q: Floats) -> Floats:
         left = raw(x)
@@ -327,7 +348,7 @@ def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, st
 
     def jacobian(x: Floats, q: Floats) -> Floats:
         each = [_change(given, x[: k + p], j, high, shown(x), effects, k) for j in range(k)]
-        whole = -np.column_stack([*(given.white(root, c) for c in each), columns, along])
+        whole = -np.column_stack([*(given.white(c) for c in each), columns, along])
         whole -= q @ (q.T @ whole)
         return np.vstack([whole, np.hstack([np.zeros((p + m, k)), np.eye(p + m)])])
 
@@ -340,7 +361,7 @@ def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, st
     x = np.clip(begin, low + inside, high - inside)
     if not np.isfinite(raw(x)).all():
         raise StiffmapError("the machine has no equilibrium with the effects that were found")
-    q = _frames(given, root, np.nan_to_num(shown(x)))
+    q = given.frames(shown(x))
     for _ in range(FRAMINGS if len(x) else 0):
         x = least_squares(
             lambda x, q=q: residual(x, q),
@@ -353,21 +374,21 @@ def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, st
             max_nfev=steps,
         ).x
         left, before = raw(x), q
-        q = _frames(given, root, np.nan_to_num(shown(x)))
+        q = given.frames(shown(x))
         if np.linalg.norm(before @ (before.T @ left) - q @ (q.T @ left)) < SETTLED:
             break
     j = jacobian(x, q)
-    covariance: Floats = np.asarray(np.linalg.pinv(j.T @ j, rcond=1e-12, hermitian=True))
+    spread: Floats = np.asarray(np.linalg.pinv(j.T @ j, rcond=1e-12, hermitian=True))
     numbers, travel = x[k : k + p] * given.spread, x[k + p :]
-    found = profiles(given.drives, travel, covariance[k + p :, k + p :])
+    found = profiles(given.drives, travel, spread[k + p :, k + p :])
     shows = given.predicted(numbers, effects(x), given.knots(found)) if found else shown(x)
-    return Corrected(_parts(terms, x), numbers, np.asarray(covariance[:k, :k]), shows, travel, found)
+    return Corrected(_parts(terms, x), numbers, np.asarray(spread[:k, :k]), shows, given, travel, found)
 
 
-def columns_of(given: Readings, found: Corrected) -> tuple[Floats, Floats]:
+def columns_of(found: Corrected) -> tuple[Floats, Floats]:
     """(N, k + p + q) change of the readings, in noise, per unit of each effect's value, number and frame at an optimum, and (k + p +
     q,) the prior precision of these."""
-    root = _root(given)
+    given = found.given
     x = np.concatenate([*(t.values for t in found.terms), found.numbers / given.spread])
     k = len(x) - len(given.spread)
     high = np.concatenate([*(t.bounds[1] for t in found.terms), np.full(len(given.spread), np.inf)])
@@ -376,10 +397,9 @@ def columns_of(given: Readings, found: Corrected) -> tuple[Floats, Floats]:
         return [t.effect(t.values) for t in _parts(found.terms, at)]
 
     each = [_change(given, x, j, high, found.prediction, effects, k) for j in range(k)]
-    numbers = given.white(root, given.sensitivity.columns) * given.spread
-    columns = np.hstack([numbers, given.along(root)])
-    frames = _frames(given, root, found.prediction)
-    whole = root @ np.hstack([*(given.white(root, c)[:, None] for c in each), columns, frames])
+    columns = np.hstack([given.columns, given.along])
+    frames = given.frames(found.prediction)
+    whole = given.rest.coloured(np.hstack([*(given.white(c)[:, None] for c in each), columns, frames]))
     return whole, np.concatenate([np.zeros(k), np.ones(columns.shape[1]), np.zeros(frames.shape[1])])
 
 
@@ -404,12 +424,12 @@ def _bends(given: Readings, found: Corrected) -> bool:
     alone = given.predicted(found.numbers, ())
     if not np.isfinite(alone[given.rows, given.channel]).all():
         return False
-    root = _root(given)
-    return bends(lambda v: given.white(root, v), given.sensitivity, found.numbers, alone, 1.0)
+    return bends(given.white, given.sensitivity, found.numbers, alone, 1.0)
 
 
-def machine_of(given: Readings, found: Corrected) -> Machine:
+def machine_of(found: Corrected) -> Machine:
     """The machine that a file has: effects, and numbers that are not of a set-up or of the instrument."""
+    given = found.given
     names = given.sensitivity.unknowns
     pairs = [(u, float(v)) for u, v in zip(names, found.numbers, strict=True) if not u.setup]
     p = given.predictor

@@ -9,7 +9,7 @@ import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.one_thread import on_one_thread
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.level import Noise
 from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.prediction.predict import Predictor
@@ -30,6 +30,8 @@ class Inferred:
 
     plan: Plan
     noise: Noise
+    suspects: Mask
+    """(n,) rows that stand alone before any cause is known."""
     uncertain: tuple[Unknown, ...]
     """All declared numbers that have an uncertainty."""
     columns: Columns
@@ -57,7 +59,7 @@ def infer(
     """The set of effects with the best evidence; `exclude`: kinds of effects and groups of numbers that are known not to be;
     `travel`: whether drives may err along their travel in any smooth way."""
     e, clock = predictor.experiment, clock or Clock()
-    noise, _ = without_suspects(e, plan.base)
+    noise, suspects = without_suspects(e, plan.base)
     kept = np.flatnonzero([v.candidate.kind not in exclude for v in plan.variants])
     if len(kept) < len(plan.variants):
         plan = replace(plan, stack=plan.stack.only(kept))
@@ -75,7 +77,7 @@ def infer(
         return found.rotated(change)
 
     clock.say("all effects at once")
-    return Inferred(plan, noise, uncertain, found, searched(found, predict, lambda: clock.over))
+    return Inferred(plan, noise, suspects, uncertain, found, searched(found, predict, lambda: clock.over))
 
 
 def terms(chosen: Sequence[Chosen]) -> tuple[AppliedEffect, ...]:

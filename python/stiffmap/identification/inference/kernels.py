@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from stiffmap.experiment.experiment import Experiment, Floats, Integers
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.field import free_position, unit
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.solve.machine import Machine
@@ -20,46 +21,100 @@ FEW_DRIVES = 3
 """Drives up to which the place of the tool says what their coordinates do."""
 
 
-def gaps(
-    machine: Machine, e: Experiment, rows: Integers, channel: Integers, sigma: Floats
-) -> Iterator[tuple[str, str, Floats]]:
-    """Kind, name and (N, N) covariance in units of the noise, of any scale, of each gap that the readings can hold."""
-    same = channel[:, None] == channel
-    angle = np.array([c.unit == "rad" for c in e.channels])[channel]
-    per = 1.0 / sigma
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Readings: row, channel and noise (m, rad) of each of N."""
+
+    rows: Integers
+    channel: Integers
+    sigma: Floats
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """A covariance of any scale of readings in units of their noise."""
+
+    kind: str
+    """``field``, ``pose`` or ``time``."""
+    name: str
+    between: Callable[[Points, Points], Floats]
+    """(N, M)."""
+    own: Callable[[Points], Floats]
+    """(N,) variances."""
+    label: Callable[[Points], Integers] | None = None
+    """(N,) number of the block that each reading is in, where it is one within blocks and zero between them."""
+
+
+def gaps(machine: Machine, e: Experiment, points: Points) -> Iterator[Kernel]:
+    """What nobody can name that some readings can hold."""
+    angle = np.array([c.unit == "rad" for c in e.channels])
     load = e.wrench / max(float(np.abs(e.wrench).max(initial=0.0)), 1e-300)
-    carried = load[rows] @ load[rows].T
-    deflects = e.quantity == "deflection"
     for what, here in (("lengths", ~angle), ("angles", angle)):
-        if not here.any():
+        if not here[points.channel].any():
             continue
-        own = same & np.outer(here, here)
         for over, x in _spaces(machine, e):
-            distance = cdist(x[rows], x[rows])
             for length in LENGTHS:
-                k = own * matern(distance / length) * np.outer(per, per)
-                yield "field", f"field of {what} over {over}, {length:g}", k
-                if deflects:
-                    yield "field", f"compliance of {what} over {over}, {length:g}", k * carried
-    yield from shared(e, rows, channel)
+                yield _field(f"field of {what} over {over}, {length:g}", here, x / length, None)
+                if e.quantity == "deflection":
+                    yield _field(f"compliance of {what} over {over}, {length:g}", here, x / length, load)
+    yield from shared(e, points)
     when = e.hours if e.hours is not None else e.order
     if when is not None:
         t, session = _sessions(when, e.runs)
-        apart = np.abs(t[rows][:, None] - t[rows])
-        together = same & (session[rows][:, None] == session[rows])
         for length in SESSIONS:
-            yield "time", f"wander over {length:g} session", together * np.exp(-apart / length)
+            yield _wander(f"wander over {length:g} session", t / length, session)
 
 
-def shared(e: Experiment, rows: Integers, channel: Integers) -> Iterator[tuple[str, str, Floats]]:
+def _field(name: str, here: Mask, x: Floats, load: Floats | None) -> Kernel:
+    """Over places x (n, k) in lengths, of channels `here` (c,); with `load` (n, 6) times load with load."""
+
+    def between(a: Points, b: Points) -> Floats:
+        same = (a.channel[:, None] == b.channel) & here[a.channel][:, None]
+        k = same * matern(cdist(x[a.rows], x[b.rows])) / np.outer(a.sigma, b.sigma)
+        return np.asarray(k if load is None else k * (load[a.rows] @ load[b.rows].T))
+
+    def own(a: Points) -> Floats:
+        carried = 1.0 if load is None else np.sum(load[a.rows] ** 2, axis=1)
+        return np.asarray(here[a.channel] * carried / a.sigma**2)
+
+    return Kernel("field", name, between, own)
+
+
+def _wander(name: str, t: Floats, session: Integers) -> Kernel:
+    """Over times t (n,) in lengths, within sessions (n,)."""
+
+    def between(a: Points, b: Points) -> Floats:
+        together = (a.channel[:, None] == b.channel) & (session[a.rows][:, None] == session[b.rows])
+        return np.asarray(together * np.exp(-np.abs(t[a.rows][:, None] - t[b.rows])))
+
+    return Kernel("time", name, between, lambda a: np.ones(len(a)))
+
+
+def blocks(kind: str, name: str, of: Integers, channels: int) -> Kernel:
+    """Of readings of one channel whose rows have the same number (n,)."""
+
+    def label(a: Points) -> Integers:
+        return np.asarray(of[a.rows] * channels + a.channel)
+
+    def between(a: Points, b: Points) -> Floats:
+        return np.asarray(label(a)[:, None] == label(b), dtype=float)
+
+    return Kernel(kind, name, between, lambda a: np.ones(len(a)), label)
+
+
+def shared(e: Experiment, points: Points) -> Iterator[Kernel]:
     """What readings of one condition and of one pose share; nothing where that is the noise, or the one before, itself."""
-    same = channel[:, None] == channel
-    pairs = len(rows)
-    for name, of in (("condition", e.conditions[rows]), ("pose", e.groups[rows])):
-        own = same & (of[:, None] == of)
-        if own.sum() > pairs:
-            yield "pose", name, own.astype(float)
-            pairs = own.sum()
+    number = len(points)
+    for name, of in (("condition", e.conditions), ("pose", e.groups)):
+        kernel = blocks("pose", name, of, len(e.channels))
+        assert kernel.label is not None
+        found = len(np.unique(kernel.label(points)))
+        if found < number:
+            yield kernel
+            number = found
 
 
 def matern(distance: Floats) -> Floats:

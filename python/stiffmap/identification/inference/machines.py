@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,12 +12,13 @@ from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.folds import folds
+from stiffmap.experiment.noise.outliers import GROSS
 from stiffmap.experiment.noise.unseen import left_unseen
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn
-from stiffmap.identification.inference.constants import STANDS_OUT
+from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
 from stiffmap.identification.inference.corrected import (
     STEPS_OF_A_FOLD,
     Corrected,
@@ -29,6 +30,8 @@ from stiffmap.identification.inference.corrected import (
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine
 
+SET_ASIDE = (DEGREES + 1.0) / (DEGREES + GROSS**2)
+"""Weight below which a reading counts in no measure: that of one beyond `GROSS` times the noise."""
 FOLDS = 10
 """Groups of poses of which the promise is the mean."""
 DECLARED, CALIBRATED, CORRECTED = "declared", "calibrated", "corrected"
@@ -61,7 +64,7 @@ class Written:
 
 
 def written(
-    models: dict[str, tuple[Readings, Corrected]],
+    models: dict[str, Corrected],
     declared: Floats,
     given: Readings,
     listed: Mask,
@@ -72,7 +75,7 @@ def written(
     all others.
 
     models
-        By name, the readings that a machine was fitted to and its optimum.
+        By name.
     declared
         (n, c) prediction of the declared machine.
     listed
@@ -89,9 +92,9 @@ def written(
         test = label == k
         seen, own = ~test & ~listed, test & ~listed
         left[DECLARED][own] = left_unseen(e, sigma, declared, seen, own)[own]
-        for name, (readings, whole) in models.items():
-            part = corrected(readings.only(~test), (), whole, STEPS_OF_A_FOLD)
-            shown = part.prediction + own_zeros(readings, part, own)
+        for name, whole in models.items():
+            part = corrected(whole.given.only(~test), (), whole, STEPS_OF_A_FOLD)
+            shown = part.prediction + own_zeros(part, own)
             left[name][own] = left_unseen(e, sigma, shown, seen, own)[own]
     best = _best(left, last, sigma, e.groups)
     before, after = (summary(left[name], sigma, e.channels) for name in (DECLARED, best))
@@ -99,9 +102,10 @@ def written(
     return _made(best, models, given, declared, held)
 
 
-def own_zeros(given: Readings, found: Corrected, own: Mask) -> Floats:
+def own_zeros(found: Corrected, own: Mask) -> Floats:
     """(n, c) m, rad: what zeros of drives add that a set-up has for itself, by the readings of the rows `own` (n,), whole set-ups:
     no other set-up says anything of them."""
+    given = found.given
     e = given.predictor.experiment
     names = np.array(e.setup)
     if not len(names):
@@ -134,18 +138,18 @@ def _best(left: dict[str, Floats], wanted: str, sigma: Floats, pose: Integers) -
 
 def _made(
     which: str,
-    models: dict[str, tuple[Readings, Corrected]],
+    models: dict[str, Corrected],
     given: Readings,
     declared: Floats,
     held: HeldOut | None,
 ) -> Written:
     if which == DECLARED:
         return Written(which, given.predictor.machine, declared, held)
-    readings, found = models[which]
-    return Written(which, machine_of(readings, found), found.prediction, held, promised(readings, found))
+    found = models[which]
+    return Written(which, machine_of(found), found.prediction, held, promised(found))
 
 
-def promised(given: Readings, found: Corrected) -> tuple[float, float]:
+def promised(found: Corrected) -> tuple[float, float]:
     """Standard deviation by which a reading of a pose that was not read differs from a machine file, m (rad where no length is
     read), noise and what nobody can name in it; and the standard uncertainty of that.
 
@@ -153,20 +157,22 @@ def promised(given: Readings, found: Corrected) -> tuple[float, float]:
     poses, and W the inverse of the covariance C of the rest: the error at poses F is B_F (β - β̂) + ε_F, of variance
     B P Bᵀ + C_FF - 2 B P B_TᵀW C_TF, since what nobody can name goes on from pose to pose and the file has none of it.
     """
+    given = found.given
     e = given.predictor.experiment
     use = drawn(e.groups[given.rows], 0, MOST_READINGS)
     rows, channel = given.rows[use], given.channel[use]
     length = metres(e.channels)[channel]
     seen = length if length.any() else ~length
-    rest = given.rest[np.ix_(use, use)] + np.diag(given.noise[use])
-    columns, prior = columns_of(given, found)
+    factor = given.rest.factor[use]
+    rest = factor @ factor.T + np.diag(given.rest.noise[use])
+    columns, prior = columns_of(found)
     columns = columns[use]
     pose = e.groups[rows]
     number = len(np.unique(pose))
     label = np.random.default_rng(0).permutation(int(pose.max()) + 1)[pose] % max(2, min(FOLDS, number))
     total, count = 0.0, 0
     for k in np.unique(label):
-        test = (label == k) & seen & (given.noise[use] <= 4.0 * np.min(given.noise))
+        test = (label == k) & seen & (given.weights[use] >= 1.0 / STANDS_OUT)
         train = label != k
         if not test.any() or not train.any():
             continue
@@ -199,10 +205,15 @@ def vouched(predictor: Predictor, made: Written, said: str, columns: Columns, ke
     return valid.kept_by(Machine(replace(d, source=source, declared=declared)))
 
 
-def stands_out(columns: Columns, fit: Fit) -> Mask:
-    """(n,) rows with a reading that heavy tails give less than a quarter of its weight."""
-    out = np.zeros(len(columns.experiment), bool)
-    out[columns.rows[fit.weights < 1.0 / STANDS_OUT]] = True
+def stands_out(columns: Columns, fit: Fit, suspects: Mask, models: Iterable[Corrected]) -> Mask:
+    """(n,) rows with a reading that heavy tails give next to no weight, in the search or in a machine; of rows that neither has, those
+    that stood alone from the first."""
+    out, seen = suspects.copy(), np.zeros_like(suspects)
+    weights = [(columns.rows, fit.weights), *((m.given.rows, m.given.weights) for m in models)]
+    for rows, w in reversed(weights):
+        out[rows[~seen[rows]]] = False
+        seen[rows] = True
+        out[rows[w < SET_ASIDE]] = True
     return out
 
 

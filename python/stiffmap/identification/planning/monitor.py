@@ -16,7 +16,7 @@ from stiffmap.experiment.experiment import PER_ROW, Experiment
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.identification.inference.amplitudes import Fit, Part, fitted
 from stiffmap.identification.inference.columns import Columns, drawn
-from stiffmap.identification.inference.kernels import gaps
+from stiffmap.identification.inference.kernels import Points, gaps
 from stiffmap.identification.planning.estimate import Estimate, estimate
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine
@@ -146,12 +146,13 @@ def _gaps(
     known = basis(np.hstack([frames, numbers]))
     free = np.linalg.qr(known, mode="complete")[0][:, known.shape[1] :]
     kernels, parts = {}, []
-    for kind, name, kernel in gaps(machine, e, rows, channel, np.ones(len(rows))):
-        shown = white @ kernel @ white.T
+    points = Points(rows, channel, np.ones(len(rows)))
+    for kernel in gaps(machine, e, points):
+        shown = white @ kernel.between(points, points) @ white.T
         size = float(np.sum(free * (shown @ free))) / free.shape[1]
         if size > 0.0:
-            kernels[name] = shown / size
-            parts.append(Part(name, kind, full=free.T @ kernels[name] @ free))
+            kernels[kernel.name] = shown / size
+            parts.append(Part(kernel.name, kernel.kind, full=free.T @ kernels[kernel.name] @ free))
     columns = Columns.bare(e, rows, channel, free, free.T @ residual)
     return fitted(columns, parts), kernels
 

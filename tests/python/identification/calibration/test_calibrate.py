@@ -17,6 +17,7 @@ from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.identification.calibration import calibrate
 from stiffmap.identification.calibration.table import independent
 from stiffmap.identification.inference.corrected import Readings, corrected
+from stiffmap.identification.inference.covariance import Covariance
 from stiffmap.identification.numbers import Tolerances, Unknown, unknowns
 from stiffmap.identification.numbers.sensitivity import bends, predicted, sensitivity, sensitivity_at
 from stiffmap.model.with_errors import edited
@@ -179,7 +180,8 @@ def test_a_calibration_of_compliances_ends_at_their_most_likely_values() -> None
     problem, s = Problem.of(twin, twin.sigma, p()), sensitivity(p, wanted)
     rows, channel = problem.index
     n, spread = len(rows), np.array([1.0, 2.0, 0.7])
-    given = Readings(p, twin.sigma, rows, channel, np.ones(n), np.zeros((n, n)), False, s, spread)
+    rest = Covariance(np.ones(n), np.zeros((n, 0)))
+    given = Readings(p, twin.sigma, rows, channel, 1.0, np.ones(n), rest, s, spread)
     found = corrected(given, ())
 
     def cost(t: Floats) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,10 +13,9 @@ from stiffmap.experiment import Predictor, random_plan
 from stiffmap.experiment.channels import AXIS_CHANNELS
 from stiffmap.identification.inference import machines
 from stiffmap.identification.inference.corrected import Readings, corrected
+from stiffmap.identification.inference.covariance import Covariance
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted, sensitivity
-
-NOBODY: Any = None
 
 
 def test_a_promise_is_what_estimates_from_other_poses_are_off_by(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -29,12 +27,14 @@ def test_a_promise_is_what_estimates_from_other_poses_are_off_by(monkeypatch: py
     prior = np.array([1.0, 1.0, 1.0, 0.0])
     rest = 4.0 * np.exp(-(((x[:, None] - x) / 0.3) ** 2))
     e = SimpleNamespace(groups=np.arange(n), channels=AXIS_CHANNELS)
+    factor = np.linalg.cholesky(rest + 1e-9 * np.eye(n))
     given: Any = SimpleNamespace(
         predictor=SimpleNamespace(experiment=e), rows=np.arange(n), channel=np.zeros(n, np.intp),
-        sigma=np.full((n, 6), 2.0), noise=np.ones(n), rest=rest,
+        sigma=np.full((n, 6), 2.0), weights=np.ones(n), rest=Covariance(np.ones(n), factor),
     )  # fmt: skip
+    found: Any = SimpleNamespace(given=given)
     monkeypatch.setattr(machines, "columns_of", lambda *_: (columns, prior))
-    size, u = machines.promised(given, NOBODY)
+    size, u = machines.promised(found)
     covariance = rest + np.eye(n)
     label = np.random.default_rng(0).permutation(n) % machines.FOLDS
     draws = 4000
@@ -45,8 +45,8 @@ def test_a_promise_is_what_estimates_from_other_poses_are_off_by(monkeypatch: py
         seen, out = label != k, label == k
         w = np.linalg.inv(covariance[np.ix_(seen, seen)])
         b = columns[seen]
-        found = np.linalg.solve(b.T @ w @ b + np.diag(prior), b.T @ w @ (b @ beta + error[seen]))
-        squares.append((columns[out] @ (beta - found) + error[out]) ** 2)
+        estimate = np.linalg.solve(b.T @ w @ b + np.diag(prior), b.T @ w @ (b @ beta + error[seen]))
+        squares.append((columns[out] @ (beta - estimate) + error[out]) ** 2)
     assert size == pytest.approx(2.0 * np.sqrt(np.mean(np.concatenate(squares))), rel=0.02)
     assert u == pytest.approx(size / np.sqrt(2.0 * n))
 
@@ -71,9 +71,28 @@ def test_numbers_move_as_far_as_their_spread_allows(spread: float) -> None:
     e, s = p.experiment, sensitivity(p, wanted)
     rows, channel = np.nonzero(e.read)
     n = len(rows)
-    given = Readings(
-        p, e.sigma, rows, channel, np.ones(n), np.zeros((n, n)), False, replace(s), np.full(3, spread)
-    )
+    rest = Covariance(np.ones(n), np.zeros((n, 0)))
+    given = Readings(p, e.sigma, rows, channel, 1.0, np.ones(n), rest, s, np.full(3, spread))
     a = s.columns[rows, channel] / e.sigma[rows, channel][:, None]
     expected = np.linalg.solve(a.T @ a + np.eye(3) / spread**2, a.T @ (a @ off))
     assert corrected(given, ()).numbers == pytest.approx(expected, abs=0.01)
+
+
+def test_what_is_far_off_in_rows_that_the_search_did_not_have_is_weighed_down() -> None:
+    """The zeros are then those of the other rows."""
+    machine = sm.load_machine("orthoglide-revised")
+    p = Predictor(machine, random_plan(machine, "position", poses=40, repeats=1, seed=1))
+    wanted = [u for u in unknowns(machine.description, p.experiment) if u.group == "zeros"]
+    rng = np.random.default_rng(0)
+    exact = predicted(p, wanted, np.array([1.0, -1.0, 0.5]))
+    reading = exact + np.nan_to_num(p.experiment.sigma) * rng.normal(size=exact.shape)
+    reading[5, 1] += 6e-4
+    p = Predictor(machine, p.experiment.with_readings(reading))
+    e, s = p.experiment, sensitivity(p, wanted)
+    rows, channel = np.nonzero(e.read)
+    n = len(rows)
+    rest = Covariance(np.ones(n), np.zeros((n, 0)))
+    found = corrected(Readings(p, e.sigma, rows, channel, 1.0, np.ones(n), rest, s, np.ones(3)), ())
+    assert found.numbers == pytest.approx([1.0, -1.0, 0.5], abs=0.1)
+    weights = found.given.weights
+    assert rows[np.argmin(weights)] == 5 and weights.min() < 1e-3 < 0.2 < np.sort(weights)[1]
