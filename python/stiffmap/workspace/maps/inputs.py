@@ -61,7 +61,7 @@ def unit(direction: ArrayLike) -> Floats:
 
 def plane_axes(plane: str) -> tuple[int, int]:
     """Indices of the two base axes of a plane."""
-    if plane not in PLANES:
+    if not isinstance(plane, str) or plane not in PLANES:
         raise StiffmapError(f"plane: expected one of {', '.join(PLANES)}, got {plane!r}")
     return PLANES[plane]
 

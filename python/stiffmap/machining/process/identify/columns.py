@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, given_path
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.pose_tables import rows_of
@@ -78,7 +78,11 @@ def columns_of(
 ) -> Columns:
     """The columns of a file or a mapping; `defaults`, SI, where it has none of that name. Raises FileError."""
     file = "table" if isinstance(table, Mapping) else str(table)
-    rows = _of_mapping(table) if isinstance(table, Mapping) else _of_file(Path(table), sheet)
+    rows = (
+        _of_mapping(table)
+        if isinstance(table, Mapping)
+        else _of_file(given_path(table, "table", "a file or a mapping of columns"), sheet)
+    )
     out = Columns(file, [line for line, _ in rows[1:]], {}, {}, {})
     if len(rows) < 2:
         out.fail("expected a line of names and a line for each cut")

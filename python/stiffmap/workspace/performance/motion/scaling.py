@@ -10,6 +10,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Drive
 from stiffmap.model.description.tree import joints
 from stiffmap.solve.machine import Machine
+from stiffmap.workspace.maps.inputs import magnitude
 
 PARTS = {"all": slice(0, 6), "translation": slice(0, 3), "rotation": slice(3, 6)}
 
@@ -54,9 +55,7 @@ def characteristic_length(machine: Machine, length: float | None) -> float:
     """m: turns angles into lengths; the machine's own (mean distance of its joints) where none is given."""
     if length is None:
         return float(machine.compiled.length)
-    if not np.isfinite(length) or length <= 0:
-        raise StiffmapError(f"length: expected a positive length in m, got {length!r}")
-    return float(length)
+    return magnitude(length, "length", "m")
 
 
 def weighted(machine: Machine, jacobian: Floats, length: float, part: str) -> Floats:
