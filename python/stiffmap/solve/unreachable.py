@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import TASK
 from stiffmap.model.description.tree import joints
@@ -47,8 +47,8 @@ def shortfalls(machine: Machine, position: ArrayLike, rotation: ArrayLike | None
     each leg reaches it alone and not all together; none where they do. Raises StiffmapError for what is no pose.
     """
     p, r = (
-        np.asarray(position, dtype=float),
-        np.asarray(machine.compiled.home_rotation if rotation is None else rotation),
+        real_array(position, "position"),
+        real_array(machine.compiled.home_rotation if rotation is None else rotation, "rotation"),
     )
     if p.shape != (3,) or r.shape != (3, 3) or not (np.isfinite(p).all() and np.isfinite(r).all()):
         raise StiffmapError(
@@ -70,9 +70,9 @@ def why_unreachable(machine: Machine, position: ArrayLike, rotation: ArrayLike |
     all legs reach the pose, drives and joints out of their ranges are named (docs/theory.md C3). A pose that can be reached is said
     to be so.
     """
-    p = np.asarray(position, dtype=float)
+    p = real_array(position, "position")
     if not (
-        np.isfinite(p).all() and (rotation is None or np.isfinite(np.asarray(rotation, dtype=float)).all())
+        np.isfinite(p).all() and (rotation is None or np.isfinite(real_array(rotation, "rotation")).all())
     ):
         return "the commanded pose holds what is not a number"
     short = shortfalls(machine, p, rotation)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats, real_array, whole_number
 from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.status import Status
@@ -88,6 +88,7 @@ def worst_deflection(
         For bad input, never for a pose.
     """
     force = magnitude(force, "force", "N")
+    whole_number(turns, "turns", 0)
     axes = (0, 1, 2) if plane is None else plane_axes(plane)
     ask = _Ask(machine, force, axes, direction, linear, rotation, gravity, threads, turns)
     if position is not None:

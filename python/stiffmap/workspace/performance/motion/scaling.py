@@ -60,7 +60,7 @@ def characteristic_length(machine: Machine, length: float | None) -> float:
 
 def weighted(machine: Machine, jacobian: Floats, length: float, part: str) -> Floats:
     """Rows of `part` with rotations times the length, columns of revolute drives per that length."""
-    if part not in PARTS:
+    if not isinstance(part, str) or part not in PARTS:
         raise StiffmapError(f"part: expected one of {', '.join(PARTS)}, got {part!r}")
     out = jacobian.copy()
     out[..., 3:, :] *= length
