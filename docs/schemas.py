@@ -1,6 +1,7 @@
 """Writes the schemas of what commands print with --json: python docs/schemas.py [COMMAND ...]
 
 Each is inferred from the calls in tests/python/project/docs/json_calls.py: types of all values, keys that every call has as `required`.
+Objects whose keys are names of parts, channels or columns stand in MAPS there: their keys are the reader's.
 A key that a newer version adds breaks no reader; one that is gone or of another type is a change that the tests notice.
 """
 
@@ -14,6 +15,7 @@ import shlex
 import sys
 import tempfile
 from collections.abc import Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -34,20 +36,23 @@ def printed(arguments: Sequence[str]) -> Any:
     return json.loads(text.getvalue())
 
 
-def inferred(values: Sequence[Any]) -> dict[str, Any]:
-    """Schema that all these values obey."""
-    kinds = sorted({_kind(v) for v in values})
-    out: dict[str, Any] = {"type": kinds[0] if len(kinds) == 1 else kinds} if kinds else {}
+def inferred(values: Sequence[Any], maps: Sequence[str] = (), at: str = "") -> dict[str, Any]:
+    """Schema that all these values obey; ``maps`` are the places of objects whose keys are names of the reader's own things.
+
+    Null is allowed everywhere: it stands for what could not be computed.
+    """
+    kinds = sorted({_kind(v) for v in values} - {"null"})
+    out: dict[str, Any] = {"type": [*kinds, "null"]} if kinds else {}
     if items := [i for v in values if isinstance(v, list) for i in v]:
-        out["items"] = inferred(items)
+        out["items"] = inferred(items, maps, f"{at}[]")
     objects = [v for v in values if isinstance(v, dict)]
     if not objects:
         return out
-    keys = list(dict.fromkeys(k for o in objects for k in o))
-    if keys and (_named(keys) or _disjoint(objects)):
-        out["additionalProperties"] = inferred([v for o in objects for v in o.values()])
+    if any(fnmatchcase(at, place.replace("[", "[[]")) for place in maps):
+        out["additionalProperties"] = inferred([v for o in objects for v in o.values()], maps, f"{at}.*")
         return out
-    out["properties"] = {k: inferred([o[k] for o in objects if k in o]) for k in keys}
+    keys = dict.fromkeys(k for o in objects for k in o)
+    out["properties"] = {k: inferred([o[k] for o in objects if k in o], maps, f"{at}.{k}") for k in keys}
     out["required"] = [k for k in keys if all(k in o for o in objects)]
     return out
 
@@ -60,26 +65,16 @@ def _kind(value: Any) -> str:
     return {int: "number", float: "number", str: "string", list: "array", dict: "object"}[type(value)]
 
 
-def _named(keys: list[str]) -> bool:
-    """Whether keys are names of a machine's parts rather than words of ours: those differ from machine to machine."""
-    return any("." in k for k in keys) or all(len(k) == 1 or k[:1].isdigit() for k in keys)
+def schema_of(name: str, documents: Sequence[Any]) -> dict[str, Any]:
+    """Published schema of a command from what its calls print: one form for each set of keys."""
+    from tests.python.project.docs.json_calls import MAPS
 
-
-def _disjoint(objects: list[dict[str, Any]]) -> bool:
-    return len(objects) > 1 and not set.intersection(*(set(o) for o in objects)) and all(objects)
-
-
-def schema_of(name: str, calls: Sequence[str]) -> dict[str, Any]:
-    """Published schema of a command: one form for each of its calls."""
-    forms = []
-    for form in dict.fromkeys(json.dumps(inferred([printed(shlex.split(c))])) for c in calls):
-        forms.append(json.loads(form))
-    out = _together(forms)
+    forms: dict[Any, list[Any]] = {}
+    for document in documents:
+        forms.setdefault(frozenset(document) if isinstance(document, dict) else None, []).append(document)
+    found = [inferred(alike, MAPS.get(name, ())) for alike in forms.values()]
+    out = found[0] if len(found) == 1 else {"anyOf": found}
     return {"$schema": DRAFT, "title": f"stiffmap {name} --json", **out}
-
-
-def _together(forms: list[dict[str, Any]]) -> dict[str, Any]:
-    return forms[0] if len(forms) == 1 else {"anyOf": forms}
 
 
 def main() -> None:
@@ -94,7 +89,9 @@ def main() -> None:
         os.chdir(folder)
         for name in sys.argv[1:] or CALLS:
             try:
-                text = json.dumps(schema_of(name, CALLS[name]), indent=1)
+                text = json.dumps(
+                    schema_of(name, [printed(shlex.split(call)) for call in CALLS[name]]), indent=1
+                )
             except SystemExit as refused:
                 print(refused, file=sys.stderr)
                 continue

@@ -12,6 +12,8 @@ import warnings
 from decimal import Decimal
 from numbers import Real
 from operator import index
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,6 +66,21 @@ def real_array(values: object, name: str, what: str = "numbers") -> Floats:
         raise
     except (TypeError, ValueError, OverflowError, Warning) as problem:
         raise _refused(name, what, f"{type(values).__name__} ({problem})") from None
+
+
+def given_path(value: object, name: str, what: str = "a file") -> Path:
+    """A path; StiffmapError with the argument's name for what is none."""
+    try:
+        return Path(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise _refused(name, what, type(value).__name__) from None
+
+
+def instance_of(value: Any, kind: Any, name: str, what: str) -> Any:
+    """The value itself where it is of this kind; else StiffmapError with the argument's name and what is expected."""
+    if not isinstance(value, kind):
+        raise _refused(name, what, repr(value) if isinstance(value, str) else type(value).__name__)
+    return value
 
 
 def _refused(name: str, what: str, found: str) -> StiffmapError:

@@ -21,16 +21,24 @@ def redesigned(description: MachineDescription, values: Mapping[str, float]) -> 
     """The description with other numbers (SI) at these addresses, its effects added again.
 
     Where the home coordinates do not close the new machine, they are followed there: the numbers go over in small steps, each
-    closed from the one before it, so that the machine stays on its assembly branch.
+    closed from the one before it, so that the machine stays on its assembly branch. A home that is searched for is the one that
+    was found: a search with other numbers might end on another branch.
     StiffmapError for an unknown address or a bad value; HomeError where the numbers reach no machine that closes.
     """
-    declared = description.declared or description
+    declared = _settled(description.declared or description)
     target = with_values(declared, values)
     try:
         CompiledMachine(target)
     except HomeError as problem:
         target = _followed(declared, values, problem)
     return apply_records(target, description.effects) if description.effects else target
+
+
+def _settled(description: MachineDescription) -> MachineDescription:
+    """The description whose home is declared by the coordinates that a search found."""
+    if not description.search_home:
+        return description
+    return replace(closed(description, CompiledMachine(description)), search_home=False)
 
 
 def _followed(

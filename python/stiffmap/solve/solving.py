@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.common.broadcasting import (
     Floats,
     batch,
+    instance_of,
     rows,
     rows_or_one,
     thread_count,
@@ -150,6 +151,8 @@ def _arrays(machine: CompiledMachine, call: Call) -> tuple[Floats, Floats, Float
 def load_types(options: SolveOptions, loaded: Sequence[str]) -> list[str]:
     """How the wrench at each loaded point follows its body; StiffmapError for an unknown word or point."""
     kinds = options.load_type
+    instance_of(options.point, str, "point", "the name of a point")
+    instance_of(kinds, (str, Mapping), "load_type", "a word, or a mapping point -> word")
     given = {options.point: kinds} if isinstance(kinds, str) else dict(kinds)
     for name, kind in given.items():
         if kind not in LOAD_TYPES:

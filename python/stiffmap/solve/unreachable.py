@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import TASK
 from stiffmap.model.description.tree import joints
@@ -47,8 +47,8 @@ def shortfalls(machine: Machine, position: ArrayLike, rotation: ArrayLike | None
     each leg reaches it alone and not all together; none where they do. Raises StiffmapError for what is no pose.
     """
     p, r = (
-        np.asarray(position, dtype=float),
-        np.asarray(machine.compiled.home_rotation if rotation is None else rotation),
+        real_array(position, "position"),
+        real_array(machine.compiled.home_rotation if rotation is None else rotation, "rotation"),
     )
     if p.shape != (3,) or r.shape != (3, 3) or not (np.isfinite(p).all() and np.isfinite(r).all()):
         raise StiffmapError(
@@ -67,22 +67,20 @@ def why_unreachable(machine: Machine, position: ArrayLike, rotation: ArrayLike |
     """Why a commanded TCP pose cannot be reached, in words, mm and deg: ``leg x ends 125 mm short of it``.
 
     position (3,) m, rotation (3, 3), None: as at home; base axes, springs at rest. A leg alone is judged by its lengths; where
-    all legs reach the pose, drives and joints out of their ranges are named (docs/theory.md C3).
+    all legs reach the pose, drives and joints out of their ranges are named (docs/theory.md C3). A pose that can be reached is said
+    to be so.
     """
-    p = np.asarray(position, dtype=float)
+    p = real_array(position, "position")
     if not (
-        np.isfinite(p).all() and (rotation is None or np.isfinite(np.asarray(rotation, dtype=float)).all())
+        np.isfinite(p).all() and (rotation is None or np.isfinite(real_array(rotation, "rotation")).all())
     ):
         return "the commanded pose holds what is not a number"
     short = shortfalls(machine, p, rotation)
     if not short:
-        return "; ".join(_beyond(machine, p, rotation)) or (
-            "every leg reaches it, but no continuous motion from the home configuration does: it lies behind a singular pose, or "
-            "in another assembly mode (start=)"
-        )
+        return _within_lengths(machine, p, rotation)
     alike: dict[str, list[str]] = {}
     for s in short:
-        alike.setdefault(_gap(s), []).append(s.leg)
+        alike.setdefault(_gap(s, machine.compiled.length), []).append(s.leg)
     said = [f"{_who(legs, machine)} {gap}" for gap, legs in alike.items()]
     others = [leg for leg in machine.legs if leg not in {s.leg for s in short}]
     if short[0].leg and others:
@@ -90,13 +88,23 @@ def why_unreachable(machine: Machine, position: ArrayLike, rotation: ArrayLike |
     return "; ".join(said)
 
 
-def _beyond(machine: Machine, p: Floats, rotation: ArrayLike | None) -> list[str]:
-    """Joints and drives that would stand outside of their ranges."""
+def _within_lengths(machine: Machine, p: Floats, rotation: ArrayLike | None) -> str:
+    """The reason where the lengths of all legs allow the pose."""
     k = inverse_kinematics(machine, p, rotation)
-    if int(k.status) != Status.CONVERGED:
-        return []
+    if int(k.status) == Status.CONVERGED:
+        return "; ".join(_beyond(machine, k.coordinates)) or "nothing is in the way: the pose can be reached"
+    if int(k.status) == Status.SINGULAR:
+        return "every leg reaches it, but the machine is singular there"
+    return (
+        "every leg reaches it, but no continuous motion from the home configuration does: it lies behind a singular pose, or "
+        "in another assembly mode (start=)"
+    )
+
+
+def _beyond(machine: Machine, coordinates: Floats) -> list[str]:
+    """Joints and drives that would stand outside of their ranges."""
     out, named = [], joints(machine.description)
-    for name, value in zip(machine.compiled.names.coordinates, k.coordinates, strict=True):
+    for name, value in zip(machine.compiled.names.coordinates, coordinates, strict=True):
         joint = named.get(name)
         ends = (
             None
@@ -125,8 +133,11 @@ def _who(legs: list[str], machine: Machine) -> str:
     )
 
 
-def _gap(s: Shortfall) -> str:
-    if s.rotation > TURNED:  # where it would be if it could turn so is idle
+def _gap(s: Shortfall, length: float) -> str:
+    # far out, the weights leave an angle in proportion to the distance, which is none that the pose asks for
+    if s.rotation > TURNED * max(
+        1.0, s.translation / length
+    ):  # where it would be if it could turn so is idle
         return f"{np.rad2deg(s.rotation):.4g} deg off the orientation"
     return f"{1e3 * s.translation:.4g} mm short of it"
 

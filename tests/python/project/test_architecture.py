@@ -128,7 +128,5 @@ def test_the_description_computes_nothing() -> None:
     for path in (ROOT / "python/stiffmap/model/description").glob("*.py"):
         for line in text(path).splitlines():
             if line.startswith(("import stiffmap", "from stiffmap")):
-                assert line.startswith(PLAIN), (
-                    f"{path.name}: {line}"
-                )
+                assert line.startswith(PLAIN), f"{path.name}: {line}"
             assert not re.match(r"(from|import) (scipy|yaml|pydantic|xarray)", line), f"{path.name}: {line}"

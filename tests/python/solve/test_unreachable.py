@@ -37,6 +37,41 @@ def test_an_orientation_that_a_leg_does_not_give() -> None:
     assert text == "legs y, z end 30 deg off the orientation; leg x would reach it"
 
 
+@pytest.mark.parametrize(
+    ("name", "at", "text"),
+    [
+        (
+            "orthoglide-original",
+            (8, 0, 0),
+            "legs y, z end 7690 mm short of it; leg x would reach it",
+        ),  # bars of 310 mm
+        (
+            "orthoglide-revised",
+            (0, -8, 0),
+            "legs x, z end 7225 mm short of it; leg y would reach it",
+        ),  # of 775 mm
+        ("orthoglide-original", (0, 0, 8), "legs x, y end 7690 mm short of it; leg z would reach it"),
+        ("tripteron", (0, 0, 8), "leg 1 would reach it"),
+        ("rotary-delta", (0, -8, 0), "leg a ends 7206 mm short of it"),
+        ("hybrid", (8, 0, 0), "leg a ends 7525 mm short of it"),
+        ("hybrid", (0, -80, 0), "mm short of it"),
+        ("ur10", (0, -8, 0), "leg arm ends 6909 mm short of it"),
+    ],
+)
+def test_far_outside_it_is_the_distance_that_is_said(name: str, at: tuple[float, ...], text: str) -> None:
+    m = sm.load_machine(name)
+    found = why_unreachable(m, m.description.home.p + np.array(at))
+    assert text in found and "orientation" not in found
+
+
+@pytest.mark.parametrize("name", sm.machine_names())
+def test_a_pose_that_can_be_reached_lies_behind_nothing(name: str) -> None:
+    m = sm.load_machine(name)
+    for p in (m.description.home.p, 0.5 * (m.description.home.p + m.workspace.mean(axis=0))):
+        if int(sm.inverse_kinematics(m, p).status) == sm.Status.CONVERGED:
+            assert why_unreachable(m, p) == "nothing is in the way: the pose can be reached"
+
+
 def test_a_reachable_pose_has_no_shortfall() -> None:
     for name in ("orthoglide-revised", "five-bar", "ur10", "tripteron"):
         m = sm.load_machine(name)

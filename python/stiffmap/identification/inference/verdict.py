@@ -225,14 +225,15 @@ def _out_of_tolerance(columns: Columns, model: Model) -> Iterator[Beyond]:
 
 
 def out_of_tolerance(columns: Columns, fit: Fit) -> Iterator[Beyond]:
-    """Declared numbers beyond tolerance, beyond what the largest of so many, and its error, are by chance, and the same over all
-    of the experiment."""
+    """Declared numbers beyond tolerance whatever their error, beyond what the largest of so many is once in a thousand machines, and
+    the same over all of the experiment."""
     size = np.linalg.norm(columns.numbers, axis=0) / np.sqrt(len(columns))
     said = zip(columns.unknowns, of_numbers(columns, fit), size, strict=True)
     found = [Beyond(u, value, sd, float(abs(value) * s)) for u, (value, sd, _), s in said]
     number = {id(b): k for k, b in enumerate(found)}
     determined = sum(b.sd < DETERMINED for b in found)
-    largest, doubt = (float(norm.isf(1.0 / (2.0 * ODDS * max(1, n)))) for n in (determined, len(found)))
+    largest = float(norm.isf(RARE / (2.0 * max(1, determined))))
+    doubt = float(norm.isf(1.0 / (2.0 * ODDS * max(1, len(found)))))
     for b in sorted(found, key=lambda b: -b.share):
         far = abs(b.value) - doubt * b.sd > TOLERANCES and abs(b.value) > largest
         if far and not unevenness(columns, fit, columns.free @ columns.numbers[:, number[id(b)]])[1]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats, real_array, real_number
+from stiffmap.common.broadcasting import Floats, instance_of, real_array, real_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.workspace.vibration.modes import TipModes
 
@@ -74,7 +74,9 @@ def mode_rows(modes: ToolModes | Iterable[Any]) -> ToolModes:
     """Rows (frequency Hz, damping ratio, mass kg, direction), the direction x, y, z or a vector; checked."""
     if isinstance(modes, ToolModes):
         return modes
-    rows = list(modes)
+    rows = list(
+        instance_of(modes, Iterable, "modes", "rows (frequency Hz, damping ratio, mass kg, direction)")
+    )
     if not rows:
         raise StiffmapError(
             "modes: expected rows (frequency Hz, damping ratio, mass kg, direction), got none"

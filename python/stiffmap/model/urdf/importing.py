@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 
+from stiffmap.common.broadcasting import given_path
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.model.description import TASK, Leg, MachineDescription, Offset
 from stiffmap.model.files.save import description_text
@@ -52,8 +53,8 @@ def import_urdf(
     (mimic), floating and planar joints on the way to the tip, several possible tools, unknown frames and joints,
     loops of another topology, and what no machine file holds.
     """
-    model = read_urdf(Path(urdf))
-    side = read_sidecar(None if sidecar is None else Path(sidecar))
+    model = read_urdf(given_path(urdf, "urdf", "a URDF file"))
+    side = read_sidecar(None if sidecar is None else given_path(sidecar, "sidecar", "a YAML file"))
     file = str(urdf) if sidecar is None else fspath(sidecar)
     _check_names(model, side, file)
     end, choice = _tip(model, side, tip, file)

@@ -6,6 +6,7 @@ import codecs
 import errno
 import io
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -16,6 +17,7 @@ from inspect import getdoc
 from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from stiffmap.common.errors import FileError, FileErrors, MissingPartError, StiffmapError
 from stiffmap.common.number_text import number_in
@@ -40,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = joined(sys.argv[1:] if arguments is None else arguments)
     try:
         with plain_streams(), one_command():
-            build_app(given)(args=given, prog_name="stiffmap")
+            build_command(given)(args=given, prog_name="stiffmap")
     except StiffmapError as error:
         for problem in error.problems if isinstance(error, FileErrors) else (error,):
             print(f"stiffmap: {one_line(problem)}", file=sys.stderr)
@@ -97,6 +99,21 @@ def build_app(arguments: Sequence[str]) -> typer.Typer:
             function = load(command) if command.name == wanted else _summary(command)
             app.command(command.name, help=flowed(getdoc(function) or ""))(function)
     return app
+
+
+def build_command(arguments: Sequence[str]) -> Any:
+    """The app as a command of click, in whose help only our own styles are markup: units such as [mm] are text."""
+    command = typer.main.get_command(build_app(arguments))
+    for each in (command, *getattr(command, "commands", {}).values()):
+        for part in (each, *each.params):
+            if part.help:
+                part.help = styled(part.help)
+    return command
+
+
+def styled(text: str) -> str:
+    """The text with every bracket escaped for rich but those of our own styles."""
+    return re.sub(r"\\(\[/?(?:cyan|bold)\])", r"\1", escape(text))
 
 
 def flowed(text: str) -> str:

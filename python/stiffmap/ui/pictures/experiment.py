@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.experiment.comparison.residual import Residual
 from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.ui.plot.style import Picture
 
 UM, MM = 1e6, 1e3
 COLOUR, NOISE, ASIDE = "#2a6f97", "#d9d9d9", "#c1432e"
@@ -46,7 +47,7 @@ def vectors(r: Residual) -> Figure:
     scale = 0.2 * max(float(np.ptp(at, axis=0).max()), 1.0) / longest
     shown = views(at)
     width = 11.0 if len(shown) == 3 else 6.0
-    figure = Figure(
+    figure = Picture(
         figsize=(width, (3.7 if len(shown) == 3 else 5.0) * len(means) + 0.3), layout="constrained"
     )
     grid = figure.subplots(len(means), len(shown), squeeze=False)
@@ -100,7 +101,7 @@ def _arrows(ax: Any, at: Floats, arrow: Floats, view: tuple[int, int]) -> None:
 
 def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:
     """Residual of each channel against each driver; the band is two noise floors wide to each side."""
-    figure = Figure(figsize=(2.5 * len(drivers) + 1.0, 1.7 * len(channels) + 0.9), layout="constrained")
+    figure = Picture(figsize=(2.5 * len(drivers) + 1.0, 1.7 * len(channels) + 0.9), layout="constrained")
     grid = figure.subplots(len(channels), len(drivers), squeeze=False, sharex="col", sharey="row")
     for row, channel in enumerate(channels):
         for column, driver in enumerate(drivers):

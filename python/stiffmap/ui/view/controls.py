@@ -19,6 +19,7 @@ from stiffmap.ui.view.state import PLANES
 MOST_FORCE, MOST_GRAVITY, DECADE = 5000.0, 20.0, 1.0
 HOME = "as at home"
 NONE = "none"
+DECIMALS = 15  # of numbers that are shown and typed: compliances are as small as 1e-10 m/N
 TITLES = {q.title: name for name, q in QUANTITIES.items()}
 
 
@@ -176,6 +177,8 @@ class Controls:
                 self.viewer.model.history.mark()
             self.viewer.act(lambda m: deed(m, event.target.value))
 
+        if hasattr(handle, "precision"):  # else a field takes no more decimals than its step has
+            handle.precision = DECIMALS
         handle.on_update(changed)
 
     def _pressed(self, handle: Any, deed: Callable[[Any], object]) -> None:

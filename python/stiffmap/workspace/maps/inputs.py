@@ -61,7 +61,7 @@ def unit(direction: ArrayLike) -> Floats:
 
 def plane_axes(plane: str) -> tuple[int, int]:
     """Indices of the two base axes of a plane."""
-    if plane not in PLANES:
+    if not isinstance(plane, str) or plane not in PLANES:
         raise StiffmapError(f"plane: expected one of {', '.join(PLANES)}, got {plane!r}")
     return PLANES[plane]
 
@@ -86,6 +86,8 @@ def wrench_cases(
         )
     out = wrench_array(wrench)
     if out.ndim == 1:
+        if cases is not None and len(cases) != 1:
+            raise StiffmapError(f"cases: expected one name of one wrench, got {list(cases)}")
         return out[None], cases
     if out.ndim != 2 or len(out) == 0:
         raise StiffmapError(f"wrench: expected shape (6,) or (cases, 6), got {out.shape}")

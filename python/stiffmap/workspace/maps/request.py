@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import whole_number
+from stiffmap.common.broadcasting import instance_of, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
@@ -41,6 +42,7 @@ def map_plan(
     """
     loading = Loading(machine, **how)
     grid = grid_of(machine, {"x": x, "y": y, "z": z})
+    instance_of(compliance, (bool, np.bool_), "compliance", "True or False")
     wrenches, names = wrench_cases(wrench, None if cases is None else tuple(cases))
     if (directions := whole_number(directions, "directions", 1)) < 3:
         raise StiffmapError(f"directions: expected 3 or more, got {directions}")

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, whole_number
+from stiffmap.common.broadcasting import Floats, real_number, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.compiled.machine import PATH_CONTROLS as CONTROLS
 from stiffmap.solve.machine import Machine, hint_metres, takes_machine
@@ -151,7 +151,7 @@ def check_control(control: str, limit: float | None, steps: int, load_type: obje
     """The limit as a number; StiffmapError where the options do not fit together."""
     if control not in CONTROLS:
         raise StiffmapError(f"control: expected one of {', '.join(CONTROLS)}, got {control!r}")
-    if limit is None or not np.isfinite(limit) or limit == 0:
+    if limit is None or not np.isfinite(real_number(limit, "limit")) or limit == 0:
         raise StiffmapError(
             f"limit: expected a number other than 0 ({UNITS[control]} for control {control!r}), got {limit!r}"
         )

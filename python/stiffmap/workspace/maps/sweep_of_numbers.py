@@ -114,6 +114,8 @@ def design_sweep(
 def _evaluated(evaluate: Evaluate | None, machine: Machine) -> dict[str, Any]:
     if evaluate is None:
         return {}
+    if not callable(evaluate):
+        raise StiffmapError(f"evaluate: expected a function of a machine, got {evaluate!r}")
     found = evaluate(machine)
     more = dict(found) if isinstance(found, Mapping) else {"value": found}
     if taken := sorted(set(more) & {*KEPT, "problem"}):

@@ -10,6 +10,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from stiffmap.common.broadcasting import given_path
 from stiffmap.common.errors import FileError
 from stiffmap.common.short import short_repr
 from stiffmap.common.yaml_text import Document, read
@@ -104,7 +105,7 @@ def load_requirements(source: str | PathLike[str]) -> Requirements:
 
     Raises FileError naming file, line, key, what was expected and what was found.
     """
-    path = Path(source)
+    path = given_path(source, "source", "a file or a shipped name")
     shipped = Path(__file__).with_name(path.name if path.suffix else f"{path.name}.yaml")
     if not path.is_file():
         if not shipped.is_file() or len(path.parts) > 1:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -10,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, MissingPartError
+from stiffmap.common.errors import FileError, MissingPartError, StiffmapError
 from stiffmap.common.tables.named import Known, read_named
-from stiffmap.common.units import ACCELERATIONS, LENGTHS, size_of
 from stiffmap.workspace.vibration.poles import Complex
+from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUnit, response_unit
 
-KINDS = {"m/N": 0, "um/N": 0, "µm/N": 0, "mm/N": 0, "m/s/N": 1, "m/s2/N": 2, "m/s²/N": 2, "g/N": 2}
 COLUMNS = Known(
     {"frequency": "Hz", "real": "", "imag": "", "coherence": ""}, {"frequency": "frequency_Hz"}, {}
 )
+EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like"
 HEAD = "frequency_Hz, real_UNIT, imag_UNIT and, where there is one, coherence"
 
 
@@ -61,18 +62,21 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
 def _csv(path: Path) -> MeasuredResponse:
     t = read_named(path, COLUMNS)
     unit = t.units.get("real", "")
-    if unit not in KINDS or t.units.get("imag") != unit or "frequency" not in t.values:
-        t.fail(
-            f"expected the columns {HEAD}, UNIT one of {', '.join(KINDS)}; found {', '.join(t.header.values())}"
-        )
+    known = response_unit(unit)
+    kind = None if known is None else _derivatives(known)
+    if known is None or kind is None or t.units.get("imag") != unit or "frequency" not in t.values:
+        t.fail(f"expected the columns {HEAD}, UNIT one of {EXAMPLES}; found {', '.join(t.header.values())}")
     if len(t.lines) < 2:
         t.fail("expected two rows or more below the header")
     f, real, imag = (t.values[n] for n in ("frequency", "real", "imag"))
-    motion = unit.removesuffix("/N")
-    scale = 1.0 if motion == "m/s" else size_of(motion, LENGTHS, ACCELERATIONS)
-    values = np.asarray(scale * (real + 1j * imag), complex)
+    values = np.asarray(known.size * (real + 1j * imag), complex)
     coherence = t.values.get("coherence", np.full(len(f), np.nan))
-    return MeasuredResponse(path.stem, f, _receptance(f, values, KINDS[unit]), coherence)
+    return MeasuredResponse(path.stem, f, _receptance(f, values, kind), coherence)
+
+
+def _derivatives(unit: ResponseUnit, length: int = 1) -> int | None:
+    """0, 1, 2 for displacement, velocity, acceleration by force; None for what is none of them."""
+    return -unit.time if unit[1:3] == (length, -1) and -unit.time in MOTIONS.values() else None
 
 
 def _receptance(frequency: Floats, values: Complex, derivatives: int) -> Complex:
@@ -87,6 +91,13 @@ MOTIONS = {8: 0, 11: 1, 12: 2}
 """Of universal files: displacement, velocity, acceleration."""
 WAYS = {0: "", 1: "+x", -1: "-x", 2: "+y", -2: "-y", 3: "+z", -3: "-z", 4: "+rx", 5: "+ry", 6: "+rz", -4: "-rx", -5: "-ry", -6: "-rz"}  # fmt: skip
 RESPONSE, COHERENCE = 4, 6
+UNITS, FUNCTION = 164, 58
+UNKNOWN, FORCES, FREQUENCY = (0, 1), (9, 13), 18
+WANTED = "expected displacement, velocity or acceleration (types 8, 11, 12) by force"
+QUANTITIES = {
+    0: "an unknown quantity", 1: "a general one", 8: "a displacement", 9: "a reaction force", 11: "a velocity",
+    12: "an acceleration", 13: "a force", 15: "a pressure", 17: "a time", 18: "a frequency", 19: "a speed of rotation",
+}  # fmt: skip
 
 
 def _universal(path: Path) -> list[MeasuredResponse]:
@@ -100,37 +111,126 @@ def _universal(path: Path) -> list[MeasuredResponse]:
         sets = pyuff.UFF(str(path)).read_sets()
     except Exception as problem:  # the reader raises whatever its parsing meets
         raise FileError(f"expected a universal file with data sets 58; {problem}", file=str(path)) from None
-    sets = [s for s in (sets if isinstance(sets, list) else [sets]) if s.get("type") == 58]
-    for s in sets:
-        _check_whole(s, path)
-    responses = [s for s in sets if s["func_type"] == RESPONSE]
+    base: dict[str, Any] = {}
+    functions = []
+    for s in sets if isinstance(sets, list) else [sets]:
+        if s.get("type") == UNITS:  # those of all that follows
+            base = s
+        elif s.get("type") == FUNCTION:
+            _check_whole(s, path)
+            functions.append((s, base))
+    responses = [(s, base) for s, base in functions if s["func_type"] == RESPONSE]
     if not responses:
         raise FileError("no frequency response (data set 58, function type 4) in it", file=str(path))
-    coherence = {_ends(s): s for s in sets if s["func_type"] == COHERENCE}
+    coherence = {_ends(s): s for s, _ in functions if s["func_type"] == COHERENCE}
     out = []
-    for s in responses:
-        kind = int(s.get("ordinate_spec_data_type", 0))
-        if kind not in MOTIONS:
-            raise FileError(
-                f"response {s.get('id1', '')}: expected displacement, velocity or acceleration (types 8, 11, 12) by "
-                f"force; found type {kind}", file=str(path)
-            )  # fmt: skip
-        f = np.asarray(s["x"], dtype=float)
+    for s, base in responses:
+        name = f"response {s.get('id1', '')}".strip()
+        x = np.asarray(s["x"], dtype=float)
+        try:
+            f, values = x * _hertz(s), _in_si(s, base)
+        except StiffmapError as problem:
+            raise FileError(f"{name}: {problem}", file=str(path)) from None
         response, reference = _ends(s)
         of = coherence.get((response, reference))
-        if of is not None and not np.array_equal(of["x"], f):
+        if of is not None and not np.array_equal(of["x"], x):
             raise FileError(
-                f"response {s.get('id1', '')}: expected its coherence at the same {len(f)} frequencies; found "
-                f"{len(of['x'])}, which are others", file=str(path)
-            )  # fmt: skip
+                f"{name}: expected its coherence at the same {len(f)} frequencies; found {len(of['x'])}, which are others",
+                file=str(path),
+            )
         known = np.full(len(f), np.nan) if of is None else np.real(of["data"])
+        size, kind = values
         out.append(
             MeasuredResponse(
-                str(s.get("id1", path.stem)), f, _receptance(f, np.asarray(s["data"], complex), MOTIONS[kind]),
+                str(s.get("id1", path.stem)), f, _receptance(f, np.asarray(size * np.asarray(s["data"]), complex), kind),
                 np.asarray(known, dtype=float), response, reference,
             )
         )  # fmt: skip
     return out
+
+
+def _hertz(s: dict[str, Any]) -> float:
+    """Hz of one unit of the abscissa."""
+    kind, label = int(s.get("abscissa_spec_data_type") or 0), _label(s, "abscissa")
+    if kind not in (*UNKNOWN, FREQUENCY):
+        raise StiffmapError(f"expected frequencies along the abscissa (type 18); found {_quantity(kind)}")
+    if label and label.lower() not in FREQUENCIES:
+        raise StiffmapError(f"expected frequencies in Hz, kHz, rad/s or rpm; found {label!r}")
+    return FREQUENCIES[label.lower()] if label else 1.0
+
+
+def _in_si(s: dict[str, Any], base: dict[str, Any]) -> tuple[float, int]:
+    """What the ordinate is multiplied by to be in SI, and 0, 1, 2 for displacement, velocity, acceleration.
+
+    Units that stand at the axes count before those of the file (data set 164), as the format says.
+    """
+    kind, by = int(s.get("ordinate_spec_data_type") or 0), int(s.get("orddenom_spec_data_type") or 0)
+    if by not in (*UNKNOWN, *FORCES):
+        raise StiffmapError(
+            f"expected a response divided by a force (types 9, 13); found one by {_quantity(by)}"
+        )
+    if kind not in (*UNKNOWN, *MOTIONS):
+        raise StiffmapError(f"{WANTED}; found {_quantity(kind)}")
+    turns, moment = (abs(int(s[key])) > 3 for key in ("rsp_dir", "ref_dir"))
+    length = 1 - turns - moment
+    above, below = _unit_of(s, "ordinate"), _unit_of(s, "orddenom")
+    if above is None and kind in MOTIONS:
+        above = ResponseUnit(_base(base, "length") if not turns else 1.0, int(not turns), 0, -MOTIONS[kind])
+    if below is None and by in FORCES:
+        size = _base(base, "force") * (_base(base, "length") if moment else 1.0)
+        below = ResponseUnit(size, int(moment), 1)
+    if above is None:
+        raise StiffmapError(f"{WANTED}; found {_quantity(kind)} without a unit")
+    if above.force == 0 and below is None:
+        raise StiffmapError(
+            "expected the force that the response is divided by, as type 13 or with its unit; found neither"
+        )
+    whole = above.over(below) if below is not None and above.force == 0 else above  # else its label has both
+    found = _derivatives(whole, length)
+    if found is None or MOTIONS.get(kind, found) != found:
+        wanted = _quantity(kind) if kind in MOTIONS else "displacement, velocity or acceleration"
+        raise StiffmapError(
+            f"expected the unit of {wanted} by force, such as {EXAMPLES}; found {_written(s)}"
+        )
+    return whole.size, found
+
+
+def _unit_of(s: dict[str, Any], axis: str) -> ResponseUnit | None:
+    """The unit at an axis; None where there is none."""
+    label = _label(s, axis)
+    unit = response_unit(label) if label else None
+    if label and unit is None:
+        raise StiffmapError(f"expected a unit that is known, such as {EXAMPLES}; found {label!r}")
+    return unit
+
+
+def _label(s: dict[str, Any], axis: str) -> str:
+    """The unit as it is written at an axis: in its own field, or in brackets after the axis's name."""
+    own, name = (str(s.get(f"{axis}_{field}") or "").strip() for field in ("axis_units_lab", "axis_lab"))
+    if own.upper() not in ("", "NONE"):
+        return own.strip("[]")
+    inside = re.fullmatch(r".*[^)\]]\s*[(\[]([^()\[\]]+)[)\]]", name)
+    return inside[1].strip() if inside else ""
+
+
+def _written(s: dict[str, Any]) -> str:
+    return " by ".join(repr(label) for axis in ("ordinate", "orddenom") if (label := _label(s, axis)))
+
+
+def _quantity(kind: int) -> str:
+    return f"{QUANTITIES.get(kind, 'another quantity')} (type {kind})"
+
+
+def _base(base: dict[str, Any], what: str) -> float:
+    """SI size of the file's own unit of length or force: data set 164 has how many of them make one of SI."""
+    factor = float(base.get(what, 1.0))
+    if not 0 < factor < np.inf:
+        raise StiffmapError(f"data set 164: expected a positive factor for {what}; found {factor:g}")
+    if base.get("units_code") == 1 and factor != 1:
+        raise StiffmapError(
+            f"data set 164 says SI, but {factor:g} for {what}; expected a factor of 1 or units at the axes"
+        )
+    return 1 / factor
 
 
 def _check_whole(s: dict[str, Any], path: Path) -> None:
@@ -141,6 +241,7 @@ def _check_whole(s: dict[str, Any], path: Path) -> None:
     if lost:
         raise FileError(f"{name}: expected a whole number for {', '.join(lost)} in its head", file=str(path))
     x, data = np.atleast_1d(s.get("x", ())), np.atleast_1d(s.get("data", ()))
+    s["x"], s["data"] = x, data = _without_padding(s, x), _without_padding(s, data)
     if not len(x) == len(data) == s["num_pts"]:
         raise FileError(
             f"{name}: expected {s['num_pts']} points, as its head says; found {len(data)}: a line is lost, or one too many",
@@ -149,6 +250,14 @@ def _check_whole(s: dict[str, Any], path: Path) -> None:
     if not np.isfinite(data).all():
         k = int(np.flatnonzero(~np.isfinite(data))[0])
         raise FileError(f"{name}: expected finite numbers; point {k + 1} has {data[k]}", file=str(path))
+
+
+def _without_padding(s: dict[str, Any], values: Any) -> Any:
+    """The values less the zeros that fill the last line."""
+    line = 6 if s.get("ord_data_type") in (2, 5) else 4
+    surplus = values[s["num_pts"] :]
+    padded = len(surplus) * (1 + np.iscomplexobj(s["data"])) < line and not np.any(s["data"][s["num_pts"] :])
+    return values[: s["num_pts"]] if padded else values
 
 
 def _ends(s: dict[str, object]) -> tuple[str, str]:

@@ -164,7 +164,7 @@ def test_a_name_needs_odds_against_the_best_model_of_another_world_without_it():
 
 def test_declared_numbers_out_of_tolerance_in_the_stead_of_a_name_do_not_take_it_away():
     c = setting(1, (0.0, 30.0, 0.0))
-    d = 10.0 * c.places[1].shapes[0].directions[:, :1]
+    d = 8.0 * c.places[1].shapes[0].directions[:, :1]
     unknown = Unknown("zero of a drive", "zeros", "m", 1e-4)
     s = searched(c)
     c = replace(c, experiment=one_place(len(c.rows)), numbers=d, unknowns=(unknown,))

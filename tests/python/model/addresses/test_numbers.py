@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import acos, atan2, hypot
 from pathlib import Path
 
@@ -196,3 +197,54 @@ def test_solution_as_a_dataset() -> None:
 
 def test_classes_are_a_dozen() -> None:
     assert len(CLASSES) >= 12
+
+
+def guessed(text: str, seed: int) -> str:
+    """The machine file with its home searched for from guesses at random."""
+    random = np.random.default_rng(seed)
+    text = re.sub(r"(home: \{translation: \[[^]]*\])", r"\1, solve: true", text, count=1)
+    assert "solve: true" in text
+    guess = r"(?<![\w.])(home|motor|elbow|pin): (-?\d+(\.\d+)?)(?=[,}\s])"
+    return re.sub(guess, lambda found: f"{found[1]}: {random.uniform(-170, 170):.1f}", text)
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "address", "value"),
+    [
+        ("five-bar", 1, "arm_length/length", 0.33),
+        ("five-bar", 2, "forearm_length/length", 0.3),
+        ("five-bar", 11, "arm_length/length", 0.27),
+        ("five-bar", 11, "forearm_length/length", 0.44),
+        ("3-rrr", 3, "arm_length/length", 0.27),
+        ("3-rrr", 4, "arm_length/length", 0.33),
+    ],
+)
+def test_a_home_that_was_searched_for_keeps_its_branch(name, seed, address, value, tmp_path):
+    file = tmp_path / "machine.yaml"
+    text = find(name).read_text("utf-8") if name in sm.machine_names() else machine_text(name, "m", {})
+    m = sm.load_machine(guessed(text, seed))
+    before, size = (
+        m.compiled.home_coordinates(),
+        float(m.numbers().value[f"{m.legs[0]}.{address}".replace("/length", "/translation.x")]),
+    )
+    small = m
+    for share in np.linspace(0.0, 1.0, 41)[1:]:  # in small steps, which cannot hop
+        small = small.with_number(address, size + share * (value - size))
+    for at_once in (
+        m.with_number(address, value),
+        m.with_effect("length", element=address.split("_")[0], error=1e-5).with_number(address, value),
+    ):
+        np.testing.assert_allclose(
+            at_once.compiled.home_coordinates(), small.compiled.home_coordinates(), atol=1e-7
+        )
+    assert np.abs(small.compiled.home_coordinates() - before).max() < 1.2
+    wrench = [50, 0, 0, 0, 0, 0]
+    swept = sm.design_sweep(m, {address: [size, value]}, wrench=wrench, progress=False)
+    assert (swept.status == 0).all()
+    assert float(swept.deflection[-1]) == pytest.approx(
+        float(np.linalg.norm(small.solve(small.description.home.p, wrench).displacement[:3])), rel=1e-6
+    )
+    small.save(file)
+    np.testing.assert_allclose(
+        sm.load_machine(file).compiled.home_coordinates(), small.compiled.home_coordinates(), atol=1e-9
+    )

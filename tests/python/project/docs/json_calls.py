@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+SHIPPED = (
+    "3-rps", "five-bar", "hexapod", "hybrid", "linear-delta", "orthoglide-original", "orthoglide-revised", "rotary-delta",
+    "swing-table", "travelling-column", "tripteron", "ur10",
+)  # fmt: skip
+EXPERIMENTS = ("A-servo", "B-none", "C-backlash", "D-gravity", "E-leglength")
+"""Of tests/data/experiments, all of orthoglide-revised; `make_workshop` puts them into its folder `measured`."""
 CALLS: dict[str, tuple[str, ...]] = {
     "machines": ("machines",),
     "new": ("new s.yaml --overwrite", "new --from scara s.yaml --overwrite", "new --list"),
-    "check": ("check five-bar", "check my_machine.yaml"),
+    "check": (*(f"check {name}" for name in SHIPPED), "check my_machine.yaml"),
     "show": (
-        "show five-bar --no-picture",
-        "show ur10 --no-picture",
+        *(f"show {name} --no-picture" for name in SHIPPED),
         "show five-bar --load 100,0,0 --no-picture",
     ),
     "effects": ("effects",),
@@ -45,10 +50,21 @@ CALLS: dict[str, tuple[str, ...]] = {
     "link": ("link bar.yaml --quick --size 6 -o b.yaml",),
     "experiment": (
         "experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 --overwrite -o clocks",
+        "experiment new more_clocks.csv --machine five-bar --set z=0 --overwrite -o more_clocks",
     ),
-    "residual": ("residual orthoglide-revised january", "residual linear-delta experiments/heights"),
-    "diagnose": ("diagnose orthoglide-revised january -o d1",),
-    "calibrate": ("calibrate orthoglide-revised held_out -o c1",),
+    "residual": (
+        *(f"residual orthoglide-revised measured/{name}" for name in EXPERIMENTS),
+        "residual orthoglide-revised january",
+        "residual linear-delta experiments/heights",
+    ),
+    "diagnose": (
+        *(f"diagnose orthoglide-revised measured/{name}" for name in EXPERIMENTS),
+        "diagnose orthoglide-revised january -o d1",
+    ),
+    "calibrate": (
+        *(f"calibrate orthoglide-revised measured/{name}" for name in EXPERIMENTS),
+        "calibrate orthoglide-revised held_out -o c1",
+    ),
     "simulate": ("simulate five-bar --poses 3 -o sim",),
     "plan": (
         "plan orthoglide-revised --identify 'compliance actuator x scale=1' --rows 4 --poses 8",
@@ -80,3 +96,26 @@ COSTLY = {
     "taps",
 }
 """Left to the slow lane."""
+MAPS: dict[str, tuple[str, ...]] = {
+    "calibrate": (".rest", ".seconds", ".held_out.groups", ".validity.drives", ".validity.loads", ".found_again"),
+    "check": (".home_gaps", ".home_changes"),
+    "diagnose": (
+        ".effects[].parameters", ".effects[].evidence", ".alternatives[][].parameters", ".alternatives[][].evidence",
+        ".before.per_axis", ".after.per_axis", ".noise.floor", ".noise.repeats", ".noise.declared", ".noise.consistency",
+        ".detectable[].sizes", ".seconds",
+    ),
+    "experiment": (".columns", ".units"),
+    "map": (".failed", ".worst_pose.shares", ".worst_pose.sources", ".rows[].percentiles"),
+    "mill": (".statuses",),
+    "new": (".dimensions", ".*.dimensions"),
+    "optimize": (".chosen", ".refined", ".refined.*.found", ".refined.*.refined", ".refined.*.deviation.*"),
+    "paper": (".statements[].numbers",),
+    "process": (".laws[].numbers",),
+    "residual": (".summary.per_axis", ".noise_floor"),
+    "show": (".legs", ".elements"),
+    "solve": (".actuator_effort", ".leg_wrench", ".joint_coordinates", ".spring_deflection"),
+    "stress": (".springs", ".joints", ".legs"),
+    "taps": (".candidates[].parameters", ".candidates[].u"),
+    "wrench": (".leg_wrench", ".leg_stiffness", ".actuator_effort"),
+}  # fmt: skip
+"""Places in what a command prints whose keys are names of parts, drives, channels, columns or measures, not words of ours; * is any text."""

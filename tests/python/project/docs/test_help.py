@@ -38,6 +38,9 @@ RUN_ELSEWHERE = {
     "optimize redesign": "my_design.yaml is this file with a smaller search",
 }
 OUTLINE = "G21 G90 G17 S18000 M3\nG0 X0 Y0 Z0\nG1 X60 F2000\nG3 X70 Y10 I0 J10\nG1 Y40\nM5\nM2\n"
+MORE_CLOCKS = (
+    "x [mm];y [mm];Fx [N];Fy [N];dx [mm];dy [mm]\n0;416;100;0;0,3515;0,01\n50;416;0;-100;0,02;-0,3499\n"
+)
 TRACKER = """Point ID;X Nominal;Y Nominal;Z Nominal;X [mm];Y [mm];Z [mm];Temp
 A1;0,0;0,0;700,0;0,012;-0,020;700,004;20,1
 A2;50,0;20,0;700,0;50,031;19,991;699,998;20,2
@@ -77,6 +80,7 @@ def make_workshop(at: Path) -> Path:
         write_text(at / "arm.urdf", ROBOT)
     shutil.copytree(SERVO, at / "experiments/servo")
     shutil.copytree(SERVO, at / "dial_gauges")
+    shutil.copytree(SERVO.parent, at / "measured")
     simulate("linear-delta", "experiments/heights", "--quantity", "position")
     simulate("ur10", "experiments/tracker", "--quantity", "position")
     shutil.copytree(at / "experiments/tracker", at / "tracker")
@@ -104,6 +108,7 @@ def make_workshop(at: Path) -> Path:
     )
     clocks = "x [mm];y [mm];Fx [N];Uhr 1 [µm];Uhr 2 [µm]\n0;416;100;351,5;352,1\n50;416;-100;-350,2;-349,9\n"
     (at / "clocks.csv").write_text(clocks, encoding="utf-8")
+    (at / "more_clocks.csv").write_text(MORE_CLOCKS, encoding="utf-8")
     shutil.copy(SHIPPED / "machining/process/library/trimming.yaml", at)
     shutil.copytree(TAPS, at / "examples/taps")
     (at / "forces.csv").write_text(FORCES, encoding="utf-8")

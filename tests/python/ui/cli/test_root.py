@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
+from inspect import getdoc
 from pathlib import Path
 
 import pytest
+from rich.text import Text
+from typer.main import get_command
 
 from stiffmap.common.errors import MissingPartError
 from stiffmap.ui.cli import main
-from stiffmap.ui.cli.app import load
+from stiffmap.ui.cli.app import build_app, load, styled
 from stiffmap.ui.cli.commands import COMMANDS, Command
 
 
@@ -28,6 +32,30 @@ def test_help_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
     for command in COMMANDS:
         if command.exists():
             assert command.summary.split()[0] in out
+
+
+@pytest.mark.parametrize("name", [command.name for command in COMMANDS if command.exists()])
+def test_each_help_string_appears_in_full(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 4000)
+    app = build_app([name])
+    (function,) = (c.callback for c in app.registered_commands if c.name == name)
+    plain = re.compile(r"\[/?(?:cyan|bold)\]")
+    expected = [plain.sub("", " ".join(p.split())) for p in (getdoc(function) or "").split("\n\n")]
+    expected += [p.help for p in get_command(app).commands[name].params if p.help and not p.hidden]
+    code, out, _ = run(capsys, name, "--help")
+    assert code == 0
+    shown = " ".join(out.split())
+    for text in expected:
+        assert " ".join(text.split()) in shown
+
+
+@pytest.mark.parametrize(
+    "text", ["x [mm]", "the extra [fea]", "[default: home]", "feed [mm/min] or [/s]", "a \\[b]", "[dim]"]
+)
+def test_brackets_in_help_are_text(text: str) -> None:
+    assert Text.from_markup(styled(f"[bold]{text}[/bold]")).plain == text
 
 
 def test_help_imports_no_command() -> None:

@@ -132,3 +132,26 @@ def test_stiffmap_does_not_import_matplotlib() -> None:
         "sys.exit('matplotlib' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", script], capture_output=True, check=False).returncode == 0
+
+
+def test_every_figure_shows_in_a_notebook_without_pyplot() -> None:
+    """A notebook draws a matplotlib Figure by itself only once pyplot is loaded."""
+    script = (
+        "import sys, stiffmap as sm\n"
+        "from stiffmap import plot\n"
+        "m = sm.load_machine('five-bar')\n"
+        "p, w = (0, 0.416, 0), (10, 0, 0, 0, 0, 0)\n"
+        "ds = sm.error_map(m, x=[0, 0.05], y=[0.4, 0.42], z=0.0, wrench=w, progress=False)\n"
+        "for f in (plot.machine_figure(m), plot.loaded_figure(m, p, w), plot.polar_figure(sm.polar(m, p, directions=8)),\n"
+        "          plot.map_figure(ds), plot.sweep_figure({'x': sm.sweep(m, p, (1, 0, 0), [10.0, 20.0])})):\n"
+        "    assert f._repr_png_()[:4] == b'\\x89PNG', f\n"
+        "assert 'matplotlib.pyplot' not in sys.modules\n"
+    )
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert not found.returncode, found.stderr
+
+
+def test_a_notebook_takes_the_picture_of_every_figure(machine: sm.Machine) -> None:
+    formatters = pytest.importorskip("IPython.core.formatters", reason="IPython is not installed")
+    data, _ = formatters.DisplayFormatter().format(plot.machine_figure(machine))
+    assert data["image/png"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.ui.cli import main
 from stiffmap.ui.view.colours import table
+from stiffmap.ui.view.controls import DECIMALS
 from stiffmap.ui.view.open import View, model_of
 
 UNNAMED = """() => [...document.querySelectorAll("input:not([type=hidden]), textarea, button, [role=slider]")]
@@ -135,6 +137,67 @@ def test_typed_numbers_undo_and_what_is_refused(browser: Any) -> None:
         assert until(lambda: tool.input_value() == "0")  # the panel shows what holds
         page.get_by_role("button", name="Undo").click()
         assert until(lambda: view.state.force == (0.0, 0.0, -300.0))
+
+
+FIELDS: dict[str, list[tuple[str, str, Callable[[View], float], float]]] = {
+    "Tool and load": [
+        ("Tool, mm, x", "12.5", lambda v: v.state.position[0], 0.0125),
+        ("Tool, mm, y", "-0.75", lambda v: v.state.position[1], -0.00075),
+        ("Tool, mm, z", ".25", lambda v: v.state.position[2], 0.00025),
+        ("Moment, N·m, x", ".25", lambda v: v.state.moment[0], 0.25),
+        ("Moment, N·m, z", "-1.125", lambda v: v.state.moment[2], -1.125),
+        ("Force, N, y", "100.5", lambda v: v.state.force[1], 100.5),
+        ("Force, N, z", "-0.001", lambda v: v.state.force[2], -0.001),
+        ("Force around z, deg", "90.5", lambda v: float(np.rad2deg(np.arctan2(*v.state.force[1::-1]))), 90.5),
+        ("Size of the force, N", "200.5", lambda v: float(np.linalg.norm(v.state.force)), 200.5),
+        ("Gravity downwards, m/s²", "9.806", lambda v: -v.state.gravity[2], 9.806),
+        ("Magnification", "37.5", lambda v: v.state.magnification or 0.0, 37.5),
+    ],
+    "Map": [
+        ("Normal of a free plane, x", "0.125", lambda v: v.state.normal[0], 0.125),
+        ("Tolerance, µm", "12.5", lambda v: v.state.tolerance, 12.5e-6),
+        ("Frequency, Hz", "7.25", lambda v: v.state.frequency, 7.25),
+    ],
+    "Numbers": [
+        ("Value, SI", "0.3", lambda v: next((x for _, x in v.state.changes), 0.0), 0.3),
+        ("Value, SI", "0.0000000125", lambda v: next((x for _, x in v.state.changes), 0.0), 1.25e-8),
+    ],
+}  # fmt: skip
+
+
+def close_to(found: Callable[[], float], wanted: float) -> bool:
+    return found() == pytest.approx(wanted, rel=1e-6)
+
+
+def test_decimals_are_taken_and_shown_in_every_field(browser: Any) -> None:
+    with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
+        page = opened(browser, view)
+        for tab, fields in FIELDS.items():
+            page.get_by_role("tab", name=tab).click()
+            for name, text, value, wanted in fields:
+                box = page.get_by_role("textbox", name=name)
+                box.fill(text)
+                box.press("Enter")
+                near = partial(close_to, lambda v=value: v(view), wanted)
+                shown = partial(close_to, lambda b=box: float(b.input_value()), float(text))
+                assert until(near, 10), (name, value(view))
+                assert until(shown, 10), (name, box.input_value())
+        page.get_by_role("tab", name="Numbers").click()
+        page.get_by_role("button", name="All as in the file").click()
+        own = next(iter(view._viewer.controls._all.values()))
+        shown = page.get_by_role("textbox", name="Value, SI")
+        assert until(lambda: float(shown.input_value()) == pytest.approx(own, rel=1e-9)), (
+            own,
+            shown.input_value(),
+        )
+
+
+def test_every_field_of_a_number_has_decimals() -> None:
+    pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
+    with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
+        fields = [h for h in vars(view._viewer.controls).values() if hasattr(h, "precision")]
+        assert len(fields) >= 12
+        assert {h.precision for h in fields} == {DECIMALS}
 
 
 def test_several_pages_show_the_same_and_a_closed_one_costs_nothing(browser: Any) -> None:

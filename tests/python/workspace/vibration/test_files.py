@@ -7,6 +7,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.workspace.vibration.files import read_responses
+from stiffmap.workspace.vibration.response_units import response_unit
 
 
 def test_a_csv_file_is_read_in_its_units(tmp_path):
@@ -104,3 +105,113 @@ def test_a_universal_file_that_is_not_whole_is_one_message(harm, message, tmp_pa
     with pytest.raises(sm.StiffmapError, match=message) as problem:
         read_responses(path)
     assert str(path) in str(problem.value)
+
+
+MASS, STIFFNESS, DAMPING = 2.0, 1e6, 0.02
+F = np.arange(1, 42) * 0.5
+W = 2 * np.pi * F
+RECEPTANCE = 1 / (STIFFNESS - MASS * W**2 + 2j * DAMPING * np.sqrt(STIFFNESS * MASS) * W)
+ACCELERANCE = -(W**2) * RECEPTANCE
+
+
+def universal(
+    path, data, above=(12, "m/s2"), below=(13, "N"), along=(18, "Hz"), *, base=None, fill=False, name=""
+):
+    """A universal file with one response, written line by line from the description of its format."""
+    lines = []
+    if base is not None:
+        code, length, force = base
+        lines += ["    -1", "   164", f"{code:10d}{'units':20s}{2:10d}"]
+        lines += [
+            "".join(f"{x:25.17E}".replace("E", "D") for x in (length, force, 1.0)),
+            f"{273.15:25.17E}",
+            "    -1",
+        ]
+    lines += ["    -1", "    58", "tap 1", "NONE", "25-Nov-26 10:00:00", "NONE", "NONE"]
+    lines.append(f"{4:5d}{1:10d}{1:5d}{0:10d} {'NONE':10s}{1:10d}{1:4d} {'NONE':10s}{1:10d}{1:4d}")
+    lines.append(f"{5:10d}{len(data):10d}{1:10d}{0.5:13.5E}{0.5:13.5E}{0.0:13.5E}")
+    for kind, unit in (along, above, below, (0, "NONE")):
+        lines.append(f"{kind:10d}{0:5d}{0:5d}{0:5d} {name or 'NONE':20s} {unit:20s}")
+    flat = [x for c in data for x in (c.real, c.imag)]
+    flat += [0.0] * (-len(flat) % 6 if fill else 0)
+    lines += ["".join(f"{x:13.5E}" for x in flat[i : i + 6]) for i in range(0, len(flat), 6)]
+    path.write_text("\n".join([*lines, "    -1"]) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("data", "axes"),
+    [
+        (ACCELERANCE, {}),
+        (ACCELERANCE / 9.80665, {"above": (12, "g")}),
+        (ACCELERANCE / 9.80665, {"above": (12, "g/N"), "below": (0, "NONE")}),
+        (ACCELERANCE / 9.80665, {"above": (12, "g/N")}),
+        (ACCELERANCE * 4.4482216, {"below": (13, "lbf")}),
+        (ACCELERANCE / 0.0254 * 4.4482216, {"above": (12, "in/s^2"), "below": (13, "lbf")}),
+        (ACCELERANCE * 1e6, {"above": (12, "mm/s²"), "below": (9, "kN")}),
+        (ACCELERANCE, {"above": (1, "(1/N)*(m/s²)"), "below": (0, "NONE")}),
+        (ACCELERANCE, {"above": (0, "(m/s2)/N"), "below": (0, "NONE")}),
+        (ACCELERANCE, {"above": (12, "NONE"), "below": (13, "")}),
+        (ACCELERANCE / 9.80665, {"above": (12, "NONE"), "name": "acc (g)", "below": (13, "N")}),
+        (ACCELERANCE * 1e3, {"above": (12, ""), "below": (13, ""), "base": (5, 1e3, 1.0)}),
+        (ACCELERANCE * 1e3 / 1e3, {"above": (12, ""), "below": (13, ""), "base": (5, 1e3, 1e3)}),
+        (ACCELERANCE * 1e3, {"above": (12, "mm/s2"), "base": (2, 3.28083989501312, 0.224808943)}),
+        (RECEPTANCE * 1e3, {"above": (8, "mm")}),
+        (RECEPTANCE * 1e6, {"above": (8, "\N{MICRO SIGN}m")}),
+        (1j * W * RECEPTANCE * 1e3, {"above": (11, "mm/s")}),
+        (RECEPTANCE, {"above": (8, "m"), "along": (18, "rad/s")}),
+        (ACCELERANCE, {"fill": True}),
+    ],
+)  # fmt: skip
+def test_universal_files_are_read_in_their_units(data, axes, tmp_path):
+    pytest.importorskip("pyuff")
+    (one,) = read_responses(universal(tmp_path / "tap.uff", data, **axes))
+    assert len(one.frequency) == len(F)
+    np.testing.assert_allclose(one.frequency, F / (2 * np.pi if "along" in axes else 1), rtol=1e-9)
+    np.testing.assert_allclose(one.receptance, RECEPTANCE, rtol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("axes", "message"),
+    [
+        ({"below": (12, "m/s2")}, "divided by a force .* an acceleration"),
+        ({"below": (8, "m")}, "divided by a force .* a displacement"),
+        ({"below": (15, "Pa")}, "divided by a force .* a pressure"),
+        ({"below": (0, "NONE")}, "expected the force"),
+        ({"below": (13, "V")}, "unit that is known.* found 'V'"),
+        ({"above": (12, "EU")}, "unit that is known.* found 'EU'"),
+        ({"above": (12, "dB")}, "unit that is known.* found 'dB'"),
+        ({"above": (12, "mm")}, "acceleration .* by force.* found 'mm' by 'N'"),
+        ({"above": (8, "m/s2")}, "displacement .* by force.* found 'm/s2' by 'N'"),
+        ({"above": (1, "g2/N2"), "below": (0, "NONE")}, "found 'g2/N2'"),
+        ({"above": (15, "Pa")}, "found a pressure"),
+        ({"along": (17, "s")}, "frequencies .* found a time"),
+        ({"along": (18, "s")}, "found 's'"),
+        ({"above": (12, ""), "base": (1, 3.28, 0.2248)}, "says SI, but 3.28"),
+    ],
+)
+def test_universal_files_that_say_no_response_by_force_are_one_message(axes, message, tmp_path):
+    pytest.importorskip("pyuff")
+    path = universal(tmp_path / "tap.uff", ACCELERANCE, **axes)
+    with pytest.raises(sm.StiffmapError, match=message) as problem:
+        read_responses(path)
+    assert str(problem.value).startswith(
+        f"{path}: response tap 1: expected" if "base" not in axes else f"{path}"
+    )
+
+
+@pytest.mark.parametrize(
+    ("unit", "size"), [("mm/s2/N", 1e-3), ("g/lbf", 9.80665 / 4.4482216), ("in/s^2/kN", 2.54e-5)]
+)
+def test_a_csv_file_may_have_any_unit_of_a_response_by_force(unit, size, tmp_path):
+    path = tmp_path / "tap.csv"
+    rows = "".join(
+        f"{f},{float(a.real / size)},{float(a.imag / size)}\n" for f, a in zip(F, ACCELERANCE, strict=True)
+    )
+    path.write_text(f"frequency_Hz,real_{unit},imag_{unit}\n{rows}")
+    np.testing.assert_allclose(read_responses(path)[0].receptance, RECEPTANCE, rtol=1e-6)
+
+
+@pytest.mark.parametrize("word", ["Mn", "m/s^", "(m", "N)", "m/N-s2", "m/ss", "furlong", "1" * 200])
+def test_a_unit_that_is_not_known_is_none(word):
+    assert response_unit(word) is None

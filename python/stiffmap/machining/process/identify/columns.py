@@ -6,11 +6,11 @@ import re
 from collections.abc import Mapping
 from math import pi
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from stiffmap.common.broadcasting import given_path
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.named import WORD, Known, NamedTable, Rows, named, rows_of
 
@@ -67,7 +67,10 @@ def columns_of(
 ) -> Columns:
     """The columns of a file or a mapping; `defaults`, SI, where it has none of that name. Raises FileError."""
     file = "table" if isinstance(table, Mapping) else str(table)
-    rows = _of_mapping(table) if isinstance(table, Mapping) else rows_of(Path(table), sheet)
+    if isinstance(table, Mapping):
+        rows = _of_mapping(table)
+    else:
+        rows = rows_of(given_path(table, "table", "a file or a mapping of columns"), sheet)
     found = named(rows, KNOWN, file)
     out = Columns(**vars(found))
     if "side" in out.values:

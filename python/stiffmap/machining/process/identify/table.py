@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, instance_of
 from stiffmap.machining.process.description import SIDES, Cut, EndMill, Process, Tool
 from stiffmap.machining.process.identify.columns import Columns, columns_of
 
@@ -124,6 +124,7 @@ def _slot_signs(table: ForceTable) -> ForceTable:
 
 
 def _defaults(process: Process) -> dict[str, Any]:
+    instance_of(process, Process, "process", "a Process, as load_process gives it")
     c, t = process.cut, process.tool
     return {
         "teeth": t.teeth, "axial": c.axial, "diameter": t.diameter, "radial": c.radial, "side": c.side,

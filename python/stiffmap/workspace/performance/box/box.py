@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats, real_array, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.rotations import as_rotations
 from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.box.box_search import BoxSearch
 from stiffmap.workspace.performance.box.proof import judge_on
 from stiffmap.workspace.performance.limits.limits import Bounds
@@ -137,8 +138,8 @@ def largest_box(
     shape = real_array(proportions, "proportions")
     if shape.shape != (3,) or not (np.isfinite(shape).all() and (shape > 0).all()):
         raise StiffmapError(f"proportions: expected 3 positive numbers, got {proportions!r}")
-    if not tolerance > 0:
-        raise StiffmapError(f"tolerance: expected a positive length in m, got {tolerance!r}")
+    magnitude(tolerance, "tolerance", "m")
+    whole_number(max_evaluations, "max_evaluations", 1)
     given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
     bounds = Bounds(
         machine, given, transmission, norm, length, ranges, joints, clearance, deflection, threads

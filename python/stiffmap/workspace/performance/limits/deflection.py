@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, real_array
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.broadcasting import Floats, real_array, whole_number
 from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.inputs import plane_axes
+from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 from stiffmap.workspace.performance.poses import box_nodes, read_box
 
 TURNS = 12
@@ -88,8 +87,8 @@ def worst_deflection(
     StiffmapError
         For bad input, never for a pose.
     """
-    if not (np.isfinite(force) and force > 0):
-        raise StiffmapError(f"force: expected a positive size in N, got {force!r}")
+    force = magnitude(force, "force", "N")
+    whole_number(turns, "turns", 0)
     axes = (0, 1, 2) if plane is None else plane_axes(plane)
     ask = _Ask(machine, force, axes, direction, linear, rotation, gravity, threads, turns)
     if position is not None:

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, instance_of, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description.machine import TASK
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
+from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.limits.bars import Bars
 from stiffmap.workspace.performance.limits.limit import UNLIMITED, Limit
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics, kernel_starts
@@ -45,7 +46,10 @@ class Bounds:
 
     def __post_init__(self) -> None:
         if self.transmission is not None:
-            low, high = self.transmission
+            ends = real_array(self.transmission, "transmission", "(lowest, highest)")
+            if ends.shape != (2,):
+                raise StiffmapError(f"transmission: expected (lowest, highest), got {self.transmission!r}")
+            low, high = ends
             if not 0 <= low < high:
                 raise StiffmapError(
                     f"transmission: expected (lowest, highest) with 0 <= lowest < highest, got ({low}, {high})"
@@ -54,8 +58,10 @@ class Bounds:
             raise StiffmapError(
                 f"norm: expected 'sphere' (singular values) or 'cube' (each drive within its limit), got {self.factors!r}"
             )
-        if self.clearance is not None and not self.clearance > 0:
-            raise StiffmapError(f"clearance: expected a positive distance in m, got {self.clearance!r}")
+        if self.clearance is not None:
+            magnitude(self.clearance, "clearance", "m")
+        if self.deflection is not None:
+            instance_of(self.deflection, (tuple, list), "deflection", "(force in N, plane, most in m)")
         if self.deflection is not None and not (self.deflection[0] > 0 and self.deflection[2] > 0):
             raise StiffmapError(
                 f"deflection: expected (force in N, plane, most in m), both positive, got {self.deflection!r}"

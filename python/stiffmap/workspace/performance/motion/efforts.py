@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats, instance_of, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description.elements import Drive
 from stiffmap.solve.machine import Machine, takes_machine
@@ -67,7 +67,7 @@ def drive_efforts(
     """
     need_masses(machine, "inverse dynamics")
     h = in_cables(machine, "inverse dynamics")
-    t = trajectory
+    t = instance_of(trajectory, Trajectory, "trajectory", "a Trajectory")
     k = drive_kinematics(machine, t.position, rotation, sharing=sharing, threads=threads)
     refuse_failed(machine, k, t.time, t.position)
     zero = np.zeros_like(t.position)

@@ -7,8 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing, wrench_array
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.broadcasting import (
+    Floats,
+    batch,
+    rows,
+    thread_count,
+    trailing,
+    whole_number,
+    wrench_array,
+)
 from stiffmap.common.rotations import as_rotations
 from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
@@ -54,8 +61,7 @@ def natural_frequencies(
     Raises StiffmapError for bad input (a machine without masses), never for a pose.
     """
     need_masses(machine, "a natural frequency")
-    if modes < 1:
-        raise StiffmapError(f"modes: expected 1 or more, got {modes}")
+    whole_number(modes, "modes", 1)
     p = trailing(position, (3,), "position", "positions (m)")
     w = wrench_array(wrench)
     r = machine.compiled.home_rotation

@@ -10,6 +10,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Drive
 from stiffmap.model.description.tree import joints
 from stiffmap.solve.machine import Machine
+from stiffmap.workspace.maps.inputs import magnitude
 
 PARTS = {"all": slice(0, 6), "translation": slice(0, 3), "rotation": slice(3, 6)}
 
@@ -54,14 +55,12 @@ def characteristic_length(machine: Machine, length: float | None) -> float:
     """m: turns angles into lengths; the machine's own (mean distance of its joints) where none is given."""
     if length is None:
         return float(machine.compiled.length)
-    if not np.isfinite(length) or length <= 0:
-        raise StiffmapError(f"length: expected a positive length in m, got {length!r}")
-    return float(length)
+    return magnitude(length, "length", "m")
 
 
 def weighted(machine: Machine, jacobian: Floats, length: float, part: str) -> Floats:
     """Rows of `part` with rotations times the length, columns of revolute drives per that length."""
-    if part not in PARTS:
+    if not isinstance(part, str) or part not in PARTS:
         raise StiffmapError(f"part: expected one of {', '.join(PARTS)}, got {part!r}")
     out = jacobian.copy()
     out[..., 3:, :] *= length

@@ -1,0 +1,86 @@
+"""What is no argument at all is one clear error of every public function: None, text, a mapping."""
+
+from __future__ import annotations
+
+import inspect
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+
+P, W = [0.0, 0.416, 0.0], [10.0, 0, 0, 0, 0, 0]
+FEW: dict[str, Any] = {"x": [0.0, 0.05], "y": [0.4, 0.42], "z": 0.0}
+CALLS: dict[str, dict[str, Any]] = {
+    "accuracy_transmission": {"position": P},
+    "assembly_wrenches": {"position": P},
+    "deflection_budget": {"position": P, "wrench": W},
+    "design_sweep": {"numbers": {"arm/length": [0.3]}},
+    "error_map": {"wrench": W, **FEW},
+    "force_transmission": {"position": P},
+    "inverse_kinematics": {"position": P},
+    "map_estimate": {"wrench": W, **FEW},
+    "natural_frequencies": {"position": P},
+    "sweep": {"position": P, "direction": [1, 0, 0], "forces": [10.0]},
+    "velocity_section": {"position": P},
+    "velocity_transmission": {"position": P},
+    "why_unreachable": {"position": P},
+    "worst_deflection": {"position": P, "force": 10.0},
+}
+"""Right arguments of calls that take a moment."""
+OTHER = {"progress", "out", "resume", "scheduler", "chunk"}
+"""Of long maps: they have tests of their own."""
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_every_argument_is_checked(name: str) -> None:
+    call, machine = getattr(sm, name), sm.load_machine("five-bar")
+    for p in inspect.signature(call).parameters.values():
+        if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD) or p.name in OTHER:
+            continue
+        for bad in (None, "zzz", {}):
+            if bad is not None or p.default is not None:
+                with suppress(sm.StiffmapError):  # and no other error
+                    call(**{"machine": machine, **CALLS[name], p.name: bad})
+
+
+@pytest.mark.parametrize("bad", [None, {}, 1, [1, 2]])
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("drive_efforts", {"machine": "five-bar", "trajectory": ...}),
+        ("drive_efforts", {"machine": ..., "trajectory": "trim"}),
+        ("limiting_depth", {"receptance": ..., "process": "slot"}),
+        ("floquet_multiplier", {"modes": ..., "process": "slot", "depth": 1e-3, "speed": 100.0}),
+        ("load_requirements", {"source": ...}),
+        ("import_urdf", {"urdf": ...}),
+        ("import_urdf", {"urdf": "arm.urdf", "sidecar": ...}),
+        ("identify_process", {"table": ...}),
+        ("identify_process", {"table": {}, "process": ...}),
+        ("worst_deflection", {"machine": "five-bar", "force": ...}),
+        ("largest_box", {"machine": "five-bar", "tolerance": ...}),
+        ("largest_box", {"machine": "five-bar", "clearance": ...}),
+        ("largest_box", {"machine": "five-bar", "transmission": ...}),
+        ("largest_box", {"machine": "five-bar", "max_evaluations": ...}),
+    ],
+)
+def test_what_is_no_argument_is_one_error(name: str, arguments: dict[str, Any], bad: Any) -> None:
+    given = {k: bad if v is ... else v for k, v in arguments.items()}
+    optional = {"sidecar", "clearance", "transmission", "process"} & {
+        k for k, v in arguments.items() if v is ...
+    }
+    sound = (bad is None and optional) or (
+        bad == 1 and not isinstance(bad, list | dict) and name in ("worst_deflection", "largest_box")
+    )
+    if sound or (bad == [1, 2] and "transmission" in arguments):
+        return
+    with pytest.raises(sm.StiffmapError):
+        getattr(sm, name)(**given)
+
+
+@pytest.mark.parametrize("force", ["300", [1.0, 2.0], np.nan, -1.0, None])
+def test_a_force_is_one_positive_number(force: Any) -> None:
+    with pytest.raises(sm.StiffmapError, match="force: expected a positive number"):
+        sm.worst_deflection("five-bar", P, force=force)
