@@ -154,7 +154,7 @@ def _universal(path: Path) -> list[MeasuredResponse]:
         size, kind = values
         out.append(
             MeasuredResponse(
-                str(s.get("id1", path.stem)), f, _receptance(f, size * np.asarray(s["data"], complex), kind),
+                str(s.get("id1", path.stem)), f, _receptance(f, np.asarray(size * s["data"], complex), kind),
                 np.asarray(known, dtype=float), response, reference,
             )
         )  # fmt: skip
