@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 
+from stiffmap.common.broadcasting import given_path, instance_of
 from stiffmap.experiment.comparison import residual as comparison
 from stiffmap.experiment.comparison.residual import Residual
 from stiffmap.experiment.experiment import Experiment
@@ -18,6 +19,7 @@ from stiffmap.model.files.load import Source
 from stiffmap.solve.machine import Machine, as_machine
 
 Effects = str | AppliedEffect | Sequence[str | AppliedEffect]
+EFFECTS = "effects, as text such as 'dead_zone actuator y half_width=10um' or records"
 """One effect or several, each as text (``compliance actuator x scale=1.2``) or as a record."""
 
 
@@ -78,12 +80,21 @@ def simulate(
 
 def as_experiment(given: Experiment | str | PathLike[str]) -> Experiment:
     """The experiment itself, or that of a folder or file."""
-    return given if isinstance(given, Experiment) else load_experiment(given)
+    if isinstance(given, Experiment):
+        return given
+    given_path(given, "experiment", "an Experiment, or its folder")
+    return load_experiment(given)
 
 
 def effects_of(machine: Machine, given: Effects) -> list[AppliedEffect]:
     """Records of effects; texts are read with the machine's own names of element and legs filled in."""
-    several = [given] if isinstance(given, str | AppliedEffect) else list(given)
+    several = (
+        [given]
+        if isinstance(given, str | AppliedEffect)
+        else list(instance_of(given, Iterable, "effects", EFFECTS))
+    )
+    for one in several:
+        instance_of(one, (str, AppliedEffect), "effects", EFFECTS)
     return [placed(machine, one) if isinstance(one, str) else one for one in several]
 
 

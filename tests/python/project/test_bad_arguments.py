@@ -60,6 +60,13 @@ def test_every_argument_is_checked(name: str) -> None:
         ("identify_process", {"table": ...}),
         ("identify_process", {"table": {}, "process": ...}),
         ("worst_deflection", {"machine": "five-bar", "force": ...}),
+        ("residual", {"machine": "five-bar", "experiment": ...}),
+        ("simulate", {"machine": "five-bar", "plan": ...}),
+        ("monitor", {"machine": "five-bar", "before": ..., "after": "a", "effects": []}),
+        ("optimize", {"design": ...}),
+        ("uncertainty_ranking", {"ds": ...}),
+        ("measures", {"machine": "five-bar", "requirements": "none", "clearance": ...}),
+        ("workspace_volume", {"machine": "five-bar", "cells": ...}),
         ("largest_box", {"machine": "five-bar", "tolerance": ...}),
         ("largest_box", {"machine": "five-bar", "clearance": ...}),
         ("largest_box", {"machine": "five-bar", "transmission": ...}),
@@ -68,7 +75,7 @@ def test_every_argument_is_checked(name: str) -> None:
 )
 def test_what_is_no_argument_is_one_error(name: str, arguments: dict[str, Any], bad: Any) -> None:
     given = {k: bad if v is ... else v for k, v in arguments.items()}
-    optional = {"sidecar", "clearance", "transmission", "process"} & {
+    optional = {"sidecar", "clearance", "transmission", "process", "cells"} & {
         k for k, v in arguments.items() if v is ...
     }
     sound = (bad is None and optional) or (

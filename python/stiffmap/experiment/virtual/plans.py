@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.common.broadcasting import random_numbers
+from stiffmap.common.broadcasting import random_numbers, real_array, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -24,6 +24,7 @@ MARGIN = 0.02
 def random_poses(machine: Machine, number: int, seed: int) -> Floats:
     """(number, 3) m, evenly distributed over the workspace box."""
     low, high = machine.workspace
+    whole_number(number, "poses", 1)
     return np.asarray(np.round(random_numbers(seed).uniform(low, high, (number, 3)), 4))
 
 
@@ -41,6 +42,7 @@ def grid_poses(machine: Machine, counts: Sequence[int]) -> Floats:
 def load_set(name: str, sizes: Sequence[float]) -> Floats:
     """(m, 6) N of a pose. ``axes``: ± x, y, z in every size. ``full``: these, the sums of pairs in the
     largest size, and no load, so that every model-free check can be made."""
+    sizes = real_array(sizes, "force", "sizes (N)").reshape(-1).tolist()
     single = [s * size * np.eye(3)[a] for a in range(3) for s in (-1, 1) for size in sizes]
     if name == "full":
         top = max(sizes)
@@ -67,7 +69,7 @@ def plan_of_poses(
     noise, angle_noise
         One standard deviation of a reading, m and rad; None: 3 µm for deflections, 8 µm for positions.
     """
-    if quantity not in MICRO:
+    if not isinstance(quantity, str) or quantity not in MICRO:
         raise StiffmapError(f"quantity: expected deflection or position, got {quantity!r}")
     own = [np.zeros((1, 6))] * len(poses) if quantity == "position" else _each(loads, len(poses))
     position = np.repeat(poses, [len(w) for w in own], axis=0)

@@ -14,7 +14,6 @@ from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.comparison.summary import summary
 from stiffmap.experiment.experiment import Experiment
-from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.outliers import swapped
 from stiffmap.experiment.noise.over_time import over_time
 from stiffmap.experiment.noise.whitening import Problem
@@ -75,7 +74,7 @@ def calibrate(
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
-    data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
+    data = as_experiment(experiment)
     for name in exclude:
         if name not in GROUPS:
             raise StiffmapError(f"calibration: unknown group '{name}'; there are: {', '.join(GROUPS)}")

@@ -12,7 +12,6 @@ from stiffmap.common.number_text import within
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.experiment import Experiment
-from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import check_kinds
 from stiffmap.identification.candidates.plan import plan_of
@@ -77,7 +76,7 @@ def diagnose(
     """
     whole_number(seed, "seed", 0)
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
-    data = experiment if isinstance(experiment, Experiment) else load_experiment(experiment)
+    data = as_experiment(experiment)
     clock = Clock.of(time_limit, progress)
     check_kinds(n for n in exclude if n not in GROUPS)
     with clock.on_interrupt():

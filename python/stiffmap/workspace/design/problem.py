@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from stiffmap.common.arithmetic import evaluate
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, given_path
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.load import describe_document
@@ -150,7 +150,7 @@ def load_design(path: str | PathLike[str]) -> Design:
 
     Raises FileError naming file, line, key, what was expected and what was found.
     """
-    given = Path(path)
+    given = given_path(path, "design", "a file or a shipped name")
     if not given.is_file():
         shipped = Path(__file__).with_name(given.name if given.suffix else f"{given.name}.yaml")
         if len(given.parts) > 1 or not shipped.is_file():

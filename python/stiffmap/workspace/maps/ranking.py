@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 
+from stiffmap.common.broadcasting import instance_of
 from stiffmap.common.errors import StiffmapError
 
 
@@ -15,7 +16,7 @@ def uncertainty_ranking(ds: xr.Dataset) -> xr.DataArray:
 
     Raises StiffmapError for a map made without ``uncertainty=True``.
     """
-    if "variance_share" not in ds:
+    if "variance_share" not in instance_of(ds, xr.Dataset, "ds", "an error map"):
         raise StiffmapError("ranking: the map has none; it needs error_map(..., uncertainty=True)")
     weight = ds.deflection_std**2
     over = list(weight.dims)

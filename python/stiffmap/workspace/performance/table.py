@@ -16,6 +16,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.status import Status
+from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion
 from stiffmap.workspace.performance.poses import box_nodes, read_box
 from stiffmap.workspace.performance.registry import Case, Found, Measure, all_measures, get_measure
@@ -198,9 +199,7 @@ def _rows(chosen: Sequence[Measure], case: Case, task: Requirements) -> tuple[Ro
 
 
 def _positive(name: str, value: float | None) -> float | None:
-    if value is not None and not (np.isfinite(value) and value > 0):
-        raise StiffmapError(f"{name}: expected a positive length in m, got {value!r}")
-    return value
+    return None if value is None else magnitude(value, name, "m")
 
 
 def _motion(given: Motion | str | PathLike[str] | None) -> Motion | None:

@@ -176,7 +176,7 @@ def _in_si(s: dict[str, Any], base: dict[str, Any]) -> tuple[float, int]:
     above, below = _unit_of(s, "ordinate"), _unit_of(s, "orddenom")
     if above is None and kind in MOTIONS:
         above = ResponseUnit(_base(base, "length") if not turns else 1.0, int(not turns), 0, -MOTIONS[kind])
-    if below is None and by in FORCES:
+    if below is None and by in FORCES and (above is None or above.force == 0):
         size = _base(base, "force") * (_base(base, "length") if moment else 1.0)
         below = ResponseUnit(size, int(moment), 1)
     if above is None:

@@ -215,3 +215,21 @@ def test_a_csv_file_may_have_any_unit_of_a_response_by_force(unit, size, tmp_pat
 @pytest.mark.parametrize("word", ["Mn", "m/s^", "(m", "N)", "m/N-s2", "m/ss", "furlong", "1" * 200])
 def test_a_unit_that_is_not_known_is_none(word):
     assert response_unit(word) is None
+
+
+@pytest.mark.parametrize("binary", [0, 1])
+def test_units_of_files_that_pyuff_writes(binary, tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    base = {"units_code": 1, "units_description": "SI", "temp_mode": 1, "temp": 1.8, "temp_offset": 459.67}
+    file = pyuff.UFF(str(tmp_path / "tap.uff"))  # the factors are those of feet and pounds: the labels count
+    file.write_sets(
+        pyuff.prepare_164(length=3.28083989501312334, force=0.224808943099710480, **base), "overwrite"
+    )
+    file.write_sets(
+        pyuff.prepare_58(
+            func_type=4, rsp_node=3, rsp_dir=3, ref_node=1, ref_dir=-1, data=ACCELERANCE / 9.80665, x=F, id1="tap",
+            ordinate_spec_data_type=12, ordinate_axis_units_lab="g/N", abscissa_spacing=0, orddenom_spec_data_type=13,
+            binary=binary,
+        ), "add",
+    )  # fmt: skip
+    np.testing.assert_allclose(read_responses(tmp_path / "tap.uff")[0].receptance, RECEPTANCE, rtol=2e-5)

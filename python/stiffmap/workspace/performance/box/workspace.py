@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from stiffmap.common.broadcasting import Floats, random_numbers, real_array
+from stiffmap.common.broadcasting import Floats, random_numbers, real_array, real_number, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.rotations import as_rotations
 from stiffmap.common.short import short_repr
@@ -106,10 +106,11 @@ def workspace_volume(
     StiffmapError
         For bad input.
     """
-    if singularity is not None and not 0 <= singularity < 1:
+    if singularity is not None and not 0 <= real_number(singularity, "singularity") < 1:
         raise StiffmapError(f"singularity: expected a distance from 0 to 1, got {singularity!r}")
-    if cells is not None and cells < 2:
-        raise StiffmapError(f"cells: expected 2 or more along each edge, got {cells!r}")
+    if cells is not None:
+        whole_number(cells, "cells", 2, what="a whole number, 2 or more along each edge")
+    whole_number(prove, "prove", 0)
     given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
     bounds = Bounds(
         machine, given, transmission, norm, length, ranges, joints, clearance, deflection, threads
