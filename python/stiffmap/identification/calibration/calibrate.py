@@ -11,6 +11,7 @@ import numpy as np
 from stiffmap.common.broadcasting import whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.one_thread import on_one_thread
+from stiffmap.experiment.calls import as_experiment
 from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.comparison.summary import summary
 from stiffmap.experiment.experiment import Experiment
