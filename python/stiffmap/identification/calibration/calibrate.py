@@ -13,7 +13,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.calls import as_experiment
 from stiffmap.experiment.comparison.limitations import refuse
-from stiffmap.experiment.comparison.summary import summary
+from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.outliers import swapped
 from stiffmap.experiment.noise.over_time import over_time
@@ -23,11 +23,17 @@ from stiffmap.identification.calibration.result import Calibration
 from stiffmap.identification.calibration.table import table_of, too_wide
 from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.clock import Clock, Progress
-from stiffmap.identification.inference.amplitudes import GAPS, NOISE
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.corrected import Corrected, corrected, readings
 from stiffmap.identification.inference.inference import Inferred, infer
-from stiffmap.identification.inference.machines import CALIBRATED, left_by, stands_out, vouched, written
+from stiffmap.identification.inference.machines import (
+    CALIBRATED,
+    HeldOut,
+    left_by,
+    stands_out,
+    vouched,
+    written,
+)
 from stiffmap.identification.inference.names import EXACT
 from stiffmap.identification.inference.shares import shares
 from stiffmap.identification.inference.verdict import judged
@@ -110,11 +116,10 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     at_name = {r.name: r for r in rows}
     beyond = tuple(at_name[b.unknown.name] for b in verdict.beyond)
     each = shares(columns, best.fit)
-    gap = sum(each.get(p.name, 0.0) for p in best.fit.parts if p.kind in (*GAPS, "time"))
     problem = Problem.of(e, sigma, made.prediction, ~listed)
     if beyond:
         word = f"beyond tolerance: {', '.join(r.name for r in beyond)}"
-    elif (verdict.rest or verdict.time) and gap > 1.0 - gap - each[NOISE]:
+    elif (verdict.rest or verdict.time) and _mostly_left(made.held_out, before, after, best.fit.noise):
         word = "unattributed"
     elif exact:
         word = "as declared"
@@ -147,3 +152,9 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
         residual=left[1],
         seconds=time.perf_counter() - start,
     )
+
+
+def _mostly_left(held: HeldOut | None, before: Summary, after: Summary, noise: float) -> bool:
+    """Whether of the squares beyond noise more is left than taken away, of readings that no fit saw where there are any."""
+    one, other = (held.before, held.after) if held else (before, after)
+    return other.ratio**2 - noise**2 > 0.5 * (one.ratio**2 - noise**2)

@@ -51,7 +51,8 @@ class Picture(Figure):
 
     def _repr_png_(self) -> bytes:
         out = BytesIO()
-        self.savefig(out, format="png")
+        canvas: Any = FigureCanvasAgg(self)
+        canvas.print_png(out)
         return out.getvalue()
 
 
