@@ -111,16 +111,9 @@ def ur5(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
 
 
 def _cause(c: Calibration) -> str:
-    """The verdict, groups of numbers beyond their tolerances as a whole, and where errors along the travel are."""
-    parts = [c.verdict]
-    whole = "; ".join(" or ".join((w.group, *w.rivals)) for w in c.wider)
-    if whole and "beyond" not in c.verdict:
-        parts.append(f"beyond tolerance as a whole: {whole}")
-    if c.travel:
-        most = sorted(c.travel.profiles, key=lambda p: -p.share)[:2]
-        shares = ", ".join(f"{p.drive} {100 * p.share:.0f} %" for p in most)
-        parts.append(f"errors along the drives' travel, alone {shares}")
-    return "; ".join(parts)
+    """The verdict, and the parts of the model that take the largest shares of the squares."""
+    most = sorted(c.shares.items(), key=lambda part: -part[1])[:3]
+    return f"{c.verdict}; " + ", ".join(f"{name} {100 * share:.0f} %" for name, share in most)
 
 
 def _mean(left: Any) -> float:
@@ -142,12 +135,12 @@ def ur10(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
             example.write(data, [series], every, folder)
             c = sm.calibrate("ur10", folder, tolerances=Tolerances().scaled(3.0))
             used = time.process_time() - begun
-            assert c.unseen is not None
+            assert c.held_out is not None
             yield {
                 "set": f"UR10, laser tracker, series {series} ({kind})",
                 "quantity": "rms length of the position error, mm",
-                "before": LENGTH * c.unseen.before,
-                "after": LENGTH * c.unseen.after,
+                "before": LENGTH * c.held_out.before.rms,
+                "after": LENGTH * c.held_out.after.rms,
                 "unseen_rows": len(c.experiment),
                 "unseen_by": "five folds of poses" + (f", one row of {every}" if every > 1 else ""),
                 "cause": _cause(c),
@@ -177,8 +170,8 @@ def delta(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
         assert h is not None
         yield {
             "quantity": "rms of the height, mm",
-            "before": 1e3 * h.before,
-            "after": 1e3 * h.after,
+            "before": 1e3 * h.before.rms,
+            "after": 1e3 * h.after.rms,
             "unseen_rows": len(c.experiment),
             "unseen_by": f"left out: {h.by}, one after the other",
             "cause": _cause(c),

@@ -89,10 +89,8 @@ def main() -> int:
             used = time.process_time() - begun
             assert c.held_out is not None
             print(
-                f"{name:34}  {measured_arm.LENGTH * c.held_out.after:12.3f}  {used:7.2f} (all folds and verdict)"
+                f"{name:34}  {measured_arm.LENGTH * c.held_out.after.rms:12.3f}  {used:7.2f} (all folds and verdict)"
             )
-            if c.travel:
-                print(f"{'  and profiles of the drives':34}  {measured_arm.LENGTH * c.travel.after:12.3f}")
         for name, python in (p.split("=", 1) for p in a.peer):
             script = Path(__file__).with_name(f"arm_{name}.py")
             run = subprocess.run(

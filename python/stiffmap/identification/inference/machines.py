@@ -32,6 +32,8 @@ from stiffmap.solve.machine import Machine
 
 SET_ASIDE = (DEGREES + 1.0) / (DEGREES + GROSS**2)
 """Weight below which a reading counts in no measure: that of one beyond `GROSS` times the noise."""
+WORD = 10
+"""Poses that the model's own word counts for in a promise."""
 FOLDS = 10
 """Groups of poses of which the promise is the mean."""
 DECLARED, CALIBRATED, CORRECTED = "declared", "calibrated", "corrected"
@@ -146,7 +148,17 @@ def _made(
     if which == DECLARED:
         return Written(which, given.predictor.machine, declared, held)
     found = models[which]
-    return Written(which, machine_of(found), found.prediction, held, promised(found))
+    said = promised(found)
+    if held is not None and held.by == "poses":
+        said = borne_out(said, held.after.size[0], len(np.unique(given.predictor.experiment.groups)))
+    return Written(which, machine_of(found), found.prediction, held, said)
+
+
+def borne_out(promise: tuple[float, float], left: float, poses: int) -> tuple[float, float]:
+    """A promise and its standard uncertainty after so many poses were predicted by the others, with what that left (rms): the model's
+    word counts as much as `WORD` poses do."""
+    size = float(np.sqrt((WORD * promise[0] ** 2 + poses * left**2) / (WORD + poses)))
+    return size, size / float(np.sqrt(2.0 * (WORD + poses)))
 
 
 def promised(found: Corrected) -> tuple[float, float]:

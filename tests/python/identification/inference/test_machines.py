@@ -96,3 +96,10 @@ def test_what_is_far_off_in_rows_that_the_search_did_not_have_is_weighed_down() 
     assert found.numbers == pytest.approx([1.0, -1.0, 0.5], abs=0.1)
     weights = found.given.weights
     assert rows[np.argmin(weights)] == 5 and weights.min() < 1e-3 < 0.2 < np.sort(weights)[1]
+
+
+def test_a_promise_goes_from_the_model_to_what_the_poses_show() -> None:
+    few, many = (machines.borne_out((1.0, 0.2), 2.0, n) for n in (0, 100_000))
+    assert few[0] == 1.0 and many[0] == pytest.approx(2.0, rel=1e-3)
+    size, u = machines.borne_out((1.0, 0.2), 2.0, machines.WORD)
+    assert size == pytest.approx(np.sqrt(2.5)) and u == pytest.approx(size / np.sqrt(40.0))
