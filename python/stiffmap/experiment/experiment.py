@@ -24,7 +24,6 @@ WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 ASKED = tuple(f"{c}_cmd" for c in WRENCH)
 """Columns of loads that were commanded, in addition to those that were measured."""
 BRANCHES = ("", "loading", "unloading")
-CLUSTERS = 20
 PER_ROW = (
     *("ids", "position", "wrench", "reading", "sigma", "rotation", "other", "other_rotation", "command"),
     *("approach", "repeat", "order", "hours", "temperature", "branch", "setup", "points", "load_points"),
@@ -215,19 +214,6 @@ class Experiment:
     def without_load(self) -> Experiment:
         """The same rows without their wrenches."""
         return replace(self, wrench=np.zeros_like(self.wrench)) if self.wrench.any() else self
-
-    @cached_property
-    def clusters(self) -> Integers:
-        """(n,) rows that share what a model gets wrong: of one pose; on a ramp of loads those of one pose, set-up
-        and direction within a twentieth of the range."""
-        ways = self.load_direction
-        if ways is None:
-            return self.groups
-        range_ = np.ptp(self.wrench, axis=0)
-        bins = np.floor(
-            CLUSTERS * (self.wrench - self.wrench.min(axis=0)) / np.where(range_ > 0, range_, 1.0)
-        )
-        return _numbers([self.groups, self.runs, ways, np.minimum(bins, CLUSTERS - 1)])
 
     @property
     def _turned(self) -> list[Any]:

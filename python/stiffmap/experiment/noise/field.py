@@ -1,47 +1,13 @@
-"""A smooth field over the workspace that does not depend on the machine.
-
-Position: a field over the commanded position per channel. Deflection: a smooth compliance, i.e. a field per wrench
-component times that component, plus a smooth field.
-"""
+"""Coordinates over which a smooth field may go."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.experiment.experiment import Experiment, Floats, Integers
+from stiffmap.experiment.experiment import Experiment, Floats
 
 TOUCHED = 0.1
 """Share of a height's spread that its sum with the commanded height keeps where the command was the reading."""
-MOST_SEEN = 300
-"""Rows from which shapes of the field are taken; more tell the same."""
-FAINT = 1e-4
-"""Share of the largest shape's variance below which one is left out."""
-
-
-def covariance(e: Experiment, length: float) -> Floats:
-    """(n, n) correlation of the field between rows; `length` in halves of the plan's extent."""
-    return _between(e, length, np.arange(len(e), dtype=np.intp))
-
-
-def shapes(e: Experiment, number: int, length: float) -> Floats:
-    """(n, k ≤ number) columns F with F Fᵀ the covariance of the field, as near as so few can be (Nyström)."""
-    _, first = np.unique(np.hstack([e.groups[:, None], e.wrench]), axis=0, return_index=True)
-    if len(first) > MOST_SEEN:
-        first = np.sort(np.random.default_rng(0).permutation(first)[:MOST_SEEN])
-    across = _between(e, length, first)
-    size, vectors = np.linalg.eigh(across[first])
-    largest = np.argsort(size)[::-1][:number]
-    kept = largest[size[largest] > FAINT * size.max()]
-    return np.asarray(across @ (vectors[:, kept] / np.sqrt(size[kept])))
-
-
-def _between(e: Experiment, length: float, some: Integers) -> Floats:
-    x = unit(free_position(e))
-    smooth = np.exp(-0.5 * ((x[:, None, :] - x[None, some, :]) ** 2).sum(axis=-1) / length**2)
-    if e.quantity == "position":
-        return np.asarray(smooth)
-    w = e.wrench / max(float(np.abs(e.wrench).max()), 1e-300)
-    return np.asarray(smooth * (0.2 + w @ w[some].T))
 
 
 def free_position(e: Experiment) -> Floats:

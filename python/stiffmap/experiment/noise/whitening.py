@@ -19,8 +19,6 @@ from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.robust import fitted
 
 Mask = NDArray[np.bool_]
-FELT = 1e-3
-"""Singular value below which an uncertain number changes no reading."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,24 +38,10 @@ class Problem:
     """Readings that share a zero, and the inverse Cholesky factor of their covariance."""
     base: Floats
     """(n, c) prediction of the declared machine."""
-    uncertain: Floats | None = None
-    """(N, k) W: declared numbers that are uncertain make the covariance I + AAᵀ, whose inverse root is
-    I - WWᵀ; None: they are taken as exact."""
 
     @staticmethod
-    def of(
-        experiment: Experiment,
-        sigma: Floats,
-        base: Floats,
-        keep: Mask | None = None,
-        uncertain: Floats | None = None,
-    ) -> Problem:
-        """Problem of the rows in `keep`; `base` (n, c) is the declared machine's prediction.
-
-        uncertain
-            (n, c, p) change of the readings per standard uncertainty of each number that is uncertain: the
-            readings are then judged with all of them integrated out (docs/theory.md (I1)).
-        """
+    def of(experiment: Experiment, sigma: Floats, base: Floats, keep: Mask | None = None) -> Problem:
+        """Problem of the rows in `keep`; `base` (n, c) is the declared machine's prediction."""
         rows = np.ones(len(experiment), bool) if keep is None else keep
         at, axis = readings_of(experiment, base)
         index = (at[rows[at]], axis[rows[at]])
@@ -67,9 +51,7 @@ class Problem:
         if columns.shape[-1]:
             q = basis(np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])]))
             bare = replace(bare, nuisance=q)
-        if uncertain is None or not uncertain.shape[-1]:
-            return bare
-        return replace(bare, uncertain=_root(bare.white(uncertain)))
+        return bare
 
     def __len__(self) -> int:
         return len(self.index[0])
@@ -96,17 +78,11 @@ class Problem:
         out = picked / self.sigma[self.index].reshape(-1, *(1,) * (picked.ndim - 1))
         for where, inverse in self.blocks:
             out[where] = inverse @ picked[where]
-        out = out - self.nuisance @ (self.nuisance.T @ out)
-        if self.uncertain is not None:
-            out = out - self.uncertain @ (self.uncertain.T @ out)
-        return np.asarray(out)
+        return np.asarray(out - self.nuisance @ (self.nuisance.T @ out))
 
     def adjoint(self, white: Floats) -> Floats:
         """(N, S) -> (R, S) y: `lines @ y` is `white_lines(lines).T @ white`."""
-        out = white
-        if self.uncertain is not None:
-            out = out - self.uncertain @ (self.uncertain.T @ out)
-        return self.unwhite(out - self.nuisance @ (self.nuisance.T @ out))
+        return self.unwhite(white - self.nuisance @ (self.nuisance.T @ white))
 
     def unwhite(self, white: Floats) -> Floats:
         """(N, S) -> (R, S): the same without any projection."""
@@ -128,20 +104,6 @@ class Problem:
         wide = np.zeros(len(self.used))
         wide[self.used] = 1.0 / self.sigma[self.index] ** 2
         return wide
-
-    @property
-    def projections(self) -> list[tuple[Floats, Floats]]:
-        """Directions (N, k), each orthogonal to all others, and shares (k,): (N, N) products of whitened readings are
-        I - Σ directions diag(shares) directionsᵀ."""
-        found = [(self.nuisance, np.ones(self.nuisance.shape[1]))]
-        if self.uncertain is not None:
-            found.append((self.uncertain, 2.0 - np.einsum("ij,ij->j", self.uncertain, self.uncertain)))
-        return [f for f in found if f[0].shape[1]]
-
-    @property
-    def exact(self) -> Problem:
-        """The problem with the declared numbers taken as exact."""
-        return replace(self, uncertain=None)
 
     def check(self, prediction: Floats) -> Floats:
         """The prediction; StiffmapError where a pose that the problem reads could not be solved."""
@@ -175,7 +137,7 @@ def best_fit(problem: Problem, columns: Floats, values: Floats, *, robust: bool 
     readings that are far off do not count."""
     if not columns.shape[-1]:
         return np.zeros_like(values)
-    bare = replace(problem.exact, nuisance=np.zeros((len(problem), 0)))
+    bare = replace(problem, nuisance=np.zeros((len(problem), 0)))
     white = np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])])
     if robust:
         return np.asarray(columns @ fitted(white, bare.white(np.nan_to_num(values)))[0])
@@ -183,14 +145,6 @@ def best_fit(problem: Problem, columns: Floats, values: Floats, *, robust: bool 
     scaled = white / np.where(size > 0, size, 1.0)
     found = np.linalg.lstsq(scaled, bare.white(np.nan_to_num(values)), rcond=1e-9)[0]
     return np.asarray(columns @ (found / np.where(size > 0, size, 1.0)))
-
-
-def _root(columns: Floats) -> Floats:
-    """(N, k) W with (I - WWᵀ)² = (I + AAᵀ)⁻¹ for whitened columns A (N, p)."""
-    size, vectors = np.linalg.eigh(columns.T @ columns)
-    felt = size > FELT**2
-    q = columns @ (vectors[:, felt] / np.sqrt(size[felt]))
-    return np.asarray(q * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + size[felt])))
 
 
 def basis(columns: Floats, tolerance: float = 1e-9) -> Floats:

@@ -16,8 +16,6 @@ AT_ONCE = 48
 # little, whose deflections need the larger step against round-off; of a factor on a compliance the factor's change itself,
 # and of a compliance that is added its share of what is there.
 LENGTHS, OTHERS = 1e-2, 2e-5
-PRESENT, LEAST = 1e-4, 1e-3
-"""Of what only grows: share of its value, and the least value, in scales."""
 Key = tuple[Candidate, Parameter]
 
 
@@ -64,11 +62,3 @@ def step_of(p: Parameter) -> float:
     """By how much a parameter is moved for its slope at the null."""
     smooth = p.null is not None and p.unit.split("/")[0] in ("m", "rad") and "N" not in p.unit
     return (LENGTHS if smooth else OTHERS) * p.scale
-
-
-def step_at(p: Parameter, value: float) -> float | None:
-    """The same at another value (SI); None where there is too little of it for one step."""
-    if side(p) == 0:
-        return step_of(p)
-    there = abs(value - _null(p))
-    return min(step_of(p), PRESENT * there) if there >= LEAST * p.scale else None

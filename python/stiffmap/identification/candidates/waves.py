@@ -68,10 +68,8 @@ class Waves:
             at = [self._lines(self.chosen[k : k + AT_ONCE]) for k in range(0, len(self.chosen), AT_ONCE)]
             return np.concatenate([_gram(problem, lines) for lines in at])
         out = self._weighted(problem)
-        for directions, shares in problem.projections:
-            a = self.along(problem.unwhite(directions))
-            out -= (a * shares) @ a.transpose(0, 2, 1)
-        return out
+        a = self.along(problem.unwhite(problem.nuisance))
+        return out - a @ a.transpose(0, 2, 1)
 
     def _weighted(self, problem: Problem) -> Floats:
         """(V, 2, 2) products of the columns over the noise of each reading."""
