@@ -97,7 +97,10 @@ COSTLY = {
 }
 """Left to the slow lane."""
 MAPS: dict[str, tuple[str, ...]] = {
-    "calibrate": (".rest", ".seconds", ".held_out.groups", ".validity.drives", ".validity.loads", ".found_again"),
+    "calibrate": (
+        ".validity.drives", ".validity.loads", ".before.per_axis", ".after.per_axis", ".held_out.before.per_axis",
+        ".held_out.after.per_axis",
+    ),
     "check": (".home_gaps", ".home_changes"),
     "diagnose": (
         ".effects[].parameters", ".effects[].evidence", ".alternatives[][].parameters", ".alternatives[][].evidence",
