@@ -254,16 +254,16 @@ def left(fit: Fit) -> tuple[str, str]:
     if over and _significant(fit, [p.name for p, _ in over]):
         time = max(over, key=lambda g: g[1])[0].name
     both = [*gaps, *over]
-    if not rest and not time and gaps and over and _significant(fit, [p.name for p, _ in both]):
+    if not rest and not time and gaps and over and _significant(fit, [p.name for p, _ in both], len(both)):
         rest = max(both, key=lambda g: g[1])[0].name  # either may be the noise, not both
     return rest, time
 
 
-def _significant(fit: Fit, names: Sequence[str]) -> bool:
+def _significant(fit: Fit, names: Sequence[str], freedom: int = 0) -> bool:
     """Likelihood ratio of some parts against none of them and noise of any size that its prior allows, at `RARE`, half of it
-    at the boundary."""
+    at the boundary; `freedom`: other degrees of freedom than one for two parts."""
     gain = 2.0 * (_supported(fit) - max(map(_supported, _noisier(fit.without(names)))))
-    return float(0.5 * chi2.sf(max(gain, 0.0), max(1, len(names) // 2))) < RARE
+    return float(0.5 * chi2.sf(max(gain, 0.0), freedom or max(1, len(names) // 2))) < RARE
 
 
 def _noisier(fit: Fit) -> Iterator[Fit]:
