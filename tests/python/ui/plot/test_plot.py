@@ -149,9 +149,3 @@ def test_every_figure_shows_in_a_notebook_without_pyplot() -> None:
     )
     found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert not found.returncode, found.stderr
-
-
-def test_a_notebook_takes_the_picture_of_every_figure(machine: sm.Machine) -> None:
-    formatters = pytest.importorskip("IPython.core.formatters", reason="IPython is not installed")
-    data, _ = formatters.DisplayFormatter().format(plot.machine_figure(machine))
-    assert data["image/png"]
