@@ -16,15 +16,15 @@ MOST = 100
 """Columns up to which a fit is robust; a zero of each of many poses is fitted plainly."""
 
 
-def fitted(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
+def fitted(columns: Floats, values: Floats, rounds: int = ROUNDS) -> tuple[Floats, Floats]:
     """(p,) coefficients of columns (N, p) for values (N,) in noise, and (N,) what they leave in robust standard deviations, which
-    are at least the noise."""
+    are at least the noise; one round is plain least squares."""
     size = np.linalg.norm(columns, axis=0)
     scaled = columns / np.where(size > 0.0, size, 1.0)
     weights: Floats = np.ones(len(values))
     found: Floats = np.zeros(columns.shape[1])
     left, scale = values, 1.0
-    for _ in range(ROUNDS if columns.shape[1] <= MOST else 1):
+    for _ in range(rounds if columns.shape[1] <= MOST else 1):
         root = np.sqrt(weights)
         found = np.asarray(np.linalg.lstsq(scaled * root[:, None], values * root, rcond=1e-9)[0])
         left = np.abs(values - scaled @ found)

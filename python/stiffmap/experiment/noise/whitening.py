@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.nuisance import nuisance_columns
-from stiffmap.experiment.noise.robust import fitted
+from stiffmap.experiment.noise.robust import ROUNDS, fitted
 
 Mask = NDArray[np.bool_]
 
@@ -139,12 +139,8 @@ def best_fit(problem: Problem, columns: Floats, values: Floats, *, robust: bool 
         return np.zeros_like(values)
     bare = replace(problem, nuisance=np.zeros((len(problem), 0)))
     white = np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])])
-    if robust:
-        return np.asarray(columns @ fitted(white, bare.white(np.nan_to_num(values)))[0])
-    size = np.linalg.norm(white, axis=0)
-    scaled = white / np.where(size > 0, size, 1.0)
-    found = np.linalg.lstsq(scaled, bare.white(np.nan_to_num(values)), rcond=1e-9)[0]
-    return np.asarray(columns @ (found / np.where(size > 0, size, 1.0)))
+    rounds = ROUNDS if robust else 1
+    return np.asarray(columns @ fitted(white, bare.white(np.nan_to_num(values)), rounds)[0])
 
 
 def basis(columns: Floats, tolerance: float = 1e-9) -> Floats:
@@ -154,6 +150,11 @@ def basis(columns: Floats, tolerance: float = 1e-9) -> Floats:
     norms = np.linalg.norm(columns, axis=0)
     u, s, _ = np.linalg.svd(columns / np.where(norms > 0, norms, 1.0), full_matrices=False)
     return np.asarray(u[:, s > tolerance])
+
+
+def complement(columns: Floats) -> Floats:
+    """(N, N - p) orthonormal directions across orthonormal columns (N, p)."""
+    return np.asarray(np.linalg.qr(columns, mode="complete")[0][:, columns.shape[1] :])
 
 
 def _blocks(

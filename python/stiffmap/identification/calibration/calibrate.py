@@ -24,7 +24,7 @@ from stiffmap.identification.calibration.table import table_of, too_wide
 from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.clock import Clock, Progress
 from stiffmap.identification.inference.constants import ODDS
-from stiffmap.identification.inference.corrected import Corrected, corrected, readings
+from stiffmap.identification.inference.corrected import Corrected, corrected
 from stiffmap.identification.inference.inference import Inferred, infer
 from stiffmap.identification.inference.machines import (
     CALIBRATED,
@@ -35,6 +35,7 @@ from stiffmap.identification.inference.machines import (
     written,
 )
 from stiffmap.identification.inference.names import EXACT
+from stiffmap.identification.inference.readings import readings
 from stiffmap.identification.inference.shares import shares
 from stiffmap.identification.inference.verdict import judged
 from stiffmap.identification.numbers import GROUPS, Tolerances
@@ -108,10 +109,11 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     clock.say("readings that no fit saw")
     made = written(models, base, given, listed, seed, lambda: clock.over)
     at = models.get(CALIBRATED)
-    left = [np.where(listed[:, None], np.nan, left_by(e, sigma, p, ~listed)) for p in (base, made.prediction)]
+    whole = [left_by(e, sigma, p, ~listed) for p in (base, made.prediction)]
+    left = [np.where(listed[:, None], np.nan, v) for v in whole]
     before, after = (summary(v, sigma, e.channels) for v in left)
-    pairs = swapped(e, left_by(e, sigma, made.prediction, ~listed), sigma, listed)
-    rows, rank = table_of(columns, found.search.calibrated or fit, given, at)
+    pairs = swapped(e, whole[1], sigma, listed)
+    rows, rank = table_of(columns, found.search.calibrated or fit, at)
     verdict, wide = judged(columns, found.search), too_wide(fit)
     at_name = {r.name: r for r in rows}
     beyond = tuple(at_name[b.unknown.name] for b in verdict.beyond)

@@ -18,11 +18,10 @@ from stiffmap.identification.calibration.table import Row
 from stiffmap.identification.calibration.wording import in_display_units, measured, table
 from stiffmap.identification.inference.machines import HeldOut
 from stiffmap.identification.inference.travel import Profile
+from stiffmap.identification.inference.verdict import not_as_stated
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.validity import Validity
 
-CLEARLY = 1.15
-"""Noise over what was declared, or under it, from which it is said."""
 LEAST, MOST = 0.005, 6
 """Share from which a line names a part, and how many."""
 
@@ -90,8 +89,7 @@ class Calibration:
 
         out = [f"calibration: {self.verdict}{' (stopped early)' if self.stopped else ''}"]
         out += [f"  {b.name}: {measured(b.value, b.sigma, b.unit)}" for b in self.beyond]
-        if not 1.0 / CLEARLY < self.scale < CLEARLY:
-            out.append(f"the noise is {self.scale:.2g} times what is stated, and is taken so")
+        out += not_as_stated(self.scale)
         out += [
             f"{group}: {factor:.2g} times as far off (rms) as their standard uncertainties say; give those that this machine has "
             f"(u in its file), or --tolerance {factor:.2g}"

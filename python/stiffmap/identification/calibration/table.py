@@ -11,7 +11,7 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.inference.amplitudes import OFF, Fit, evaluated
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
-from stiffmap.identification.inference.corrected import Corrected, Readings
+from stiffmap.identification.inference.corrected import Corrected
 from stiffmap.identification.inference.shares import of_numbers
 
 SEEN = 1.0
@@ -42,14 +42,12 @@ class Row:
     """Whether it belongs to the minimal set that spans all that the readings determine."""
 
 
-def table_of(
-    columns: Columns, fit: Fit, given: Readings, best: Corrected | None
-) -> tuple[tuple[Row, ...], int]:
+def table_of(columns: Columns, fit: Fit, best: Corrected | None) -> tuple[tuple[Row, ...], int]:
     """Rows of all numbers that the readings show, with their values at the optimum, and how many directions the readings
     determine."""
     at = {}
     if best is not None:
-        at = {u.name: float(v) for u, v in zip(given.sensitivity.unknowns, best.numbers, strict=True)}
+        at = {u.name: float(v) for u, v in zip(best.given.sensitivity.unknowns, best.numbers, strict=True)}
     numbers = [p.name for p in fit.parts if p.kind == "number"]
     white = fit.without(numbers).white(columns.numbers)
     gram = white.T @ white

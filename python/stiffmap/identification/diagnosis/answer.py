@@ -25,9 +25,9 @@ from stiffmap.identification.diagnosis.report.findings import Effect, NoiseRepor
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.separation import separation
 from stiffmap.identification.inference.amplitudes import GAPS, Fit
-from stiffmap.identification.inference.columns import Columns, Place
+from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import RARE
-from stiffmap.identification.inference.corrected import Corrected, Readings, Term, corrected, readings
+from stiffmap.identification.inference.corrected import Corrected, Term, corrected
 from stiffmap.identification.inference.inference import Inferred, terms
 from stiffmap.identification.inference.machines import (
     CALIBRATED,
@@ -39,13 +39,13 @@ from stiffmap.identification.inference.machines import (
     written,
 )
 from stiffmap.identification.inference.names import Chosen, put_instead
+from stiffmap.identification.inference.places import Place
+from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, of_numbers, shares
-from stiffmap.identification.inference.verdict import Named, Verdict, judged
+from stiffmap.identification.inference.verdict import Named, Verdict, judged, not_as_stated
 
 RIVALS = 3
 """Places in an effect's stead that are fitted; all are named."""
-CLEARLY = 1.15
-"""Noise over what was declared, or under it, from which it is said."""
 
 
 def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross_validate: bool) -> Diagnosis:
@@ -270,9 +270,7 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
 
 def _first(fit: Fit, v: Verdict) -> list[str]:
     """What must be known of the noise before anything else."""
-    out = []
-    if not 1.0 / CLEARLY < fit.noise < CLEARLY:
-        out.append(f"the noise is {fit.noise:.2g} times what is stated, and is taken so")
+    out = not_as_stated(fit.noise)
     if np.any(fit.weights != 1.0):
         out.append("some readings stand out: all are weighed by heavy-tailed noise")
     if v.time:

@@ -7,7 +7,7 @@ integrated out with a flat prior is gone from everything that follows.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,58 +18,22 @@ from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.outliers import GROSS, MANY
 from stiffmap.experiment.noise.robust import fitted
-from stiffmap.experiment.noise.whitening import basis, readings_of
+from stiffmap.experiment.noise.whitening import basis, complement, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.candidates.candidates import Candidate
-from stiffmap.identification.candidates.coarseness import coarseness
 from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.candidates.sensitivity import Variant
-from stiffmap.identification.inference.constants import LARGEST_ERROR, STANDS_OUT
+from stiffmap.identification.inference.constants import STANDS_OUT
 from stiffmap.identification.inference.kernels import Kernel, Points, gaps
+from stiffmap.identification.inference.places import NULL, Place, places
 from stiffmap.identification.inference.travel import drives_of
 from stiffmap.identification.numbers.homing import zeros_anew
 from stiffmap.identification.numbers.sensitivity import Sensitivity, sensitivity
 from stiffmap.identification.numbers.unknowns import Unknown
-from stiffmap.model.description import MachineDescription
-from stiffmap.model.effects import Parameter
 
 MOST_READINGS = 600
 """Readings that are compared with each other; of more, whole poses are drawn. Effort only: an (N, N) matrix is factorised."""
 FEWEST_POSES = 10
 """Poses that are kept where readings are drawn, if there are so many."""
-VISIBLE = 3.0
-"""Noise: a candidate whose largest plausible size shows less is left out."""
-LARGEST = 20.0
-"""Noise, rms: two places are one where even an effect of this size would differ by less than `VISIBLE`."""
-NULL = 1e-9
-"""Share of the longest column below which a direction is no direction."""
-
-
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """One candidate at one shape: its directions U (m, p), orthonormal over the noise."""
-
-    variant: Variant
-    directions: Floats
-    sign: int
-    """+1 or -1 where a single strength can only have that sign along the direction, else 0."""
-
-    @property
-    def factor(self) -> Floats:
-        """(m, p) F of the covariance F Fᵀ of an effect of rms one in the noise."""
-        m, p = self.directions.shape
-        return np.asarray(self.directions * np.sqrt(m / p))
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """A candidate that the plan separates from all others, at all its shapes; the others are its aliases."""
-
-    candidate: Candidate
-    shapes: tuple[Shape, ...]
-    aliases: tuple[Candidate, ...] = ()
-    wider: tuple[Candidate, ...] = ()
-    """Candidates of more directions that contain its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +157,7 @@ def columns(
     mean = _averages(e, rows, channel, noise, raw)
     frames = mean.T @ (nuisance_columns(e, base)[index] / noise[:, None])
     q = basis(frames) if frames.shape[1] else frames
-    free = mean @ np.linalg.qr(q, mode="complete")[0][:, q.shape[1] :] if q.shape[1] else mean
+    free = mean @ complement(q) if q.shape[1] else mean
     within = raw - mean @ (mean.T @ raw)
     s = sensitivity(predictor, unknowns)
     s = zeros_anew(s, e) or s
@@ -216,7 +180,7 @@ def columns(
         tuple(u for u, k in zip(s.unknowns, seen, strict=True) if k),
         numbers[:, seen],
         tuple((kind, name, k * len(k) / np.trace(k)) for kind, name, k in found if np.trace(k) > NULL),
-        _places(plan, free, noise, use, predictor.machine.description),
+        places(plan, free, noise, use, predictor.machine.description),
         use,
         tuple(_along_travel(predictor, s, index, noise, free)) if travel else (),
         (float(within @ within), float(len(rows) - mean.shape[1])),
@@ -280,85 +244,3 @@ def zeros(e: Experiment, points: Points) -> Floats:
     label = e.groups[points.rows] * len(e.channels) + points.channel
     size = e.zeros[points.channel] / points.sigma
     return np.asarray((label[:, None] == np.unique(label)) * size[:, None])
-
-
-def _places(
-    plan: Plan, free: Floats, noise: Floats, use: Integers, description: MachineDescription
-) -> tuple[Place, ...]:
-    """Candidates with their directions; those that show alike under one name, that of the coarsest part."""
-    by: dict[int, list[Shape]] = {}
-    for v in plan.variants:
-        white = free.T @ (v.array()[:, use] / noise).T
-        found = _directions(white, v)
-        if found is not None:
-            by.setdefault(id(v.candidate), []).append(found)
-    tolerance = VISIBLE / (LARGEST * np.sqrt(free.shape[1]))
-
-    def order(shapes: list[Shape]) -> tuple[object, ...]:
-        rank = shapes[0].directions.shape[1]
-        return (rank, len(shapes) > 1, *coarseness(shapes[0].variant.candidate, rank, description))
-
-    out: list[Place] = []
-    single: list[tuple[Floats, int, int]] = []
-    for shapes in sorted(by.values(), key=order):
-        candidate, first = shapes[0].variant.candidate, shapes[0]
-        if len(shapes) == 1:
-            same = next((k for d, sign, k in single if _alike(d, sign, first, tolerance)), None)
-            if same is not None:
-                out[same] = replace(out[same], aliases=(*out[same].aliases, candidate))
-                continue
-            single.append((first.directions, first.sign, len(out)))
-        out.append(Place(candidate, tuple(shapes)))
-    for d, _, k in single:
-        wider = tuple(
-            out[j].candidate
-            for other, _, j in single
-            if other.shape[1] > d.shape[1] and d.shape[1] - np.sum((other.T @ d) ** 2) < tolerance**2
-        )
-        out[k] = replace(out[k], wider=wider)
-    return tuple(out)
-
-
-def _directions(white: Floats, v: Variant) -> Shape | None:
-    """(m, p) orthonormal directions of the columns (m, q) that a plausible size makes visible; None without any."""
-    length = np.linalg.norm(white, axis=0)
-    most = np.minimum([_reach(v, k) for k in range(white.shape[1])], 1.0 / NULL)
-    seen = length * most > VISIBLE
-    if not seen.any():
-        return None
-    u, s, _ = np.linalg.svd(white[:, seen] / length[seen], full_matrices=False)
-    kept = u[:, s > 1e-4 * s[0]]
-    sign = 0
-    if kept.shape[1] == 1 and seen.sum() == 1 and v.sign[seen][0]:
-        sign = int(np.sign(v.sign[seen][0]) * np.sign(float(kept[:, 0] @ white[:, seen][:, 0])))
-    return Shape(v, np.ascontiguousarray(kept), sign)
-
-
-def _reach(v: Variant, k: int) -> float:
-    """Largest plausible value of a column's parameter, in its scale."""
-    linear = v.candidate.linear
-    if k >= len(linear) or len(linear) != len(v.sign):
-        return np.inf
-    return reach(linear[k])
-
-
-def reach(p: Parameter) -> float:
-    """Largest change from its null that a parameter can have, in its scale."""
-    low, high = possible(p)
-    null = float(p.null or 0.0)
-    return max(high - null, null - low) / p.scale
-
-
-def possible(p: Parameter) -> tuple[float, float]:
-    """Least and largest value of a parameter (SI) that a machine can have."""
-    null, most = float(p.null or 0.0), LARGEST_ERROR.get(p.unit, np.inf)
-    return max(p.lower, null - most), min(p.upper, null + most)
-
-
-def _alike(directions: Floats, sign: int, other: Shape, tolerance: float) -> bool:
-    if directions.shape != other.directions.shape:
-        return False
-    across = directions.T @ other.directions
-    if sign and other.sign and float(across[0, 0]) * sign * other.sign < 0.0:
-        return False
-    return bool(np.sum(other.directions**2) - np.sum(across**2) < tolerance**2)

@@ -42,24 +42,24 @@ class Covariance:
 
     def white(self, values: Floats) -> Floats:
         """(N, ...) V^-½ values."""
-        root, u, size = self._directions
-        scaled = values / root.reshape(-1, *(1,) * (values.ndim - 1))
-        flat = scaled.reshape(len(root), -1)
-        return np.asarray(flat + u @ ((1.0 / np.sqrt(1.0 + size) - 1.0)[:, None] * (u.T @ flat))).reshape(
-            values.shape
-        )
+        root, _, size = self._directions
+        scaled = (values.reshape(len(root), -1) / root[:, None]) if values.ndim > 1 else values / root
+        return self._stretched(1.0 / np.sqrt(1.0 + size), scaled).reshape(values.shape)
 
     def coloured(self, white: Floats) -> Floats:
         """(N, p) V^½ of whitened values."""
-        root, u, size = self._directions
-        return np.asarray(
-            root[:, None] * (white + u @ ((np.sqrt(1.0 + size) - 1.0)[:, None] * (u.T @ white)))
-        )
+        root, _, size = self._directions
+        return np.asarray(root[:, None] * self._stretched(np.sqrt(1.0 + size), white))
 
     def noise_part(self, white: Floats) -> Floats:
         """(N,) posterior mean of the noise, by whitened readings."""
-        root, u, size = self._directions
-        return np.asarray(root * (white + u @ ((1.0 / np.sqrt(1.0 + size) - 1.0) * (u.T @ white))))
+        root, _, size = self._directions
+        return np.asarray(root * self._stretched(1.0 / np.sqrt(1.0 + size), white))
+
+    def _stretched(self, by: Floats, values: Floats) -> Floats:
+        """(N,) or (N, p) values, along each of the directions U so many times as long (k,)."""
+        u = self._directions[1]
+        return np.asarray(values + u @ (((by - 1.0) * (u.T @ values).T).T))
 
     def only(self, keep: Mask) -> Covariance:
         """Of some readings (N,)."""

@@ -22,11 +22,11 @@ from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
 from stiffmap.identification.inference.corrected import (
     STEPS_OF_A_FOLD,
     Corrected,
-    Readings,
     columns_of,
     corrected,
     machine_of,
 )
+from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine
 

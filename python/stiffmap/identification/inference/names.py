@@ -28,8 +28,9 @@ from stiffmap.identification.inference.amplitudes import (
     spectrum,
 )
 from stiffmap.identification.inference.candidates import evidence, of_pairs
-from stiffmap.identification.inference.columns import Columns, Place, possible
+from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, REFITS, SIZES
+from stiffmap.identification.inference.places import Place, possible
 from stiffmap.model.effects import Parameter
 
 EXACT = "exact"

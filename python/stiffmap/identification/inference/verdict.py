@@ -10,15 +10,18 @@ from scipy.stats import chi2, norm
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.identification.inference.amplitudes import GAPS, OFF, Fit, noise_prior
-from stiffmap.identification.inference.columns import Columns, Place
+from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, ODDS, RARE, TOLERANCES
 from stiffmap.identification.inference.names import EXACT, Chosen, Model, Search, is_possible
+from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.shares import of_numbers
 from stiffmap.identification.numbers.unknowns import Unknown
 
 DETERMINED = 0.5
 """Posterior standard deviation, in standard uncertainties, of a number that the readings determine."""
 TOLERABLE = "declared numbers within their tolerances show the same"
+CLEARLY = 1.15
+"""Noise over what is stated, or under it, from which it is said."""
 KAPPA_SDS = 4.0
 """Prior standard deviations of ln κ beyond which the noise is no noise."""
 
@@ -257,6 +260,13 @@ def left(fit: Fit) -> tuple[str, str]:
     if not rest and not time and gaps and over and _significant(fit, [p.name for p, _ in both], len(both)):
         rest = max(both, key=lambda g: g[1])[0].name  # either may be the noise, not both
     return rest, time
+
+
+def not_as_stated(noise: float) -> list[str]:
+    """What must be said of noise that is so many times what is stated; nothing where that is near enough."""
+    if 1.0 / CLEARLY < noise < CLEARLY:
+        return []
+    return [f"the noise is {noise:.2g} times what is stated, and is taken so"]
 
 
 def _significant(fit: Fit, names: Sequence[str], freedom: int = 0) -> bool:

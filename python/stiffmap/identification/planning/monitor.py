@@ -13,7 +13,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import PER_ROW, Experiment
-from stiffmap.experiment.noise.whitening import basis, readings_of
+from stiffmap.experiment.noise.whitening import basis, complement, readings_of
 from stiffmap.identification.inference.amplitudes import Fit, Part, fitted
 from stiffmap.identification.inference.columns import Columns, drawn
 from stiffmap.identification.inference.kernels import Points, gaps
@@ -143,8 +143,7 @@ def _gaps(
     channel = np.concatenate([read[0][1], read[1][1]])
     white = block_diag(*(x.problem.white_lines(np.eye(len(r[0]))) for x, r in zip((a, b), read, strict=True)))
     frames = block_diag(a.problem.nuisance, b.problem.nuisance)
-    known = basis(np.hstack([frames, numbers]))
-    free = np.linalg.qr(known, mode="complete")[0][:, known.shape[1] :]
+    free = complement(basis(np.hstack([frames, numbers])))
     kernels, parts = {}, []
     points = Points(rows, channel, np.ones(len(rows)))
     for kernel in gaps(machine, e, points):

@@ -16,8 +16,9 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.identification.calibration import calibrate
 from stiffmap.identification.calibration.table import independent
-from stiffmap.identification.inference.corrected import Readings, corrected
+from stiffmap.identification.inference.corrected import corrected
 from stiffmap.identification.inference.covariance import Covariance
+from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.numbers import Tolerances, Unknown, unknowns
 from stiffmap.identification.numbers.sensitivity import bends, predicted, sensitivity, sensitivity_at
 from stiffmap.model.with_errors import edited

@@ -11,8 +11,8 @@ from tests.python.identification.inference.synthetic import READINGS, columns, p
 from tests.python.identification.inference.test_amplitudes import dense
 
 from stiffmap.identification.inference import amplitudes, candidates
-from stiffmap.identification.inference.columns import Place, Shape
 from stiffmap.identification.inference.constants import SIZES
+from stiffmap.identification.inference.places import Place, Shape
 
 AT = np.array([0.1, -1.0, -0.5])
 

@@ -12,8 +12,9 @@ import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan
 from stiffmap.experiment.channels import AXIS_CHANNELS
 from stiffmap.identification.inference import machines
-from stiffmap.identification.inference.corrected import Readings, corrected
+from stiffmap.identification.inference.corrected import corrected
 from stiffmap.identification.inference.covariance import Covariance
+from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted, sensitivity
 

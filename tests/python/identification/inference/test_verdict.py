@@ -14,8 +14,8 @@ from tests.python.identification.inference.synthetic import READINGS, columns
 from stiffmap.experiment.channels import Channel
 from stiffmap.identification.inference import amplitudes, verdict
 from stiffmap.identification.inference.amplitudes import Part
-from stiffmap.identification.inference.columns import Place, Shape
 from stiffmap.identification.inference.names import Chosen
+from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.numbers.unknowns import Unknown
 
 FLAT = np.ones(READINGS)

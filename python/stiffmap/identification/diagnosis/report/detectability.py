@@ -9,8 +9,9 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.diagnosis.report.effects import as_place
 from stiffmap.identification.diagnosis.report.findings import Detectability
 from stiffmap.identification.inference.amplitudes import Fit
-from stiffmap.identification.inference.columns import Columns, Place, reach
+from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
+from stiffmap.identification.inference.places import Place, reach
 
 POWER = 0.95
 

@@ -1,0 +1,183 @@
+"""Readings that a machine is fitted to, under the amplitudes of a fit: what it does not explain is their covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment.experiment import Floats, Integers, Mask
+from stiffmap.experiment.noise.nuisance import nuisance_columns
+from stiffmap.experiment.noise.whitening import basis, readings_of
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.inference.amplitudes import NOTHING, OFF, Fit
+from stiffmap.identification.inference.columns import Columns, drawn, zeros
+from stiffmap.identification.inference.covariance import Covariance, covariance
+from stiffmap.identification.inference.kernels import Points, gaps
+from stiffmap.identification.inference.travel import Drive, Profile, drives_of, knots_of
+from stiffmap.identification.numbers.homing import zeros_anew
+from stiffmap.identification.numbers.sensitivity import Sensitivity, predicted, sensitivity
+from stiffmap.identification.numbers.unknowns import Unknown, joint_name
+from stiffmap.model.description import AppliedEffect
+from stiffmap.model.description.tree import joints
+from stiffmap.model.with_errors import Knots, edited
+from stiffmap.solve.machine import Machine
+
+MOST_FITTED = 9000
+"""Readings that a machine is fitted to; of more, whole poses are drawn. Effort only."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings that a machine is fitted to, with the covariance of what it does not explain."""
+
+    predictor: Predictor
+    sigma: Floats
+    """(n, c) m, rad."""
+    rows: Integers
+    """(N,)."""
+    channel: Integers
+    """(N,)."""
+    kappa: float
+    """Noise over the declared one."""
+    weights: Floats
+    """(N,) of heavy tails."""
+    rest: Covariance
+    """Of what nobody can name, of common zeros and of effects without a name, and of the noise."""
+    sensitivity: Sensitivity
+    spread: Floats
+    """(p,) standard deviation of each number, in standard uncertainties."""
+    drives: tuple[tuple[Drive, Floats], ...] = ()
+    """Drives that err along their travel, and the root (k, k) of the covariance at their knots, m² or rad²."""
+
+    @cached_property
+    def along(self) -> Floats:
+        """(N, K) errors along the travel of all drives, whitened."""
+        own = self.sigma[self.rows, self.channel][:, None]
+        parts = [d.columns(self.rows, self.channel) @ r / own for d, r in self.drives]
+        return self.rest.white(np.hstack([np.zeros((len(own), 0)), *parts]))
+
+    @cached_property
+    def columns(self) -> Floats:
+        """(N, p) change of the readings per prior standard deviation of each number, whitened."""
+        return self.white(self.sensitivity.columns) * self.spread
+
+    def knots(self, found: Sequence[Profile]) -> dict[str, Knots]:
+        """Axis positioning errors as a machine file has them."""
+        of = joints(self.predictor.machine.description)
+        return {p.drive: knots_of(of[joint_name(p.drive)], p) for p in found}
+
+    def only(self, keep: Mask) -> Readings:
+        """Those of some rows (n,)."""
+        own = keep[self.rows]
+        return replace(
+            self,
+            rows=self.rows[own],
+            channel=self.channel[own],
+            weights=self.weights[own],
+            rest=self.rest.only(own),
+        )
+
+    def weighed(self, weights: Floats) -> Readings:
+        """With other weights (N,)."""
+        more = self.kappa**2 * (1.0 / weights - 1.0 / self.weights)
+        return replace(self, weights=weights, rest=Covariance(self.rest.noise + more, self.rest.factor))
+
+    def white(self, values: Floats) -> Floats:
+        """(N, ...) of (n, c, ...), m or rad: whitened."""
+        picked = values[self.rows, self.channel]
+        return self.rest.white(
+            picked / self.sigma[self.rows, self.channel].reshape(-1, *(1,) * (picked.ndim - 1))
+        )
+
+    def frames(self, prediction: Floats) -> Floats:
+        """(N, q) orthonormal directions, whitened, of frames, tools and zeros where a machine stands that shows `prediction` (n, c)."""
+        found = nuisance_columns(self.predictor.experiment, np.nan_to_num(prediction))
+        return basis(self.white(found)) if found.shape[-1] else np.zeros((len(self.rows), 0))
+
+    def predicted(
+        self, numbers: Floats, effects: Sequence[AppliedEffect], travel: Mapping[str, Knots] | None = None
+    ) -> Floats:
+        """(n, c) m, rad; NaN where the machine cannot be."""
+        p = self.predictor
+        try:
+            if travel:
+                p = p.beside(machine=Machine(edited(p.machine.description, {}, travel), like=p.machine))
+            return predicted(p, self.sensitivity.unknowns, numbers, effects)
+        except StiffmapError:
+            return np.full_like(self.sigma, np.nan)
+
+
+def readings(
+    predictor: Predictor,
+    uncertain: Sequence[Unknown],
+    columns: Columns,
+    fit: Fit,
+    sigma: Floats,
+    suspects: Mask,
+    without_name: Sequence[Floats] = (),
+    exact: Sequence[Unknown] = (),
+) -> Readings:
+    """The readings of an experiment under the amplitudes of a fit.
+
+    uncertain
+        The numbers of the columns, and those that no reading shows.
+    suspects
+        (n,) rows that stand alone before any cause is known.
+    without_name
+        (n, c) m, rad: what effects of the fit that have no name add to the readings.
+    exact
+        Numbers that are as declared, since an effect speaks of them.
+    """
+    e = predictor.experiment
+    rows, channel = readings_of(e, predictor())
+    kept = drawn(e.groups[rows], 0, MOST_FITTED)
+    rows, channel = rows[kept], channel[kept]
+    own = sigma[rows, channel]
+    points = Points(rows, channel, own)
+    some = Points(columns.rows, columns.channel, columns.sigma)
+    amplitude = {p.name: float(np.exp(t)) for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF}
+    kernels = [
+        (k, amplitude[k.name] * scale)
+        for k in gaps(predictor.machine, e, some)
+        if k.name in amplitude and (scale := columns.scale_of(k)) > 0.0
+    ]
+    patterns = [np.nan_to_num(change[rows, channel])[:, None] / own[:, None] for change in without_name]
+    weights = np.full(sigma.shape, 1.0)
+    weights[suspects] = NOTHING
+    weights[columns.rows, columns.channel] = fit.weights
+    weights = weights[rows, channel]
+    rest = covariance(points, some, kernels, fit.noise**2 / weights, np.hstack([zeros(e, points), *patterns]))
+    size = {k: fit.spread(group) for group, index in columns.groups.items() for k in index}
+    known = [(u, size[k]) for k, u in enumerate(columns.unknowns) if u not in exact]
+    unknowns = tuple(u for u, s in known if s > 0.0)
+    s = sensitivity(predictor, uncertain)
+    s = zeros_anew(s, e) or s
+    drives = tuple(_erring(predictor, s, columns, amplitude)) if columns.travel else ()
+    index = [s.unknowns.index(u) for u in unknowns]
+    s = replace(s, unknowns=unknowns, columns=s.columns[..., index])
+    return Readings(
+        predictor,
+        sigma,
+        rows,
+        channel,
+        fit.noise,
+        weights,
+        rest,
+        s,
+        np.array([size for _, size in known if size > 0.0]),
+        drives,
+    )
+
+
+def _erring(
+    predictor: Predictor, s: Sensitivity, columns: Columns, amplitude: Mapping[str, float]
+) -> Iterator[tuple[Drive, Floats]]:
+    """Drives that err along their travel in a fit, with the roots at their knots; `amplitude`: variances of its parts, in noise."""
+    variance = {name: amplitude[name] * sd**2 for name, _, sd in columns.travel if name in amplitude}
+    for drive in drives_of(predictor, s):
+        if any(name in variance for name, _ in drive.names()):
+            yield drive, drive.root(variance)
