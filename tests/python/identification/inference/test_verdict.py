@@ -115,6 +115,15 @@ def test_a_number_far_off_is_out_of_tolerance_and_others_are_not():
     assert one.unknown.name == "number 1" and one.value == pytest.approx(-8.0, abs=0.5) and one.sd < 0.2
 
 
+@pytest.mark.parametrize(("value", "beyond"), [(2.8, 0), (-4.2, 1)])
+def test_out_of_tolerance_is_what_one_machine_in_a_thousand_is(value, beyond):
+    """Of one number: beyond 3.29 of its standard uncertainties."""
+    c = numbers((value,))
+    c = replace(c, numbers=20.0 * c.numbers, residual=20.0 * value * c.numbers[:, 0])
+    fit = amplitudes.fitted(c, amplitudes.Parts(c).numbers)
+    assert len(list(verdict.out_of_tolerance(c, fit))) == beyond
+
+
 def test_a_number_that_only_a_part_of_the_experiment_shows_is_not_out_of_tolerance():
     c = numbers((0.5, -8.0, 0.3))
     shown = c.free @ c.numbers[:, 1]
