@@ -27,6 +27,12 @@ def bounded(value: float) -> float:
     return 0.0 if abs(value) < SMALLEST else value
 
 
+def percent(share: float) -> str:
+    """A share of a whole in per cent, to two digits: ``0.097 %``, ``14 %``, ``100 %``."""
+    value = 100.0 * share
+    return f"{value:.0f} %" if value >= 99.5 else f"{value:.2g} %"
+
+
 def with_uncertainty(value: float, u: float) -> str:
     """``0.301 ± 0.002``: both to the first digit of the uncertainty, to the second where that is a 1; the uncertainty is never 0."""
     return f"{within(value, u)} ± {within(u, u)}"

@@ -11,7 +11,7 @@ import pytest
 
 from stiffmap.common import yaml_text
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.number_text import LARGEST, SMALLEST, bounded, number_in
+from stiffmap.common.number_text import LARGEST, SMALLEST, bounded, number_in, percent
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.value_units import read_value
@@ -44,6 +44,14 @@ def test_what_is_within_the_bounds_is_exact() -> None:
     for value in (LARGEST, -LARGEST, SMALLEST, 0.1, np.inf, -np.inf):
         assert bounded(value) == value
         assert yaml_text.parse(f"a: {str(value).replace('inf', '.inf')}").data["a"] == value
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [(1.0, "100 %"), (0.9984, "100 %"), (0.994, "99 %"), (0.138, "14 %"), (0.00097, "0.097 %"), (0.0, "0 %")],
+)
+def test_shares_have_two_digits_and_no_powers(share: float, text: str) -> None:
+    assert percent(share) == text
 
 
 @pytest.mark.parametrize("noise", ["1e160", "1e-300"])

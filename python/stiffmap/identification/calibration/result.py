@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from stiffmap.common.number_text import percent
 from stiffmap.common.plain import plain
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.comparison.summary import Summary
@@ -96,7 +97,7 @@ class Calibration:
             for group, factor in self.wide.items()
         ]
         out.append(f"identifiable from the readings: {self.rank} directions of {len(self.rows)} unknowns")
-        parts = ", ".join(f"{p} {100 * s:.2g} %" for p, s in _largest(self.shares))
+        parts = ", ".join(f"{p} {percent(s)}" for p, s in _largest(self.shares))
         out.append(f"shares of the squares: {parts}")
         noise = "" if math.isnan(self.noise) else f" (noise {in_display_units(self.noise, 'm')})"
         out.append(f"misfit: rms {size(self.before)} as declared, {size(self.after)} {self.which}{noise}")

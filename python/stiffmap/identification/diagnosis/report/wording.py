@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiffmap.common.number_text import with_uncertainty, within
+from stiffmap.common.number_text import percent, with_uncertainty, within
 from stiffmap.identification.diagnosis.report.findings import Effect, Findings, Number, Rest
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.slip import Slip
@@ -66,7 +66,7 @@ def _more(d: Findings) -> list[str]:
     out = []
     largest = [(name, s) for name, s in sorted(d.shares.items(), key=lambda s: -s[1]) if s > 0.005]
     if d.verdict != "none" and len(largest) > 1:
-        out.append("shares of the squares: " + ", ".join(f"{name} {100 * s:.2g} %" for name, s in largest))
+        out.append("shares of the squares: " + ", ".join(f"{name} {percent(s)}" for name, s in largest))
     if d.which == "declared" and d.effects:
         out.append(
             "machine.yaml is the declared machine: none that was corrected predicts unseen readings better"
@@ -148,7 +148,7 @@ def _others(d: Findings) -> str:
 def _left(d: Findings) -> str:
     if d.unexplained:
         p = d.unexplained[0]
-        return f"unexplained: {p.what}, {100 * p.share:.2g} % of the squares{_place(p)}"
+        return f"unexplained: {p.what}, {percent(p.share)} of the squares{_place(p)}"
     if d.separations:
         return f"to separate: {separation_text(d.separations[0])}"
     out = f"{len(d.outliers)} outliers listed" if d.outliers else "no outliers"

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import percent
 from stiffmap.experiment.experiment import WRENCH, Floats
 from stiffmap.identification.diagnosis.report.findings import Findings
 from stiffmap.identification.diagnosis.report.wording import noise_size
@@ -125,7 +126,7 @@ def shared_out(d: Findings) -> Figure:
     effects = {str(e).partition(":")[0] for e in d.effects}
     colours = [AFTER if name in effects else "0.7" for name, _ in found]
     bars = ax.barh([name for name, _ in found], [s for _, s in found], color=colours)
-    ax.bar_label(bars, [f"{s:.2g} %" for _, s in found], padding=3)
+    ax.bar_label(bars, [percent(s / 100) for _, s in found], padding=3)
     ax.set_xscale("log")
     ax.set(xlabel="share of the squares, %", xlim=(50 * LEAST_SHARE, 400))
     for side in ("top", "right"):
