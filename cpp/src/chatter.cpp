@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "stiffmap/dense.hpp"
+#include "stiffmap/parallel.hpp"
 
 namespace stiffmap {
 namespace {
@@ -167,6 +168,16 @@ VecX largest_multipliers(const ToolModes& modes, const std::vector<Chip>& chips,
     else ws.blocks.reshaped().noalias() = at_nodes * weights(nodes, depths[j]);
     out[j] = dominant(state, size, ws);
   }
+  return out;
+}
+
+Answers largest_multipliers(const ToolModes& modes, const std::vector<Chip>& chips, const VecX& periods,
+                            const VecX& depths, int threads) {
+  Answers out(periods.size());
+  const Blocks found = out.numbers("multipliers", {depths.size()});
+  parallel_chunks(periods.size(), 1, threads, [&](int, long begin, long end) {
+    for (long i = begin; i < end; ++i) found(i) = largest_multipliers(modes, chips, periods[i], depths);
+  });
   return out;
 }
 

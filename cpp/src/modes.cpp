@@ -8,7 +8,16 @@
 namespace stiffmap {
 namespace {
 
-constexpr double massless = 1e-13;  // relative to the largest inverse square of a frequency
+constexpr double no_mass = 1e-13;    // relative to the largest inverse square of a frequency
+constexpr double no_damper = 1e-12;  // relative to the largest damping of a motion without mass
+constexpr double negligible = 1e-9;   // of a tangent and of its eigenvalues, relative
+
+/// Motions that keep all loops closed, their tangent and mass.
+struct Reduced {
+  MatX Z;             ///< coordinates x motions
+  MatX K, S, M;       ///< tangent, its symmetric part, mass
+  Cholesky cholesky;  ///< of S
+};
 
 /// Columns: motions that springs, laws and joints allow before the loops are closed, as lengths.
 MatX allowed(const Mechanism& m, const Linearization& lin) {
@@ -38,62 +47,29 @@ MatX closed_motions(const Mechanism& m, const Linearization& lin) {
   return P * left_null_vectors(C.transpose(), rank_threshold);
 }
 
-MatX tangent(const Mechanism& m, const Linearization& lin) { return springs_only(m, lin) - lin.H; }
-
-void keep(const MatX& Z, const VecX& inverse_square, const MatX& vectors, ModesResult& out) {
-  const double largest = std::max(inverse_square.cwiseAbs().maxCoeff(), 0.0);
-  const Index count = out.square.size();
-  for (Index k = 0; k < std::min<Index>(count, inverse_square.size()); ++k) {
-    const double mu = inverse_square[inverse_square.size() - 1 - k];
-    if (!(mu > massless * largest)) break;
-    out.square[k] = 1 / mu;
-    out.shape.col(k) = Z * vectors.col(vectors.cols() - 1 - k) / std::sqrt(mu);
-  }
+/// Stiffness of springs and laws alone, in coordinates: the tangent without the loads.
+MatX springs_only(const Mechanism& m, const Linearization& lin) {
+  MatX out = lin.K;
+  for (Index j = 0; j < m.size(); ++j)
+    if (m.coordinates[at(j)].law >= 0 && lin.da[j] != 0) out(j, j) += lin.dtau[j] / lin.da[j];
+  return out;
 }
 
-/// A tangent that dead moments make unsymmetric: complex frequencies are flutter.
-bool unsymmetric(const MatX& Z, const MatX& K, const MatX& M, ModesResult& out) {
-  Lu lu(K.rows());
-  lu.compute(K);
-  MatX A;
-  lu.solve(M, A);
-  const auto [values, all] = general_eigen(A);
-  std::vector<Index> order(at(values.size()));
-  std::iota(order.begin(), order.end(), Index{0});
-  std::sort(order.begin(), order.end(),
-            [&values = values](Index a, Index b) { return values[a].real() < values[b].real(); });
-  const double largest = values.cwiseAbs().maxCoeff();
-  VecX mu(values.size());
-  MatX vectors(K.rows(), values.size());
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    const Index j = order[k];
-    if (std::abs(values[j].imag()) > 1e-9 * largest || values[j].real() < -1e-9 * largest) return false;
-    const VecX v = all.col(j).real();
-    mu[static_cast<Index>(k)] = values[j].real();
-    const double modal = v.dot(M * v);
-    vectors.col(static_cast<Index>(k)) =
-        v * std::sqrt(std::max(mu[static_cast<Index>(k)], 0.0) / std::max(modal, 1e-300));
-  }
-  keep(Z, mu, vectors, out);
-  return true;
-}
-
-}  // namespace
-
-bool reduced_pose(const Mechanism& m, const Inertias& inertias, const PoseInput& in, SolveWorkspace& ws,
-                  ReducedPose& out) {
+/// False where there is no equilibrium, or none that a small motion comes back to.
+bool reduced_pose(const Mechanism& m, const Inertias& inertias, const PoseInput& in, SolveWorkspace& ws, Reduced& out,
+                  ModesResult& found) {
   const ClosureResult closure = prepare_pose(m, in, ws);
-  out.status = closure.status;
-  out.flags = closure.flags;
+  found.status = closure.status;
+  found.flags = closure.flags;
   if (closure.status != Status::converged) return false;
   const EquilibriumResult eq = solve_equilibrium(m, ws.problem, {}, ws.equilibrium, ws.state);
-  out.status = eq.status;
-  out.flags |= eq.flags;
+  found.status = eq.status;
+  found.flags |= eq.flags;
   if (eq.status != Status::converged) return false;
   const Linearization& lin = ws.equilibrium.lin;
-  out.x = lin.x;
+  found.x = lin.x;
   out.Z = closed_motions(m, lin);
-  out.K = out.Z.transpose() * tangent(m, lin) * out.Z;
+  out.K = out.Z.transpose() * (springs_only(m, lin) - lin.H) * out.Z;
   out.M = out.Z.transpose() * coordinate_mass(m, inertias, lin.frames) * out.Z;
   out.S = 0.5 * (out.K + out.K.transpose());
   if (out.K.rows() == 0) return true;
@@ -104,41 +80,105 @@ bool reduced_pose(const Mechanism& m, const Inertias& inertias, const PoseInput&
   const VecX values = symmetric_eigen(out.S).values;
   const double low = values[0], high = values[out.K.rows() - 1];
   if (low > 1e-12 * high) return true;
-  out.status = low < -1e-9 * high ? Status::unstable : Status::singular;
+  found.status = low < -1e-9 * high ? Status::unstable : Status::singular;
   return false;
 }
 
-MatX springs_only(const Mechanism& m, const Linearization& lin) {
-  MatX out = lin.K;
-  for (Index j = 0; j < m.size(); ++j)
-    if (m.coordinates[at(j)].law >= 0 && lin.da[j] != 0) out(j, j) += lin.dtau[j] / lin.da[j];
-  return out;
+/// Inverse squares of frequencies, ascending, and modes of unit stiffness, of a tangent as it is; false: complex, which
+/// is flutter.
+bool unsymmetric(const Reduced& pose, EigenX& out) {
+  Lu lu(pose.K.rows());
+  lu.compute(pose.K);
+  MatX A;
+  lu.solve(pose.M, A);
+  const auto [values, all] = general_eigen(A);
+  const double largest = negligible * values.cwiseAbs().maxCoeff();
+  if ((values.imag().array().abs() > largest).any() || (values.real().array() < -largest).any()) return false;
+  std::vector<Index> order(at(values.size()));
+  std::iota(order.begin(), order.end(), Index{0});
+  std::sort(order.begin(), order.end(),
+            [&values = values](Index a, Index b) { return values[a].real() < values[b].real(); });
+  out.values = values(order).real();
+  out.vectors = all(Eigen::indexing::all, order).real();
+  for (Index k = 0; k < out.values.size(); ++k) {
+    const double modal = out.vectors.col(k).dot(pose.M * out.vectors.col(k));
+    out.vectors.col(k) *= std::sqrt(std::max(out.values[k], 0.0) / std::max(modal, 1e-300));
+  }
+  return true;
 }
 
-void natural_modes(const Mechanism& m, const Inertias& inertias, const PoseInput& in, Index count, SolveWorkspace& ws,
-                   ModesResult& out) {
+/// The same of the symmetric part S = L L': of L^-1 M L'^-1.
+EigenX symmetric(const Reduced& pose) {
+  MatX lower = pose.M;
+  pose.cholesky.solve_lower(lower);
+  MatX inverse_square = lower.transpose();
+  pose.cholesky.solve_lower(inverse_square);
+  EigenX found = symmetric_eigen(MatX(0.5 * (inverse_square + inverse_square.transpose())));
+  pose.cholesky.solve_upper(found.vectors);
+  return found;
+}
+
+/// Columns of X without mass, turned so that those with dampers come first; their number.
+Index damped_first(const MatX& D, MatX& X) {
+  if (X.cols() == 0 || D.isZero(0)) return 0;
+  const EigenX found = symmetric_eigen(MatX(X.transpose() * D * X));
+  const double largest = found.values[X.cols() - 1];
+  if (!(largest > 0)) return 0;
+  X = (X * found.vectors.rowwise().reverse()).eval();
+  return (found.values.array() > no_damper * largest).count();
+}
+
+}  // namespace
+
+void lowest_modes(const Mechanism& m, const Inertias& inertias, const Damping& damping, const PoseInput& in,
+                  Index count, bool whole, SolveWorkspace& ws, ModesResult& out) {
+  out.kept = 0;
+  out.x.setConstant(m.size(), nan);
   out.square.setConstant(count, nan);
   out.shape.setConstant(m.size(), count, nan);
-  out.x.setConstant(m.size(), nan);
-  ReducedPose pose;
-  const bool found = reduced_pose(m, inertias, in, ws, pose);
-  out.status = pose.status;
-  out.flags = pose.flags;
-  if (!found) return;
-  out.x = pose.x;
-  const MatX &Z = pose.Z, &K = pose.K, &M = pose.M;
-  if (K.rows() == 0 || M.isZero(0)) return;  // nothing moves, or nothing has mass
-  if ((K - K.transpose()).norm() > 1e-9 * pose.S.norm()) {
-    if (!unsymmetric(Z, K, M, out)) out.status = Status::unstable;
+  out.tip.setConstant(6, count, nan);
+  out.viscous.setConstant(count, count, nan);
+  out.loss.setConstant(count, count, nan);
+  out.rest.setConstant(nan);
+  out.unsymmetric = nan;
+  Reduced pose;
+  if (!reduced_pose(m, inertias, in, ws, pose, out)) return;
+  out.rest.setZero();
+  out.unsymmetric = 0;
+  const Index n = pose.K.rows();
+  if (n == 0) return;  // nothing moves
+  out.unsymmetric = (pose.K - pose.K.transpose()).norm() / pose.S.norm();
+  const Linearization& lin = ws.equilibrium.lin;
+  EigenX modes;
+  if (!whole || out.unsymmetric <= negligible) modes = symmetric(pose);
+  else if (!unsymmetric(pose, modes)) {
+    out.status = Status::unstable;
     return;
   }
-  MatX X = M;
-  pose.cholesky.solve_lower(X);
-  MatX reduced = X.transpose();
-  pose.cholesky.solve_lower(reduced);
-  EigenX modes = symmetric_eigen(MatX(0.5 * (reduced + reduced.transpose())));
-  pose.cholesky.solve_upper(modes.vectors);
-  keep(Z, modes.values, modes.vectors, out);
+  MatX X = pose.Z * modes.vectors.rowwise().reverse();  // unit stiffness, lowest frequency first
+  VecX mu = modes.values.reverse();
+  const Index massive = (mu.array() > no_mass * std::max(mu[0], 0.0)).count();
+
+  const VecX root = damping.loss.cwiseSqrt();
+  const MatX lossy = root.asDiagonal() * springs_only(m, lin) * root.asDiagonal();
+  const MatX both = lossy + MatX(damping.viscous.asDiagonal());
+  MatX still = X.rightCols(n - massive);
+  const Index damped = damped_first(both, still);
+  X.rightCols(n - massive) = still;
+  mu.tail(n - massive).setZero();
+
+  MatX jacobian(6, m.size());
+  lin.point_jacobian(m, in.load_points.front().node, in.load_points.front().offset, jacobian);
+  const MatX tip = jacobian * X;
+  out.kept = std::min(count, massive + damped);
+  const Index k = out.kept;
+  out.square.head(k) = mu.head(k);
+  out.shape.leftCols(k) = X.leftCols(k);
+  out.tip.leftCols(k) = tip.leftCols(k);
+  const MatX kept = X.leftCols(k);
+  out.viscous.topLeftCorner(k, k) = kept.transpose() * damping.viscous.asDiagonal() * kept;
+  out.loss.topLeftCorner(k, k) = kept.transpose() * lossy * kept;
+  out.rest = tip.rightCols(n - k) * tip.rightCols(n - k).transpose();
 }
 
 }  // namespace stiffmap

@@ -6,24 +6,34 @@
 #include <limits>
 #include <utility>
 
-#include "kept_memory.hpp"
+#include "arrays.hpp"
 #include "stiffmap/batch.hpp"
+#include "stiffmap/kept_memory.hpp"
 
 namespace stiffmap::bindings {
 
-using Shape = std::vector<py::ssize_t>;
+/// A new array, not filled, of memory that is kept.
+template <class T>
+py::array_t<T> kept_array(const Shape& shape) {
+  std::size_t bytes = sizeof(T);
+  for (const py::ssize_t n : shape) bytes *= static_cast<std::size_t>(n);
+  if (!KeptMemory::keeps(bytes)) return py::array_t<T>(shape);
+  auto* const piece = KeptMemory::all().take(bytes);
+  const py::capsule owner(piece, [](void* p) { KeptMemory::all().give(static_cast<KeptMemory::Piece*>(p)); });
+  return py::array_t<T>(shape, static_cast<T*>(piece->memory), owner);
+}
 
 /// Arrays of one call; every array has the pose as its leading axis.
 struct Answer {
   Answer(const Mechanism& m, py::ssize_t n, py::ssize_t reads, py::ssize_t moved, bool full)
-      : displacement(KeptMemory::array<double>({n, reads, 6})), status(n), flags(n), iterations(n) {
+      : displacement(kept_array<double>({n, reads, 6})), status(n), flags(n), iterations(n) {
     const py::ssize_t legs = static_cast<py::ssize_t>(m.legs.size()), k = full ? n : 0;
-    for (py::array_t<double>* a : {&stiffness, &compliance, &free_twists}) *a = KeptMemory::array<double>({k, 6, 6});
-    effort = KeptMemory::array<double>({k, static_cast<py::ssize_t>(m.drives.size())});
-    leg_wrench = KeptMemory::array<double>({k, legs, 6});
-    coordinates = KeptMemory::array<double>({k, m.size()});
-    indeterminate = KeptMemory::array<std::uint8_t>({k, m.size()});
-    nothing_free = KeptMemory::array<std::uint8_t>({k});
+    for (py::array_t<double>* a : {&stiffness, &compliance, &free_twists}) *a = kept_array<double>({k, 6, 6});
+    effort = kept_array<double>({k, static_cast<py::ssize_t>(m.drives.size())});
+    leg_wrench = kept_array<double>({k, legs, 6});
+    coordinates = kept_array<double>({k, m.size()});
+    indeterminate = kept_array<std::uint8_t>({k, m.size()});
+    nothing_free = kept_array<std::uint8_t>({k});
     variants = py::array_t<double>(Shape{moved ? n : 0, moved, 6});
     out.displacement = displacement.mutable_data();
     out.status = status.mutable_data();

@@ -7,16 +7,11 @@
 namespace stiffmap::bindings {
 namespace {
 
-Vec3 vec3(const Array& a, const char* name) { return Eigen::Map<const Vec3>(data(a, {3}, name)); }
-
 Mat6 mat6(const Array& a, const char* name) {
   return Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(data(a, {6, 6}, name));
 }
 
-Pose make_pose(const Array& p, const Array& R) {
-  return {vec3(p, "translation"),
-          Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(data(R, {3, 3}, "rotation"))};
-}
+Pose make_pose(const Array& p, const Array& R) { return {vec3(p, "translation"), mat3(R, "rotation")}; }
 
 DriveNumbers drive_numbers_of(const py::dict& given) {
   DriveNumbers out;

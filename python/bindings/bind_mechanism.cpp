@@ -17,11 +17,14 @@ Nine by_rows(const Mat3& R) {
   return out;
 }
 
-template <class T, class Get>
-std::vector<std::string> names(const std::vector<T>& items, Get get) {
-  std::vector<std::string> out;
-  for (const T& item : items) out.push_back(get(item));
-  return out;
+/// The list of one thing of every item that a mechanism has.
+template <class Item, class Get>
+auto each(std::vector<Item> Mechanism::* items, Get get) {
+  return [items, get](const Mechanism& m) {
+    std::vector<std::decay_t<std::invoke_result_t<Get, const Item&>>> out;
+    for (const Item& item : m.*items) out.push_back(get(item));
+    return out;
+  };
 }
 
 using PlainGap = std::tuple<std::string, double, double>;  // name, m, rad
@@ -39,8 +42,7 @@ void bind_mechanism(py::module_& m) {
   py::class_<Mechanism> mechanism(m, "Mechanism");  // before the signatures that name it
   py::class_<FastPlan>(m, "FastPlan")
       .def(py::init([](const Mechanism& k, const Array& low, const Array& high, int grid_nodes) {
-             const Vec3 a = Eigen::Map<const Vec3>(data(low, {3}, "low")),
-                        b = Eigen::Map<const Vec3>(data(high, {3}, "high"));
+             const Vec3 a = vec3(low, "low"), b = vec3(high, "high");
              py::gil_scoped_release free;
              return std::make_unique<FastPlan>(k, a, b, grid_nodes);
            }),
@@ -72,67 +74,36 @@ void bind_mechanism(py::module_& m) {
                              like);
            }),
            "root"_a, "home"_a, "springs"_a, "task"_a = full_task, "search"_a = false, "like"_a = nullptr)
+      .def_property_readonly("coordinates", each(&Mechanism::coordinates, [](const Coordinate& c) { return c.name; }))
+      .def_property_readonly("roles", each(&Mechanism::coordinates, [](const Coordinate& c) { return int(c.role); }))
+      .def_property_readonly("prismatic", each(&Mechanism::coordinates,
+                                               [](const Coordinate& c) { return c.type == JointType::prismatic; }))
+      .def_property_readonly("locked", each(&Mechanism::coordinates, [](const Coordinate& c) { return c.locked; }))
       .def_property_readonly(
-          "coordinates",
-          [](const Mechanism& k) { return names(k.coordinates, [](const Coordinate& c) { return c.name; }); })
-      .def_property_readonly("roles",
-                             [](const Mechanism& k) {
-                               std::vector<int> out;
-                               for (const Coordinate& c : k.coordinates) out.push_back(static_cast<int>(c.role));
-                               return out;
-                             })
-      .def_property_readonly("prismatic",
-                             [](const Mechanism& k) {
-                               std::vector<bool> out;
-                               for (const Coordinate& c : k.coordinates) out.push_back(c.type == JointType::prismatic);
-                               return out;
-                             })
-      .def_property_readonly("locked",
-                             [](const Mechanism& k) {
-                               std::vector<bool> out;
-                               for (const Coordinate& c : k.coordinates) out.push_back(c.locked);
-                               return out;
-                             })
-      .def_property_readonly("spun_balls",
-                             [](const Mechanism& k) {
-                               std::vector<std::tuple<Index, Nine, Nine>> out;  // first coordinate, turn, axes
-                               for (const SpunBall& b : k.spun_balls)
-                                 out.emplace_back(b.first, by_rows(b.turn), by_rows(b.axes));
-                               return out;
-                             })
+          "limits", each(&Mechanism::coordinates, [](const Coordinate& c) { return std::pair(c.lower, c.upper); }))
+      .def_property_readonly(
+          "spun_balls", each(&Mechanism::spun_balls,
+                             [](const SpunBall& b) { return std::tuple(b.first, by_rows(b.turn), by_rows(b.axes)); }))
       .def_property_readonly("springs",
-                             [](const Mechanism& k) {
-                               std::vector<std::pair<std::string, Index>> out;
-                               for (const SpringGroup& g : k.groups) out.emplace_back(g.name, g.first);
-                               return out;
-                             })
+                             each(&Mechanism::groups, [](const SpringGroup& g) { return std::pair(g.name, g.first); }))
       .def_property_readonly("actuators",
-                             [](const Mechanism& k) {
-                               std::vector<std::pair<std::string, Index>> out;
-                               for (const Drive& d : k.drives) out.emplace_back(d.name, d.coordinate);
-                               return out;
-                             })
-      .def_property_readonly("nodes",
-                             [](const Mechanism& k) {
-                               std::vector<std::pair<Index, Index>> out;  // parent, coordinate
-                               for (const Node& n : k.nodes) out.emplace_back(n.parent, n.coordinate);
-                               return out;
-                             })
-      .def_property_readonly("loops",
-                             [](const Mechanism& k) {
-                               std::vector<std::tuple<std::string, std::string, Index, Index>> out;
-                               for (const Loop& l : k.loops) out.emplace_back(l.block, l.branch, l.primary, l.end);
-                               return out;
-                             })
+                             each(&Mechanism::drives, [](const Drive& d) { return std::pair(d.name, d.coordinate); }))
       .def_property_readonly(
-          "points", [](const Mechanism& k) { return names(k.points, [](const NodePoint& p) { return p.name; }); })
+          "bodies", each(&Mechanism::bodies, [](const NodeBody& b) { return std::tuple(b.name, b.node, b.mass); }))
+      .def_property_readonly("nodes",
+                             each(&Mechanism::nodes, [](const Node& n) { return std::pair(n.parent, n.coordinate); }))
+      .def_property_readonly(
+          "loops",
+          each(&Mechanism::loops, [](const Loop& l) { return std::tuple(l.block, l.branch, l.primary, l.end); }))
+      .def_property_readonly("points", each(&Mechanism::points, [](const NodePoint& p) { return p.name; }))
       .def_property_readonly("cables",
                              [](const Mechanism& k) {
                                std::vector<std::string> out;
                                for (const Index i : k.cables) out.push_back(k.external_springs[at(i)].name);
                                return out;
                              })
-      .def_property_readonly("legs", [](const Mechanism& k) { return k.legs; })
+      .def_readonly("legs", &Mechanism::legs)
+      .def_readonly("redundancy", &Mechanism::redundancy)
       .def_readonly("length", &Mechanism::length)
       .def_readonly("stiffness", &Mechanism::stiffness)
       .def("home_coordinates", [](const Mechanism& k) {

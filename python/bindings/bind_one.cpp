@@ -66,7 +66,7 @@ class OneAnswer {
 
   /// The array of one member of BatchOutput, sharing the memory of `self`.
   template <class T>
-  static py::array_t<T> view(const py::object& self, Get<T> member, std::vector<py::ssize_t> shape) {
+  static py::array_t<T> view(const py::object& self, Get<T> member, Shape shape) {
     return py::array_t<T>(std::move(shape), self.cast<OneAnswer&>().output().*member, self);
   }
 
@@ -92,7 +92,7 @@ class OneCall {
     const Index tcp = m.point("tcp");
     const NodePoint& p = m.points[static_cast<std::size_t>(tcp)];
     shared_.count = 1;
-    shared_.gravity = Eigen::Map<const Vec3>(data(gravity, {3}, "gravity"));
+    shared_.gravity = vec3(gravity, "gravity");
     shared_.load_points = {{p.node, p.offset, LoadType::dead}};
     shared_.read_points = {tcp};
   }
@@ -120,8 +120,7 @@ class OneCall {
 };
 
 template <class T>
-void field(py::class_<OneAnswer>& c, const char* name, T* BatchOutput::* member,
-           std::vector<py::ssize_t> (*shape)(const OneAnswer&)) {
+void field(py::class_<OneAnswer>& c, const char* name, T* BatchOutput::* member, Shape (*shape)(const OneAnswer&)) {
   c.def_property_readonly(name, [member, shape](const py::object& self) {
     return OneAnswer::view(self, member, shape(self.cast<const OneAnswer&>()));
   });
@@ -131,7 +130,6 @@ void field(py::class_<OneAnswer>& c, const char* name, T* BatchOutput::* member,
 
 void bind_one(py::module_& m) {
   using namespace py::literals;
-  using Shape = std::vector<py::ssize_t>;
   py::class_<OneAnswer> answer(m, "OneAnswer");
   const auto scalar = [](const OneAnswer&) { return Shape{1}; };
   const auto six = [](const OneAnswer&) { return Shape{1, 6, 6}; };

@@ -3,12 +3,11 @@
 
 namespace stiffmap::bindings {
 void bind_chain(pybind11::module_& m);
-void bind_measures(pybind11::module_& m);
 void bind_mechanism(pybind11::module_& m);
 void bind_one(pybind11::module_& m);
 void bind_paths(pybind11::module_& m);
+void bind_poses(pybind11::module_& m);
 void bind_solve(pybind11::module_& m);
-void bind_vibration(pybind11::module_& m);
 }  // namespace stiffmap::bindings
 
 PYBIND11_MODULE(_core, m, pybind11::mod_gil_not_used()) {
@@ -17,7 +16,6 @@ PYBIND11_MODULE(_core, m, pybind11::mod_gil_not_used()) {
   stiffmap::bindings::bind_mechanism(m);  // before what takes a Mechanism
   stiffmap::bindings::bind_solve(m);
   stiffmap::bindings::bind_one(m);
-  stiffmap::bindings::bind_measures(m);
   stiffmap::bindings::bind_paths(m);
-  stiffmap::bindings::bind_vibration(m);
+  stiffmap::bindings::bind_poses(m);
 }

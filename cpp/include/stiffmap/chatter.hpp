@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "stiffmap/types.hpp"
+#include "stiffmap/answers.hpp"
 
 namespace stiffmap {
 
@@ -19,5 +19,9 @@ struct ToolModes {
 
 /// |mu| of the largest multiplier at depths (m); `chips`: means over the equal intervals of a tooth period (s).
 VecX largest_multipliers(const ToolModes& modes, const std::vector<Chip>& chips, double period, const VecX& depths);
+
+/// The same of many tooth periods: "multipliers", periods x depths.
+Answers largest_multipliers(const ToolModes& modes, const std::vector<Chip>& chips, const VecX& periods,
+                            const VecX& depths, int threads);
 
 }  // namespace stiffmap

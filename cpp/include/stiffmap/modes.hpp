@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Natural frequencies of the elastic machine with its drives held, about a loaded equilibrium (theory D7).
+// What vibrates at one pose, its drives held, about a loaded equilibrium: modes, as all coordinates and as the tool
+// move in them, damping between them, and the flexibility of all that has no mass or is not kept (theory D7, V1, V2).
 #pragma once
 
 #include "stiffmap/dense.hpp"
@@ -8,33 +9,31 @@
 
 namespace stiffmap {
 
+/// Per coordinate; empty where there is none.
+struct Damping {
+  VecX viscous;  ///< N·s/m, N·m·s/rad
+  VecX loss;     ///< loss factor of its spring or law
+};
+
+/// Modes are scaled to unit stiffness: the receptance at s = i w is
+/// tip (1 + s viscous + s^2 diag(square) + i sign(w) loss)^-1 tip' + rest.
 struct ModesResult {
   Status status = Status::unreachable;
   std::uint32_t flags = 0;
-  VecX square;  ///< (rad/s)^2, lowest first; NaN beyond the last
-  MatX shape;   ///< coordinates x modes, of unit modal mass
-  VecX x;       ///< coordinates at the equilibrium
+  Index kept = 0;
+  VecX x;                  ///< coordinates at the equilibrium
+  VecX square;             ///< s^2: inverse square of each angular frequency, the largest first; NaN beyond `kept`
+  MatX shape;              ///< coordinates x modes
+  MatX tip;                ///< 6 x modes
+  MatX viscous, loss;      ///< modes x modes
+  Mat6 rest;               ///< m/N and the like
+  double unsymmetric = 0;  ///< norm of the tangent's part that is not symmetric, relative
 };
 
-/// What vibrates at one pose: motions that keep all loops closed, their tangent and mass.
-struct ReducedPose {
-  Status status = Status::unreachable;
-  std::uint32_t flags = 0;
-  MatX Z;             ///< coordinates x motions
-  MatX K, S, M;       ///< tangent, its symmetric part, mass
-  Cholesky cholesky;  ///< of S
-  VecX x;             ///< coordinates at the equilibrium
-};
-
-/// False where there is no equilibrium, or none that a small motion comes back to.
-bool reduced_pose(const Mechanism& m, const Inertias& inertias, const PoseInput& in, SolveWorkspace& ws,
-                  ReducedPose& out);
-
-/// Stiffness of springs and laws alone, in coordinates: the tangent without the loads.
-MatX springs_only(const Mechanism& m, const Linearization& lin);
-
-/// The lowest `count` modes at one pose.
-void natural_modes(const Mechanism& m, const Inertias& inertias, const PoseInput& in, Index count, SolveWorkspace& ws,
-                   ModesResult& out);
+/// `count` modes at most, at the point of the first load; those with dampers and no mass come last. Of a tangent that
+/// dead moments make unsymmetric: of its symmetric part, or, `whole`, as it is, and unstable where frequencies are
+/// complex.
+void lowest_modes(const Mechanism& m, const Inertias& inertias, const Damping& damping, const PoseInput& in,
+                  Index count, bool whole, SolveWorkspace& ws, ModesResult& out);
 
 }  // namespace stiffmap

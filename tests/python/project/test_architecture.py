@@ -13,8 +13,8 @@ HEADERS = sorted((ROOT / "cpp/include/stiffmap").glob("*.hpp"))
 
 # A header may include headers of earlier ranks only.
 RANKS = (
-    ("types", "check", "parallel", "command_error", "drive_numbers"),
-    ("dense", "se3"),
+    ("types", "check", "parallel", "command_error", "drive_numbers", "kept_memory"),
+    ("dense", "se3", "answers"),
     ("law", "spring", "load", "chatter"),
     ("chain",),
     ("whole_branches",),
@@ -29,7 +29,8 @@ RANKS = (
     ("spins",),
     ("assemble", "solve", "fast_plan"),
     ("batch", "clamp", "follower", "modes"),
-    ("path", "vibration"),
+    ("path",),
+    ("poses",),
 )
 RANK = {name: i for i, names in enumerate(RANKS) for name in names}
 
@@ -130,3 +131,11 @@ def test_the_description_computes_nothing() -> None:
             if line.startswith(("import stiffmap", "from stiffmap")):
                 assert line.startswith(PLAIN), f"{path.name}: {line}"
             assert not re.match(r"(from|import) (scipy|yaml|pydantic|xarray)", line), f"{path.name}: {line}"
+
+
+def test_bindings_hand_arrays_over_and_decide_nothing() -> None:
+    """What is answered at which pose is the core's: no loop over poses, no status and no flag at the border."""
+    words = re.compile(r"parallel_chunks|Status::|flag::|\bcontinue\b")
+    files = sorted((ROOT / "python/bindings").glob("*.[ch]pp"))
+    assert files
+    assert {p.name: words.search(code(p)) for p in files if words.search(code(p))} == {}

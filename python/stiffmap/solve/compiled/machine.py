@@ -154,18 +154,19 @@ class CompiledMachine:
 
         start: (n, coordinates) on the assembly branch that is meant; None: that of home.
         """
-        return self._mechanism.closure(self._plan, position, rotation, True, threads, start)
+        return tuple(self._mechanism.closure(self._plan, position, rotation, True, threads, start).values())
 
     def close_actuators(
         self, actuators: Floats, threads: int, start: Floats | None = None
     ) -> tuple[Any, ...]:
         """The same of (n, actuators) actuator coordinates, continued from home or from `start`."""
         none = np.zeros((0, 3, 3))
-        return self._mechanism.closure(None, actuators, none, False, threads, start)  # type: ignore[arg-type]
+        found = self._mechanism.closure(None, actuators, none, False, threads, start)  # type: ignore[arg-type]
+        return tuple(found.values())
 
     def point_positions(self, point: str, coordinates: Floats) -> Floats:
         """(n, 3) m, base axes, of a named point at (n, coordinates), nominal geometry."""
-        return self._mechanism.point_positions(point, coordinates)
+        return np.asarray(self._mechanism.point_positions(point, coordinates)["position"])
 
     def home_coordinates(self) -> Floats:
         """(coordinates,) at home."""
@@ -182,14 +183,14 @@ class CompiledMachine:
         threads: int,
     ) -> dict[str, Any]:
         """Arrays by name: what keeps `point` at (n, 6) displacements from its commanded poses."""
-        return _core.clamp(self._mechanism, position, rotation, displacement, point, gravity, threads)
+        return self._mechanism.clamp(position, rotation, displacement, point, gravity, threads)
 
     def reactions(
         self, position: Floats, rotation: Floats, wrench: Floats, *, point: str, gravity: Floats, threads: int
     ) -> Floats:
         """(n, coordinates) N or N·m of every spring, drive and locked coordinate, reference path."""
-        (force,) = _core.reactions(self._mechanism, position, rotation, wrench, point, gravity, threads)
-        return np.asarray(force)
+        found = self._mechanism.reactions(position, rotation, wrench, point, gravity, threads)
+        return np.asarray(found["force"])
 
     def path(
         self,
@@ -244,7 +245,7 @@ class CompiledMachine:
         continuation from home does not reach is out of reach. Only: so is one that its start does not lead to.
         """
         begin = np.zeros((0, len(self.names.coordinates))) if start is None else start
-        return self._mechanism.kinematics(position, rotation, begin, weights, False, patient, only, threads)
+        return self._mechanism.kinematics(position, rotation, begin, weights, patient, only, threads)
 
     @property
     def not_enclosed(self) -> str:
@@ -306,37 +307,32 @@ class CompiledMachine:
         position: Floats,
         rotation: Floats,
         wrench: Floats,
-        gravity: Floats,
-        count: int,
-        threads: int,
-    ) -> dict[str, Any]:
-        """Arrays by name: squares of the lowest angular frequencies and their shapes."""
-        return self._mechanism.modes(inertias, position, rotation, wrench, gravity, count, threads)
-
-    def tip_modes(
-        self,
-        inertias: Floats,
-        viscous: Floats,
-        loss: Floats,
-        position: Floats,
-        rotation: Floats,
-        wrench: Floats,
         *,
         gravity: Floats,
-        closed: Floats,
-        point: str,
         count: int,
         threads: int,
+        viscous: Floats | None = None,
+        loss: Floats | None = None,
+        closed: Floats | None = None,
+        point: str = "tcp",
+        whole: bool = False,
     ) -> dict[str, Any]:
-        """Arrays by name: the lowest modes at a point, damping between them, the flexibility of all others."""
-        return self._mechanism.tip_modes(
-            inertias, viscous, loss, position, rotation, wrench, gravity, closed, point, count, threads
-        )
+        """Arrays by name: the lowest modes at a point, damping between them, the flexibility of all others.
+
+        viscous, loss: (coordinates,). closed: (n, coordinates) closed at the poses. whole: of a tangent that is not symmetric as it
+        is, with the motion of all coordinates.
+        """
+        size = len(self.names.coordinates)
+        none, unknown = np.zeros(size), np.zeros((0, size))
+        return self._mechanism.modes(
+            inertias, none if viscous is None else viscous, none if loss is None else loss, position, rotation, wrench,
+            gravity, unknown if closed is None else closed, point, count, whole, threads,
+        )  # fmt: skip
 
     def frames(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """(nodes, 3) m and (nodes, 3, 3): all frames at given coordinates, nominal geometry."""
-        position, rotation = self._mechanism.frames(coordinates)
-        return position, rotation
+        found = self._mechanism.frames(coordinates)
+        return found["position"], found["rotation"]
 
 
 LOAD_TYPES = {"dead": 0, "follower": 1, "semitangential": 2}
@@ -366,4 +362,5 @@ def multipliers(
     (modes,) rad/s, ratio, kg and (modes, 3) unit vectors; (3, 3) m/N that follows at once; (intervals, 3, 2) N/m² means of the
     chip's force; (periods,) s; (depths,) m.
     """
-    return np.asarray(_core.multipliers(frequency, ratio, mass, way, rest, chips, period, depth, threads))
+    found = _core.multipliers(frequency, ratio, mass, way, rest, chips, period, depth, threads)
+    return np.asarray(found["multipliers"])

@@ -99,8 +99,8 @@ def tip_modes(
     shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2])
     poses, turns, loads = rows(p, shape, (3,)), rows(r, shape, (3, 3)), rows(w, shape, (6,))
     cores = thread_count(threads)
-    out = compiled.tip_modes(
-        inertias(machine), declared.viscous, declared.loss, poses, turns, loads,
+    out = compiled.modes(
+        inertias(machine), poses, turns, loads, viscous=declared.viscous, loss=declared.loss,
         gravity=compiled.gravity(gravity), closed=compiled.close_poses(poses, turns, cores)[0], point=point,
         count=_count(machine, declared, modes), threads=cores,
     )  # fmt: skip

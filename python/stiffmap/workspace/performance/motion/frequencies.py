@@ -70,11 +70,13 @@ def natural_frequencies(
         r = as_rotations(r)
     shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2])
     out = machine.compiled.modes(
-        inertias(machine), rows(p, shape, (3,)), rows(r, shape, (3, 3)), rows(w, shape, (6,)),
-        machine.compiled.gravity(gravity), modes, thread_count(threads),
+        inertias(machine), rows(p, shape, (3,)), rows(r, shape, (3, 3)), rows(w, shape, (6,)), count=modes, whole=True,
+        gravity=machine.compiled.gravity(gravity), threads=thread_count(threads),
     )  # fmt: skip
-    shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items()}
+    w0 = 1 / np.sqrt(out["square"])
+    found = {k: out[k].reshape(shape + out[k].shape[1:]) for k in ("coordinates", "status", "flags")}
     return NaturalFrequencies(
-        frequency=np.sqrt(shaped.pop("square")) / (2 * np.pi),
-        **shaped,
+        frequency=(w0 / (2 * np.pi)).reshape(*shape, -1),
+        shape=(w0[..., None] * out["shape"]).reshape(*shape, *out["shape"].shape[1:]),
+        **found,
     )

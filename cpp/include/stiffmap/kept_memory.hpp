@@ -6,30 +6,19 @@
 #include <map>
 #include <new>
 
-#include "arrays.hpp"
+namespace stiffmap {
 
-namespace stiffmap::bindings {
-
-/// Pieces that no array holds any more. Only used with the interpreter's lock held.
+/// Pieces that no array holds any more. Not for two threads at once: the interpreter's lock is held.
 class KeptMemory {
  public:
-  /// A new array of `shape`, not filled.
-  template <class T>
-  static py::array_t<T> array(const std::vector<py::ssize_t>& shape) {
-    std::size_t bytes = sizeof(T);
-    for (const py::ssize_t n : shape) bytes *= static_cast<std::size_t>(n);
-    if (bytes < least || bytes > most_each) return py::array_t<T>(shape);
-    Piece* const piece = all().take((bytes + grain - 1) / grain * grain);
-    return py::array_t<T>(shape, static_cast<T*>(piece->memory),
-                          py::capsule(piece, [](void* p) { all().give(static_cast<Piece*>(p)); }));
-  }
-
- private:
   static constexpr std::size_t grain = 1 << 16, least = 1 << 16, most_each = 1 << 24, most_kept = 1 << 26;
   struct Piece {
     void* memory;
     std::size_t bytes;
   };
+
+  /// Whether it pays to keep so many bytes.
+  static bool keeps(std::size_t bytes) { return bytes >= least && bytes <= most_each; }
 
   /// Never destroyed: arrays may outlive everything else.
   static KeptMemory& all() {
@@ -38,7 +27,8 @@ class KeptMemory {
   }
 
   /// The smallest that fits and is not much too large.
-  Piece* take(std::size_t bytes) {
+  Piece* take(std::size_t wanted) {
+    const std::size_t bytes = (wanted + grain - 1) / grain * grain;
     const auto found = free_.lower_bound(bytes);
     if (found != free_.end() && found->first <= bytes + bytes / 4) {
       Piece* const piece = found->second;
@@ -61,8 +51,9 @@ class KeptMemory {
     free_.emplace(piece->bytes, piece);
   }
 
+ private:
   std::multimap<std::size_t, Piece*> free_;
   std::size_t kept_ = 0;
 };
 
-}  // namespace stiffmap::bindings
+}  // namespace stiffmap
