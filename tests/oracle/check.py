@@ -24,7 +24,10 @@ SAME = 1e-9  # m, rad
 OFF = 1e-8  # m, rad: from the core's TCP to the equilibrium
 FAR = 0.1  # m, rad
 METRE = 1.0
+EPS = float(np.finfo(float).eps)
+PLACE = ("translation", "rotation", "displacement")
 MODES = 3
+FINER = 16
 
 
 @dataclass(frozen=True)
@@ -41,11 +44,17 @@ class Check:
 
 
 def checks(task: Task, machine: sm.Machine | None = None) -> tuple[Answer, list[Check]]:
-    """Every way to ask."""
-    bodies = Machine(task.description)
+    """Every way to ask. What disagrees is asked again of bodies that close in finer steps."""
+    machine = machine or sm.Machine(task.description)
+    truth, found = checked(task, machine, Machine(task.description))
+    if any(c.wrong for c in found):
+        truth, found = checked(task, machine, Machine(task.description, FINER))
+    return truth, found
+
+
+def checked(task: Task, machine: sm.Machine, bodies: Machine) -> tuple[Answer, list[Check]]:
     modes = MODES if vibrates(task) else 0
     truth = bodies.solve(task.loads, task.pose, task.drives, task.kind, modes=modes)
-    machine = machine or sm.Machine(task.description)
     out = []
     for how, s in asked(machine, task, truth):
         there, asking = truth, task
@@ -54,6 +63,10 @@ def checks(task: Task, machine: sm.Machine | None = None) -> tuple[Answer, list[
             there = bodies.solve(task.loads, None, own, task.kind, modes=modes)
             if not same_pose(there, truth):
                 there = truth  # those drives lead elsewhere: let it be judged as it stands
+        elif task.drives is not None and "pose" in how and s.status == sm.Status.UNREACHABLE:
+            there = bodies.solve(
+                task.loads, truth.pose, None, task.kind
+            )  # drives may lead where no straight way does
         out.append(against(there, how, s, machine, asking, bodies))
     return truth, out
 
@@ -118,7 +131,7 @@ def against(
     elsewhere = told and task.drives is not None and "pose" in how
     wrong = "" if elsewhere else objection(truth, status, told, gaps, s)
     numbers = status in (sm.Status.CONVERGED, sm.Status.UNSTABLE)
-    off = not truth.found or any(not v < limit(k, truth) for k, v in gaps.items())
+    off = not truth.found or any(not v < limit(k, truth, gaps) for k, v in gaps.items())
     if (
         not wrong
         and numbers
@@ -129,8 +142,9 @@ def against(
         away, falling = bodies.judge(s.displacement, task.loads, task.pose, task.drives, task.kind)
         if np.isnan(away):
             return Check(how, status.name, told, f"{truth.kind}, undecided", gaps, "")
-        if not away < OFF and (not truth.found or leapt(truth)) and balanced(machine, s, task, truth, how):
-            # the TCP alone does not say how slender leaves are bent; which way a path goes on stays open
+        open_way = not truth.found or leapt(truth) or told
+        if not away < OFF and open_way and balanced(machine, s, task, truth, how):
+            # the TCP alone does not say how slender springs are bent; which way a path goes on stays open
             return Check(how, status.name, told, f"{truth.kind}, balanced", gaps, "")
         if not away < OFF:
             wrong = f"not an equilibrium, {away:.0e} off"
@@ -141,10 +155,9 @@ def against(
 
 def balanced(machine: sm.Machine, s: sm.Solution, task: Task, truth: Answer, how: str) -> bool:
     """The core's own coordinates by free bodies (`verify`), where the bodies here lose the path."""
-    if task.loads.at_points:
-        return False
     wrench = np.r_[task.loads.force, task.loads.moment][None]
     load = {"wrench": wrench, "load_type": task.kind, "gravity": task.loads.gravity}
+    load["wrenches"] = {n: [*f, 0, 0, 0] for n, f in task.loads.at_points.items()}
     pose = task.pose or truth.pose
     p, r = np.array(pose.p)[None], np.array(pose.r)[None]
     if by_drives := "drives" in how:
@@ -165,11 +178,13 @@ def leapt(truth: Answer) -> bool:
     return truth.released > FAR
 
 
-def limit(kind: str, truth: Answer) -> float:
-    """Of a difference. What a Hessian with a small eigenvalue gives is no better than its round-off."""
-    if kind in ("translation", "rotation", "displacement"):
+def limit(kind: str, truth: Answer, gaps: dict[str, float]) -> float:
+    """Of a difference. What a Hessian with a small eigenvalue gives is no better than its round-off and than the place where it is
+    taken."""
+    if kind in PLACE:
         return LIMIT
-    return max(LIMIT, ROUND_OFF / max(abs(truth.lowest), 1e-300))
+    off = max((gaps.get(k, 0.0) for k in PLACE), default=0.0)
+    return max(LIMIT, (ROUND_OFF + min(off, LIMIT)) / max(abs(truth.lowest), 1e-300))
 
 
 def objection(truth: Answer, status: sm.Status, told: bool, gaps: dict[str, float], s: sm.Solution) -> str:
@@ -181,7 +196,7 @@ def objection(truth: Answer, status: sm.Status, told: bool, gaps: dict[str, floa
     if not truth.found or leapt(truth):  # any equilibrium will do: `against` looks whether it is one
         return ""
     far = truth.crossed or float(np.abs(truth.displacement).max()) > FAR
-    off = {k: v for k, v in gaps.items() if not v < limit(k, truth)}
+    off = {k: v for k, v in gaps.items() if not v < limit(k, truth, gaps)}
     if told and numbers and not off:  # right, and needlessly doubted: counted as flagged
         return ""
     if told:
@@ -198,7 +213,9 @@ def objection(truth: Answer, status: sm.Status, told: bool, gaps: dict[str, floa
 def differences(truth: Answer, s: sm.Solution) -> dict[str, float]:
     """Of what has a number in the core's answer; NaN where it should have one."""
     moved, size = truth.displacement, float(np.abs(truth.displacement[:3]).max())
-    floor = 1e-7  # m: 1e-15 m of a coordinate is round-off
+    floor = max(
+        1e-7, len(s.coordinate_names) * EPS / LIMIT
+    )  # m, rad: one unit in the last place of each coordinate
     out = {
         "translation": float(np.abs(s.displacement[:3] - moved[:3]).max() / max(size, floor)),
         "rotation": float(

@@ -52,6 +52,8 @@ class Case:
     little to tell."""
     left_open: tuple[str, ...] = ()
     """Full names of joints of which the answer says that they are open: held where they were, by whatever force."""
+    at_points: dict[str, Array] = field(default_factory=dict)
+    """Named point -> (3,) N, dead."""
 
 
 @dataclass
@@ -317,7 +319,10 @@ def load(walk: Walk, tip: Frame) -> None:
 
 
 def external(walk: Walk) -> None:
-    """Cables and counterbalances."""
+    """Forces on named points, cables and counterbalances."""
+    for name, force in walk.case.at_points.items():
+        f, at = walk.points[name.removeprefix("platform.").removeprefix("base.")]
+        walk.known.append((f, at, np.broadcast_to(force, at.shape), np.zeros_like(at)))
     for s in walk.d.external_springs:
         f, at = walk.points[s.point.removeprefix("platform.").removeprefix("base.")]
         line = np.array(s.anchor) - at

@@ -81,7 +81,10 @@ def verified_alike(whole: Question, s: sm.Solution, at: Array) -> Verdict:
     case = Case(command, still, wrench[:, :3], wrench[:, 3:], gravity, str(q.load["load_type"]), q.before)
     gap, tip = closed(d, q.before, case, size)
     left_open = tuple(n for n, i in s.joint_index.items() if s.indeterminate_mask[at, i].all())
-    case = replace(case, turned=tip.r, smooth=without_friction(q, names), left_open=left_open)
+    at_points = {n: np.array(w[:3], dtype=float) for n, w in q.load.get("wrenches", {}).items()}
+    case = replace(
+        case, turned=tip.r, smooth=without_friction(q, names), left_open=left_open, at_points=at_points
+    )
     found = balance(d, coordinates(names, s.coordinates[at]), case, size)
     stated = s.displacement[at]
     turn = Rotation.from_matrix(found.rotation @ np.swapaxes(tip.r, 1, 2)).as_rotvec()

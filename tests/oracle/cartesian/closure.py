@@ -24,10 +24,10 @@ class Unreachable(Exception):
 
 
 class Closure:
-    """Of a structure as drawn."""
+    """Of a structure as drawn. `finer`: steps so many times as short, which lose a branch near a singular pose less easily."""
 
-    def __init__(self, s: Structure) -> None:
-        self.s = s
+    def __init__(self, s: Structure, finer: int = 1) -> None:
+        self.s, self.finer = s, finer
         self.rigid = [*s.where("keep"), *s.where("spring")]
         self.joints = s.where("joint")
 
@@ -47,13 +47,13 @@ class Closure:
     def at_pose(self, home: tuple[State, Array], pose: Pose) -> tuple[State, Array]:
         p, r = np.array(pose.p), np.array(pose.r)
         far = np.abs(np.r_[p - self.s.d.home.p, r.ravel() - np.ravel(self.s.d.home.r)]).max()
-        return self.reach(*home, p, r, {}, steps=max(1, int(np.ceil(far / 0.08))))
+        return self.reach(*home, p, r, {}, steps=self.finer * max(1, int(np.ceil(far / 0.08))))
 
     def at_drives(self, home: tuple[State, Array], command: dict[str, float]) -> tuple[State, Array]:
         """`command` by full name."""
         at = {self.s.names.index(n): v for n, v in command.items()}
         far = max((abs(v - home[1][i]) for i, v in at.items()), default=0.0)
-        return self.reach(*home, None, None, at, steps=max(1, int(np.ceil(far / 0.15))))
+        return self.reach(*home, None, None, at, steps=self.finer * max(1, int(np.ceil(far / 0.15))))
 
     def reach(
         self, at: State, near: Array, p: Array | None, r: Array | None, drives: dict[int, float], steps: int
@@ -76,7 +76,7 @@ class Closure:
                 if step < SHORTEST:
                     raise
                 continue
-            done, step = share, 2 * step
+            done, step = share, 2 * step if self.finer == 1 else min(2 * step, 1.0 / steps)
         return at, near
 
     def newton(

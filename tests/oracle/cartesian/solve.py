@@ -54,10 +54,10 @@ def nothing(kind: str, pose: Pose, drives: dict[str, float]) -> Answer:
 class Machine:
     """A description, closed at home."""
 
-    def __init__(self, d: MachineDescription) -> None:
+    def __init__(self, d: MachineDescription, finer: int = 1) -> None:
         self.d = d
         self.drawn = Builder(d).build()
-        self.closure = Closure(self.drawn)
+        self.closure = Closure(self.drawn, finer)
         self.home = self.closure.home()
 
     @property
