@@ -55,6 +55,8 @@ def _head(e: Experiment, title: str) -> dict[str, Any]:
         head["orientation"] = {"against": "base"}
     if (e.normal, e.surface) != ((0.0, 0.0, 1.0), "known"):
         head["surface"] = {"normal": list(e.normal), "shape": e.surface}
+    if e.anchor is not None:
+        head["anchor"] = [float(f"{MM * v:.9g}") for v in e.anchor]
     if e.certificate:
         mm = ("frame", "tool")
         head["certificate"] = {k: float(f"{v * (MM if k in mm else 1.0):.6g}") for k, v in e.certificate}
@@ -150,8 +152,11 @@ def _absolute(e: Experiment) -> tuple[dict[str, list[Any]], tuple[str, ...]]:
         columns |= {c: _text(np.where(good, turns[:, i], np.nan)) for i, c in enumerate(SEEN_TURNED)}
         told += AXES[3:]
     for kind in kinds():
-        if kind.name in e.absolute:
-            columns[kind.absolute] = _text(e.absolute[kind.name] * _scale(kind.channel))
+        values = e.absolute.get(kind.name)
+        if values is None and kind.found and kind.commanded and e.registration and kind.channel in e.extra:
+            values = e.reading[:, e.channels.index(kind.channel)] + kind.commanded(e)
+        if values is not None:
+            columns[kind.absolute] = _text(values * _scale(kind.channel))
             told += (kind.name,)
     return columns, told
 

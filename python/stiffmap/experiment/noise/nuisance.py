@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings import kind_of
-from stiffmap.experiment.setups import SEEN, setups_of, targets_of
+from stiffmap.experiment.setups import setups_of, target_positions, targets_of
 
 
 def nuisance_columns(experiment: Experiment, base: Floats) -> Floats:
@@ -52,25 +53,6 @@ def _turns(here: Floats, experiment: Experiment, base: Floats) -> Iterator[Float
         yield _wide(experiment, here[:, None] * np.hstack([linear, angular]))
 
 
-def target_positions(experiment: Experiment) -> Floats:
-    """(n, 3) m, base axes: where the targets were commanded."""
-    return np.asarray(experiment.position + _levers(experiment))
-
-
-def _levers(experiment: Experiment) -> Floats:
-    """(n, 3) m, base axes: from the tool point to the target that was seen, where it has been found."""
-    out = np.zeros((len(experiment), 3))
-    if experiment.rotation is None:  # the same in all rows: a shift
-        return out
-    shifts = {name: shift for name, _, shift in experiment.registration}
-    number, names = targets_of(experiment)
-    for i, point in enumerate(experiment.points):
-        target = f"target {names[number[i]]}"
-        if SEEN in point and target in shifts:
-            out[i] = experiment.rotation[i] @ shifts[target]
-    return out
-
-
 def _of_rotation_vector(turned: Floats, turn: Floats) -> Floats:
     """(n, 3) change of the rotation vectors `turned` (n, 3), small, by a small further turn in base axes."""
     return np.asarray(turn - 0.5 * np.cross(turned, turn))
@@ -100,8 +82,11 @@ def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
 
 def _readings(experiment: Experiment, base: Floats) -> Iterator[Floats]:
     """What nobody knows of a kind of reading, as the height of a surface."""
+    where = experiment
+    if experiment.quantity == "position" and any(kind_of(c) for c in experiment.extra):
+        where = replace(experiment, position=experiment.position + np.nan_to_num(base[:, :3]))
     for i, kind in ((i, kind_of(c)) for i, c in enumerate(experiment.channels)):
-        for change in kind.nuisance(experiment) if kind and kind.nuisance else ():
+        for change in kind.nuisance(where) if kind and kind.nuisance else ():
             column = np.zeros_like(experiment.reading)
             column[:, i] = change
             yield column
