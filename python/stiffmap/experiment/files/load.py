@@ -213,13 +213,11 @@ def _fits(quantity: str, table: Table) -> None:
 
 def _above_zero(table: Table, absolute: dict[str, Floats]) -> None:
     """FileError for a reading that has the wrong sign."""
-    for kind in kinds():
-        wrong = np.flatnonzero(absolute[kind.name] <= 0.0) if kind.positive and kind.name in absolute else ()
-        if len(wrong):
-            found = table.text(kind.absolute)[wrong[0]]
-            line = table.lines[int(wrong[0])]
-            message = f"column '{kind.absolute}': {kind.title}: expected a number above zero; found {found}"
-            raise FileError(message, file=table.file, line=line)
+    for kind in (k for k in kinds() if k.positive and k.name in absolute):
+        for line, value in zip(table.lines, absolute[kind.name], strict=True):
+            if value <= 0.0:
+                message = f"column '{kind.absolute}': expected {kind.title} above zero; found {value:g} m"
+                raise FileError(message, file=table.file, line=line)
 
 
 def _promise(

@@ -58,7 +58,7 @@ def read_and_ask(
         answers = replace(answers, chosen=meant.chosen, units=meant.units)
         joints = commanded(table, how.drives, answers.chosen, answers.units)
         if joints is not None:
-            joints, answers = seated(joints, answers, ask)
+            joints, answers = seated(joints, answers)
             joints = as_seen(joints, answers.units, how.difference)
             table, answers = joints.sheet, replace(answers, chosen=joints.chosen)
             told += joints.told

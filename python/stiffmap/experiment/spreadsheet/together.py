@@ -105,22 +105,22 @@ def _signs(m: Meant) -> None:
 
 def _lengths(m: Meant) -> None:
     """Lengths of a wire or bar: rows with a wrong sign are left out, and large numbers without a unit are mm."""
-    for c in [c for c in guess(m.sheet.header, m.chosen) if c.meaning == "ll"]:
-        values, name = m.sheet.numbers(c.index), m.sheet.header[c.index]
-        typical = float(np.median(np.abs(values[np.isfinite(values)]))) if np.isfinite(values).any() else 0.0
-        if not c.unit and not {"ll", "length"} & set(m.units) and typical > MOST_METRES:
+    for c in [c for c in guess(m.sheet.header, m.chosen) if c.meaning == "ll" and not c.repeat]:
+        values = m.sheet.numbers(c.index)
+        if (
+            not c.unit
+            and not {"ll", "length"} & set(m.units)
+            and np.nanmax(np.abs(values), initial=0.0) > MOST_METRES
+        ):
             m.units["ll"] = "mm"
-            m.said.append(f"'{name}' is {typical:.4g} in the middle: taken as mm")
+            m.said.append(f"'{c.name}' goes to {np.nanmax(values):.4g}: taken as mm")
         wrong = np.flatnonzero(values <= 0.0)
         if wrong.size:
-            rows = ", ".join(f"line {m.sheet.lines[i]}: {values[i]:g}" for i in wrong[:NAMED])
-            more = f" and {wrong.size - NAMED} more" if wrong.size > NAMED else ""
-            m.said.append(f"'{name}': a length is above zero; left out: {rows}{more}")
-            m.add(
-                f"{c.name} above zero" + (f" [{c.unit}]" if c.unit else ""),
-                np.where(values > 0.0, values, np.nan),
-                "ll",
-            )
+            rows = ", ".join(f"line {m.sheet.lines[i]} ({values[i]:g})" for i in wrong[:NAMED])
+            told = f"{rows} and {wrong.size - NAMED} more" if wrong.size > NAMED else rows
+            m.said.append(f"'{c.name}': expected lengths above zero; left out: {told}")
+            name = f"{c.name} in use" + (f" [{c.unit}]" if c.unit else "")
+            m.add(name, np.where(values > 0.0, values, np.nan), "ll")
 
 
 def _stateless(header: str) -> tuple[str, str]:
