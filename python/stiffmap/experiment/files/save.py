@@ -15,6 +15,7 @@ from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Channel, Experim
 from stiffmap.experiment.files.columns import APPROACH, POSE, POSE2, SEEN, SEEN_TURNED
 from stiffmap.experiment.files.orientation import VECTOR
 from stiffmap.experiment.readings import kinds
+from stiffmap.experiment.setups import SEEN as SEEN_TARGET
 
 MM = 1e3
 PLAIN = {"unloaded": "centre", "frame": "known", "tool": "known"}
@@ -129,7 +130,9 @@ def _columns(e: Experiment) -> dict[str, list[Any]]:
         if values is not None:
             columns[name] = _text(np.asarray(values, dtype=float))
     words = {n: getattr(e, field) for n, field in WORDS.items()}
-    return columns | {n: list(v) for n, v in words.items() if v}
+    return columns | {
+        n: list(v) for n, v in words.items() if v and not (n == "point" and SEEN_TARGET in v[0])
+    }
 
 
 def plan_columns(e: Experiment) -> dict[str, list[Any]]:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.readings import kind_of
+from stiffmap.experiment.readings import ReadingKind, kind_of
 from stiffmap.experiment.setups import setups_of, target_positions, targets_of
 
 
@@ -82,14 +82,23 @@ def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
 
 def _readings(experiment: Experiment, base: Floats) -> Iterator[Floats]:
     """What nobody knows of a kind of reading, as the height of a surface."""
-    where = experiment
-    if experiment.quantity == "position" and any(kind_of(c) for c in experiment.extra):
-        where = replace(experiment, position=experiment.position + np.nan_to_num(base[:, :3]))
     for i, kind in ((i, kind_of(c)) for i, c in enumerate(experiment.channels)):
-        for change in kind.nuisance(where) if kind and kind.nuisance else ():
+        for change in kind.nuisance(_standing(experiment, base, kind, i)) if kind and kind.nuisance else ():
             column = np.zeros_like(experiment.reading)
             column[:, i] = change
             yield column
+
+
+def _standing(e: Experiment, base: Floats, kind: ReadingKind, i: int) -> Experiment:
+    """The experiment where a machine that shows `base` (n, c) stands, with the absolute readings of channel i where frames are found."""
+    if e.quantity != "position":
+        return e
+    own = (
+        {kind.name: e.reading[:, i] + kind.commanded(e)}
+        if kind.found and kind.commanded and e.registration
+        else {}
+    )
+    return replace(e, position=e.position + np.nan_to_num(base[:, :3]), absolute=own)
 
 
 def _tool_axis(rotation: Floats | None, n: int, k: int) -> Floats:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -32,8 +34,17 @@ def commanded(e: Experiment) -> Floats:
 
 
 def nuisance(e: Experiment) -> Iterator[Floats]:
-    """Zero of the length and, where it is unknown, place of the anchor, one of each per set-up."""
-    way, label = _apart(e)[0], setups_of(e)[0]
+    """Zero of the length and, where it is unknown, place of the anchor, one of each per set-up.
+
+    Along the secant from the anchor in use to that which fits where the machine stands: exact however far apart they are.
+    """
+    label, (way, far) = setups_of(e)[0], _apart(e)
+    if e.anchor is None and READING.name in e.absolute:
+        with suppress(StiffmapError):  # too few
+            there, more = _apart(
+                replace(e, registration=(*e.registration, *found(e, e.absolute[READING.name])))
+            )
+            way = (way * far[:, None] + there * more[:, None]) / (far + more)[:, None]
     shapes = [np.ones(len(e)), *(way.T if e.anchor is None else ())]
     yield from ((label == s) * shape for s in np.unique(label) for shape in shapes)
 
