@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings import ReadingKind, kind_of
 from stiffmap.experiment.setups import setups_of, target_positions, targets_of
@@ -65,6 +67,8 @@ def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
     label = targets_of(experiment)[0]
     turned = np.nan_to_num(base[:, 3:6])
     there = Rotation.from_rotvec(turned)
+    kinds = ((i, kind_of(c)) for i, c in enumerate(experiment.channels))
+    stands = {i: _standing(experiment, base, kind, i) for i, kind in kinds if kind and kind.tool_offset}
     for here in ((label == t).astype(float) for t in np.unique(label)):
         for k in range(3):
             arm = _tool_axis(experiment.rotation, len(experiment), k)
@@ -73,7 +77,7 @@ def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
             column = _wide(experiment, np.hstack([linear, np.zeros_like(linear)]))
             for i, kind in ((i, kind_of(c)) for i, c in enumerate(experiment.channels)):
                 if kind and kind.tool_offset:
-                    column[:, i] = kind.tool_offset(experiment, arm, k)
+                    column[:, i] = kind.tool_offset(stands[i], arm if kind.pair else held, k)
             yield here[:, None] * column
             if experiment.tool == "unknown" and experiment.quantity == "position":
                 angular = _of_rotation_vector(turned, held)
@@ -90,15 +94,20 @@ def _readings(experiment: Experiment, base: Floats) -> Iterator[Floats]:
 
 
 def _standing(e: Experiment, base: Floats, kind: ReadingKind, i: int) -> Experiment:
-    """The experiment where a machine that shows `base` (n, c) stands, with the absolute readings of channel i where frames are found."""
-    if e.quantity != "position":
+    """The experiment where a machine that shows `base` (n, c) stands; with what the absolute readings of channel i fit there, next to
+    what was found at the commands."""
+    if e.quantity != "position" or kind.pair:
         return e
-    own = (
-        {kind.name: e.reading[:, i] + kind.commanded(e)}
-        if kind.found and kind.commanded and e.registration
-        else {}
-    )
-    return replace(e, position=e.position + np.nan_to_num(base[:, :3]), absolute=own)
+    turn = Rotation.from_rotvec(np.nan_to_num(base[:, 3:6])).as_matrix()
+    out = replace(e, rotation=None if e.rotation is None else turn @ e.rotation)
+    levers = target_positions(out) - out.position
+    out = replace(out, position=target_positions(e) + np.nan_to_num(base[:, :3]) - levers)
+    if not (kind.found and kind.commanded and e.registration):
+        return out
+    with suppress(StiffmapError):  # too few rows
+        again = kind.found(out, e.reading[:, i] + kind.commanded(e))
+        out = replace(out, registration=(*e.registration, *again))
+    return out
 
 
 def _tool_axis(rotation: Floats | None, n: int, k: int) -> Floats:

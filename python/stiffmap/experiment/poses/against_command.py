@@ -30,9 +30,10 @@ def resolved(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
         if kind.found:
             found = kind.found(e, e.absolute[kind.name])
             e = replace(e, registration=(*e.registration, *found))
-            tools = [p for name, _, p in found if name.startswith("target ")]
+            places, (target, names) = {name: p for name, _, p in found}, targets_of(e)
+            tools = [p for n in names if (p := places.get(f"target {n}")) is not None]
             if tools:
-                machine, e = _on_points(machine, e, np.array(tools), targets_of(e)[0])
+                machine, e = _on_points(machine, e, np.array(tools), target)
         reading[:, e.channels.index(kind.channel)] = e.absolute[kind.name] - kind.commanded(e)
     return machine, replace(e, reading=reading, absolute={})
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from scipy.optimize import least_squares
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.readings.types import ReadingKind, Seen
-from stiffmap.experiment.setups import SEEN, setups_of, target_positions, targets_of
+from stiffmap.experiment.setups import setups_of, target_positions, targets_of
 
 FEWEST = 6
 """Lengths of a set-up, for three coordinates of its anchor and a zero."""
@@ -34,41 +33,38 @@ def commanded(e: Experiment) -> Floats:
 
 
 def nuisance(e: Experiment) -> Iterator[Floats]:
-    """Zero of the length and, where it is unknown, place of the anchor, one of each per set-up.
-
-    Along the secant from the anchor in use to that which fits where the machine stands: exact however far apart they are.
-    """
-    label, (way, far) = setups_of(e)[0], _apart(e)
-    if e.anchor is None and READING.name in e.absolute:
-        with suppress(StiffmapError):  # too few
-            there, more = _apart(
-                replace(e, registration=(*e.registration, *found(e, e.absolute[READING.name])))
-            )
-            way = (way * far[:, None] + there * more[:, None]) / (far + more)[:, None]
+    """Zero of the length and, where it is unknown, place of the anchor, one of each per set-up."""
+    label, way = setups_of(e)[0], _way(e)
     shapes = [np.ones(len(e)), *(way.T if e.anchor is None else ())]
     yield from ((label == s) * shape for s in np.unique(label) for shape in shapes)
 
 
 def tool_offset(e: Experiment, arm: Floats, k: int) -> Floats:
     """(n,) change of the length per length of the target's offset."""
-    return np.asarray(np.sum(_apart(e)[0] * arm, axis=1))
+    return np.asarray(np.sum(_way(e) * arm, axis=1))
 
 
 def found(e: Experiment, length: Floats) -> tuple[tuple[str, Floats, Floats], ...]:
     """Anchors and zeros of set-ups and, where it is unknown, the place of each target on the tool.
 
-    Nonlinear least squares, far rows weighed down, from the anchor and zero that the squares of the lengths fit linearly.
+    Nonlinear least squares, far rows weighed down, from those that were found before, or from the anchor and zero that the squares of
+    the lengths fit linearly.
     Raises StiffmapError where a set-up has fewer than `FEWEST` lengths.
     """
     good = np.flatnonzero(np.isfinite(length))
     (setup, names), (target, targets) = setups_of(e), targets_of(e)
-    place, length, setup, target = target_positions(e)[good], length[good], setup[good], target[good]
+    before = {name: shift for name, _, shift in e.registration}
+    again = before.get(f"anchor {names[0]}") is not None
+    on_tool = (
+        e.tool != "known" and e.rotation is not None and (again or before.get(f"target {targets[0]}") is None)
+    )
+    place = e.position if on_tool else target_positions(e)
+    place, length, setup, target = place[good], length[good], setup[good], target[good]
     few = [n for k, n in enumerate(names) if 0 < np.count_nonzero(setup == k) < FEWEST]
     if few:
         raise StiffmapError(
             f"{e.name}: too few lengths to find the anchor of set-up {few[0]} ({FEWEST} or more in each)"
         )
-    on_tool = e.tool != "known" and e.rotation is not None and not any(SEEN in p for p in e.points)
     turn = e.rotation[good] if on_tool and e.rotation is not None else np.zeros((len(good), 3, 3))
     n, arms = len(names), [np.zeros(3)]
     if on_tool:
@@ -84,17 +80,15 @@ def found(e: Experiment, length: Floats) -> tuple[tuple[str, Floats, Floats], ..
         left = length - zeros[setup] - np.linalg.norm(at - anchors[setup], axis=1)
         return np.append(left, tools * ERROR / ARM)
 
-    fits = [
-        least_squares(
-            residual,
-            np.append(start, np.tile(arm, len(targets))),
-            loss="soft_l1",
-            f_scale=ERROR,
-            x_scale="jac",
-        )
-        for arm in arms
-        for start in _starts(place + turn @ arm, length, setup, n)
+    starts = [
+        np.append(s, np.tile(a, len(targets)))
+        for a in arms
+        for s in _starts(place + turn @ a, length, setup, n)
     ]
+    if again:
+        own = [before[f"anchor {k}"] for k in names] + [[before[f"zero of anchor {k}"][0] for k in names]]
+        starts = [np.concatenate([*own, *(before.get(f"target {k}", np.zeros(3)) for k in targets)])]
+    fits = [least_squares(residual, s, loss="soft_l1", f_scale=ERROR, x_scale="jac") for s in starts]
     anchors, zeros, tools = parts(min(fits, key=lambda f: f.cost).x)
     told = [(f"anchor {k}", a) for k, a in zip(names, anchors, strict=True)]
     told += [(f"zero of anchor {k}", np.array([z, 0.0, 0.0])) for k, z in zip(names, zeros, strict=True)]
@@ -115,6 +109,13 @@ def _starts(place: Floats, length: Floats, setup: Integers, n: int) -> Iterator[
         yield np.append(anchors, zeros)
 
 
+def _way(e: Experiment) -> Floats:
+    """(n, 3) from the anchor to the target: along the secant from those that were found first to those found last, so that it is exact
+    however far these lie apart."""
+    (before, short), (way, far) = _apart(replace(e, registration=e.registration[::-1])), _apart(e)
+    return np.asarray((before * short[:, None] + way * far[:, None]) / (short + far)[:, None])
+
+
 def _apart(e: Experiment) -> tuple[Floats, Floats]:
     """(n, 3) direction from the anchor to the target, and (n,) m how far it is."""
     apart = target_positions(e) - _anchor(e)
@@ -131,9 +132,10 @@ def _found(e: Experiment, what: str) -> Floats:
     """(n, 3) m of each row's set-up. Raises StiffmapError where it was not found."""
     at = {name: shift for name, _, shift in e.registration}
     number, names = setups_of(e)
-    if any(f"{what} {n}" not in at for n in names):
+    shifts = [at.get(f"{what} {n}") for n in names]
+    if any(s is None for s in shifts):
         raise StiffmapError(f"{e.name}: column 'll' needs 'anchor' in experiment.yaml; or give 'length'")
-    return np.asarray(np.array([at[f"{what} {n}"] for n in names])[number])
+    return np.asarray(np.array(shifts)[number])
 
 
 READING = ReadingKind(
