@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -14,14 +14,27 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings import ReadingKind, kind_of
 from stiffmap.experiment.setups import setups_of, target_positions, targets_of
 
+Kinds = Sequence[tuple[int, ReadingKind, Experiment]]
+"""Channel, what it is, and the experiment where the machine stands."""
+
 
 def nuisance_columns(experiment: Experiment, base: Floats) -> Floats:
     """(n, c, q) changes of the readings of a machine that shows `base` (n, c)."""
-    columns = [c for part in (_zeros, _frames, _tools, _readings) for c in part(experiment, base)]
+    kinds = [
+        (i, kind, _standing(experiment, base, kind, i))
+        for i, c in enumerate(experiment.channels)
+        if (kind := kind_of(c))
+    ]
+    columns = [
+        *_zeros(experiment),
+        *_frames(experiment, base),
+        *_tools(experiment, base, kinds),
+        *_readings(experiment, kinds),
+    ]
     return np.stack(columns, axis=-1) if columns else np.zeros((*experiment.reading.shape, 0))
 
 
-def _zeros(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+def _zeros(experiment: Experiment) -> Iterator[Floats]:
     """An unknown zero per pose and channel."""
     if experiment.quantity == "deflection" and experiment.unloaded == "unknown":
         for group in np.unique(experiment.groups):
@@ -60,34 +73,32 @@ def _of_rotation_vector(turned: Floats, turn: Floats) -> Floats:
     return np.asarray(turn - 0.5 * np.cross(turned, turn))
 
 
-def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+def _tools(experiment: Experiment, base: Floats, kinds: Kinds) -> Iterator[Floats]:
     """Where targets sit on the tool: off by a vector that turns with the tool, and turned if that is unknown."""
     if experiment.tool == "known":
         return
     label = targets_of(experiment)[0]
     turned = np.nan_to_num(base[:, 3:6])
     there = Rotation.from_rotvec(turned)
-    kinds = ((i, kind_of(c)) for i, c in enumerate(experiment.channels))
-    stands = {i: _standing(experiment, base, kind, i) for i, kind in kinds if kind and kind.tool_offset}
     for here in ((label == t).astype(float) for t in np.unique(label)):
         for k in range(3):
             arm = _tool_axis(experiment.rotation, len(experiment), k)
             held = there.apply(arm)
             linear = held if experiment.quantity == "position" else held - arm
             column = _wide(experiment, np.hstack([linear, np.zeros_like(linear)]))
-            for i, kind in ((i, kind_of(c)) for i, c in enumerate(experiment.channels)):
-                if kind and kind.tool_offset:
-                    column[:, i] = kind.tool_offset(stands[i], arm if kind.pair else held, k)
+            for i, kind, stands in kinds:
+                if kind.tool_offset:
+                    column[:, i] = kind.tool_offset(stands, arm if kind.pair else held, k)
             yield here[:, None] * column
             if experiment.tool == "unknown" and experiment.quantity == "position":
                 angular = _of_rotation_vector(turned, held)
                 yield here[:, None] * _wide(experiment, np.hstack([np.zeros_like(arm), angular]))
 
 
-def _readings(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+def _readings(experiment: Experiment, kinds: Kinds) -> Iterator[Floats]:
     """What nobody knows of a kind of reading, as the height of a surface."""
-    for i, kind in ((i, kind_of(c)) for i, c in enumerate(experiment.channels)):
-        for change in kind.nuisance(_standing(experiment, base, kind, i)) if kind and kind.nuisance else ():
+    for i, kind, stands in kinds:
+        for change in kind.nuisance(stands) if kind.nuisance else ():
             column = np.zeros_like(experiment.reading)
             column[:, i] = change
             yield column

@@ -74,11 +74,22 @@ def found(e: Experiment, length: Floats) -> tuple[tuple[str, Floats, Floats], ..
         anchors, tools = x[: 3 * n].reshape(n, 3), x[4 * n :].reshape(-1, 3)
         return anchors if e.anchor is None else np.tile(e.anchor, (n, 1)), x[3 * n : 4 * n], tools
 
+    def apart(x: Floats) -> Floats:
+        anchors, _, tools = parts(x)
+        return np.asarray(place + np.einsum("nij,nj->ni", turn, tools[target]) - anchors[setup])
+
     def residual(x: Floats) -> Floats:
-        anchors, zeros, tools = parts(x)
-        at = place + np.einsum("nij,nj->ni", turn, tools[target])
-        left = length - zeros[setup] - np.linalg.norm(at - anchors[setup], axis=1)
-        return np.append(left, tools * ERROR / ARM)
+        left = length - parts(x)[1][setup] - np.linalg.norm(apart(x), axis=1)
+        return np.append(left, x[4 * n :] * ERROR / ARM)
+
+    def jacobian(x: Floats) -> Floats:
+        way = apart(x) / np.linalg.norm(apart(x), axis=1, keepdims=True)
+        out, rows = np.zeros((len(good), len(x))), np.arange(len(good))
+        out[rows, 3 * n + setup] = -1.0
+        for k in range(3):
+            out[rows, 3 * setup + k] = way[:, k] * (e.anchor is None)
+            out[rows, 4 * n + 3 * target + k] = -np.sum(way * turn[:, :, k], axis=1)
+        return np.vstack([out, np.eye(len(x))[4 * n :] * ERROR / ARM])
 
     starts = [
         np.append(s, np.tile(a, len(targets)))
@@ -88,7 +99,9 @@ def found(e: Experiment, length: Floats) -> tuple[tuple[str, Floats, Floats], ..
     if again:
         own = [before[f"anchor {k}"] for k in names] + [[before[f"zero of anchor {k}"][0] for k in names]]
         starts = [np.concatenate([*own, *(before.get(f"target {k}", np.zeros(3)) for k in targets)])]
-    fits = [least_squares(residual, s, loss="soft_l1", f_scale=ERROR, x_scale="jac") for s in starts]
+    fits = [
+        least_squares(residual, s, jacobian, loss="soft_l1", f_scale=ERROR, x_scale="jac") for s in starts
+    ]
     anchors, zeros, tools = parts(min(fits, key=lambda f: f.cost).x)
     told = [(f"anchor {k}", a) for k, a in zip(names, anchors, strict=True)]
     told += [(f"zero of anchor {k}", np.array([z, 0.0, 0.0])) for k, z in zip(names, zeros, strict=True)]
