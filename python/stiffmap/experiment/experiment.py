@@ -105,6 +105,8 @@ class Experiment:
     """Of the surface that heights are measured against, base axes."""
     surface: str = "known"
     """The surface: ``known``, its height ``offset_unknown``, or ``unknown`` with two tilts; per set-up."""
+    anchor: tuple[float, float, float] | None = None
+    """m, base axes, from which lengths are read; None: unknown, per set-up."""
     instrument: tuple[str, ...] = ()
     """Instrument of each row; each has a frame of its own."""
     target: tuple[str, ...] = ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.experiment.experiment import Experiment, Integers
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 
 SEEN = "seen_target_"
 """Names of the points on the tool that stand for targets, with their number behind."""
@@ -18,6 +18,25 @@ def setups_of(e: Experiment) -> tuple[Integers, list[str]]:
 def targets_of(e: Experiment) -> tuple[Integers, list[str]]:
     """(n,) number of each row's target, and their names; one per set-up where none is named."""
     return _labelled(e, e.target or e.setup)
+
+
+def target_positions(experiment: Experiment) -> Floats:
+    """(n, 3) m, base axes: where the targets were commanded."""
+    return np.asarray(experiment.position + _levers(experiment))
+
+
+def _levers(experiment: Experiment) -> Floats:
+    """(n, 3) m, base axes: from the tool point to the target that was seen, where it has been found."""
+    out = np.zeros((len(experiment), 3))
+    if experiment.rotation is None:  # the same in all rows: a shift
+        return out
+    shifts = {name: shift for name, _, shift in experiment.registration}
+    number, names = targets_of(experiment)
+    for i, point in enumerate(experiment.points):
+        target = f"target {names[number[i]]}"
+        if SEEN in point and target in shifts:
+            out[i] = experiment.rotation[i] @ shifts[target]
+    return out
 
 
 def _labelled(e: Experiment, *words: tuple[str, ...]) -> tuple[Integers, list[str]]:

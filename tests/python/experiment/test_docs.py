@@ -18,7 +18,7 @@ PAGE = (Path(__file__).parents[3] / "docs" / "experiments.md").read_text(encodin
 EXAMPLES = re.findall(r"```yaml\n([^`]*)```\n```csv\n([^`]*)```", PAGE)
 
 
-@pytest.mark.parametrize("number", range(9))
+@pytest.mark.parametrize("number", range(10))
 def test_examples(number: int, tmp_path: Path) -> None:
     head, rows = EXAMPLES[number]
     (tmp_path / "experiment.yaml").write_text(head, encoding="utf-8")
@@ -30,7 +30,7 @@ def test_examples(number: int, tmp_path: Path) -> None:
 
 
 def test_all_examples_are_tried() -> None:
-    assert len(EXAMPLES) == 9
+    assert len(EXAMPLES) == 10
 
 
 def test_every_key_and_column_is_explained() -> None:

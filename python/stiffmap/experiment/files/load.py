@@ -107,6 +107,7 @@ def _readings(
         for k in kinds()
         if k.absolute and k.absolute in table
     }
+    _above_zero(table, absolute)
     _promise(reading, channels, table, seen, seen_rotation, absolute)
     if not np.isfinite(reading).any():
         raise MissingColumnError(
@@ -165,6 +166,7 @@ def _setting(model: ExperimentFile, scales: Scales, file: Path) -> dict[str, Any
         "reference_temperature": model.reference_temperature,
         "normal": (x, y, z),
         "surface": model.surface.shape,
+        "anchor": None if model.anchor is None else tuple(scales.length * v for v in model.anchor),
         "point": model.point,
         "load_point": model.load_point or model.point,
         "zero_sigma": np.nan_to_num(read_columns.declared(model.zero_noise, scales, AXIS_CHANNELS)),
@@ -207,6 +209,15 @@ def _fits(quantity: str, table: Table) -> None:
     for column, title in wrong:
         if column and column in table:
             raise FileError(f"column '{column}': {title or 'it'} is no {quantity}", file=table.file, line=1)
+
+
+def _above_zero(table: Table, absolute: dict[str, Floats]) -> None:
+    """FileError for a reading that has the wrong sign."""
+    for kind in (k for k in kinds() if k.positive and k.name in absolute):
+        for line, value in zip(table.lines, absolute[kind.name], strict=True):
+            if value <= 0.0:
+                message = f"column '{kind.absolute}': expected {kind.title} above zero; found {value:g} m"
+                raise FileError(message, file=table.file, line=line)
 
 
 def _promise(

@@ -15,6 +15,7 @@ from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Channel, Experim
 from stiffmap.experiment.files.columns import APPROACH, POSE, POSE2, SEEN, SEEN_TURNED
 from stiffmap.experiment.files.orientation import VECTOR
 from stiffmap.experiment.readings import kinds
+from stiffmap.experiment.setups import SEEN as SEEN_TARGET
 
 MM = 1e3
 PLAIN = {"unloaded": "centre", "frame": "known", "tool": "known"}
@@ -55,6 +56,8 @@ def _head(e: Experiment, title: str) -> dict[str, Any]:
         head["orientation"] = {"against": "base"}
     if (e.normal, e.surface) != ((0.0, 0.0, 1.0), "known"):
         head["surface"] = {"normal": list(e.normal), "shape": e.surface}
+    if e.anchor is not None:
+        head["anchor"] = [float(f"{MM * v:.9g}") for v in e.anchor]
     if e.certificate:
         mm = ("frame", "tool")
         head["certificate"] = {k: float(f"{v * (MM if k in mm else 1.0):.6g}") for k, v in e.certificate}
@@ -127,7 +130,9 @@ def _columns(e: Experiment) -> dict[str, list[Any]]:
         if values is not None:
             columns[name] = _text(np.asarray(values, dtype=float))
     words = {n: getattr(e, field) for n, field in WORDS.items()}
-    return columns | {n: list(v) for n, v in words.items() if v}
+    return columns | {
+        n: list(v) for n, v in words.items() if v and not (n == "point" and SEEN_TARGET in v[0])
+    }
 
 
 def plan_columns(e: Experiment) -> dict[str, list[Any]]:
@@ -150,8 +155,11 @@ def _absolute(e: Experiment) -> tuple[dict[str, list[Any]], tuple[str, ...]]:
         columns |= {c: _text(np.where(good, turns[:, i], np.nan)) for i, c in enumerate(SEEN_TURNED)}
         told += AXES[3:]
     for kind in kinds():
-        if kind.name in e.absolute:
-            columns[kind.absolute] = _text(e.absolute[kind.name] * _scale(kind.channel))
+        values = e.absolute.get(kind.name)
+        if values is None and kind.found and kind.commanded and e.registration and kind.channel in e.extra:
+            values = e.reading[:, e.channels.index(kind.channel)] + kind.commanded(e)
+        if values is not None:
+            columns[kind.absolute] = _text(values * _scale(kind.channel))
             told += (kind.name,)
     return columns, told
 

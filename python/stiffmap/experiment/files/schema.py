@@ -177,6 +177,7 @@ class ExperimentFile(FileModel):
     tool: Literal["known", "offset_unknown", "unknown"] = "known"
     target_orientation: Literal["rotvec", "xyz", "XYZ", "zyx", "ZYX", "ZYZ", "zyz"] = "rotvec"
     surface: SurfaceModel = SurfaceModel()
+    anchor: Axes3 | None = None
     gravity: Axes3 | dict[str, Axes3] | None = None
     reference_temperature: Finite | None = None
     metrology: LoopModel = LoopModel()

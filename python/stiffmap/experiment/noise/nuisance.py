@@ -2,23 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.readings import kind_of
-from stiffmap.experiment.setups import SEEN, setups_of, targets_of
+from stiffmap.experiment.readings import ReadingKind, kind_of
+from stiffmap.experiment.setups import setups_of, target_positions, targets_of
+
+Kinds = Sequence[tuple[int, ReadingKind, Experiment]]
+"""Channel, what it is, and the experiment where the machine stands."""
 
 
 def nuisance_columns(experiment: Experiment, base: Floats) -> Floats:
     """(n, c, q) changes of the readings of a machine that shows `base` (n, c)."""
-    columns = [c for part in (_zeros, _frames, _tools, _readings) for c in part(experiment, base)]
+    kinds = [
+        (i, kind, _standing(experiment, base, kind, i))
+        for i, c in enumerate(experiment.channels)
+        if (kind := kind_of(c))
+    ]
+    columns = [
+        *_zeros(experiment),
+        *_frames(experiment, base),
+        *_tools(experiment, base, kinds),
+        *_readings(experiment, kinds),
+    ]
     return np.stack(columns, axis=-1) if columns else np.zeros((*experiment.reading.shape, 0))
 
 
-def _zeros(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+def _zeros(experiment: Experiment) -> Iterator[Floats]:
     """An unknown zero per pose and channel."""
     if experiment.quantity == "deflection" and experiment.unloaded == "unknown":
         for group in np.unique(experiment.groups):
@@ -52,31 +68,12 @@ def _turns(here: Floats, experiment: Experiment, base: Floats) -> Iterator[Float
         yield _wide(experiment, here[:, None] * np.hstack([linear, angular]))
 
 
-def target_positions(experiment: Experiment) -> Floats:
-    """(n, 3) m, base axes: where the targets were commanded."""
-    return np.asarray(experiment.position + _levers(experiment))
-
-
-def _levers(experiment: Experiment) -> Floats:
-    """(n, 3) m, base axes: from the tool point to the target that was seen, where it has been found."""
-    out = np.zeros((len(experiment), 3))
-    if experiment.rotation is None:  # the same in all rows: a shift
-        return out
-    shifts = {name: shift for name, _, shift in experiment.registration}
-    number, names = targets_of(experiment)
-    for i, point in enumerate(experiment.points):
-        target = f"target {names[number[i]]}"
-        if SEEN in point and target in shifts:
-            out[i] = experiment.rotation[i] @ shifts[target]
-    return out
-
-
 def _of_rotation_vector(turned: Floats, turn: Floats) -> Floats:
     """(n, 3) change of the rotation vectors `turned` (n, 3), small, by a small further turn in base axes."""
     return np.asarray(turn - 0.5 * np.cross(turned, turn))
 
 
-def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+def _tools(experiment: Experiment, base: Floats, kinds: Kinds) -> Iterator[Floats]:
     """Where targets sit on the tool: off by a vector that turns with the tool, and turned if that is unknown."""
     if experiment.tool == "known":
         return
@@ -89,22 +86,39 @@ def _tools(experiment: Experiment, base: Floats) -> Iterator[Floats]:
             held = there.apply(arm)
             linear = held if experiment.quantity == "position" else held - arm
             column = _wide(experiment, np.hstack([linear, np.zeros_like(linear)]))
-            for i, kind in ((i, kind_of(c)) for i, c in enumerate(experiment.channels)):
-                if kind and kind.tool_offset:
-                    column[:, i] = kind.tool_offset(experiment, arm, k)
+            for i, kind, stands in kinds:
+                if kind.tool_offset:
+                    column[:, i] = kind.tool_offset(stands, arm if kind.pair else held, k)
             yield here[:, None] * column
             if experiment.tool == "unknown" and experiment.quantity == "position":
                 angular = _of_rotation_vector(turned, held)
                 yield here[:, None] * _wide(experiment, np.hstack([np.zeros_like(arm), angular]))
 
 
-def _readings(experiment: Experiment, base: Floats) -> Iterator[Floats]:
+def _readings(experiment: Experiment, kinds: Kinds) -> Iterator[Floats]:
     """What nobody knows of a kind of reading, as the height of a surface."""
-    for i, kind in ((i, kind_of(c)) for i, c in enumerate(experiment.channels)):
-        for change in kind.nuisance(experiment) if kind and kind.nuisance else ():
+    for i, kind, stands in kinds:
+        for change in kind.nuisance(stands) if kind.nuisance else ():
             column = np.zeros_like(experiment.reading)
             column[:, i] = change
             yield column
+
+
+def _standing(e: Experiment, base: Floats, kind: ReadingKind, i: int) -> Experiment:
+    """The experiment where a machine that shows `base` (n, c) stands; with what the absolute readings of channel i fit there, next to
+    what was found at the commands."""
+    if e.quantity != "position" or kind.pair:
+        return e
+    turn = Rotation.from_rotvec(np.nan_to_num(base[:, 3:6])).as_matrix()
+    out = replace(e, rotation=None if e.rotation is None else turn @ e.rotation)
+    levers = target_positions(out) - out.position
+    out = replace(out, position=target_positions(e) + np.nan_to_num(base[:, :3]) - levers)
+    if not (kind.found and kind.commanded and e.registration):
+        return out
+    with suppress(StiffmapError):  # too few rows
+        again = kind.found(out, e.reading[:, i] + kind.commanded(e))
+        out = replace(out, registration=(*e.registration, *again))
+    return out
 
 
 def _tool_axis(rotation: Floats | None, n: int, k: int) -> Floats:

@@ -10,8 +10,8 @@ from scipy.stats import chi2
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.level import Noise, noise_of
-from stiffmap.experiment.noise.nuisance import target_positions
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.setups import target_positions
 
 Mask = NDArray[np.bool_]
 MANY, LEAST_MANY = 0.1, 2

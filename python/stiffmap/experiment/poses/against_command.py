@@ -21,14 +21,21 @@ def resolved(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
     Where a target's place on the tool is unknown and its orientation is not seen, the machine gets a named
     point there, so that the target moves as its place on the tool does.
     """
+    if e.seen is not None or e.seen_rotation is not None:
+        machine, e = _sighted(machine, e)
     reading = e.reading.copy()
     for kind in kinds():
-        if kind.commanded and kind.name in e.absolute:
-            reading[:, e.channels.index(kind.channel)] = e.absolute[kind.name] - kind.commanded(e)
-    e = replace(e, reading=reading, absolute={})
-    if e.seen is None and e.seen_rotation is None:
-        return machine, e
-    return _sighted(machine, e)
+        if not (kind.commanded and kind.name in e.absolute):
+            continue
+        if kind.found:
+            found = kind.found(e, e.absolute[kind.name])
+            e = replace(e, registration=(*e.registration, *found))
+            places, (target, names) = {name: p for name, _, p in found}, targets_of(e)
+            tools = [p for n in names if (p := places.get(f"target {n}")) is not None]
+            if tools:
+                machine, e = _on_points(machine, e, np.array(tools), target)
+        reading[:, e.channels.index(kind.channel)] = e.absolute[kind.name] - kind.commanded(e)
+    return machine, replace(e, reading=reading, absolute={})
 
 
 def _sighted(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:

@@ -39,8 +39,12 @@ class ReadingKind:
         Of experiments that may have it; the reading of a deflection is the loaded less the unloaded one.
     absolute, commanded
         Column that gives the same reading in coordinates of its own, and (n,) what the command stands for in it.
+    found
+        Where instruments stand and targets sit, as in `Experiment.registration`, from the absolute readings (n,) of best fit.
+    positive
+        Whether an absolute reading is above zero.
     nuisance
-        (n,) changes of the reading by what nobody knows, as a surface's height; fitted and taken out.
+        (n,) changes of the reading by what nobody knows, as a surface's height, where the machine stands; fitted and taken out.
     tool_offset
         (n,) change of the reading per length of an offset of the target along axis k of the tool, (n, 3) in base axes.
     """
@@ -53,6 +57,8 @@ class ReadingKind:
     quantities: tuple[str, ...] = ("deflection", "position")
     absolute: str = ""
     commanded: Callable[[Experiment], Floats] | None = None
+    found: Callable[[Experiment, Floats], tuple[tuple[str, Floats, Floats], ...]] | None = None
+    positive: bool = False
     nuisance: Callable[[Experiment], Iterator[Floats]] | None = None
     tool_offset: Callable[[Experiment, Floats, int], Floats] | None = None
 

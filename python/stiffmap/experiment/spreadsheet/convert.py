@@ -24,6 +24,8 @@ POSE = ("x", "y", "z")
 FORCE, MOMENT = ("fx", "fy", "fz"), ("mx", "my", "mz")
 POSE2 = ("x2", "y2", "z2")
 COUNTED = ("order", "repeat")
+ABSOLUTE = {"ll": "length"}
+"""Readings that a sheet has in coordinates of their own -> their columns in data.csv."""
 
 
 class Question(StiffmapError):
@@ -83,7 +85,7 @@ def understand(
     beside = _beside(sheet, columns)
     plain = (*WORDS, *COUNTED, *drives)
     found = {c.meaning: _unit(sheet, c, units, beside) for c in used if c.meaning not in plain}
-    if loaded and not known & {*FORCE, *MOMENT}:
+    if loaded and not known & {*FORCE, *MOMENT, "ll"}:
         _ask_load(sheet)
     said = []
     for c in used:
@@ -114,7 +116,8 @@ def _ask(sheet: Sheet, known_: set[str]) -> None:
     if not known_ & set(READINGS):
         raise Question(
             f"{sheet.file}: which column is a reading? Say --map dx='HEADER' (dy, dz, rx, ry, rz), several "
-            f"headers with | between them for repeats; columns: {there}",
+            f"headers with | between them for repeats, or length='HEADER'; where a ball stood in one socket, --set px=0 --set py=0 "
+            f"--set pz=0; columns: {there}",
             "column",
             "reading",
         )
@@ -296,7 +299,8 @@ def write_folder(
     }
     if noise:
         factors = {n.replace("p", "d"): f for n, f in found.factors.items()}
-        head["noise"] = {n: v * factors.get(n, 1.0) for n, v in noise.items()}
+        own = {absolute: n for n, absolute in ABSOLUTE.items()}
+        head["noise"] = {own.get(n, n): v * factors.get(own.get(n, n), 1.0) for n, v in noise.items()}
     head |= found.head
     told = {**dict(sheet.record), **(record or {})}
     if "notes" in told:
@@ -304,7 +308,7 @@ def write_folder(
     if told:
         head["record"] = told
     with only_job(make_folder(folder)):
-        head["rows"] = write_rows(folder / "data.csv", found.header, found.rows)
+        head["rows"] = write_rows(folder / "data.csv", [ABSOLUTE.get(h, h) for h in found.header], found.rows)
         if found.notes:
             kept = ([row[c.index] for c in found.notes] for row in sheet.rows)
             write_rows(folder / "notes.csv", [sheet.header[c.index] for c in found.notes], kept)

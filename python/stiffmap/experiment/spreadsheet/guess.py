@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import split_unit
@@ -20,12 +20,13 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     *((f"u_d{a}", rf"u ?_?d?{a}|sigma ?_?d?{a}|std ?_?d?{a}") for a in "xyz"),
     *((f"d{a}", rf"(d|delta|δ|defl|deflection|displ\.?|displacement|verschiebung|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung) ?_?(in )?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a} ?(deflection|displ\.?|displacement|verschiebung|abweichung|dial|gau?ge|uhr|reading)") for a in "xyz"),
     *((f"p{a}", rf"p_?{a}") for a in "xyz"),
+    ("ll", r"l|ll|(measured |gemessene )?(length|länge|laenge)|(draw[ -]?)?wire( ?length)?|(cable|string|ball-?bar|bar) ?length|seil(zug)?(länge)?|distance|abstand"),
     *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
     *((a, rf"{a}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(nominal|pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|soll ?_?{a}|{a} ?soll|{a}[ _-]?(t|target|cmd|nominal|command|commanded)|target[ _-]?{a}") for a in "xyz"),
 )  # fmt: skip
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
 SEEN = ("px", "py", "pz")
-READINGS = ("dx", "dy", "dz", "rx", "ry", "rz", "dd", *SEEN)
+READINGS = ("dx", "dy", "dz", "rx", "ry", "rz", "dd", "ll", *SEEN)
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,10 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
         else:
             meaning, repeat = _meaning(name)
             out.append(Column(index, name, unit, "note" if meaning in chosen else meaning, repeat))
+    if "ll" not in chosen and any(c.meaning in READINGS and c.meaning != "ll" for c in out):
+        out = [
+            replace(c, meaning="note") if c.meaning == "ll" else c for c in out
+        ]  # a length of something else
     return _one_each(out)
 
 
@@ -96,7 +101,7 @@ def _meaning(name: str) -> tuple[str, int]:
     match = REPEATED.match(plain)
     if match and match[1]:
         for meaning, pattern in PATTERNS:
-            if meaning in READINGS and re.fullmatch(pattern, match[1].strip()):
+            if meaning in READINGS and meaning != "ll" and re.fullmatch(pattern, match[1].strip()):
                 return meaning, int(match[2])
     return "note", 0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -152,6 +152,8 @@ def as_seen(c: Commanded, units: Mapping[str, str], difference: str) -> Commande
             if s in of:
                 sheet, chosen = _in_mm(sheet, chosen, s, [(1.0, of[s])], units)
         return Commanded(sheet, c.columns, chosen, unknown, c.told)
+    if "ll" in of:  # a wire's end sits somewhere on the tool; x y z are the controller's
+        return replace(c, head={"tool": "offset_unknown"})
     if not all(a in of for a in "xyz"):
         return c
     if not all(f"d{a}" in of for a in "xyz"):

@@ -23,6 +23,7 @@ from stiffmap.experiment.spreadsheet.dialogue import (
 from stiffmap.experiment.spreadsheet.guess import guess, has_meaning
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings
 from stiffmap.experiment.spreadsheet.joints import Commanded, as_seen, commanded, turned
+from stiffmap.experiment.spreadsheet.sockets import seated
 from stiffmap.experiment.spreadsheet.together import Meant, oriented, together
 
 
@@ -57,6 +58,7 @@ def read_and_ask(
         answers = replace(answers, chosen=meant.chosen, units=meant.units)
         joints = commanded(table, how.drives, answers.chosen, answers.units)
         if joints is not None:
+            joints, answers = seated(joints, answers)
             joints = as_seen(joints, answers.units, how.difference)
             table, answers = joints.sheet, replace(answers, chosen=joints.chosen)
             told += joints.told

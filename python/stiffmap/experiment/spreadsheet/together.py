@@ -41,6 +41,10 @@ TARGET = re.compile(
 POINT = re.compile(
     r"(mess)?(point|punkt|stelle|position|name|id)[ _.-]?(id|name|no\.?|nr\.?)?", re.IGNORECASE
 )
+MOST_METRES = 20.0
+"""Of a wire or bar; larger numbers are mm."""
+NAMED = 5
+"""Rows that a sentence names."""
 ANGLE = r"(tcp|pos|ist|soll|nominal|cmd|orientation|ori|rot)?[ _.-]?{}"
 
 
@@ -67,8 +71,9 @@ def together(
     sheet: Sheet, chosen: Mapping[str, Sequence[str]], units: Mapping[str, str], deflection: bool
 ) -> Meant:
     """Signs in `chosen`, gauges before and after a load, loads with their direction. Raises StiffmapError."""
-    m = Meant(sheet, {k: list(v) for k, v in chosen.items()}, dict(units))
+    m = Meant(sheet, {{"length": "ll"}.get(k, k): list(v) for k, v in chosen.items()}, dict(units))
     _signs(m)
+    _lengths(m)
     if deflection:
         _differences(m)
     _directions(m)
@@ -96,6 +101,26 @@ def _signs(m: Meant) -> None:
                 m.sheet = with_column(m.sheet, name, [float(-v if name[0] == "-" else v) for v in values])
             headers[k] = name
             m.said.append(f"{meaning} is {name[0]}'{m.sheet.header[index]}'")
+
+
+def _lengths(m: Meant) -> None:
+    """Lengths of a wire or bar: rows with a wrong sign are left out, and large numbers without a unit are mm."""
+    for c in [c for c in guess(m.sheet.header, m.chosen) if c.meaning == "ll" and not c.repeat]:
+        values = m.sheet.numbers(c.index)
+        if (
+            not c.unit
+            and not {"ll", "length"} & set(m.units)
+            and np.nanmax(np.abs(values), initial=0.0) > MOST_METRES
+        ):
+            m.units["ll"] = "mm"
+            m.said.append(f"'{c.name}' goes to {np.nanmax(values):.4g}: taken as mm")
+        wrong = np.flatnonzero(values <= 0.0)
+        if wrong.size:
+            rows = ", ".join(f"line {m.sheet.lines[i]} ({values[i]:g})" for i in wrong[:NAMED])
+            told = f"{rows} and {wrong.size - NAMED} more" if wrong.size > NAMED else rows
+            m.said.append(f"'{c.name}': expected lengths above zero; left out: {told}")
+            name = f"{c.name} in use" + (f" [{c.unit}]" if c.unit else "")
+            m.add(name, np.where(values > 0.0, values, np.nan), "ll")
 
 
 def _stateless(header: str) -> tuple[str, str]:

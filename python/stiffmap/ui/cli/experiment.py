@@ -166,7 +166,7 @@ def experiment(
     table, found, answers, told, joints = read_and_ask(file, sheet, read, given, ask)
     if rows is not None and joints is None:
         raise StiffmapError(f"{file}: no column commands a joint; the arm has {', '.join(drives)}")
-    quantity = "position" if joints and joints.head else quantity
+    quantity = "position" if (joints and joints.head) or "ll" in found.units else quantity
     machine = machine or str(output / "machine.yaml")
     title = f"from {table.file.replace(str(file), file.name)}"
     kept = {"source": file.name, "sha256": file_digest(file), **pairs(record, "record")}
@@ -226,7 +226,9 @@ def tell(
         console.print(f"'{escape(header[c.index])}': {where}")
     for name, value in found.constants.items():
         console.print(f"{name} = {value:g} in every row")
-    if commands or made.seen is not None:  # what was seen is no deviation before the frame is known
+    if (
+        commands or made.seen is not None or made.absolute
+    ):  # what was seen is no deviation before the frame is known
         _show_cells(console, found)
     else:
         _show(console, made)

@@ -111,7 +111,7 @@ def test_without_the_file_its_column_is_unknown(tmp_path: Path) -> None:
     (tmp_path / "experiment.yaml").write_text(YAML.replace(", slope: mrad", ""), encoding="utf-8")
     with pytest.raises(sm.StiffmapError, match="slope"):
         load_experiment(tmp_path)
-    assert [k.name for k in kinds()] == ["dd", "hh"]
+    assert [k.name for k in kinds()] == ["dd", "hh", "ll"]
 
 
 def test_definitions_that_cannot_be_are_refused(level: ReadingKind, tmp_path: Path) -> None:
