@@ -72,10 +72,7 @@ def import_urdf(
             raise FileError(
                 f"{option}: expected a {expected} with this option, found a {other}", file=str(urdf)
             )
-    if table:
-        found = _of_table(urdf, dh_convention, unit)
-    else:
-        found = read(urdf, sidecar, tip=tip)
+    found = _of_table(urdf, dh_convention, unit) if table else read(urdf, sidecar, tip=tip)
     machine = Machine(found.description)
     file = output or urdf.with_name(f"{machine.name}.yaml")
     if file.exists() and not overwrite:
