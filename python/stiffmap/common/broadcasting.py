@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
+from collections.abc import Collection
 from decimal import Decimal
 from numbers import Real
 from operator import index
@@ -80,6 +81,13 @@ def instance_of(value: Any, kind: Any, name: str, what: str) -> Any:
     """The value itself where it is of this kind; else StiffmapError with the argument's name and what is expected."""
     if not isinstance(value, kind):
         raise _refused(name, what, repr(value) if isinstance(value, str) else type(value).__name__)
+    return value
+
+
+def one_of(value: object, known: Collection[str], name: str) -> str:
+    """One of these words; StiffmapError with the argument's name and the words for anything else."""
+    if not isinstance(value, str) or value not in known:
+        raise _refused(name, ", ".join(known), repr(value))
     return value
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from os import PathLike
 
 from stiffmap.common.broadcasting import given_path, instance_of
@@ -91,7 +91,7 @@ def effects_of(machine: Machine, given: Effects) -> list[AppliedEffect]:
     several = (
         [given]
         if isinstance(given, str | AppliedEffect)
-        else list(instance_of(given, Iterable, "effects", EFFECTS))
+        else list(instance_of(given, Sequence, "effects", EFFECTS))
     )
     for one in several:
         instance_of(one, (str, AppliedEffect), "effects", EFFECTS)

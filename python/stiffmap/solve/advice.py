@@ -59,7 +59,7 @@ def _freedoms(machine: Machine) -> list[str]:
 def _reach(machine: Machine) -> list[str]:
     """Home and box against what can be reached."""
     d = machine.description
-    home = serial_home(d)
+    home = serial_home(machine.compiled)
     length = (home.arm if home else 0.0) or machine.compiled.length
     task = d.task or ("x", "y", "z")
     moved = [i for i, a in enumerate(NAMES) if a in task]
@@ -67,7 +67,7 @@ def _reach(machine: Machine) -> list[str]:
     out = []
     lost = [k for k in steps if int(machine.solve(d.home.p + k, np.zeros(6)).status) == Status.UNREACHABLE]
     both = [NAMES[i] for i in moved if sum(bool(k[i]) for k in lost) == 2]
-    singular = singular_words(d, bool(lost))
+    singular = singular_words(machine.compiled, bool(lost))
     if singular:
         out.append(singular)
     elif both:

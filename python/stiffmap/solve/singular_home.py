@@ -9,8 +9,8 @@ from itertools import combinations
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.rotations import rotation_about
-from stiffmap.model.description import TASK, Body, Joint, MachineDescription, Offset, Point, Pose, Spring
+from stiffmap.model.description import TASK, Body, Joint, Offset, Point, Spring
+from stiffmap.solve.compiled import CompiledMachine, Role
 
 SINGULAR, NEAR = 1e-6, 0.03
 """Of the largest singular value: below the first nothing moves that way, below the second steps soon fail."""
@@ -53,39 +53,43 @@ class SerialHome:
         return out
 
 
-def serial_home(d: MachineDescription, bent: Mapping[str, float] | None = None) -> SerialHome | None:
+def serial_home(machine: CompiledMachine, bent: Mapping[str, float] | None = None) -> SerialHome | None:
     """The axes of a machine of one chain whose joints all have drives; None for another.
 
     bent
         Joint -> what is added to its coordinate at home, m or rad.
     """
-    if len(d.legs) != 1:
+    d = machine.description
+    elements = (*d.base, *d.legs[0].elements, *d.platform)
+    joints = [e for e in elements if type(e) is Joint and e.actuated]
+    if len(d.legs) != 1 or any(
+        not isinstance(e, Offset | Spring | Body | Point) for e in elements if e not in joints
+    ):
         return None
-    at, axes = Pose(), []
-    for e in (*d.base, *d.legs[0].elements, *d.platform):
-        if isinstance(e, Offset):
-            at = at @ (e.actual or e.nominal)
-        elif type(e) is Joint and e.actuated:
-            along, turns = np.array(e.axes[0]), e.kind == "revolute"
-            axes.append(Axis(e.name, turns, at.r @ along, at.p))
-            q = e.home[0] + (bent or {}).get(e.name, 0.0)
-            at = at @ (Pose.of(rotation=rotation_about(along, q)) if turns else Pose.of(q * along))
-        elif not isinstance(e, Spring | Body | Point):
-            return None
+    node = {
+        c: i for i, (_, c) in enumerate(machine.nodes) if c >= 0 and machine.names.roles[c] == Role.ACTUATOR
+    }
+    q = machine.home_coordinates().copy()
+    q[[*node]] += [(bent or {}).get(e.name, 0.0) for e in joints]
+    position, rotation = machine.frames(q)
+    axes = [
+        Axis(e.name, e.kind == "revolute", rotation[i] @ np.array(e.axes[0]), position[i])
+        for e, i in zip(joints, node.values(), strict=True)
+    ]
     columns = [
-        np.r_[np.cross(a.along, at.p - a.point), a.along] if a.turns else np.r_[a.along, np.zeros(3)]
+        np.r_[np.cross(a.along, position[-1] - a.point), a.along] if a.turns else np.r_[a.along, np.zeros(3)]
         for a in axes
     ]
     return SerialHome(axes, np.array(columns).reshape(-1, 6).T)
 
 
-def singular_words(d: MachineDescription, steps_fail: bool) -> str:
+def singular_words(machine: CompiledMachine, steps_fail: bool) -> str:
     """That home is singular, with the lost directions and the joints to bend; empty where it is not.
 
     With `steps_fail`, small steps from home having failed, also a home close to a singular one. Only for serial machines
     with a drive for each component of their task.
     """
-    home = serial_home(d)
+    home, d = serial_home(machine), machine.description
     rows = [TASK.index(c) for c in d.task]
     if home is None or len(home.axes) < len(rows):
         return ""
@@ -98,7 +102,7 @@ def singular_words(d: MachineDescription, steps_fail: bool) -> str:
     nearly = "" if sizes[-1] < SINGULAR * sizes[0] else "nearly "
     return (
         f"home is {nearly}singular: the tool cannot move along {ways}{_cause(home, right[len(sizes) - lost.sum() :])}"
-        + _remedy(d, home, rows)
+        + _remedy(machine, home, rows)
     )
 
 
@@ -139,12 +143,12 @@ def _cause(home: SerialHome, kernel: Floats) -> str:
     return f": the motions of {', '.join(among)} add up to none"
 
 
-def _remedy(d: MachineDescription, home: SerialHome, rows: list[int]) -> str:
+def _remedy(machine: CompiledMachine, home: SerialHome, rows: list[int]) -> str:
     """The one or two joints that lead farthest away from the singular home."""
     turning = [a.name for a in home.axes if a.turns]
     for count in (1, 2):
         tried = [
-            (_margin(serial_home(d, dict.fromkeys(few, BENT)), rows), few)
+            (_margin(serial_home(machine, dict.fromkeys(few, BENT)), rows), few)
             for few in combinations(turning, count)
         ]
         best, few = max(tried, default=(0.0, ()))

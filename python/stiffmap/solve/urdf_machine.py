@@ -13,7 +13,6 @@ def import_urdf(
     sidecar: str | PathLike[str] | None = None,
     *,
     tip: str | None = None,
-    meshes: bool = True,
 ) -> Machine:
     """Machine (SI) of a URDF file: a serial chain from the root link to the tip, or legs in parallel with a sidecar.
 
@@ -24,8 +23,6 @@ def import_urdf(
     tip
         Link that is the tool. None: that of the sidecar, or the one that has the name of a tool (tool0, tcp, tool, ee,
         flange), or the only end; `machine.description.source` says which.
-    meshes
-        Has no effect: meshes are never read.
 
     Joints that are not on the way to the tip are left out, and stand at zero; what they carry stays as a mass on the
     body that they hang on. `stiffmap.model.urdf.import_urdf` returns the description and what was left out. Raises FileError, one line, for what cannot be used.

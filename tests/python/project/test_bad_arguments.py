@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
+from stiffmap.experiment.virtual.plans import plan_of_poses
 
 P, W = [0.0, 0.416, 0.0], [10.0, 0, 0, 0, 0, 0]
 FEW: dict[str, Any] = {"x": [0.0, 0.05], "y": [0.4, 0.42], "z": 0.0}
@@ -23,6 +24,7 @@ CALLS: dict[str, dict[str, Any]] = {
     "inverse_kinematics": {"position": P},
     "map_estimate": {"wrench": W, **FEW},
     "natural_frequencies": {"position": P},
+    "plan": {"identify": "zero_offset motor left error=0mrad", "rows": 3, "poses": 5},
     "sweep": {"position": P, "direction": [1, 0, 0], "forces": [10.0]},
     "velocity_section": {"position": P},
     "velocity_transmission": {"position": P},
@@ -46,6 +48,28 @@ def test_every_argument_is_checked(name: str) -> None:
                     call(**{"machine": machine, **CALLS[name], p.name: bad})
 
 
+@pytest.mark.parametrize("bad", [None, "zzz", {}, -1.5])
+def test_plans_check_every_argument(bad: Any) -> None:
+    call = {"machine": sm.load_machine("five-bar"), "quantity": "deflection", "poses": [P], "loads": [[W]]}
+    plan_of_poses(**call)
+    for name in inspect.signature(plan_of_poses).parameters:
+        if (name, bad) in (("noise", None), ("noise", -1.5), ("angle_noise", -1.5)):
+            continue
+        with pytest.raises(sm.StiffmapError, match=None if name == "machine" else name):
+            plan_of_poses(**{**call, name: bad})
+
+
+@pytest.mark.parametrize("bad", [{}, 5, "zzz", ["a"]])
+@pytest.mark.parametrize(
+    "call", [lambda s: sm.error_map("five-bar", wrench=W, **FEW, scheduler=s),
+             lambda s: sm.vibration_map("five-bar", P, "slot", scheduler=s)],
+)  # fmt: skip
+def test_a_scheduler_is_an_address_or_a_client(call: Any, bad: Any) -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(sm.StiffmapError, match="scheduler: expected the address of a running dask scheduler"):
+        call(bad)
+
+
 @pytest.mark.parametrize("bad", [None, {}, 1, [1, 2]])
 @pytest.mark.parametrize(
     ("name", "arguments"),
@@ -64,6 +88,8 @@ def test_every_argument_is_checked(name: str) -> None:
         ("simulate", {"machine": "five-bar", "plan": ...}),
         ("monitor", {"machine": "five-bar", "before": ..., "after": "a", "effects": []}),
         ("optimize", {"design": ...}),
+        ("plan", {"machine": "five-bar", "identify": "zero_offset motor left error=0mrad", "rival": ...}),
+        ("plan", {"machine": "five-bar", "identify": "zero_offset motor left error=0mrad", "axes": ...}),
         ("uncertainty_ranking", {"ds": ...}),
         ("measures", {"machine": "five-bar", "requirements": "none", "clearance": ...}),
         ("workspace_volume", {"machine": "five-bar", "cells": ...}),

@@ -12,6 +12,7 @@ import stiffmap as sm
 from stiffmap.experiment.spreadsheet.dh import Row, arm
 from stiffmap.model.description import TASK, MachineDescription
 from stiffmap.solve.advice import _reach
+from stiffmap.solve.compiled import CompiledMachine
 from stiffmap.solve.singular_home import serial_home, singular_words
 
 # theta, d, a, alpha of a UR5: nominal, and one whose second to fourth axes are off parallel by less than a milliradian
@@ -81,7 +82,7 @@ HOMES = {
 def test_the_lost_direction(name: str) -> None:
     rows, q, cause, remedy = HOMES[name]
     d = machine(rows, q)
-    said = singular_words(d, False)
+    said = singular_words(CompiledMachine(d), False)
     j = slopes(d)
     sizes = np.linalg.svd(j, compute_uv=False)
     assert bool(said) == (sizes[-1] < 1e-6 * sizes[0])
@@ -97,18 +98,18 @@ def test_two_links_in_line() -> None:
     from dataclasses import replace
 
     stretched = replace(machine(TWO, [0.3, 0]), task=("x", "y"))
-    said = singular_words(stretched, False)
+    said = singular_words(CompiledMachine(stretched), False)
     assert f"({np.cos(0.3):.3f}, {np.sin(0.3):.3f})" in said
     assert "j2 bent" in said
-    assert singular_words(replace(machine(TWO, [0.3, 0.8]), task=("x", "y")), False) == ""
+    assert singular_words(CompiledMachine(replace(machine(TWO, [0.3, 0.8]), task=("x", "y"))), False) == ""
     # two drives for six components: no home helps
-    assert singular_words(machine(TWO, [0.3, 0]), True) == ""
+    assert singular_words(CompiledMachine(machine(TWO, [0.3, 0])), True) == ""
 
 
 def test_frames_that_lie_far_off() -> None:
     """Between axes that are nearly parallel, lengths of hundreds of metres cancel; the arm is no larger for them."""
     far, near = machine(CALIBRATED), machine(NOMINAL)
-    home = serial_home(far)
+    home = serial_home(CompiledMachine(far))
     assert home is not None
     assert 0.3 < home.arm < 1.2
     np.testing.assert_allclose(home.jacobian, slopes(far), atol=1e-6)
@@ -116,8 +117,8 @@ def test_frames_that_lie_far_off() -> None:
     widths = [np.ptp(np.array(m.workspace), axis=0) for m in (far, near)]
     np.testing.assert_allclose(widths[0], widths[1], rtol=0.2)
     straight = machine(CALIBRATED, [0.3, -0.9, 1.1, -0.5, 0, 0.4])
-    assert "home is nearly singular" in singular_words(straight, True)
-    assert singular_words(far, True) == ""
+    assert "home is nearly singular" in singular_words(CompiledMachine(straight), True)
+    assert singular_words(CompiledMachine(far), True) == ""
 
 
 def test_forward_kinematics_is_of_the_declared_geometry() -> None:

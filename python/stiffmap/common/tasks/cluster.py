@@ -92,7 +92,7 @@ def client_of(scheduler: Any) -> Iterator[Any]:
         return
     try:
         client: Any = Client(scheduler, timeout=10, set_as_default=False)  # type: ignore[no-untyped-call]
-    except (OSError, TimeoutError, ValueError) as error:
+    except (OSError, TimeoutError, ValueError, TypeError) as error:
         raise StiffmapError(
             f"scheduler: expected the address of a running dask scheduler such as tcp://127.0.0.1:8786, "
             f"got {scheduler!r} ({error or type(error).__name__})"

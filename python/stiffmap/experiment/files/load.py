@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.errors import FileError, MissingColumnError
+from stiffmap.common.units import name_and_unit
 from stiffmap.common.yaml_text import read
 from stiffmap.experiment.channels import AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Experiment, Floats, Loop
@@ -36,18 +38,24 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
     document = read(file)
     expected = "an experiment file is a mapping with machine, quantity and units"
     model = validated(file_model(), document, str(file), expected)
+    scales = Scales.of(model, str(file))
     table = _rename(read_table(file.parent / model.data, model.rows), model.columns)
+    table = scales.of_header(table, {*model.joints, *model.command})
     seconds = [f"{c}2" for c in model.command if f"{c}2" in table]
     _known_columns(table, (*model.joints, *model.command, *seconds))
-    return _assemble(model, table, Scales.of(model, str(file)), file)
+    return _assemble(model, table, scales, file)
 
 
 def _rename(table: Table, columns: dict[str, str]) -> Table:
     """Header with the file's own names replaced: ``columns: {dx: DEFL_X}``."""
-    back = {theirs: ours for ours, theirs in columns.items()}
-    for theirs in back:
-        table.text(theirs)
-    return Table(table.file, tuple(back.get(c, c) for c in table.header), table.columns, table.lines)
+    header = list(table.header)
+    for ours, theirs in columns.items():
+        found = [h for h in header if theirs in (h, name_and_unit(h)[0])]
+        if not found:
+            table.text(theirs)
+        unit = name_and_unit(found[0])[1] if found[0] != theirs else ""
+        header[header.index(found[0])] = f"{ours} [{unit}]" if unit else ours
+    return replace(table, header=tuple(header))
 
 
 def _known_columns(table: Table, own: tuple[str, ...]) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,8 @@ class Table:
     header: tuple[str, ...]
     columns: tuple[Cells, ...]
     lines: Sequence[int]
+    factors: Mapping[str, float] = field(default_factory=dict)
+    """What a column's numbers are multiplied by: its own unit over the one that they are read in."""
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -49,9 +51,10 @@ class Table:
 
     def numbers(self, column: str, *, blank: bool = False) -> Floats:
         """A column as floats; with `blank`, empty cells are NaN (a value that was not read)."""
-        return self._cells(column).numbers(
+        found = self._cells(column).numbers(
             lambda cell, row: self._number(cell, column, self.lines[row], blank)
         )
+        return found * self.factors[column] if self.factors.get(column, 1.0) != 1.0 else found
 
     def _number(self, cell: str, column: str, line: int, blank: bool) -> float:
         if blank and cell.lower() in ("", "nan", "na"):

@@ -7,13 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.common.broadcasting import random_numbers, real_array, whole_number
+from stiffmap.common.broadcasting import (
+    instance_of,
+    one_of,
+    random_numbers,
+    real_array,
+    real_number,
+    trailing,
+    whole_number,
+    wrench_array,
+)
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings.library.distance import READING
 from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
-from stiffmap.solve.machine import Machine
+from stiffmap.solve.machine import Machine, as_machine
 
 MICRO = {"deflection": 3e-6, "position": 8e-6}
 """m: default noise of a reading."""
@@ -69,17 +78,21 @@ def plan_of_poses(
     noise, angle_noise
         One standard deviation of a reading, m and rad; None: 3 µm for deflections, 8 µm for positions.
     """
-    if not isinstance(quantity, str) or quantity not in MICRO:
-        raise StiffmapError(f"quantity: expected deflection or position, got {quantity!r}")
+    one_of(quantity, MICRO, "quantity")
+    for axis in instance_of(axes, Sequence, "axes", "names of axes"):
+        one_of(axis, AXES, "axes")
+    poses = trailing(poses, (3,), "poses", "positions (m)").reshape(-1, 3)
     own = [np.zeros((1, 6))] * len(poses) if quantity == "position" else _each(loads, len(poses))
     position = np.repeat(poses, [len(w) for w in own], axis=0)
     wrench = np.vstack(own)
-    n = len(position) * repeats
-    size = np.where([c.unit == "m" for c in AXIS_CHANNELS], noise or MICRO[quantity], angle_noise)
+    n = len(position) * whole_number(repeats, "repeats", 1)
+    given = None if noise is None else real_number(noise, "noise")
+    turn = real_number(angle_noise, "angle_noise")
+    size = np.where([c.unit == "m" for c in AXIS_CHANNELS], given or MICRO[quantity], turn)
     sigma = np.tile(np.where([a in axes for a in AXES], size, np.nan), (n, 1))
     return Experiment(
         name="plan",
-        machine=machine.name,
+        machine=as_machine(machine).name,
         quantity=quantity,
         ids=tuple(str(i + 1) for i in range(n)),
         position=np.repeat(position, repeats, axis=0),
@@ -109,7 +122,14 @@ def plan_of_joints(
 
 
 def _each(loads: Floats | Sequence[Floats], number: int) -> list[Floats]:
-    return [loads] * number if isinstance(loads, np.ndarray) else list(loads)
+    if isinstance(loads, np.ndarray):
+        loads = [loads] * number
+    each = [
+        wrench_array(w, "loads").reshape(-1, 6) for w in instance_of(loads, Sequence, "loads", "wrenches")
+    ]
+    if len(each) != number:
+        raise StiffmapError(f"loads: expected one array for each of {number} poses, got {len(each)}")
+    return each
 
 
 def random_plan(

@@ -7,7 +7,7 @@ from os import PathLike
 
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import real_array
+from stiffmap.common.broadcasting import trailing, wrench_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.calls import Effects, as_experiment, effects_of
@@ -69,14 +69,14 @@ def plan(
         m,
         terms,
         rows=rows,
-        aim=aim or ("separate" if others else "identify"),
+        aim=("separate" if others else "identify") if aim is None else aim,
         rival=others,
         quantity=quantity,
         poses=poses,
         force=force,
         candidates=None if candidates is None else as_experiment(candidates),
-        at=None if position is None else real_array(position, "position").reshape(-1, 3),
-        load=None if wrench is None else real_array(wrench, "wrench"),
+        at=None if position is None else trailing(position, (3,), "position", "positions (m)").reshape(-1, 3),
+        load=None if wrench is None else wrench_array(wrench),
         frame=frame,
         tool=tool,
         axes=axes,

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats, random_numbers
+from stiffmap.common.broadcasting import Floats, one_of, random_numbers, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import Experiment
@@ -30,6 +30,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Flag
 
 AIMS = ("identify", "separate", "map")
+UNKNOWN = ("known", "offset_unknown", "unknown")
 RANDOM = 20
 """Random plans for comparison with the chosen one."""
 
@@ -98,6 +99,8 @@ def design(
         For bad input.
     """
     _check(aim, rival, rows)
+    one_of(frame, UNKNOWN, "frame")
+    one_of(tool, UNKNOWN, "tool")
     if candidates is None:
         candidates = candidate_rows(machine, quantity, poses, force, axes, noise, seed)
     pool = replace(in_limits(machine, candidates), frame=frame, tool=tool)
@@ -185,12 +188,10 @@ def follow(
 
 
 def _check(aim: str, rival: Sequence[AppliedEffect], rows: int) -> None:
-    if aim not in AIMS:
-        raise StiffmapError(f"aim: expected {', '.join(AIMS)}, got {aim!r}")
+    one_of(aim, AIMS, "aim")
     if aim == "separate" and not rival:
         raise StiffmapError("rival: separating two explanations needs the other one")
-    if rows < 1:
-        raise StiffmapError(f"rows: expected 1 or more, got {rows}")
+    whole_number(rows, "rows", 1)
 
 
 OFF_LIMITS = Flag.DRIVE_RANGE | Flag.JOINT_LIMIT

@@ -4,7 +4,7 @@ from stiffmap.machining.compensation.axis_errors import AxisErrors, axis_errors,
 from stiffmap.machining.compensation.commands import Commands, compensate
 from stiffmap.machining.compensation.geometry import DhRow, corrected_geometry, dh_list
 from stiffmap.machining.compensation.tables import FORMATS, compensation_table, read_table, write_table
-from stiffmap.machining.compensation.urdf import urdf_text
+from stiffmap.machining.compensation.urdf import corrected_urdf
 
 __all__ = [
     "FORMATS",
@@ -16,8 +16,8 @@ __all__ = [
     "compensate",
     "compensation_table",
     "corrected_geometry",
+    "corrected_urdf",
     "dh_list",
     "read_table",
-    "urdf_text",
     "write_table",
 ]

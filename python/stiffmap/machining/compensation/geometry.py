@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.description import Element, Joint, MachineDescription, Offset, Pose
+from stiffmap.model.description import Element, Joint, MachineDescription, Offset, Pose, Spring
 
 PARALLEL = 0.05
 """rad: below it two axes count as parallel and their row has Hayati's fourth parameter: the common normal of
@@ -38,7 +38,7 @@ def corrected_geometry(description: MachineDescription) -> tuple[MachineDescript
     Built offsets become nominal and zero errors become offsets before their joint. Second: what geometry
     cannot hold and `compensate` must, in words.
     """
-    left: list[str] = []
+    left = [f"{s.name}: a spring outside the legs" for s in description.external_springs]
 
     def part(elements: tuple[Element, ...], path: str) -> tuple[Element, ...]:
         out: list[Element] = []
@@ -48,6 +48,8 @@ def corrected_geometry(description: MachineDescription) -> tuple[MachineDescript
             elif isinstance(e, Joint):
                 out += _joint(e, f"{path}.{e.name}", left)
             else:
+                if isinstance(e, Spring):
+                    left.append(f"{path}.{e.name}: compliance")
                 out.append(e)
         return tuple(out)
 

@@ -1,52 +1,99 @@
-"""A serial arm as URDF: nominal geometry of a description, for a controller or a planner."""
+"""A corrected arm in the URDF that it was imported from."""
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
+import re
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from stiffmap.common.broadcasting import Floats
-from stiffmap.machining.compensation.geometry import serial_joints
-from stiffmap.model.description import MachineDescription
+from stiffmap.common.errors import FileError
+from stiffmap.machining.compensation.geometry import corrected_geometry, serial_joints
+from stiffmap.model.description import Joint, MachineDescription, Offset, Pose
+from stiffmap.model.urdf.chains import plain_name
+from stiffmap.model.urdf.editing import SAME, with_origins
+from stiffmap.model.urdf.model import UrdfJoint, UrdfModel
+from stiffmap.model.urdf.reader import read_urdf
 
-
-def urdf_text(description: MachineDescription) -> str:
-    """URDF of the joints and the tool, m and rad. Raises StiffmapError for a machine that is no serial arm."""
-    joints, tool = serial_joints(description)
-    robot = ET.Element("robot", name=description.name)
-    links = [f"link_{i}" for i in range(len(joints) + 1)]
-    for name in (*links, "tool"):
-        ET.SubElement(robot, "link", name=name)
-    before = (np.zeros(3), np.eye(3))
-    for (e, frame, _), parent, child in zip(joints, links[:-1], links[1:], strict=True):
-        kind = "prismatic" if e.kind == "prismatic" else "revolute"
-        joint = ET.SubElement(robot, "joint", name=e.name, type=kind)
-        _place(joint, before, frame, parent, child)
-        ET.SubElement(joint, "axis", xyz=_numbers(np.array(e.axes[0])))
-        low, high = (e.drive.range if e.drive and e.drive.range else e.limits) or (-1e3, 1e3)
-        effort = e.drive.force if e.drive and e.drive.force else 0.0
-        speed = e.drive.speed if e.drive and e.drive.speed else 0.0
-        ET.SubElement(
-            joint, "limit", lower=repr(float(low)), upper=repr(float(high)), effort=repr(float(effort)),
-            velocity=repr(float(speed)),
-        )  # fmt: skip
-        before = frame
-    _place(ET.SubElement(robot, "joint", name="tool_joint", type="fixed"), before, tool, links[-1], "tool")
-    ET.indent(robot)
-    return ET.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"
+CLOSE = 1e-9  # m, and of a rotation matrix: a machine file's digits
 
 
-def _place(
-    joint: ET.Element, a: tuple[Floats, Floats], b: tuple[Floats, Floats], parent: str, child: str
-) -> None:
-    p, r = a[1].T @ (b[0] - a[0]), a[1].T @ b[1]
-    rpy = Rotation.from_matrix(r).as_euler("xyz")
-    ET.SubElement(joint, "origin", xyz=_numbers(p), rpy=_numbers(rpy))
-    ET.SubElement(joint, "parent", link=parent)
-    ET.SubElement(joint, "child", link=child)
+def corrected_urdf(description: MachineDescription, urdf: str | PathLike[str]) -> tuple[bytes, list[str]]:
+    """The URDF of an imported arm with the origins of its joints as they really are (m, rad), a zero error as a turn or
+    shift of the joint's origin; every other byte is the file's. Second: what no origin can hold, in words.
+
+    Raises FileError where the file cannot be read or is not that of the machine, StiffmapError for a machine that is no
+    serial arm.
+    """
+    model = read_urdf(Path(urdf))
+    corrected, left = corrected_geometry(description)
+    serial_joints(description)
+    declared, _ = _origins(description, model)
+    _check(description, model, declared)
+    real, tool = _origins(corrected, model)
+    if _apart(tool, Pose()) > SAME:
+        left.append("the tool's frame: no fixed joint of the file with an origin holds it")
+    changed = {j: (declared[j], real[j]) for j in real if _apart(declared[j], real[j]) > SAME}
+    return with_origins(Path(urdf), changed), left
 
 
-def _numbers(values: Floats) -> str:
-    return " ".join(repr(float(v)) for v in values)
+def _apart(a: Pose, b: Pose) -> float:
+    return float(max(np.abs(a.p - b.p).max(), np.abs(a.r - b.r).max()))
+
+
+def _origins(description: MachineDescription, model: UrdfModel) -> tuple[dict[str, Pose], Pose]:
+    """Origin of each joint of the file that the arm's declared geometry speaks of, and what follows the last of them."""
+    known = {plain_name(j.name): j for j in model.above.values()}
+    out: dict[str, Pose] = {}
+    here, after = "", Pose()
+    for e in (*description.base, *description.legs[0].elements, *description.platform):
+        if not isinstance(e, Joint | Offset):
+            continue
+        own = known.get(
+            e.name if isinstance(e, Joint) else e.name.removesuffix("_zero").removesuffix("_origin")
+        )
+        if isinstance(e, Joint) and (own is None or not _alike(e, own)):
+            raise _other(description, model, f"expected its joint {e.name} with the same type and axis, "
+                         f"found {'no such joint' if own is None else 'another one'}")  # fmt: skip
+        if own is not None and own.name not in out:
+            out[own.name], here, after = after, own.name, Pose()
+        if isinstance(e, Joint):
+            here = ""
+        elif here:
+            out[here] = out[here] @ e.nominal
+        else:
+            after = after @ e.nominal
+    said = re.search(r" to (\S+)", description.source)  # the tip, as the import writes it
+    for joint in model.way(said[1] if said else ""):
+        if joint.name not in out and joint.kind == "fixed" and joint.parent == model.joint([*out][-1]).child:
+            out[joint.name], after = after, Pose()
+    return out, after
+
+
+def _alike(e: Joint, own: UrdfJoint) -> bool:
+    return e.kind == own.kind and bool(np.abs(np.subtract(e.axes[0], own.axis)).max() < CLOSE)
+
+
+def _check(description: MachineDescription, model: UrdfModel, declared: dict[str, Pose]) -> None:
+    """FileError where the declared origins are not those of the file on the way to the last joint."""
+    way = model.way(model.joint([*declared][-1]).child)
+    moving = [e.name for e, _, _ in serial_joints(description)[0]]
+    for joint in way:
+        if joint.kind != "fixed" and plain_name(joint.name) not in moving:
+            raise _other(description, model, f"the machine has no joint {joint.name}")
+        off = _apart(declared.get(joint.name, Pose()), joint.origin)
+        if off > CLOSE:
+            raise _other(
+                description,
+                model,
+                f"the origin of joint {joint.name} is {off:.2g} off (m, or of its rotation)",
+            )
+    if [j.name for j in way if j.name in declared] != [*declared]:
+        raise _other(description, model, f"its joints follow each other as {', '.join(declared)}")
+
+
+def _other(description: MachineDescription, model: UrdfModel, found: str) -> FileError:
+    return FileError(
+        f"this is not the URDF that {description.name} was imported from: {found}", file=model.file
+    )

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.outputs import write_text
+from stiffmap.common.outputs import write_text, writing
 from stiffmap.common.outputs.option import written
 from stiffmap.experiment.comparison.prediction_error import left_by
 from stiffmap.experiment.experiment import Experiment, Mask
@@ -23,8 +23,8 @@ from stiffmap.machining.compensation import (
     axis_errors_of_map,
     compensation_table,
     corrected_geometry,
+    corrected_urdf,
     dh_list,
-    urdf_text,
     write_table,
 )
 from stiffmap.machining.compensation import compensate as compute
@@ -51,17 +51,19 @@ def compensate(
     poses: Annotated[
         Path | None, typer.Argument(help="CSV of wanted poses: x,y,z in mm, loads, approach_x …")
     ] = None,
-    output: Annotated[Path | None, written(help="CSV of commands.")] = None,
+    output: Annotated[Path | None, written(help="CSV of commands, table of --axis, or URDF.")] = None,
     effect: EffectsOption = None,
     force: Annotated[
         str, typer.Option(help="Force at the tool in every pose, N, where the CSV has none.")
     ] = "0,0,0",
     gravity: Annotated[str | None, typer.Option(help="m/s², base axes, as 0,0,-9.81.")] = None,
     urdf: Annotated[
-        Path | None, written("--urdf", help="Write the corrected geometry of a serial arm as URDF.")
+        Path | None,
+        typer.Option(help="The arm's own URDF: its joints get the corrected origins, all else is kept."),
     ] = None,
     dh: Annotated[
-        Path | None, written("--dh", help="Write it as a list of Denavit-Hartenberg rows (CSV).")
+        Path | None,
+        written("--dh", help="Write the geometry of a serial arm as Denavit-Hartenberg rows (CSV)."),
     ] = None,
     axis: Annotated[
         str | None, typer.Option(help="Instead of poses: a controller's table of this axis, x, y or z.")
@@ -101,7 +103,9 @@ def compensate(
 
       [cyan]stiffmap compensate results/map.nc --case Fx --axis x --format siemens -o x.mpf[/cyan]
 
-      [cyan]stiffmap compensate ur10 --effect 'zero_offset elbow error=1mrad' --urdf arm.urdf --dh arm.csv[/cyan]
+      [cyan]stiffmap compensate calibrated_arm.yaml --urdf arm.urdf -o corrected.urdf[/cyan]
+
+      [cyan]stiffmap compensate ur10 --effect 'zero_offset elbow error=1mrad' --dh arm.csv[/cyan]
 
       [cyan]stiffmap compensate result/machine.yaml --check held_out[/cyan]
     """
@@ -112,9 +116,13 @@ def compensate(
         return
     if poses is None and urdf is None and dh is None and check is None:
         raise StiffmapError("compensate: give a CSV of wanted poses, --axis, --urdf, --dh or --check")
+    if urdf is not None and (output is None or poses is not None):
+        raise StiffmapError(
+            "--urdf: give -o FILE, the URDF to write, and no poses, whose commands go there too"
+        )
     m = machine_with(machine, effect)
     if urdf is not None or dh is not None:
-        out |= _geometry(m, urdf, dh)
+        out |= _geometry(m, urdf, dh, output)
     if poses is not None:
         out |= _commands(m, poses, output, force, gravity)
     if check is not None:
@@ -238,10 +246,12 @@ def _commands(
     }
 
 
-def _geometry(m: Machine, urdf: Path | None, dh: Path | None) -> dict[str, object]:
+def _geometry(m: Machine, urdf: Path | None, dh: Path | None, output: Path | None) -> dict[str, object]:
     corrected, left = corrected_geometry(m.description)
-    if urdf is not None:
-        write_text(urdf, urdf_text(corrected))
+    if urdf is not None and output is not None:
+        text, left = corrected_urdf(m.description, urdf)
+        with writing(output) as fresh:
+            fresh.write_bytes(text)
     if dh is not None:
         write_text(dh, _dh_text(corrected))
     return {"not in the geometry": "; ".join(left) or "nothing"}

@@ -44,9 +44,6 @@ def import_urdf(
             help="Link of the URDF that is the tool. [default: tool0 and the like, or the only end]"
         ),
     ] = None,
-    without_meshes: Annotated[
-        bool, typer.Option("--without-meshes", help="Has no effect: meshes are never read.", hidden=True)
-    ] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing file.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -68,10 +65,14 @@ def import_urdf(
     from stiffmap.model.urdf import import_urdf as read
     from stiffmap.solve.machine import Machine
 
-    if urdf.suffix.lower() in TABLES:
-        found = _of_table(urdf, dh_convention, unit)
-    else:
-        found = read(urdf, sidecar, tip=tip)
+    table = urdf.suffix.lower() in TABLES
+    for option, given in {"--sidecar": sidecar, "--tip": tip}.items() if table else [("--unit", unit)]:
+        if given:
+            expected, other = ("URDF", "table") if table else ("table", "URDF")
+            raise FileError(
+                f"{option}: expected a {expected} with this option, found a {other}", file=str(urdf)
+            )
+    found = _of_table(urdf, dh_convention, unit) if table else read(urdf, sidecar, tip=tip)
     machine = Machine(found.description)
     file = output or urdf.with_name(f"{machine.name}.yaml")
     if file.exists() and not overwrite:

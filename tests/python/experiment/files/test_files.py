@@ -71,3 +71,34 @@ def test_a_virtual_experiment_survives_its_file(tmp_path: Path) -> None:
     np.testing.assert_allclose(back.wrench, twin.wrench, atol=1e-12)
     np.testing.assert_allclose(back.reading, twin.reading, rtol=1e-8)
     np.testing.assert_allclose(back.sigma, twin.sigma, rtol=1e-5)
+
+
+HEADERS = "id,x,y,z,fx,dx,dy,rx,u_dx,hours"
+CELLS = "a,1,2,300,100,0.01,0.02,0.5,0.003,1"
+
+
+def with_header(folder: Path, header: str, cells: str, more: str = "") -> sm.Experiment:
+    (folder / "experiment.yaml").write_text(
+        "machine: linear-delta\nquantity: deflection\nunits: {length: mm, force: N, angle: mrad}\n"
+        f"noise: {{dx: 0.003, dy: 0.003, dz: 0.003, rx: 0.01}}\n{more}"
+    )
+    (folder / "data.csv").write_text(f"{header}\n{cells}\n", encoding="utf-8")
+    return sm.load_experiment(folder)
+
+
+def test_a_header_may_name_its_unit(tmp_path: Path) -> None:
+    """The unit of a column is its header's; noise of the file stays in the file's units."""
+    bare = with_header(tmp_path, HEADERS, CELLS)
+    headers = "id,x [cm],y [µm],z (m),fx [kN],DEFL [um],dy [mm],rx [deg],u_dx [um],hours [h]"
+    cells = f"a,0.1,2000,0.3,0.1,10,0.02,{float(np.degrees(5e-4))!r},3,1"
+    own = with_header(tmp_path, headers, cells, "columns: {dx: DEFL}\n")
+    for name in ("position", "wrench", "reading", "sigma", "hours"):
+        np.testing.assert_allclose(getattr(own, name), getattr(bare, name), rtol=1e-14, err_msg=name)
+    wrong = {"x [N]": "unit of column 'x': expected m, cm, .*; found 'N'", "fx [kg]": "unit of column 'fx'",
+             "id [mm]": "unit of column 'id': expected none; found 'mm'", "x,x [mm]": "column 'x' occurs twice"}  # fmt: skip
+    for header, words in wrong.items():
+        column = header.partition(" ")[0].partition(",")[0]
+        more = CELLS if "," not in header else CELLS.replace("a,1", "a,1,1")
+        with pytest.raises(sm.StiffmapError, match=words) as caught:
+            with_header(tmp_path, f",{HEADERS},".replace(f",{column},", f",{header},").strip(","), more)
+        assert "data.csv" in str(caught.value) and "\n" not in str(caught.value)

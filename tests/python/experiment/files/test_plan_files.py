@@ -28,9 +28,9 @@ def test_headers_may_name_their_units(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("x [N],y,z\n1,2,3\n", "unit of column 'x': expected 'm', .*; found 'N'"),
+        ("x [N],y,z\n1,2,3\n", "unit of column 'x': expected m, cm, .*; found 'N'"),
         ("x,y,z,order [s]\n1,2,3,1\n", "unit of column 'order': expected none; found 's'"),
-        ("x,x [mm],y,z\n1,1,2,3\n", "column 'x' stands twice"),
+        ("x,x [mm],y,z\n1,1,2,3\n", "column 'x' occurs twice"),
         ("x [mm],y,zz [mm]\n1,2,3\n", "unknown column 'zz'"),
     ],
 )

@@ -69,6 +69,9 @@ def test_an_arm_stands_where_its_table_says(
             at = at @ own @ link if convention == "standard" else at @ link @ own
         assert real.position == pytest.approx(at[:3, 3], abs=1e-12)
         assert real.rotation == pytest.approx(at[:3, :3], abs=1e-12)
+    for more in (["--tip", "a"], ["--sidecar", "side.yaml"]):  # of a URDF
+        assert main(["import", file, *more, "-o", str(out)]) == 2
+        assert f"{more[0]}: expected a URDF with this option, found a table" in capsys.readouterr().err
     jacobian_is_regular = np.linalg.cond(sm.jacobian(machine)) if hasattr(sm, "jacobian") else 1.0
     assert jacobian_is_regular < 1e4
 

@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan, save_experiment
 from stiffmap.experiment.comparison.prediction_error import left_by
-from stiffmap.machining.compensation import compensate, corrected_geometry, dh_list, urdf_text
-from stiffmap.model.urdf import import_urdf
+from stiffmap.machining.compensation import compensate, corrected_geometry, dh_list
 from stiffmap.ui.cli.app import main
 
 MACHINES = (
@@ -85,7 +84,7 @@ def test_bad_input() -> None:
     with pytest.raises(sm.StiffmapError, match="got 'q'"):
         compensate(machine, [0, 0, 0], components=("q",))
     with pytest.raises(sm.StiffmapError, match="3 legs"):
-        urdf_text(sm.load_machine("linear-delta").description)
+        dh_list(sm.load_machine("linear-delta").description)
 
 
 def errors_of_an_arm() -> sm.Machine:
@@ -127,17 +126,6 @@ def test_rows_of_denavit_and_hartenberg_lead_to_the_tool() -> None:
     assert np.linalg.det(tool_r) == pytest.approx(1.0)
 
 
-def test_the_urdf_is_the_corrected_arm(tmp_path: Path) -> None:
-    machine = errors_of_an_arm()
-    corrected, _ = corrected_geometry(machine.description)
-    (tmp_path / "arm.urdf").write_text(urdf_text(corrected))
-    back = sm.Machine(import_urdf(tmp_path / "arm.urdf").description)
-    q = np.array([0.3, -1.1, 1.2, -0.7, 0.9, 0.2])
-    real = machine.solve_joints(q, stiffness=False).displacement[:3]
-    wanted = sm.forward_kinematics(machine, q).position + real
-    np.testing.assert_allclose(sm.forward_kinematics(back, q).position, wanted, atol=1e-9)
-
-
 def test_the_command_line_writes_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "poses.csv").write_text("x,y,z\n0,0,0\n50,20,-30\n")
     out = tmp_path / "commands.csv"
@@ -145,7 +133,7 @@ def test_the_command_line_writes_commands(tmp_path: Path, capsys: pytest.Capture
     assert main([*arguments, "--effect", "length bar x error=0.1mm", "--force", "0,0,-300"]) == 0
     assert "rows without an answer: none" in capsys.readouterr().out
     assert out.read_text().startswith("wanted_x_mm")
-    assert main(["compensate", "linear-delta", "--urdf", str(tmp_path / "a.urdf")]) == 2
+    assert main(["compensate", "linear-delta", "--dh", str(tmp_path / "a.csv")]) == 2
     assert "serial arm" in capsys.readouterr().err
     assert main(["compensate", "linear-delta", "--check", str(tmp_path / "nothing")]) == 2
     assert main(["compensate", "linear-delta"]) == 2

@@ -126,8 +126,8 @@ def test_bad_urdf(message: str, tmp_path: Path, capsys: pytest.CaptureFixture[st
 def test_meshes_need_not_be_there(tmp_path: Path) -> None:
     urdf, _ = written(tmp_path, robots.ARM.replace('<link name="base"/>', MESH))
     assert import_urdf(urdf).rigid == ("q1", "q2", "q3", "q4")
-    for more in ([], ["--without-meshes", "--overwrite"]):  # the option of older versions
-        assert main(["import", str(urdf), "-o", str(tmp_path / "arm.yaml"), *more]) == 0
+    assert main(["import", str(urdf), "-o", str(tmp_path / "arm.yaml")]) == 0
+    assert main(["import", str(urdf), "--unit", "a=mm", "-o", str(tmp_path / "arm.yaml")]) == 2
 
 
 BAD_SIDECAR = {

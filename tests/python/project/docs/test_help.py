@@ -78,6 +78,7 @@ def make_workshop(at: Path) -> Path:
             (at / name).parent.mkdir(exist_ok=True)
             machine.save(at / name)
         write_text(at / "arm.urdf", ROBOT)
+        sm.import_urdf(at / "arm.urdf").save(at / "calibrated_arm.yaml")
     shutil.copytree(SERVO, at / "experiments/servo")
     shutil.copytree(SERVO, at / "dial_gauges")
     shutil.copytree(SERVO.parent, at / "measured")
