@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 from stiffmap.common.errors import HomeError
-from stiffmap.model.addresses import known_values, with_values
+from stiffmap.model.addresses import known_values, listed, with_values
 from stiffmap.model.addresses.places import single_addresses
 from stiffmap.model.description import MachineDescription, tree
 from stiffmap.model.description.elements import Element, Joint
@@ -32,6 +33,26 @@ def redesigned(description: MachineDescription, values: Mapping[str, float]) -> 
     except HomeError as problem:
         target = _followed(declared, values, problem)
     return apply_records(target, description.effects) if description.effects else target
+
+
+def on_branch_of(base: MachineDescription, other: MachineDescription) -> MachineDescription:
+    """`other`, which differs from `base` in numbers alone, with its home on the assembly branch that a search finds for `base`; as it
+    is where its home is declared. HomeError where the numbers reach no machine that closes."""
+    if not other.search_home:
+        return other
+    start, end = _settled(base.declared or base), other.declared or other
+    now = {row.address: row.value for row in listed(start)}
+    new = {row.address: row.value for row in listed(end) if not row.address.partition("/")[2].startswith("home")}
+    there = redesigned(start, {a: v for a, v in new.items() if a in now and v != now[a]})
+    for full, e in tree.all_elements(there):
+        if isinstance(e, Joint):
+            end = tree.edit(end, full, partial(_with_home, home=e.home)) or end
+    end = replace(end, search_home=False)
+    return apply_records(end, other.effects) if other.effects else end
+
+
+def _with_home(element: Element, home: tuple[float, ...]) -> Element | None:
+    return replace(element, home=home) if isinstance(element, Joint) else None
 
 
 def _settled(description: MachineDescription) -> MachineDescription:

@@ -56,8 +56,6 @@ class Beyond:
 class Verdict:
     """The answer of the inference, before it is put into words."""
 
-    word: str
-    """``none``, ``effects``, ``ambiguous``, ``unattributed``."""
     named: tuple[Named, ...]
     refused: tuple[tuple[Chosen, str], ...]
     """Effects of the model without a name, and why."""
@@ -69,6 +67,13 @@ class Verdict:
     """Correlation of the noise in time; empty: none."""
     as_effects: tuple[Unknown, ...] = ()
     """Numbers out of tolerance that are named as the effect that shows the same."""
+
+    @property
+    def word(self) -> str:
+        """``none``, ``effects``, ``ambiguous``, ``unattributed``."""
+        if self.named:
+            return "ambiguous" if any(n.equivalents or n.numbers for n in self.named) else "effects"
+        return "unattributed" if self.rest else "effects" if self.beyond else "none"
 
 
 def judged(columns: Columns, search: Search) -> Verdict:
@@ -99,22 +104,20 @@ def judged(columns: Columns, search: Search) -> Verdict:
     rest, time = left(model.fit)
     unexplained = [why for _, why in refused if why != TOLERABLE]
     rest = rest or (unexplained[0] if unexplained else "")
-    if named:
-        word = "ambiguous" if any(n.equivalents or n.numbers for n in named) else "effects"
-    else:
-        word = "unattributed" if rest else "effects" if beyond else "none"
     named.sort(key=lambda n: -n.share)
-    return Verdict(word, tuple(named), tuple(refused), beyond, rest, time, as_effects)
+    return Verdict(tuple(named), tuple(refused), beyond, rest, time, as_effects)
 
 
 def effect_of(columns: Columns, b: Beyond, taken: Sequence[Chosen]) -> Chosen | None:
-    """The effect of fewest directions in whose span a number out of tolerance lies; None where there is none, or it is taken."""
+    """The effect of fewest directions in whose span a number out of tolerance lies; None where there is none, or it is taken, or an
+    effect that is taken lies in its span."""
+    within = [id(a) for c in taken for a in (*c.place.aliases, *c.place.wider)]
     d = columns.numbers[:, columns.unknowns.index(b.unknown)]
     for place in sorted(columns.places, key=lambda p: p.shapes[0].directions.shape[1]):
         q = place.shapes[0].directions
         if len(place.shapes) > 1 or float(np.sum((q.T @ d) ** 2)) < ALIKE * float(d @ d):
             continue
-        if any(c.place is place for c in taken):
+        if any(c.place is place for c in taken) or id(place.candidate) in within:
             return None
         bare = Chosen.at(place, 0)
         values = np.linalg.lstsq(columns.rotated(bare.lines(columns)), b.value * d, rcond=1e-9)[0]

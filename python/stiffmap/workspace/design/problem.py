@@ -16,11 +16,13 @@ from stiffmap.common.arithmetic import evaluate
 from stiffmap.common.broadcasting import Floats, given_path
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.yaml_text import Document, read
+from stiffmap.model.description import MachineDescription
 from stiffmap.model.files.load import describe_document
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.machine import Machine
+from stiffmap.solve.redesign import on_branch_of
 from stiffmap.workspace.design.editing import Editor
 from stiffmap.workspace.design.places import put, unshared
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion, near_or_shipped
@@ -127,7 +129,7 @@ class Design:
             return self.machine(x)
         names = self.names(x)
         values = {place: evaluate(text, names) for place, text in self.model.numbers.items()}
-        return Machine(self._editor.description(values), start_nodes=START_NODES)
+        return Machine(self._on_branch(self._editor.description(values)), start_nodes=START_NODES)
 
     @cached_property
     def toolpath(self) -> Motion | None:
@@ -141,8 +143,19 @@ class Design:
 
     def machine(self, x: Floats) -> Machine:
         """The machine of a vector of variables; StiffmapError where it cannot be."""
-        document = Document(self.data(x), self.document.lines)
-        return Machine(describe_document(document, self.machine_file, Path(self.machine_file).parent))
+        return Machine(self._on_branch(self._described(self.data(x))))
+
+    def _described(self, data: Any) -> MachineDescription:
+        document = Document(data, self.document.lines)
+        return describe_document(document, self.machine_file, Path(self.machine_file).parent)
+
+    def _on_branch(self, description: MachineDescription) -> MachineDescription:
+        """On the assembly branch of the machine file, where a home is searched for."""
+        return on_branch_of(self._base, description) if description.search_home else description
+
+    @cached_property
+    def _base(self) -> MachineDescription:
+        return self._described(unshared(self.document.data))
 
 
 def load_design(path: str | PathLike[str]) -> Design:

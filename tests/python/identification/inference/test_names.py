@@ -17,9 +17,9 @@ from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference.amplitudes import Parts, fitted
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.inference import inferred, terms
-from stiffmap.identification.inference.names import Model, searched
+from stiffmap.identification.inference.names import Chosen, Model, searched
 from stiffmap.identification.inference.places import Place, Shape
-from stiffmap.identification.inference.verdict import TOLERABLE, judged
+from stiffmap.identification.inference.verdict import TOLERABLE, Beyond, effect_of, judged
 from stiffmap.identification.numbers.unknowns import Unknown
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
@@ -176,3 +176,24 @@ def test_declared_numbers_out_of_tolerance_in_the_stead_of_a_name_do_not_take_it
         assert len(v.named) == named
         assert [b.unknown.name for n in v.named for b in n.numbers] == ["zero of a drive"] * named
         assert v.word == ("ambiguous" if named else "none")
+
+
+def test_a_number_is_no_effect_that_contains_a_named_one():
+    """A tilt about three axes is no second name beside the zero that is one of them: together neither has a size."""
+    c = setting(1, (0.0, 30.0, 0.0))
+    narrow, other = c.places[1], c.places[2]
+    both = np.linalg.qr(np.hstack([p.shapes[0].directions for p in (narrow, other)]))[0]
+    candidate = replace(
+        narrow.candidate, element="both", parameters=tuple(
+            replace(narrow.candidate.parameters[0], name=n) for n in ("first", "second")
+        ),
+    )  # fmt: skip
+    lines = (c.free @ both).T
+    wide = Place(candidate, (Shape(SimpleNamespace(array=lambda: lines, candidate=candidate), both, 0),))
+    narrow = replace(narrow, wider=(candidate,))
+    d = other.shapes[0].directions
+    unknown = Unknown("turn of an axis", "joints", "rad", 1e-4)
+    c = replace(c, places=(narrow, wide), numbers=8.0 * d, unknowns=(unknown,))
+    b = Beyond(unknown, 5.0, 0.1, 1.0)
+    assert effect_of(c, b, [Chosen.at(narrow, 0)]) is None
+    assert effect_of(c, b, []).place is wide

@@ -11,11 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.python.model.addresses.test_numbers import guessed
 
 import stiffmap as sm
 import stiffmap.workspace.design
 from stiffmap.common import python_file
 from stiffmap.common.arithmetic import evaluate
+from stiffmap.model.files.shipped import find
 from stiffmap.workspace.design import load_design, optimize
 from stiffmap.workspace.design.judging import judge
 from stiffmap.workspace.design.store import Evaluations
@@ -224,3 +226,24 @@ objectives: [mass]
         assert judge(design, np.array([outer])).values["mass"] == pytest.approx(
             3 * (5 + 2 * bar) + 6, rel=1e-9
         )
+
+
+@pytest.mark.parametrize(("seed", "bar", "value"), [(2, "forearm", 300.0), (11, "arm", 270.0)])
+def test_a_home_that_is_searched_for_keeps_its_branch(seed, bar, value, tmp_path):
+    """As `with_number` keeps it, which goes over in small steps (model/addresses/test_numbers.py)."""
+    text = guessed(find("five-bar").read_text("utf-8"), seed)
+    (tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
+    places = [f"legs.{leg}.elements.offset[{bar}_length].translation[0]" for leg in ("left", "right")]
+    given = {
+        "name": "d",
+        "machine": "machine.yaml",
+        "variables": {"a": {"low": 200, "high": 500}},
+        "numbers": dict.fromkeys(places, "a"),
+        "objectives": ["mass"],
+    }
+    (tmp_path / "design.yaml").write_text(json.dumps(given), encoding="utf-8")
+    design = load_design(tmp_path / "design.yaml")
+    machine = sm.load_machine(tmp_path / "machine.yaml")
+    wanted = machine.with_number(f"{bar}_length/length", value / 1e3).compiled.home_coordinates()
+    for made in (design.machine(np.array([value])), design.quick_machine(np.array([value]))):
+        np.testing.assert_allclose(made.compiled.home_coordinates(), wanted, atol=1e-7)
