@@ -12,12 +12,13 @@ the bound of a scale mixture: Lange, Little, Taylor, JASA 84 (1989) 881.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.linalg import LinAlgError
 from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.linalg.blas import dsymm
 from scipy.linalg.lapack import dpotri
 from scipy.special import gammaln
 
@@ -169,28 +170,39 @@ def fitted(
 
     start
         ln variances to begin with, by the name of the part; others begin small.
+    weights
+        (N,) of heavy tails of a fit that this one goes on from. While readings stand out they are not given up.
     """
     given = start or {}
     first = np.array([given.get(NOISE, 0.0), *(given.get(p.name, BEGIN) for p in parts)])
+    if weights is not None and np.any(weights != 1.0):
+        heavy = _weighed(_optimum(columns, tuple(parts), first, weights))
+        if np.any(np.abs(noise_part(heavy)[0]) > STANDS_OUT * heavy.noise):
+            return heavy
     light = _optimum(columns, tuple(parts), first, np.ones(len(columns.rows)))
     mean, _ = noise_part(light)
     typical = min(light.noise, 1.4826 * float(np.median(np.abs(mean))))
     starts = []
-    if weights is not None or np.any(np.abs(mean) > STANDS_OUT * typical):
+    if np.any(np.abs(mean) > STANDS_OUT * typical):
         starts.append(_heavy(light))
     if columns.alone.any():
         starts.append(np.where(columns.alone, NOTHING, 1.0))
     best = light
     for w in starts:
-        begun, heavy = np.array([2.0 * np.log(typical), *first[1:]]), light  # what sank may rise
-        for k in range(WEIGHINGS):
-            before, heavy = heavy.score, _optimum(columns, tuple(parts), begun, w, steps=3 if k else STEPS)
-            if k and abs(heavy.score - before) < WEIGHED:
-                break
-            begun, w = heavy.t, _heavy(heavy)
+        begun = np.array([2.0 * np.log(typical), *first[1:]])  # what sank may rise
+        heavy = _weighed(_optimum(columns, tuple(parts), begun, w))
         if heavy.score > best.score:
             best = heavy
     return best
+
+
+def _weighed(fit: Fit) -> Fit:
+    """The fit with the weights of its heavy tails: in turn weights, and a step to the amplitudes that go with them."""
+    for _ in range(WEIGHINGS):
+        before, fit = fit.score, _optimum(fit.columns, fit.parts, fit.t, _heavy(fit), steps=1)
+        if abs(fit.score - before) < WEIGHED:
+            break
+    return fit
 
 
 def _heavy(fit: Fit) -> Floats:
@@ -201,7 +213,8 @@ def _heavy(fit: Fit) -> Floats:
 
 def evaluated(columns: Columns, parts: Sequence[Part], t: Floats, weights: Floats) -> Fit:
     """The evidence at given amplitudes."""
-    return _evaluate(columns, tuple(parts), t, weights, _noise_matrix(columns, weights), True)[0]
+    fit, _, information = _evaluate(columns, tuple(parts), t, weights, _noise_matrix(columns, weights))
+    return _priced(fit, information)
 
 
 def noise_prior(columns: Columns) -> tuple[float, float]:
@@ -228,9 +241,10 @@ def _noise_matrix(columns: Columns, weights: Floats) -> Floats:
 
 
 def _evaluate(
-    columns: Columns, parts: tuple[Part, ...], t: Floats, weights: Floats, noise: Floats, price: bool
+    columns: Columns, parts: tuple[Part, ...], t: Floats, weights: Floats, noise: Floats
 ) -> tuple[Fit, Floats, Floats]:
-    """The fit at these amplitudes, the gradient of its objective and the average information; parts that are off have none."""
+    """The fit at these amplitudes without their price, the gradient of its objective and the average information; parts that are off
+    have none."""
     matrices = [noise, *(p.matrix for p in parts)]
     on = [k for k, x in enumerate(t) if k == 0 or x > OFF]
     v = columns.zero.copy()
@@ -242,28 +256,39 @@ def _evaluate(
     m = len(r)
     likelihood = -0.5 * float(r @ solved) - float(np.log(np.diag(root)).sum()) - 0.5 * m * np.log(2 * np.pi)
     likelihood += _bound(weights)
-    lower = dpotri(root, lower=1)[0]
-    inverse = np.tril(lower) + np.tril(lower, -1).T
-    along, trace = np.zeros((m, len(t))), np.zeros(len(t))
+    inverse = dpotri(root, lower=1)[0]  # below the diagonal; above it zero, as the root is
+    along, trace = np.zeros((m, len(t)), order="F"), np.zeros(len(t))
     for k in on:
         along[:, k] = np.exp(t[k]) * (matrices[k] @ solved)
-        trace[k] = np.exp(t[k]) * float(np.vdot(inverse, matrices[k]))
+        both = 2.0 * np.vdot(inverse.T, matrices[k]) - np.vdot(np.diag(inverse), np.diag(matrices[k]))
+        trace[k] = np.exp(t[k]) * float(both)
     gradient = 0.5 * (along.T @ solved - trace)
-    of_data = 0.5 * along.T @ (inverse @ along)
-    centre, own = noise_prior(columns)
-    sd = np.array([own, *(p.sd for p in parts)])
-    off = t - np.array([centre, *np.zeros(len(parts))])
+    of_data = 0.5 * along.T @ dsymm(1.0, inverse, along, lower=1)
+    centre, sd = _prior(columns, parts)
+    off = t - centre
     score = likelihood - 0.5 * float(np.sum((off / sd) ** 2))
-    if price:
-        wide = np.minimum(sd, WIDEST)
-        counted = np.array([True, *(p.kind != "effect" for p in parts)])
-        some = (wide[:, None] * of_data * wide)[np.ix_(counted, counted)]
-        score -= 0.5 * float(np.linalg.slogdet(np.eye(int(counted.sum())) + some)[1])
-        for k, p in enumerate(parts):
-            if p.kind == "effect":
-                score += _of_size(p, root, solved, float(t[1 + k]))
     fit = Fit(columns, parts, t, weights, root, solved, likelihood, score)
     return fit, gradient - off / sd**2, of_data + np.diag(1.0 / sd**2)
+
+
+def _prior(columns: Columns, parts: Sequence[Part]) -> tuple[Floats, Floats]:
+    """(1 + k,) means and standard deviations of ln variances before any reading."""
+    mean, sd = noise_prior(columns)
+    return np.array([mean, *np.zeros(len(parts))]), np.array([sd, *(p.sd for p in parts)])
+
+
+def _priced(fit: Fit, information: Floats) -> Fit:
+    """The evidence: less the price of the amplitudes (Laplace), the mean over sizes of each effect."""
+    _, sd = _prior(fit.columns, fit.parts)
+    wide = np.minimum(sd, WIDEST)
+    counted = np.array([True, *(p.kind != "effect" for p in fit.parts)])
+    of_data = information - np.diag(1.0 / sd**2)
+    some = (wide[:, None] * of_data * wide)[np.ix_(counted, counted)]
+    score = fit.score - 0.5 * float(np.linalg.slogdet(np.eye(int(counted.sum())) + some)[1])
+    for p, x in zip(fit.parts, fit.t[1:], strict=True):
+        if p.kind == "effect":
+            score += _of_size(p, fit.root, fit.solved, float(x))
+    return replace(fit, score=score)
 
 
 def _root(v: Floats) -> Floats:
@@ -326,13 +351,13 @@ def _optimum(
 ) -> Fit:
     """Damped Newton steps on ln variances."""
     damping, noise = SHRINK, _noise_matrix(columns, weights)
-    fit, gradient, information = _evaluate(columns, parts, t, weights, noise, False)
+    fit, gradient, information = _evaluate(columns, parts, t, weights, noise)
     for _ in range(steps):
         scale = np.maximum(np.diag(information), 1e-2)
         step = np.linalg.solve(information + damping * np.diag(scale), gradient)
         step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
         sinks = (fit.t + step < SINKS) & (step < 0.0)
-        moved = _evaluate(columns, parts, np.where(sinks, OFF, fit.t + step), weights, noise, False)
+        moved = _evaluate(columns, parts, np.where(sinks, OFF, fit.t + step), weights, noise)
         gain = moved[0].score - fit.score
         if gain < -1e-9:
             damping *= 8.0
@@ -343,4 +368,4 @@ def _optimum(
         damping = max(damping / 4.0, 1e-3)
         if gain < ENOUGH:
             break
-    return _evaluate(columns, parts, fit.t, weights, noise, True)[0]
+    return _priced(fit, information)

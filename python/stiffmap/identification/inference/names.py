@@ -257,21 +257,24 @@ class _World:
         for place in places:
             chosen.append(Chosen.at(place, _best_shape(anchor, place)))
             start[chosen[-1].part.name] = _size(anchor, chosen[-1].part)
-        return self._fit(tuple(chosen), start)
+        return self._fit(tuple(chosen), start, anchor.weights)
 
-    def _fit(self, chosen: tuple[Chosen, ...], start: dict[str, float] | None) -> Model:
+    def _fit(
+        self, chosen: tuple[Chosen, ...], start: dict[str, float] | None, weights: Floats | None = None
+    ) -> Model:
         """A set at its best amplitudes, on a residual that is corrected for what the effects' columns miss; fitted once."""
         key = frozenset((id(c.place), c.shape) for c in chosen)
         if key not in self.known:
-            self.known[key] = self._made(
-                tuple(replace(c, values=np.zeros(0), refined=()) for c in chosen), start
-            )
+            bare = tuple(replace(c, values=np.zeros(0), refined=()) for c in chosen)
+            self.known[key] = self._made(bare, start, weights)
         return self.known[key]
 
-    def _made(self, chosen: tuple[Chosen, ...], start: dict[str, float] | None) -> Model:
+    def _made(
+        self, chosen: tuple[Chosen, ...], start: dict[str, float] | None, weights: Floats | None
+    ) -> Model:
         columns = self.columns
         parts = (*self.numbers, *self.gaps, *(c.part for c in chosen))
-        fit = fitted(columns, parts, start)
+        fit = fitted(columns, parts, start, weights)
         if self.predict and chosen:
             fit, chosen = self._corrected(fit, chosen)
         chosen = tuple(c if len(c.values) else replace(c, values=_values(fit, c)) for c in chosen)
@@ -333,7 +336,7 @@ class _World:
     def _less(self, missed: Floats, fit: Fit) -> Fit:
         """The fit on a residual less something."""
         residual = self.columns.residual - missed
-        return fitted(replace(self.columns, residual=residual), fit.parts, amplitudes(fit))
+        return fitted(replace(self.columns, residual=residual), fit.parts, amplitudes(fit), fit.weights)
 
     def _optimum(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Chosen, ...]:
         """The effects at the least squares of whole predictions, all else of the fit as it is; found once for each set."""
@@ -393,7 +396,8 @@ class _World:
 
     def less(self, model: Model, c: Chosen) -> Model:
         """The effects of a model but one, in this world."""
-        return self._fit(tuple(o for o in model.chosen if o.part.name != c.part.name), amplitudes(model.fit))
+        kept = tuple(o for o in model.chosen if o.part.name != c.part.name)
+        return self._fit(kept, amplitudes(model.fit), model.fit.weights)
 
     def coarsest(self, model: Model) -> Model:
         """The set with the coarsest part in each effect's place, of those whose evidence is the same."""

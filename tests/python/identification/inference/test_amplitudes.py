@@ -30,7 +30,7 @@ def test_the_likelihood_is_that_of_the_covariance_and_its_gradient_that_of_diffe
     noise = c.free.T @ (c.free / w[:, None])
 
     def objective(x):
-        return amplitudes._evaluate(c, some, x, w, noise, False)
+        return amplitudes._evaluate(c, some, x, w, noise)
 
     fit, gradient, information = objective(at)
     expected = multivariate_normal(cov=dense(c, some, at, w)).logpdf(c.residual)
@@ -71,7 +71,7 @@ def test_priors_are_those_of_the_table():
     rng = np.random.default_rng(0)
     c, some = columns(rng), parts(rng)
     at, w = np.array([0.3, 0.8, -1.0, 0.5]), np.ones(READINGS)
-    fit = amplitudes._evaluate(c, some, at, w, np.eye(len(c)), False)[0]
+    fit = amplitudes._evaluate(c, some, at, w, np.eye(len(c)))[0]
     prior = -0.5 * (0.3 / (2 * NOISE_SD)) ** 2 - 0.5 * (0.8 / (2 * NUMBERS_SD)) ** 2
     assert fit.score - fit.likelihood == pytest.approx(prior, abs=1e-12)
     repeated = columns(np.random.default_rng(0), repeats=1.44)
@@ -84,7 +84,7 @@ def test_the_price_of_an_effect_is_the_mean_over_its_sizes():
     c, some = columns(rng), parts(rng)
     at, w = np.array([0.1, -1.0, -0.5, 1.2]), np.ones(READINGS)
     fit = amplitudes.evaluated(c, some[2:], at[[0, 3]], w)
-    bare = amplitudes._evaluate(c, some[2:], at[[0, 3]], w, np.eye(len(c)), True)[2]
+    bare = amplitudes._evaluate(c, some[2:], at[[0, 3]], w, np.eye(len(c)))[2]
     sizes = [np.array([at[0], 2 * np.log(b)]) for b in amplitudes.SIZES]
     each = [multivariate_normal(cov=dense(c, some[2:], x, w)).logpdf(c.residual) for x in sizes]
     price = np.logaddexp.reduce(each) - np.log(len(each)) - fit.likelihood
