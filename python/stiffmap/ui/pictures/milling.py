@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.milling.job import Milled
-from stiffmap.solve.kinematics import inverse_kinematics
-from stiffmap.ui.plot.machines import draw_skeleton, look_from
-from stiffmap.ui.plot.skeleton import skeleton
+from stiffmap.ui.plot.loaded import round_factor
+from stiffmap.ui.plot.scene import draw_skeleton, finish, on, scene_axes
+from stiffmap.ui.plot.skeleton import standing
 from stiffmap.ui.plot.style import (
     BLACK,
     BLUE,
@@ -22,6 +22,7 @@ from stiffmap.ui.plot.style import (
     MM,
     TOLERANCE,
     headline,
+    leg_colours,
     legend_below,
     length_unit,
     new_figure,
@@ -30,16 +31,6 @@ from stiffmap.ui.plot.style import (
 
 SHARE = 0.08
 """Of the outline's size, that the largest error takes as it is drawn."""
-ROUND = (1, 2, 5)
-
-
-def magnification(size: float, largest: float) -> float:
-    """A round number by which errors are drawn larger."""
-    if not largest > 0:
-        return 1.0
-    wanted = SHARE * size / largest
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(max(power * max(r for r in ROUND if r * power <= wanted * 1.0001), 1.0))
 
 
 def outline_figure(found: Milled) -> Figure:
@@ -50,7 +41,7 @@ def outline_figure(found: Milled) -> Figure:
     wall = job.points.position - side * off
     before, after = ds.error_normal.values, ds.error_normal_after.values
     size = float(np.ptp(wall[:, :2], axis=0).max())
-    factor = magnification(size, float(np.nanmax(np.abs(before), initial=0.0)))
+    factor = max(round_factor(SHARE * size, float(np.nanmax(np.abs(before), initial=0.0))), 1.0)
     unit, scale = length_unit(float(np.nanmax(np.abs(before), initial=0.0)))
     with paper_style():
         figure = new_figure(6.4, 4.8)
@@ -127,16 +118,13 @@ def machine_path_figure(found: Milled) -> Figure:
     """The path on the machine, which stands where the error is largest."""
     job, ds = found.job, found.dataset
     worst = int(np.nanargmax(np.abs(np.nan_to_num(ds.error_normal.values))))
-    k = inverse_kinematics(job.machine, job.position[worst], job.rotation[worst])
-    shape = skeleton(job.machine, k.coordinates)
+    shape = standing(job.machine, job.position[worst], job.rotation[worst])
     with paper_style():
         figure = new_figure(5.6, 5.2)
-        ax: Any = figure.add_subplot(projection="3d")
-        draw_skeleton(ax, shape, job.machine.legs)
-        ax.plot(*(MM * job.position.T), color=BLACK, lw=1.6, label="path")
-        ax.set_aspect("equal")
-        look_from(ax, shape, None)
-        ax.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
+        ax: Any = scene_axes(figure, shape, None)
+        draw_skeleton(ax, shape, leg_colours(job.machine.legs))
+        ax.plot(*on(ax, job.position), color=BLACK, lw=1.6, label="path")
+        finish(ax)
         headline(figure, f"{job.machine.name}: the tool where the error is largest")
         legend_below(figure, ax.get_legend_handles_labels()[0], most=4)
     return figure

@@ -19,6 +19,7 @@ from stiffmap.ui.plot.style import (
     new_figure,
     panel,
     paper_style,
+    place_text,
 )
 
 
@@ -68,7 +69,7 @@ def in_words(variable: str) -> str:
 
 def position_text(ds: xr.Dataset) -> str:
     """Position in mm."""
-    return f"({', '.join(f'{MM * v:g}' for v in ds.position.values)}) mm"
+    return place_text(ds.position.values)
 
 
 def force_text(ds: xr.Dataset) -> str:

@@ -14,6 +14,7 @@ import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.outputs import write_picture
 
 MM = 1e3
@@ -94,6 +95,16 @@ def legend_below(figure: Figure, handles: Sequence[Any], most: int = 7) -> None:
 def length_unit(largest: float) -> tuple[str, float]:
     """Unit and factor in which a deflection of this size (m) reads well: no 0.0xx mm."""
     return ("µm", 1e6) if largest < 0.0995e-3 else ("mm", 1e3)
+
+
+def place_text(position: Floats) -> str:
+    """A position (3,) m in mm."""
+    return f"({', '.join(f'{MM * v:g}' for v in position)}) mm"
+
+
+def leg_colours(legs: Sequence[str]) -> dict[str, str]:
+    """Colour of each leg, the same in all pictures; black for base and platform."""
+    return {leg: CYCLE[i % len(CYCLE)] for i, leg in enumerate(legs)} | {"": BLACK}
 
 
 def panel(index: int) -> str:
