@@ -108,5 +108,5 @@ def toolpath_figure(ds: xr.Dataset, name: str) -> Figure:
         ax.set(xlabel="way along the path, mm", ylabel="deflection, µm")
         ax.grid(color="0.9", lw=0.5)
         headline(figure, f"{name}: deflection along the toolpath")
-        legend_below(figure, ax.get_legend_handles_labels()[0])
+        legend_below(figure)
     return figure

@@ -28,7 +28,7 @@ def figure_5(results: Results) -> Figure:
             draw_ellipse(bottom, pol, "xy", TOLERANCE)
             bottom.set_title(panel(i + 4), loc="left")
         headline(figure, f"Figure 5. Deflection in the xy plane, mm, under a force of {FORCE:g} N")
-        legend_below(figure, bottom.get_legend_handles_labels()[0])
+        legend_below(figure)
     return figure
 
 

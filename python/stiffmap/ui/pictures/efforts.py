@@ -39,7 +39,7 @@ def efforts_figure(found: xr.Dataset) -> Figure:
             axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
             axes.set_ylabel(label if margin is None else f"{label}, {_unit(turns, name == 'effort')}")
         panels[-1].set_xlabel("time, s")
-        legend_below(figure, panels[0].get_legend_handles_labels()[0])
+        legend_below(figure)
         limits_told = "thin lines: declared limits" if within else "declared limits are far off"
         headline(figure, f"{found.attrs['machine']}: drives along the motion ({limits_told})")
     return figure

@@ -63,7 +63,7 @@ def outline_figure(found: Milled) -> Figure:
         ax.autoscale_view()
         ax.set(xlabel="x of the part, mm", ylabel="y of the part, mm")
         headline(figure, f"Wall of the part; errors drawn {factor:g} times larger")
-        legend_below(figure, ax.get_legend_handles_labels()[0])
+        legend_below(figure)
     return figure
 
 
@@ -108,9 +108,8 @@ def error_figure(ds: xr.Dataset) -> Figure:
             )  # fmt: skip
         bottom.axhline(0, color="0.7", lw=0.6, zorder=0)
         bottom.set(xlabel="way along the path, mm", ylabel=f"compensated, {fine}")
-        handles = [*top.get_legend_handles_labels()[0], *bottom.get_legend_handles_labels()[0]]
         headline(figure, f"{ds.attrs['machine']}, {ds.attrs['path']}, {ds.attrs['process']}")
-        legend_below(figure, handles)
+        legend_below(figure)
     return figure
 
 
@@ -126,5 +125,5 @@ def machine_path_figure(found: Milled) -> Figure:
         ax.plot(*on(ax, job.position), color=BLACK, lw=1.6, label="path")
         finish(ax)
         headline(figure, f"{job.machine.name}: the tool where the error is largest")
-        legend_below(figure, ax.get_legend_handles_labels()[0], most=4)
+        legend_below(figure, most=4)
     return figure

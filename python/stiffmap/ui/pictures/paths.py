@@ -40,9 +40,7 @@ def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
                         _lines(axes, row, machine, i, one)
             axes.set_ylim(bottom=0)
         panels[-1].set_xlabel("way along the path, mm")
-        shown = {h.get_label(): h for axes in panels for h in axes.get_legend_handles_labels()[0]}
-        if shown:
-            legend_below(figure, list(shown.values()))
+        legend_below(figure)
         told = f"{next(iter(tables))}: along" if one else "Along"
         headline(figure, f"{told} the toolpath, with its force")
     return figure

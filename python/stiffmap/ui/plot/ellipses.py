@@ -26,7 +26,7 @@ def ellipse_figure(
             ax.set_title((panel(i) + " " if len(many) > 1 else "") + position_text(pol))
         machine = many[0].attrs["machine"]
         headline(figure, f"{machine}: displacement under {force_text(many[0])}")
-        legend_below(figure, axes[0].get_legend_handles_labels()[0])
+        legend_below(figure)
     return figure
 
 

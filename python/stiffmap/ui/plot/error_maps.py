@@ -25,6 +25,7 @@ from stiffmap.ui.plot.style import (
     new_figure,
     panel,
     paper_style,
+    wrench_text,
 )
 
 TITLES = {
@@ -50,7 +51,8 @@ def map_figure(
 
     Panels stand across the axis with the fewest positions. What lies beyond `tolerance` (m) is dotted, and
     its share is written over the panel. `variable` is a deflection of `ds` (m), or a component of its displacement: ``dx``, ``dy``, ``dz`` (m),
-    ``|d|`` for its norm, or one in any plane, ``d_xz``. None: the worst one in the
+    ``|d|`` for its norm, or one in any plane, ``d_xz``; a deflection's standard deviation, ``…_std``, where the map has
+    it. None: the worst one in the
     plane in which the force turned; the deflection of a map without directions, and of ``ds.sel(case=…)``. `case` picks a load case
     where it has several. `directions`: short lines along the force of the worst or best direction.
     `isolines`: thin lines of equal deflection. `limits` of the colour scale in m; `common_scale=False` gives
@@ -88,7 +90,9 @@ def _panels(
     directions: bool,
     isolines: bool,
 ) -> Figure:
-    figure, axes = panel_row(len(how.values), own_scales=not common_scale)
+    count = len(how.values)
+    figure = new_figure(max((2.35 if common_scale else 2.9) * count + 0.9, 4.6), 3.4)
+    axes = figure.subplots(1, count, squeeze=False, sharey=True)[0]
     norm = Normalize(unit[1] * limits[0], unit[1] * limits[1]) if limits else colour_range(values, unit[1])
     entries: dict[str, Any] = {}
     for i, ax in enumerate(axes):
@@ -110,12 +114,6 @@ def _panels(
     if entries:
         legend_below(figure, list(entries.values()))
     return figure
-
-
-def panel_row(count: int, *, own_scales: bool = False) -> tuple[Figure, Any]:
-    """A figure with a row of panels that share the upward axis."""
-    figure = new_figure(max((2.9 if own_scales else 2.35) * count + 0.9, 4.6), 3.4)
-    return figure, figure.subplots(1, count, squeeze=False, sharey=True)[0]
 
 
 def default_variable(ds: xr.Dataset) -> str:
@@ -219,16 +217,20 @@ def colour_label(values: xr.DataArray, unit: str = "mm") -> str:
     name = str(values.name or "")
     if name in ("dx", "dy", "dz"):
         return f"{name}, {unit}"
+    if name.endswith("_std"):
+        return f"standard deviation, {unit}"
     plane = name.rpartition("_")[2]
     return f"deflection in the {plane} plane, {unit}" if plane in FORCE_PLANES else f"deflection, {unit}"
 
 
 def title(ds: xr.Dataset, variable: str, case: str | None) -> str:
     """Machine, load and direction."""
+    variable, deviation, _ = variable.partition("_std")
     base = variable.removesuffix("_xy").removesuffix("_xz").removesuffix("_yz")
+    ending = ": standard deviation of the deflection" if deviation else ""
     if base not in TITLES or base == "deflection":
-        return f"{ds.attrs['machine']}: {load_text(ds, case)}"
-    return f"{ds.attrs['machine']}: {ds.attrs['turning_force_N']:g} N, {TITLES[base]}"
+        return f"{ds.attrs['machine']}: {load_text(ds, case)}{ending}"
+    return f"{ds.attrs['machine']}: {ds.attrs['turning_force_N']:g} N, {TITLES[base]}{ending}"
 
 
 def load_text(ds: xr.Dataset, case: str | None) -> str:
@@ -236,9 +238,7 @@ def load_text(ds: xr.Dataset, case: str | None) -> str:
     wrench = ds.wrench
     if "case" in wrench.dims:
         wrench = wrench.sel(case=case) if case is not None else wrench.isel(case=0)
-    names = zip(wrench.wrench_component.values, wrench.values, strict=True)
-    parts = [f"{n} = {v:g} {'N' if n.startswith('f') else 'N m'}" for n, v in names if v]
-    return ", ".join(parts) or "no wrench"
+    return wrench_text(wrench.values)
 
 
 LINE: dict[str, Any] = {"pivot": "mid", "headwidth": 0, "headlength": 0, "headaxislength": 0, "width": 0.005}

@@ -25,12 +25,17 @@ def halo(width: float, colour: str) -> list[patheffects.AbstractPathEffect]:
     return [patheffects.withStroke(linewidth=width, foreground=colour)]
 
 
+def levels(low: float, high: float, most: int = 8) -> list[float]:
+    """Round values inside a range."""
+    return [float(t) for t in MaxNLocator(most).tick_values(low, high) if low < t < high]
+
+
 def draw_isolines(ax: Axes, plane: xr.DataArray, how: Planes, factor: float, norm: Normalize) -> None:
     """Some thin labelled lines of equal deflection, on a grid that is fine enough."""
     v = factor * plane.values
     if min(v.shape) < FEWEST or not np.isfinite(v).any() or norm.vmin is None or norm.vmax is None:
         return
-    inside = [t for t in MaxNLocator(6).tick_values(norm.vmin, norm.vmax) if np.nanmin(v) < t < np.nanmax(v)]
+    inside = [t for t in levels(norm.vmin, norm.vmax, 6) if np.nanmin(v) < t < np.nanmax(v)]
     if not inside:
         return
     x, y = MM * plane[how.right].values, MM * plane[how.up].values

@@ -19,6 +19,7 @@ from stiffmap.ui.plot.skeleton import Skeleton, skeleton
 from stiffmap.ui.plot.style import (
     BLUE,
     ORANGE,
+    UM,
     headline,
     leg_colours,
     legend_below,
@@ -109,7 +110,7 @@ def loaded_figure(
         force = ", ".join(f"{v:g}" for v in budget.wrench[:3])
         headline(figure, f"{machine.name} at {place_text(budget.position)} under ({force}) N: the tool moves "
                          f"{1e6 * np.linalg.norm(shape.displacement[:3]):.1f} µm (drawn × {shape.factor:g})")  # fmt: skip
-        legend_below(figure, ax.get_legend_handles_labels()[0])
+        legend_below(figure)
     return figure
 
 
@@ -127,14 +128,21 @@ def draw_loaded(
     finish(ax, view)
 
 
-def draw_budget(ax: Any, budget: DeflectionBudget) -> None:
-    """A bar per element, in the direction in which the tool moves."""
-    size = 1e6 * float(np.linalg.norm(budget.displacement[:3]))
+def budget_rows(budget: DeflectionBudget) -> list[tuple[str, float, float]]:
+    """Element, its part (µm) of the tool's deflection along that, and its share, the largest first; what is not worth a
+    row is one at the end."""
+    size = UM * float(np.linalg.norm(budget.displacement[:3]))
     ranked = [(n, size * s, s) for n, _, s in budget.ranked()]
     shown = min(MOST_BARS, sum(abs(s) > FAINT for _, _, s in ranked))
+    if len(ranked) <= shown + 1:
+        return ranked
     rest = sum(s for _, _, s in ranked[shown:])
-    if len(ranked) > shown + 1:
-        ranked = [*ranked[:shown], (f"{len(ranked) - shown} others", size * rest, rest)]
+    return [*ranked[:shown], (f"{len(ranked) - shown} others", size * rest, rest)]
+
+
+def draw_budget(ax: Any, budget: DeflectionBudget) -> None:
+    """A bar per element, in the direction in which the tool moves."""
+    ranked = budget_rows(budget)
     at = np.arange(len(ranked))
     values = [v for _, v, _ in ranked]
     ax.barh(at, values, color=[BLUE if v >= 0 else ORANGE for v in values])

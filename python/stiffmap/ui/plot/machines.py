@@ -37,5 +37,5 @@ def machine_figure(
             draw_box(ax, *machine.workspace)
         finish(ax, view)
         ax.set_title(f"{machine.name} at {place_text(p)}", fontsize=10)
-        legend_below(figure, ax.get_legend_handles_labels()[0], most=4)
+        legend_below(figure, most=4)
     return figure

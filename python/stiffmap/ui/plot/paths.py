@@ -50,7 +50,7 @@ def path_figure(path: xr.Dataset) -> Figure:
         ax.axhline(0, color="0.7", lw=0.6, zorder=0)
         ax.set(xlabel="displacement along the force, mm", ylabel="force, N")
         ax.set_title(f"{path.attrs['machine']}, {position_text(path)}")
-        legend_below(figure, ax.get_legend_handles_labels()[0], most=2)
+        legend_below(figure, most=2)
     return figure
 
 
@@ -97,7 +97,7 @@ def mode_figure(
             f"{float(path.critical_force[index]):.4g} N\nmode enlarged: "
             + (f"leg {leg}, " if leg else "") + f"most in {joint}", fontsize=9,
         )  # fmt: skip
-        legend_below(figure, ax.get_legend_handles_labels()[0], most=4)
+        legend_below(figure, most=4)
     return figure
 
 

@@ -41,7 +41,7 @@ def polar_figure(
         machine = many[0].attrs["machine"]
         unit = length_unit(max(float(np.nanmax(p[variable].values, initial=0.0)) for p in many))[0]
         headline(figure, f"{machine}: deflection, {unit}, under {force_text(many[0])}")
-        legend_below(figure, ax.get_legend_handles_labels()[0])
+        legend_below(figure)
     return figure
 
 

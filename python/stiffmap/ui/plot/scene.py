@@ -51,9 +51,9 @@ def draw_body(ax: Any, shape: Skeleton) -> None:
     corners, tool = on(ax, shape.plate).T, shape.links[-1]
     look: dict[str, Any] = {"facecolor": "0.55", "edgecolor": "0.25", "label": "platform"}
     if dimensions(ax) == 2:
-        ax.add_patch(Polygon(corners, alpha=0.5, zorder=1, **look))
+        ax.add_patch(Polygon(corners, **look, alpha=0.5, zorder=1))
     else:
-        ax.add_collection3d(Poly3DCollection([corners], alpha=0.45, **look))
+        ax.add_collection3d(Poly3DCollection([corners], **look, alpha=0.45))
     if np.linalg.norm(tool[1] - tool[0]) > 1e-6:
         ax.plot(*on(ax, tool), color=BLACK, lw=1.2, zorder=1)
 

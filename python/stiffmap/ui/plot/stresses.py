@@ -11,8 +11,6 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.internal_wrenches import InternalWrenches
 from stiffmap.ui.plot.style import BLUE, CYCLE, VERMILLION, headline, legend_below, new_figure, paper_style
 
-DIRECTIONS = ("fx", "fy", "fz", "mx", "my", "mz")
-
 
 def stress_figure(stress: InternalWrenches, title: str = "") -> Figure:
     """Forces (N, left) and moments (N·m, right) of every link spring at one pose, in the spring's axes."""
@@ -34,5 +32,5 @@ def stress_figure(stress: InternalWrenches, title: str = "") -> Figure:
             ax.set(xlim=(-reach, reach), xlabel=unit, yticks=rows, yticklabels=names)
         axes[0].invert_yaxis()
         headline(figure, title or "internal wrenches, spring axes")
-        legend_below(figure, axes[0].get_legend_handles_labels()[0])
+        legend_below(figure)
     return figure

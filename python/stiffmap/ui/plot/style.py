@@ -17,7 +17,8 @@ from matplotlib.figure import Figure
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.outputs import write_picture
 
-MM = 1e3
+MM, UM = 1e3, 1e6
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 # Okabe and Ito's palette: eight colours that the common colour blindnesses keep apart.
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION, BLACK = (
     "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000",
@@ -26,6 +27,8 @@ CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 TOLERANCE = VERMILLION
 COLOURS = "cividis"
+BEFORE, AFTER = "#c1432e", "#2a6f97"
+"""What the machine of the file leaves of readings, and a corrected one."""
 
 SETTINGS: dict[str, Any] = {
     "font.size": 9,
@@ -81,8 +84,10 @@ def headline(figure: Figure, text: str, size: float = 10) -> None:
         artist.set_text("\n".join(fill(line, columns) for line in text.splitlines()))
 
 
-def legend_below(figure: Figure, handles: Sequence[Any], most: int = 7) -> None:
-    """Legend under the picture, in as many columns as its width allows."""
+def legend_below(figure: Figure, handles: Sequence[Any] | None = None, most: int = 7) -> None:
+    """Legend under the picture (None: of all its axes), in as many columns as its width allows."""
+    if handles is None:
+        handles = [h for ax in figure.axes for h in ax.get_legend_handles_labels()[0]]
     entries = {str(h.get_label()): h for h in handles}
     renderer = _renderer(figure)
     for columns in range(min(len(entries), most), 0, -1):
@@ -100,6 +105,12 @@ def length_unit(largest: float) -> tuple[str, float]:
 def place_text(position: Floats) -> str:
     """A position (3,) m in mm."""
     return f"({', '.join(f'{MM * v:g}' for v in position)}) mm"
+
+
+def wrench_text(wrench: Floats) -> str:
+    """What of a wrench (6,) is not zero, for example ``fx = 100 N``."""
+    parts = [f"{n} = {v:g} {'N' if n[0] == 'f' else 'N·m'}" for n, v in zip(WRENCH, wrench, strict=True) if v]
+    return ", ".join(parts) or "no wrench"
 
 
 def leg_colours(legs: Sequence[str]) -> dict[str, str]:

@@ -46,7 +46,7 @@ def sweep_figure(
         axes[0].set_ylabel(f"{in_words(variable)}, mm")
         machine = next(iter(many[0].values())).attrs["machine"]
         headline(figure, f"{machine}: deflection against force")
-        legend_below(figure, [h for ax in axes for h in ax.get_legend_handles_labels()[0]])
+        legend_below(figure)
     return figure
 
 

@@ -54,7 +54,7 @@ def lobes_figure(
         ax.set_xlabel("speed of the spindle, rpm")
         ax.set_ylabel("depth along the tool, mm")
         headline(figure, f"{title}\ndamping {lobes.attrs['damping']}")
-        legend_below(figure, ax.get_legend_handles_labels()[0])
+        legend_below(figure)
     return figure
 
 
@@ -78,5 +78,5 @@ def response_figure(responses: Mapping[str, xr.DataArray], axes: str = "xyz") ->
         panels[0].set_ylabel("receptance, µm/N")
         headline(figure, "Frequency response at the tool")
         if len(responses) > 1:
-            legend_below(figure, panels[0].get_legend_handles_labels()[0])
+            legend_below(figure)
     return figure

@@ -6,7 +6,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import box_of, moves, orientation
+from stiffmap.ui.view.place import box_of, moves, solved
 from stiffmap.ui.view.quantities import QUANTITIES, Load
 
 NODES = 15
@@ -25,12 +25,5 @@ def box_cloud(moment: Moment) -> tuple[Floats, Floats]:
         for i, free in enumerate(moves(m))
     ]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    solution = m.solve(
-        points,
-        s.wrench,
-        rotation=orientation(s),
-        gravity=s.gravity,
-        start=s.start_array,
-        stiffness=quantity.stiffness,
-    )
+    solution = solved(m, s, points, stiffness=quantity.stiffness)
     return points, quantity.of(solution, Load(np.array(s.force), s.tolerance)) * quantity.factor

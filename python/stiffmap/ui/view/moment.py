@@ -15,7 +15,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.loaded import SHOWN, round_factor
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
-from stiffmap.ui.view.place import box_of, orientation
+from stiffmap.ui.view.place import box_of, orientation, solved
 from stiffmap.ui.view.plane import FINE, PlaneMap, plane_map
 from stiffmap.ui.view.state import State
 
@@ -32,10 +32,7 @@ class Moment:
 
     def solve(self) -> Solution:
         """The tool's pose under the load."""
-        s = self.state
-        return self.machine.solve(
-            s.position, s.wrench, rotation=orientation(s), gravity=s.gravity, start=s.start_array, threads=1
-        )
+        return solved(self.machine, self.state, threads=1)
 
     def plane(self, count: int = FINE) -> PlaneMap:
         """The plane through the tool."""

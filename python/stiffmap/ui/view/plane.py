@@ -13,7 +13,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.view.dynamics import dynamic_stiffness, lowest_frequency
-from stiffmap.ui.view.place import drawn_box, orientation
+from stiffmap.ui.view.place import drawn_box, solved
 from stiffmap.ui.view.quantities import QUANTITIES, Load, Mask
 from stiffmap.ui.view.state import State
 
@@ -138,10 +138,7 @@ def plane_map(machine: Machine, state: State, count: int = FINE, *, threads: int
         make = lowest_frequency if state.quantity == "frequency" else dynamic_stiffness
         values, status = make(machine, state, p, threads)
     else:
-        s = machine.solve(
-            p, state.wrench, rotation=orientation(state), gravity=state.gravity,
-            start=state.start_array, stiffness=quantity.stiffness, threads=threads,
-        )  # fmt: skip
+        s = solved(machine, state, p, stiffness=quantity.stiffness, threads=threads)
         values = quantity.of(s, Load(np.array(state.force), state.tolerance))
         status = np.asarray(s.status, dtype=float)
     values = np.where(outside, np.nan, values)

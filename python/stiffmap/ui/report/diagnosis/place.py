@@ -15,6 +15,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.elements import nodes_of
 from stiffmap.ui.plot.scene import draw_skeleton, finish, marks, on, scene_axes
 from stiffmap.ui.plot.skeleton import COINCIDENT, owners, skeleton
+from stiffmap.ui.plot.style import new_figure
 
 LIT, GREY = "#d62728", "0.65"
 
@@ -23,7 +24,7 @@ def place_figure(d: Findings) -> Figure:
     """The declared machine at home in grey; legs of the named effects dark, their elements red."""
     machine = d.declared
     k = inverse_kinematics(machine, machine.description.home.p)
-    figure = Figure(figsize=(4.6, 3.4), layout="constrained")
+    figure = new_figure(4.6, 3.4)
     if int(k.status) != Status.CONVERGED:
         return figure
     shape = skeleton(machine, k.coordinates)
