@@ -11,7 +11,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.pictures.workspace import INSIDE, name_axes, paint, patches, planes_of, section
-from stiffmap.ui.plot.style import BLACK, BLUE, MM, headline, legend_below, new_figure, paper_style
+from stiffmap.ui.plot.style import BLACK, BLUE, MM, headline, legend_below, paper
 from stiffmap.workspace.performance.box.box import LargestBox
 from stiffmap.workspace.performance.box.cell import BOX
 from stiffmap.workspace.performance.box.inside import REACH
@@ -38,8 +38,7 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = NODES) -> Figure:
     declared = np.allclose(box.orientation, np.eye(3))
     marks = "xyz" if declared else ("x′", "y′", "z′")
     seen = dict(INSIDE)
-    with paper_style():
-        figure = new_figure(max(3.1 * len(planes) + 0.4, 4.4), 4.1)
+    with paper(max(3.1 * len(planes) + 0.4, 4.4), 4.1, most=0) as figure:
         for axes, (a, b) in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
             middle, reach = (low + high) / 2, AROUND * (high - low)
             u, v = (np.linspace(middle[i] - reach[i], middle[i] + reach[i], nodes) for i in (a, b))

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from stiffmap.ui.plot.style import CYCLE, DASHES, headline, legend_below, new_figure, paper_style
+from stiffmap.ui.plot.style import CYCLE, DASHES, headline, paper
 
 PANELS = (("effort", "effort", "effort_margin", "peak_effort"), ("rate", "speed", "speed_margin", "peak_speed"),
           ("power", "power, W", None, None))  # fmt: skip
@@ -16,8 +16,7 @@ def efforts_figure(found: xr.Dataset) -> Figure:
     """Three panels over time, one line per drive; limits as thin lines of the same colour (of `drive_efforts`)."""
     drives = [str(d) for d in found.drive.values]
     turns = found.attrs.get("revolute", [0] * len(drives))
-    with paper_style():
-        figure = new_figure(6.4, 6.0)
+    with paper(6.4, 6.0) as figure:
         panels = figure.subplots(3, 1, sharex=True)
         within = False
         for axes, (name, label, margin, peak) in zip(panels, PANELS, strict=True):
@@ -39,7 +38,6 @@ def efforts_figure(found: xr.Dataset) -> Figure:
             axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
             axes.set_ylabel(label if margin is None else f"{label}, {_unit(turns, name == 'effort')}")
         panels[-1].set_xlabel("time, s")
-        legend_below(figure)
         limits_told = "thin lines: declared limits" if within else "declared limits are far off"
         headline(figure, f"{found.attrs['machine']}: drives along the motion ({limits_told})")
     return figure

@@ -107,6 +107,7 @@ def _arrows(ax: Any, at: Floats, arrow: Floats, view: tuple[int, int], colour: s
     ax.plot(at[:, a], at[:, b], ".", ms=3, color="0.4")
     ax.update_datalim((at + arrow)[:, [a, b]])  # autoscaling sees the tails of arrows only
     ax.margins(0.1)
+    ax.tick_params(labelbottom=True, labelleft=True)  # also where axes are shared
     ax.set(xlabel=f"{'xyz'[a]}, mm", ylabel=f"{'xyz'[b]}, mm", aspect="equal")
 
 

@@ -14,20 +14,7 @@ from stiffmap.machining.milling.job import Milled
 from stiffmap.ui.plot.loaded import round_factor
 from stiffmap.ui.plot.scene import draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import standing
-from stiffmap.ui.plot.style import (
-    BLACK,
-    BLUE,
-    COLOURS,
-    GREEN,
-    MM,
-    TOLERANCE,
-    headline,
-    leg_colours,
-    legend_below,
-    length_unit,
-    new_figure,
-    paper_style,
-)  # fmt: skip
+from stiffmap.ui.plot.style import BLACK, BLUE, COLOURS, GREEN, MM, TOLERANCE, leg_colours, length_unit, paper
 
 SHARE = 0.08
 """Of the outline's size, that the largest error takes as it is drawn."""
@@ -43,8 +30,7 @@ def outline_figure(found: Milled) -> Figure:
     size = float(np.ptp(wall[:, :2], axis=0).max())
     factor = max(round_factor(SHARE * size, float(np.nanmax(np.abs(before), initial=0.0))), 1.0)
     unit, scale = length_unit(float(np.nanmax(np.abs(before), initial=0.0)))
-    with paper_style():
-        figure = new_figure(6.4, 4.8)
+    with paper(6.4, 4.8, f"Wall of the part; errors drawn {factor:g} times larger") as figure:
         ax: Any = figure.subplots()
         ax.plot(*(MM * wall[:, :2].T), color=BLACK, lw=1.0, label="wanted")
         cut = MM * (wall + factor * before[:, None] * off)[:, :2]
@@ -62,8 +48,6 @@ def outline_figure(found: Milled) -> Figure:
         ax.set_aspect("equal")
         ax.autoscale_view()
         ax.set(xlabel="x of the part, mm", ylabel="y of the part, mm")
-        headline(figure, f"Wall of the part; errors drawn {factor:g} times larger")
-        legend_below(figure)
     return figure
 
 
@@ -75,8 +59,7 @@ def error_figure(ds: xr.Dataset) -> Figure:
     """Errors across the wall over the way along the path; below, those of the compensated program in their own scale."""
     way = MM * ds.way.values
     unit, scale = length_unit(float(np.nanmax(np.abs(ds.error_normal.values), initial=0.0)))
-    with paper_style():
-        figure = new_figure(6.4, 5.0)
+    with paper(6.4, 5.0, f"{ds.attrs['machine']}, {ds.attrs['path']}, {ds.attrs['process']}") as figure:
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
         top.plot(way, scale * ds.error_normal, color=BLUE, label="as it is cut")
         top.plot(way, scale * ds.error_normal_after, color=GREEN, ls="--", label="compensated")
@@ -108,8 +91,6 @@ def error_figure(ds: xr.Dataset) -> Figure:
             )  # fmt: skip
         bottom.axhline(0, color="0.7", lw=0.6, zorder=0)
         bottom.set(xlabel="way along the path, mm", ylabel=f"compensated, {fine}")
-        headline(figure, f"{ds.attrs['machine']}, {ds.attrs['path']}, {ds.attrs['process']}")
-        legend_below(figure)
     return figure
 
 
@@ -118,12 +99,9 @@ def machine_path_figure(found: Milled) -> Figure:
     job, ds = found.job, found.dataset
     worst = int(np.nanargmax(np.abs(np.nan_to_num(ds.error_normal.values))))
     shape = standing(job.machine, job.position[worst], job.rotation[worst])
-    with paper_style():
-        figure = new_figure(5.6, 5.2)
+    with paper(5.6, 5.2, f"{job.machine.name}: the tool where the error is largest", most=4) as figure:
         ax: Any = scene_axes(figure, shape, None)
         draw_skeleton(ax, shape, leg_colours(job.machine.legs))
         ax.plot(*on(ax, job.position), color=BLACK, lw=1.6, label="path")
         finish(ax)
-        headline(figure, f"{job.machine.name}: the tool where the error is largest")
-        legend_below(figure, most=4)
     return figure

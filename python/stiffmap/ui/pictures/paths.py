@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.plot.style import BLACK, CYCLE, DASHES, MM, headline, legend_below, new_figure, paper_style
+from stiffmap.ui.plot.style import BLACK, CYCLE, DASHES, MM, headline, paper
 from stiffmap.workspace.performance.table import MeasuresTable, Row
 
 ALONG = ("path_compliance", "path_effort")
@@ -30,8 +30,7 @@ def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
     if not names:
         raise StiffmapError("no measure along a toolpath; asked for path_compliance, path_effort")
     one = len(tables) == 1
-    with paper_style():
-        figure = new_figure(6.4, 0.9 + 2.2 * len(names))
+    with paper(6.4, 0.9 + 2.2 * len(names)) as figure:
         panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
         for axes, name in zip(panels, names, strict=True):
             for i, (machine, table) in enumerate(tables.items()):
@@ -40,7 +39,6 @@ def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
                         _lines(axes, row, machine, i, one)
             axes.set_ylim(bottom=0)
         panels[-1].set_xlabel("way along the path, mm")
-        legend_below(figure)
         told = f"{next(iter(tables))}: along" if one else "Along"
         headline(figure, f"{told} the toolpath, with its force")
     return figure

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.style import BLACK, GREEN, MM, ORANGE, PURPLE, SKY, VERMILLION, new_figure, paper_style
+from stiffmap.ui.plot.style import BLACK, GREEN, MM, ORANGE, PURPLE, SKY, VERMILLION, paper
 from stiffmap.workspace.performance.box.inside import REACH
 from stiffmap.workspace.performance.box.workspace import Workspace
 
@@ -46,8 +46,7 @@ def workspace_figure(machine: Machine, found: Workspace, nodes: int = NODES) -> 
     middle = found.box.mean(axis=0)
     low, high = machine.workspace
     seen = dict(INSIDE)
-    with paper_style():
-        figure = new_figure(max(3.0 * len(planes) + 0.4, 4.0), 3.9)
+    with paper(max(3.0 * len(planes) + 0.4, 4.0), 3.9, most=0) as figure:
         for axes, (a, b) in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
             u, v = (np.linspace(float(found.region[0, i]), float(found.region[1, i]), nodes) for i in (a, b))
             judged = found.at(section(middle, a, b, u, v))

@@ -16,17 +16,7 @@ from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.ui.plot.scene import draw_force, draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton
-from stiffmap.ui.plot.style import (
-    BLUE,
-    ORANGE,
-    UM,
-    headline,
-    leg_colours,
-    legend_below,
-    new_figure,
-    paper_style,
-    place_text,
-)
+from stiffmap.ui.plot.style import BLUE, ORANGE, UM, headline, leg_colours, paper, place_text
 
 SHOWN = 0.08
 """Of the machine's extent, how far the tool moves in the picture."""
@@ -100,8 +90,7 @@ def loaded_figure(
     element in the tool's deflection."""
     shape = loaded_shape(machine, position, wrench, rotation=rotation, gravity=gravity)
     budget = deflection_budget(machine, position, wrench, rotation=rotation, gravity=gravity)
-    with paper_style():
-        figure = new_figure(10.4, 5.0)
+    with paper(10.4, 5.0) as figure:
         grid = figure.add_gridspec(1, 2, width_ratios=(1.3, 1.0))
         left, right = grid[0, 0], grid[0, 1]
         ax: Any = scene_axes(figure, shape.rest, view, left)
@@ -110,7 +99,6 @@ def loaded_figure(
         force = ", ".join(f"{v:g}" for v in budget.wrench[:3])
         headline(figure, f"{machine.name} at {place_text(budget.position)} under ({force}) N: the tool moves "
                          f"{1e6 * np.linalg.norm(shape.displacement[:3]):.1f} µm (drawn × {shape.factor:g})")  # fmt: skip
-        legend_below(figure)
     return figure
 
 

@@ -11,7 +11,7 @@ from stiffmap.common.broadcasting import real_array
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.ui.plot.scene import draw_box, draw_skeleton, finish, scene_axes
 from stiffmap.ui.plot.skeleton import standing
-from stiffmap.ui.plot.style import leg_colours, legend_below, new_figure, paper_style, place_text
+from stiffmap.ui.plot.style import leg_colours, paper, place_text
 
 
 @takes_machine
@@ -29,13 +29,11 @@ def machine_figure(
     """
     p = machine.description.home.p if position is None else real_array(position, "position")
     shape = standing(machine, p, rotation)
-    with paper_style():
-        figure = new_figure(5.6, 5.2)
+    with paper(5.6, 5.2, most=4) as figure:
         ax: Any = scene_axes(figure, shape, view)
         draw_skeleton(ax, shape, leg_colours(machine.legs))
         if machine.description.workspace is not None:
             draw_box(ax, *machine.workspace)
         finish(ax, view)
         ax.set_title(f"{machine.name} at {place_text(p)}", fontsize=10)
-        legend_below(figure, most=4)
     return figure

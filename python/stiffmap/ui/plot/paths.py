@@ -15,17 +15,7 @@ from stiffmap.solve.status import Status
 from stiffmap.ui.plot.polars import position_text
 from stiffmap.ui.plot.scene import draw_skeleton, finish, marks, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton
-from stiffmap.ui.plot.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    MM,
-    VERMILLION,
-    leg_colours,
-    legend_below,
-    new_figure,
-    paper_style,
-)
+from stiffmap.ui.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, leg_colours, paper
 
 MARKS = {"limit": "^", "bifurcation": "X"}
 HALO = "#f5c9b0"
@@ -37,8 +27,7 @@ def path_figure(path: xr.Dataset) -> Figure:
     crossing branch in another colour."""
     if not path.attrs.get("end"):
         raise StiffmapError("path: expected a sweep with a limit, got one of single forces")
-    with paper_style():
-        figure = new_figure(4.6, 3.4)
+    with paper(4.6, 3.4, most=2) as figure:
         ax: Any = figure.subplots()
         for number, colour, name in ((0, BLUE, ""), (1, GREEN, "crossing branch, ")):
             _draw_branch(ax, path.isel(step=path.branch.values == number), colour, name)
@@ -50,7 +39,6 @@ def path_figure(path: xr.Dataset) -> Figure:
         ax.axhline(0, color="0.7", lw=0.6, zorder=0)
         ax.set(xlabel="displacement along the force, mm", ylabel="force, N")
         ax.set_title(f"{path.attrs['machine']}, {position_text(path)}")
-        legend_below(figure, most=2)
     return figure
 
 
@@ -83,8 +71,7 @@ def mode_figure(
     at = path.critical_coordinates.values[index]
     moved = at + SHARE * machine.compiled.length * path.mode.values[index]
     leg, joint = str(path.mode_leg.values[index]), str(path.mode_joint.values[index])
-    with paper_style():
-        figure = new_figure(5.2, 4.8)
+    with paper(5.2, 4.8, most=4) as figure:
         shape = skeleton(machine, moved)
         ax: Any = scene_axes(figure, shape, view)
         for _, ends in skeleton(machine, at).bars:
@@ -97,7 +84,6 @@ def mode_figure(
             f"{float(path.critical_force[index]):.4g} N\nmode enlarged: "
             + (f"leg {leg}, " if leg else "") + f"most in {joint}", fontsize=9,
         )  # fmt: skip
-        legend_below(figure, most=4)
     return figure
 
 

@@ -85,7 +85,7 @@ def headline(figure: Figure, text: str, size: float = 10) -> None:
 
 
 def legend_below(figure: Figure, handles: Sequence[Any] | None = None, most: int = 7) -> None:
-    """Legend under the picture (None: of all its axes), in as many columns as its width allows."""
+    """Legend under the picture (None: of all its axes), in as many columns as its width and `most` allow."""
     if handles is None:
         handles = [h for ax in figure.axes for h in ax.get_legend_handles_labels()[0]]
     entries = {str(h.get_label()): h for h in handles}
@@ -95,6 +95,18 @@ def legend_below(figure: Figure, handles: Sequence[Any] | None = None, most: int
         if columns == 1 or legend.get_window_extent(renderer).width <= EDGE * figure.bbox.width:
             return
         legend.remove()
+
+
+@contextmanager
+def paper(width: float, height: float, title: str = "", *, most: int = 7) -> Iterator[Figure]:
+    """An empty figure (inches), drawn in the style of all pictures; at the end it gets its title, and a legend of what its axes
+    hold, in at most `most` columns (0: none)."""
+    with paper_style():
+        figure = new_figure(width, height)
+        yield figure
+        if title:
+            headline(figure, title)
+        legend_below(figure, most=most)
 
 
 def length_unit(largest: float) -> tuple[str, float]:

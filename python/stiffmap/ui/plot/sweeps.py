@@ -11,17 +11,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.polars import in_words, position_text
-from stiffmap.ui.plot.style import (
-    BLACK,
-    CYCLE,
-    DASHES,
-    MM,
-    headline,
-    legend_below,
-    new_figure,
-    panel,
-    paper_style,
-)
+from stiffmap.ui.plot.style import BLACK, CYCLE, DASHES, MM, headline, panel, paper
 
 
 def sweep_figure(
@@ -35,8 +25,7 @@ def sweep_figure(
     Unstable equilibria are drawn as open circles; failed ones leave a gap and a cross on the axis.
     """
     many = [panels] if isinstance(panels, Mapping) else list(panels)
-    with paper_style():
-        figure = new_figure(max(2.3 * len(many) + 0.6, 4.0), 3.1)
+    with paper(max(2.3 * len(many) + 0.6, 4.0), 3.1) as figure:
         axes = figure.subplots(1, len(many), squeeze=False)[0]
         for i, (ax, lines) in enumerate(zip(axes, many, strict=True)):
             draw_sweeps(ax, lines, variable, tolerance)
@@ -46,7 +35,6 @@ def sweep_figure(
         axes[0].set_ylabel(f"{in_words(variable)}, mm")
         machine = next(iter(many[0].values())).attrs["machine"]
         headline(figure, f"{machine}: deflection against force")
-        legend_below(figure)
     return figure
 
 

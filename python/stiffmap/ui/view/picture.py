@@ -16,16 +16,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.plot import save
 from stiffmap.ui.plot.loaded import draw_budget
 from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
-from stiffmap.ui.plot.style import (
-    COLOURS,
-    MM,
-    ORANGE,
-    TOLERANCE,
-    headline,
-    leg_colours,
-    new_figure,
-    paper_style,
-)
+from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
 from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.isolines import isolines, tolerance_lines
 from stiffmap.ui.view.moment import Moment
@@ -45,8 +36,7 @@ def view_figure(moment: Moment) -> Figure:
     """Machine, deflected ghost, plane with isolines, and where the deflection comes from."""
     solution, rest, found = moment.solve(), moment.rest(), moment.plane(SHOWN)
     q, limits, s = QUANTITIES[moment.state.quantity], found.range, moment.state
-    with paper_style():
-        figure = new_figure(9.6, 5.2)
+    with paper(9.6, 5.2, most=0) as figure:
         ax: Any = figure.add_subplot(1, 2, 1, projection="3d")
         draw_box(ax, *moment.box())
         _plane(ax, found, limits)

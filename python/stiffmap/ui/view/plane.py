@@ -123,23 +123,28 @@ class PlaneMap:
         return float(look((b, a)))
 
 
+def values_at(
+    machine: Machine, state: State, position: Floats, threads: int | None = None
+) -> tuple[Floats, Floats]:
+    """(...) of the state's quantity with the tool at (..., 3) m, SI, and statuses."""
+    quantity = QUANTITIES[state.quantity]
+    if quantity.of is None:
+        make = lowest_frequency if state.quantity == "frequency" else dynamic_stiffness
+        return make(machine, state, position, threads)
+    s = solved(machine, state, position, stiffness=quantity.stiffness, threads=threads)
+    return quantity.of(s, Load(np.array(state.force), state.tolerance)), np.asarray(s.status, dtype=float)
+
+
 def plane_map(machine: Machine, state: State, count: int = FINE, *, threads: int | None = None) -> PlaneMap:
     """Solve the poses of the plane; outside the box they are solved as well and hidden."""
     begun = time.perf_counter()
     frame = plane_frame(machine, state)
-    quantity = QUANTITIES[state.quantity]
-    if quantity.of is None:
+    if QUANTITIES[state.quantity].of is None:
         count = min(count, DEAR)
     p = frame.poses(count)
     low, high = drawn_box(machine)
     slack = INSIDE * (high - low)
     outside = np.asarray(((p < low - slack) | (p > high + slack)).any(axis=-1))
-    if quantity.of is None:
-        make = lowest_frequency if state.quantity == "frequency" else dynamic_stiffness
-        values, status = make(machine, state, p, threads)
-    else:
-        s = solved(machine, state, p, stiffness=quantity.stiffness, threads=threads)
-        values = quantity.of(s, Load(np.array(state.force), state.tolerance))
-        status = np.asarray(s.status, dtype=float)
+    values, status = values_at(machine, state, p, threads)
     values = np.where(outside, np.nan, values)
     return PlaneMap(frame, state.quantity, values, status, outside, time.perf_counter() - begun)
