@@ -22,7 +22,7 @@ def ellipse_figure(
         axes = figure.subplots(1, len(many), squeeze=False)[0]
         for i, (ax, pol) in enumerate(zip(axes, many, strict=True)):
             draw_ellipse(ax, pol, plane, tolerance)
-            ax.set_title((panel(i) + " " if len(many) > 1 else "") + position_text(pol))
+            ax.set_title(f"{panel(i, len(many))} {position_text(pol)}".strip())
         machine = many[0].attrs["machine"]
         headline(figure, f"{machine}: displacement under {force_text(many[0])}")
     return figure

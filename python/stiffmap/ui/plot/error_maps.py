@@ -103,9 +103,7 @@ def _panels(
             draw_isolines(ax, plane, how, unit[1], own)
         if directions:
             draw_directions(ax, ds, variable, how, i, entries)
-        ax.set_title(
-            f"{panel(i) + ' ' if len(axes) > 1 else ''}{how.title(i)}" + shares(plane.values, tolerance)
-        )
+        ax.set_title(f"{panel(i, len(axes))} {how.title(i)}{shares(plane.values, tolerance)}".strip())
         if not common_scale:
             figure.colorbar(mesh, ax=ax, label=colour_label(values, unit[0]), shrink=0.85)
     axes[0].set_ylabel(f"{how.up}, mm")

@@ -25,7 +25,7 @@ def polar_figure(
         for i, pol in enumerate(many):
             ax: Any = figure.add_subplot(1, len(many), i + 1, projection="polar")
             draw_polar(ax, pol, variable, tolerance, factor)
-            ax.set_title((panel(i) + " " if len(many) > 1 else "") + position_text(pol))
+            ax.set_title(f"{panel(i, len(many))} {position_text(pol)}".strip())
         machine = many[0].attrs["machine"]
         unit = length_unit(max(float(np.nanmax(p[variable].values, initial=0.0)) for p in many))[0]
         headline(figure, f"{machine}: deflection, {unit}, under {force_text(many[0])}")

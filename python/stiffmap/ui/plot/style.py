@@ -130,9 +130,14 @@ def leg_colours(legs: Sequence[str]) -> dict[str, str]:
     return {leg: CYCLE[i % len(CYCLE)] for i, leg in enumerate(legs)} | {"": BLACK}
 
 
-def panel(index: int) -> str:
-    """(a), (b), (c) …"""
-    return f"({chr(ord('a') + index)})"
+def line_look(index: int) -> dict[str, Any]:
+    """Colour and dashes of one of several lines."""
+    return {"color": CYCLE[index % len(CYCLE)], "ls": DASHES[index % len(DASHES)]}
+
+
+def panel(index: int, of: int = 2) -> str:
+    """(a), (b), (c) …; empty for the only one."""
+    return f"({chr(ord('a') + index)})" if of > 1 else ""
 
 
 def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> Path:

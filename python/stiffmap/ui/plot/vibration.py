@@ -8,10 +8,19 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from stiffmap.ui.plot.style import BLACK, BLUE, COLOURS, CYCLE, DASHES, MM, VERMILLION, legend_below, paper
+from stiffmap.ui.plot.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    MM,
+    UM,
+    VERMILLION,
+    legend_below,
+    line_look,
+    paper,
+)
 
 RPM = 60 / (2 * np.pi)
-MICRO = 1e6
 
 
 def lobes_figure(
@@ -50,13 +59,7 @@ def response_figure(responses: Mapping[str, xr.DataArray], axes: str = "xyz") ->
         for ax, axis in zip(panels, axes, strict=True):
             for i, (label, H) in enumerate(responses.items()):
                 own = np.abs(H.sel(response=axis, force=f"f{axis}"))
-                ax.semilogy(
-                    H.frequency,
-                    MICRO * own,
-                    color=CYCLE[i % len(CYCLE)],
-                    ls=DASHES[i % len(DASHES)],
-                    label=label,
-                )
+                ax.semilogy(H.frequency, UM * own, label=label, **line_look(i))
             ax.set_title(f"along {axis}")
             ax.set_xlabel("frequency, Hz")
         panels[0].set_ylabel("receptance, µm/N")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.pictures.modes import swung
+from stiffmap.ui.plot.modes import swung
 from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.view.dynamics import modes_at
 from stiffmap.ui.view.moment import Moment

@@ -13,7 +13,7 @@ from stiffmap.experiment.experiment import WRENCH, Floats
 from stiffmap.identification.diagnosis.report.findings import Findings
 from stiffmap.identification.diagnosis.report.wording import noise_size
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.pictures.experiment import kept, pose_means
+from stiffmap.ui.plot.experiment import kept, pose_means
 from stiffmap.ui.plot.loaded import loaded_figure
 from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 from stiffmap.ui.report.diagnosis.place import place_figure

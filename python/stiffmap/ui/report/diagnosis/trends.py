@@ -8,7 +8,7 @@ from scipy.stats import f as f_distribution
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.identification.diagnosis.report.findings import Findings
-from stiffmap.ui.pictures.experiment import kept
+from stiffmap.ui.plot.experiment import kept
 from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 
 Driver = tuple[str, Floats]

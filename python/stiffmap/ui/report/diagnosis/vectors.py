@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.diagnosis.report.findings import Findings
-from stiffmap.ui.pictures.experiment import arrow_figure, kept, pose_means, vector_cases
+from stiffmap.ui.plot.experiment import arrow_figure, kept, pose_means, vector_cases
 from stiffmap.ui.plot.style import AFTER, BEFORE, UM
 
 

@@ -10,8 +10,8 @@ from matplotlib.patches import Patch, Rectangle
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.pictures.workspace import INSIDE, name_axes, paint, patches, planes_of, section
 from stiffmap.ui.plot.style import BLACK, BLUE, MM, headline, legend_below, paper
+from stiffmap.ui.plot.workspace import INSIDE, name_axes, paint, patches, planes_of, section
 from stiffmap.workspace.performance.box.box import LargestBox
 from stiffmap.workspace.performance.box.cell import BOX
 from stiffmap.workspace.performance.box.inside import REACH

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from stiffmap.ui.plot.style import CYCLE, DASHES, headline, paper
+from stiffmap.ui.plot.style import CYCLE, headline, line_look, paper
 
 PANELS = (("effort", "effort", "effort_margin", "peak_effort"), ("rate", "speed", "speed_margin", "peak_speed"),
           ("power", "power, W", None, None))  # fmt: skip
@@ -23,8 +23,7 @@ def efforts_figure(found: xr.Dataset) -> Figure:
             limits: dict[float, str] = {}
             for i, drive in enumerate(drives):
                 colour = CYCLE[i % len(CYCLE)]
-                style = DASHES[i % len(DASHES)]
-                axes.plot(found.time, found[name][:, i], color=colour, linestyle=style, label=drive)
+                axes.plot(found.time, found[name][:, i], label=drive, **line_look(i))
                 if margin is not None:
                     limits.setdefault(round(float(found[peak][i] + found[margin][i]), 9), colour)
             span = float(np.abs(found[name]).max())

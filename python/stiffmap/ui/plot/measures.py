@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.pictures.box import box_figure
-from stiffmap.ui.pictures.modes import mode_figure, mode_frames
-from stiffmap.ui.pictures.paths import ALONG, path_measures_figure, path_rows
-from stiffmap.ui.pictures.workspace import workspace_figure
+from stiffmap.ui.plot.along_paths import ALONG, path_measures_figure, path_rows
+from stiffmap.ui.plot.box import box_figure
+from stiffmap.ui.plot.modes import mode_figure, mode_frames
 from stiffmap.ui.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, headline, paper
+from stiffmap.ui.plot.workspace import workspace_figure
 from stiffmap.workspace.performance.box.box import LargestBox
 from stiffmap.workspace.performance.box.box_map import box_map, levels
 from stiffmap.workspace.performance.box.workspace import Workspace

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.plot.style import BLACK, CYCLE, DASHES, MM, headline, paper
+from stiffmap.ui.plot.style import BLACK, MM, headline, line_look, paper
 from stiffmap.workspace.performance.table import MeasuresTable, Row
 
 ALONG = ("path_compliance", "path_effort")
@@ -52,18 +52,10 @@ def _lines(axes: Axes, row: Row, machine: str, number: int, one: bool) -> None:
     share = row.found.extra.get("share")
     if one and isinstance(share, np.ndarray):
         for j, drive in enumerate(row.found.extra["drives"]):  # type: ignore[arg-type, var-annotated]
-            axes.plot(
-                way,
-                share[:, j],
-                color=CYCLE[j % len(CYCLE)],
-                linestyle=DASHES[j % len(DASHES)],
-                label=str(drive),
-            )
+            axes.plot(way, share[:, j], label=str(drive), **line_look(j))
     else:
-        colour, dash = BLACK if one else CYCLE[number % len(CYCLE)], DASHES[number % len(DASHES)]
-        axes.plot(
-            way, row.measure.factor * values, color=colour, linestyle=dash, label="" if one else machine
-        )
+        look = line_look(number) | ({"color": BLACK, "label": ""} if one else {"label": machine})
+        axes.plot(way, row.measure.factor * values, **look)
     unit = "share of the declared effort" if share is not None else f"compliance, {row.measure.shown}"
     axes.set_ylabel(unit)
     limit = None if row.bound is None else row.bound.at_most
