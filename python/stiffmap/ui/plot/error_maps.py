@@ -9,24 +9,13 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.plot.failed import hatch_failed
 from stiffmap.ui.plot.isolines import draw_isolines, draw_tolerance, halo
 from stiffmap.ui.plot.map_lines import draw_line
 from stiffmap.ui.plot.planes import Planes, on_grid, planes
-from stiffmap.ui.plot.style import (
-    COLOURS,
-    MM,
-    headline,
-    legend_below,
-    length_unit,
-    new_figure,
-    panel,
-    paper_style,
-    wrench_text,
-)
+from stiffmap.ui.plot.style import COLOURS, MM, length_unit, panel, paper, wrench_text
 
 TITLES = {
     "worst_deflection": "worst direction of the force",
@@ -66,18 +55,19 @@ def map_figure(
     values = pick(ds, variable, case)
     how = planes(values)
     unit, factor = length_unit(limits[1] if limits else float(np.nanmax(values.values, initial=0.0)))
-    with paper_style():
+    count = len(how.values)
+    width = 5.2 if how.is_line else max((2.35 if common_scale else 2.9) * count + 0.9, 4.6)
+    with paper(width, 3.4, title(ds, variable, case)) as figure:
         if how.is_line:
-            figure = new_figure(5.2, 3.4)
             draw_line(figure, ds, values, how, (unit, factor), tolerance)
         else:
-            figure = _panels(ds, values, how, (unit, factor), tolerance, limits, common_scale,
-                             variable, case, directions, isolines)  # fmt: skip
-        headline(figure, title(ds, variable, case))
+            _panels(figure, ds, values, how, (unit, factor), tolerance, limits, common_scale,
+                    variable, case, directions, isolines)  # fmt: skip
     return figure
 
 
 def _panels(
+    figure: Figure,
     ds: xr.Dataset,
     values: xr.DataArray,
     how: Planes,
@@ -89,29 +79,23 @@ def _panels(
     case: str | None,
     directions: bool,
     isolines: bool,
-) -> Figure:
-    count = len(how.values)
-    figure = new_figure(max((2.35 if common_scale else 2.9) * count + 0.9, 4.6), 3.4)
-    axes = figure.subplots(1, count, squeeze=False, sharey=True)[0]
+) -> None:
+    axes = figure.subplots(1, len(how.values), squeeze=False, sharey=True)[0]
     norm = Normalize(unit[1] * limits[0], unit[1] * limits[1]) if limits else colour_range(values, unit[1])
-    entries: dict[str, Any] = {}
     for i, ax in enumerate(axes):
         plane = values.isel({how.across: i}).transpose(how.up, how.right)
         own = norm if common_scale or limits else colour_range(plane, unit[1])
-        mesh = draw_plane(ax, ds, plane, how, variable, case, own, tolerance, unit, entries)
+        mesh = draw_plane(ax, ds, plane, how, variable, case, own, tolerance, unit)
         if isolines:
             draw_isolines(ax, plane, how, unit[1], own)
         if directions:
-            draw_directions(ax, ds, variable, how, i, entries)
+            draw_directions(ax, ds, variable, how, i)
         ax.set_title(f"{panel(i, len(axes))} {how.title(i)}{shares(plane.values, tolerance)}".strip())
         if not common_scale:
             figure.colorbar(mesh, ax=ax, label=colour_label(values, unit[0]), shrink=0.85)
     axes[0].set_ylabel(f"{how.up}, mm")
     if common_scale:
         figure.colorbar(mesh, ax=list(axes), label=colour_label(values, unit[0]), shrink=0.85)
-    if entries:
-        legend_below(figure, list(entries.values()))
-    return figure
 
 
 def default_variable(ds: xr.Dataset) -> str:
@@ -187,15 +171,13 @@ def draw_plane(
     norm: Normalize,
     tolerance: float | None,
     unit: tuple[str, float],
-    entries: dict[str, Any],
 ) -> Any:
-    """One plane: colours, tolerance, hatched failures; adds to the legend's entries."""
+    """One plane: colours, tolerance, hatched failures."""
     x, y, v = MM * plane[how.right].values, MM * plane[how.up].values, unit[1] * plane.values
     mesh = ax.pcolormesh(x, y, v, shading="nearest", cmap=COLOURS, norm=norm, rasterized=True)
-    for entry in hatch_failed(ax, x, y, v, status_of(ds, plane, how, variable, case)):
-        entries[str(entry.get_label())] = entry
+    hatch_failed(ax, x, y, v, status_of(ds, plane, how, variable, case))
     if tolerance is not None:
-        entries |= draw_tolerance(ax, x, y, v, unit[1] * tolerance, f"{MM * tolerance:g} mm")
+        draw_tolerance(ax, x, y, v, unit[1] * tolerance, f"{MM * tolerance:g} mm")
     ax.set_aspect("equal")
     ax.set_xlabel(f"{how.right}, mm")
     return mesh
@@ -242,9 +224,7 @@ def load_text(ds: xr.Dataset, case: str | None) -> str:
 LINE: dict[str, Any] = {"pivot": "mid", "headwidth": 0, "headlength": 0, "headaxislength": 0, "width": 0.005}
 
 
-def draw_directions(
-    ax: Axes, ds: xr.Dataset, variable: str, how: Planes, index: int, entries: dict[str, Any]
-) -> None:
+def draw_directions(ax: Axes, ds: xr.Dataset, variable: str, how: Planes, index: int) -> None:
     """Lines along the force, as they are seen in the panel's plane; shorter where the force leaves it."""
     name = variable.replace("_deflection", "_direction")
     if name == variable or name not in ds:
@@ -256,9 +236,7 @@ def draw_directions(
     u, v = (parts.get(a, np.zeros(angle.shape)) for a in (how.right, how.up))
     x, y = np.meshgrid(MM * angle[how.right], MM * angle[how.up])
     ax.quiver(x, y, u, v, color="white", scale=18, **LINE).set_path_effects(halo(1.8, "#444444"))
-    entries["direction"] = Line2D(
-        [], [], color="white", label="direction of the force", path_effects=halo(2.5, "#444444")
-    )
+    ax.plot([], [], color="white", label="direction of the force", path_effects=halo(2.5, "#444444"))
 
 
 def _spread(count: int, most: int = 9) -> Any:
