@@ -116,8 +116,8 @@ def exceeded(found: xr.Dataset) -> np.ndarray:
 
 def write(found: xr.Dataset, output: Path) -> list[str]:
     """Data and picture."""
-    from stiffmap.ui.pictures.efforts import efforts_figure
     from stiffmap.ui.plot import save
+    from stiffmap.ui.plot.efforts import efforts_figure
     from stiffmap.workspace.maps.files import write_dataset
 
     data = write_dataset(found, output / "efforts.nc")

@@ -174,7 +174,7 @@ def _finish(
     if out is not None:
         save_link(file, out)
     if picture is not None:
-        from stiffmap.ui.pictures.link import draw_link, draw_part_link
+        from stiffmap.ui.plot.link import draw_link, draw_part_link
 
         draw_link(link, picture) if part is None else draw_part_link(part, picture)
     if as_json:

@@ -17,7 +17,7 @@ from stiffmap.solve.kinematics import must_take
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli.inputs import MM, finish, force_given
 from stiffmap.ui.cli.output import print_json
-from stiffmap.ui.plot.style import BLACK, CYCLE, headline, legend_below, new_figure, paper_style
+from stiffmap.ui.plot.style import BLACK, CYCLE, paper
 
 
 def map_toolpath(
@@ -97,8 +97,7 @@ def _table(ds: xr.Dataset, path: Path) -> Path:
 
 def toolpath_figure(ds: xr.Dataset, name: str) -> Figure:
     """Deflection and its components over the way."""
-    with paper_style():
-        figure = new_figure(6.4, 3.4)
+    with paper(6.4, 3.4, f"{name}: deflection along the toolpath") as figure:
         ax: Any = figure.subplots()
         way = ds.way.values / MM
         ax.plot(way, 1e6 * ds.deflection.values, color=BLACK, lw=1.6, label="|d|")
@@ -107,6 +106,4 @@ def toolpath_figure(ds: xr.Dataset, name: str) -> Figure:
                 ax.plot(way, 1e6 * ds.displacement.values[:, i], color=CYCLE[i], lw=1.0, label=f"d{axis}")
         ax.set(xlabel="way along the path, mm", ylabel="deflection, µm")
         ax.grid(color="0.9", lw=0.5)
-        headline(figure, f"{name}: deflection along the toolpath")
-        legend_below(figure, ax.get_legend_handles_labels()[0])
     return figure

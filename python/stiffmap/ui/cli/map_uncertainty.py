@@ -83,9 +83,10 @@ def print_uncertainty(console: Console, data: dict[str, Any], plane: str) -> Non
 
 def draw_deviations(ds: xr.Dataset, output: Path, plane: str) -> list[Path]:
     """A picture of the worst direction's standard deviation and one per load case."""
-    from stiffmap.ui.plot import save
-    from stiffmap.ui.plot.deviations import deviation_figure
+    from stiffmap.ui.plot import map_figure, save
 
-    chosen: dict[str, dict[str, Any]] = {"worst": {"variable": f"worst_deflection_{plane}"}}
-    chosen |= {str(c): {"variable": f"deflection_{plane}", "case": str(c)} for c in ds.case.values}
-    return [save(deviation_figure(ds, **how), output / f"map-{n}-std.png") for n, how in chosen.items()]
+    chosen: dict[str, dict[str, Any]] = {"worst": {"variable": f"worst_deflection_{plane}_std"}}
+    chosen |= {str(c): {"variable": f"deflection_{plane}_std", "case": str(c)} for c in ds.case.values}
+    return [
+        save(map_figure(ds, **how, tolerance=None), output / f"map-{n}-std.png") for n, how in chosen.items()
+    ]

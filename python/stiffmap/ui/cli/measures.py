@@ -181,8 +181,8 @@ def write(table: MeasuresTable, output: Path) -> list[str]:
     """Table, maps and pictures."""
     import json
 
-    from stiffmap.ui.pictures.measures import measure_figures, moving_modes
     from stiffmap.ui.plot import save
+    from stiffmap.ui.plot.measures import measure_figures, moving_modes
     from stiffmap.ui.report.pictures import animation
 
     data = output / "measures.json"
@@ -202,7 +202,7 @@ def write(table: MeasuresTable, output: Path) -> list[str]:
 
 def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure | bytes]) -> Path:
     """The table as one page with its pictures."""
-    from stiffmap.ui.pictures.measures import caption
+    from stiffmap.ui.plot.measures import caption
     from stiffmap.ui.report.sheet import Sheet, write_sheet
     from stiffmap.workspace.maps.provenance import machine_digest
 

@@ -102,9 +102,9 @@ def optimize(
 
 def write(found: ParetoSet, place: Path, report: Report) -> list[str]:
     """The set and its pictures."""
-    from stiffmap.ui.pictures.design import beside_figure, front_figure, parallel_figure, progress_figure
-    from stiffmap.ui.pictures.paths import path_measures_figure
     from stiffmap.ui.plot import save
+    from stiffmap.ui.plot.along_paths import path_measures_figure
+    from stiffmap.ui.plot.design import beside_figure, front_figure, parallel_figure, progress_figure
     from stiffmap.workspace.maps.files import write_dataset
 
     data = write_dataset(found.dataset, place / "pareto.nc")

@@ -68,7 +68,7 @@ def _write(r: Residual, rows: int, output: Path) -> None:
     import json
 
     from stiffmap.experiment.comparison.table import write_table
-    from stiffmap.ui.pictures.experiment import figures
+    from stiffmap.ui.plot.experiment import figures
 
     place = make_folder(output)
     write_table(r, place / "residual.csv")

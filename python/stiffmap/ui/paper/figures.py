@@ -11,15 +11,16 @@ from stiffmap.ui.paper.results import FORCE, TOLERANCE, Results
 from stiffmap.ui.plot.ellipses import draw_ellipse
 from stiffmap.ui.plot.error_maps import map_figure
 from stiffmap.ui.plot.polars import draw_polar, position_text
-from stiffmap.ui.plot.style import MM, headline, legend_below, new_figure, panel, paper_style, save
+from stiffmap.ui.plot.style import MM, headline, panel, paper, save
 from stiffmap.ui.plot.sweeps import sweep_figure
 
 
 def figure_5(results: Results) -> Figure:
     """(a)-(d) size of the deflection against the force's direction; (e)-(h) ellipses of deflections."""
     many = list(results.polars.values())
-    with paper_style():
-        figure = new_figure(10.4, 5.7)
+    with paper(
+        10.4, 5.7, f"Figure 5. Deflection in the xy plane, mm, under a force of {FORCE:g} N"
+    ) as figure:
         for i, pol in enumerate(many):
             top: Any = figure.add_subplot(2, 4, i + 1, projection="polar")
             draw_polar(top, pol, "deflection_xy", TOLERANCE)
@@ -27,8 +28,6 @@ def figure_5(results: Results) -> Figure:
             bottom = figure.add_subplot(2, 4, i + 5)
             draw_ellipse(bottom, pol, "xy", TOLERANCE)
             bottom.set_title(panel(i + 4), loc="left")
-        headline(figure, f"Figure 5. Deflection in the xy plane, mm, under a force of {FORCE:g} N")
-        legend_below(figure, bottom.get_legend_handles_labels()[0])
     return figure
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stiffmap.ui.plot.polars import force_text, position_text
-from stiffmap.ui.plot.style import BLUE, MM, TOLERANCE, headline, legend_below, new_figure, panel, paper_style
+from stiffmap.ui.plot.style import BLUE, MM, TOLERANCE, headline, panel, paper
 
 
 def ellipse_figure(
@@ -18,15 +18,13 @@ def ellipse_figure(
 ) -> Figure:
     """Displacement of the TCP in the plane (mm) as the force turns; one panel per Dataset of `polar`."""
     many = [diagrams] if isinstance(diagrams, xr.Dataset) else list(diagrams)
-    with paper_style():
-        figure = new_figure(max(2.5 * len(many) + 0.4, 4.0), 3.2)
+    with paper(max(2.5 * len(many) + 0.4, 4.0), 3.2) as figure:
         axes = figure.subplots(1, len(many), squeeze=False)[0]
         for i, (ax, pol) in enumerate(zip(axes, many, strict=True)):
             draw_ellipse(ax, pol, plane, tolerance)
-            ax.set_title((panel(i) + " " if len(many) > 1 else "") + position_text(pol))
+            ax.set_title(f"{panel(i, len(many))} {position_text(pol)}".strip())
         machine = many[0].attrs["machine"]
         headline(figure, f"{machine}: displacement under {force_text(many[0])}")
-        legend_below(figure, axes[0].get_legend_handles_labels()[0])
     return figure
 
 

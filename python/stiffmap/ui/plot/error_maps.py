@@ -9,23 +9,13 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.plot.failed import hatch_failed
 from stiffmap.ui.plot.isolines import draw_isolines, draw_tolerance, halo
 from stiffmap.ui.plot.map_lines import draw_line
 from stiffmap.ui.plot.planes import Planes, on_grid, planes
-from stiffmap.ui.plot.style import (
-    COLOURS,
-    MM,
-    headline,
-    legend_below,
-    length_unit,
-    new_figure,
-    panel,
-    paper_style,
-)
+from stiffmap.ui.plot.style import COLOURS, MM, length_unit, panel, paper, wrench_text
 
 TITLES = {
     "worst_deflection": "worst direction of the force",
@@ -50,7 +40,8 @@ def map_figure(
 
     Panels stand across the axis with the fewest positions. What lies beyond `tolerance` (m) is dotted, and
     its share is written over the panel. `variable` is a deflection of `ds` (m), or a component of its displacement: ``dx``, ``dy``, ``dz`` (m),
-    ``|d|`` for its norm, or one in any plane, ``d_xz``. None: the worst one in the
+    ``|d|`` for its norm, or one in any plane, ``d_xz``; a deflection's standard deviation, ``…_std``, where the map has
+    it. None: the worst one in the
     plane in which the force turned; the deflection of a map without directions, and of ``ds.sel(case=…)``. `case` picks a load case
     where it has several. `directions`: short lines along the force of the worst or best direction.
     `isolines`: thin lines of equal deflection. `limits` of the colour scale in m; `common_scale=False` gives
@@ -64,18 +55,19 @@ def map_figure(
     values = pick(ds, variable, case)
     how = planes(values)
     unit, factor = length_unit(limits[1] if limits else float(np.nanmax(values.values, initial=0.0)))
-    with paper_style():
+    count = len(how.values)
+    width = 5.2 if how.is_line else max((2.35 if common_scale else 2.9) * count + 0.9, 4.6)
+    with paper(width, 3.4, title(ds, variable, case)) as figure:
         if how.is_line:
-            figure = new_figure(5.2, 3.4)
             draw_line(figure, ds, values, how, (unit, factor), tolerance)
         else:
-            figure = _panels(ds, values, how, (unit, factor), tolerance, limits, common_scale,
-                             variable, case, directions, isolines)  # fmt: skip
-        headline(figure, title(ds, variable, case))
+            _panels(figure, ds, values, how, (unit, factor), tolerance, limits, common_scale,
+                    variable, case, directions, isolines)  # fmt: skip
     return figure
 
 
 def _panels(
+    figure: Figure,
     ds: xr.Dataset,
     values: xr.DataArray,
     how: Planes,
@@ -87,35 +79,23 @@ def _panels(
     case: str | None,
     directions: bool,
     isolines: bool,
-) -> Figure:
-    figure, axes = panel_row(len(how.values), own_scales=not common_scale)
+) -> None:
+    axes = figure.subplots(1, len(how.values), squeeze=False, sharey=True)[0]
     norm = Normalize(unit[1] * limits[0], unit[1] * limits[1]) if limits else colour_range(values, unit[1])
-    entries: dict[str, Any] = {}
     for i, ax in enumerate(axes):
         plane = values.isel({how.across: i}).transpose(how.up, how.right)
         own = norm if common_scale or limits else colour_range(plane, unit[1])
-        mesh = draw_plane(ax, ds, plane, how, variable, case, own, tolerance, unit, entries)
+        mesh = draw_plane(ax, ds, plane, how, variable, case, own, tolerance, unit)
         if isolines:
             draw_isolines(ax, plane, how, unit[1], own)
         if directions:
-            draw_directions(ax, ds, variable, how, i, entries)
-        ax.set_title(
-            f"{panel(i) + ' ' if len(axes) > 1 else ''}{how.title(i)}" + shares(plane.values, tolerance)
-        )
+            draw_directions(ax, ds, variable, how, i)
+        ax.set_title(f"{panel(i, len(axes))} {how.title(i)}{shares(plane.values, tolerance)}".strip())
         if not common_scale:
             figure.colorbar(mesh, ax=ax, label=colour_label(values, unit[0]), shrink=0.85)
     axes[0].set_ylabel(f"{how.up}, mm")
     if common_scale:
         figure.colorbar(mesh, ax=list(axes), label=colour_label(values, unit[0]), shrink=0.85)
-    if entries:
-        legend_below(figure, list(entries.values()))
-    return figure
-
-
-def panel_row(count: int, *, own_scales: bool = False) -> tuple[Figure, Any]:
-    """A figure with a row of panels that share the upward axis."""
-    figure = new_figure(max((2.9 if own_scales else 2.35) * count + 0.9, 4.6), 3.4)
-    return figure, figure.subplots(1, count, squeeze=False, sharey=True)[0]
 
 
 def default_variable(ds: xr.Dataset) -> str:
@@ -191,15 +171,13 @@ def draw_plane(
     norm: Normalize,
     tolerance: float | None,
     unit: tuple[str, float],
-    entries: dict[str, Any],
 ) -> Any:
-    """One plane: colours, tolerance, hatched failures; adds to the legend's entries."""
+    """One plane: colours, tolerance, hatched failures."""
     x, y, v = MM * plane[how.right].values, MM * plane[how.up].values, unit[1] * plane.values
     mesh = ax.pcolormesh(x, y, v, shading="nearest", cmap=COLOURS, norm=norm, rasterized=True)
-    for entry in hatch_failed(ax, x, y, v, status_of(ds, plane, how, variable, case)):
-        entries[str(entry.get_label())] = entry
+    hatch_failed(ax, x, y, v, status_of(ds, plane, how, variable, case))
     if tolerance is not None:
-        entries |= draw_tolerance(ax, x, y, v, unit[1] * tolerance, f"{MM * tolerance:g} mm")
+        draw_tolerance(ax, x, y, v, unit[1] * tolerance, f"{MM * tolerance:g} mm")
     ax.set_aspect("equal")
     ax.set_xlabel(f"{how.right}, mm")
     return mesh
@@ -219,16 +197,20 @@ def colour_label(values: xr.DataArray, unit: str = "mm") -> str:
     name = str(values.name or "")
     if name in ("dx", "dy", "dz"):
         return f"{name}, {unit}"
+    if name.endswith("_std"):
+        return f"standard deviation, {unit}"
     plane = name.rpartition("_")[2]
     return f"deflection in the {plane} plane, {unit}" if plane in FORCE_PLANES else f"deflection, {unit}"
 
 
 def title(ds: xr.Dataset, variable: str, case: str | None) -> str:
     """Machine, load and direction."""
+    variable, deviation, _ = variable.partition("_std")
     base = variable.removesuffix("_xy").removesuffix("_xz").removesuffix("_yz")
+    ending = ": standard deviation of the deflection" if deviation else ""
     if base not in TITLES or base == "deflection":
-        return f"{ds.attrs['machine']}: {load_text(ds, case)}"
-    return f"{ds.attrs['machine']}: {ds.attrs['turning_force_N']:g} N, {TITLES[base]}"
+        return f"{ds.attrs['machine']}: {load_text(ds, case)}{ending}"
+    return f"{ds.attrs['machine']}: {ds.attrs['turning_force_N']:g} N, {TITLES[base]}{ending}"
 
 
 def load_text(ds: xr.Dataset, case: str | None) -> str:
@@ -236,17 +218,13 @@ def load_text(ds: xr.Dataset, case: str | None) -> str:
     wrench = ds.wrench
     if "case" in wrench.dims:
         wrench = wrench.sel(case=case) if case is not None else wrench.isel(case=0)
-    names = zip(wrench.wrench_component.values, wrench.values, strict=True)
-    parts = [f"{n} = {v:g} {'N' if n.startswith('f') else 'N m'}" for n, v in names if v]
-    return ", ".join(parts) or "no wrench"
+    return wrench_text(wrench.values)
 
 
 LINE: dict[str, Any] = {"pivot": "mid", "headwidth": 0, "headlength": 0, "headaxislength": 0, "width": 0.005}
 
 
-def draw_directions(
-    ax: Axes, ds: xr.Dataset, variable: str, how: Planes, index: int, entries: dict[str, Any]
-) -> None:
+def draw_directions(ax: Axes, ds: xr.Dataset, variable: str, how: Planes, index: int) -> None:
     """Lines along the force, as they are seen in the panel's plane; shorter where the force leaves it."""
     name = variable.replace("_deflection", "_direction")
     if name == variable or name not in ds:
@@ -258,9 +236,7 @@ def draw_directions(
     u, v = (parts.get(a, np.zeros(angle.shape)) for a in (how.right, how.up))
     x, y = np.meshgrid(MM * angle[how.right], MM * angle[how.up])
     ax.quiver(x, y, u, v, color="white", scale=18, **LINE).set_path_effects(halo(1.8, "#444444"))
-    entries["direction"] = Line2D(
-        [], [], color="white", label="direction of the force", path_effects=halo(2.5, "#444444")
-    )
+    ax.plot([], [], color="white", label="direction of the force", path_effects=halo(2.5, "#444444"))
 
 
 def _spread(count: int, most: int = 9) -> Any:

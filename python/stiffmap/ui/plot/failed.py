@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
@@ -30,17 +30,15 @@ def edges(centres: Floats) -> Floats:
     return np.concatenate([[first], middle, [last]])
 
 
-def hatch_failed(ax: Axes, x: Floats, y: Floats, values: Floats, status: NDArray[np.uint8]) -> list[Patch]:
-    """Hatch the cells (y, x) without a value; returns the legend's entries."""
-    entries: list[Patch] = []
+def hatch_failed(ax: Axes, x: Floats, y: Floats, values: Floats, status: NDArray[np.uint8]) -> None:
+    """Hatch the cells (y, x) without a value."""
     for state, (name, hatch, colour) in LOOK.items():
         cells = np.argwhere(np.isnan(values) & (status == state))
         if len(cells) == 0:
             continue
         look: dict[str, Any] = {"facecolor": colour, "edgecolor": "#555555", "hatch": hatch, "linewidth": 0}
         ax.add_collection(PatchCollection(_rectangles(edges(x), edges(y), cells), **look))
-        entries.append(Patch(label=name, **look))
-    return entries
+        ax.fill([], [], label=name, **look)
 
 
 def _rectangles(x: Floats, y: Floats, cells: NDArray[np.intp]) -> list[Rectangle]:

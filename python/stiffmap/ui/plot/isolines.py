@@ -9,8 +9,6 @@ import xarray as xr
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from stiffmap.ui.plot.planes import Planes
@@ -25,12 +23,17 @@ def halo(width: float, colour: str) -> list[patheffects.AbstractPathEffect]:
     return [patheffects.withStroke(linewidth=width, foreground=colour)]
 
 
+def levels(low: float, high: float, most: int = 8) -> list[float]:
+    """Round values inside a range."""
+    return [float(t) for t in MaxNLocator(most).tick_values(low, high) if low < t < high]
+
+
 def draw_isolines(ax: Axes, plane: xr.DataArray, how: Planes, factor: float, norm: Normalize) -> None:
     """Some thin labelled lines of equal deflection, on a grid that is fine enough."""
     v = factor * plane.values
     if min(v.shape) < FEWEST or not np.isfinite(v).any() or norm.vmin is None or norm.vmax is None:
         return
-    inside = [t for t in MaxNLocator(6).tick_values(norm.vmin, norm.vmax) if np.nanmin(v) < t < np.nanmax(v)]
+    inside = [t for t in levels(norm.vmin, norm.vmax, 6) if np.nanmin(v) < t < np.nanmax(v)]
     if not inside:
         return
     x, y = MM * plane[how.right].values, MM * plane[how.up].values
@@ -39,18 +42,17 @@ def draw_isolines(ax: Axes, plane: xr.DataArray, how: Planes, factor: float, nor
         text.set_path_effects(halo(1.2, "#444444"))
 
 
-def draw_tolerance(ax: Axes, x: Any, y: Any, v: Any, level: float, words: str) -> dict[str, Any]:
-    """Outline and dots of what lies beyond the tolerance (unit of v); the legend's entries."""
+def draw_tolerance(ax: Axes, x: Any, y: Any, v: Any, level: float, words: str) -> None:
+    """Outline and dots of what lies beyond the tolerance (unit of v)."""
     finite = v[np.isfinite(v)]
     if min(v.shape) < 2 or finite.size == 0 or not finite.max() > level:
-        return {}
+        return
     look: dict[str, Any] = {"hatch": "..", "facecolor": "none", "edgecolor": TOLERANCE, "linewidth": 0}
     beyond = ax.contourf(x, y, v, levels=[level, finite.max()], colors="none", hatches=[".."], extend="max")
     beyond.set_edgecolor(TOLERANCE)
     beyond.set_linewidth(0)
-    entries: dict[str, Any] = {"beyond": Patch(label=f"beyond {words}", **look)}
+    ax.fill([], [], label=f"beyond {words}", **look)
     if finite.min() < level:
         lines = ax.contour(x, y, v, levels=[level], colors=TOLERANCE, linewidths=1.6)
         lines.set_path_effects(halo(3, "white"))
-        entries["tolerance"] = Line2D([], [], color=TOLERANCE, label=f"tolerance {words}")
-    return entries
+        ax.plot([], [], color=TOLERANCE, label=f"tolerance {words}")

@@ -14,21 +14,19 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.budget import DeflectionBudget, deflection_budget
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.ui.plot.machines import draw_skeleton
-from stiffmap.ui.plot.scene import draw_arrow, finish, on, scene_axes
+from stiffmap.ui.plot.scene import draw_force, draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton
-from stiffmap.ui.plot.style import BLUE, MM, ORANGE, headline, legend_below, new_figure, paper_style
+from stiffmap.ui.plot.style import BLUE, ORANGE, UM, headline, leg_colours, paper, place_text
 
 SHOWN = 0.08
 """Of the machine's extent, how far the tool moves in the picture."""
 MOST_BARS = 10
 FAINT = 5e-4  # share of an element that is not worth a bar
-FORCE = "#C1121F"
 
 
 @dataclass(frozen=True)
 class LoadedShape:
-    """The machine at rest and under load, with the factor that makes the difference visible."""
+    """The machine at rest and under load (m, N), with the factor that makes the difference visible."""
 
     rest: Skeleton
     loaded: Skeleton
@@ -38,28 +36,7 @@ class LoadedShape:
 
     def enlarged(self, factor: float | None = None) -> Skeleton:
         """The loaded shape with every frame's translation times the factor."""
-        k = self.factor if factor is None else factor
-
-        def mix(a: Floats, b: Floats) -> Floats:
-            return np.asarray(a + k * (b - a))
-
-        return Skeleton(
-            [(n, mix(a, b)) for (n, a), (_, b) in zip(self.rest.links, self.loaded.links, strict=True)],
-            self.rest.guides,
-            mix(self.rest.actuators, self.loaded.actuators),
-            mix(self.rest.passive, self.loaded.passive),
-            mix(self.rest.tcp, self.loaded.tcp),
-            mix(self.rest.platform, self.loaded.platform),
-            self.rest.ends,
-        )
-
-    @property
-    def extent(self) -> float:
-        """Diagonal of what is drawn, m."""
-        points = np.concatenate(
-            [ends for _, ends in (*self.rest.links, *self.rest.guides)] or [np.zeros((1, 3))]
-        )
-        return float(np.linalg.norm(np.ptp(points, axis=0)))
+        return self.rest.enlarged(self.loaded, self.factor if factor is None else factor)
 
 
 def loaded_shape(
@@ -81,15 +58,13 @@ def loaded_shape(
     under = machine.solve(p, load, rotation=rotation, gravity=gravity)
     status = max(int(free.status), int(under.status))
     if status != Status.CONVERGED:
-        where = ", ".join(f"{MM * v:g}" for v in p)
         raise StiffmapError(
-            f"{machine.name} cannot be drawn under load at ({where}) mm: {Status(status).name.lower()}"
+            f"{machine.name} cannot be drawn under load at {place_text(p)}: {Status(status).name.lower()}"
         )
-    rest, loaded = (skeleton(machine, s.coordinates, shortest=-1.0) for s in (free, under))
+    rest, loaded = (skeleton(machine, s.coordinates) for s in (free, under))
     d = np.asarray(under.displacement - free.displacement)
-    shape = LoadedShape(rest, loaded, 1.0, d, load[:3])
     return LoadedShape(
-        rest, loaded, round_factor(SHOWN * shape.extent, float(np.linalg.norm(d[:3]))), d, load[:3]
+        rest, loaded, round_factor(SHOWN * rest.extent, float(np.linalg.norm(d[:3]))), d, load[:3]
     )
 
 
@@ -115,18 +90,15 @@ def loaded_figure(
     element in the tool's deflection."""
     shape = loaded_shape(machine, position, wrench, rotation=rotation, gravity=gravity)
     budget = deflection_budget(machine, position, wrench, rotation=rotation, gravity=gravity)
-    with paper_style():
-        figure = new_figure(10.4, 5.0)
+    with paper(10.4, 5.0) as figure:
         grid = figure.add_gridspec(1, 2, width_ratios=(1.3, 1.0))
         left, right = grid[0, 0], grid[0, 1]
         ax: Any = scene_axes(figure, shape.rest, view, left)
         draw_loaded(ax, shape, machine.legs, view)
         draw_budget(figure.add_subplot(right), budget)
-        where = ", ".join(f"{MM * v:g}" for v in budget.position)
         force = ", ".join(f"{v:g}" for v in budget.wrench[:3])
-        headline(figure, f"{machine.name} at ({where}) mm under ({force}) N: the tool moves "
+        headline(figure, f"{machine.name} at {place_text(budget.position)} under ({force}) N: the tool moves "
                          f"{1e6 * np.linalg.norm(shape.displacement[:3]):.1f} µm (drawn × {shape.factor:g})")  # fmt: skip
-        legend_below(figure, ax.get_legend_handles_labels()[0])
     return figure
 
 
@@ -135,27 +107,30 @@ def draw_loaded(
 ) -> None:
     """Ghost, enlarged shape, arrow of the force."""
     label: str | None = "without load"
-    for _, ends in shape.rest.links:
+    for _, ends in shape.rest.bars:
         ax.plot(*on(ax, ends), color="0.72", lw=1.4, ls="--", zorder=1, label=label)
         label = None
     moved = shape.enlarged()
-    draw_skeleton(ax, moved, legs)
-    size = float(np.linalg.norm(shape.force))
-    if size > 0:
-        arrow = 0.16 * shape.extent * shape.force / size
-        tail = moved.tcp - arrow
-        draw_arrow(ax, tail, arrow, color=FORCE, label=f"force {size:g} N")
-    finish(ax, shape.rest, view)
+    draw_skeleton(ax, moved, leg_colours(legs))
+    draw_force(ax, moved.tcp, shape.force, shape.rest.extent)
+    finish(ax, view)
+
+
+def budget_rows(budget: DeflectionBudget) -> list[tuple[str, float, float]]:
+    """Element, its part (µm) of the tool's deflection along that, and its share, the largest first; what is not worth a
+    row is one at the end."""
+    size = UM * float(np.linalg.norm(budget.displacement[:3]))
+    ranked = [(n, size * s, s) for n, _, s in budget.ranked()]
+    shown = min(MOST_BARS, sum(abs(s) > FAINT for _, _, s in ranked))
+    if len(ranked) <= shown + 1:
+        return ranked
+    rest = sum(s for _, _, s in ranked[shown:])
+    return [*ranked[:shown], (f"{len(ranked) - shown} others", size * rest, rest)]
 
 
 def draw_budget(ax: Any, budget: DeflectionBudget) -> None:
     """A bar per element, in the direction in which the tool moves."""
-    size = 1e6 * float(np.linalg.norm(budget.displacement[:3]))
-    ranked = [(n, size * s, s) for n, _, s in budget.ranked()]
-    shown = min(MOST_BARS, sum(abs(s) > FAINT for _, _, s in ranked))
-    rest = sum(s for _, _, s in ranked[shown:])
-    if len(ranked) > shown + 1:
-        ranked = [*ranked[:shown], (f"{len(ranked) - shown} others", size * rest, rest)]
+    ranked = budget_rows(budget)
     at = np.arange(len(ranked))
     values = [v for _, v, _ in ranked]
     ax.barh(at, values, color=[BLUE if v >= 0 else ORANGE for v in values])

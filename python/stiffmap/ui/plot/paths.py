@@ -12,10 +12,10 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
-from stiffmap.ui.plot.machines import draw_skeleton, look_from
 from stiffmap.ui.plot.polars import position_text
+from stiffmap.ui.plot.scene import draw_skeleton, finish, marks, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton
-from stiffmap.ui.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, legend_below, new_figure, paper_style
+from stiffmap.ui.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, leg_colours, paper
 
 MARKS = {"limit": "^", "bifurcation": "X"}
 HALO = "#f5c9b0"
@@ -27,8 +27,7 @@ def path_figure(path: xr.Dataset) -> Figure:
     crossing branch in another colour."""
     if not path.attrs.get("end"):
         raise StiffmapError("path: expected a sweep with a limit, got one of single forces")
-    with paper_style():
-        figure = new_figure(4.6, 3.4)
+    with paper(4.6, 3.4, most=2) as figure:
         ax: Any = figure.subplots()
         for number, colour, name in ((0, BLUE, ""), (1, GREEN, "crossing branch, ")):
             _draw_branch(ax, path.isel(step=path.branch.values == number), colour, name)
@@ -40,7 +39,6 @@ def path_figure(path: xr.Dataset) -> Figure:
         ax.axhline(0, color="0.7", lw=0.6, zorder=0)
         ax.set(xlabel="displacement along the force, mm", ylabel="force, N")
         ax.set_title(f"{path.attrs['machine']}, {position_text(path)}")
-        legend_below(figure, ax.get_legend_handles_labels()[0], most=2)
     return figure
 
 
@@ -73,33 +71,30 @@ def mode_figure(
     at = path.critical_coordinates.values[index]
     moved = at + SHARE * machine.compiled.length * path.mode.values[index]
     leg, joint = str(path.mode_leg.values[index]), str(path.mode_joint.values[index])
-    with paper_style():
-        figure = new_figure(5.2, 4.8)
-        ax: Any = figure.add_subplot(projection="3d")
-        for _, ends in skeleton(machine, at).links:
-            ax.plot(*(MM * ends.T), color="0.7", lw=1.5, zorder=1)
+    with paper(5.2, 4.8, most=4) as figure:
         shape = skeleton(machine, moved)
-        draw_skeleton(ax, shape, machine.legs)
+        ax: Any = scene_axes(figure, shape, view)
+        for _, ends in skeleton(machine, at).bars:
+            ax.plot(*on(ax, ends), color="0.7", lw=1.5, zorder=1)
+        draw_skeleton(ax, shape, leg_colours(machine.legs))
         _mark(ax, machine, shape, moved, leg, joint)
-        ax.set_aspect("equal")
-        look_from(ax, shape, view)
+        finish(ax, view)
         ax.set_title(
             f"{machine.name}: {path.critical_kind.values[index]} point at "
             f"{float(path.critical_force[index]):.4g} N\nmode enlarged: "
             + (f"leg {leg}, " if leg else "") + f"most in {joint}", fontsize=9,
         )  # fmt: skip
-        legend_below(figure, ax.get_legend_handles_labels()[0], most=4)
     return figure
 
 
 def _mark(ax: Any, machine: Machine, shape: Skeleton, moved: Floats, leg: str, joint: str) -> None:
     """A halo behind the leg of the mode, a ring about what moves most."""
-    for of, ends in shape.links:
+    for of, ends in shape.bars:
         if of == leg:
-            ax.plot(*(MM * ends.T), color=HALO, lw=7, alpha=0.6, solid_capstyle="round", zorder=0)
+            ax.plot(*on(ax, ends), color=HALO, lw=7, alpha=0.6, solid_capstyle="round", zorder=0)
     core = machine.compiled
     index = core.names.coordinates.index(joint)
     node = next(i for i, (_, c) in enumerate(core.nodes) if c == index)
     at = core.frames(moved)[0][node]
-    ax.scatter(*(MM * at), s=190, facecolor="none", edgecolor=VERMILLION, linewidth=1.8, label="moves most",
-               depthshade=False)  # fmt: skip
+    ax.scatter(*on(ax, at), s=190, facecolor="none", edgecolor=VERMILLION, linewidth=1.8, label="moves most",
+               **marks(ax))  # fmt: skip

@@ -9,17 +9,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from stiffmap.ui.plot.style import (
-    BLUE,
-    MM,
-    TOLERANCE,
-    headline,
-    legend_below,
-    length_unit,
-    new_figure,
-    panel,
-    paper_style,
-)
+from stiffmap.ui.plot.style import BLUE, MM, TOLERANCE, headline, length_unit, panel, paper, place_text
 
 
 def polar_figure(
@@ -30,17 +20,15 @@ def polar_figure(
 ) -> Figure:
     """One diagram per Dataset of `polar`: radius = deflection (mm), angle = direction of the force."""
     many = [diagrams] if isinstance(diagrams, xr.Dataset) else list(diagrams)
-    with paper_style():
-        figure = new_figure(max(2.6 * len(many) + 0.4, 4.0), 3.3)
+    with paper(max(2.6 * len(many) + 0.4, 4.0), 3.3) as figure:
         factor = length_unit(max(float(np.nanmax(p[variable].values, initial=0.0)) for p in many))[1]
         for i, pol in enumerate(many):
             ax: Any = figure.add_subplot(1, len(many), i + 1, projection="polar")
             draw_polar(ax, pol, variable, tolerance, factor)
-            ax.set_title((panel(i) + " " if len(many) > 1 else "") + position_text(pol))
+            ax.set_title(f"{panel(i, len(many))} {position_text(pol)}".strip())
         machine = many[0].attrs["machine"]
         unit = length_unit(max(float(np.nanmax(p[variable].values, initial=0.0)) for p in many))[0]
         headline(figure, f"{machine}: deflection, {unit}, under {force_text(many[0])}")
-        legend_below(figure, ax.get_legend_handles_labels()[0])
     return figure
 
 
@@ -68,7 +56,7 @@ def in_words(variable: str) -> str:
 
 def position_text(ds: xr.Dataset) -> str:
     """Position in mm."""
-    return f"({', '.join(f'{MM * v:g}' for v in ds.position.values)}) mm"
+    return place_text(ds.position.values)
 
 
 def force_text(ds: xr.Dataset) -> str:

@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from matplotlib.patches import Polygon
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.ui.plot.skeleton import Skeleton, plate
-from stiffmap.ui.plot.style import BLACK, MM
+from stiffmap.ui.plot.skeleton import Skeleton
+from stiffmap.ui.plot.style import BLACK, MM, ORANGE
 
-FLAT = 1e-6  # m
+ARROW = 0.16
+"""Of the machine's extent, length of the arrow of the force."""
+FORCE = "#C1121F"
 ZOOM = 1.03
 MARGIN = 0.06
 THINNEST = 0.3  # of the widest axis
 
 
-def is_flat(shape: Skeleton) -> bool:
-    """Whether everything lies in one plane of constant z."""
-    points = shape.points
-    return bool(points.size) and float(np.ptp(points[:, 2])) < FLAT
-
-
 def scene_axes(figure: Any, shape: Skeleton, view: tuple[float, float] | None, place: Any = 111) -> Any:
     """Axes for a machine; a `view` asks for three dimensions."""
-    if view is None and is_flat(shape):
+    if view is None and shape.is_flat:
         return figure.add_subplot(place)
     return figure.add_subplot(place, projection="3d")
 
@@ -41,37 +39,76 @@ def on(ax: Any, points: ArrayLike) -> Any:
     return (MM * np.asarray(points, dtype=float).T)[: dimensions(ax)]
 
 
-def flat_marks(ax: Any) -> dict[str, Any]:
-    """What a scatter of marks needs in three dimensions only."""
+def marks(ax: Any) -> dict[str, Any]:
+    """What a scatter of marks needs to lie above lines."""
     return {"depthshade": False} if dimensions(ax) == 3 else {"zorder": 4}
 
 
-def draw_body(ax: Any, points: Floats) -> None:
-    """A platform: the plate between the joints (n, 3) m that hold it."""
-    ordered = plate(points)
-    corners = on(ax, ordered if len(ordered) else points).T
-    if dimensions(ax) == 2:
-        ax.add_patch(
-            Polygon(corners, facecolor="0.55", edgecolor="0.25", alpha=0.5, zorder=1, label="platform")
-        )
+def draw_body(ax: Any, shape: Skeleton) -> None:
+    """A platform that is a plate: its area, and from its middle to the TCP."""
+    if not len(shape.plate):
         return
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+    corners, tool = on(ax, shape.plate).T, shape.links[-1]
+    look: dict[str, Any] = {"facecolor": "0.55", "edgecolor": "0.25", "label": "platform"}
+    if dimensions(ax) == 2:
+        ax.add_patch(Polygon(corners, **look, alpha=0.5, zorder=1))
+    else:
+        ax.add_collection3d(Poly3DCollection([corners], **look, alpha=0.45))
+    if np.linalg.norm(tool[1] - tool[0]) > 1e-6:
+        ax.plot(*on(ax, tool), color=BLACK, lw=1.2, zorder=1)
 
-    ax.add_collection3d(
-        Poly3DCollection([corners], facecolor="0.55", edgecolor="0.25", alpha=0.45, label="platform")
-    )
+
+def draw_skeleton(ax: Any, s: Skeleton, colours: Mapping[str, str], *, joints: bool = True) -> None:
+    """Guides, links in the colours of their legs, platform, joints, TCP."""
+    for ends in s.guides:
+        ax.plot(*on(ax, ends), color="0.82", lw=5, solid_capstyle="butt", zorder=1)
+    named: set[str] = set()
+    for leg, ends in s.bars:
+        label = None if leg in named or not leg else f"leg {leg}"
+        named.add(leg)
+        ax.plot(*on(ax, ends), color=colours[leg], lw=2, label=label)
+    if len(s.guides):
+        ax.plot([], [], color="0.82", lw=5, label="travel of a drive")
+    draw_body(ax, s)
+    if joints:
+        ax.scatter(*on(ax, s.actuators), marker="s", s=32, color=BLACK, label="actuator", **marks(ax))
+    if joints and len(s.passive):
+        ax.scatter(*on(ax, s.passive), marker="o", s=12, facecolor="white", edgecolor=BLACK, linewidth=0.8,
+                   label="passive joint", **marks(ax))  # fmt: skip
+    ax.scatter(*on(ax, s.tcp), marker="*", s=110, color=ORANGE, edgecolor=BLACK, linewidth=0.5, label="TCP",
+               **marks(ax))  # fmt: skip
 
 
-def draw_arrow(ax: Any, tail: Floats, arrow: Floats, **look: Any) -> None:
-    """A force, from `tail` along `arrow` (3,) m."""
-    start, way = on(ax, tail), on(ax, arrow)
+def box_edges(low: Floats, high: Floats) -> Floats:
+    """(12, 2, 3) edges of a box."""
+    corners = np.array([[(low, high)[c >> i & 1][i] for i in range(3)] for c in range(8)])
+    return np.array([[corners[c], corners[c | 1 << i]] for c in range(8) for i in range(3) if not c >> i & 1])
+
+
+def draw_box(ax: Any, low: Floats, high: Floats) -> None:
+    """Edges of the workspace box, m."""
+    label: str | None = "workspace"
+    for ends in box_edges(low, high):
+        if np.ptp(on(ax, ends), axis=1).any():
+            ax.plot(*on(ax, ends), color="0.5", lw=0.8, ls="--", label=label)
+            label = None
+
+
+def draw_force(ax: Any, tip: Floats, force: Floats, extent: float) -> None:
+    """An arrow along a force (3,) N that ends at `tip` (3,) m, its length a share of the machine's extent."""
+    size = float(np.linalg.norm(force))
+    if not size:
+        return
+    arrow = ARROW * extent * np.asarray(force) / size
+    look: dict[str, Any] = {"color": FORCE, "label": f"force {size:g} N"}
+    start, way = on(ax, tip - arrow), on(ax, arrow)
     if dimensions(ax) == 3:
         ax.quiver(*start, *way, lw=2.2, arrow_length_ratio=0.3, **look)
     elif np.linalg.norm(way) > 0.0:
         ax.quiver(*start, *way, angles="xy", scale_units="xy", scale=1, width=0.012, zorder=5, **look)
 
 
-def finish(ax: Any, shape: Skeleton, view: tuple[float, float] | None = None) -> None:
+def finish(ax: Any, view: tuple[float, float] | None = None) -> None:
     """Equal scales, direction of view, labels, and limits that leave no empty room."""
     ax.set(xlabel="x, mm", ylabel="y, mm")
     if dimensions(ax) == 2:
@@ -95,11 +132,3 @@ def finish(ax: Any, shape: Skeleton, view: tuple[float, float] | None = None) ->
     ax.set_box_aspect(spans, zoom=ZOOM)
     ax.view_init(*(view or (22.0, 35.0)))
     ax.locator_params(nbins=5)  # numbers of slanting axes would run into each other
-
-
-def tool(ax: Any, shape: Skeleton) -> None:
-    """From the middle of the platform to the TCP."""
-    if len(shape.platform):
-        middle = shape.platform.mean(axis=0)
-        if np.linalg.norm(shape.tcp - middle) > 1e-6:
-            ax.plot(*on(ax, np.stack([middle, shape.tcp])), color=BLACK, lw=1.2, zorder=1)

@@ -1,83 +1,122 @@
-"""The lines and joints of a machine at a configuration, from its mechanism's frames."""
+"""What of a machine is drawn at a configuration: lines and joints, from its mechanism's frames."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Joint
 from stiffmap.model.description.tree import joints
-from stiffmap.solve.compiled import CompiledMachine, Role
+from stiffmap.solve.compiled import CompiledMachine, Role, Status
+from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
+from stiffmap.ui.plot.style import place_text
 
 COINCIDENT = 1e-9
+FLAT = 1e-6  # m
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Polylines and points in base axes, m."""
+    """Lines and points in base axes, m: all pictures of a machine draw these; the same pieces at all its coordinates."""
 
-    links: list[tuple[str, Floats]]
-    """Leg ("" for base and platform) and the two ends (2, 3) of each rigid piece."""
-    guides: list[tuple[str, Floats]]
-    """Leg and travel (2, 3) of each prismatic actuator."""
+    legs: tuple[str, ...]
+    """Leg of each link; empty for base and platform, whose rim comes last."""
+    links: Floats
+    """(n, 2, 3) the two ends of each rigid piece."""
+    guides: Floats
+    """(m, 2, 3) travel of the drives that slide."""
     actuators: Floats
-    """(n, 3)."""
+    """(k, 3)."""
     passive: Floats
-    """(n, 3)."""
+    """(k, 3)."""
     tcp: Floats
     """(3,)."""
-    platform: Floats
-    """(n, 3) where its legs hold the platform (`plate` puts them in order); none where these are
-    not corners of a plate at home."""
+    plate: Floats
+    """(n, 3) corners of the platform where its legs hold it, in order around its middle; none where these span no plate
+    at home."""
     ends: tuple[int, ...]
-    """The node of the mechanism at which each link ends."""
+    """The node of the mechanism at which each link but those of the rim ends."""
+
+    @property
+    def bars(self) -> list[tuple[str, Floats]]:
+        """Leg and ends (2, 3) of each link that has a length, without the rim."""
+        bars = zip(self.legs, self.links[: len(self.ends)], strict=False)
+        return [(leg, ends) for leg, ends in bars if np.linalg.norm(ends[1] - ends[0]) > COINCIDENT]
 
     @property
     def points(self) -> Floats:
         """(n, 3) ends of everything that is drawn."""
-        ends = [e for _, e in (*self.links, *self.guides)]
-        return np.concatenate([*ends, self.platform, self.tcp[None]]) if ends else self.tcp[None]
+        return np.concatenate([self.links.reshape(-1, 3), self.guides.reshape(-1, 3), self.tcp[None]])
+
+    @property
+    def extent(self) -> float:
+        """Diagonal of the box around everything, m."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether everything lies in one plane of constant z."""
+        return float(np.ptp(self.points[:, 2])) < FLAT
+
+    def enlarged(self, loaded: Skeleton, factor: float) -> Skeleton:
+        """With the way of every frame to a loaded skeleton times the factor."""
+        moving = ("links", "actuators", "passive", "tcp", "plate")
+        ways = {n: getattr(self, n) + factor * (getattr(loaded, n) - getattr(self, n)) for n in moving}
+        return replace(self, **ways)
 
 
-def skeleton(machine: Machine, coordinates: Floats, *, shortest: float = COINCIDENT) -> Skeleton:
-    """Geometry to draw at coordinates (springs at rest, or deflected); pieces that are not longer than
-    `shortest` (m) are left out."""
+def standing(
+    machine: Machine,
+    position: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    *,
+    start: ArrayLike | None = None,
+) -> Skeleton:
+    """The machine at a commanded TCP pose (m, base axes; None: home), springs at rest; StiffmapError out of its reach."""
+    p = machine.description.home.p if position is None else real_array(position, "position")
+    k = inverse_kinematics(machine, p, rotation, start=start, threads=1)
+    if int(k.status) != Status.CONVERGED:
+        raise StiffmapError(
+            f"position: {machine.name} cannot be drawn at {place_text(p)}: {Status(int(k.status)).name}"
+        )
+    return skeleton(machine, k.coordinates)
+
+
+def skeleton(machine: Machine, coordinates: Floats) -> Skeleton:
+    """What is drawn at coordinates, springs at rest or deflected."""
     core = machine.compiled
     position, rotation = core.frames(coordinates)
     owner = owners(core)
     named = joints(machine.description)
-    held = held_by(core)
-    at_home, _ = core.frames(
-        core.home_coordinates()
-    )  # it decides, so that the pieces are the same at all coordinates
-    corners = position[sorted(held)]
-    if not len(plate(at_home[sorted(held)])):
-        corners, held = np.zeros((0, 3)), set()
-    body = beyond(core, held)
-    links, guides, ends, marks = [], [], [], {Role.ACTUATOR: [], Role.PASSIVE: []}  # type: ignore[var-annotated]
+    held = sorted(held_by(core))
+    # home decides, so that the pieces are the same at all coordinates
+    order = around(core.frames(core.home_coordinates())[0][held])
+    body = beyond(core, set(held) if len(order) else set())
+    legs, links, guides, ends, marks = [], [], [], [], {Role.ACTUATOR: [], Role.PASSIVE: []}  # type: ignore[var-annotated]
     for i, (parent, c) in enumerate(core.nodes):
         role = core.names.roles[c] if c >= 0 else None
         if role in marks:
             marks[role].append(position[i])
         joint = named.get(core.names.coordinates[c]) if c >= 0 else None
         if joint is not None and joint.kind == "prismatic" and not _moves(core, parent):
-            guides.append((owner[i], travel(joint, float(coordinates[c]), position[i], rotation[i])))
-        elif (
-            parent >= 0
-            and np.linalg.norm(position[i] - position[parent]) > shortest
-            and parent != 0
-            and i not in body
-        ):
-            links.append((owner[i], position[[parent, i]]))
+            guides.append(travel(joint, float(coordinates[c]), position[i], rotation[i]))
+        elif parent > 0 and i not in body:
+            legs.append(owner[i])
+            links.append(position[[parent, i]])
             ends.append(i)
-    empty = np.zeros((0, 3))
-    return Skeleton(
-        links, guides, np.array(marks[Role.ACTUATOR]).reshape(-1, 3) if marks[Role.ACTUATOR] else empty,
-        np.array(marks[Role.PASSIVE]).reshape(-1, 3) if marks[Role.PASSIVE] else empty, position[-1], corners, tuple(ends),
-    )  # fmt: skip
+    tcp, corners = position[-1], position[held][order]
+    if len(corners):  # its edges, and from its middle to the TCP
+        links += [np.stack(pair) for pair in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+        links.append(np.stack([corners.mean(axis=0), tcp]))
+        legs += [""] * (len(corners) + 1)
+    drives, passive = (np.array(marks[r]).reshape(-1, 3) for r in (Role.ACTUATOR, Role.PASSIVE))
+    pieces, ways = (np.array(v).reshape(-1, 2, 3) for v in (links, guides))
+    return Skeleton(tuple(legs), pieces, ways, drives, passive, tcp, corners, tuple(ends))
 
 
 def held_by(core: CompiledMachine) -> set[int]:
@@ -106,15 +145,16 @@ def beyond(core: CompiledMachine, held: set[int]) -> set[int]:
     return out
 
 
-def plate(points: Floats) -> Floats:
-    """Points (n, 3) that span a plate, in order around its middle; none where they do not."""
+def around(points: Floats) -> NDArray[np.intp]:
+    """Order in which points (n, 3) that span a plate stand around its middle; none where they do not."""
+    none = np.zeros(0, np.intp)
     if len(points) < 3:
-        return np.zeros((0, 3))
+        return none
     away = points - points.mean(axis=0)
     _, sizes, axes = np.linalg.svd(away, full_matrices=False)
     if sizes[1] < 1e-3 * sizes[0] or sizes[2] > 0.5 * sizes[1]:
-        return np.zeros((0, 3))
-    return np.asarray(points[np.argsort(np.arctan2(away @ axes[1], away @ axes[0]))])
+        return none
+    return np.argsort(np.arctan2(away @ axes[1], away @ axes[0]))
 
 
 def _moves(core: CompiledMachine, node: int) -> bool:

@@ -9,9 +9,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.internal_wrenches import InternalWrenches
-from stiffmap.ui.plot.style import BLUE, CYCLE, VERMILLION, headline, legend_below, new_figure, paper_style
-
-DIRECTIONS = ("fx", "fy", "fz", "mx", "my", "mz")
+from stiffmap.ui.plot.style import BLUE, CYCLE, VERMILLION, paper
 
 
 def stress_figure(stress: InternalWrenches, title: str = "") -> Figure:
@@ -21,8 +19,7 @@ def stress_figure(stress: InternalWrenches, title: str = "") -> Figure:
     names = list(stress.springs)
     values = np.array([stress.springs[n] for n in names]).reshape(len(names), 6)
     rows = np.arange(len(names))
-    with paper_style():
-        figure = new_figure(6.4, 1.2 + 0.24 * len(names))
+    with paper(6.4, 1.2 + 0.24 * len(names), title or "internal wrenches, spring axes") as figure:
         axes: Any = figure.subplots(1, 2, sharey=True)
         for ax, first, unit in zip(axes, (0, 3), ("force, N", "moment, N m"), strict=True):
             for k in range(3):
@@ -33,6 +30,4 @@ def stress_figure(stress: InternalWrenches, title: str = "") -> Figure:
             reach = 1.1 * max(float(np.nanmax(np.abs(values[:, first : first + 3]), initial=0.0)), 1e-6)
             ax.set(xlim=(-reach, reach), xlabel=unit, yticks=rows, yticklabels=names)
         axes[0].invert_yaxis()
-        headline(figure, title or "internal wrenches, spring axes")
-        legend_below(figure, axes[0].get_legend_handles_labels()[0])
     return figure

@@ -14,9 +14,11 @@ import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.outputs import write_picture
 
-MM = 1e3
+MM, UM = 1e3, 1e6
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 # Okabe and Ito's palette: eight colours that the common colour blindnesses keep apart.
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION, BLACK = (
     "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000",
@@ -25,6 +27,8 @@ CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 TOLERANCE = VERMILLION
 COLOURS = "cividis"
+BEFORE, AFTER = "#c1432e", "#2a6f97"
+"""What the machine of the file leaves of readings, and a corrected one."""
 
 SETTINGS: dict[str, Any] = {
     "font.size": 9,
@@ -80,8 +84,10 @@ def headline(figure: Figure, text: str, size: float = 10) -> None:
         artist.set_text("\n".join(fill(line, columns) for line in text.splitlines()))
 
 
-def legend_below(figure: Figure, handles: Sequence[Any], most: int = 7) -> None:
-    """Legend under the picture, in as many columns as its width allows."""
+def legend_below(figure: Figure, handles: Sequence[Any] | None = None, most: int = 7) -> None:
+    """Legend under the picture (None: of all its axes), in as many columns as its width and `most` allow."""
+    if handles is None:
+        handles = [h for ax in figure.axes for h in ax.get_legend_handles_labels()[0]]
     entries = {str(h.get_label()): h for h in handles}
     renderer = _renderer(figure)
     for columns in range(min(len(entries), most), 0, -1):
@@ -91,14 +97,47 @@ def legend_below(figure: Figure, handles: Sequence[Any], most: int = 7) -> None:
         legend.remove()
 
 
+@contextmanager
+def paper(width: float, height: float, title: str = "", *, most: int = 7) -> Iterator[Figure]:
+    """An empty figure (inches), drawn in the style of all pictures; at the end it gets its title, and a legend of what its axes
+    hold, in at most `most` columns (0: none)."""
+    with paper_style():
+        figure = new_figure(width, height)
+        yield figure
+        if title:
+            headline(figure, title)
+        legend_below(figure, most=most)
+
+
 def length_unit(largest: float) -> tuple[str, float]:
     """Unit and factor in which a deflection of this size (m) reads well: no 0.0xx mm."""
     return ("µm", 1e6) if largest < 0.0995e-3 else ("mm", 1e3)
 
 
-def panel(index: int) -> str:
-    """(a), (b), (c) …"""
-    return f"({chr(ord('a') + index)})"
+def place_text(position: Floats) -> str:
+    """A position (3,) m in mm."""
+    return f"({', '.join(f'{MM * v:g}' for v in position)}) mm"
+
+
+def wrench_text(wrench: Floats) -> str:
+    """What of a wrench (6,) is not zero, for example ``fx = 100 N``."""
+    parts = [f"{n} = {v:g} {'N' if n[0] == 'f' else 'N·m'}" for n, v in zip(WRENCH, wrench, strict=True) if v]
+    return ", ".join(parts) or "no wrench"
+
+
+def leg_colours(legs: Sequence[str]) -> dict[str, str]:
+    """Colour of each leg, the same in all pictures; black for base and platform."""
+    return {leg: CYCLE[i % len(CYCLE)] for i, leg in enumerate(legs)} | {"": BLACK}
+
+
+def line_look(index: int) -> dict[str, Any]:
+    """Colour and dashes of one of several lines."""
+    return {"color": CYCLE[index % len(CYCLE)], "ls": DASHES[index % len(DASHES)]}
+
+
+def panel(index: int, of: int = 2) -> str:
+    """(a), (b), (c) …; empty for the only one."""
+    return f"({chr(ord('a') + index)})" if of > 1 else ""
 
 
 def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> Path:

@@ -11,17 +11,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.polars import in_words, position_text
-from stiffmap.ui.plot.style import (
-    BLACK,
-    CYCLE,
-    DASHES,
-    MM,
-    headline,
-    legend_below,
-    new_figure,
-    panel,
-    paper_style,
-)
+from stiffmap.ui.plot.style import BLACK, CYCLE, MM, headline, line_look, panel, paper
 
 
 def sweep_figure(
@@ -35,18 +25,14 @@ def sweep_figure(
     Unstable equilibria are drawn as open circles; failed ones leave a gap and a cross on the axis.
     """
     many = [panels] if isinstance(panels, Mapping) else list(panels)
-    with paper_style():
-        figure = new_figure(max(2.3 * len(many) + 0.6, 4.0), 3.1)
+    with paper(max(2.3 * len(many) + 0.6, 4.0), 3.1) as figure:
         axes = figure.subplots(1, len(many), squeeze=False)[0]
         for i, (ax, lines) in enumerate(zip(axes, many, strict=True)):
             draw_sweeps(ax, lines, variable, tolerance)
-            ax.set_title(
-                (panel(i) + " " if len(many) > 1 else "") + position_text(next(iter(lines.values())))
-            )
+            ax.set_title(f"{panel(i, len(many))} {position_text(next(iter(lines.values())))}".strip())
         axes[0].set_ylabel(f"{in_words(variable)}, mm")
         machine = next(iter(many[0].values())).attrs["machine"]
         headline(figure, f"{machine}: deflection against force")
-        legend_below(figure, [h for ax in axes for h in ax.get_legend_handles_labels()[0]])
     return figure
 
 
@@ -56,7 +42,7 @@ def draw_sweeps(ax: Axes, lines: Mapping[str, xr.Dataset], variable: str, tolera
         colour = CYCLE[i % len(CYCLE)]
         stable = swp.status == Status.CONVERGED
         force, value = swp.force, MM * swp[variable]
-        ax.plot(force, value.where(stable), color=colour, ls=DASHES[i % len(DASHES)], label=label)
+        ax.plot(force, value.where(stable), label=label, **line_look(i))
         unstable = (swp.status == Status.UNSTABLE) & np.isfinite(value)
         if unstable.any():
             ax.plot(

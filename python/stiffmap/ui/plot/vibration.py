@@ -12,26 +12,22 @@ from stiffmap.ui.plot.style import (
     BLACK,
     BLUE,
     COLOURS,
-    CYCLE,
-    DASHES,
     MM,
+    UM,
     VERMILLION,
-    headline,
     legend_below,
-    new_figure,
-    paper_style,
+    line_look,
+    paper,
 )
 
 RPM = 60 / (2 * np.pi)
-MICRO = 1e6
 
 
 def lobes_figure(
     lobes: xr.Dataset, title: str, speed: float | None = None, depth: float | None = None
 ) -> Figure:
     """Stable depth (mm) over the speed of the spindle (rpm); the cut of the process as a point."""
-    with paper_style():
-        figure = new_figure(6.0, 4.0)
+    with paper(6.0, 4.0, f"{title}\ndamping {lobes.attrs['damping']}") as figure:
         ax = figure.add_subplot()
         s, d = RPM * lobes.speed.values, MM * lobes.depth.values
         if "multiplier" in lobes:
@@ -53,30 +49,20 @@ def lobes_figure(
         ax.set_ylim(0, d[-1])
         ax.set_xlabel("speed of the spindle, rpm")
         ax.set_ylabel("depth along the tool, mm")
-        headline(figure, f"{title}\ndamping {lobes.attrs['damping']}")
-        legend_below(figure, ax.get_legend_handles_labels()[0])
     return figure
 
 
 def response_figure(responses: Mapping[str, xr.DataArray], axes: str = "xyz") -> Figure:
     """Size of the receptances (µm/N) along base axes over the frequency, a panel for each axis."""
-    with paper_style():
-        figure = new_figure(2.5 * len(axes) + 0.5, 3.0)
+    with paper(2.5 * len(axes) + 0.5, 3.0, "Frequency response at the tool", most=0) as figure:
         panels = figure.subplots(1, len(axes), squeeze=False, sharey=True)[0]
         for ax, axis in zip(panels, axes, strict=True):
             for i, (label, H) in enumerate(responses.items()):
                 own = np.abs(H.sel(response=axis, force=f"f{axis}"))
-                ax.semilogy(
-                    H.frequency,
-                    MICRO * own,
-                    color=CYCLE[i % len(CYCLE)],
-                    ls=DASHES[i % len(DASHES)],
-                    label=label,
-                )
+                ax.semilogy(H.frequency, UM * own, label=label, **line_look(i))
             ax.set_title(f"along {axis}")
             ax.set_xlabel("frequency, Hz")
         panels[0].set_ylabel("receptance, µm/N")
-        headline(figure, "Frequency response at the tool")
         if len(responses) > 1:
-            legend_below(figure, panels[0].get_legend_handles_labels()[0])
+            legend_below(figure)
     return figure

@@ -19,7 +19,7 @@ from stiffmap.machining.process import cutting_force
 from stiffmap.machining.process.force import force_uncertainty
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.status import Status
-from stiffmap.ui.pictures.milling import error_figure, machine_path_figure, outline_figure
+from stiffmap.ui.plot.milling import error_figure, machine_path_figure, outline_figure
 from stiffmap.ui.plot.style import save
 from stiffmap.ui.report.sheet import Sheet, write_sheet
 from stiffmap.workspace.maps.files import write_dataset

@@ -7,13 +7,14 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.common.outputs import write_text
 from stiffmap.solve.budget import deflection_budget
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.loaded import LoadedShape, loaded_shape
-from stiffmap.ui.plot.style import BLACK, CYCLE
+from stiffmap.ui.plot.style import leg_colours
 
 
 def write_page(
@@ -46,21 +47,20 @@ def write_page(
 
 def scene(shape: LoadedShape, legs: tuple[str, ...]) -> dict[str, Any]:
     """Lines and points at rest and under load (mm), for the page's script."""
-    colours = {leg: CYCLE[i % len(CYCLE)] for i, leg in enumerate(legs)} | {"": BLACK}
+    colours, rest, loaded = leg_colours(legs), shape.rest, shape.loaded
     links = [
         {"leg": leg, "colour": colours[leg], "rest": _mm(a), "loaded": _mm(b)}
-        for (leg, a), (_, b) in zip(shape.rest.links, shape.loaded.links, strict=True)
+        for leg, a, b in zip(rest.legs, rest.links, loaded.links, strict=True)
     ]
+    points = ("actuators", "passive", "tcp")
     return {
         "links": links,
-        "guides": [_mm(ends) for _, ends in shape.rest.guides],
-        "actuators": {"rest": _mm(shape.rest.actuators), "loaded": _mm(shape.loaded.actuators)},
-        "passive": {"rest": _mm(shape.rest.passive), "loaded": _mm(shape.loaded.passive)},
-        "tcp": {"rest": _mm(shape.rest.tcp[None]), "loaded": _mm(shape.loaded.tcp[None])},
+        "guides": list(map(_mm, rest.guides)),
+        **{n: {"rest": _mm(getattr(rest, n)), "loaded": _mm(getattr(loaded, n))} for n in points},
         "force": list(map(float, shape.force)),
         "factor": shape.factor,
     }
 
 
 def _mm(points: Any) -> list[list[float]]:
-    return [[float(f"{1e3 * v:.7g}") for v in p] for p in points]
+    return [[float(f"{1e3 * v:.7g}") for v in p] for p in np.atleast_2d(points)]

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.pictures.modes import swung
-from stiffmap.ui.view.drawing import drawing
+from stiffmap.ui.plot.modes import swung
+from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.view.dynamics import modes_at
 from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.scene import GHOST
 from stiffmap.workspace.performance.motion.frequencies import NaturalFrequencies
 
 MODES, RATE, PERIOD, SWING = 6, 20.0, 1.5, 0.05
@@ -66,8 +67,8 @@ class Swing:
         if not np.isfinite(w.frequency[self.mode]):
             return
         at = swung(moment.machine, w, self.mode, phase, SWING * scene.extent)
-        moved = drawing(moment.machine, at).links
-        scene.lines("/ghost", moved, "#E69F00", 0.004 * scene.extent)
+        moved = skeleton(moment.machine, at).links
+        scene.lines("/ghost", moved, GHOST, 0.004 * scene.extent)
 
     def stop(self) -> None:
         """End the thread."""

@@ -6,8 +6,9 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import box_of, moves, orientation
-from stiffmap.ui.view.quantities import QUANTITIES, Load
+from stiffmap.ui.view.place import box_of, moves
+from stiffmap.ui.view.plane import values_at
+from stiffmap.ui.view.quantities import QUANTITIES
 
 NODES = 15
 """Along each commanded axis."""
@@ -25,12 +26,4 @@ def box_cloud(moment: Moment) -> tuple[Floats, Floats]:
         for i, free in enumerate(moves(m))
     ]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    solution = m.solve(
-        points,
-        s.wrench,
-        rotation=orientation(s),
-        gravity=s.gravity,
-        start=s.start_array,
-        stiffness=quantity.stiffness,
-    )
-    return points, quantity.of(solution, Load(np.array(s.force), s.tolerance)) * quantity.factor
+    return points, values_at(m, s, points)[0] * quantity.factor

@@ -15,7 +15,7 @@ from stiffmap.ui.plot.loaded import round_factor
 from stiffmap.ui.plot.style import BLUE, GREEN, VERMILLION
 from stiffmap.ui.view.diagnosed import Findings
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import orientation
+from stiffmap.ui.view.place import solved
 from stiffmap.ui.view.scene import Scene
 
 DRAWN = 0.06
@@ -173,13 +173,9 @@ def path_errors(moment: Moment, path: Floats, size: float) -> tuple[Floats, Floa
 
     The mirror step commands the path less its deflection; what is left is solved there.
     """
-    s, m = moment.state, moment.machine
 
     def off(at: Floats) -> Floats:
-        solution = m.solve(
-            at, s.wrench, rotation=orientation(s), gravity=s.gravity, start=s.start_array, stiffness=False
-        )
-        return np.asarray(solution.displacement[:, :3])
+        return np.asarray(solved(moment.machine, moment.state, at, stiffness=False).displacement[:, :3])
 
     cut = off(path)
     command = path - cut

@@ -10,7 +10,7 @@ from typing import Any
 
 from stiffmap.common.errors import FileError
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.view.drawing import element_links
+from stiffmap.ui.plot.elements import element_links
 
 RESULT, CORRECTED = "diagnosis.json", "machine.yaml"
 
@@ -26,11 +26,7 @@ class Named:
 
     def links(self, machine: Machine) -> list[int]:
         """Which links of a drawing are lit for it."""
-        bare = self.element.partition(".")[0]
-        found = dict.fromkeys(
-            link for name in _names(machine, bare, self.legs) for link in element_links(machine, name)
-        )
-        return list(found)
+        return element_links(machine, self.element, self.legs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +69,3 @@ def _named(e: Any) -> Named:
     return Named(
         str(e["kind"]), str(e["element"]), legs, f"{e['kind']} of {e['element']}{where}: {values}{more}"
     )
-
-
-def _names(machine: Machine, element: str, legs: tuple[str, ...]) -> list[str]:
-    """Elements as the core names them; one in both branches of a parallelogram is two."""
-    out = []
-    for coordinate in machine.compiled.names.coordinates:
-        parts = coordinate.split(".")
-        if element in parts and (not legs or parts[0] in legs):
-            out.append(".".join(parts[: len(parts) - parts[::-1].index(element)]))
-    return list(dict.fromkeys(out))

@@ -4,19 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from contourpy import contour_generator
-from matplotlib.ticker import MaxNLocator
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.ui.plot.isolines import levels
 from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES
-
-MOST = 8
-
-
-def levels(limits: tuple[float, float]) -> list[float]:
-    """Round values inside a range."""
-    low, high = limits
-    return [float(t) for t in MaxNLocator(MOST).tick_values(low, high) if low < t < high]
 
 
 def lines_at(found: PlaneMap, level: float) -> Floats:
@@ -39,7 +31,7 @@ def isolines(found: PlaneMap, limits: tuple[float, float]) -> Floats:
     """(n, 2, 3) of all round levels; none of a status."""
     if found.quantity == "status":
         return np.zeros((0, 2, 3))
-    parts = [lines_at(found, t) for t in levels(limits)]
+    parts = [lines_at(found, t) for t in levels(*limits)]
     return np.concatenate(parts) if parts else np.zeros((0, 2, 3))
 
 

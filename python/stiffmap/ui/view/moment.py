@@ -14,8 +14,8 @@ from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.loaded import SHOWN, round_factor
-from stiffmap.ui.view.drawing import Drawing, drawing
-from stiffmap.ui.view.place import box_of, orientation
+from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
+from stiffmap.ui.view.place import box_of, orientation, solved
 from stiffmap.ui.view.plane import FINE, PlaneMap, plane_map
 from stiffmap.ui.view.state import State
 
@@ -32,26 +32,22 @@ class Moment:
 
     def solve(self) -> Solution:
         """The tool's pose under the load."""
-        s = self.state
-        return self.machine.solve(
-            s.position, s.wrench, rotation=orientation(s), gravity=s.gravity, start=s.start_array, threads=1
-        )
+        return solved(self.machine, self.state, threads=1)
 
     def plane(self, count: int = FINE) -> PlaneMap:
         """The plane through the tool."""
         return plane_map(self.machine, self.state, count)
 
-    def rest(self) -> Drawing:
+    def rest(self) -> Skeleton:
         """The machine at its pose, springs at rest."""
-        m, s = self.machine, self.state
-        k = inverse_kinematics(m, s.position, orientation(s), start=s.start_array, threads=1)
-        return drawing(m, k.coordinates)
+        s = self.state
+        return standing(self.machine, s.position, orientation(s), start=s.start_array)
 
-    def loaded(self, solution: Solution) -> Drawing | None:
+    def loaded(self, solution: Solution) -> Skeleton | None:
         """The machine under the load; None where there is no equilibrium."""
-        return drawing(self.machine, solution.coordinates) if bool(solution.ok) else None
+        return skeleton(self.machine, solution.coordinates) if bool(solution.ok) else None
 
-    def magnification(self, rest: Drawing, solution: Solution) -> float:
+    def magnification(self, rest: Skeleton, solution: Solution) -> float:
         """Of the deflected machine: as the state says, else a round factor."""
         if self.state.magnification is not None:
             return self.state.magnification

@@ -10,8 +10,11 @@ import numpy as np
 from stiffmap.solve.budget import DeflectionBudget
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Status
+from stiffmap.ui.plot.isolines import levels
+from stiffmap.ui.plot.loaded import budget_rows
+from stiffmap.ui.plot.style import BLUE, ORANGE, TOLERANCE
 from stiffmap.ui.view.colours import STATUS_COLOURS, table
-from stiffmap.ui.view.isolines import levels, tolerance_level
+from stiffmap.ui.view.isolines import tolerance_level
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.probe import probe
@@ -19,8 +22,7 @@ from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.surfaces import principal
 from stiffmap.workspace.performance.motion.scaling import drive_table
 
-MOST_SHARES = 9
-BLUE, ORANGE, RED = "#0072B2", "#E69F00", "#B00020"
+RED = "#B00020"
 Row = tuple[str, float, str, str]
 """Label, length of the bar (-1 … 1), colour, text."""
 
@@ -63,11 +65,11 @@ def colour_bar(found: PlaneMap, limits: tuple[float, float], tolerance: float) -
     ticks = "".join(
         f'<line x1="{at(v):.1f}" x2="{at(v):.1f}" y1="18" y2="36" stroke="white" stroke-width=".8"/>'
         f'<text x="{at(v):.1f}" y="48" font-size="10" text-anchor="middle" fill="currentColor">{v:.5g}</text>'
-        for v in levels(limits)
+        for v in levels(*limits)
     )
     level = tolerance_level(found.quantity, tolerance)
     if level is not None and low < level < high:
-        ticks += f'<line x1="{at(level):.1f}" x2="{at(level):.1f}" y1="14" y2="40" stroke="#D55E00" stroke-width="2.5"/>'
+        ticks += f'<line x1="{at(level):.1f}" x2="{at(level):.1f}" y1="14" y2="40" stroke="{TOLERANCE}" stroke-width="2.5"/>'
     words = f"{q.title}, {q.unit}"
     failed = int(found.failed.sum())
     which = "1 pose" if failed == 1 else f"{failed} poses"
@@ -97,21 +99,18 @@ def bars(title: str, rows: Sequence[Row]) -> str:
 
 def shares_panel(budget: DeflectionBudget, lit: str = "") -> str:
     """Where the deflection comes from."""
-    ranked = budget.ranked()
-    biggest = max((abs(s) for _, _, s in ranked), default=1.0) or 1.0
+    found = budget_rows(budget)
+    biggest = max((abs(s) for _, _, s in found), default=1.0) or 1.0
     size = 1e6 * float(np.linalg.norm(budget.displacement[:3]))
     rows: list[Row] = [
         (
             f"▶ {n}" if n == lit else n,
             s / biggest,
             BLUE if s >= 0 else ORANGE,
-            f"{size * s:z.2f} µm, {100 * s:z.0f} %",
+            f"{part:z.2f} µm, {100 * s:z.0f} %",
         )
-        for n, _, s in ranked[:MOST_SHARES]
+        for n, part, s in found
     ]
-    others = sum(s for _, _, s in ranked[MOST_SHARES:])
-    if len(ranked) > MOST_SHARES:
-        rows.append((f"{len(ranked) - MOST_SHARES} others", others / biggest, BLUE, f"{100 * others:z.0f} %"))
     return bars(f"where the {size:.2f} µm come from", rows)
 
 

@@ -14,24 +14,14 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.plot import save
-from stiffmap.ui.plot.loaded import FORCE, draw_budget
-from stiffmap.ui.plot.style import (
-    BLACK,
-    COLOURS,
-    CYCLE,
-    MM,
-    ORANGE,
-    TOLERANCE,
-    headline,
-    new_figure,
-    paper_style,
-)
+from stiffmap.ui.plot.loaded import draw_budget
+from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
+from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
 from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.isolines import isolines, tolerance_lines
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES
-from stiffmap.ui.view.scene import ARROW, box_edges
 
 SHOWN = 51
 """Poses along each edge of the plane in a picture."""
@@ -46,29 +36,18 @@ def view_figure(moment: Moment) -> Figure:
     """Machine, deflected ghost, plane with isolines, and where the deflection comes from."""
     solution, rest, found = moment.solve(), moment.rest(), moment.plane(SHOWN)
     q, limits, s = QUANTITIES[moment.state.quantity], found.range, moment.state
-    with paper_style():
-        figure = new_figure(9.6, 5.2)
+    with paper(9.6, 5.2, most=0) as figure:
         ax: Any = figure.add_subplot(1, 2, 1, projection="3d")
-        names = moment.machine.legs
-        colours = {leg: CYCLE[i % len(CYCLE)] for i, leg in enumerate(names)} | {"": BLACK}
-        low, high = moment.box()
-        _lines(ax, box_edges(low, high), "0.7", 0.7)
+        draw_box(ax, *moment.box())
         _plane(ax, found, limits)
         _lines(ax, isolines(found, limits), "white", 0.5)
         _lines(ax, tolerance_lines(found, s.tolerance), TOLERANCE, 1.5)
-        _lines(ax, rest.guides, "0.75", 4)
-        for leg, ends in zip(rest.legs, rest.links, strict=True):
-            ax.plot(*(MM * ends.T), color=colours[leg], lw=1.6)
+        draw_skeleton(ax, rest, leg_colours(moment.machine.legs))
         loaded, factor = moment.loaded(solution), moment.magnification(rest, solution)
         if loaded is not None and factor:
-            _lines(ax, rest.enlarged(loaded, factor), ORANGE, 1.0)
-        size = float(np.linalg.norm(s.force))
-        if size:
-            arrow = ARROW * rest.extent * np.array(s.force) / size
-            ax.quiver(*(MM * (rest.tcp - arrow)), *(MM * arrow), color=FORCE, lw=2, arrow_length_ratio=0.3)
-        ax.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
-        ax.set_aspect("equal")
-        ax.view_init(22, -50)
+            _lines(ax, rest.enlarged(loaded, factor).links, ORANGE, 1.0)
+        draw_force(ax, rest.tcp, np.array(s.force), rest.extent)
+        finish(ax, (22, -50))
         if s.quantity != "status":
             bar = ScalarMappable(Normalize(*limits), COLOURS)
             figure.colorbar(bar, ax=ax, label=f"{q.title}, {q.unit}", shrink=0.6, location="bottom", pad=0.08)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
+from stiffmap.solve.solution import Solution
 from stiffmap.ui.view.state import State
 
 SMALL_TURN = 0.03
@@ -46,6 +48,21 @@ def drawn_box(machine: Machine) -> tuple[Floats, Floats]:
 def orientation(state: State) -> Floats | None:
     """(3, 3) of a state; None: as at home."""
     return None if state.rotation is None else np.asarray(Rotation.from_rotvec(state.rotation).as_matrix())
+
+
+def solved(
+    machine: Machine,
+    state: State,
+    position: ArrayLike | None = None,
+    *,
+    stiffness: bool = True,
+    threads: int | None = None,
+) -> Solution:
+    """Under the load of a state, at its pose or at positions (..., 3) m with its orientation."""
+    return machine.solve(
+        state.position if position is None else position, state.wrench, rotation=orientation(state),
+        gravity=state.gravity, start=state.start_array, stiffness=stiffness, threads=threads,
+    )  # fmt: skip
 
 
 def rotation_of(machine: Machine, state: State) -> Floats:

@@ -13,7 +13,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.view.dynamics import dynamic_stiffness, lowest_frequency
-from stiffmap.ui.view.place import drawn_box, orientation
+from stiffmap.ui.view.place import drawn_box, solved
 from stiffmap.ui.view.quantities import QUANTITIES, Load, Mask
 from stiffmap.ui.view.state import State
 
@@ -123,26 +123,28 @@ class PlaneMap:
         return float(look((b, a)))
 
 
+def values_at(
+    machine: Machine, state: State, position: Floats, threads: int | None = None
+) -> tuple[Floats, Floats]:
+    """(...) of the state's quantity with the tool at (..., 3) m, SI, and statuses."""
+    quantity = QUANTITIES[state.quantity]
+    if quantity.of is None:
+        make = lowest_frequency if state.quantity == "frequency" else dynamic_stiffness
+        return make(machine, state, position, threads)
+    s = solved(machine, state, position, stiffness=quantity.stiffness, threads=threads)
+    return quantity.of(s, Load(np.array(state.force), state.tolerance)), np.asarray(s.status, dtype=float)
+
+
 def plane_map(machine: Machine, state: State, count: int = FINE, *, threads: int | None = None) -> PlaneMap:
     """Solve the poses of the plane; outside the box they are solved as well and hidden."""
     begun = time.perf_counter()
     frame = plane_frame(machine, state)
-    quantity = QUANTITIES[state.quantity]
-    if quantity.of is None:
+    if QUANTITIES[state.quantity].of is None:
         count = min(count, DEAR)
     p = frame.poses(count)
     low, high = drawn_box(machine)
     slack = INSIDE * (high - low)
     outside = np.asarray(((p < low - slack) | (p > high + slack)).any(axis=-1))
-    if quantity.of is None:
-        make = lowest_frequency if state.quantity == "frequency" else dynamic_stiffness
-        values, status = make(machine, state, p, threads)
-    else:
-        s = machine.solve(
-            p, state.wrench, rotation=orientation(state), gravity=state.gravity,
-            start=state.start_array, stiffness=quantity.stiffness, threads=threads,
-        )  # fmt: skip
-        values = quantity.of(s, Load(np.array(state.force), state.tolerance))
-        status = np.asarray(s.status, dtype=float)
+    values, status = values_at(machine, state, p, threads)
     values = np.where(outside, np.nan, values)
     return PlaneMap(frame, state.quantity, values, status, outside, time.perf_counter() - begun)

@@ -3,31 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.status import Status
-from stiffmap.ui.view.dynamics import dynamic_stiffness, lowest_frequency
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.plane import Frame
-from stiffmap.ui.view.quantities import QUANTITIES, Load
+from stiffmap.ui.view.plane import Frame, values_at
 
 
 def probe(moment: Moment, point: Sequence[float]) -> tuple[float, Status]:
     """Value (SI) of the state's quantity with the tool at a point (3,) m, and the status there."""
-    m, s = moment.machine, moment.state
-    at = np.array(point, dtype=float)
-    quantity = QUANTITIES[s.quantity]
-    if quantity.of is None:
-        make = lowest_frequency if s.quantity == "frequency" else dynamic_stiffness
-        value, status = make(m, s, at)
-        return float(value), Status(int(status))
-    x, y, z = (float(v) for v in at)
-    solution = replace(moment, state=replace(s, position=(x, y, z))).solve()
-    value = quantity.of(solution, Load(np.array(s.force), s.tolerance))
-    return float(value), Status(int(solution.status))
+    value, status = values_at(moment.machine, moment.state, np.array(point, dtype=float))
+    return float(value), Status(int(status))
 
 
 def under_ray(frame: Frame, origin: Floats, direction: Floats) -> Floats | None:

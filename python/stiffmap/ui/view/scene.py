@@ -10,20 +10,19 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.solution import Solution
-from stiffmap.ui.plot.loaded import FORCE
-from stiffmap.ui.plot.style import BLACK, CYCLE, ORANGE, TOLERANCE
+from stiffmap.ui.plot.elements import thicknesses
+from stiffmap.ui.plot.scene import ARROW, FORCE, box_edges
+from stiffmap.ui.plot.skeleton import Skeleton
+from stiffmap.ui.plot.style import BLACK, ORANGE, SKY, TOLERANCE, leg_colours
 from stiffmap.ui.view.colours import plane_image
-from stiffmap.ui.view.drawing import Drawing, thicknesses
 from stiffmap.ui.view.isolines import isolines, tolerance_lines
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import moves, rotation_of, turns
 from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.surfaces import ellipsoid, polar_surface, sphere
 
-ARROW = 0.16
-"""Of the extent, length of the arrow of the force."""
 SURFACE = 0.12
-"""The same, of the surface at the tool."""
+"""Of the extent, size of the surface at the tool."""
 GHOST, LIT, DIAGNOSED = ORANGE, "#FFD400", "#E8279B"
 GREY, DARK = "#BBBBBB", "#666666"
 NOTHING = np.zeros((1, 2, 3))
@@ -111,7 +110,7 @@ class Scene:
             color=rgb(colour), opacity=0.4, side="double", cast_shadow=False, visible=shown,
         )  # fmt: skip
 
-    def machine(self, moment: Moment, rest: Drawing, loaded: Drawing | None, factor: float) -> None:
+    def machine(self, moment: Moment, rest: Skeleton, loaded: Skeleton | None, factor: float) -> None:
         """Links, joints, the deflected ghost and the tool."""
         self.rest = rest
         for name, colour, thick, chosen in self._groups:
@@ -129,7 +128,7 @@ class Scene:
             if self._plate is None:
                 self._plate = self.mesh("/platform", middle, fan, DARK)
             self._plate.vertices = np.asarray(middle, np.float32)
-        moved = NOTHING[:0] if loaded is None or factor == 0 else rest.enlarged(loaded, factor)
+        moved = NOTHING[:0] if loaded is None or factor == 0 else rest.enlarged(loaded, factor).links
         self.lines("/ghost", moved, GHOST, 0.004 * self.extent)
         named = rest.links[self.diagnosed] if self.diagnosed else NOTHING[:0]
         self.lines("/diagnosis/element", named, DIAGNOSED, 0.025 * self.extent)
@@ -211,7 +210,7 @@ class Scene:
                 "/surface",
                 points,
                 sphere()[1],
-                color=rgb("#56B4E9"),
+                color=rgb(SKY),
                 opacity=0.45,
                 side="double",
                 cast_shadow=False,
@@ -234,11 +233,10 @@ class Scene:
         self.api.add_label("/probe/label", text, anchor="bottom-left")
 
 
-def _groups(moment: Moment, rest: Drawing) -> list[tuple[str, str, float, list[int]]]:
+def _groups(moment: Moment, rest: Skeleton) -> list[tuple[str, str, float, list[int]]]:
     """Node, colour, thickness and links of each set of links that look alike."""
     thick = thicknesses(moment.machine, rest)
-    names = moment.machine.legs
-    colours = {leg: CYCLE[i % len(CYCLE)] for i, leg in enumerate(names)} | {"": DARK}
+    colours = leg_colours(moment.machine.legs) | {"": DARK}
     sets: dict[tuple[str, float], list[int]] = {}
     lengths = np.linalg.norm(rest.links[:, 1] - rest.links[:, 0], axis=1) if len(rest.links) else []
     for i, leg in enumerate(rest.legs):
@@ -253,18 +251,11 @@ def _active(moment: Moment) -> tuple[bool, bool, bool]:
     return free if any(free) else (True, True, True)
 
 
-def box_edges(low: Floats, high: Floats) -> Floats:
-    """(12, 2, 3) edges of a box."""
-    corners = np.array([[(low, high)[c >> i & 1][i] for i in range(3)] for c in range(8)])
-    return np.array([[corners[c], corners[c | 1 << i]] for c in range(8) for i in range(3) if not c >> i & 1])
-
-
-def look_at_machine(server: Any, rest: Drawing, extent: float) -> None:
+def look_at_machine(server: Any, rest: Skeleton, extent: float) -> None:
     """The first look: from the front right, from above where all lies in a plane of constant height."""
-    points = np.concatenate([rest.links.reshape(-1, 3), rest.tcp[None]])
+    points = rest.points
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    is_flat = float(np.ptp(points[:, 2])) < 1e-3
-    direction = np.array([0.02, -0.05, 1.0] if is_flat else [0.75, -0.9, 0.6])
+    direction = np.array([0.02, -0.05, 1.0] if rest.is_flat else [0.75, -0.9, 0.6])
     server.initial_camera.look_at = tuple(middle)
     server.initial_camera.position = tuple(middle + 0.8 * extent * direction / np.linalg.norm(direction))
     server.initial_camera.up = (0.0, 0.0, 1.0)

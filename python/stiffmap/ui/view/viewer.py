@@ -11,12 +11,12 @@ import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.solution import Solution
+from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.view.animation import Swing
 from stiffmap.ui.view.box_cloud import box_cloud
 from stiffmap.ui.view.colours import colours_of
 from stiffmap.ui.view.controls import Controls
 from stiffmap.ui.view.data import Data
-from stiffmap.ui.view.drawing import element_links
 from stiffmap.ui.view.model import Model
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.panels import (

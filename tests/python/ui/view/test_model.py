@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 import stiffmap as sm
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.model.files.shipped import find
+from stiffmap.ui.plot.elements import THICK, THIN, element_links, thicknesses
+from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.view.changes import addresses, changed
-from stiffmap.ui.view.drawing import THICK, THIN, drawing, element_links, thicknesses
 from stiffmap.ui.view.model import Model
 from stiffmap.ui.view.place import first_plane, moves, turns
 from stiffmap.ui.view.surfaces import ellipsoid, polar_surface, principal, sphere
@@ -171,7 +172,7 @@ def test_a_file_that_is_edited_is_read_again_or_its_error_is_named(tmp_path: Pat
 
 def test_links_keep_their_place_and_have_the_thickness_of_their_springs(machine: sm.Machine) -> None:
     rest = Model(machine).moment.rest()
-    there = drawing(machine, sm.inverse_kinematics(machine, (0.1, 0.1, 0.1)).coordinates)
+    there = skeleton(machine, sm.inverse_kinematics(machine, (0.1, 0.1, 0.1)).coordinates)
     assert rest.legs == there.legs and rest.links.shape == there.links.shape
     thick = thicknesses(machine, rest)
     assert (thick >= THIN * rest.extent - 1e-12).all() and (thick <= THICK * rest.extent + 1e-12).all()
@@ -188,7 +189,7 @@ def test_a_drawing_has_the_same_pieces_wherever_the_machine_stands(name: str) ->
     pieces = set()
     for s in (machine.solve(p), machine.solve(p, [300.0, 200.0, -500.0, 0, 0, 0])):
         for x in s.coordinates[s.status == sm.Status.CONVERGED]:
-            d = drawing(machine, x)
+            d = skeleton(machine, x)
             pieces.add((d.legs, d.ends, len(d.links), len(d.plate)))
     assert len(pieces) == 1
 

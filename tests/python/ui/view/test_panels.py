@@ -13,8 +13,8 @@ import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.view import _change, _state
+from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.view import model_of
-from stiffmap.ui.view.drawing import element_links
 from stiffmap.ui.view.model import Model
 from stiffmap.ui.view.outputs import command_line, python_lines
 from stiffmap.ui.view.panels import (

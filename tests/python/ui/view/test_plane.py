@@ -9,9 +9,10 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.solve.status import Status
+from stiffmap.ui.plot.isolines import levels
 from stiffmap.ui.view.colours import DARK, GREY, colours_of, plane_image, table
 from stiffmap.ui.view.dynamics import dynamic_stiffness
-from stiffmap.ui.view.isolines import isolines, levels, lines_at, tolerance_lines
+from stiffmap.ui.view.isolines import isolines, lines_at, tolerance_lines
 from stiffmap.ui.view.model import Model
 from stiffmap.ui.view.plane import plane_frame, plane_map
 from stiffmap.ui.view.probe import probe, under_ray
@@ -107,7 +108,7 @@ def test_failed_poses_are_hatched() -> None:
 
 def test_isolines_lie_at_their_values(machine: sm.Machine) -> None:
     found = plane_map(machine, State((0.0, 0.0, 0.1), force=FORCE), 41)
-    for level in levels(found.range)[:3]:
+    for level in levels(*found.range)[:3]:
         for a, _ in lines_at(found, level)[::40]:
             s = machine.solve(a, (*FORCE, 0, 0, 0))
             assert 1e6 * np.linalg.norm(s.displacement[:3]) == pytest.approx(level, rel=2e-3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.ui.pictures.design import beside_figure
+from stiffmap.ui.plot.design import beside_figure
 from stiffmap.workspace.design import load_design
 from stiffmap.workspace.design.judging import judge
 from stiffmap.workspace.design.refining import refine

@@ -9,7 +9,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.ui.cli import main
-from stiffmap.ui.pictures.efforts import efforts_figure
+from stiffmap.ui.plot.efforts import efforts_figure
 from stiffmap.workspace.performance import circle, drive_efforts, line, load_motion, timed
 
 CUT = """

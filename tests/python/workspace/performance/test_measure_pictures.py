@@ -9,10 +9,10 @@ import pytest
 from PIL import Image
 
 import stiffmap as sm
-from stiffmap.ui.pictures.box import box_figure
-from stiffmap.ui.pictures.measures import caption, measure_figures
-from stiffmap.ui.pictures.modes import mode_frames
-from stiffmap.ui.pictures.paths import path_measures_figure
+from stiffmap.ui.plot.along_paths import path_measures_figure
+from stiffmap.ui.plot.box import box_figure
+from stiffmap.ui.plot.measures import caption, measure_figures
+from stiffmap.ui.plot.modes import mode_frames
 from stiffmap.ui.report.pictures import animation, inline
 from stiffmap.workspace.design import load_design
 from stiffmap.workspace.performance import largest_box, load_motion

@@ -114,7 +114,7 @@ def test_what_cannot_be_divided_is_said():
 
 
 def test_shapes_are_drawn_at_their_phase():
-    from stiffmap.ui.pictures.modes import mode_figure, swung
+    from stiffmap.ui.plot.modes import mode_figure, swung
 
     m = sm.load_machine("five-bar")
     p = m.workspace.mean(axis=0)

@@ -31,8 +31,6 @@ SHOWN = 12
 """Detectable effects above the fold."""
 FIRST, FOLDED = ("place", "before_after"), ("residual_others",)
 """Pictures of the first page, and those that are folded."""
-PARTS = 8
-"""Elements in the table of shares."""
 
 
 def write_report(
@@ -146,6 +144,7 @@ def _effect(e: Effect) -> dict[str, Any]:
 
 def _budget(d: Findings) -> dict[str, Any] | None:
     """Shares of the corrected machine's deflection at the worst pose of the map in the pictures; None where it has play without load."""
+    from stiffmap.ui.plot.loaded import budget_rows
     from stiffmap.ui.report.diagnosis.pictures import worst_pose
 
     worst = worst_pose(d) if d.effects else None
@@ -161,7 +160,7 @@ def _budget(d: Findings) -> dict[str, Any] | None:
         "at": ", ".join(f"{1e3 * v:.0f}" for v in p),
         "force": ", ".join(f"{v:.0f}" for v in force[:3]),
         "size": whole,
-        "rows": [(in_shop_words(n), whole * s, 100 * s) for n, _, s in found.ranked()[:PARTS]],
+        "rows": [(in_shop_words(n), part, 100 * s) for n, part, s in budget_rows(found)],
     }
 
 

@@ -13,8 +13,9 @@ from stiffmap.experiment.experiment import WRENCH, Floats
 from stiffmap.identification.diagnosis.report.findings import Findings
 from stiffmap.identification.diagnosis.report.wording import noise_size
 from stiffmap.solve.machine import Machine
+from stiffmap.ui.plot.experiment import kept, pose_means
 from stiffmap.ui.plot.loaded import loaded_figure
-from stiffmap.ui.report.diagnosis.drawn import AFTER, BEFORE, MM, UM, kept, pose_means
+from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 from stiffmap.ui.report.diagnosis.place import place_figure
 from stiffmap.ui.report.diagnosis.trends import trending, trends
 from stiffmap.ui.report.diagnosis.vectors import vectors
@@ -75,7 +76,7 @@ def drawn(make: Callable[[Findings], Figure], d: Findings) -> Figure:
     try:
         return make(d)
     except Exception as problem:
-        figure = Figure(figsize=(7, 1.2), layout="constrained")
+        figure = new_figure(7, 1.2)
         figure.text(0.5, 0.5, f"not drawn: {problem}"[:300], ha="center", va="center", wrap=True, fontsize=9)
         return figure
 
@@ -99,7 +100,7 @@ def loops(d: Findings) -> Figure:
     channel = int(np.argmax(np.array(size)))
     scale, unit = (MM, "mm") if e.channels[channel].unit == "m" else (1e3, "mrad")
     told = (("as declared", d.residual_before, BEFORE), ("corrected", d.residual_after, AFTER))
-    figure = Figure(figsize=(9, 5), layout="constrained")
+    figure = new_figure(9, 5)
     ax = figure.subplots()
     assert e.order is not None
     for k, run in enumerate(np.unique(e.runs)):
@@ -121,7 +122,7 @@ def loops(d: Findings) -> Figure:
 def shared_out(d: Findings) -> Figure:
     """Bars of the shares, the largest first, on a logarithmic scale."""
     found = [(name, 100 * s) for name, s in sorted(d.shares.items(), key=lambda s: s[1]) if s >= LEAST_SHARE]
-    figure = Figure(figsize=(7, 0.8 + 0.35 * len(found)), layout="constrained")
+    figure = new_figure(7, 0.8 + 0.35 * len(found))
     ax = figure.subplots()
     effects = {str(e).partition(":")[0] for e in d.effects}
     colours = [AFTER if name in effects else "0.7" for name, _ in found]
@@ -143,7 +144,7 @@ def left(d: Findings) -> Figure:
     at = pose_means(d.experiment, d.experiment.position) * MM
     values = pose_means(d.experiment, kept(d, d.gap))[:, axis] * UM
     top = float(np.nanmax(np.abs(values))) or 1.0
-    figure = Figure(figsize=(11, 3.4), layout="constrained")
+    figure = new_figure(11, 3.4)
     row = figure.subplots(1, 3)
     for ax, (a, b) in zip(row, ((0, 1), (0, 2), (1, 2)), strict=True):
         dots = ax.scatter(at[:, a], at[:, b], c=values, cmap="coolwarm", vmin=-top, vmax=top, s=36)
@@ -156,7 +157,7 @@ def before_after(d: Findings) -> Figure:
     """Rms of what both machines leave of readings that no fit saw, and the noise."""
     unit = d.before.size[1]
     values = [UM * d.before.size[0], UM * d.after.size[0], UM * noise_size(d)]
-    figure = Figure(figsize=(4.6, 2.4), layout="constrained")
+    figure = new_figure(4.6, 2.4)
     ax = figure.subplots()
     bars = ax.barh(["your file", "corrected", "noise"], values, color=[BEFORE, AFTER, "0.7"])
     ax.bar_label(bars, [f"{v:#.3g} µ{unit}".replace(". ", " ") for v in values], padding=3)
@@ -172,7 +173,7 @@ def before_after(d: Findings) -> Figure:
 
 def histogram(d: Findings) -> Figure:
     """Residuals over the noise floor, with the normal distribution that noise alone would give."""
-    figure = Figure(figsize=(6, 3.4), layout="constrained")
+    figure = new_figure(6, 3.4)
     ax = figure.subplots()
     floor = np.array([d.noise.floor.get(c.name, np.nan) for c in d.experiment.channels])
     both = [(kept(d, r) / floor) for r in (d.residual_before, d.residual_after)]
@@ -199,7 +200,7 @@ def maps(d: Findings) -> Figure:
     x, y, force, one, other = plane_errors(d)
     if not np.isfinite(one).any() or not np.isfinite(other).any():
         raise StiffmapError("no pose of the plane of the maps has an equilibrium under this force")
-    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    figure = new_figure(11, 3.8)
     axes = figure.subplots(1, 3)
     top = float(np.nanmax([np.nanmax(np.linalg.norm(v, axis=-1)) for v in (one, other)])) * MM
     titles = ("machine of the file", "corrected machine", "difference of the two")

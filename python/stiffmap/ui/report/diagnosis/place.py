@@ -12,8 +12,10 @@ from stiffmap.identification.diagnosis.report.findings import Effect, Findings
 from stiffmap.solve.compiled import Role, Status
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.scene import draw_body, finish, flat_marks, on, scene_axes, tool
-from stiffmap.ui.plot.skeleton import owners, skeleton
+from stiffmap.ui.plot.elements import nodes_of
+from stiffmap.ui.plot.scene import draw_skeleton, finish, marks, on, scene_axes
+from stiffmap.ui.plot.skeleton import COINCIDENT, owners, skeleton
+from stiffmap.ui.plot.style import new_figure
 
 LIT, GREY = "#d62728", "0.65"
 
@@ -22,28 +24,22 @@ def place_figure(d: Findings) -> Figure:
     """The declared machine at home in grey; legs of the named effects dark, their elements red."""
     machine = d.declared
     k = inverse_kinematics(machine, machine.description.home.p)
-    figure = Figure(figsize=(4.6, 3.4), layout="constrained")
+    figure = new_figure(4.6, 3.4)
     if int(k.status) != Status.CONVERGED:
         return figure
     shape = skeleton(machine, k.coordinates)
     ax: Any = scene_axes(figure, shape, None)
     legs = {leg for e in d.effects for leg in e.legs}
-    for _, ends in shape.guides:
-        ax.plot(*on(ax, ends), color="0.85", lw=4, solid_capstyle="butt")
-    for leg, ends in shape.links:
-        named = leg in legs and len(legs) < len(machine.legs)
-        ax.plot(*on(ax, ends), color="0.2" if named else GREY, lw=2.4 if named else 1.6)
-    if len(shape.platform):
-        draw_body(ax, shape.platform)
-        tool(ax, shape)
-    marks = flat_marks(ax)
+    dark = legs if len(legs) < len(machine.legs) else ()
+    draw_skeleton(
+        ax, shape, {leg: "0.2" if leg in dark else GREY for leg in ("", *machine.legs)}, joints=False
+    )
     for e in d.effects:
-        points, ends_of = lit(machine, k.coordinates, e)
-        for ends in ends_of:
+        points, pieces = lit(machine, k.coordinates, e)
+        for ends in pieces:
             ax.plot(*on(ax, ends), color=LIT, lw=4)
-        ax.scatter(*on(ax, points if len(points) else shape.tcp[None]), s=90, color=LIT, **marks)
-    ax.scatter(*on(ax, shape.tcp), marker="*", s=90, color="#E69F00", edgecolor="black", lw=0.5, **marks)
-    finish(ax, shape)
+        ax.scatter(*on(ax, points if len(points) else shape.tcp[None]), s=90, color=LIT, **marks(ax))
+    finish(ax)
     ax.set_axis_off()
     names = [
         f"{e.element.replace('actuator', 'drive')}{' of leg ' + ', '.join(e.legs) if e.legs else ''}"
@@ -57,20 +53,12 @@ def lit(machine: Machine, coordinates: Floats, e: Effect) -> tuple[Floats, list[
     """Points (n, 3) and pieces (2, 3) of the element that an effect names; nothing for instruments and loads."""
     core = machine.compiled
     position, _ = core.frames(coordinates)
-    owner = owners(core)
-    wanted = e.element.split(".")
-    points, pieces = [], []
-    for i, (parent, c) in enumerate(core.nodes):
-        if c < 0:
-            continue
-        parts = core.names.coordinates[c].split(".")
-        if (e.legs and parts[0] not in e.legs) or not any(
-            parts[k : k + len(wanted)] == wanted for k in range(len(parts))
-        ):
-            continue
-        points.append(position[i])
-        spring = core.names.roles[c] == Role.SPRING
-        if spring and parent > 0 and owner[i] and np.linalg.norm(position[i] - position[parent]) > 1e-9:
-            pieces.append(position[[parent, i]])
-    unique = np.unique(np.round(np.array(points).reshape(-1, 3), 9), axis=0)
-    return unique, pieces
+    owner, found = owners(core), list(nodes_of(core, e.element, e.legs))
+    pieces = [
+        position[[parent, i]]
+        for i in found
+        for parent, c in (core.nodes[i],)
+        if core.names.roles[c] == Role.SPRING and parent > 0 and owner[i]
+        if np.linalg.norm(position[i] - position[parent]) > COINCIDENT
+    ]
+    return np.unique(np.round(position[found], 9), axis=0), pieces

@@ -8,7 +8,8 @@ from scipy.stats import f as f_distribution
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.identification.diagnosis.report.findings import Findings
-from stiffmap.ui.report.diagnosis.drawn import AFTER, BEFORE, MM, UM, kept
+from stiffmap.ui.plot.experiment import kept
+from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 
 Driver = tuple[str, Floats]
 """Label and value of each row."""
@@ -54,7 +55,7 @@ def trends(d: Findings, against: list[Driver]) -> Figure:
     axes_read = [int(i) for i in np.flatnonzero(d.experiment.axis_read)]
     channels = d.experiment.channels
     # a row per driver fits an upright page; its columns are the channels
-    figure = Figure(figsize=(max(6.0, 3.0 * len(axes_read)), 1.9 * len(against) + 0.6), layout="constrained")
+    figure = new_figure(max(6.0, 3.0 * len(axes_read)), 1.9 * len(against) + 0.6)
     grid = figure.subplots(len(against), len(axes_read), squeeze=False, sharex="row", sharey="col")
     for row, (name, x) in enumerate(against):
         for column, axis in enumerate(axes_read):

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.pictures.workspace import INSIDE, name_axes, paint, patches, planes_of, section
-from stiffmap.ui.plot.style import BLACK, BLUE, MM, headline, legend_below, new_figure, paper_style
+from stiffmap.ui.plot.style import BLACK, BLUE, MM, paper
+from stiffmap.ui.plot.workspace import edges, name_axes, paint, planes_of, section
 from stiffmap.workspace.performance.box.box import LargestBox
 from stiffmap.workspace.performance.box.cell import BOX
 from stiffmap.workspace.performance.box.inside import REACH
@@ -37,37 +35,29 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = NODES) -> Figure:
     at = _tightest(box)
     declared = np.allclose(box.orientation, np.eye(3))
     marks = "xyz" if declared else ("x′", "y′", "z′")
-    seen = dict(INSIDE)
-    with paper_style():
-        figure = new_figure(max(3.1 * len(planes) + 0.4, 4.4), 4.1)
+    ends = f"; limited by {', '.join(box.limited_by)}" if box.limited_by else ""
+    sure = "proven" if box.proven else "sampled"
+    title = (
+        f"{machine.name}: largest box {_edges(box)} mm ({sure}), none of {MM * box.edge_upper:.2f} mm{ends}"
+    )
+    with paper(max(3.1 * len(planes) + 0.4, 4.4), 4.1, title, most=4) as figure:
         for axes, (a, b) in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
             middle, reach = (low + high) / 2, AROUND * (high - low)
             u, v = (np.linspace(middle[i] - reach[i], middle[i] + reach[i], nodes) for i in (a, b))
             closed, limits = box.bounds.at(section(at, a, b, u, v) @ box.orientation.T)
             broken = {limit.name: closed & ~(limit.value <= limit.most) for limit in limits}
             inside = closed & ~np.any([*broken.values(), np.zeros_like(closed)], axis=0)
-            paint(axes, u, v, inside, broken | {REACH: ~closed}, seen)
-            axes.add_patch(_frame(low, high, a, b, BLUE, "-", 1.6))
+            paint(axes, u, v, inside, broken | {REACH: ~closed})
+            axes.add_patch(edges(low, high, a, b, edgecolor=BLUE, linewidth=1.6, label="largest box"))
             if declared:
-                space = machine.workspace
-                axes.add_patch(_frame(space[0], space[1], a, b, BLACK, ":", 1.0))
-            axes.plot(*(MM * at[[a, b]]), "o", color=BLUE, markersize=5, clip_on=False)
+                box_there, words = machine.workspace, "box of the machine file"
+                space = edges(box_there[0], box_there[1], a, b, edgecolor=BLACK, linestyle=":", label=words)
+                axes.add_patch(space)
+            corner = "its corner nearest to a limit"
+            axes.plot(*(MM * at[[a, b]]), "o", color=BLUE, markersize=5, clip_on=False, label=corner)
             name_axes(axes, a, b, at, marks)
             axes.set_xlim(MM * u[0], MM * u[-1])
             axes.set_ylim(MM * v[0], MM * v[-1])
-        extra: list[Patch | Line2D] = [
-            Patch(fill=False, edgecolor=BLUE, linewidth=1.6, label="largest box"),
-            Line2D([], [], marker="o", linestyle="", color=BLUE, label="its corner nearest to a limit"),
-        ]
-        if declared:
-            extra.append(Patch(fill=False, edgecolor=BLACK, linestyle=":", label="box of the machine file"))
-        legend_below(figure, [*patches(seen), *extra], most=4)
-        ends = f"; limited by {', '.join(box.limited_by)}" if box.limited_by else ""
-        sure = "proven" if box.proven else "sampled"
-        headline(
-            figure,
-            f"{machine.name}: largest box {_edges(box)} mm ({sure}), none of {MM * box.edge_upper:.2f} mm{ends}",
-        )
     return figure
 
 
@@ -82,16 +72,3 @@ def _tightest(box: LargestBox) -> Floats:
     _, limits = box.bounds.at(corners @ box.orientation.T)
     room = [(limit.most - limit.value) / max(abs(limit.most), 1e-9) for limit in limits]
     return np.asarray(corners[int(np.argmin(np.min(room, axis=0)))] if room else corners[0])
-
-
-def _frame(low: Floats, high: Floats, a: int, b: int, colour: str, style: str, width: float) -> Rectangle:
-    size = MM * (high - low)
-    return Rectangle(
-        (MM * low[a], MM * low[b]),
-        size[a],
-        size[b],
-        fill=False,
-        edgecolor=colour,
-        linestyle=style,
-        linewidth=width,
-    )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 
 from stiffmap.common.outputs import write_picture
@@ -13,18 +12,16 @@ from stiffmap.model.link.arrays import Floats, Ints
 from stiffmap.model.link.pipeline import PartLink
 from stiffmap.model.link.report import unit_factor, unit_name
 from stiffmap.model.link.result import Link
+from stiffmap.ui.plot.style import BLUE, COLOURS, VERMILLION, new_figure, wrench_text
 
-matplotlib.use("Agg", force=False)
-BLUE, GREY = "#0072B2", "#999999"
+GREY = "#999999"
 MOST_TRIANGLES = 6000
 
 
 def draw_part_link(part: PartLink, path: str | Path) -> None:
     """Write a PNG: a row of deformed shapes, a row of residual fields, the table with error bars."""
-    from matplotlib import pyplot as plt
-
     cases = min(len(part.wrenches), 6)
-    figure = plt.figure(figsize=(17, 13), layout="constrained")
+    figure = new_figure(17, 13)
     rows: Any = figure.subfigures(3, 1, height_ratios=(1.0, 0.9, 1.5))
     shapes, residuals, table = rows
     triangles = boundary_triangles(part.mesh.tets)
@@ -32,19 +29,17 @@ def draw_part_link(part: PartLink, path: str | Path) -> None:
         _draw_shape(shapes.add_subplot(1, cases, k + 1, projection="3d"), part, triangles, k)
     _draw_residuals(residuals, part.link, cases)
     _draw_entries(table.add_subplot(), part.link, part.budget.standard_error())
-    _save(figure, path)
+    write_picture(path, figure, dpi=110)
 
 
 def draw_link(link: Link, path: str | Path) -> None:
     """Write a PNG of a link identified from a given field: residual fields and the table."""
-    from matplotlib import pyplot as plt
-
-    figure = plt.figure(figsize=(17, 9), layout="constrained")
+    figure = new_figure(17, 9)
     rows: Any = figure.subfigures(2, 1, height_ratios=(0.9, 1.5))
     residuals, table = rows
     _draw_residuals(residuals, link, min(len(link.sigma), 6))
     _draw_entries(table.add_subplot(), link, link.standard_error)
-    _save(figure, path)
+    write_picture(path, figure, dpi=110)
 
 
 def boundary_triangles(tets: Ints) -> Ints:
@@ -63,10 +58,10 @@ def _draw_residuals(figure: Any, link: Link, cases: int) -> None:
     for k in range(cases):
         axes = figure.add_subplot(1, cases, k + 1)
         size = 1e6 * np.linalg.norm(residual[k], axis=1)
-        dots = axes.scatter(x, y, c=size, s=12, cmap="cividis")
+        dots = axes.scatter(x, y, c=size, s=12, cmap=COLOURS)
         axes.quiver(x, y, residual[k, :, a], residual[k, :, b], angles="xy", width=0.005)
         out = link.outliers[k]
-        axes.plot(x[out], y[out], "x", color="#D55E00", label="outlier")
+        axes.plot(x[out], y[out], "x", color=VERMILLION, label="outlier")
         figure.colorbar(dots, ax=axes, label="residual, µm", location="bottom")
         axes.set(title=f"case {k + 1}", xlabel=f"{'xyz'[a]}, mm", aspect="equal")
         if k == 0:
@@ -94,16 +89,8 @@ def _draw_shape(axes: Any, part: PartLink, triangles: Ints, case: int) -> None:
     for axis, width in zip("xyz", size, strict=True):  # labels of a thin side would overlap
         axes.locator_params(axis=axis, nbins=4 if width > 0.5 * size.max() else 2)
     axes.set_title(
-        f"case {case + 1}: {wrench_words(part.wrenches[case])}\n(displacement × {scale:.0f})", fontsize=9
+        f"case {case + 1}: {wrench_text(part.wrenches[case])}\n(displacement × {scale:.0f})", fontsize=9
     )
-
-
-def wrench_words(wrench: Floats) -> str:
-    """For example ``Fx = 100 N``; only what is not zero."""
-    names = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
-    units = ("N",) * 3 + ("N·m",) * 3
-    parts = [f"{n} = {w:g} {u}" for n, u, w in zip(names, units, wrench, strict=True) if w]
-    return ", ".join(parts) or "no load"
 
 
 def _draw_entries(axes: Any, link: Link, error: Floats) -> None:
@@ -124,12 +111,3 @@ def _draw_entries(axes: Any, link: Link, error: Floats) -> None:
     axes.set_yticks(y, labels, fontsize=8, family="monospace")
     axes.set_xlabel("entry / sqrt(kii kjj), with 95 % interval (± in the labels: one standard uncertainty)")
     axes.grid(axis="x", alpha=0.3)
-
-
-def _save(figure: Any, path: str | Path) -> None:
-    from matplotlib import pyplot as plt
-
-    try:
-        write_picture(path, figure, dpi=110)
-    finally:
-        plt.close(figure)

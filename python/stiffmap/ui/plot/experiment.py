@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,10 @@ from matplotlib.figure import Figure
 
 from stiffmap.experiment.comparison.residual import Residual
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.ui.plot.style import Picture
+from stiffmap.identification.diagnosis.report.findings import Findings
+from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 
-UM, MM = 1e6, 1e3
-COLOUR, NOISE, ASIDE = "#2a6f97", "#d9d9d9", "#c1432e"
+NOISE = "#d9d9d9"
 MOST_LABELS = 12
 FLAT = 0.05
 """Share of the largest extent below which poses lie in a plane."""
@@ -31,32 +32,45 @@ def figures(r: Residual) -> dict[str, Figure]:
         "residual_history": history_drivers(r.experiment),
     }
     made = {name: against(r, drivers, drawn) for name, drivers in groups.items() if drivers}
-    vector = np.isfinite(_mean(r.experiment, r.values)[:, :3]).all(axis=1).any()
+    vector = np.isfinite(pose_means(r.experiment, r.values)[:, :3]).all(axis=1).any()
     return {"residual_vectors": vectors(r)} | made if vector else made
 
 
 def vectors(r: Residual) -> Figure:
-    """Mean residual vector of each pose in three views of the workspace, on one scale.
+    """Mean residual vector of each pose in the views of the workspace, on one scale.
 
     Deflections: a row for the loads along x, y and z each, residuals turned with the sign of the force.
     """
     e = r.experiment
-    at = _mean(e, e.position) * MM
-    means = [(name, _mean(e, _kept(r)[:, :3] * weight[:, None])) for name, weight in vector_cases(e)]
-    longest = max(1e-12, *(float(np.nanmax(np.linalg.norm(m, axis=1), initial=0.0)) for _, m in means))
-    scale = 0.2 * max(float(np.ptp(at, axis=0).max()), 1.0) / longest
-    shown = views(at)
-    width = 11.0 if len(shown) == 3 else 6.0
-    figure = Picture(
-        figsize=(width, (3.7 if len(shown) == 3 else 5.0) * len(means) + 0.3), layout="constrained"
-    )
-    grid = figure.subplots(len(means), len(shown), squeeze=False)
-    for row, (name, mean) in zip(grid, means, strict=True):
-        for ax, view in zip(row, shown, strict=True):
-            _arrows(ax, at, np.nan_to_num(mean) * scale, view)
-        row[len(row) // 2].set_title(name)
+    means = [
+        (name, pose_means(e, kept(r, r.values)[:, :3] * weight[:, None]), AFTER)
+        for name, weight in vector_cases(e)
+    ]
+    figure, longest = arrow_figure(pose_means(e, e.position), means)
     figure.suptitle(f"{e.name}: mean residual of each pose; longest arrow {longest * UM:.1f} µm")
     return figure
+
+
+def arrow_figure(at: Floats, cases: Sequence[tuple[str, Floats, str]]) -> tuple[Figure, float]:
+    """Arrows at poses (n, 3) m in the views in which these spread, on one scale, and the length of the longest, m.
+
+    cases: title, arrows (n, 3) m and colour of each row; of poses in one plane they stand side by side.
+    """
+    longest = max(1e-12, *(float(np.nanmax(np.linalg.norm(v, axis=1), initial=0.0)) for _, v, _ in cases))
+    at = at * MM
+    scale = 0.2 * max(float(np.ptp(at, axis=0).max()), 1.0) / longest
+    shown = views(at)
+    if len(shown) == 1:
+        figure = new_figure(5.0 * len(cases), 5.0)
+        grid = figure.subplots(1, len(cases), squeeze=False, sharex=True, sharey=True).T
+    else:
+        figure = new_figure(11.0, 3.7 * len(cases) + 0.3)
+        grid = figure.subplots(len(cases), len(shown), squeeze=False, sharex="col", sharey="col")
+    for row, (name, arrows, colour) in zip(grid, cases, strict=True):
+        for ax, view in zip(row, shown, strict=True):
+            _arrows(ax, at, np.nan_to_num(arrows) * scale, view, colour)
+        row[len(row) // 2].set_title(name)
+    return figure, longest
 
 
 def vector_cases(e: Experiment) -> list[tuple[str, Floats]]:
@@ -84,24 +98,22 @@ def views(at: Floats) -> tuple[tuple[int, int], ...]:
     return tuple(v for v in all_ if flat[0] not in v)
 
 
-def _arrows(ax: Any, at: Floats, arrow: Floats, view: tuple[int, int]) -> None:
+def _arrows(ax: Any, at: Floats, arrow: Floats, view: tuple[int, int], colour: str) -> None:
     a, b = view
     ax.quiver(
         *(at[:, a], at[:, b], arrow[:, a], arrow[:, b]),
-        angles="xy", scale_units="xy", scale=1, color=COLOUR, width=0.006,
+        angles="xy", scale_units="xy", scale=1, color=colour, width=0.006,
     )  # fmt: skip
     ax.plot(at[:, a], at[:, b], ".", ms=3, color="0.4")
-    ends = np.vstack([at[:, [a, b]], at[:, [a, b]] + arrow[:, [a, b]]])
-    low, high = ends.min(axis=0), ends.max(axis=0)
-    room = 0.1 * max(float((high - low).max()), 1.0)  # autoscaling sees the tails of arrows only
+    ax.update_datalim((at + arrow)[:, [a, b]])  # autoscaling sees the tails of arrows only
+    ax.margins(0.1)
+    ax.tick_params(labelbottom=True, labelleft=True)  # also where axes are shared
     ax.set(xlabel=f"{'xyz'[a]}, mm", ylabel=f"{'xyz'[b]}, mm", aspect="equal")
-    ax.set_xlim(low[0] - room, high[0] + room)
-    ax.set_ylim(low[1] - room, high[1] + room)
 
 
 def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:
     """Residual of each channel against each driver; the band is two noise floors wide to each side."""
-    figure = Picture(figsize=(2.5 * len(drivers) + 1.0, 1.7 * len(channels) + 0.9), layout="constrained")
+    figure = new_figure(2.5 * len(drivers) + 1.0, 1.7 * len(channels) + 0.9)
     grid = figure.subplots(len(channels), len(drivers), squeeze=False, sharex="col", sharey="row")
     for row, channel in enumerate(channels):
         for column, driver in enumerate(drivers):
@@ -120,12 +132,12 @@ def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:
 def _scatter(ax: Any, r: Residual, channel: int, driver: Driver) -> None:
     _, x, labels = driver
     values, floor = r.values[:, channel], float(r.noise.floor[channel])
-    scale = UM if r.experiment.channels[channel].unit == "m" else 1e6
+    scale = UM  # µm or µrad
     ax.axhspan(-2 * floor * scale, 2 * floor * scale, color=NOISE, lw=0)
     ax.axhline(0, color="0.5", lw=0.6)
     spread = 0.12 * np.sin(np.arange(len(x)) * 2.4) if labels else 0.0
-    ax.plot((x + spread)[~r.set_aside], values[~r.set_aside] * scale, ".", ms=3, color=COLOUR, alpha=0.6)
-    ax.plot((x + spread)[r.set_aside], values[r.set_aside] * scale, "x", ms=5, color=ASIDE)
+    ax.plot((x + spread)[~r.set_aside], values[~r.set_aside] * scale, ".", ms=3, color=AFTER, alpha=0.6)
+    ax.plot((x + spread)[r.set_aside], values[r.set_aside] * scale, "x", ms=5, color=BEFORE)
     if labels:
         ax.set_xticks(range(len(labels)), labels, fontsize=7, rotation=30 if len(labels) > 3 else 0)
         ax.set_xlim(-0.5, len(labels) - 0.5)
@@ -190,11 +202,12 @@ def history_drivers(e: Experiment) -> list[Driver]:
     return out
 
 
-def _kept(r: Residual) -> Floats:
-    return np.where(r.set_aside[:, None], np.nan, r.values)
+def kept(found: Residual | Findings, values: Floats) -> Floats:
+    """(n, k) values, NaN in rows that were set aside."""
+    return np.where(found.set_aside[:, None], np.nan, values)
 
 
-def _mean(e: Experiment, values: Floats) -> Floats:
+def pose_means(e: Experiment, values: Floats) -> Floats:
     """(groups, k) mean of what is finite of each pose."""
     number, good = int(e.groups.max()) + 1, np.isfinite(values)
     sums = [np.bincount(e.groups, v, number) for v in np.where(good, values, 0.0).T]

@@ -11,35 +11,13 @@ from matplotlib.figure import Figure
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.milling.job import Milled
-from stiffmap.solve.kinematics import inverse_kinematics
-from stiffmap.ui.plot.machines import draw_skeleton, look_from
-from stiffmap.ui.plot.skeleton import skeleton
-from stiffmap.ui.plot.style import (
-    BLACK,
-    BLUE,
-    COLOURS,
-    GREEN,
-    MM,
-    TOLERANCE,
-    headline,
-    legend_below,
-    length_unit,
-    new_figure,
-    paper_style,
-)  # fmt: skip
+from stiffmap.ui.plot.loaded import round_factor
+from stiffmap.ui.plot.scene import draw_skeleton, finish, on, scene_axes
+from stiffmap.ui.plot.skeleton import standing
+from stiffmap.ui.plot.style import BLACK, BLUE, COLOURS, GREEN, MM, TOLERANCE, leg_colours, length_unit, paper
 
 SHARE = 0.08
 """Of the outline's size, that the largest error takes as it is drawn."""
-ROUND = (1, 2, 5)
-
-
-def magnification(size: float, largest: float) -> float:
-    """A round number by which errors are drawn larger."""
-    if not largest > 0:
-        return 1.0
-    wanted = SHARE * size / largest
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(max(power * max(r for r in ROUND if r * power <= wanted * 1.0001), 1.0))
 
 
 def outline_figure(found: Milled) -> Figure:
@@ -50,10 +28,9 @@ def outline_figure(found: Milled) -> Figure:
     wall = job.points.position - side * off
     before, after = ds.error_normal.values, ds.error_normal_after.values
     size = float(np.ptp(wall[:, :2], axis=0).max())
-    factor = magnification(size, float(np.nanmax(np.abs(before), initial=0.0)))
+    factor = max(round_factor(SHARE * size, float(np.nanmax(np.abs(before), initial=0.0))), 1.0)
     unit, scale = length_unit(float(np.nanmax(np.abs(before), initial=0.0)))
-    with paper_style():
-        figure = new_figure(6.4, 4.8)
+    with paper(6.4, 4.8, f"Wall of the part; errors drawn {factor:g} times larger") as figure:
         ax: Any = figure.subplots()
         ax.plot(*(MM * wall[:, :2].T), color=BLACK, lw=1.0, label="wanted")
         cut = MM * (wall + factor * before[:, None] * off)[:, :2]
@@ -71,8 +48,6 @@ def outline_figure(found: Milled) -> Figure:
         ax.set_aspect("equal")
         ax.autoscale_view()
         ax.set(xlabel="x of the part, mm", ylabel="y of the part, mm")
-        headline(figure, f"Wall of the part; errors drawn {factor:g} times larger")
-        legend_below(figure, ax.get_legend_handles_labels()[0])
     return figure
 
 
@@ -84,8 +59,7 @@ def error_figure(ds: xr.Dataset) -> Figure:
     """Errors across the wall over the way along the path; below, those of the compensated program in their own scale."""
     way = MM * ds.way.values
     unit, scale = length_unit(float(np.nanmax(np.abs(ds.error_normal.values), initial=0.0)))
-    with paper_style():
-        figure = new_figure(6.4, 5.0)
+    with paper(6.4, 5.0, f"{ds.attrs['machine']}, {ds.attrs['path']}, {ds.attrs['process']}") as figure:
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
         top.plot(way, scale * ds.error_normal, color=BLUE, label="as it is cut")
         top.plot(way, scale * ds.error_normal_after, color=GREEN, ls="--", label="compensated")
@@ -117,9 +91,6 @@ def error_figure(ds: xr.Dataset) -> Figure:
             )  # fmt: skip
         bottom.axhline(0, color="0.7", lw=0.6, zorder=0)
         bottom.set(xlabel="way along the path, mm", ylabel=f"compensated, {fine}")
-        handles = [*top.get_legend_handles_labels()[0], *bottom.get_legend_handles_labels()[0]]
-        headline(figure, f"{ds.attrs['machine']}, {ds.attrs['path']}, {ds.attrs['process']}")
-        legend_below(figure, handles)
     return figure
 
 
@@ -127,16 +98,10 @@ def machine_path_figure(found: Milled) -> Figure:
     """The path on the machine, which stands where the error is largest."""
     job, ds = found.job, found.dataset
     worst = int(np.nanargmax(np.abs(np.nan_to_num(ds.error_normal.values))))
-    k = inverse_kinematics(job.machine, job.position[worst], job.rotation[worst])
-    shape = skeleton(job.machine, k.coordinates)
-    with paper_style():
-        figure = new_figure(5.6, 5.2)
-        ax: Any = figure.add_subplot(projection="3d")
-        draw_skeleton(ax, shape, job.machine.legs)
-        ax.plot(*(MM * job.position.T), color=BLACK, lw=1.6, label="path")
-        ax.set_aspect("equal")
-        look_from(ax, shape, None)
-        ax.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
-        headline(figure, f"{job.machine.name}: the tool where the error is largest")
-        legend_below(figure, ax.get_legend_handles_labels()[0], most=4)
+    shape = standing(job.machine, job.position[worst], job.rotation[worst])
+    with paper(5.6, 5.2, f"{job.machine.name}: the tool where the error is largest", most=4) as figure:
+        ax: Any = scene_axes(figure, shape, None)
+        draw_skeleton(ax, shape, leg_colours(job.machine.legs))
+        ax.plot(*on(ax, job.position), color=BLACK, lw=1.6, label="path")
+        finish(ax)
     return figure

@@ -10,17 +10,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.plot.style import (
-    BLUE,
-    COLOURS,
-    CYCLE,
-    MM,
-    SKY,
-    VERMILLION,
-    headline,
-    new_figure,
-    paper_style,
-)
+from stiffmap.ui.plot.style import BLUE, COLOURS, CYCLE, MM, SKY, VERMILLION, headline, paper
 from stiffmap.workspace.design.search import ParetoSet
 from stiffmap.workspace.performance.box.box_map import BoxMap, box_map, levels
 from stiffmap.workspace.performance.registry import get_measure
@@ -34,8 +24,12 @@ def front_figure(found: ParetoSet) -> Figure:
     names = found.design.model.objectives
     pairs = list(combinations(range(len(names)), 2)) or [(0, 0)]
     values = np.array([[get_measure(n).factor * j.values[n] for n in names] for j in found.judged])
-    with paper_style():
-        figure = new_figure(3.6 * len(pairs), 3.2)
+    with paper(
+        3.6 * len(pairs),
+        3.2,
+        f"{found.design.model.name}: {len(found.x)} designs that no other one betters",
+        most=0,
+    ) as figure:
         for axes, (a, b) in zip(figure.subplots(1, len(pairs), squeeze=False)[0], pairs, strict=True):
             axes.plot(values[:, a], values[:, b], "o", color=SKY, markersize=4)
             for colour, (label, i) in zip(CYCLE[1:], found.chosen().items(), strict=False):
@@ -43,7 +37,6 @@ def front_figure(found: ParetoSet) -> Figure:
             axes.set_xlabel(_axis(names[a]))
             axes.set_ylabel(_axis(names[b]))
             axes.legend()
-        headline(figure, f"{found.design.model.name}: {len(found.x)} designs that no other one betters")
     return figure
 
 
@@ -54,8 +47,7 @@ def parallel_figure(found: ParetoSet) -> Figure:
     labels = [*found.design.variables, *names]
     low, high = table.min(axis=0), table.max(axis=0)
     scaled = (table - low) / np.where(high > low, high - low, 1)
-    with paper_style():
-        figure = new_figure(max(6.0, 0.9 * len(labels)), 3.4)
+    with paper(max(6.0, 0.9 * len(labels)), 3.4, most=0) as figure:
         axes = figure.add_subplot()
         axes.plot(scaled.T, color=BLUE, alpha=0.25, linewidth=0.8)
         axes.plot(scaled[found.chosen()["compromise"]], color=VERMILLION, linewidth=1.6)
@@ -74,8 +66,7 @@ def parallel_figure(found: ParetoSet) -> Figure:
 def progress_figure(found: ParetoSet) -> Figure:
     """Hypervolume against evaluations."""
     steps = np.array(found.history)
-    with paper_style():
-        figure = new_figure(4.2, 3.0)
+    with paper(4.2, 3.0, most=0) as figure:
         axes = figure.add_subplot()
         axes.plot(steps[:, 1], steps[:, 2], color=BLUE)
         axes.set_xlabel("designs evaluated")
@@ -88,8 +79,7 @@ def beside_figure(tables: Mapping[str, MeasuresTable], names: Sequence[str] = MA
     rows = [n for n in names if all(_map(t, n) is not None for t in tables.values())]
     if not rows:
         raise StiffmapError(f"no maps to set side by side; asked for {', '.join(names)}")
-    with paper_style():
-        figure = new_figure(2.2 * len(tables) + 0.8, 2.3 * len(rows) + 0.4)
+    with paper(2.2 * len(tables) + 0.8, 2.3 * len(rows) + 0.4, most=0) as figure:
         grid = figure.subplots(len(rows), len(tables), squeeze=False)
         for line, name in zip(grid, rows, strict=True):
             maps = {k: m for k, t in tables.items() if (m := _map(t, name)) is not None}

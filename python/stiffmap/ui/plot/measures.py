@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.pictures.box import box_figure
-from stiffmap.ui.pictures.modes import mode_figure, mode_frames
-from stiffmap.ui.pictures.paths import ALONG, path_measures_figure, path_rows
-from stiffmap.ui.pictures.workspace import workspace_figure
-from stiffmap.ui.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, headline, new_figure, paper_style
+from stiffmap.ui.plot.along_paths import ALONG, path_measures_figure, path_rows
+from stiffmap.ui.plot.box import box_figure
+from stiffmap.ui.plot.modes import mode_figure, mode_frames
+from stiffmap.ui.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, headline, paper
+from stiffmap.ui.plot.workspace import workspace_figure
 from stiffmap.workspace.performance.box.box import LargestBox
 from stiffmap.workspace.performance.box.box_map import box_map, levels
 from stiffmap.workspace.performance.box.workspace import Workspace
@@ -35,8 +35,7 @@ def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy"
     j = v.jacobian[:3]
     if not np.isfinite(j).all():
         raise StiffmapError(f"{machine.name}: no Jacobian at {p.tolist()} m (status {int(v.status)})")
-    with paper_style():
-        figure = new_figure(11.0, 4.2)
+    with paper(11.0, 4.2, most=0) as figure:
         axes: list[Any] = [figure.add_subplot(1, 3, i, projection="3d" if i < 3 else None) for i in (1, 2, 3)]
         _ellipsoid(axes[0], j)
         axes[0].set_title(f"(a) sphere: {v.sphere_min:.3g} … {v.sphere_max:.3g}", y=0.95)
@@ -150,8 +149,7 @@ def caption(name: str) -> str:
 def requirement_figure(table: MeasuresTable) -> Figure:
     """Each requirement as a bar: worst value over the bound, the line at 1 is the bound."""
     rows = [r for r in table.rows if r.bound is not None]
-    with paper_style():
-        figure = new_figure(6.4, 0.6 + 0.42 * len(rows))
+    with paper(6.4, 0.6 + 0.42 * len(rows), most=0) as figure:
         axes = figure.add_subplot()
         for i, r in enumerate(rows):
             share = _share(r)
@@ -190,8 +188,7 @@ def map_figure(table: MeasuresTable, row: Row) -> Figure:
     assert over is not None
     x, y, z, grid = over
     planes = sorted({0, len(z) // 2, len(z) - 1})
-    with paper_style():
-        figure = new_figure(3.0 * len(planes) + 0.8, 3.2)
+    with paper(3.0 * len(planes) + 0.8, 3.2, most=0) as figure:
         axes = figure.subplots(1, len(planes), squeeze=False)[0]
         steps = levels(grid)
         for a, k in zip(axes, planes, strict=True):

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.style import BLACK, GREEN, MM, ORANGE, PURPLE, SKY, VERMILLION, new_figure, paper_style
+from stiffmap.ui.plot.style import BLACK, GREEN, MM, ORANGE, PURPLE, SKY, VERMILLION, paper
 from stiffmap.workspace.performance.box.inside import REACH
 from stiffmap.workspace.performance.box.workspace import Workspace
 
@@ -30,7 +31,6 @@ KINDS = (
     ("deflection", GREEN, "deflection"),
 )
 """How a limit's name begins, its colour and its words; where several are broken, the first of these counts."""
-INSIDE = {0: ("inside", SKY)}
 
 
 def workspace_figure(machine: Machine, found: Workspace, nodes: int = NODES) -> Figure:
@@ -45,22 +45,15 @@ def workspace_figure(machine: Machine, found: Workspace, nodes: int = NODES) -> 
     planes = planes_of(moves)
     middle = found.box.mean(axis=0)
     low, high = machine.workspace
-    seen = dict(INSIDE)
-    with paper_style():
-        figure = new_figure(max(3.0 * len(planes) + 0.4, 4.0), 3.9)
+    unit = {2: "m²", 3: "m³"}[found.dimension]
+    title = f"{machine.name}: workspace, {found.volume:.4g} ± {found.error:.1g} {unit}"
+    with paper(max(3.0 * len(planes) + 0.4, 4.0), 3.9, title, most=1 + len(planes)) as figure:
         for axes, (a, b) in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
             u, v = (np.linspace(float(found.region[0, i]), float(found.region[1, i]), nodes) for i in (a, b))
             judged = found.at(section(middle, a, b, u, v))
-            paint(axes, u, v, judged.inside, judged.causes(), seen)
-            axes.add_patch(
-                Rectangle(MM * low[[a, b]], *(MM * (high - low)[[a, b]]), fill=False, linewidth=1.0)
-            )
+            paint(axes, u, v, judged.inside, judged.causes())
+            axes.add_patch(edges(low, high, a, b, edgecolor=BLACK, label="box of the machine file"))
             name_axes(axes, a, b, middle)
-        handles = patches(seen)
-        handles.append(Patch(fill=False, edgecolor="black", label="box of the machine file"))
-        figure.legend(handles=handles, loc="outside lower center", ncols=1 + len(planes))
-        unit = {2: "m²", 3: "m³"}[found.dimension]
-        figure.suptitle(f"{machine.name}: workspace, {found.volume:.4g} ± {found.error:.1g} {unit}")
     return figure
 
 
@@ -85,8 +78,9 @@ def name_axes(axes: Axes, a: int, b: int, at: Floats, marks: Sequence[str] = "xy
     axes.set_aspect("equal")
 
 
-Seen = dict[int, tuple[str, str]]
-"""Kinds that a picture shows: words and colour."""
+def edges(low: Floats, high: Floats, a: int, b: int, **look: Any) -> Rectangle:
+    """A box between two corners (3,) m, as a section shows it."""
+    return Rectangle((MM * low[a], MM * low[b]), *(MM * (high - low)[[a, b]]), fill=False, **look)
 
 
 def paint(
@@ -95,23 +89,19 @@ def paint(
     v: Floats,
     inside: NDArray[np.bool_],
     broken: Mapping[str, NDArray[np.bool_]],
-    seen: Seen,
 ) -> None:
-    """Poses on the nodes of u and v (m), first axis u, coloured by what excludes them; adds what it shows to `seen`."""
-    kind = np.where(inside, 0, 1)
+    """Poses on the nodes of u and v (m), first axis u, coloured by what excludes them."""
+    kind, seen = np.where(inside, 0, 1), {"inside": SKY}
     for number, (begin, colour, words) in reversed(list(enumerate(KINDS, 1))):
         for name, bad in broken.items():
             if name.startswith(begin):
                 kind[bad & ~inside] = number
                 if (bad & ~inside).any():
-                    seen[number] = (words, colour)
+                    seen[words] = colour
     shown = ListedColormap([SKY, *(colour for _, colour, _ in KINDS)])
     axes.pcolormesh(
         MM * u, MM * v, kind.reshape(len(u), len(v)).T, cmap=shown, vmin=-0.5, vmax=len(KINDS) + 0.5,
         shading="nearest", rasterized=True,
     )  # fmt: skip
-
-
-def patches(seen: Seen) -> list[Patch]:
-    """Entries of a legend."""
-    return [Patch(facecolor=c, edgecolor="0.6", label=w) for w, c in dict.fromkeys(seen.values())]
+    for words, colour in seen.items():
+        axes.fill([], [], facecolor=colour, edgecolor="0.6", label=words)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.plot.style import BLACK, CYCLE, DASHES, MM, headline, legend_below, new_figure, paper_style
+from stiffmap.ui.plot.style import BLACK, MM, headline, line_look, paper
 from stiffmap.workspace.performance.table import MeasuresTable, Row
 
 ALONG = ("path_compliance", "path_effort")
@@ -30,8 +30,7 @@ def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
     if not names:
         raise StiffmapError("no measure along a toolpath; asked for path_compliance, path_effort")
     one = len(tables) == 1
-    with paper_style():
-        figure = new_figure(6.4, 0.9 + 2.2 * len(names))
+    with paper(6.4, 0.9 + 2.2 * len(names)) as figure:
         panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
         for axes, name in zip(panels, names, strict=True):
             for i, (machine, table) in enumerate(tables.items()):
@@ -40,9 +39,6 @@ def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
                         _lines(axes, row, machine, i, one)
             axes.set_ylim(bottom=0)
         panels[-1].set_xlabel("way along the path, mm")
-        shown = {h.get_label(): h for axes in panels for h in axes.get_legend_handles_labels()[0]}
-        if shown:
-            legend_below(figure, list(shown.values()))
         told = f"{next(iter(tables))}: along" if one else "Along"
         headline(figure, f"{told} the toolpath, with its force")
     return figure
@@ -56,18 +52,10 @@ def _lines(axes: Axes, row: Row, machine: str, number: int, one: bool) -> None:
     share = row.found.extra.get("share")
     if one and isinstance(share, np.ndarray):
         for j, drive in enumerate(row.found.extra["drives"]):  # type: ignore[arg-type, var-annotated]
-            axes.plot(
-                way,
-                share[:, j],
-                color=CYCLE[j % len(CYCLE)],
-                linestyle=DASHES[j % len(DASHES)],
-                label=str(drive),
-            )
+            axes.plot(way, share[:, j], label=str(drive), **line_look(j))
     else:
-        colour, dash = BLACK if one else CYCLE[number % len(CYCLE)], DASHES[number % len(DASHES)]
-        axes.plot(
-            way, row.measure.factor * values, color=colour, linestyle=dash, label="" if one else machine
-        )
+        look = line_look(number) | ({"color": BLACK, "label": ""} if one else {"label": machine})
+        axes.plot(way, row.measure.factor * values, **look)
     unit = "share of the declared effort" if share is not None else f"compliance, {row.measure.shown}"
     axes.set_ylabel(unit)
     limit = None if row.bound is None else row.bound.at_most

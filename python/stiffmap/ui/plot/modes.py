@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -62,7 +62,7 @@ class _Scene:
                 f"{machine.name}: no mode at {np.asarray(position).tolist()} m (one pose (3,))"
             )
         rest = skeleton(machine, w.coordinates)
-        lines = [line for _, line in rest.links]
+        lines = [line for _, line in rest.bars]
         points = np.concatenate(lines)
         centre, self.half = (points.max(0) + points.min(0)) / 2, np.ptp(points, axis=0).max() / 2
         self.moving: list[list[Any]] = []
@@ -71,8 +71,7 @@ class _Scene:
             for i in range(count):
                 axes: Any = self.figure.add_subplot(1, count, i + 1, projection="3d")
                 _lines(axes, lines, {"color": "0.45", "linewidth": 0.8, "linestyle": "--"})
-                pieces = self._pieces(w.coordinates)
-                self.moving.append(_lines(axes, pieces, {"color": BLUE, "linewidth": 1.2}))
+                self.moving.append(_lines(axes, rest.links, {"color": BLUE, "linewidth": 1.2}))
                 axes.plot(*(MM * rest.tcp)[:, None], "o", color=VERMILLION, markersize=4)
                 for name, c in zip("xyz", centre, strict=True):
                     getattr(axes, f"set_{name}lim")(MM * (c - self.half), MM * (c + self.half))
@@ -86,12 +85,8 @@ class _Scene:
         """Moves the lines to a phase."""
         for i, drawn in enumerate(self.moving):
             at = swung(self.machine, self.w, i, phase, SWING * 2 * self.half)
-            for artist, line in zip(drawn, self._pieces(at), strict=True):
+            for artist, line in zip(drawn, skeleton(self.machine, at).links, strict=True):
                 artist.set_data_3d(*(MM * line.T))
-
-    def _pieces(self, coordinates: Floats) -> list[Floats]:
-        """All of them, those without length at rest too: springs have one in a swing."""
-        return [line for _, line in skeleton(self.machine, coordinates, shortest=-1.0).links]
 
 
 def swung(machine: Machine, w: NaturalFrequencies, mode: int, phase: float, size: float) -> Floats:
@@ -102,5 +97,5 @@ def swung(machine: Machine, w: NaturalFrequencies, mode: int, phase: float, size
     return np.asarray(w.coordinates + size / most * np.sin(phase) * w.shape[mode])
 
 
-def _lines(axes: Any, lines: list[Floats], style: dict[str, object]) -> list[Any]:
+def _lines(axes: Any, lines: Iterable[Floats], style: dict[str, object]) -> list[Any]:
     return [axes.plot(*(MM * line.T), **style)[0] for line in lines]

@@ -1,1 +1,0 @@
-"""Pictures of results: functions that return a matplotlib Figure."""
