@@ -31,9 +31,9 @@ from stiffmap.machining.compensation import compensate as compute
 from stiffmap.model.description import MachineDescription
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.validity import Validity
-from stiffmap.ui.cli.inputs import EffectsOption, machine_with, numbers
+from stiffmap.ui.cli.inputs import EffectsOption, finish, machine_with, numbers
 from stiffmap.ui.cli.inputs import gravity as gravity_of
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.workspace.maps.files import read_dataset
 
 MM = 1e3
@@ -110,26 +110,34 @@ def compensate(
       [cyan]stiffmap compensate result/machine.yaml --check held_out[/cyan]
     """
     out: dict[str, object] = {}
-    if axis is not None:
-        out = _table(machine, effect, axis, form, points, through, case, zero, output, force, gravity)
-        _say(out, as_json)
-        return
-    if poses is None and urdf is None and dh is None and check is None:
+    if axis is None and poses is None and urdf is None and dh is None and check is None:
         raise StiffmapError("compensate: give a CSV of wanted poses, --axis, --urdf, --dh or --check")
-    if urdf is not None and (output is None or poses is not None):
+    if axis is None and urdf is not None and (output is None or poses is not None):
         raise StiffmapError(
             "--urdf: give -o FILE, the URDF to write, and no poses, whose commands go there too"
         )
-    m = machine_with(machine, effect)
-    if urdf is not None or dh is not None:
-        out |= _geometry(m, urdf, dh, output)
-    if poses is not None:
-        out |= _commands(m, poses, output, force, gravity)
-    if check is not None:
-        out |= _checked(m, check)
-    _say(out, as_json)
-    if out.get("verdict") == WORSE:
-        raise typer.Exit(1)
+    if axis is not None:
+        out = _table(machine, effect, axis, form, points, through, case, zero, output, force, gravity)
+    else:
+        out = _of_machine(machine_with(machine, effect), poses, output, force, gravity, urdf, dh, check)
+    show(as_json, out, (f"{key}: {value}" for key, value in out.items()))
+    finish(out.get("verdict") == WORSE)
+
+
+def _of_machine(
+    m: Machine,
+    poses: Path | None,
+    output: Path | None,
+    force: str,
+    gravity: str | None,
+    urdf: Path | None,
+    dh: Path | None,
+    check: Path | None,
+) -> dict[str, object]:
+    """Geometry, commands and the judgement of readings, those that are asked for."""
+    out = {} if urdf is None and dh is None else _geometry(m, urdf, dh, output)
+    out |= {} if poses is None else _commands(m, poses, output, force, gravity)
+    return out | ({} if check is None else _checked(m, check))
 
 
 def _checked(m: Machine, folder: Path) -> dict[str, object]:
@@ -166,14 +174,6 @@ def _promise(m: Machine) -> dict[str, object]:
     if v is None or v.error is None:
         return {}
     return {f"promised by the file, m{v.unit}": f"{MM * v.error:.4g} ± {MM * v.error_u:.1g} rms ({v})"}
-
-
-def _say(out: dict[str, object], as_json: bool) -> None:
-    if as_json:
-        print_json(out)
-        return
-    for key, value in out.items():
-        print(f"{key}: {value}")
 
 
 def _table(

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs import asked_to_replace
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 
 if TYPE_CHECKING:
     from stiffmap.model.urdf import Imported
@@ -80,26 +80,21 @@ def import_urdf(
     if overwrite:
         asked_to_replace(file)
     machine.save(file)
-    if as_json:
-        print_json({"file": str(file), "name": machine.name, "legs": list(machine.legs),
-                    "actuators": list(machine.actuators), "tip": found.tip, "left_out": list(found.left_out),
-                    "rigid": list(found.rigid)})  # fmt: skip
-        return
-    console = Console(highlight=False, soft_wrap=True)
-    console.print(
-        f"wrote {escape(str(file))}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"
-    )
-    if found.choice:
-        console.print(
-            f"[yellow]tip[/yellow] {escape(found.tip)}, {escape(found.choice)}; --tip LINK takes another"
-        )
-    if found.left_out:
-        console.print(
-            "[yellow]left out[/yellow] (not on the way to the tip; masses stay on what carries them): "
-            f"{escape(', '.join(found.left_out))}"
-        )
-    if found.rigid:
-        console.print(f"[yellow]rigid[/yellow] (no compliance in the sidecar): {', '.join(found.rigid)}")
+    data = {"file": file, "name": machine.name, "legs": machine.legs, "actuators": machine.actuators, "tip": found.tip,
+            "left_out": found.left_out, "rigid": found.rigid}  # fmt: skip
+    told = [f"wrote {file}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"]
+    show(as_json, data, [*told, *_remarks(found)])
+
+
+def _remarks(found: Imported) -> Iterator[Text]:
+    """What was chosen, left out or taken as rigid."""
+    for head, text, there in (
+        ("tip", f" {found.tip}, {found.choice}; --tip LINK takes another", found.choice),
+        ("left out", f" (not on the way to the tip; masses stay on what carries them): {', '.join(found.left_out)}", found.left_out),
+        ("rigid", f" (no compliance in the sidecar): {', '.join(found.rigid)}", found.rigid),
+    ):  # fmt: skip
+        if there:
+            yield Text.assemble((head, "yellow"), text)
 
 
 def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from stiffmap.model.link.pipeline import PartLink, Solver, Support, link_from_pa
 from stiffmap.model.link.readers import read_field
 from stiffmap.model.link.result import Link
 from stiffmap.model.link.solve import Material, Setup
+from stiffmap.ui.cli.output import JsonOption, show
 
 FIELDS = {".csv", ".dat", ".frd", ".vtk", ".vtu", ".lis", ".txt"}
 
@@ -66,7 +67,7 @@ def link_command(
     zeros: Annotated[bool, typer.Option("--zeros", help="Set insignificant entries to zero.")] = False,
     out: Annotated[Path | None, written("-o", "--out", help="Link file to write (YAML).")] = None,
     picture: Annotated[Path | None, written("--picture", help="PNG to write.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, SI.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Identify a link's 6x6 spring, with error bars, from a part or a displacement field."""
     try:
@@ -177,42 +178,36 @@ def _finish(
         from stiffmap.ui.pictures.link import draw_link, draw_part_link
 
         draw_link(link, picture) if part is None else draw_part_link(part, picture)
-    if as_json:
-        typer.echo(json.dumps(as_data(link, part, file)))
-        return
-    typer.echo(link.report())
-    if part is not None:
-        typer.echo(
-            f"\n{part.solver}, {len(part.mesh.nodes)} nodes, {len(part.mesh.tets)} ten-node tetrahedra"
-        )
-        typer.echo(
-            "relative standard uncertainty of the diagonal, by source (fit: which nodes, by block bootstrap):"
-        )
-        typer.echo(part.budget.table(link.compliance))
-        if part.refinement is not None:
-            typer.echo(f"observed order of the mesh error: {part.refinement.words}")
-    for path in (out, picture):
-        if path is not None:
-            typer.echo(f"wrote {path}")
+    told = [link.report(), *([] if part is None else _of_part(part, link))]
+    told += [f"wrote {path}" for path in (out, picture) if path is not None]
+    show(as_json, as_data(link, part, file), told)
+
+
+def _of_part(part: PartLink, link: Link) -> Iterator[str]:
+    yield f"\n{part.solver}, {len(part.mesh.nodes)} nodes, {len(part.mesh.tets)} ten-node tetrahedra"
+    yield "relative standard uncertainty of the diagonal, by source (fit: which nodes, by block bootstrap):"
+    yield part.budget.table(link.compliance)
+    if part.refinement is not None:
+        yield f"observed order of the mesh error: {part.refinement.words}"
 
 
 def as_data(link: Link, part: PartLink | None, file: LinkFile) -> dict[str, Any]:
     """What ``--json`` prints, SI."""
     data: dict[str, Any] = {
         "units": "SI (m, N, rad)",
-        "reference": link.reference.tolist(),
-        "compliance": file.compliance.tolist(),
-        "standard_error": file.standard_error.tolist(),
-        "insignificant": link.insignificant.tolist(),
+        "reference": link.reference,
+        "compliance": file.compliance,
+        "standard_error": file.standard_error,
+        "insignificant": link.insignificant,
         "level": link.level,
-        "sigma": link.sigma.tolist(),
-        "dof": link.dof.tolist(),
+        "sigma": link.sigma,
+        "dof": link.dof,
         "outliers": int(link.outliers.sum()),
         "asymmetry": link.asymmetry,
     }
     if part is not None:
         data["solver"] = part.solver
-        data["uncertainty"] = {k: part.budget.standard_error(k).tolist() for k in part.budget.parts}
+        data["uncertainty"] = {k: part.budget.standard_error(k) for k in part.budget.parts}
         r = part.refinement
         data["order"] = None if r is None or r.why else r.order
         data["order_note"] = "one mesh" if r is None else r.why

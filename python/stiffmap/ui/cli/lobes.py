@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,8 +10,6 @@ import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.outputs import make_folder
-from stiffmap.common.plain import plain
 from stiffmap.ui.cli.inputs import (
     MM,
     EffectsOption,
@@ -26,7 +25,7 @@ from stiffmap.ui.cli.inputs import (
     position,
     rotation,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, print_json, write_files
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -115,7 +114,7 @@ def lobes(
     }  # fmt: skip
     answers = [_one(m, p, text, given, output, i) for i, text in enumerate(at or [None])]
     if as_json:
-        print_json(plain({"machine": m.name, "process": p.name, "poses": answers}))
+        print_json({"machine": m.name, "process": p.name, "poses": answers})
     else:
         for a in answers:
             _say(a)
@@ -145,7 +144,7 @@ def _one(
         "stable_speeds": [{"speed_rpm": s * RPM, "limit_mm": d / MM} for s, d in a["stable_speeds"]],
     }  # fmt: skip
     if output is not None:
-        out["files"] = _write(ds, p, machine.name, place, make_folder(output), i)
+        out["files"] = list(map(str, write_files(output, _files(ds, p, machine.name, place, i))))
     return out
 
 
@@ -162,19 +161,13 @@ def _modes(given: list[str] | None) -> list[tuple[float, float, float, str]]:
     return out
 
 
-def _write(ds: xr.Dataset, p: Process, name: str, place: Any, folder: Path, i: int) -> list[str]:
-    from stiffmap.ui.plot.style import save
+def _files(ds: xr.Dataset, p: Process, name: str, place: Any, i: int) -> Iterator[tuple[str, Any]]:
     from stiffmap.ui.plot.vibration import lobes_figure
-    from stiffmap.workspace.maps.files import write_dataset
 
     where = ", ".join(f"{v / MM:g}" for v in place)
     stem = "lobes" if i == 0 else f"lobes_{i + 1}"
-    picture, data = folder / f"{stem}.png", folder / f"{stem}.nc"
-    save(lobes_figure(ds, f"{name} at ({where}) mm: {p.name}", p.spindle, p.cut.axial), picture)
-    ds = ds.copy()
-    ds.attrs["stable_speeds"] = np.ravel(ds.attrs["stable_speeds"])
-    write_dataset(ds, data)
-    return [str(picture), str(data)]
+    yield f"{stem}.png", lobes_figure(ds, f"{name} at ({where}) mm: {p.name}", p.spindle, p.cut.axial)
+    yield f"{stem}.nc", ds.assign_attrs(stable_speeds=np.ravel(ds.attrs["stable_speeds"]))
 
 
 def _say(a: dict[str, Any]) -> None:

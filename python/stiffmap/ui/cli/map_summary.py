@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from rich import box
 from rich.table import Table
 
 from stiffmap.ui.cli.statuses import failed
+from stiffmap.ui.cli.table_text import table
 from stiffmap.workspace.maps.variables import BEYOND
 
 
@@ -60,18 +60,16 @@ def beyond(ds: xr.Dataset) -> dict[str, Any] | None:
 
 def as_table(ds: xr.Dataset, rows: list[dict[str, Any]], plane: str, tolerance: float) -> Table:
     """For the terminal, mm."""
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        title=f"{ds.attrs['machine']}: deflection in the {plane} plane, mm, under "
-        f"{ds.attrs['turning_force_N']:g} N",
-    )
     axis = across(ds)
-    for head in (f"{axis}, mm", "force", "min", "median", "max", f"within {tolerance:g} mm"):
-        table.add_column(head, justify="left" if head == "force" else "right")
+    out = table(
+        f"{ds.attrs['machine']}: deflection in the {plane} plane, mm, under {ds.attrs['turning_force_N']:g} N",
+        (f"{axis}, mm", "force", "min", "median", "max", f"within {tolerance:g} mm"),
+        left=("force",),
+    )
     for r in rows:
         sizes = (f"{1e3 * r[k]:.3f}" if np.isfinite(r[k]) else "–" for k in ("min", "median", "max"))
         name = f"{r['force']} direction" if r["force"] in ("worst", "best") else r["force"]
         if r["force"] in ds.case and name_of(ds, plane, r["force"]) == "deflection":
             name = f"{name}, |d| in space"
-        table.add_row(f"{1e3 * r[axis]:g}", name, *sizes, f"{100 * r['share_within']:.1f} %")
-    return table
+        out.add_row(f"{1e3 * r[axis]:g}", name, *sizes, f"{100 * r['share_within']:.1f} %")
+    return out

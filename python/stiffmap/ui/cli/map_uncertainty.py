@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from rich import box
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from stiffmap.ui.cli.map_summary import across
+from stiffmap.ui.cli.table_text import table
 
 SHOWN = 8
 
@@ -55,13 +55,14 @@ def uncertainty_data(ds: xr.Dataset, plane: str) -> dict[str, Any]:
     }
 
 
-def print_uncertainty(console: Console, data: dict[str, Any], plane: str) -> None:
+def uncertainty_told(data: dict[str, Any], plane: str) -> Iterator[Table | Text]:
     """Two tables, mm and per cent."""
-    title = f"standard deviation of the deflection in the {plane} plane, mm"
-    table = Table(box=box.SIMPLE_HEAD, title=title)
     axis = next(a for a in "xyz" if a in data["rows"][0])
-    for head in (f"{axis}, mm", "force", "median", "max", "max, relative"):
-        table.add_column(head, justify="left" if head == "force" else "right")
+    out = table(
+        f"standard deviation of the deflection in the {plane} plane, mm",
+        (f"{axis}, mm", "force", "median", "max", "max, relative"),
+        left=("force",),
+    )
     for r in data["rows"]:
         name = "worst direction" if r["force"] == "worst" else r["force"]
         sizes = (
@@ -69,23 +70,19 @@ def print_uncertainty(console: Console, data: dict[str, Any], plane: str) -> Non
             f"{1e3 * r['max_std']:.4f}",
             f"{100 * r['max_relative']:.1f} %",
         )
-        table.add_row(f"{1e3 * r[axis]:g}", name, *sizes)
-    console.print(table)
-    shares = Table(box=box.SIMPLE_HEAD, title="share in the variance of the deflection, whole map")
-    shares.add_column("number")
-    shares.add_column("share", justify="right")
-    for r in data["ranking"][:SHOWN]:
-        shares.add_row(r["number"], f"{100 * r['share']:.2f} %")
-    console.print(shares)
+        out.add_row(f"{1e3 * r[axis]:g}", name, *sizes)
+    yield out
+    shares = ((r["number"], f"{100 * r['share']:.2f} %") for r in data["ranking"][:SHOWN])
+    title = "share in the variance of the deflection, whole map"
+    yield table(title, ("number", "share"), shares, left=("number",))
     if data["left_out"]:
-        console.print(f"[yellow]not propagated: {data['left_out']}[/yellow]")
+        yield Text(f"not propagated: {data['left_out']}", "yellow")
 
 
-def draw_deviations(ds: xr.Dataset, output: Path, plane: str) -> list[Path]:
+def deviation_figures(ds: xr.Dataset, plane: str) -> Iterator[tuple[str, Any]]:
     """A picture of the worst direction's standard deviation and one per load case."""
-    from stiffmap.ui.plot import save
     from stiffmap.ui.plot.deviations import deviation_figure
 
     chosen: dict[str, dict[str, Any]] = {"worst": {"variable": f"worst_deflection_{plane}"}}
     chosen |= {str(c): {"variable": f"deflection_{plane}", "case": str(c)} for c in ds.case.values}
-    return [save(deviation_figure(ds, **how), output / f"map-{n}-std.png") for n, how in chosen.items()]
+    yield from ((f"map-{n}-std.png", deviation_figure(ds, **how)) for n, how in chosen.items())

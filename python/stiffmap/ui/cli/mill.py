@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -11,7 +12,6 @@ import typer
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.plain import plain
 from stiffmap.machining.milling import mill_job
 from stiffmap.machining.milling.entry import best_entry
 from stiffmap.machining.milling.placement import placements
@@ -31,7 +31,7 @@ from stiffmap.ui.cli.inputs import (
     machine_with,
     numbers,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.report.milling import placement_summary, summary, write_report
 
 MM = 1e-3
@@ -176,10 +176,7 @@ def mill(
     out = {**summary(found), **out}
     if output is not None:
         out["files"] = {k: str(output / v) for k, v in write_report(found, output).items()}
-    if as_json:
-        print_json(plain(out))
-    else:
-        _say(out)
+    show(as_json, out, _lines(out))
     states: Any = found.dataset.status.values
     t = cut.tolerance
     after = np.abs(found.dataset.error_normal_after.values)
@@ -227,12 +224,10 @@ def _offsets(given: list[str] | None) -> dict[str, list[float]] | None:
     return out
 
 
-def _say(out: dict[str, object]) -> None:
-    print(out["verdict"])
+def _lines(out: dict[str, object]) -> Iterator[str]:
+    yield str(out["verdict"])
     for key, value in out.items():
-        if key == "verdict":
-            continue
-        if value == [] or value is None:
+        if key == "verdict" or value == [] or value is None:
             continue
         if key == "warnings" and isinstance(value, list):
             text = " ".join(w["text"] for w in value)
@@ -246,7 +241,7 @@ def _say(out: dict[str, object]) -> None:
             )
         else:
             text = _text(value)
-        print(f"{key}: {text}")
+        yield f"{key}: {text}"
 
 
 def _text(value: object) -> str:

@@ -9,7 +9,6 @@ import typer
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.json_text import parse_json
-from stiffmap.common.plain import plain
 from stiffmap.experiment import load_experiment
 from stiffmap.experiment.calls import placed
 from stiffmap.identification.planning.budget import budgets
@@ -17,7 +16,7 @@ from stiffmap.identification.planning.monitor import compare
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli.inputs import EffectsOption
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 
 
 def monitor(
@@ -47,12 +46,9 @@ def monitor(
     if not terms:
         raise StiffmapError("monitor: name what to follow, by --effect or --diagnosis")
     found = compare(m, load_experiment(before), load_experiment(after), terms)
-    if as_json:
-        print_json(plain({"common": found.common, "p": found.p, "changes": [vars(c) for c in found.changes]}))
-    else:
-        print(found)
-        if budget:
-            print(*budgets(m, load_experiment(after), found.second), sep="\n")
+    data = {"common": found.common, "p": found.p, "changes": [vars(c) for c in found.changes]}
+    now = budgets(m, load_experiment(after), found.second) if budget and not as_json else []
+    show(as_json, data, [str(found), *map(str, now)])
     if not found.common:
         raise typer.Exit(1)
 

@@ -13,7 +13,6 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import with_uncertainty
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.outputs.option import written
-from stiffmap.common.plain import plain
 from stiffmap.experiment import simulate
 from stiffmap.experiment.calls import placed
 from stiffmap.experiment.files.save import plan_columns
@@ -22,7 +21,7 @@ from stiffmap.identification.planning.estimate import fitted
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli.inputs import numbers
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 
 MM = 1e-3
 
@@ -111,10 +110,7 @@ def plan(
     )
     if output is not None:
         _write(found, output)
-    if as_json:
-        print_json(_plain(found))
-    else:
-        print("\n".join(_lines(found)))
+    show(as_json, _plain(found), _lines(found))
 
 
 def _taps(m: Machine, count: int, tries: int, seed: int, output: Path | None, as_json: bool) -> None:
@@ -124,13 +120,10 @@ def _taps(m: Machine, count: int, tries: int, seed: int, output: Path | None, as
     poses = [[round(float(v), 1) for v in p] for p in where_to_tap(m, count, tries=tries, seed=seed) / MM]
     if output is not None:
         write_rows(output, ["x_mm", "y_mm", "z_mm"], poses)
-    if as_json:
-        none: dict[str, Any] = {"parameters": [], "value": None, "value_random": None}
-        print_json({"aim": "taps", "rows": len(poses), "poses_mm": poses, **none})
-        return
-    print(f"{len(poses)} poses to tap, the most informative first (x, y, z in mm)")
-    for p in poses:
-        print("  " + ", ".join(f"{v:.1f}" for v in p))
+    none: dict[str, Any] = {"parameters": [], "value": None, "value_random": None}
+    told = [f"{len(poses)} poses to tap, the most informative first (x, y, z in mm)"]
+    told += ["  " + ", ".join(f"{v:.1f}" for v in p) for p in poses]
+    show(as_json, {"aim": "taps", "rows": len(poses), "poses_mm": poses, **none}, told)
 
 
 def _sequential(
@@ -151,13 +144,14 @@ def _sequential(
     last = steps[-1][1]
     scale = np.array([p.scale for _, p in fitted(m.description, tuple(terms))])
     met = bool((last.sigma * last.misfit / scale).max() <= until)
-    if as_json:
-        print_json(plain({"met": met, "steps": [{"rows": n, "parameters": _numbers(e)} for n, e in steps]}))
-        return
+    told = []
     for count, e in steps:
         each = zip(e.names, e.values, e.sigma * e.misfit, e.units, strict=True)
-        print(f"{count} rows: " + ", ".join(f"{n} {with_uncertainty(v, u)} {s}" for n, v, u, s in each))
-    print(f"stopped: every u is at most {until:g} of a typical size" if met else "stopped: rows used up")
+        told.append(f"{count} rows: " + ", ".join(f"{n} {with_uncertainty(v, u)} {s}" for n, v, u, s in each))
+    told.append(
+        f"stopped: every u is at most {until:g} of a typical size" if met else "stopped: rows used up"
+    )
+    show(as_json, {"met": met, "steps": [{"rows": n, "parameters": _numbers(e)} for n, e in steps]}, told)
 
 
 def _numbers(e: Estimate) -> list[dict[str, object]]:
@@ -172,19 +166,14 @@ def _write(found: Design, path: Path) -> None:
 
 
 def _plain(d: Design) -> dict[str, object]:
-    out: dict[str, object] = plain(
-        {
-            "aim": d.aim,
-            "rows": len(d.experiment),
-            "parameters": [
-                {"name": n, "unit": u, "u": s, "u_random": r}
-                for n, u, s, r in zip(d.names, d.units, d.sigma, d.random_sigma, strict=True)
-            ],
-            "value": d.value,
-            "value_random": d.random_value,
-        }
-    )
-    return out
+    each = zip(d.names, d.units, d.sigma, d.random_sigma, strict=True)
+    return {
+        "aim": d.aim,
+        "rows": len(d.experiment),
+        "parameters": [{"name": n, "unit": u, "u": s, "u_random": r} for n, u, s, r in each],
+        "value": d.value,
+        "value_random": d.random_value,
+    }
 
 
 def _lines(d: Design) -> list[str]:

@@ -9,8 +9,8 @@ import numpy as np
 import typer
 from scipy.spatial.transform import Rotation
 
+from stiffmap.common.json_text import json_text
 from stiffmap.common.outputs import make_folder, write_picture, write_text
-from stiffmap.common.plain import plain
 from stiffmap.experiment import Experiment, Residual, load_experiment
 from stiffmap.experiment import residual as compute
 from stiffmap.experiment.calls import placed
@@ -18,7 +18,7 @@ from stiffmap.experiment.channels import Channel
 from stiffmap.identification.validity import beyond
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli.inputs import EffectsOption, FolderOption, ThreadsOption
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 
 
 def residual(
@@ -49,30 +49,22 @@ def residual(
     if output is not None:
         _write(result, rows, output)
     far = beyond(declared, result.experiment)
-    if as_json:
-        print_json(
-            as_plain(result, rows) | ({} if far is None else {"rows_beyond_calibration": int(far.sum())})
-        )
-    else:
-        told = (
-            []
-            if far is None
-            else [f"  beyond what the machine was calibrated by: {int(far.sum())} of {len(far)} rows"]
-        )
-        print("\n".join([*lines(result, rows), *told]))
+    found, told = as_plain(result, rows), lines(result, rows)
+    if far is not None:
+        found["rows_beyond_calibration"] = int(far.sum())
+        told.append(f"  beyond what the machine was calibrated by: {int(far.sum())} of {len(far)} rows")
+    show(as_json, found, told)
     if result.lack_of_fit < 1e-3:
         raise typer.Exit(1)
 
 
 def _write(r: Residual, rows: int, output: Path) -> None:
-    import json
-
     from stiffmap.experiment.comparison.table import write_table
     from stiffmap.ui.pictures.experiment import figures
 
     place = make_folder(output)
     write_table(r, place / "residual.csv")
-    write_text(place / "residual.json", json.dumps(as_plain(r, rows), indent=2))
+    write_text(place / "residual.json", json_text(as_plain(r, rows)))
     for name, figure in figures(r).items():
         write_picture(place / f"{name}.png", figure, dpi=130)
 
@@ -80,7 +72,7 @@ def _write(r: Residual, rows: int, output: Path) -> None:
 def as_plain(r: Residual, rows: int) -> dict[str, Any]:
     """JSON data, SI."""
     e = r.experiment
-    out = {
+    return {
         "experiment": e.name,
         "quantity": e.quantity,
         "units": "SI (m, rad), base axes",
@@ -96,8 +88,6 @@ def as_plain(r: Residual, rows: int) -> dict[str, Any]:
         "worst": [{"id": i, "channel": c, "residual": v} for i, c, v in r.worst(rows)],
         "checks": [vars(c) for c in r.checks],
     }
-    found: dict[str, Any] = plain(out)
-    return found
 
 
 def lines(r: Residual, rows: int) -> list[str]:

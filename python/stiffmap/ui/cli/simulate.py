@@ -16,7 +16,7 @@ from stiffmap.experiment.calls import placed
 from stiffmap.experiment.virtual import plans as make
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli import plan_options as plans
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 
 Effects = Annotated[
     list[str] | None,
@@ -109,8 +109,7 @@ def simulate(
     twin = run(chosen, layout, [placed(chosen, e) for e in effect or []], seed=seed, outlier_share=outliers)
     save_experiment(twin, output, "virtual experiment" + "".join(f"; {e}" for e in effect or []))
     number = int(twin.groups.max()) + 1
-    if as_json:
-        found = {"rows": len(twin), "poses": number, "quantity": twin.quantity, "axes": list(twin.axes)}
-        print_json({"machine": chosen.name, **found, "folder": str(output)})
-        return
-    print(f"{output}: {len(twin)} rows of {twin.quantity} at {number} poses; reads {', '.join(twin.axes)}")
+    data = {"machine": chosen.name, "rows": len(twin), "poses": number, "quantity": twin.quantity,
+            "axes": twin.axes, "folder": output}  # fmt: skip
+    told = f"{output}: {len(twin)} rows of {twin.quantity} at {number} poses; reads {', '.join(twin.axes)}"
+    show(as_json, data, [told])

@@ -8,14 +8,12 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.markup import escape
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli.inputs import MM, EffectsOption, GravityOption, MachineArgument, machine_with, numbers
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.view.quantities import QUANTITIES
 
 LOCAL = "127.0.0.1"
@@ -172,22 +170,15 @@ def _write(model: Any, data: Any, html: Path | None, picture: Path | None, as_js
 
     files = [] if html is None else [write_page(model.moment, html, data)]
     files += [] if picture is None else [write_view_picture(model.moment, picture)]
-    if as_json:
-        print_json({"machine": model.declared.name, "files": [str(f) for f in files]})
-    else:
-        Console(highlight=False).print(f"wrote {escape(', '.join(map(str, files)))}", soft_wrap=True)
+    show(as_json, {"machine": model.declared.name}, [], files)
 
 
 def _serve(model: Any, data: Any, host: str, port: int | None, browser: bool, as_json: bool) -> None:
     from stiffmap.ui.view.open import View
 
     opened = View(model, host, port, data)
-    if as_json:
-        print_json({"machine": model.declared.name, "url": opened.url})
-    else:
-        console = Console(highlight=False)
-        console.print(f"{escape(model.declared.name)}: {escape(opened.url)}", soft_wrap=True)
-        console.print("Ctrl-C ends it", soft_wrap=True)
+    name = model.declared.name
+    show(as_json, {"machine": name, "url": opened.url}, [f"{name}: {opened.url}", "Ctrl-C ends it"])
     if browser:
         webbrowser.open(opened.url)
     opened.wait()
