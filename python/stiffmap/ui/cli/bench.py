@@ -31,7 +31,7 @@ class Line(NamedTuple):
     unit: str
 
 
-def bench(
+def command(
     rounds: Annotated[int, typer.Option(help="Measurements of each case; the median is shown.")] = 7,
     as_json: JsonOption = False,
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.text import Text
@@ -16,7 +16,7 @@ from stiffmap.ui.cli.output import JsonOption, show
 MOST_CHANGES = 12
 
 
-def check(
+def command(
     file: Annotated[str, typer.Argument(help="Machine file, or the name of a shipped machine.")],
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 where there are warnings.")] = False,
     as_json: JsonOption = False,
@@ -34,7 +34,7 @@ def check(
       [cyan]stiffmap check --strict my_machine.yaml[/cyan]
     """
     result = with_advice(check_file(file), file)
-    show(as_json, as_plain(result), _lines(result))
+    show(as_json, result.as_plain(), _lines(result))
     if strict and result.warnings:
         raise typer.Exit(1)
 
@@ -45,20 +45,6 @@ def with_advice(result: FileCheck, file: str) -> FileCheck:
     from stiffmap.solve.machine import Machine
 
     return replace(result, warnings=[*result.warnings, *advice(Machine(result.description), file)])
-
-
-def as_plain(result: FileCheck) -> dict[str, Any]:
-    """A check as JSON data (SI)."""
-    return {
-        "file": str(result.path),
-        "name": result.description.name,
-        "title": result.description.title,
-        "counts": result.counts,
-        "home_gaps": {g.name: {"translation": g.translation, "rotation": g.rotation} for g in result.gaps},
-        "home_changes": {c.name: {"declared": c.declared, "closed": c.closed} for c in result.changes},
-        "effects": [effect.kind for effect in result.description.effects],
-        "warnings": result.warnings,
-    }
 
 
 def _lines(result: FileCheck) -> Iterator[str | Text]:

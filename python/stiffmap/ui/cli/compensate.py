@@ -21,17 +21,25 @@ from stiffmap.identification.validity import beyond
 from stiffmap.machining.compensation import (
     axis_errors,
     axis_errors_of_map,
+    compensate,
     compensation_table,
     corrected_geometry,
     corrected_urdf,
     dh_list,
     write_table,
 )
-from stiffmap.machining.compensation import compensate as compute
 from stiffmap.model.description import MachineDescription
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.validity import Validity
-from stiffmap.ui.cli.inputs import EffectsOption, finish, machine_with, numbers
+from stiffmap.ui.cli.inputs import (
+    CorrectedArgument,
+    EffectsOption,
+    GravityOption,
+    finish,
+    in_si,
+    machine_with,
+    numbers,
+)
 from stiffmap.ui.cli.inputs import gravity as gravity_of
 from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.workspace.maps.files import read_dataset
@@ -44,10 +52,8 @@ NAMED = 12
 """Rows that a line names."""
 
 
-def compensate(
-    machine: Annotated[
-        str, typer.Argument(help="Corrected machine: file with its effects, or a shipped name.")
-    ],
+def command(
+    machine: CorrectedArgument,
     poses: Annotated[
         Path | None, typer.Argument(help="CSV of wanted poses: x,y,z in mm, loads, approach_x …")
     ] = None,
@@ -56,7 +62,7 @@ def compensate(
     force: Annotated[
         str, typer.Option(help="Force at the tool in every pose, N, where the CSV has none.")
     ] = "0,0,0",
-    gravity: Annotated[str | None, typer.Option(help="m/s², base axes, as 0,0,-9.81.")] = None,
+    gravity: GravityOption = None,
     urdf: Annotated[
         Path | None,
         typer.Option(help="The arm's own URDF: its joints get the corrected origins, all else is kept."),
@@ -109,7 +115,6 @@ def compensate(
 
       [cyan]stiffmap compensate result/machine.yaml --check held_out[/cyan]
     """
-    out: dict[str, object] = {}
     if axis is None and poses is None and urdf is None and dh is None and check is None:
         raise StiffmapError("compensate: give a CSV of wanted poses, --axis, --urdf, --dh or --check")
     if axis is None and urdf is not None and (output is None or poses is not None):
@@ -119,25 +124,12 @@ def compensate(
     if axis is not None:
         out = _table(machine, effect, axis, form, points, through, case, zero, output, force, gravity)
     else:
-        out = _of_machine(machine_with(machine, effect), poses, output, force, gravity, urdf, dh, check)
+        m = machine_with(machine, effect)
+        out = {} if urdf is None and dh is None else _geometry(m, urdf, dh, output)
+        out |= {} if poses is None else _commands(m, poses, output, force, gravity)
+        out |= {} if check is None else _checked(m, check)
     show(as_json, out, (f"{key}: {value}" for key, value in out.items()))
     finish(out.get("verdict") == WORSE)
-
-
-def _of_machine(
-    m: Machine,
-    poses: Path | None,
-    output: Path | None,
-    force: str,
-    gravity: str | None,
-    urdf: Path | None,
-    dh: Path | None,
-    check: Path | None,
-) -> dict[str, object]:
-    """Geometry, commands and the judgement of readings, those that are asked for."""
-    out = {} if urdf is None and dh is None else _geometry(m, urdf, dh, output)
-    out |= {} if poses is None else _commands(m, poses, output, force, gravity)
-    return out | ({} if check is None else _checked(m, check))
 
 
 def _checked(m: Machine, folder: Path) -> dict[str, object]:
@@ -190,7 +182,7 @@ def _table(
     gravity: str | None,
 ) -> dict[str, object]:
     """Table of an axis, from a machine or from a map that has been written."""
-    point = None if through is None else np.array(numbers(through, "through", 3)) / MM
+    point = in_si(through, "through", 3)
     if machine.endswith((".nc", ".zarr")):
         errors = axis_errors_of_map(read_dataset(machine), axis, through=point, case=case)
     else:
@@ -226,7 +218,7 @@ def _commands(
 ) -> dict[str, object]:
     plan = against_base(load_plan(poses, m, "position"), m.description.home.r)
     wrench = plan.wrench if plan.wrench.any() else np.append(numbers(force, "force", 3), np.zeros(3))
-    found = compute(
+    found = compensate(
         m, plan.position, plan.rotation, wrench=wrench, approach=plan.approach, gravity=gravity_of(gravity)
     )
     if output is not None:

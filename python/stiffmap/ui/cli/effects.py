@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from stiffmap.solve.machine import Machine
 
 
-def effects(
+def command(
     kind: Annotated[
         str | None,
         typer.Argument(

@@ -12,6 +12,7 @@ import xarray as xr
 from rich.table import Table
 
 from stiffmap.ui.cli.inputs import (
+    MM,
     EffectsOption,
     FolderOption,
     GravityOption,
@@ -19,13 +20,14 @@ from stiffmap.ui.cli.inputs import (
     ThreadsOption,
     finish,
     gravity,
+    in_si,
     machine_with,
 )
 from stiffmap.ui.cli.output import JsonOption, show, write_files
 from stiffmap.ui.cli.table_text import table
 
 
-def efforts(
+def command(
     machine: MachineArgument,
     trajectory: Annotated[
         Path,
@@ -72,9 +74,7 @@ def efforts(
 
     m = machine_with(machine, effect)
     g = gravity(gravity_)
-    run = load_motion(trajectory).trajectory(
-        m, duration=duration, gravity=g, feed=None if feed is None else feed * 1e-3 / 60
-    )
+    run = load_motion(trajectory).trajectory(m, duration=duration, gravity=g, feed=in_si(feed, unit=MM / 60))
     found = drive_efforts(m, run, gravity=g, friction=friction, threads=threads)
     files = write_files(output, _files(found))
     names = (

@@ -11,10 +11,10 @@ import numpy as np
 import typer
 from rich.text import Text
 
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
-from stiffmap.common.outputs import asked_to_replace
 from stiffmap.common.outputs.option import written
+from stiffmap.ui.cli.inputs import DhConventionOption, OverwriteOption, new_file, pairs
 from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.cli.table_text import table as table_of
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 RECORDED = {"operator", "instrument", "certificate", "date", "temperature", "notes", "source", "sha256"}
 
 
-def experiment(
+def command(
     action: Annotated[str, typer.Argument(help="new: make a folder from a spreadsheet.")],
     file: Annotated[
         Path, typer.Argument(help="Spreadsheet: .xlsx, .csv, .txt (any separator and decimal sign).")
@@ -42,12 +42,7 @@ def experiment(
             help="Instead: table of Denavit and Hartenberg of a serial arm, of which machine.yaml is made.",
         ),
     ] = None,
-    dh_convention: Annotated[
-        str,
-        typer.Option(
-            "--dh-convention", help="standard, or modified (Craig: a and alpha of the link before)."
-        ),
-    ] = "standard",
+    dh_convention: DhConventionOption = "standard",
     difference: Annotated[
         str,
         typer.Option(help="What differences in the file are: actual-minus-target or target-minus-actual."),
@@ -102,7 +97,7 @@ def experiment(
     dialogue: Annotated[
         bool, typer.Option("--dialogue", help="Ask what cannot be guessed, and remember the answers.")
     ] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing experiment.")] = False,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Make an experiment of a spreadsheet: columns, units and repeats are understood and described in words.
@@ -144,10 +139,7 @@ def experiment(
         raise StiffmapError(f"--difference: expected {' or '.join(DIFFERENCES)}, got '{difference}'")
     if (machine is None) == (dh is None):
         raise StiffmapError("experiment: give either --machine or --dh")
-    if (output / "experiment.yaml").exists() and not overwrite:
-        raise FileError("exists already; use --overwrite to replace it", file=str(output / "experiment.yaml"))
-    if overwrite:
-        asked_to_replace(output)
+    new_file(output / "experiment.yaml", overwrite, output)
     given = Answers(
         {k: v.split("|") for k, v in pairs(mapped, "map").items()},
         pairs(unit, "unit"),
@@ -247,16 +239,6 @@ def _told(
     if silent:
         yield f"no noise of {', '.join(silent)} is declared: repeats must show it (five or more), or say --noise {silent[0]}=…"
     yield Text.assemble("next: ", (f"stiffmap residual {machine} {output}", "cyan"))
-
-
-def pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
-    out = {}
-    for text in given or []:
-        key, equals, value = text.partition("=")
-        if not equals or not value:
-            raise StiffmapError(f"--{name}: expected NAME=VALUE, such as dx=…; got '{text}'")
-        out[key.strip()] = value.strip()
-    return out
 
 
 def _numbers(given: Sequence[str] | None, name: str) -> dict[str, float]:

@@ -9,7 +9,7 @@ from stiffmap.model.files import shipped_machines
 from stiffmap.ui.cli.output import JsonOption, print_json, say
 
 
-def machines(as_json: JsonOption = False) -> None:
+def command(as_json: JsonOption = False) -> None:
     """List the machines that come with stiffmap.
 
     Examples:

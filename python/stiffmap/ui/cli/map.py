@@ -22,6 +22,7 @@ from stiffmap.ui.cli.inputs import (
     MachineArgument,
     MethodOption,
     PlaneOption,
+    SchedulerOption,
     ThreadsOption,
     ToleranceOption,
     finish,
@@ -40,7 +41,7 @@ from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 from stiffmap.workspace.maps.workspace_grid import grid_of
 
 
-def map_command(
+def command(
     machine: MachineArgument,
     output: OutputOption = Path("stiffmap-map"),
     z: ZOption = None,
@@ -153,7 +154,7 @@ def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wa
     data: dict[str, Any] = {"machine": machine.name, "rows": rows, "failed": failed, "files": files}
     told: list[Any] = [table]
     if band is not None:
-        told += uncertainty_told(band, wanted.plane)
+        told += uncertainty_told(ds, band, wanted.plane)
     if worst is not None:
         told.append(in_words(worst))
     if far is not None:
@@ -229,9 +230,6 @@ EstimateOption = Annotated[
 ]
 StatisticsOption = Annotated[
     bool, typer.Option("--statistics", help="Maxima, percentiles and shares only; no map is stored.")
-]
-SchedulerOption = Annotated[
-    str | None, typer.Option(help="Address of a dask scheduler whose workers solve the map.")
 ]
 ToolpathOption = Annotated[
     str | None,

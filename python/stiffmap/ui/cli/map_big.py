@@ -6,12 +6,12 @@ from typing import Any
 
 import xarray as xr
 from rich.table import Table
-from rich.text import Text
 
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import finish
 from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.statuses import failed_in_words
 from stiffmap.ui.cli.table_text import table
 
 
@@ -33,7 +33,7 @@ def print_statistics(
     rows = statistics_rows(ds, plane)
     failed = {s.name: int(ds.status_count.sel(status=int(s)).sum()) for s in Status if s}
     failed = {name: count for name, count in failed.items() if count}
-    lost = [Text(f"{count} solves of the load cases: {name}", "yellow") for name, count in failed.items()]
+    lost = failed_in_words(failed, "solves of the load cases")
     show(as_json, {"machine": machine.name, "rows": rows, "failed": failed}, [_table(ds, rows), *lost])
     finish(bool(failed))
 
@@ -46,22 +46,14 @@ def statistics_rows(ds: xr.Dataset, plane: str) -> list[dict[str, Any]]:
         for force in ("worst", "best", *map(str, ds.case.values)):
             name = f"{force}_deflection_{plane}" if force in ("worst", "best") else f"deflection_{plane}"
             one = here if force in ("worst", "best") else here.sel(case=force)
-            rows.append(
-                {
-                    "z": float(z),
-                    "force": force,
-                    "max": float(one[f"{name}_max"]),
-                    "at": one[f"{name}_max_position"].values.tolist(),
-                    "percentiles": dict(
-                        zip(
-                            ds.percentile.values.tolist(),
-                            one[f"{name}_percentile"].values.tolist(),
-                            strict=True,
-                        )
-                    ),
-                    "share_within": float(one[f"{name}_within"]),
-                }
+            percentiles = zip(
+                ds.percentile.values.tolist(), one[f"{name}_percentile"].values.tolist(), strict=True
             )
+            rows.append(
+                {"z": float(z), "force": force, "max": float(one[f"{name}_max"]),
+                 "at": one[f"{name}_max_position"].values.tolist(), "percentiles": dict(percentiles),
+                 "share_within": float(one[f"{name}_within"])}
+            )  # fmt: skip
     return rows
 
 

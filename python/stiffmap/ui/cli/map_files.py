@@ -15,7 +15,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import MM
-from stiffmap.ui.cli.map_summary import name_of
+from stiffmap.ui.cli.map_summary import readings
 from stiffmap.ui.cli.map_uncertainty import deviation_figures
 from stiffmap.ui.cli.map_worst import in_words
 from stiffmap.ui.cli.output import write_files
@@ -67,13 +67,9 @@ def map_figures(ds: xr.Dataset, plane: str, tolerance: float, own_scales: bool) 
     """One picture per reading of the force's direction."""
     from stiffmap.ui.plot import map_figure
 
-    chosen: dict[str, dict[str, Any]] = {
-        w: {"variable": f"{w}_deflection_{plane}"} for w in ("worst", "best")
-    }
-    chosen |= {str(c): {"variable": name_of(ds, plane, c), "case": str(c)} for c in ds.case.values}
     return {
         n: map_figure(ds, tolerance=tolerance, common_scale=not own_scales, **how)
-        for n, how in chosen.items()
+        for n, how in readings(ds, plane).items()
     }
 
 

@@ -22,8 +22,10 @@ from stiffmap.ui.cli.inputs import (
     ThreadsOption,
     finish,
     gravity,
+    in_si,
     machine_with,
     numbers,
+    words,
 )
 from stiffmap.ui.cli.output import JsonOption, show, write_files
 from stiffmap.ui.cli.table_text import as_text
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     from stiffmap.workspace.performance.table import Row
 
 
-def measures(
+def command(
     machine: MachineArgument,
     requirements: Annotated[
         str | None, typer.Option(help="Requirements file, or a shipped one by name: trimming.")
@@ -97,10 +99,10 @@ def measures(
     limits = None if box is None else MM * numbers(box, "box", 6).reshape(3, 2).T
     table = all_of(
         m, box=limits, force=force, plane=plane, requirements=requirements,
-        only=None if only is None else [n.strip() for n in only.split(",")], nodes=nodes, coarse=coarse,
-        length=None if length is None else MM * length, gravity=gravity(gravity_), threads=threads,
-        toolpath=toolpath, clearance=None if clearance is None else MM * clearance,
-        deflection=None if deflection is None else MM * deflection,
+        only=words(only), nodes=nodes, coarse=coarse,
+        length=in_si(length), gravity=gravity(gravity_), threads=threads,
+        toolpath=toolpath, clearance=in_si(clearance),
+        deflection=in_si(deflection),
     )  # fmt: skip
     files = [] if output is None else write(table, make_folder(output))
     show(as_json, table.as_plain(), _told(table), files)
@@ -112,9 +114,7 @@ def _told(table: MeasuresTable) -> Iterator[Table | Text | str]:
     yield as_table(table, narrow=get_console().width < WIDE)
     yield from (Text(note, "dim") for note in (*table.notes, *remarks(table)))
     if table.requirements.bounds:
-        missed = [r.measure.name for r in table.rows if r.verdict not in ("", "pass")]
-        verdict = f"does not meet: {', '.join(missed)}" if missed else "meets all of it"
-        yield f"{table.machine.name} against {table.requirements.name}: {verdict}"
+        yield verdict_of(table)
 
 
 WIDE = 100

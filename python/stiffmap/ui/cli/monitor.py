@@ -10,17 +10,16 @@ import typer
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.json_text import parse_json
 from stiffmap.experiment import load_experiment
-from stiffmap.experiment.calls import placed
 from stiffmap.identification.planning.budget import budgets
-from stiffmap.identification.planning.monitor import compare
+from stiffmap.identification.planning.calls import monitor
 from stiffmap.model.description import AppliedEffect
-from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.cli.inputs import EffectsOption
+from stiffmap.solve.machine import load_machine
+from stiffmap.ui.cli.inputs import DeclaredArgument, EffectsOption, finish
 from stiffmap.ui.cli.output import JsonOption, show
 
 
-def monitor(
-    machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
+def command(
+    machine: DeclaredArgument,
     before: Annotated[str, typer.Argument(help="Experiment folder: the machine as it was, or one specimen.")],
     after: Annotated[str, typer.Argument(help="Experiment folder: the machine now, or another specimen.")],
     effect: EffectsOption = None,
@@ -42,18 +41,17 @@ def monitor(
       [cyan]stiffmap monitor orthoglide-revised january june --diagnosis january/diagnosis.json --budget[/cyan]
     """
     m = load_machine(machine)
-    terms = [placed(m, text) for text in effect or []] + (_of(m, diagnosis) if diagnosis else [])
+    terms = [*(effect or ()), *(_of(diagnosis) if diagnosis else ())]
     if not terms:
         raise StiffmapError("monitor: name what to follow, by --effect or --diagnosis")
-    found = compare(m, load_experiment(before), load_experiment(after), terms)
+    found = monitor(m, before, after, terms)
     data = {"common": found.common, "p": found.p, "changes": [vars(c) for c in found.changes]}
     now = budgets(m, load_experiment(after), found.second) if budget and not as_json else []
     show(as_json, data, [str(found), *map(str, now)])
-    if not found.common:
-        raise typer.Exit(1)
+    finish(not found.common)
 
 
-def _of(m: Machine, path: Path) -> list[AppliedEffect]:
+def _of(path: Path) -> list[AppliedEffect]:
     """Effects that a diagnosis named."""
     try:
         data: Any = parse_json(path.read_text(encoding="utf-8"))

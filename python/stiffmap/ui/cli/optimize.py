@@ -16,6 +16,7 @@ from rich.text import Text
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
 from stiffmap.common.outputs.option import written
+from stiffmap.ui.cli.inputs import SchedulerOption, finish
 from stiffmap.ui.cli.output import JsonOption, show, write_files
 from stiffmap.ui.cli.table_text import table
 
@@ -24,14 +25,12 @@ if TYPE_CHECKING:
     from stiffmap.workspace.design import ParetoSet
 
 
-def optimize(
+def command(
     design: Annotated[str, typer.Argument(help="Design file, or a shipped one by name: redesign.")],
     output: Annotated[Path, written(help="Folder for results; resumed from there.")] = Path("design"),
     generations: Annotated[int | None, typer.Option(help="Generations; default: the file's.")] = None,
     processes: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Address of a dask scheduler whose workers judge the designs.")
-    ] = None,
+    scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Machines that are best under several measures at once: a Pareto set, and chosen designs as machine files.
@@ -51,10 +50,8 @@ def optimize(
 
       [cyan]stiffmap optimize redesign --scheduler tcp://HOST:8786 -o results/redesign[/cyan]
     """
-    from stiffmap.ui.cli.inputs import finish
     from stiffmap.ui.report.design import measured
-    from stiffmap.workspace.design import load_design
-    from stiffmap.workspace.design import optimize as search
+    from stiffmap.workspace.design import load_design, optimize
 
     console = Console(stderr=True, highlight=False)
     begun = time.monotonic()
@@ -64,7 +61,7 @@ def optimize(
 
     problem = load_design(design)
     place = make_folder(output)
-    found = search(
+    found = optimize(
         problem,
         folder=place,
         generations=generations,

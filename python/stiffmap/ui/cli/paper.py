@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 NO_CURVES = "The paper prints no numbers of the curves in Figures 5 to 7; the numbers above are those of its text and Table 1."
 
 
-def paper(
+def command(
     output: Annotated[Path | None, written(help="Folder for figures and tables.")] = None,
     points: Annotated[int, typer.Option(help="Positions along x and y of the error maps.")] = 101,
     figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 7 (with -o).")] = True,
@@ -41,14 +41,14 @@ def paper(
       [cyan]stiffmap paper --points 31 --no-figures -o results[/cyan]
     """
     from stiffmap.ui.paper import all_statements, compute
-    from stiffmap.ui.paper.table import as_plain, as_rich, count, count_text
+    from stiffmap.ui.paper.table import as_rich, count, count_text
 
     target = make_folder(output) if output else None
     results = compute(points, threads=threads, progress=False if as_json else None)
     statements = all_statements(results)
     files = write(results, statements, target, figures) if target else []
     told = [as_rich(statements), count_text(statements), NO_CURVES]
-    show(as_json, {"statements": as_plain(statements), "count": count(statements)}, told, files)
+    show(as_json, {"statements": statements, "count": count(statements)}, told, files)
 
 
 def write(results: Results, statements: list[Statement], target: Path, figures: bool) -> list[Path]:

@@ -18,6 +18,7 @@ from stiffmap.ui.cli.inputs import (
     GravityOption,
     MachineArgument,
     MethodOption,
+    PlacesOption,
     PlaneOption,
     ToleranceOption,
     finish,
@@ -30,14 +31,10 @@ from stiffmap.ui.cli.output import JsonOption, show, write_files
 from stiffmap.ui.cli.statuses import failed, failed_in_words
 from stiffmap.ui.cli.table_text import table
 
-AtOption = Annotated[
-    list[str] | None, typer.Option(help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]")
-]
 
-
-def polar(
+def command(
     machine: MachineArgument,
-    at: AtOption = None,
+    at: PlacesOption = None,
     force: ForceOption = "300",
     plane: PlaneOption = "xy",
     directions: Annotated[int, typer.Option(help="Number of directions.")] = 72,

@@ -11,7 +11,7 @@ from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli.output import JsonOption, show
 
 
-def process(
+def command(
     table: Annotated[
         Path,
         typer.Argument(

@@ -20,21 +20,19 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.mobility import Mobility, mobility
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import (
+    AtOption,
     EffectsOption,
     MachineArgument,
     RotationOption,
-    machine_with,
+    machine_at,
     numbers,
-    position,
-    rotation,
 )
-from stiffmap.ui.cli.output import JsonOption
-from stiffmap.ui.cli.output import show as show_result
+from stiffmap.ui.cli.output import JsonOption, show
 
 
-def show(
+def command(
     machine: MachineArgument,
-    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    at: AtOption = None,
     turned: RotationOption = None,
     output: Annotated[Path | None, written(help="Picture to write. [default: MACHINE.png]")] = None,
     effect: EffectsOption = None,
@@ -69,8 +67,8 @@ def show(
 
       [cyan]stiffmap show orthoglide-revised --at -200,-200,-200 --load 300,0,0 --page loaded.html[/cyan]
     """
-    m = machine_with(machine, effect)
-    p, r = position(at, m), rotation(turned)
+    m, p, how = machine_at(machine, effect, at, turned)
+    r = how["rotation"]
     k = inverse_kinematics(m, p, r)
     if int(k.status) != Status.CONVERGED:
         raise StiffmapError(f"{m.name} cannot take this pose: {Status(int(k.status)).name.lower()}")
@@ -84,32 +82,28 @@ def show(
             raise StiffmapError("--page: needs --load, the force under which the machine is drawn")
         write_page(m, page, p, wrench, rotation=r)
     if wrench is not None:
-        _show_load(m, p, r, wrench, file, page, as_json)
+        _show_load(m, p, r, wrench, [f for f in (file, page) if f is not None], as_json)
     else:
-        show_result(as_json, as_plain(m, counts, file), _lines(m, counts, file))
+        show(as_json, as_plain(m, counts, file), _lines(m, counts, file))
 
 
 def _draw(m: Machine, p: Any, r: Any, path: Path, view: str | None, wrench: Any) -> Path:
     from stiffmap.ui.plot import loaded_figure, machine_figure, save
 
-    angles = None if view is None else numbers(view, "view", 2)
-    looks = None if angles is None else (float(angles[0]), float(angles[1]))
+    looks = None if view is None else tuple(numbers(view, "view", 2).tolist())
     if wrench is not None:
         return save(loaded_figure(m, p, wrench, rotation=r, view=looks), path)
     return save(machine_figure(m, p, rotation=r, view=looks), path)
 
 
-def _show_load(
-    m: Machine, p: Any, r: Any, wrench: Any, file: Path | None, page: Path | None, as_json: bool
-) -> None:
+def _show_load(m: Machine, p: Any, r: Any, wrench: Any, files: list[Path], as_json: bool) -> None:
     """The budget of the deflection, and the files written."""
     from stiffmap.solve.budget import deflection_budget
 
     budget = deflection_budget(m, p, wrench, rotation=r)
-    files = [f for f in (file, page) if f is not None]
     shares = {n: {"share": s, "displacement": c} for n, c, s in budget.ranked()}
     found = {"machine": m.name, "wrench": wrench, "displacement": budget.displacement, "elements": shares}
-    show_result(as_json, found | {"second_order": budget.rest_share}, [str(budget)], files)
+    show(as_json, found | {"second_order": budget.rest_share}, [str(budget)], files)
 
 
 def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:

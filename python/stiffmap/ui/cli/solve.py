@@ -29,15 +29,11 @@ from stiffmap.ui.cli.inputs import (
     RotationOption,
     finish,
     force_given,
-    gravity,
-    machine_with,
+    machine_at,
     numbers,
-    position,
     position_words,
-    rotation,
 )
-from stiffmap.ui.cli.output import JsonOption
-from stiffmap.ui.cli.output import show as show_result
+from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.cli.statuses import MEANINGS
 from stiffmap.ui.cli.table_text import table as table_of
 
@@ -47,7 +43,7 @@ SHOWN = 20  # rows of a file that are printed
 """m to mm, rad stays: a compliance then is in mm/N, rad/N, mm/(N mm), rad/(N mm)."""
 
 
-def solve(
+def command(
     machine: MachineArgument,
     at: Annotated[
         str | None,
@@ -84,16 +80,12 @@ def solve(
 
       [cyan]stiffmap solve orthoglide-revised --at poses.csv --force 0,0,-100 -o answers.csv[/cyan]
     """
-    m = machine_with(machine, effect)
-    how: dict[str, Any] = {
-        "rotation": rotation(turned),
-        "point": point,
-        "gravity": gravity(gravity_),
-        "method": method,
-    }
-    if at is not None and (is_file_name(at)):
+    file = Path(at) if at is not None and is_file_name(at) else None
+    m, place, how = machine_at(machine, effect, None if file else at, turned, gravity_)
+    how |= {"point": point, "method": method}
+    if file is not None:
         load = np.r_[force_vector(force), MM * numbers(moment, "moment", 3)]
-        finish(not solve_table(m, Path(at), load, how, output, as_json))
+        finish(not solve_table(m, file, load, how, output, as_json))
         return
     if output is not None:
         raise StiffmapError("--output: only with a file of poses (--at poses.csv)")
@@ -101,11 +93,10 @@ def solve(
     if vector is None:
         from stiffmap.solve.worst_force import worst_force
 
-        acting = worst_force(m, position(at, m), size, **how)
+        acting = worst_force(m, place, size, **how)
     else:
         acting = vector
     load = np.r_[acting, MM * numbers(moment, "moment", 3)]
-    place = position(at, m)
     s = m.solve(place, load, **how)
     why = reason(m, s, place, how["rotation"])
     told: list[Any] = [position_words(place, m), *_lines(s)]
@@ -115,7 +106,7 @@ def solve(
     told += [f"reason: {why}"] if why else []
     if int(s.status) == Status.SINGULAR and (ways := free_motions(m, s.free_twists)):
         told.append(f"free: the platform can {'; '.join(ways)}")
-    show_result(as_json, as_plain(m.name, s, load) | {"reason": why}, told)
+    show(as_json, as_plain(m.name, s, load) | {"reason": why}, told)
     finish(int(s.status) != Status.CONVERGED)
 
 
@@ -208,7 +199,7 @@ def solve_table(
         for p, w, state, d in zip(table.position, wrench, words, s.displacement, strict=True)
     ]
     data = {"machine": m.name, "point": s.point, "poses": rows}
-    show_result(as_json, data, _rows(table, s, words), files)
+    show(as_json, data, _rows(table, s, words), files)
     return bool(s.ok.all())
 
 

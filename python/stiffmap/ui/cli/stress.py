@@ -3,32 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich.table import Table
 
 from stiffmap.solve.internal_wrenches import InternalWrenches
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import (
+    AtOption,
     EffectsOption,
     FolderOption,
     GravityOption,
     MachineArgument,
     RotationOption,
     finish,
-    gravity,
-    machine_with,
-    position,
-    rotation,
+    machine_at,
 )
 from stiffmap.ui.cli.output import JsonOption, show, write_files
 from stiffmap.ui.cli.table_text import table
 
 
-def stress(
+def command(
     machine: MachineArgument,
-    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    at: AtOption = None,
     turned: RotationOption = None,
     effect: EffectsOption = None,
     gravity_: GravityOption = None,
@@ -49,11 +46,8 @@ def stress(
     """
     import stiffmap
 
-    m = machine_with(machine, effect)
-    none = (0.0, 0.0, 0.0)
-    result = stiffmap.assembly_wrenches(
-        m, position(at, m), rotation=rotation(turned), gravity=none if gravity_ is None else gravity(gravity_)
-    )
+    m, place, how = machine_at(machine, effect, at, turned, gravity_ or "0,0,0")
+    result = stiffmap.assembly_wrenches(m, place, **how)
     files = write_files(output, _picture(result, m.name))
     status = Status(int(result.status))
     data = {"machine": m.name, "status": status.name} | {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -11,11 +10,11 @@ import typer
 import xarray as xr
 from rich.table import Table
 
-from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import (
     MM,
+    AtOption,
     EffectsOption,
     FolderOption,
     GravityOption,
@@ -23,18 +22,16 @@ from stiffmap.ui.cli.inputs import (
     MethodOption,
     ToleranceOption,
     finish,
-    gravity,
-    machine_with,
+    machine_at,
     numbers,
-    position,
 )
 from stiffmap.ui.cli.output import JsonOption, show, write_files
 from stiffmap.ui.cli.table_text import table
 
 
-def sweep(
+def command(
     machine: MachineArgument,
-    at: Annotated[str | None, typer.Option(help="TCP position in mm, e.g. 0,0,300. [default: home]")] = None,
+    at: AtOption = None,
     direction: Annotated[str, typer.Option(help="Direction of the force, any length.")] = "1,0,0",
     to: Annotated[float, typer.Option(help="Largest force, N.")] = 1000.0,
     from_: Annotated[
@@ -80,29 +77,20 @@ def sweep(
     """
     import stiffmap
 
-    m = machine_with(machine, effect)
-    if limit is not None or control != "force" or cross:
+    m, place, posed = machine_at(machine, effect, at, acting=gravity_)
+    path = limit is not None or control != "force" or bool(cross)
+    how: dict[str, Any] = {"forces": np.linspace(from_, to, max(points, 0)), "method": method}
+    if path:
         reach = limit if limit is None or control == "force" else MM * limit
-        path(
-            m,
-            position(at, m),
-            numbers(direction, "direction", 3),
-            control,
-            reach,
-            points,
-            cross,
-            gravity(gravity_),
-            output,
-            as_json,
-        )
-        return
-    forces = np.linspace(from_, to, max(points, 0))
-    place, u = position(at, m), numbers(direction, "direction", 3)
-    ds = stiffmap.sweep(m, place, u, forces, gravity=gravity(gravity_), method=method)
-    files = write_files(output, _files(ds, MM * tolerance))
-    names = ("position", "direction", "force", "deflection", "deflection_along", "displacement", "status")
-    show(as_json, {"machine": m.name} | {n: ds[n].values for n in names}, [as_table(ds)], files)
-    finish(bool((ds.status != Status.CONVERGED).any()))
+        how = {"control": control, "limit": reach, "steps": points, "cross": cross}
+    ds = stiffmap.sweep(m, place, numbers(direction, "direction", 3), **posed, **how)
+    files = write_files(output, _path_files(m, ds) if path else _files(ds, MM * tolerance))
+    counted = ds.assign(unstable_modes=ds.unstable_modes.astype(int)) if path else ds
+    data = {"machine": m.name} | ({n: ds.attrs[n] for n in ("end", "crossing_end")} if path else {})
+    data |= {n: counted[n].values for n in (OF_PATH if path else OF_FORCES)}
+    show(as_json, data, _path_lines(ds) if path else [as_table(ds)], files)
+    early = path and ds.attrs["end"] != "the limit was reached"
+    finish(early or bool((ds.status != Status.CONVERGED).any()))
 
 
 def _files(ds: xr.Dataset, tolerance: float) -> Iterator[tuple[str, Any]]:
@@ -130,35 +118,10 @@ def _place(ds: xr.Dataset) -> str:
     return f"{ds.attrs['machine']} at ({', '.join(f'{1e3 * v:g}' for v in ds.position.values)}) mm"
 
 
+OF_FORCES = ("position", "direction", "force", "deflection", "deflection_along", "displacement", "status")
+OF_PATH = ("force", "deflection", "deflection_along", "unstable_modes", "status", "branch", "critical_force",
+           "critical_deflection", "critical_kind", "mode_leg", "mode_joint")  # fmt: skip
 SHOWN = 20
-
-
-def path(
-    machine: Machine,
-    at: Floats,
-    direction: Floats,
-    control: str,
-    limit: float | None,
-    steps: int,
-    cross: int,
-    gravity: Any,
-    output: Path | None,
-    as_json: bool,
-) -> None:
-    """Follow the path, print it, write it; exit with 1 where it ends early or is unstable somewhere."""
-    import stiffmap
-
-    ds = stiffmap.sweep(
-        machine, at, direction, control=control, limit=limit, steps=steps, cross=cross, gravity=gravity
-    )
-    files = write_files(output, _path_files(machine, ds))
-    names = ("force", "deflection", "deflection_along", "unstable_modes", "status", "branch", "critical_force",
-             "critical_deflection", "critical_kind", "mode_leg", "mode_joint")  # fmt: skip
-    counted = ds.assign(unstable_modes=ds.unstable_modes.astype(int))
-    data = {"machine": machine.name, "end": ds.attrs["end"], "crossing_end": ds.attrs["crossing_end"]}
-    show(as_json, data | {n: counted[n].values for n in names}, _path_lines(ds), files)
-    reached = ds.attrs["end"] == "the limit was reached"
-    finish(not reached or bool((ds.status != Status.CONVERGED).any()))
 
 
 def _path_files(machine: Machine, ds: xr.Dataset) -> Iterator[tuple[str, Any]]:

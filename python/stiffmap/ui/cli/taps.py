@@ -10,14 +10,14 @@ import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.cli.inputs import EffectsOption, FolderOption, MachineArgument, finish, machine_with
+from stiffmap.ui.cli.inputs import EffectsOption, FolderOption, MachineArgument, finish, machine_with, words
 from stiffmap.ui.cli.output import JsonOption, show, write_files
 
 if TYPE_CHECKING:
     from stiffmap.identification.taps import TapDiagnosis, TapTest
 
 
-def taps(
+def command(
     machine: MachineArgument,
     table: Annotated[
         Path,
@@ -56,11 +56,11 @@ def taps(
     measured = load_taps(table, m)
     found = explain_taps(
         m, measured, None if statics is None else load_experiment(statics), default_u=mass_u / 100,
-        only=None if only is None else [k.strip() for k in only.split(",")],
+        only=words(only),
     )  # fmt: skip
     rows = compared(m, measured, found)
     files = write_files(output, _files(m, measured, found))
-    data = {"machine": m.name, **as_plain(found), "modes": rows}
+    data = {"machine": m.name, **found.as_plain(), "modes": rows}
     show(as_json, data, [found.sentence, *map(_row, rows)], files)
     finish(bool(found.alike) or not found.sentence.startswith("Nothing"))
 
@@ -74,21 +74,6 @@ def _row(r: dict[str, Any]) -> str:
         return text
     text += f"; damping {r['damping_percent']:.2f} % measured, {r['damping_before_percent']:.2f} before"
     return text if (d := r["damping_after_percent"]) is None else f"{text}, after {d:.2f}"
-
-
-def as_plain(found: TapDiagnosis) -> dict[str, Any]:
-    """Data of an answer."""
-    return {
-        "sentence": found.sentence, "chi2_before": found.before, "readings": found.readings,
-        "named": None if found.named is None else found.named.candidate,
-        "candidates": [
-            {
-                "candidate": e.candidate, "parameters": e.parameters, "u": e.u, "chi2": e.chi2, "statics": e.statics,
-                "taps": e.taps, "disagreement": e.disagreement,
-            }
-            for e in found.alike
-        ],
-    }  # fmt: skip
 
 
 def compared(machine: Any, measured: TapTest, found: TapDiagnosis) -> list[dict[str, Any]]:

@@ -10,23 +10,21 @@ import typer
 from stiffmap.solve.status import Flag, Status
 from stiffmap.ui.cli.inputs import (
     MM,
+    AtOption,
     EffectsOption,
     GravityOption,
     MachineArgument,
     RotationOption,
     finish,
-    gravity,
-    machine_with,
+    machine_at,
     numbers,
-    position,
-    rotation,
 )
 from stiffmap.ui.cli.output import JsonOption, show
 
 
-def wrench(
+def command(
     machine: MachineArgument,
-    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    at: AtOption = None,
     by: Annotated[str, typer.Option(help="Imposed translation of the point in mm, base axes.")] = "0,0,0",
     turn: Annotated[str, typer.Option(help="Imposed rotation vector in deg, base axes.")] = "0,0,0",
     turned: RotationOption = None,
@@ -45,11 +43,9 @@ def wrench(
 
       [cyan]stiffmap wrench hexapod --by 0,0,-0.2 --turn 0,0.01,0 --json[/cyan]
     """
-    m = machine_with(machine, effect)
+    m, place, how = machine_at(machine, effect, at, turned, gravity_)
     displacement = np.r_[MM * numbers(by, "by", 3), np.deg2rad(numbers(turn, "turn", 3))]
-    held = m.wrench(
-        position(at, m), displacement, rotation=rotation(turned), point=point, gravity=gravity(gravity_)
-    )
+    held = m.wrench(place, displacement, point=point, **how)
     legs = dict(zip(held.legs, held.leg_wrench, strict=True))
     free = Status(int(held.force_status))
     data = {
