@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from stiffmap.model.description import Joint, MachineDescription
 from stiffmap.model.description.tree import all_elements
@@ -35,6 +36,19 @@ class FileCheck:
     gaps: list[Gap]
     changes: list[HomeChange]
     warnings: list[str]
+
+    def as_plain(self) -> dict[str, Any]:
+        """Data of JSON, SI."""
+        return {
+            "file": str(self.path),
+            "name": self.description.name,
+            "title": self.description.title,
+            "counts": self.counts,
+            "home_gaps": {g.name: {"translation": g.translation, "rotation": g.rotation} for g in self.gaps},
+            "home_changes": {c.name: {"declared": c.declared, "closed": c.closed} for c in self.changes},
+            "effects": [effect.kind for effect in self.description.effects],
+            "warnings": self.warnings,
+        }
 
 
 def check_file(path: str | PathLike[str]) -> FileCheck:

@@ -42,7 +42,9 @@ def on_branch_of(base: MachineDescription, other: MachineDescription) -> Machine
         return other
     start, end = _settled(base.declared or base), other.declared or other
     now = {row.address: row.value for row in listed(start)}
-    new = {row.address: row.value for row in listed(end) if not row.address.partition("/")[2].startswith("home")}
+    new = {
+        row.address: row.value for row in listed(end) if not row.address.partition("/")[2].startswith("home")
+    }
     there = redesigned(start, {a: v for a, v in new.items() if a in now and v != now[a]})
     for full, e in tree.all_elements(there):
         if isinstance(e, Joint):

@@ -82,6 +82,26 @@ class Residual:
         e = self.experiment
         return [(e.ids[i], e.channels[a].name, float(self.values[i, a])) for i, a in at if z[i, a] > 0]
 
+    def as_plain(self, rows: int = 10) -> dict[str, Any]:
+        """Data of JSON, SI, with the worst `rows`."""
+        e = self.experiment
+        return {
+            "experiment": e.name,
+            "quantity": e.quantity,
+            "units": "SI (m, rad), base axes",
+            "summary": vars(self.summary),
+            "noise_floor": {
+                c.name: f for c, f in zip(e.channels, self.noise.floor, strict=True) if c.name in e.axes
+            },
+            "limitations": self.limitations,
+            "lack_of_fit": self.lack_of_fit,
+            "nuisances": self.nuisances,
+            "poses_off": self.groups_off,
+            "set_aside": [e.ids[i] for i in self.set_aside.nonzero()[0]],
+            "worst": [{"id": i, "channel": c, "residual": v} for i, c, v in self.worst(rows)],
+            "checks": [vars(c) for c in self.checks],
+        }
+
 
 @takes_machine
 def residual(

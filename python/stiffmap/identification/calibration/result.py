@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from stiffmap.common.json_text import json_text
 from stiffmap.common.number_text import percent
 from stiffmap.common.plain import plain
 from stiffmap.common.short import short_repr
@@ -121,7 +121,7 @@ class Calibration:
 
     def to_json(self) -> str:
         """All but arrays and machines, SI; NaN is null."""
-        return json.dumps(self.as_plain(), indent=2, ensure_ascii=False, allow_nan=False)
+        return json_text(self.as_plain())
 
     def as_plain(self) -> dict[str, Any]:
         """JSON data."""

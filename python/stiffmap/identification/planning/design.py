@@ -53,6 +53,17 @@ class Design:
     """``identify``: log det; ``separate``: standard deviations between the rivals; ``map``: m, rms."""
     random_value: float
 
+    def as_plain(self) -> dict[str, Any]:
+        """Data of JSON, SI."""
+        each = zip(self.names, self.units, self.sigma, self.random_sigma, strict=True)
+        return {
+            "aim": self.aim,
+            "rows": len(self.experiment),
+            "parameters": [{"name": n, "unit": u, "u": s, "u_random": r} for n, u, s, r in each],
+            "value": self.value,
+            "value_random": self.random_value,
+        }
+
 
 def design(
     machine: Machine,

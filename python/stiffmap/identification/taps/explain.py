@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -84,6 +85,17 @@ class TapDiagnosis:
     alike: tuple[Explained, ...]
     """Candidates that the readings cannot distinguish from the best, which is the first."""
     sentence: str
+
+    def as_plain(self) -> dict[str, Any]:
+        """Data of JSON."""
+        return {
+            "sentence": self.sentence, "chi2_before": self.before, "readings": self.readings,
+            "named": None if self.named is None else self.named.candidate,
+            "candidates": [
+                {n: getattr(e, n) for n in ("candidate", "parameters", "u", "chi2", "statics", "taps", "disagreement")}
+                for e in self.alike
+            ],
+        }  # fmt: skip
 
 
 @takes_machine

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 import typer
-from rich import box
-from rich.console import Console
-from rich.table import Table
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli.table_text import table
 
 if TYPE_CHECKING:
     from stiffmap import Machine
@@ -33,7 +31,7 @@ class Line(NamedTuple):
     unit: str
 
 
-def bench(
+def command(
     rounds: Annotated[int, typer.Option(help="Measurements of each case; the median is shown.")] = 7,
     as_json: JsonOption = False,
 ) -> None:
@@ -56,16 +54,10 @@ def bench(
     level = os.environ.get("STIFFMAP_ISA") or kernel_levels()[-1]
     lines = [line for name in MACHINES for line in machine_lines(load_machine(name), rounds)]
     lines += thread_lines(load_machine(MACHINES[1]), rounds)
-    if as_json:
-        print_json({"instruction_set": level, "rounds": rounds, "cases": [line._asdict() for line in lines]})
-        return
-    table = Table(box=box.SIMPLE_HEAD, title=f"instruction set {level}, median of {rounds}")
-    table.add_column("case")
-    table.add_column("value", justify="right")
-    table.add_column("unit")
-    for line in lines:
-        table.add_row(line.case, f"{line.value:.3g}", line.unit)
-    Console(highlight=False).print(table)
+    title = f"instruction set {level}, median of {rounds}"
+    words = [(line.case, f"{line.value:.3g}", line.unit) for line in lines]
+    data = {"instruction_set": level, "rounds": rounds, "cases": [line._asdict() for line in lines]}
+    show(as_json, data, [table(title, ("case", "value", "unit"), words, left=("case", "unit"))])
 
 
 def machine_lines(machine: Machine, rounds: int) -> list[Line]:

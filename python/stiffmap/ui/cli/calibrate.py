@@ -14,25 +14,29 @@ from stiffmap.common.outputs.option import written
 from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.numbers import Tolerances
+from stiffmap.ui.cli.inputs import (
+    BudgetOption,
+    DeclaredArgument,
+    ExperimentArgument,
+    SpreadOption,
+    ThreadsOption,
+    finish,
+)
 from stiffmap.ui.cli.output import JsonOption
 
 
-def calibrate_command(
-    machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
-    data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
+def command(
+    machine: DeclaredArgument,
+    data: ExperimentArgument,
     output: Annotated[Path | None, written(help="Folder for calibration.json and table.txt.")] = None,
-    tolerance: Annotated[
-        float, typer.Option(min=1e-3, help="Factor on the default standard uncertainties of the machine.")
-    ] = 1.0,
+    tolerance: SpreadOption = 1.0,
     exclude: Annotated[
         list[str] | None, typer.Option(help="Group that is known to be right; may be repeated.")
     ] = None,
-    budget: Annotated[
-        float | None, typer.Option(min=0.1, help="Seconds after which the best so far is given.")
-    ] = None,
+    budget: BudgetOption = None,
     rows: Annotated[int, typer.Option(help="Unknowns to list.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
-    threads: Annotated[int | None, typer.Option(help="Threads; default: all cores.")] = None,
+    threads: ThreadsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """All uncertain numbers of a machine from readings at once, and which of them the readings can determine.
@@ -57,8 +61,7 @@ def calibrate_command(
     if output is not None:
         write(result, output)
     print(result.to_json() if as_json else "\n".join([*result.lines(), "", *result.table(rows)]))
-    if result.verdict not in ("as declared", "adjusted within tolerance"):
-        raise typer.Exit(1)
+    finish(result.verdict not in ("as declared", "adjusted within tolerance"))
 
 
 def write(result: Calibration, folder: Path) -> None:

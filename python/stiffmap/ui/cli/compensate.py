@@ -21,19 +21,27 @@ from stiffmap.identification.validity import beyond
 from stiffmap.machining.compensation import (
     axis_errors,
     axis_errors_of_map,
+    compensate,
     compensation_table,
     corrected_geometry,
     corrected_urdf,
     dh_list,
     write_table,
 )
-from stiffmap.machining.compensation import compensate as compute
 from stiffmap.model.description import MachineDescription
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.validity import Validity
-from stiffmap.ui.cli.inputs import EffectsOption, machine_with, numbers
+from stiffmap.ui.cli.inputs import (
+    CorrectedArgument,
+    EffectsOption,
+    GravityOption,
+    finish,
+    in_si,
+    machine_with,
+    numbers,
+)
 from stiffmap.ui.cli.inputs import gravity as gravity_of
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.workspace.maps.files import read_dataset
 
 MM = 1e3
@@ -44,10 +52,8 @@ NAMED = 12
 """Rows that a line names."""
 
 
-def compensate(
-    machine: Annotated[
-        str, typer.Argument(help="Corrected machine: file with its effects, or a shipped name.")
-    ],
+def command(
+    machine: CorrectedArgument,
     poses: Annotated[
         Path | None, typer.Argument(help="CSV of wanted poses: x,y,z in mm, loads, approach_x …")
     ] = None,
@@ -56,7 +62,7 @@ def compensate(
     force: Annotated[
         str, typer.Option(help="Force at the tool in every pose, N, where the CSV has none.")
     ] = "0,0,0",
-    gravity: Annotated[str | None, typer.Option(help="m/s², base axes, as 0,0,-9.81.")] = None,
+    gravity: GravityOption = None,
     urdf: Annotated[
         Path | None,
         typer.Option(help="The arm's own URDF: its joints get the corrected origins, all else is kept."),
@@ -109,27 +115,21 @@ def compensate(
 
       [cyan]stiffmap compensate result/machine.yaml --check held_out[/cyan]
     """
-    out: dict[str, object] = {}
-    if axis is not None:
-        out = _table(machine, effect, axis, form, points, through, case, zero, output, force, gravity)
-        _say(out, as_json)
-        return
-    if poses is None and urdf is None and dh is None and check is None:
+    if axis is None and poses is None and urdf is None and dh is None and check is None:
         raise StiffmapError("compensate: give a CSV of wanted poses, --axis, --urdf, --dh or --check")
-    if urdf is not None and (output is None or poses is not None):
+    if axis is None and urdf is not None and (output is None or poses is not None):
         raise StiffmapError(
             "--urdf: give -o FILE, the URDF to write, and no poses, whose commands go there too"
         )
-    m = machine_with(machine, effect)
-    if urdf is not None or dh is not None:
-        out |= _geometry(m, urdf, dh, output)
-    if poses is not None:
-        out |= _commands(m, poses, output, force, gravity)
-    if check is not None:
-        out |= _checked(m, check)
-    _say(out, as_json)
-    if out.get("verdict") == WORSE:
-        raise typer.Exit(1)
+    if axis is not None:
+        out = _table(machine, effect, axis, form, points, through, case, zero, output, force, gravity)
+    else:
+        m = machine_with(machine, effect)
+        out = {} if urdf is None and dh is None else _geometry(m, urdf, dh, output)
+        out |= {} if poses is None else _commands(m, poses, output, force, gravity)
+        out |= {} if check is None else _checked(m, check)
+    show(as_json, out, (f"{key}: {value}" for key, value in out.items()))
+    finish(out.get("verdict") == WORSE)
 
 
 def _checked(m: Machine, folder: Path) -> dict[str, object]:
@@ -168,14 +168,6 @@ def _promise(m: Machine) -> dict[str, object]:
     return {f"promised by the file, m{v.unit}": f"{MM * v.error:.4g} ± {MM * v.error_u:.1g} rms ({v})"}
 
 
-def _say(out: dict[str, object], as_json: bool) -> None:
-    if as_json:
-        print_json(out)
-        return
-    for key, value in out.items():
-        print(f"{key}: {value}")
-
-
 def _table(
     machine: str,
     effect: list[str] | None,
@@ -190,7 +182,7 @@ def _table(
     gravity: str | None,
 ) -> dict[str, object]:
     """Table of an axis, from a machine or from a map that has been written."""
-    point = None if through is None else np.array(numbers(through, "through", 3)) / MM
+    point = in_si(through, "through", 3)
     if machine.endswith((".nc", ".zarr")):
         errors = axis_errors_of_map(read_dataset(machine), axis, through=point, case=case)
     else:
@@ -226,7 +218,7 @@ def _commands(
 ) -> dict[str, object]:
     plan = against_base(load_plan(poses, m, "position"), m.description.home.r)
     wrench = plan.wrench if plan.wrench.any() else np.append(numbers(force, "force", 3), np.zeros(3))
-    found = compute(
+    found = compensate(
         m, plan.position, plan.rotation, wrench=wrench, approach=plan.approach, gravity=gravity_of(gravity)
     )
     if output is not None:

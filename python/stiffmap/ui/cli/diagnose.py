@@ -14,24 +14,28 @@ from stiffmap.common.outputs.option import written
 from stiffmap.identification.diagnosis import Diagnosis, diagnose
 from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.numbers import Tolerances
+from stiffmap.ui.cli.inputs import (
+    BudgetOption,
+    DeclaredArgument,
+    ExperimentArgument,
+    SpreadOption,
+    ThreadsOption,
+    finish,
+)
 from stiffmap.ui.cli.output import JsonOption
 
 
-def diagnose_command(
-    machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
-    data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
+def command(
+    machine: DeclaredArgument,
+    data: ExperimentArgument,
     output: Annotated[Path | None, written(help="Folder for report and files.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the folds, and of the poses drawn of many.")] = 0,
-    threads: Annotated[int | None, typer.Option(help="Threads; default: all cores.")] = None,
+    threads: ThreadsOption = None,
     exclude: Annotated[
         list[str] | None, typer.Option(help="Kind of effect or group of numbers known not to be; repeatable.")
     ] = None,
-    budget: Annotated[
-        float | None, typer.Option(min=0.1, help="Seconds after which the best so far is given.")
-    ] = None,
-    tolerance: Annotated[
-        float, typer.Option(min=1e-3, help="Factor on the default standard uncertainties of the machine.")
-    ] = 1.0,
+    budget: BudgetOption = None,
+    tolerance: SpreadOption = 1.0,
     date: Annotated[str | None, typer.Option(help="Date that the report bears, as you write it.")] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing of what is being tried.")] = False,
     as_json: JsonOption = False,
@@ -68,8 +72,7 @@ def diagnose_command(
         print(f"next: {next_step(result)}")
         if output is not None:
             print(f"wrote {output}: start with report.html")
-    if result.verdict != "none":
-        raise typer.Exit(1)
+    finish(result.verdict != "none")
 
 
 def _say(what: str) -> None:

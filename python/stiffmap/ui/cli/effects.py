@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
 
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, print_json, say
 
 if TYPE_CHECKING:
     from stiffmap.model.effects import EffectType
     from stiffmap.solve.machine import Machine
 
 
-def effects(
+def command(
     kind: Annotated[
         str | None,
         typer.Argument(
@@ -53,14 +53,13 @@ def effects(
     if as_json:
         print_json([_plain(e, machine) for e in chosen])
         return
-    console = Console(highlight=False)
     for effect in chosen:
         names = ", ".join(f"{p.name} ({p.unit})" if p.unit != "1" else p.name for p in effect.parameters)
-        console.print(f"[bold]{effect.kind}[/bold]  {escape(effect.title)}: {escape(names)}")
+        say(Text.assemble((effect.kind, "bold"), f"  {effect.title}: {names}"))
         if machine is not None:
-            console.print(f"    on {escape(', '.join(_where(effect, machine)) or 'nothing of this machine')}")
+            say(f"    on {', '.join(_where(effect, machine)) or 'nothing of this machine'}")
     if kind:
-        _definition(console, chosen[0])
+        say(*_definition(chosen[0]))
 
 
 def _where(effect: EffectType, machine: Machine) -> list[str]:
@@ -72,16 +71,16 @@ def _where(effect: EffectType, machine: Machine) -> list[str]:
     return [f"{element} ({', '.join(at)})" if at else element for element, at in legs.items()]
 
 
-def _definition(console: Console, effect: EffectType) -> None:
-    console.print(escape(effect.doc))
-    console.print(escape(f"pivot: {effect.pivot}; frame: {effect.frame}; moves: {effect.moves}"))
+def _definition(effect: EffectType) -> Iterator[str]:
+    yield effect.doc
+    yield f"pivot: {effect.pivot}; frame: {effect.frame}; moves: {effect.moves}"
     for option in effect.options:
         choices = ", ".join(option.choices)
-        console.print(escape(f"option {option.name}: {choices} (the first by default); {option.doc}"))
+        yield f"option {option.name}: {choices} (the first by default); {option.doc}"
     for p in effect.parameters:
         unit = f"{p.unit}, {p.angular} where it turns" if p.angular else p.unit
         null = "" if p.null is None else f"; none at {p.null:g}"
-        console.print(escape(f"  {p.name} [{unit}] {p.lower:g} … {p.upper:g}{null}: {p.doc}"))
+        yield f"  {p.name} [{unit}] {p.lower:g} … {p.upper:g}{null}: {p.doc}"
 
 
 def _plain(effect: EffectType, machine: Machine | None) -> dict[str, Any]:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 import xarray as xr
-from rich import box
-from rich.console import Console
 from rich.table import Table
 
-from stiffmap.common.outputs import make_folder
-from stiffmap.common.plain import plain
 from stiffmap.ui.cli.inputs import (
+    MM,
     EffectsOption,
     FolderOption,
     GravityOption,
@@ -22,12 +20,14 @@ from stiffmap.ui.cli.inputs import (
     ThreadsOption,
     finish,
     gravity,
+    in_si,
     machine_with,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show, write_files
+from stiffmap.ui.cli.table_text import table
 
 
-def efforts(
+def command(
     machine: MachineArgument,
     trajectory: Annotated[
         Path,
@@ -74,37 +74,20 @@ def efforts(
 
     m = machine_with(machine, effect)
     g = gravity(gravity_)
-    run = load_motion(trajectory).trajectory(
-        m, duration=duration, gravity=g, feed=None if feed is None else feed * 1e-3 / 60
-    )
+    run = load_motion(trajectory).trajectory(m, duration=duration, gravity=g, feed=in_si(feed, unit=MM / 60))
     found = drive_efforts(m, run, gravity=g, friction=friction, threads=threads)
-    files = write(found, make_folder(output)) if output else []
-    if as_json:
-        names = (
-            "peak_effort",
-            "rms_effort",
-            "effort_margin",
-            "peak_speed",
-            "speed_margin",
-            "peak_power",
-            "range_margin",
-        )
-        print_json(
-            plain(
-                {
-                    "machine": m.name,
-                    "time": float(run.time[-1]),
-                    "drives": [str(d) for d in found.drive.values],
-                }
-                | {n: found[n].values for n in names}
-                | {"files": files}
-            )
-        )
-    else:
-        console = Console(highlight=False)
-        console.print(as_table(found))
-        if files:
-            console.print(f"wrote {', '.join(files)}", soft_wrap=True)
+    files = write_files(output, _files(found))
+    names = (
+        "peak_effort",
+        "rms_effort",
+        "effort_margin",
+        "peak_speed",
+        "speed_margin",
+        "peak_power",
+        "range_margin",
+    )
+    data = {"machine": m.name, "time": found.time.values[-1], "drives": list(map(str, found.drive.values))}
+    show(as_json, data | {n: found[n].values for n in names}, [as_table(found)], files)
     finish(bool(exceeded(found).any()))
 
 
@@ -114,34 +97,27 @@ def exceeded(found: xr.Dataset) -> np.ndarray:
     return np.asarray(np.nanmin([np.where(np.isnan(m), np.inf, m) for m in margins], axis=0) < -1e-9)
 
 
-def write(found: xr.Dataset, output: Path) -> list[str]:
+def _files(found: xr.Dataset) -> Iterator[tuple[str, Any]]:
     """Data and picture."""
-    from stiffmap.ui.plot import save
     from stiffmap.ui.plot.efforts import efforts_figure
-    from stiffmap.workspace.maps.files import write_dataset
 
-    data = write_dataset(found, output / "efforts.nc")
-    return [str(data), str(save(efforts_figure(found), output / "efforts.png"))]
+    yield "efforts.nc", found
+    yield "efforts.png", efforts_figure(found)
 
 
 def as_table(found: xr.Dataset) -> Table:
     """A row per drive."""
     span = float(found.time[-1] - found.time[0])
     turns = found.attrs["revolute"]
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        title=f"{found.attrs['machine']}: {span:.4g} s; peaks; share of the declared limit",
-    )
-    heads = ("drive", "unit", "effort", "share", "rms", "speed", "share", "power, W", "limit")
-    for head in heads:
-        table.add_column(
-            head, no_wrap=True, justify="left" if head in ("drive", "unit", "limit") else "right"
-        )
+    out = table(
+        f"{found.attrs['machine']}: {span:.4g} s; peaks; share of the declared limit",
+        ("drive", "unit", "effort", "share", "rms", "speed", "share", "power, W", "limit"),
+        left=("drive", "unit", "limit"), no_wrap=True, padding=(0, 1, 0, 0),
+    )  # fmt: skip
     over = exceeded(found)
     for i, drive in enumerate(found.drive.values):
         at = found.isel(drive=i)
-        table.add_row(
+        out.add_row(
             str(drive),
             "N·m, rad/s" if turns[i] else "N, m/s",
             f"{float(at.peak_effort):.4g}",
@@ -152,7 +128,7 @@ def as_table(found: xr.Dataset) -> Table:
             f"{float(at.peak_power):.4g}",
             "[red]over[/red]" if over[i] else "",
         )
-    return table
+    return out
 
 
 def _share(peak: xr.DataArray, margin: xr.DataArray) -> str:

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
-from rich import box
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
+from rich.text import Text
 
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
-from stiffmap.common.outputs import asked_to_replace
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.inputs import DhConventionOption, OverwriteOption, new_file, pairs
+from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli.table_text import table as table_of
 
 if TYPE_CHECKING:
     from stiffmap.experiment import Experiment
@@ -28,7 +26,7 @@ if TYPE_CHECKING:
 RECORDED = {"operator", "instrument", "certificate", "date", "temperature", "notes", "source", "sha256"}
 
 
-def experiment(
+def command(
     action: Annotated[str, typer.Argument(help="new: make a folder from a spreadsheet.")],
     file: Annotated[
         Path, typer.Argument(help="Spreadsheet: .xlsx, .csv, .txt (any separator and decimal sign).")
@@ -44,12 +42,7 @@ def experiment(
             help="Instead: table of Denavit and Hartenberg of a serial arm, of which machine.yaml is made.",
         ),
     ] = None,
-    dh_convention: Annotated[
-        str,
-        typer.Option(
-            "--dh-convention", help="standard, or modified (Craig: a and alpha of the link before)."
-        ),
-    ] = "standard",
+    dh_convention: DhConventionOption = "standard",
     difference: Annotated[
         str,
         typer.Option(help="What differences in the file are: actual-minus-target or target-minus-actual."),
@@ -104,7 +97,7 @@ def experiment(
     dialogue: Annotated[
         bool, typer.Option("--dialogue", help="Ask what cannot be guessed, and remember the answers.")
     ] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing experiment.")] = False,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Make an experiment of a spreadsheet: columns, units and repeats are understood and described in words.
@@ -146,10 +139,7 @@ def experiment(
         raise StiffmapError(f"--difference: expected {' or '.join(DIFFERENCES)}, got '{difference}'")
     if (machine is None) == (dh is None):
         raise StiffmapError("experiment: give either --machine or --dh")
-    if (output / "experiment.yaml").exists() and not overwrite:
-        raise FileError("exists already; use --overwrite to replace it", file=str(output / "experiment.yaml"))
-    if overwrite:
-        asked_to_replace(output)
+    new_file(output / "experiment.yaml", overwrite, output)
     given = Answers(
         {k: v.split("|") for k, v in pairs(mapped, "map").items()},
         pairs(unit, "unit"),
@@ -177,16 +167,16 @@ def experiment(
     if rows is not None and joints is not None and dh is not None:
         Machine(arm(rows, dh_convention, output.name, f"from {dh.name}", joints.middle())).save(machine)
     warnings = [line for line in (against_the_load(made), *contradictions(made)) if line]
-    if as_json:
-        print_json({"folder": str(output), "rows": len(made), "repeats": found.repeats,
-                    "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units,
-                    "warnings": warnings})  # fmt: skip
-        return
-    for line in warnings:
-        Console(highlight=False, soft_wrap=True).print(f"[bold red]WARNING: {escape(line)}[/bold red]")
-    for line in (*told, *(f"left out: {text}" for text in table.aside)):
-        Console(highlight=False, soft_wrap=True).print(escape(line))
-    tell(found, table.header, made, machine, output, joints.columns if joints else {})
+    data = {"folder": output, "rows": len(made), "repeats": found.repeats,
+            "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units,
+            "warnings": warnings}  # fmt: skip
+    lines = [*(Text(f"WARNING: {line}", "bold red") for line in warnings), *told]
+    lines += [f"left out: {text}" for text in table.aside]
+    show(
+        as_json,
+        data,
+        [*lines, *_told(found, table.header, made, machine, output, joints.columns if joints else {})],
+    )
 
 
 def _prompt(text: str) -> str:
@@ -198,19 +188,18 @@ def _prompt(text: str) -> str:
         ) from None
 
 
-def tell(
+def _told(
     found: Imported,
     header: Sequence[str],
     made: Experiment,
     machine: str,
     output: Path,
     commands: Mapping[str, tuple[str, str]],
-) -> None:
+) -> Iterator[Any]:
     """What each column was taken for, the first rows, and what to do next."""
-    console = Console(highlight=False, soft_wrap=True)
     for c in found.columns:
         if c.meaning in commands:
-            console.print(f"'{escape(header[c.index])}': command of {', '.join(commands[c.meaning])}")
+            yield f"'{header[c.index]}': command of {', '.join(commands[c.meaning])}"
             continue
         told = f"repeat {c.repeat} of {c.meaning}" if c.repeat else c.meaning
         where = (
@@ -218,24 +207,29 @@ def tell(
             if c.meaning == "note"
             else f"{told}, {found.units.get(c.meaning, 'no unit')}"
             + (
-                f" ({escape(c.unit) or 'one'} of the sheet: {found.factors[c.meaning]:.9g} {found.units[c.meaning]})"
+                f" ({c.unit or 'one'} of the sheet: {found.factors[c.meaning]:.9g} {found.units[c.meaning]})"
                 if c.meaning in found.factors
                 else ""
             )
         )
-        console.print(f"'{escape(header[c.index])}': {where}")
+        yield f"'{header[c.index]}': {where}"
     for name, value in found.constants.items():
-        console.print(f"{name} = {value:g} in every row")
+        yield f"{name} = {value:g} in every row"
     if (
         commands or made.seen is not None or made.absolute
     ):  # what was seen is no deviation before the frame is known
-        _show_cells(console, found)
+        head: Sequence[str] = found.header
+        rows: Any = (
+            [f"{c:.7g}" if isinstance(c, float) else str(c) for c in row]
+            for row in islice(iter(found.rows), 3)
+        )
     else:
-        _show(console, made)
+        from stiffmap.experiment.notebook import experiment_rows
+
+        head, rows = experiment_rows(made)
+    yield table_of("the first rows, as understood", head, rows, padding=(0, 1, 0, 0))
     poses = int(made.groups.max()) + 1
-    console.print(
-        f"{output}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
-    )
+    yield f"{output}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
     declared = np.all(~made.read | (made.sigma > 0), axis=0)
     silent = [
         c.name
@@ -243,44 +237,8 @@ def tell(
         if read and not known
     ]
     if silent:
-        console.print(
-            f"no noise of {', '.join(silent)} is declared: repeats must show it (five or more), or say --noise {silent[0]}=…"
-        )
-    console.print(
-        f"next: [cyan]stiffmap residual {escape(machine)} {escape(str(output))}[/cyan]", soft_wrap=True
-    )
-
-
-def _show(console: Console, made: object) -> None:
-    from stiffmap.experiment.notebook import experiment_rows
-
-    head, rows = experiment_rows(made)
-    table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood", padding=(0, 1, 0, 0))
-    for name in head:
-        table.add_column(name, justify="right")
-    for row in rows:
-        table.add_row(*row)
-    console.print(table)
-
-
-def _show_cells(console: Console, found: Imported) -> None:
-    """The first rows as they were written."""
-    table = Table(box=box.SIMPLE_HEAD, title="the first rows, as understood")
-    for name in found.header:
-        table.add_column(name, justify="right")
-    for row in islice(iter(found.rows), 3):
-        table.add_row(*(f"{c:.7g}" if isinstance(c, float) else str(c) for c in row))
-    console.print(table)
-
-
-def pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
-    out = {}
-    for text in given or []:
-        key, equals, value = text.partition("=")
-        if not equals or not value:
-            raise StiffmapError(f"--{name}: expected NAME=VALUE, such as dx=…; got '{text}'")
-        out[key.strip()] = value.strip()
-    return out
+        yield f"no noise of {', '.join(silent)} is declared: repeats must show it (five or more), or say --noise {silent[0]}=…"
+    yield Text.assemble("next: ", (f"stiffmap residual {machine} {output}", "cyan"))
 
 
 def _numbers(given: Sequence[str] | None, name: str) -> dict[str, float]:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
 
 from stiffmap.common.errors import FileError
-from stiffmap.common.outputs import asked_to_replace
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.inputs import DhConventionOption, OverwriteOption, new_file, pairs
+from stiffmap.ui.cli.output import JsonOption, show
 
 if TYPE_CHECKING:
     from stiffmap.model.urdf import Imported
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm")
 
 
-def import_urdf(
+def command(
     urdf: Annotated[
         Path, typer.Argument(help="URDF file, or a table of Denavit and Hartenberg (.csv, .txt, .xlsx).")
     ],
@@ -29,12 +29,7 @@ def import_urdf(
         Path | None, typer.Option(help="YAML with what a URDF lacks: loops, motors, compliances.")
     ] = None,
     output: Annotated[Path | None, written(help="Machine file to write. [default: NAME.yaml]")] = None,
-    dh_convention: Annotated[
-        str,
-        typer.Option(
-            "--dh-convention", help="standard, or modified (Craig: a and alpha of the link before)."
-        ),
-    ] = "standard",
+    dh_convention: DhConventionOption = "standard",
     unit: Annotated[
         list[str] | None, typer.Option(help="Unit of a column of the table without one, e.g. a=mm.")
     ] = None,
@@ -44,7 +39,7 @@ def import_urdf(
             help="Link of the URDF that is the tool. [default: tool0 and the like, or the only end]"
         ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing file.")] = False,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Machine file from a URDF: its tree to a tool as a serial machine, with a sidecar also closed loops; or from a table
@@ -62,7 +57,7 @@ def import_urdf(
 
       [cyan]stiffmap import arm.urdf --tip tool -o tool.yaml[/cyan]
     """
-    from stiffmap.model.urdf import import_urdf as read
+    from stiffmap.model.urdf import import_urdf
     from stiffmap.solve.machine import Machine
 
     table = urdf.suffix.lower() in TABLES
@@ -72,34 +67,25 @@ def import_urdf(
             raise FileError(
                 f"{option}: expected a {expected} with this option, found a {other}", file=str(urdf)
             )
-    found = _of_table(urdf, dh_convention, unit) if table else read(urdf, sidecar, tip=tip)
+    found = _of_table(urdf, dh_convention, unit) if table else import_urdf(urdf, sidecar, tip=tip)
     machine = Machine(found.description)
-    file = output or urdf.with_name(f"{machine.name}.yaml")
-    if file.exists() and not overwrite:
-        raise FileError("exists already; use --overwrite to replace it", file=str(file))
-    if overwrite:
-        asked_to_replace(file)
+    file = new_file(output or urdf.with_name(f"{machine.name}.yaml"), overwrite)
     machine.save(file)
-    if as_json:
-        print_json({"file": str(file), "name": machine.name, "legs": list(machine.legs),
-                    "actuators": list(machine.actuators), "tip": found.tip, "left_out": list(found.left_out),
-                    "rigid": list(found.rigid)})  # fmt: skip
-        return
-    console = Console(highlight=False, soft_wrap=True)
-    console.print(
-        f"wrote {escape(str(file))}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"
-    )
-    if found.choice:
-        console.print(
-            f"[yellow]tip[/yellow] {escape(found.tip)}, {escape(found.choice)}; --tip LINK takes another"
-        )
-    if found.left_out:
-        console.print(
-            "[yellow]left out[/yellow] (not on the way to the tip; masses stay on what carries them): "
-            f"{escape(', '.join(found.left_out))}"
-        )
-    if found.rigid:
-        console.print(f"[yellow]rigid[/yellow] (no compliance in the sidecar): {', '.join(found.rigid)}")
+    data = {"file": file, "name": machine.name, "legs": machine.legs, "actuators": machine.actuators, "tip": found.tip,
+            "left_out": found.left_out, "rigid": found.rigid}  # fmt: skip
+    told = [f"wrote {file}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"]
+    show(as_json, data, [*told, *_remarks(found)])
+
+
+def _remarks(found: Imported) -> Iterator[Text]:
+    """What was chosen, left out or taken as rigid."""
+    for head, text, there in (
+        ("tip", f" {found.tip}, {found.choice}; --tip LINK takes another", found.choice),
+        ("left out", f" (not on the way to the tip; masses stay on what carries them): {', '.join(found.left_out)}", found.left_out),
+        ("rigid", f" (no compliance in the sidecar): {', '.join(found.rigid)}", found.rigid),
+    ):  # fmt: skip
+        if there:
+            yield Text.assemble((head, "yellow"), text)
 
 
 def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
@@ -107,7 +93,6 @@ def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
     from stiffmap.common.tables.sheet import read_sheet
     from stiffmap.experiment.spreadsheet.dh import arm, read_dh
     from stiffmap.model.urdf import Imported
-    from stiffmap.ui.cli.experiment import pairs
 
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
     rows = read_dh(read_sheet(file), pairs(unit, "unit"))

@@ -10,8 +10,9 @@ import numpy as np
 import typer
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import number_in
+from stiffmap.common.outputs import asked_to_replace
 from stiffmap.common.outputs.option import written
 
 if TYPE_CHECKING:
@@ -20,6 +21,20 @@ if TYPE_CHECKING:
 MM = 1e-3
 
 MachineArgument = Annotated[str, typer.Argument(help="Shipped name (stiffmap machines) or machine file.")]
+DeclaredArgument = Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")]
+CorrectedArgument = Annotated[
+    str, typer.Argument(help="Corrected machine: file with its effects, or a shipped name.")
+]
+ExperimentArgument = Annotated[
+    str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")
+]
+AtOption = Annotated[
+    str | None, typer.Option("--at", help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")
+]
+PlacesOption = Annotated[
+    list[str] | None,
+    typer.Option("--at", help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]"),
+]
 EffectsOption = Annotated[
     list[str] | None,
     typer.Option("--effect", help="Add an effect, e.g. 'dead_zone actuator y half_width=12um'; repeatable."),
@@ -38,6 +53,26 @@ ForceOption = Annotated[
     ),
 ]
 MethodOption = Annotated[str, typer.Option(help="fast or reference.")]
+QuantityOption = Annotated[str, typer.Option(help="deflection or position.")]
+FrameOption = Annotated[str, typer.Option(help="Instrument's frame: known, offset_unknown or unknown.")]
+TargetOption = Annotated[str, typer.Option("--tool", help="Point on the tool: known or offset_unknown.")]
+BudgetOption = Annotated[
+    float | None, typer.Option("--budget", min=0.1, help="Seconds after which the best so far is given.")
+]
+SpreadOption = Annotated[
+    float,
+    typer.Option(
+        "--tolerance", min=1e-3, help="Factor on the default standard uncertainties of the machine."
+    ),
+]
+SchedulerOption = Annotated[
+    str | None, typer.Option(help="Address of a dask scheduler whose workers do the work.")
+]
+DhConventionOption = Annotated[
+    str,
+    typer.Option("--dh-convention", help="standard, or modified (Craig: a and alpha of the link before)."),
+]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Overwrite what is there already.")]
 ThreadsOption = Annotated[int | None, typer.Option(help="Threads; default: all cores.")]
 ToleranceOption = Annotated[float, typer.Option(help="Tolerated deflection, mm.")]
 PlaneOption = Annotated[str, typer.Option(help="Plane in which the force turns: xy, xz or yz.")]
@@ -63,6 +98,29 @@ def numbers(text: str, name: str, count: int | None = None) -> Floats:
         raise StiffmapError(f"--{name}: expected {expected} separated by commas, got '{text}'")
     if not np.isfinite(out).all():
         raise StiffmapError(f"--{name}: expected finite numbers, got '{text}'")
+    return out
+
+
+def in_si(given: str | float | None, name: str = "", count: int | None = None, unit: float = MM) -> Any:
+    """A number or the numbers of a text times their unit (mm where nothing else is said); None where nothing is given."""
+    if given is None:
+        return None
+    return unit * (numbers(given, name, count) if isinstance(given, str) else given)
+
+
+def words(text: str | None) -> list[str] | None:
+    """What stands between commas; None where nothing is given."""
+    return None if text is None else [part.strip() for part in text.split(",")]
+
+
+def pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
+    """The values of NAME=VALUE by their names."""
+    out = {}
+    for text in given or []:
+        key, equals, value = text.partition("=")
+        if not equals or not value:
+            raise StiffmapError(f"--{name}: expected NAME=VALUE, such as dx=…; got '{text}'")
+        out[key.strip()] = value.strip()
     return out
 
 
@@ -106,7 +164,7 @@ def rotation(text: str | None) -> Any:
 
 def gravity(text: str | None) -> Any:
     """Gravity as given, or None."""
-    return None if text is None else numbers(text, "gravity", 3)
+    return in_si(text, "gravity", 3, 1.0)
 
 
 def force_given(text: str) -> tuple[float, Floats | None]:
@@ -119,6 +177,27 @@ def force_given(text: str) -> tuple[float, Floats | None]:
     if given.size == 1 and given[0] <= 0:
         raise StiffmapError(f"--force: a size is a positive number (a direction takes three); got '{text}'")
     return float(np.linalg.norm(given)), given if given.size == 3 else None
+
+
+def machine_at(
+    name: str,
+    effects: Sequence[str] | None,
+    at: str | None,
+    turned: str | None = None,
+    acting: str | None = None,
+) -> tuple[Machine, Floats, dict[str, Any]]:
+    """A machine with effects, its commanded position, and rotation and gravity as keywords."""
+    machine = machine_with(name, effects)
+    return machine, position(at, machine), {"rotation": rotation(turned), "gravity": gravity(acting)}
+
+
+def new_file(file: Path, overwrite: bool, output: Path | None = None) -> Path:
+    """A file to write, of the folder `output` or on its own; FileError where it is there already and may not be replaced."""
+    if file.exists() and not overwrite:
+        raise FileError("exists already; use --overwrite to replace it", file=str(file))
+    if overwrite:
+        asked_to_replace(output or file)
+    return file
 
 
 def machine_with(name: str, effects: Sequence[str] | None) -> Machine:

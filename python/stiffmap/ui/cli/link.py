@@ -1,5 +1,197 @@
-"""`stiffmap link`: the command lives next to what it does; this module keeps ``--help`` quick."""
+"""``stiffmap link``: a part or a displacement field to a spring with error bars. mm, N at this boundary."""
 
-from stiffmap.ui.cli.link_command import link_command
+from __future__ import annotations
 
-__all__ = ["link_command"]
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import typer
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.outputs.option import written
+from stiffmap.model.link.arrays import Floats
+from stiffmap.model.link.gmshmesh import CAD, MESH, mesh_file
+from stiffmap.model.link.identify import identify_link
+from stiffmap.model.link.inputs import UNIT_WRENCHES, read_cases, read_material, read_part
+from stiffmap.model.link.linkfile import LinkFile, save_link
+from stiffmap.model.link.mesh import SolidMesh, face_area_centre
+from stiffmap.model.link.pipeline import PartLink, Solver, Support, link_from_part
+from stiffmap.model.link.readers import read_field
+from stiffmap.model.link.result import Link
+from stiffmap.model.link.solve import Material, Setup
+from stiffmap.ui.cli.inputs import in_si
+from stiffmap.ui.cli.output import JsonOption, show
+
+FIELDS = {".csv", ".dat", ".frd", ".vtk", ".vtu", ".lis", ".txt"}
+
+EXAMPLES = """
+Examples:
+
+  [cyan]stiffmap link bar.yaml --out bar-link.yaml --picture bar.png[/cyan]
+
+  [cyan]stiffmap link bracket.step --fixed face3 --loaded face7 --material aluminium --size 4[/cyan]
+
+  [cyan]stiffmap link field.csv --cases cases.csv --reference 310,0,0[/cyan]
+"""
+
+
+def command(
+    part: Annotated[
+        Path, typer.Argument(help="beam.yaml, .step, .msh, or a field: .csv .dat .frd .vtu .lis")
+    ],
+    fixed: Annotated[str, typer.Option(help="Face that is held; a+b joins faces.")] = "fixed",
+    loaded: Annotated[str, typer.Option(help="Face that carries the load and the spring.")] = "loaded",
+    material: Annotated[
+        str | None, typer.Option(help="A name (steel, aluminium, ...) or 70GPa,0.33.")
+    ] = None,
+    cases: Annotated[Path | None, typer.Option(help="CSV of wrenches: fx [N] ... mz [N*mm].")] = None,
+    reference: Annotated[
+        str | None, typer.Option(help="x,y,z of the spring in mm; else the face's centre.")
+    ] = None,
+    size: Annotated[float | None, typer.Option(help="Edge length of the elements in mm.")] = None,
+    unit: Annotated[str | None, typer.Option(help="Length unit of a file that does not carry it.")] = None,
+    nodes: Annotated[Path | None, typer.Option(help="Coordinates for .dat and .lis: node x y z.")] = None,
+    solver: Annotated[str, typer.Option(help="auto, ccx or skfem.")] = "auto",
+    quick: Annotated[
+        bool, typer.Option("--quick", help="One mesh, one boundary: no share of these.")
+    ] = False,
+    support: Annotated[
+        str,
+        typer.Option(
+            help="Besides clamped, for the boundary's share: bed (bolted down), soft (pin in hole)."
+        ),
+    ] = "bed",
+    zeros: Annotated[bool, typer.Option("--zeros", help="Set insignificant entries to zero.")] = False,
+    out: Annotated[Path | None, written("-o", "--out", help="Link file to write (YAML).")] = None,
+    picture: Annotated[Path | None, written("--picture", help="PNG to write.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Identify a link's 6x6 spring, with error bars, from a part or a displacement field."""
+    wrenches = UNIT_WRENCHES if cases is None else read_cases(cases)
+    place = in_si(reference, "reference", 3)
+    if part.suffix.lower() in FIELDS:
+        if cases is None or place is None:
+            raise StiffmapError(f"{part}: a displacement field needs --cases FILE and --reference x,y,z")
+        link = identify_link(*_field(part, unit, nodes, wrenches), wrenches, reference=place)
+        _finish(link.with_zeros() if zeros else link, None, part.stem, out, picture, as_json)
+        return
+    mesher, made_of, name, centre = _part(part, unit, None if material is None else read_material(material))
+    edge = in_si(size)
+    found = link_from_part(
+        mesher,
+        made_of,
+        Setup(fixed, loaded, _reference(mesher, loaded, place, centre, edge)),
+        wrenches,
+        size=edge,
+        solver=cast(Solver, solver),
+        study=not quick,
+        other_support=cast(Support, support),
+        refine=not quick and part.suffix.lower() not in MESH,
+    )
+    link = found.link.with_zeros() if zeros else found.link
+    _finish(link, replace(found, link=link), name, out, picture, as_json)
+
+
+command.__doc__ = f"{command.__doc__}\n{EXAMPLES}"
+
+
+def _field(path: Path, unit: str | None, nodes: Path | None, wrenches: Floats) -> tuple[Floats, Floats]:
+    points, displacements = read_field(path, unit, nodes)
+    if len(displacements) != len(wrenches):
+        raise StiffmapError(f"{path}: has {len(displacements)} load cases, --cases has {len(wrenches)}")
+    return points, displacements
+
+
+def _part(
+    path: Path, unit: str | None, material: Material | None
+) -> tuple[Any, Material, str, Floats | None]:
+    """Mesher, material, name, and the reference point of a parametric part."""
+    suffix = path.suffix.lower()
+    mesher: Any
+    if suffix in {".yaml", ".yml"}:
+        shape, own, name = read_part(path)
+        mesher, material, centre = shape.mesh, material or own, shape.reference()
+    elif suffix in CAD | MESH:
+        mesher, name, centre = partial(_mesh_file, path, unit), path.stem, None
+    else:
+        known = ", ".join(sorted({".yaml"} | CAD | MESH | FIELDS))
+        raise StiffmapError(f"{path}: expected one of {known}, got {suffix!r}")
+    if material is None:
+        raise StiffmapError(
+            f"{path}: the part has no material; give --material, for example --material steel"
+        )
+    return mesher, material, name, centre
+
+
+def _mesh_file(path: Path, unit: str | None, size: float | None) -> SolidMesh:
+    return mesh_file(path, size, unit)
+
+
+def _reference(
+    mesher: Any, loaded: str, place: Floats | None, centre: Floats | None, size: float | None
+) -> Floats:
+    if place is not None:
+        return place
+    if centre is not None and loaded == "loaded":
+        return centre
+    mesh = mesher(size)
+    return face_area_centre(mesh.nodes, mesh.face(loaded))[1]
+
+
+def _finish(
+    link: Link, part: PartLink | None, name: str, out: Path | None, picture: Path | None, as_json: bool
+) -> None:
+    file = (
+        LinkFile(
+            (link.compliance + link.compliance.T) / 2,
+            link.covariance,
+            link.reference,
+            {"source": "field"},
+            name,
+        )
+        if part is None
+        else part.file(name)
+    )
+    if out is not None:
+        save_link(file, out)
+    if picture is not None:
+        from stiffmap.ui.plot.link import draw_link, draw_part_link
+
+        draw_link(link, picture) if part is None else draw_part_link(part, picture)
+    told = [link.report(), *([] if part is None else _of_part(part, link))]
+    told += [f"wrote {path}" for path in (out, picture) if path is not None]
+    show(as_json, as_data(link, part, file), told)
+
+
+def _of_part(part: PartLink, link: Link) -> Iterator[str]:
+    yield f"\n{part.solver}, {len(part.mesh.nodes)} nodes, {len(part.mesh.tets)} ten-node tetrahedra"
+    yield "relative standard uncertainty of the diagonal, by source (fit: which nodes, by block bootstrap):"
+    yield part.budget.table(link.compliance)
+    if part.refinement is not None:
+        yield f"observed order of the mesh error: {part.refinement.words}"
+
+
+def as_data(link: Link, part: PartLink | None, file: LinkFile) -> dict[str, Any]:
+    """What ``--json`` prints, SI."""
+    data: dict[str, Any] = {
+        "units": "SI (m, N, rad)",
+        "reference": link.reference,
+        "compliance": file.compliance,
+        "standard_error": file.standard_error,
+        "insignificant": link.insignificant,
+        "level": link.level,
+        "sigma": link.sigma,
+        "dof": link.dof,
+        "outliers": int(link.outliers.sum()),
+        "asymmetry": link.asymmetry,
+    }
+    if part is not None:
+        data["solver"] = part.solver
+        data["uncertainty"] = {k: part.budget.standard_error(k) for k in part.budget.parts}
+        r = part.refinement
+        data["order"] = None if r is None or r.why else r.order
+        data["order_note"] = "one mesh" if r is None else r.why
+    return data

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,24 +10,25 @@ import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.outputs import make_folder
-from stiffmap.common.plain import plain
 from stiffmap.ui.cli.inputs import (
     MM,
     EffectsOption,
     FolderOption,
     GravityOption,
     MachineArgument,
+    PlacesOption,
     RotationOption,
+    SchedulerOption,
     ThreadsOption,
     finish,
     gravity,
+    in_si,
     machine_with,
     numbers,
     position,
     rotation,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show, write_files
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,13 +38,10 @@ if TYPE_CHECKING:
 RPM = 60 / (2 * np.pi)
 
 
-def lobes(
+def command(
     machine: MachineArgument,
     process: Annotated[str, typer.Option(help="Process file, or a shipped name: slot.")],
-    at: Annotated[
-        list[str] | None,
-        typer.Option(help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]"),
-    ] = None,
+    at: PlacesOption = None,
     feed: Annotated[
         str | None, typer.Option(help="Direction of the feed, base axes. [default: x, or y across the tool]")
     ] = None,
@@ -72,9 +71,7 @@ def lobes(
     gravity_: GravityOption = None,
     output: FolderOption = None,
     threads: ThreadsOption = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Address of a dask scheduler whose workers take the speeds.")
-    ] = None,
+    scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Stability lobes: at which speed of the spindle what depth of cut does not chatter.
@@ -96,29 +93,26 @@ def lobes(
 
     m = machine_with(machine, effect)
     p = load_process(process)
-    many = int(numbers(points, "points", 2)[0]), int(numbers(points, "points", 2)[1])
+    many = numbers(points, "points", 2).astype(int)
     if min(many) < 2:
         raise StiffmapError(f"--points: expected two numbers from 2 on, got '{points}'")
-    ends = None if speeds is None else numbers(speeds, "speeds", 2)
+    ends = in_si(speeds, "speeds", 2, 1 / RPM)
     if ends is not None and not 0 < ends[0] < ends[1]:
         raise StiffmapError(f"--speeds: expected a lowest and a highest speed in rpm, got '{speeds}'")
     if depth is not None and not depth > 0:
         raise StiffmapError(f"--depth: expected a depth above zero in mm, got {depth:g}")
     given: dict[str, Any] = {
-        "speeds": None if ends is None else np.linspace(ends[0], ends[1], many[0]) / RPM,
+        "speeds": None if ends is None else np.linspace(ends[0], ends[1], many[0]),
         "depths": None if depth is None else MM * np.linspace(0, depth, many[1] + 1)[1:],
-        "feed": None if feed is None else numbers(feed, "feed", 3),
-        "tool": None if tool is None else numbers(tool, "tool", 3), "also": _modes(mode), "method": method,
+        "feed": in_si(feed, "feed", 3, 1.0),
+        "tool": in_si(tool, "tool", 3, 1.0), "also": _modes(mode), "method": method,
         "rotation": rotation(rotation_), "gravity": gravity(gravity_), "threads": threads,
         "scheduler": scheduler,
-        "damping": None if damping is None else numbers(damping, "damping") / 100,
+        "damping": in_si(damping, "damping", unit=0.01),
     }  # fmt: skip
     answers = [_one(m, p, text, given, output, i) for i, text in enumerate(at or [None])]
-    if as_json:
-        print_json(plain({"machine": m.name, "process": p.name, "poses": answers}))
-    else:
-        for a in answers:
-            _say(a)
+    data = {"machine": m.name, "process": p.name, "poses": answers}
+    show(as_json, data, (line for a in answers for line in _lines(a)))
     finish(not all(a["stable"] for a in answers))
 
 
@@ -145,7 +139,7 @@ def _one(
         "stable_speeds": [{"speed_rpm": s * RPM, "limit_mm": d / MM} for s, d in a["stable_speeds"]],
     }  # fmt: skip
     if output is not None:
-        out["files"] = _write(ds, p, machine.name, place, make_folder(output), i)
+        out["files"] = list(map(str, write_files(output, _files(ds, p, machine.name, place, i))))
     return out
 
 
@@ -162,34 +156,28 @@ def _modes(given: list[str] | None) -> list[tuple[float, float, float, str]]:
     return out
 
 
-def _write(ds: xr.Dataset, p: Process, name: str, place: Any, folder: Path, i: int) -> list[str]:
-    from stiffmap.ui.plot.style import save
+def _files(ds: xr.Dataset, p: Process, name: str, place: Any, i: int) -> Iterator[tuple[str, Any]]:
     from stiffmap.ui.plot.vibration import lobes_figure
-    from stiffmap.workspace.maps.files import write_dataset
 
     where = ", ".join(f"{v / MM:g}" for v in place)
     stem = "lobes" if i == 0 else f"lobes_{i + 1}"
-    picture, data = folder / f"{stem}.png", folder / f"{stem}.nc"
-    save(lobes_figure(ds, f"{name} at ({where}) mm: {p.name}", p.spindle, p.cut.axial), picture)
-    ds = ds.copy()
-    ds.attrs["stable_speeds"] = np.ravel(ds.attrs["stable_speeds"])
-    write_dataset(ds, data)
-    return [str(picture), str(data)]
+    yield f"{stem}.png", lobes_figure(ds, f"{name} at ({where}) mm: {p.name}", p.spindle, p.cut.axial)
+    yield f"{stem}.nc", ds.assign_attrs(stable_speeds=np.ravel(ds.attrs["stable_speeds"]))
 
 
-def _say(a: dict[str, Any]) -> None:
+def _lines(a: dict[str, Any]) -> Iterator[str]:
     p, where = a["process"], ", ".join(f"{v:g}" for v in a["at_mm"])
     limit = p["limit_mm"]
     word = "stable" if a["stable"] else "chatters"
     verdict = f"{word}: {p['depth_mm']:.4g} mm at {p['speed_rpm']:.0f} rpm (multiplier {p['multiplier']:.3f})"
     if np.isfinite(limit):
         verdict += f"; from {_down(limit)} mm on it chatters"
-    print(f"at ({where}) mm, damping {a['damping']}: {verdict}")
+    yield f"at ({where}) mm, damping {a['damping']}: {verdict}"
     axes = (", ".join(f"{v + 0.0:.3g}" for v in a[name]) for name in ("tool", "feed"))
-    print("  tool from tip to holder along ({}), feed along ({})".format(*axes))
+    yield "  tool from tip to holder along ({}), feed along ({})".format(*axes)
     if np.isfinite(a["least_on_diagram_mm"]):
-        print(f"  least limit {_down(a['least_on_diagram_mm'])} mm, at {a['least_at_rpm']:.0f} rpm")
-    print(
+        yield f"  least limit {_down(a['least_on_diagram_mm'])} mm, at {a['least_at_rpm']:.0f} rpm"
+    yield (
         f"  zero order, any speed: {_down(a['least_limit_mm'])} mm ({a['chatter_frequency_Hz']:.1f} Hz); without regeneration modes "
         f"couple from {_down(a['coupling_limit_mm'])} mm on"
     )
@@ -197,10 +185,10 @@ def _say(a: dict[str, Any]) -> None:
         pockets = ", ".join(
             f"{s['speed_rpm']:.0f} rpm ({_down(s['limit_mm'])} mm)" for s in a["stable_speeds"]
         )
-        print(f"  deepest between lobes: {pockets}")
-    print(f"  {a['modes']} modes")
+        yield f"  deepest between lobes: {pockets}"
+    yield f"  {a['modes']} modes"
     for f in a.get("files", []):
-        print(f"  wrote {f}")
+        yield f"  wrote {f}"
 
 
 def _down(limit: float) -> str:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from rich.console import Console
-from rich.markup import escape
 from rich.padding import Padding
+from rich.text import Text
 
 from stiffmap.model.files import shipped_machines
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, print_json, say
 
 
-def machines(as_json: JsonOption = False) -> None:
+def command(as_json: JsonOption = False) -> None:
     """List the machines that come with stiffmap.
 
     Examples:
@@ -25,7 +24,6 @@ def machines(as_json: JsonOption = False) -> None:
             [{"name": m.name, "title": m.title, "source": m.source, "file": str(m.path)} for m in shipped]
         )
         return
-    console = Console(highlight=False)
     for machine in shipped:
-        console.print(f"[bold]{machine.name}[/bold]  {escape(machine.title)}")
-        console.print(Padding(f"[dim]{escape(machine.source)}[/dim]", (0, 0, 0, 2)))
+        say(Text.assemble((machine.name, "bold"), f"  {machine.title}"))
+        say(Padding(Text(machine.source, "dim"), (0, 0, 0, 2)))

@@ -8,12 +8,11 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
+from rich.text import Text
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
 from stiffmap.common.outputs.option import written
-from stiffmap.common.plain import plain
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli.inputs import (
     MM,
@@ -23,6 +22,7 @@ from stiffmap.ui.cli.inputs import (
     MachineArgument,
     MethodOption,
     PlaneOption,
+    SchedulerOption,
     ThreadsOption,
     ToleranceOption,
     finish,
@@ -31,17 +31,17 @@ from stiffmap.ui.cli.inputs import (
     machine_with,
 )
 from stiffmap.ui.cli.map_big import print_estimate, print_statistics
-from stiffmap.ui.cli.map_files import Wanted, write_files
+from stiffmap.ui.cli.map_files import Wanted, write_map_files
 from stiffmap.ui.cli.map_summary import as_table, beyond, failures, summary
-from stiffmap.ui.cli.map_uncertainty import print_uncertainty, uncertainty_data
+from stiffmap.ui.cli.map_uncertainty import uncertainty_data, uncertainty_told
 from stiffmap.ui.cli.map_worst import in_words, worst_pose
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.cli.statuses import failed_in_words
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 from stiffmap.workspace.maps.workspace_grid import grid_of
 
 
-def map_command(
+def command(
     machine: MachineArgument,
     output: OutputOption = Path("stiffmap-map"),
     z: ZOption = None,
@@ -148,27 +148,21 @@ def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wa
     rows, failed = summary(ds, wanted.plane, MM * wanted.tolerance), failures(ds)
     worst = worst_pose(machine, ds, call["gravity"])
     table = as_table(ds, rows, wanted.plane, wanted.tolerance)
-    files = [how["out"], *write_files(machine, ds, wanted, table, worst, failed, call["gravity"])]
+    files = [how["out"], *write_map_files(machine, ds, wanted, table, worst, failed, call["gravity"])]
     band = uncertainty_data(ds, wanted.plane) if wanted.uncertainty else None
     far = beyond(ds)
-    if as_json:
-        data: dict[str, Any] = {"machine": machine.name, "rows": rows, "failed": failed}
-        data |= {"files": list(map(str, files)), "worst_pose": worst}
-        data |= {} if far is None else {"beyond_calibration": far}
-        print_json(plain(data if band is None else data | {"uncertainty": band}))
-    else:
-        console = Console(highlight=False)
-        console.print(table)
-        if band is not None:
-            print_uncertainty(console, band, wanted.plane)
-        if worst is not None:
-            console.print(in_words(worst), soft_wrap=True)
-        if far is not None:
-            told = f"{100 * far['share']:.3g} % of it beyond what the machine was calibrated by ({far['calibrated_by']})"
-            console.print(f"[yellow]{told}[/yellow]" if far["share"] else told, soft_wrap=True)
-        for line in failed_in_words(failed):
-            console.print(f"[yellow]{line}[/yellow]", soft_wrap=True)
-        console.print(f"wrote {', '.join(map(str, files))}", soft_wrap=True)
+    data: dict[str, Any] = {"machine": machine.name, "rows": rows, "failed": failed, "files": files}
+    told: list[Any] = [table]
+    if band is not None:
+        told += uncertainty_told(ds, band, wanted.plane)
+    if worst is not None:
+        told.append(in_words(worst))
+    if far is not None:
+        words = f"{100 * far['share']:.3g} % of it beyond what the machine was calibrated by ({far['calibrated_by']})"
+        told.append(Text(words, "yellow" if far["share"] else ""))
+    data |= {"worst_pose": worst} | ({} if far is None else {"beyond_calibration": far})
+    data |= {} if band is None else {"uncertainty": band}
+    show(as_json, data, [*told, *failed_in_words(failed)], files)
     finish(bool(failed))
 
 
@@ -236,9 +230,6 @@ EstimateOption = Annotated[
 ]
 StatisticsOption = Annotated[
     bool, typer.Option("--statistics", help="Maxima, percentiles and shares only; no map is stored.")
-]
-SchedulerOption = Annotated[
-    str | None, typer.Option(help="Address of a dask scheduler whose workers solve the map.")
 ]
 ToolpathOption = Annotated[
     str | None,

@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import xarray as xr
-from rich import box
-from rich.console import Console
 from rich.table import Table
 
-from stiffmap.common.plain import plain
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import finish
-from stiffmap.ui.cli.output import print_json
+from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.statuses import failed_in_words
+from stiffmap.ui.cli.table_text import table
 
 
 def print_estimate(machine: Machine, call: dict[str, Any], as_json: bool) -> None:
@@ -21,10 +20,7 @@ def print_estimate(machine: Machine, call: dict[str, Any], as_json: bool) -> Non
     import stiffmap
 
     found = stiffmap.map_estimate(machine, **call)
-    if as_json:
-        print_json(vars(found))
-    else:
-        Console(highlight=False).print(str(found), soft_wrap=True)
+    show(as_json, vars(found), [str(found)])
 
 
 def print_statistics(
@@ -37,13 +33,8 @@ def print_statistics(
     rows = statistics_rows(ds, plane)
     failed = {s.name: int(ds.status_count.sel(status=int(s)).sum()) for s in Status if s}
     failed = {name: count for name, count in failed.items() if count}
-    if as_json:
-        print_json(plain({"machine": machine.name, "rows": rows, "failed": failed}))
-    else:
-        console = Console(highlight=False)
-        console.print(_table(ds, rows))
-        for name, count in failed.items():
-            console.print(f"[yellow]{count} solves of the load cases: {name}[/yellow]")
+    lost = failed_in_words(failed, "solves of the load cases")
+    show(as_json, {"machine": machine.name, "rows": rows, "failed": failed}, [_table(ds, rows), *lost])
     finish(bool(failed))
 
 
@@ -55,43 +46,27 @@ def statistics_rows(ds: xr.Dataset, plane: str) -> list[dict[str, Any]]:
         for force in ("worst", "best", *map(str, ds.case.values)):
             name = f"{force}_deflection_{plane}" if force in ("worst", "best") else f"deflection_{plane}"
             one = here if force in ("worst", "best") else here.sel(case=force)
-            rows.append(
-                {
-                    "z": float(z),
-                    "force": force,
-                    "max": float(one[f"{name}_max"]),
-                    "at": one[f"{name}_max_position"].values.tolist(),
-                    "percentiles": dict(
-                        zip(
-                            ds.percentile.values.tolist(),
-                            one[f"{name}_percentile"].values.tolist(),
-                            strict=True,
-                        )
-                    ),
-                    "share_within": float(one[f"{name}_within"]),
-                }
+            percentiles = zip(
+                ds.percentile.values.tolist(), one[f"{name}_percentile"].values.tolist(), strict=True
             )
+            rows.append(
+                {"z": float(z), "force": force, "max": float(one[f"{name}_max"]),
+                 "at": one[f"{name}_max_position"].values.tolist(), "percentiles": dict(percentiles),
+                 "share_within": float(one[f"{name}_within"])}
+            )  # fmt: skip
     return rows
 
 
 def _table(ds: xr.Dataset, rows: list[dict[str, Any]]) -> Table:
     percent = [f"{p:g} %" for p in ds.percentile.values]
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        title=f"{ds.attrs['machine']}: deflection in the plane, mm, under {ds.attrs['turning_force_N']:g} N",
+    out = table(
+        f"{ds.attrs['machine']}: deflection in the plane, mm, under {ds.attrs['turning_force_N']:g} N",
+        ("z, mm", "force", *percent, "max", "at x, y", f"within {1e3 * ds.attrs['tolerance_m']:g} mm"),
+        left=("force",),
     )
-    for head in (
-        "z, mm",
-        "force",
-        *percent,
-        "max",
-        "at x, y",
-        f"within {1e3 * ds.attrs['tolerance_m']:g} mm",
-    ):
-        table.add_column(head, justify="left" if head == "force" else "right")
     for r in rows:
         name = f"{r['force']} direction" if r["force"] in ("worst", "best") else r["force"]
         values = (f"{1e3 * v:.3f}" for v in (*r["percentiles"].values(), r["max"]))
         place = f"{1e3 * r['at'][0]:.0f}, {1e3 * r['at'][1]:.0f}"
-        table.add_row(f"{1e3 * r['z']:g}", name, *values, place, f"{100 * r['share_within']:.1f} %")
-    return table
+        out.add_row(f"{1e3 * r['z']:g}", name, *values, place, f"{100 * r['share_within']:.1f} %")
+    return out

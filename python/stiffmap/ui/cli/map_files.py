@@ -15,9 +15,10 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import MM
-from stiffmap.ui.cli.map_summary import name_of
-from stiffmap.ui.cli.map_uncertainty import draw_deviations
+from stiffmap.ui.cli.map_summary import readings
+from stiffmap.ui.cli.map_uncertainty import deviation_figures
 from stiffmap.ui.cli.map_worst import in_words
+from stiffmap.ui.cli.output import write_files
 from stiffmap.ui.cli.table_text import as_text
 from stiffmap.workspace.maps.table import write_map_table
 
@@ -40,7 +41,7 @@ class Wanted:
     uncertainty: bool
 
 
-def write_files(
+def write_map_files(
     machine: Machine,
     ds: xr.Dataset,
     wanted: Wanted,
@@ -50,13 +51,13 @@ def write_files(
     gravity: Any = None,
 ) -> list[Path]:
     """Pictures of the map and of the machine at its worst pose, tables, deviations, report."""
-    from stiffmap.ui.plot import save
-
     figures = map_figures(ds, wanted.plane, MM * wanted.tolerance, wanted.own_scales) if wanted.kinds else {}
     figures |= loaded(machine, worst, gravity) if figures and worst is not None else {}
-    files = [save(f, wanted.output / f"map-{n}.{kind}") for n, f in figures.items() for kind in wanted.kinds]
+    named = ((f"map-{n}.{kind}", f) for n, f in figures.items() for kind in wanted.kinds)
+    files = write_files(wanted.output, named)
     files += [write_map_table(ds, wanted.output / f"map.{kind}") for kind in wanted.tables]
-    files += draw_deviations(ds, wanted.output, wanted.plane) if wanted.uncertainty and figures else []
+    if wanted.uncertainty and figures:
+        files += write_files(wanted.output, deviation_figures(ds, wanted.plane))
     if figures:
         files.append(write_report(ds, wanted, table, worst, failed, figures))
     return files
@@ -66,13 +67,9 @@ def map_figures(ds: xr.Dataset, plane: str, tolerance: float, own_scales: bool) 
     """One picture per reading of the force's direction."""
     from stiffmap.ui.plot import map_figure
 
-    chosen: dict[str, dict[str, Any]] = {
-        w: {"variable": f"{w}_deflection_{plane}"} for w in ("worst", "best")
-    }
-    chosen |= {str(c): {"variable": name_of(ds, plane, c), "case": str(c)} for c in ds.case.values}
     return {
         n: map_figure(ds, tolerance=tolerance, common_scale=not own_scales, **how)
-        for n, how in chosen.items()
+        for n, how in readings(ds, plane).items()
     }
 
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from rich import box
 from rich.table import Table
 
 from stiffmap.ui.cli.statuses import failed
+from stiffmap.ui.cli.table_text import table
 from stiffmap.workspace.maps.variables import BEYOND
 
 
@@ -22,13 +22,33 @@ def summary(ds: xr.Dataset, plane: str, tolerance: float) -> list[dict[str, Any]
     """Per plane and reading of the force's direction: least, median, largest deflection in the plane of
     the force (m), or in space of a force that is not in it, share of the poses within the tolerance; failed poses do not count as within."""
     ds, axis = ds.load(), across(ds)
-    readings = {w: ds[f"{w}_deflection_{plane}"] for w in ("worst", "best")}
-    readings |= {str(c): ds[name_of(ds, plane, c)].sel(case=c) for c in ds.case.values}
+    read = {name: values_of(ds, how) for name, how in readings(ds, plane).items()}
     return [
         {axis: float(at), "force": name} | _row(values.sel({axis: at}).values, tolerance)
         for at in ds[axis].values
-        for name, values in readings.items()
+        for name, values in read.items()
     ]
+
+
+def readings(ds: xr.Dataset, plane: str) -> dict[str, dict[str, Any]]:
+    """What a map is read for: the worst and the best direction, then its load cases; each with its variable and case."""
+    turned: dict[str, dict[str, Any]] = {
+        w: {"variable": f"{w}_deflection_{plane}"} for w in ("worst", "best")
+    }
+    return turned | {str(c): {"variable": name_of(ds, plane, c), "case": str(c)} for c in ds.case.values}
+
+
+def values_of(ds: xr.Dataset, reading: dict[str, str], suffix: str = "") -> xr.DataArray:
+    """The values of a reading, or of what is next to it, such as ``_std``."""
+    values = ds[reading["variable"] + suffix]
+    return values.sel(case=reading["case"]) if "case" in reading else values
+
+
+def label(ds: xr.Dataset, plane: str, name: str) -> str:
+    """A reading as tables call it."""
+    if name in ("worst", "best"):
+        return f"{name} direction"
+    return f"{name}, |d| in space" if name_of(ds, plane, name) == "deflection" else name
 
 
 def name_of(ds: xr.Dataset, plane: str, case: object) -> str:
@@ -60,18 +80,15 @@ def beyond(ds: xr.Dataset) -> dict[str, Any] | None:
 
 def as_table(ds: xr.Dataset, rows: list[dict[str, Any]], plane: str, tolerance: float) -> Table:
     """For the terminal, mm."""
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        title=f"{ds.attrs['machine']}: deflection in the {plane} plane, mm, under "
-        f"{ds.attrs['turning_force_N']:g} N",
-    )
     axis = across(ds)
-    for head in (f"{axis}, mm", "force", "min", "median", "max", f"within {tolerance:g} mm"):
-        table.add_column(head, justify="left" if head == "force" else "right")
+    out = table(
+        f"{ds.attrs['machine']}: deflection in the {plane} plane, mm, under {ds.attrs['turning_force_N']:g} N",
+        (f"{axis}, mm", "force", "min", "median", "max", f"within {tolerance:g} mm"),
+        left=("force",),
+    )
     for r in rows:
         sizes = (f"{1e3 * r[k]:.3f}" if np.isfinite(r[k]) else "–" for k in ("min", "median", "max"))
-        name = f"{r['force']} direction" if r["force"] in ("worst", "best") else r["force"]
-        if r["force"] in ds.case and name_of(ds, plane, r["force"]) == "deflection":
-            name = f"{name}, |d| in space"
-        table.add_row(f"{1e3 * r[axis]:g}", name, *sizes, f"{100 * r['share_within']:.1f} %")
-    return table
+        out.add_row(
+            f"{1e3 * r[axis]:g}", label(ds, plane, r["force"]), *sizes, f"{100 * r['share_within']:.1f} %"
+        )
+    return out

@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from rich.console import Console
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.outputs import make_folder, write_rows
-from stiffmap.common.plain import plain
+from stiffmap.common.outputs import write_rows
 from stiffmap.solve.kinematics import must_take
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli.inputs import MM, finish, force_given
-from stiffmap.ui.cli.output import print_json
+from stiffmap.ui.cli.output import show, write_files
 from stiffmap.ui.plot.style import BLACK, CYCLE, paper
 
 
@@ -30,8 +28,6 @@ def map_toolpath(
     as_json: bool,
 ) -> None:
     """Solve along the path, print the worst place, write table, data and pictures."""
-    from stiffmap.ui.plot import save
-    from stiffmap.workspace.maps.files import write_dataset
     from stiffmap.workspace.performance import load_motion
 
     position, given = load_motion(toolpath).places()
@@ -42,34 +38,23 @@ def map_toolpath(
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
     ds = s.to_xarray(("way",), {"way": ("way", way, {"units": "m"})})
     ds = ds.assign(position=(("way", "axis"), position), force=(("way", "axis"), load))
-    folder = make_folder(output)
-    files = [str(write_dataset(ds, folder / "toolpath.nc")), str(_table(ds, folder / "toolpath.csv"))]
-    files += [str(save(toolpath_figure(ds, m.name), folder / f"toolpath.{kind}")) for kind in pictures]
+    pictured = toolpath_figure(ds, m.name) if pictures else None
+    files = [*write_files(output, [("toolpath.nc", ds)]), _table(ds, output / "toolpath.csv")]
+    files += write_files(output, ((f"toolpath.{kind}", pictured) for kind in pictures))
     failed = int((~s.ok).sum())
     sizes = ds.deflection.values
-    worst = int(np.nanargmax(sizes)) if np.isfinite(sizes).any() else None
-    if as_json:
-        at = (
-            None
-            if worst is None
-            else {"way": way[worst], "position": position[worst], "deflection": sizes[worst]}
+    worst, told = None, f"{m.name}: no pose of the path converged"
+    if np.isfinite(sizes).any():
+        i = int(np.nanargmax(sizes))
+        worst = {"way": way[i], "position": position[i], "deflection": sizes[i]}
+        place = ", ".join(f"{v / MM:.4g}" for v in position[i])
+        told = (
+            f"{m.name}: largest deflection along the path {1e6 * sizes[i]:.1f} µm at ({place}) mm, "
+            f"{way[i] / MM:.4g} mm from its start"
         )
-        print_json(
-            plain({"machine": m.name, "poses": len(way), "failed": failed, "worst": at, "files": files})
-        )
-    else:
-        console = Console(highlight=False)
-        if worst is None:
-            console.print(f"{m.name}: no pose of the path converged")
-        else:
-            place = ", ".join(f"{v / MM:.4g}" for v in position[worst])
-            console.print(
-                f"{m.name}: largest deflection along the path {1e6 * sizes[worst]:.1f} µm at ({place}) mm, "
-                f"{way[worst] / MM:.4g} mm from its start"
-            )
-        if failed:
-            console.print(f"{failed} of {len(way)} poses failed: {s.count()}")
-        console.print(f"wrote {', '.join(files)}", soft_wrap=True)
+    lost = f"{failed} of {len(way)} poses failed: {s.count()}" if failed else None
+    data = {"machine": m.name, "poses": len(way), "failed": failed, "worst": worst}
+    show(as_json, data, [told, lost], files)
     finish(failed > 0)
 
 

@@ -22,10 +22,10 @@ def worst_pose(machine: Machine, ds: Any, gravity: Any) -> dict[str, Any] | None
     The load is a case of the map, or the force that turned, in its worst direction there. None where no pose has an
     answer, or its deflection none to share.
     """
-    found = [w for w in (_of_cases(ds), _of_directions(ds)) if w is not None]
-    if not found:
+    found = _worst(ds)
+    if found is None:
         return None
-    size, load, p, wrench = max(found, key=lambda w: w[0])
+    size, load, p, wrench = found
     try:
         budget = deflection_budget(machine, p, wrench, gravity=gravity)
     except StiffmapError:
@@ -40,43 +40,24 @@ def worst_pose(machine: Machine, ds: Any, gravity: Any) -> dict[str, Any] | None
     }
 
 
-Worst = tuple[float, str, list[float], Any]
-"""Deflection (m), load in words, position (m), wrench (6,)."""
-
-
-def _of_cases(ds: Any) -> Worst | None:
-    size = ds.deflection.transpose("z", "y", "x", "case").values
-    if not np.isfinite(size).any():
+def _worst(ds: Any) -> tuple[float, str, list[float], Any] | None:
+    """Deflection (m), load in words, position (m) and wrench (6,): of a case, or of the directions in which the force turned."""
+    sizes: list[tuple[Any, tuple[str, ...]]] = [(ds.deflection, ("z", "y", "x", "case"))]
+    sizes += [(ds.worst_deflection, ("z", "y", "x"))] if "worst_deflection" in ds else []
+    largest = [v.isel(v.argmax(axes)) for v, axes in sizes if np.isfinite(v).any()]
+    if not largest:
         return None
-    k, j, i, c = np.unravel_index(int(np.nanargmax(size)), size.shape)
-    case = str(ds.case.values[c])
-    return float(size[k, j, i, c]), case, _at(ds, k, j, i), ds.wrench.sel(case=case).values
-
-
-def _of_directions(ds: Any) -> Worst | None:
-    """Over the directions in which the map turned its force."""
-    if "worst_deflection" not in ds:
-        return None
-    size = ds.worst_deflection.transpose("z", "y", "x").values
-    if not np.isfinite(size).any():
-        return None
-    k, j, i = np.unravel_index(int(np.nanargmax(size)), size.shape)
-    plane = ds.worst_direction.attrs["plane"]
-    angle = float(ds.worst_direction.transpose("z", "y", "x").values[k, j, i])
-    force = float(ds.attrs["turning_force_N"])
+    there = max(largest, key=float)
+    p = [float(there[a]) for a in "xyz"]
+    if "case" in there.coords:
+        case = str(there.case.values)
+        return float(there), case, p, ds.wrench.sel(case=case).values
+    plane, force = ds.worst_direction.attrs["plane"], ds.attrs["turning_force_N"]
+    angle = float(ds.worst_direction.sel({a: there[a] for a in "xyz"}))
     wrench = np.zeros(6)
     wrench[["xyz".index(a) for a in plane]] = force * np.cos(angle), force * np.sin(angle)
     text = ", ".join(f"{v:.0f}" for v in wrench[:3])
-    return (
-        float(size[k, j, i]),
-        f"({text}) N, the worst direction in the {plane} plane",
-        _at(ds, k, j, i),
-        wrench,
-    )
-
-
-def _at(ds: Any, k: Any, j: Any, i: Any) -> list[float]:
-    return [float(ds[a].values[n]) for a, n in (("x", i), ("y", j), ("z", k))]
+    return float(there), f"({text}) N, the worst direction in the {plane} plane", p, wrench
 
 
 def in_words(worst: dict[str, Any]) -> str:

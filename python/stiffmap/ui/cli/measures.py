@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
-from rich import box as borders
-from rich.console import Console
+from rich import get_console
 from rich.table import Table
+from rich.text import Text
 
-from stiffmap.common.outputs import make_folder, write_text, writing
-from stiffmap.common.plain import plain
+from stiffmap.common.outputs import make_folder, writing
 from stiffmap.ui.cli.inputs import (
     MM,
     EffectsOption,
@@ -22,11 +22,14 @@ from stiffmap.ui.cli.inputs import (
     ThreadsOption,
     finish,
     gravity,
+    in_si,
     machine_with,
     numbers,
+    words,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show, write_files
 from stiffmap.ui.cli.table_text import as_text
+from stiffmap.ui.cli.table_text import table as table_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +38,7 @@ if TYPE_CHECKING:
     from stiffmap.workspace.performance.table import Row
 
 
-def measures(
+def command(
     machine: MachineArgument,
     requirements: Annotated[
         str | None, typer.Option(help="Requirements file, or a shipped one by name: trimming.")
@@ -96,31 +99,22 @@ def measures(
     limits = None if box is None else MM * numbers(box, "box", 6).reshape(3, 2).T
     table = all_of(
         m, box=limits, force=force, plane=plane, requirements=requirements,
-        only=None if only is None else [n.strip() for n in only.split(",")], nodes=nodes, coarse=coarse,
-        length=None if length is None else MM * length, gravity=gravity(gravity_), threads=threads,
-        toolpath=toolpath, clearance=None if clearance is None else MM * clearance,
-        deflection=None if deflection is None else MM * deflection,
+        only=words(only), nodes=nodes, coarse=coarse,
+        length=in_si(length), gravity=gravity(gravity_), threads=threads,
+        toolpath=toolpath, clearance=in_si(clearance),
+        deflection=in_si(deflection),
     )  # fmt: skip
-    files = write(table, make_folder(output)) if output else []
-    if as_json:
-        print_json({**plain(table.as_plain()), "files": files})
-    else:
-        show(table, files)
+    files = [] if output is None else write(table, make_folder(output))
+    show(as_json, table.as_plain(), _told(table), files)
     finish(not table.passed)
 
 
-def show(table: MeasuresTable, files: list[str]) -> None:
+def _told(table: MeasuresTable) -> Iterator[Table | Text | str]:
     """The table as text."""
-    console = Console(highlight=False)
-    console.print(as_table(table, narrow=console.width < WIDE))
-    for note in (*table.notes, *remarks(table)):
-        console.print(f"[dim]{note}[/dim]", soft_wrap=True)
+    yield as_table(table, narrow=get_console().width < WIDE)
+    yield from (Text(note, "dim") for note in (*table.notes, *remarks(table)))
     if table.requirements.bounds:
-        missed = [r.measure.name for r in table.rows if r.verdict not in ("", "pass")]
-        verdict = f"does not meet: {', '.join(missed)}" if missed else "meets all of it"
-        console.print(f"{table.machine.name} against {table.requirements.name}: {verdict}", soft_wrap=True)
-    if files:
-        console.print(f"wrote {', '.join(files)}", soft_wrap=True)
+        yield verdict_of(table)
 
 
 WIDE = 100
@@ -133,18 +127,12 @@ def as_table(table: MeasuresTable, narrow: bool = False) -> Table:
     spans = ", ".join(
         f"{a} {1e3 * lo:.4g}…{1e3 * hi:.4g}" for a, lo, hi in zip("xyz", c.low, c.high, strict=True)
     )
-    out = Table(
-        box=borders.SIMPLE,
-        padding=(0, 0 if narrow else 1),
-        pad_edge=not narrow,
-        title=f"{table.machine.name} over {spans} mm; plane {c.plane}, {c.force:.4g} N",
-    )
-    for name in ("measure", "worst", "unit", "at (mm)", "best", "required", "margin", ""):
-        left = name in ("measure", "unit", "")
-        out.add_column(name, justify="left" if left else "right", no_wrap=True)
-    for r in table.rows:
-        out.add_row(*cells(r))
-    return out
+    return table_of(
+        f"{table.machine.name} over {spans} mm; plane {c.plane}, {c.force:.4g} N",
+        ("measure", "worst", "unit", "at (mm)", "best", "required", "margin", ""),
+        map(cells, table.rows),
+        left=("measure", "unit", ""), no_wrap=True, padding=(0, 0 if narrow else 1), pad_edge=not narrow,
+    )  # fmt: skip
 
 
 def remarks(table: MeasuresTable) -> list[str]:
@@ -177,18 +165,14 @@ def required(r: Row) -> str:
     return " ".join(f"{sign} {r.measure.factor * v:.4g}" for sign, v in sides if v is not None)
 
 
-def write(table: MeasuresTable, output: Path) -> list[str]:
+def write(table: MeasuresTable, output: Path) -> list[Path]:
     """Table, maps and pictures."""
-    import json
-
-    from stiffmap.ui.plot import save
     from stiffmap.ui.plot.measures import measure_figures, moving_modes
     from stiffmap.ui.report.pictures import animation
 
-    data = output / "measures.json"
-    write_text(data, json.dumps(plain(table.as_plain()), indent=2, ensure_ascii=False))
     figures = measure_figures(table)
-    pictures = [save(f, output / f"{name}.png") for name, f in figures.items()]
+    named = {f"{name}.png": f for name, f in figures.items()}
+    files = write_files(output, {"measures.json": table.as_plain(), **named}.items())
     shown: dict[str, Figure | bytes] = {**figures}
     if "modes" in figures:
         swinging = animation(moving_modes(table))
@@ -196,8 +180,8 @@ def write(table: MeasuresTable, output: Path) -> list[str]:
         moving = output / "modes.gif"
         with writing(moving) as fresh:
             fresh.write_bytes(swinging)
-        pictures.append(moving)
-    return [str(p) for p in (data, *pictures, write_report(table, output / "report.html", shown))]
+        files.append(moving)
+    return [*files, write_report(table, output / "report.html", shown)]
 
 
 def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure | bytes]) -> Path:

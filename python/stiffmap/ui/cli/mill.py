@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -11,10 +12,10 @@ import typer
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.plain import plain
 from stiffmap.machining.milling import mill_job
 from stiffmap.machining.milling.entry import best_entry
 from stiffmap.machining.milling.placement import placements
+from stiffmap.machining.milling.redundancy import Redundancy
 from stiffmap.machining.milling.redundancy import redundancy as choose_turns
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import other_side
@@ -24,24 +25,26 @@ from stiffmap.machining.toolpath.entry import entered_at, turned_round
 from stiffmap.solve.machine import load_machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import (
+    MM,
+    CorrectedArgument,
     EffectsOption,
     FolderOption,
+    SchedulerOption,
     ThreadsOption,
     finish,
+    in_si,
     machine_with,
     numbers,
+    pairs,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.report.milling import placement_summary, summary, write_report
 
-MM = 1e-3
 IDLE = "no turn changes the error, as the last joint turns about the tool's own axis; a spindle across the flange would make use of it"
 
 
-def mill(
-    machine: Annotated[
-        str, typer.Argument(help="Corrected machine: file with its effects, or a shipped name.")
-    ],
+def command(
+    machine: CorrectedArgument,
     path: Annotated[
         str,
         typer.Argument(
@@ -104,9 +107,7 @@ def mill(
         typer.Option(help="Arms: choose the turn about the tool from so many over a full turn, e.g. 72."),
     ] = None,
     threads: ThreadsOption = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Address of a dask scheduler whose workers try placements and turns.")
-    ] = None,
+    scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """The part as a machine will cut it, and a program that makes it right.
@@ -130,17 +131,15 @@ def mill(
         path,
         feed=cut.feed,
         spindle=cut.spindle,
-        size=None if size is None else tuple(float(v) * MM for v in numbers(size, "size")),
+        size=None if size is None else tuple(in_si(size, "size").tolist()),
         offsets=_offsets(offset),
         progress=None if as_json or not sys.stderr.isatty() else _read,
     )
     if reverse:
         p, cut = turned_round(p), other_side(cut)
-    plate = None
-    if stock is not None:
-        corners = MM * numbers(stock, "stock", 6)
-        plate = box(corners[:3], corners[3:])
-    where = None if at is None else MM * numbers(at, "at", 3)
+    corners = in_si(stock, "stock", 6)
+    plate = None if corners is None else box(corners[:3], corners[3:])
+    where = in_si(at, "at", 3)
     angle = float(np.radians(turn))
     out: dict[str, object] = {}
     if place is not None:
@@ -152,34 +151,33 @@ def mill(
         place = path.placed(m.description.home.p if where is None else where, angle)
         return setting(
             m, path, cut, sampled(path, MM * step), place, stock=plate, angle=turns,
-            thickness=None if thickness is None else MM * thickness,
+            thickness=in_si(thickness),
         )  # fmt: skip
 
-    turns = None
-    if redundancy is not None:
-        turns = choose_turns(job(p), redundancy, threads=threads, scheduler=scheduler).angle
+    def turned(path: Toolpath) -> Redundancy | None:
+        if redundancy is None:
+            return None
+        return choose_turns(job(path), redundancy, threads=threads, scheduler=scheduler)
+
+    chosen = turned(p)
     if entry is not None:
-        p, out["entry"] = _entered(p, entry, job(p, turns), threads)
-    if redundancy is not None:
-        chosen = choose_turns(job(p), redundancy, threads=threads, scheduler=scheduler)
-        turns = chosen.angle
+        p, out["entry"] = _entered(p, entry, job(p, None if chosen is None else chosen.angle), threads)
+        chosen = turned(p)
+    if chosen is not None:
         out["redundancy"] = {
             "largest_mm": float(1e3 * np.abs(chosen.error).max()), "best_fixed_turn_mm": float(1e3 * chosen.fixed.min()),
             "as_at_home_mm": float(1e3 * np.interp(0.0, chosen.turns, chosen.fixed)),
             **({"note": IDLE} if chosen.idle else {}),
         }  # fmt: skip
     found = mill_job(
-        m, p, cut, at=where, turn=angle, step=MM * step, within=MM * within, angle=turns, feeds=feeds, stock=plate,
+        m, p, cut, at=where, turn=angle, step=MM * step, within=MM * within, angle=None if chosen is None else chosen.angle, feeds=feeds, stock=plate,
         true_machine=None if true_machine is None else load_machine(true_machine),
-        thickness=None if thickness is None else MM * thickness, passes=passes, band=band, threads=threads,
+        thickness=in_si(thickness), passes=passes, band=band, threads=threads,
     )  # fmt: skip
     out = {**summary(found), **out}
     if output is not None:
         out["files"] = {k: str(output / v) for k, v in write_report(found, output).items()}
-    if as_json:
-        print_json(plain(out))
-    else:
-        _say(out)
+    show(as_json, out, _lines(out))
     states: Any = found.dataset.status.values
     t = cut.tolerance
     after = np.abs(found.dataset.error_normal_after.values)
@@ -219,20 +217,17 @@ def _offsets(given: list[str] | None) -> dict[str, list[float]] | None:
     if not given:
         return None
     out = {"G54": [0.0, 0.0, 0.0]}
-    for text in given:
-        name, sign, values = text.partition("=")
-        if not sign or name.strip().upper() not in {f"G{n}" for n in range(54, 60)}:
-            raise StiffmapError(f"--offset: expected such as G55=10,0,0; got '{text}'")
-        out[name.strip().upper()] = [float(v) * MM for v in numbers(values, "offset", 3)]
+    for name, values in pairs(given, "offset").items():
+        if name.upper() not in {f"G{n}" for n in range(54, 60)}:
+            raise StiffmapError(f"--offset: expected such as G55=10,0,0; got '{name}={values}'")
+        out[name.upper()] = [float(v) * MM for v in numbers(values, "offset", 3)]
     return out
 
 
-def _say(out: dict[str, object]) -> None:
-    print(out["verdict"])
+def _lines(out: dict[str, object]) -> Iterator[str]:
+    yield str(out["verdict"])
     for key, value in out.items():
-        if key == "verdict":
-            continue
-        if value == [] or value is None:
+        if key == "verdict" or value == [] or value is None:
             continue
         if key == "warnings" and isinstance(value, list):
             text = " ".join(w["text"] for w in value)
@@ -246,7 +241,7 @@ def _say(out: dict[str, object]) -> None:
             )
         else:
             text = _text(value)
-        print(f"{key}: {text}")
+        yield f"{key}: {text}"
 
 
 def _text(value: object) -> str:

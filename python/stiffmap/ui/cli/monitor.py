@@ -9,19 +9,17 @@ import typer
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.json_text import parse_json
-from stiffmap.common.plain import plain
 from stiffmap.experiment import load_experiment
-from stiffmap.experiment.calls import placed
 from stiffmap.identification.planning.budget import budgets
-from stiffmap.identification.planning.monitor import compare
+from stiffmap.identification.planning.calls import monitor
 from stiffmap.model.description import AppliedEffect
-from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.cli.inputs import EffectsOption
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.solve.machine import load_machine
+from stiffmap.ui.cli.inputs import DeclaredArgument, EffectsOption, finish
+from stiffmap.ui.cli.output import JsonOption, show
 
 
-def monitor(
-    machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
+def command(
+    machine: DeclaredArgument,
     before: Annotated[str, typer.Argument(help="Experiment folder: the machine as it was, or one specimen.")],
     after: Annotated[str, typer.Argument(help="Experiment folder: the machine now, or another specimen.")],
     effect: EffectsOption = None,
@@ -43,21 +41,17 @@ def monitor(
       [cyan]stiffmap monitor orthoglide-revised january june --diagnosis january/diagnosis.json --budget[/cyan]
     """
     m = load_machine(machine)
-    terms = [placed(m, text) for text in effect or []] + (_of(m, diagnosis) if diagnosis else [])
+    terms = [*(effect or ()), *(_of(diagnosis) if diagnosis else ())]
     if not terms:
         raise StiffmapError("monitor: name what to follow, by --effect or --diagnosis")
-    found = compare(m, load_experiment(before), load_experiment(after), terms)
-    if as_json:
-        print_json(plain({"common": found.common, "p": found.p, "changes": [vars(c) for c in found.changes]}))
-    else:
-        print(found)
-        if budget:
-            print(*budgets(m, load_experiment(after), found.second), sep="\n")
-    if not found.common:
-        raise typer.Exit(1)
+    found = monitor(m, before, after, terms)
+    data = {"common": found.common, "p": found.p, "changes": [vars(c) for c in found.changes]}
+    now = budgets(m, load_experiment(after), found.second) if budget and not as_json else []
+    show(as_json, data, [str(found), *map(str, now)])
+    finish(not found.common)
 
 
-def _of(m: Machine, path: Path) -> list[AppliedEffect]:
+def _of(path: Path) -> list[AppliedEffect]:
     """Effects that a diagnosis named."""
     try:
         data: Any = parse_json(path.read_text(encoding="utf-8"))

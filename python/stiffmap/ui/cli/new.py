@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
 
-from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.outputs import asked_to_replace, write_text
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.outputs import write_text
 from stiffmap.model.files.starter import starter_text
 from stiffmap.solve.starters import CLASSES, OPTIONS, class_of, machine_text
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.inputs import OverwriteOption, new_file
+from stiffmap.ui.cli.output import JsonOption, print_json, show
 
 
 def _dimension(key: str) -> Any:
@@ -24,7 +24,7 @@ def _dimension(key: str) -> Any:
 Length = float | None
 
 
-def new(
+def command(
     file: Annotated[
         Path | None, typer.Argument(help="File to write; its stem becomes the machine's name.")
     ] = None,
@@ -46,7 +46,7 @@ def new(
     tube: Annotated[Length, _dimension("tube")] = None,
     wall: Annotated[Length, _dimension("wall")] = None,
     drive: Annotated[Length, _dimension("drive")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite an existing file.")] = False,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Start a machine file: a template in which every key is explained, or a machine of a common class.
@@ -72,26 +72,20 @@ def new(
         raise StiffmapError("new: expected a file to write, such as my_machine.yaml (or --list)")
     if kind is None and (given := [k for k, v in dimensions.items() if v is not None]):
         raise StiffmapError(f"--{given[0]}: only with --from; the classes are {', '.join(CLASSES)}")
-    if file.exists() and not overwrite:
-        raise FileError("exists already; use --overwrite to replace it", file=str(file))
-    if overwrite:
-        asked_to_replace(file)
+    new_file(file, overwrite)
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
     write_text(file, starter_text(name) if kind is None else machine_text(kind, name, dimensions))
-    if as_json:
-        more = {} if kind is None else {"class": kind, "dimensions": class_of(kind).values(dimensions)}
-        print_json({"file": str(file), "name": name, **more})
-        return
-    console = Console(highlight=False, soft_wrap=True)
-    text = escape(str(file))
+    data: dict[str, Any] = {"file": file, "name": name}
     if kind is None:
-        console.print(f"wrote {text}; edit it, then: [cyan]stiffmap check {text}[/cyan]")
+        told = Text.assemble(f"wrote {file}; edit it, then: ", (f"stiffmap check {file}", "cyan"))
     else:
-        used = ", ".join(f"{k} {v:g}" for k, v in class_of(kind).values(dimensions).items())
-        console.print(f"wrote {text}: {kind} with {used} (mm; drive in N/µm or kN·m/rad)")
-        console.print(
-            f"look at it: [cyan]stiffmap show {text}[/cyan]; map it: [cyan]stiffmap map {text}[/cyan]"
-        )
+        data |= {"class": kind, "dimensions": class_of(kind).values(dimensions)}
+        used = ", ".join(f"{k} {v:g}" for k, v in data["dimensions"].items())
+        told = Text.assemble(
+            f"wrote {file}: {kind} with {used} (mm; drive in N/µm or kN·m/rad)\nlook at it: ",
+            (f"stiffmap show {file}", "cyan"), "; map it: ", (f"stiffmap map {file}", "cyan"),
+        )  # fmt: skip
+    show(as_json, data, [told])
 
 
 def _list(as_json: bool) -> None:

@@ -3,34 +3,34 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich import box
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
 from stiffmap.common.outputs.option import written
-from stiffmap.common.plain import plain
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.inputs import SchedulerOption, finish
+from stiffmap.ui.cli.output import JsonOption, show, write_files
+from stiffmap.ui.cli.table_text import table
 
 if TYPE_CHECKING:
     from stiffmap.ui.report.design import Chosen, Report
     from stiffmap.workspace.design import ParetoSet
 
 
-def optimize(
+def command(
     design: Annotated[str, typer.Argument(help="Design file, or a shipped one by name: redesign.")],
     output: Annotated[Path, written(help="Folder for results; resumed from there.")] = Path("design"),
     generations: Annotated[int | None, typer.Option(help="Generations; default: the file's.")] = None,
     processes: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Address of a dask scheduler whose workers judge the designs.")
-    ] = None,
+    scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Machines that are best under several measures at once: a Pareto set, and chosen designs as machine files.
@@ -50,10 +50,8 @@ def optimize(
 
       [cyan]stiffmap optimize redesign --scheduler tcp://HOST:8786 -o results/redesign[/cyan]
     """
-    from stiffmap.ui.cli.inputs import finish
     from stiffmap.ui.report.design import measured
-    from stiffmap.workspace.design import load_design
-    from stiffmap.workspace.design import optimize as search
+    from stiffmap.workspace.design import load_design, optimize
 
     console = Console(stderr=True, highlight=False)
     begun = time.monotonic()
@@ -63,7 +61,7 @@ def optimize(
 
     problem = load_design(design)
     place = make_folder(output)
-    found = search(
+    found = optimize(
         problem,
         folder=place,
         generations=generations,
@@ -72,49 +70,37 @@ def optimize(
         scheduler=scheduler,
     )
     report = measured(found, place)
-    tables = report.tables
-    files = write(found, place, report)
+    files = write_files(place, _files(found, report))
     console.print(f"{found.evaluated} designs in {time.monotonic() - begun:.0f} s")
-    if as_json:
-        print_json(
-            plain(
-                {
-                    "design": problem.model.name,
-                    "evaluated": found.evaluated,
-                    "front": len(found.x),
-                    "chosen": {k: t.as_plain() for k, t in tables.items()},
-                    "refined": {k: refined(c) for k, c in report.chosen.items()},
-                    "files": files,
-                }
-            )
-        )
-    else:
-        out = Console(highlight=False)
-        out.print(as_table(found, report))
-        for line in remarks(report):
-            out.print(f"[dim]{line}[/dim]", soft_wrap=True)
-        out.print(
-            f"wrote {', '.join(files)} and the machine files {', '.join(f'{k}.yaml' for k in report.chosen)}",
-            soft_wrap=True,
-        )
+    data = {
+        "design": problem.model.name,
+        "evaluated": found.evaluated,
+        "front": len(found.x),
+        "chosen": {k: t.as_plain() for k, t in report.tables.items()},
+        "refined": {k: refined(c) for k, c in report.chosen.items()},
+        "files": files,
+    }
+    machines = ", ".join(f"{k}.yaml" for k in report.chosen)
+    told = [
+        *(Text(line, "dim") for line in remarks(report)),
+        f"wrote {', '.join(map(str, files))} and the machine files {machines}",
+    ]
+    show(as_json, data, [as_table(found, report), *told])
     finish(not all(c.table.passed for c in report.chosen.values()))
 
 
-def write(found: ParetoSet, place: Path, report: Report) -> list[str]:
+def _files(found: ParetoSet, report: Report) -> Iterator[tuple[str, Any]]:
     """The set and its pictures."""
-    from stiffmap.ui.plot import save
     from stiffmap.ui.plot.along_paths import path_measures_figure
     from stiffmap.ui.plot.design import beside_figure, front_figure, parallel_figure, progress_figure
-    from stiffmap.workspace.maps.files import write_dataset
 
-    data = write_dataset(found.dataset, place / "pareto.nc")
+    yield "pareto.nc", found.dataset
     figures = {"fronts": front_figure, "parallel": parallel_figure, "progress": progress_figure}
-    saved = [str(save(make(found), place / f"{name}.png")) for name, make in figures.items()]
+    yield from ((f"{name}.png", make(found)) for name, make in figures.items())
     with suppress(StiffmapError):  # no measure with a map is asked for
-        saved.append(str(save(beside_figure(report.tables), place / "beside.png")))
+        yield "beside.png", beside_figure(report.tables)
     with suppress(StiffmapError):  # no toolpath
-        saved.append(str(save(path_measures_figure(report.tables), place / "toolpath.png")))
-    return [str(data), *saved]
+        yield "toolpath.png", path_measures_figure(report.tables)
 
 
 NOTHING = 1e-9
@@ -123,16 +109,14 @@ NOTHING = 1e-9
 
 def as_table(found: ParetoSet, report: Report) -> Table:
     """Measures of the reference machines and of the chosen designs, with the standard deviations that tolerances give."""
-    out = Table(
-        box=box.SIMPLE,
-        padding=(0, 0, 0, 1),
-        pad_edge=False,
-        title=f"{found.design.model.name}: measured in full, ± by tolerances",
-    )
-    out.add_column("measure", no_wrap=True)
     tables = report.tables
-    for name in tables:
-        out.add_column(name, justify="right", overflow="fold")
+    out = table(
+        f"{found.design.model.name}: measured in full, ± by tolerances",
+        ("measure", *tables), left=("measure",), padding=(0, 0, 0, 1), pad_edge=False,
+    )  # fmt: skip
+    out.columns[0].no_wrap = True
+    for column in out.columns[1:]:
+        column.overflow = "fold"
     for i, row in enumerate(next(iter(tables.values())).rows):
         m = row.measure
         cells = []

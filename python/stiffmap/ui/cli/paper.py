@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from stiffmap.common.outputs import make_folder, write_text
 from stiffmap.common.outputs.option import written
-from stiffmap.common.plain import plain
 from stiffmap.ui.cli.inputs import ThreadsOption
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 
 if TYPE_CHECKING:
     from stiffmap.ui.paper import Results, Statement
 
+NO_CURVES = "The paper prints no numbers of the curves in Figures 5 to 7; the numbers above are those of its text and Table 1."
 
-def paper(
+
+def command(
     output: Annotated[Path | None, written(help="Folder for figures and tables.")] = None,
     points: Annotated[int, typer.Option(help="Positions along x and y of the error maps.")] = 101,
     figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 7 (with -o).")] = True,
@@ -41,23 +41,14 @@ def paper(
       [cyan]stiffmap paper --points 31 --no-figures -o results[/cyan]
     """
     from stiffmap.ui.paper import all_statements, compute
-    from stiffmap.ui.paper.table import as_plain, as_rich, count, count_text
+    from stiffmap.ui.paper.table import as_rich, count, count_text
 
     target = make_folder(output) if output else None
     results = compute(points, threads=threads, progress=False if as_json else None)
     statements = all_statements(results)
-    files = [str(f) for f in write(results, statements, target, figures)] if target else []
-    if as_json:
-        print_json(plain({"statements": as_plain(statements), "count": count(statements), "files": files}))
-        return
-    console = Console(highlight=False)
-    console.print(as_rich(statements))
-    console.print(count_text(statements))
-    console.print(
-        "The paper prints no numbers of the curves in Figures 5 to 7; the numbers above are those of its text and Table 1."
-    )
-    if files:
-        console.print(f"wrote {', '.join(files)}", soft_wrap=True)
+    files = write(results, statements, target, figures) if target else []
+    told = [as_rich(statements), count_text(statements), NO_CURVES]
+    show(as_json, {"statements": statements, "count": count(statements)}, told, files)
 
 
 def write(results: Results, statements: list[Statement], target: Path, figures: bool) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,21 +14,18 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import with_uncertainty
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.outputs.option import written
-from stiffmap.common.plain import plain
 from stiffmap.experiment import simulate
-from stiffmap.experiment.calls import placed
+from stiffmap.experiment.calls import effects_of
 from stiffmap.experiment.files.save import plan_columns
-from stiffmap.identification.planning import Design, Estimate, design, follow
+from stiffmap.identification.planning import Design, Estimate, follow
+from stiffmap.identification.planning.calls import plan as design
 from stiffmap.identification.planning.estimate import fitted
-from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.cli.inputs import numbers
-from stiffmap.ui.cli.output import JsonOption, print_json
-
-MM = 1e-3
+from stiffmap.ui.cli.inputs import MM, FrameOption, QuantityOption, TargetOption, in_si, numbers
+from stiffmap.ui.cli.output import JsonOption, show
 
 
-def plan(
+def command(
     machine: Annotated[str, typer.Argument(help="Machine: shipped name or machine file.")],
     identify: Annotated[
         list[str] | None,
@@ -50,13 +48,13 @@ def plan(
         typer.Option(help="Point of the workpiece, mm, as 100,0,50; repeatable (with --map)."),
     ] = None,
     rows: Annotated[int, typer.Option(help="Rows to measure.")] = 12,
-    quantity: Annotated[str, typer.Option(help="deflection or position.")] = "deflection",
+    quantity: QuantityOption = "deflection",
     poses: Annotated[int, typer.Option(help="Candidate poses, at random in the workspace.")] = 60,
     force: Annotated[float, typer.Option(help="Size of the forces, N.")] = 400.0,
     read: Annotated[str, typer.Option(help="Axes read, of dx,dy,dz,rx,ry,rz.")] = "dx,dy,dz",
     noise: Annotated[float | None, typer.Option(help="One standard deviation of a reading, mm.")] = None,
-    frame: Annotated[str, typer.Option(help="Instrument's frame: known, offset_unknown, unknown.")] = "known",
-    tool: Annotated[str, typer.Option(help="Point on the tool: known or offset_unknown.")] = "known",
+    frame: FrameOption = "known",
+    tool: TargetOption = "known",
     until: Annotated[
         float | None,
         typer.Option(
@@ -94,27 +92,21 @@ def plan(
     if taps is not None:
         _taps(m, taps, poses, seed, output, as_json)
         return
-    terms = [placed(m, text) for text in identify or ()]
     if rival and for_map:
         raise StiffmapError("--map and --rival exclude each other")
     aim = "separate" if rival else "map" if for_map else "identify"
     options: dict[str, Any] = {
         "quantity": quantity, "poses": poses, "force": force, "axes": tuple(read.split(",")), "frame": frame,
-        "tool": tool, "noise": None if noise is None else MM * noise, "seed": seed,
+        "tool": tool, "noise": in_si(noise), "seed": seed,
     }  # fmt: skip
     if until is not None:
-        _sequential(m, terms, twin, until, rows, options, as_json)
+        _sequential(m, identify or (), twin, until, rows, options, as_json)
         return
     workpiece = np.array([MM * numbers(t, "at", 3) for t in at]) if at else None
-    found = design(
-        m, terms, rows=rows, aim=aim, rival=[placed(m, t) for t in rival or []], at=workpiece, **options
-    )
+    found = design(m, identify or (), rows=rows, aim=aim, rival=rival or (), position=workpiece, **options)
     if output is not None:
         _write(found, output)
-    if as_json:
-        print_json(_plain(found))
-    else:
-        print("\n".join(_lines(found)))
+    show(as_json, found.as_plain(), _lines(found))
 
 
 def _taps(m: Machine, count: int, tries: int, seed: int, output: Path | None, as_json: bool) -> None:
@@ -124,18 +116,15 @@ def _taps(m: Machine, count: int, tries: int, seed: int, output: Path | None, as
     poses = [[round(float(v), 1) for v in p] for p in where_to_tap(m, count, tries=tries, seed=seed) / MM]
     if output is not None:
         write_rows(output, ["x_mm", "y_mm", "z_mm"], poses)
-    if as_json:
-        none: dict[str, Any] = {"parameters": [], "value": None, "value_random": None}
-        print_json({"aim": "taps", "rows": len(poses), "poses_mm": poses, **none})
-        return
-    print(f"{len(poses)} poses to tap, the most informative first (x, y, z in mm)")
-    for p in poses:
-        print("  " + ", ".join(f"{v:.1f}" for v in p))
+    none: dict[str, Any] = {"parameters": [], "value": None, "value_random": None}
+    told = [f"{len(poses)} poses to tap, the most informative first (x, y, z in mm)"]
+    told += ["  " + ", ".join(f"{v:.1f}" for v in p) for p in poses]
+    show(as_json, {"aim": "taps", "rows": len(poses), "poses_mm": poses, **none}, told)
 
 
 def _sequential(
     m: Machine,
-    terms: list[AppliedEffect],
+    identify: Sequence[str],
     twin: list[str] | None,
     until: float,
     rows: int,
@@ -143,21 +132,27 @@ def _sequential(
     as_json: bool,
 ) -> None:
     """Plan, simulate, fit, again; prints each step."""
-    truth = [placed(m, t) for t in twin] if twin else terms
+    terms = effects_of(m, identify)
     seeds = itertools.count(options["seed"])
     steps = follow(
-        m, terms, lambda e: simulate(m, e, truth, seed=next(seeds)), until=until, batch=rows, **options
+        m,
+        terms,
+        lambda e: simulate(m, e, twin or terms, seed=next(seeds)),
+        until=until,
+        batch=rows,
+        **options,
     )
     last = steps[-1][1]
     scale = np.array([p.scale for _, p in fitted(m.description, tuple(terms))])
     met = bool((last.sigma * last.misfit / scale).max() <= until)
-    if as_json:
-        print_json(plain({"met": met, "steps": [{"rows": n, "parameters": _numbers(e)} for n, e in steps]}))
-        return
+    told = []
     for count, e in steps:
         each = zip(e.names, e.values, e.sigma * e.misfit, e.units, strict=True)
-        print(f"{count} rows: " + ", ".join(f"{n} {with_uncertainty(v, u)} {s}" for n, v, u, s in each))
-    print(f"stopped: every u is at most {until:g} of a typical size" if met else "stopped: rows used up")
+        told.append(f"{count} rows: " + ", ".join(f"{n} {with_uncertainty(v, u)} {s}" for n, v, u, s in each))
+    told.append(
+        f"stopped: every u is at most {until:g} of a typical size" if met else "stopped: rows used up"
+    )
+    show(as_json, {"met": met, "steps": [{"rows": n, "parameters": _numbers(e)} for n, e in steps]}, told)
 
 
 def _numbers(e: Estimate) -> list[dict[str, object]]:
@@ -169,22 +164,6 @@ def _numbers(e: Estimate) -> list[dict[str, object]]:
 def _write(found: Design, path: Path) -> None:
     columns = plan_columns(found.experiment)
     write_rows(path, list(columns), zip(*columns.values(), strict=True))
-
-
-def _plain(d: Design) -> dict[str, object]:
-    out: dict[str, object] = plain(
-        {
-            "aim": d.aim,
-            "rows": len(d.experiment),
-            "parameters": [
-                {"name": n, "unit": u, "u": s, "u_random": r}
-                for n, u, s, r in zip(d.names, d.units, d.sigma, d.random_sigma, strict=True)
-            ],
-            "value": d.value,
-            "value_random": d.random_value,
-        }
-    )
-    return out
 
 
 def _lines(d: Design) -> list[str]:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 import xarray as xr
-from rich import box
-from rich.console import Console
 from rich.table import Table
 
-from stiffmap.common.outputs import make_folder
-from stiffmap.common.plain import plain
 from stiffmap.ui.cli.inputs import (
     MM,
     EffectsOption,
@@ -21,6 +18,7 @@ from stiffmap.ui.cli.inputs import (
     GravityOption,
     MachineArgument,
     MethodOption,
+    PlacesOption,
     PlaneOption,
     ToleranceOption,
     finish,
@@ -29,17 +27,14 @@ from stiffmap.ui.cli.inputs import (
     machine_with,
     position,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show, write_files
 from stiffmap.ui.cli.statuses import failed, failed_in_words
-
-AtOption = Annotated[
-    list[str] | None, typer.Option(help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]")
-]
+from stiffmap.ui.cli.table_text import table
 
 
-def polar(
+def command(
     machine: MachineArgument,
-    at: AtOption = None,
+    at: PlacesOption = None,
     force: ForceOption = "300",
     plane: PlaneOption = "xy",
     directions: Annotated[int, typer.Option(help="Number of directions.")] = 72,
@@ -74,77 +69,53 @@ def polar(
     size, vector = force_given(force)
     how: dict[str, Any] = {"gravity": gravity(gravity_), "method": method}
     many = [stiffmap.polar(m, p, size, plane, directions=directions, **how) for p in places]
-    files = write(many, make_folder(output), plane, MM * tolerance) if output else []
-    if as_json:
-        data = {"machine": m.name, "diagrams": [as_plain(d, plane) for d in many], "files": files}
-        if vector is not None:
-            given = [m.solve(p, [*vector, 0, 0, 0], **how).displacement for p in places]
-            data["displacement_under_the_vector"] = plain(given)
-        print_json(data)
-    else:
-        console = Console(highlight=False)
-        console.print(as_table(many, plane))
-        for p in places if vector is not None else []:
-            console.print(_under(m, p, vector, how), soft_wrap=True)
-        statuses = np.concatenate([d.status.values.ravel() for d in many])
-        for line in failed_in_words(failed(statuses), "directions"):
-            console.print(f"[yellow]{line}[/yellow]", soft_wrap=True)
-        if files:
-            console.print(f"wrote {', '.join(files)}", soft_wrap=True)
+    files = write_files(output, _files(many, plane, MM * tolerance))
+    moved = [] if vector is None else [m.solve(p, [*vector, 0, 0, 0], **how).displacement for p in places]
+    statuses = np.concatenate([d.status.values.ravel() for d in many])
+    told = [_under(p, vector, d) for p, d in zip(places, moved, strict=False)]
+    data: dict[str, Any] = {"machine": m.name, "diagrams": [as_plain(d, plane) for d in many], "files": files}
+    data |= {} if vector is None else {"displacement_under_the_vector": moved}
+    show(
+        as_json, data, [as_table(many, plane), *told, *failed_in_words(failed(statuses), "directions")], files
+    )
     finish(any(bool((d.status != 0).any()) for d in many))
 
 
-def _under(m: Any, place: Any, vector: Any, how: dict[str, Any]) -> str:
+def _under(place: Any, vector: Any, displacement: Any) -> str:
     """The deflection under the force that was given as a vector, in words."""
-    d = 1e3 * m.solve(place, [*vector, 0, 0, 0], **how).displacement[:3]
+    d = 1e3 * displacement[:3]
     words = [", ".join(f"{v:.4g}" for v in values) for values in (1e3 * place, vector, d)]
     return f"at ({words[0]}) mm, force ({words[1]}) N: ({words[2]}) mm, norm {np.linalg.norm(d):.4f} mm"
 
 
-def write(many: list[xr.Dataset], output: Any, plane: str, tolerance: float) -> list[str]:
-    """Pictures and data."""
-    from stiffmap.ui.plot import ellipse_figure, polar_figure, save
-    from stiffmap.workspace.maps.files import write_dataset
+def _files(many: list[xr.Dataset], plane: str, tolerance: float) -> Iterator[tuple[str, Any]]:
+    """Data and pictures."""
+    from stiffmap.ui.plot import ellipse_figure, polar_figure
 
-    data = [
-        write_dataset(d, output / (f"polar-{i}.nc" if len(many) > 1 else "polar.nc"))
-        for i, d in enumerate(many, 1)
-    ]
-    pictures = [
-        save(polar_figure(many, variable=f"deflection_{plane}", tolerance=tolerance), output / "polar.png"),
-        save(ellipse_figure(many, plane=plane, tolerance=tolerance), output / "ellipses.png"),
-    ]
-    return [str(f) for f in (*data, *pictures)]
+    for i, d in enumerate(many, 1):
+        yield f"polar-{i}.nc" if len(many) > 1 else "polar.nc", d
+    yield "polar.png", polar_figure(many, variable=f"deflection_{plane}", tolerance=tolerance)
+    yield "ellipses.png", ellipse_figure(many, plane=plane, tolerance=tolerance)
 
 
 def as_plain(d: xr.Dataset, plane: str) -> Any:
     """A diagram as JSON data (SI)."""
     names = ("position", "force", "angle", "deflection", f"deflection_{plane}", "displacement", "status")
     extremes = [f"{w}_{what}_{plane}" for w in ("worst", "best") for what in ("deflection", "direction")]
-    return plain({n: d[n].values for n in (*names, *extremes)})
+    return {n: d[n].values for n in (*names, *extremes)}
 
 
 def as_table(many: list[xr.Dataset], plane: str) -> Table:
     """Extremes of each diagram, mm and deg."""
     first = many[0]
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        title=f"{first.attrs['machine']}: deflection in the {plane} plane, mm, under "
-        f"{float(first.force):g} N",
+    out = table(
+        f"{first.attrs['machine']}: deflection in the {plane} plane, mm, under {float(first.force):g} N",
+        ("position, mm", "worst", "at, deg", "best", "at, deg", "worst/best", "failed"),
     )
-    for head in ("position, mm", "worst", "at, deg", "best", "at, deg", "worst/best", "failed"):
-        table.add_column(head, justify="right")
     for d in many:
         worst, best = (1e3 * float(d[f"{w}_deflection_{plane}"]) for w in ("worst", "best"))
         angles = [np.rad2deg(float(d[f"{w}_direction_{plane}"])) for w in ("worst", "best")]
         place = ", ".join(f"{1e3 * v:g}" for v in d.position.values)
-        table.add_row(
-            place,
-            f"{worst:.4f}",
-            f"{angles[0]:.1f}",
-            f"{best:.4f}",
-            f"{angles[1]:.1f}",
-            f"{worst / best:.2f}",
-            str(int((d.status != 0).sum())),
-        )
-    return table
+        sizes = f"{worst:.4f}", f"{angles[0]:.1f}", f"{best:.4f}", f"{angles[1]:.1f}", f"{worst / best:.2f}"
+        out.add_row(place, *sizes, str(int((d.status != 0).sum())))
+    return out

@@ -8,11 +8,10 @@ from typing import Annotated
 import typer
 
 from stiffmap.common.outputs.option import written
-from stiffmap.common.plain import plain
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 
 
-def process(
+def command(
     table: Annotated[
         Path,
         typer.Argument(
@@ -47,8 +46,5 @@ def process(
 
     given = None if base is None else load_process(base)
     law = identify_process(table, given, sheet)
-    files = [] if output is None else [str(law.save(output, given))]
-    if as_json:
-        print_json(plain({**law.to_dict(), "files": files}))
-    else:
-        print("\n".join([*law.words(), *(f"wrote {f}" for f in files)]))
+    files = [] if output is None else [law.save(output, given)]
+    show(as_json, law.to_dict(), law.words(), files)

@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
 from scipy.spatial.transform import Rotation
 
+from stiffmap.common.json_text import json_text
 from stiffmap.common.outputs import make_folder, write_picture, write_text
-from stiffmap.common.plain import plain
-from stiffmap.experiment import Experiment, Residual, load_experiment
-from stiffmap.experiment import residual as compute
-from stiffmap.experiment.calls import placed
+from stiffmap.experiment import Experiment, Residual, residual
 from stiffmap.experiment.channels import Channel
 from stiffmap.identification.validity import beyond
 from stiffmap.solve.machine import load_machine
-from stiffmap.ui.cli.inputs import EffectsOption, FolderOption, ThreadsOption
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.inputs import (
+    DeclaredArgument,
+    EffectsOption,
+    ExperimentArgument,
+    FolderOption,
+    ThreadsOption,
+    finish,
+)
+from stiffmap.ui.cli.output import JsonOption, show
 
 
-def residual(
-    machine: Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")],
-    data: Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")],
+def command(
+    machine: DeclaredArgument,
+    data: ExperimentArgument,
     rows: Annotated[int, typer.Option(help="Number of worst rows to print.")] = 5,
     effect: EffectsOption = None,
     output: FolderOption = None,
@@ -44,60 +49,27 @@ def residual(
       [cyan]stiffmap residual orthoglide-revised experiments/servo --effect 'compliance actuator z scale=2.1'[/cyan]
     """
     declared = load_machine(machine)
-    terms = [placed(declared, text) for text in effect or []]
-    result = compute(declared, load_experiment(data), terms, threads=threads)
+    result = residual(declared, data, effect or (), threads=threads)
     if output is not None:
         _write(result, rows, output)
     far = beyond(declared, result.experiment)
-    if as_json:
-        print_json(
-            as_plain(result, rows) | ({} if far is None else {"rows_beyond_calibration": int(far.sum())})
-        )
-    else:
-        told = (
-            []
-            if far is None
-            else [f"  beyond what the machine was calibrated by: {int(far.sum())} of {len(far)} rows"]
-        )
-        print("\n".join([*lines(result, rows), *told]))
-    if result.lack_of_fit < 1e-3:
-        raise typer.Exit(1)
+    found, told = result.as_plain(rows), lines(result, rows)
+    if far is not None:
+        found["rows_beyond_calibration"] = int(far.sum())
+        told.append(f"  beyond what the machine was calibrated by: {int(far.sum())} of {len(far)} rows")
+    show(as_json, found, told)
+    finish(result.lack_of_fit < 1e-3)
 
 
 def _write(r: Residual, rows: int, output: Path) -> None:
-    import json
-
     from stiffmap.experiment.comparison.table import write_table
     from stiffmap.ui.plot.experiment import figures
 
     place = make_folder(output)
     write_table(r, place / "residual.csv")
-    write_text(place / "residual.json", json.dumps(as_plain(r, rows), indent=2))
+    write_text(place / "residual.json", json_text(r.as_plain(rows)))
     for name, figure in figures(r).items():
         write_picture(place / f"{name}.png", figure, dpi=130)
-
-
-def as_plain(r: Residual, rows: int) -> dict[str, Any]:
-    """JSON data, SI."""
-    e = r.experiment
-    out = {
-        "experiment": e.name,
-        "quantity": e.quantity,
-        "units": "SI (m, rad), base axes",
-        "summary": vars(r.summary),
-        "noise_floor": {
-            c.name: f for c, f in zip(e.channels, r.noise.floor, strict=True) if c.name in e.axes
-        },
-        "limitations": r.limitations,
-        "lack_of_fit": r.lack_of_fit,
-        "nuisances": r.nuisances,
-        "poses_off": r.groups_off,
-        "set_aside": [e.ids[i] for i in r.set_aside.nonzero()[0]],
-        "worst": [{"id": i, "channel": c, "residual": v} for i, c, v in r.worst(rows)],
-        "checks": [vars(c) for c in r.checks],
-    }
-    found: dict[str, Any] = plain(out)
-    return found
 
 
 def lines(r: Residual, rows: int) -> list[str]:

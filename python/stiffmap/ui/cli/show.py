@@ -8,13 +8,11 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
 from rich.tree import Tree
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
-from stiffmap.common.plain import plain
 from stiffmap.model.description import Block, Body, Element, Joint, Offset, Point, Spring
 from stiffmap.model.effects import effect_text
 from stiffmap.solve.kinematics import inverse_kinematics
@@ -22,20 +20,19 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.mobility import Mobility, mobility
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import (
+    AtOption,
     EffectsOption,
     MachineArgument,
     RotationOption,
-    machine_with,
+    machine_at,
     numbers,
-    position,
-    rotation,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 
 
-def show(
+def command(
     machine: MachineArgument,
-    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    at: AtOption = None,
     turned: RotationOption = None,
     output: Annotated[Path | None, written(help="Picture to write. [default: MACHINE.png]")] = None,
     effect: EffectsOption = None,
@@ -70,8 +67,8 @@ def show(
 
       [cyan]stiffmap show orthoglide-revised --at -200,-200,-200 --load 300,0,0 --page loaded.html[/cyan]
     """
-    m = machine_with(machine, effect)
-    p, r = position(at, m), rotation(turned)
+    m, p, how = machine_at(machine, effect, at, turned)
+    r = how["rotation"]
     k = inverse_kinematics(m, p, r)
     if int(k.status) != Status.CONVERGED:
         raise StiffmapError(f"{m.name} cannot take this pose: {Status(int(k.status)).name.lower()}")
@@ -85,85 +82,71 @@ def show(
             raise StiffmapError("--page: needs --load, the force under which the machine is drawn")
         write_page(m, page, p, wrench, rotation=r)
     if wrench is not None:
-        _show_load(m, p, r, wrench, file, page, as_json)
-    elif as_json:
-        print_json(as_plain(m, counts, file))
+        _show_load(m, p, r, wrench, [f for f in (file, page) if f is not None], as_json)
     else:
-        show_text(Console(highlight=False, soft_wrap=True), m, counts, file)
+        show(as_json, as_plain(m, counts, file), _lines(m, counts, file))
 
 
 def _draw(m: Machine, p: Any, r: Any, path: Path, view: str | None, wrench: Any) -> Path:
     from stiffmap.ui.plot import loaded_figure, machine_figure, save
 
-    angles = None if view is None else numbers(view, "view", 2)
-    looks = None if angles is None else (float(angles[0]), float(angles[1]))
+    looks = None if view is None else tuple(numbers(view, "view", 2).tolist())
     if wrench is not None:
         return save(loaded_figure(m, p, wrench, rotation=r, view=looks), path)
     return save(machine_figure(m, p, rotation=r, view=looks), path)
 
 
-def _show_load(
-    m: Machine, p: Any, r: Any, wrench: Any, file: Path | None, page: Path | None, as_json: bool
-) -> None:
+def _show_load(m: Machine, p: Any, r: Any, wrench: Any, files: list[Path], as_json: bool) -> None:
     """The budget of the deflection, and the files written."""
     from stiffmap.solve.budget import deflection_budget
 
     budget = deflection_budget(m, p, wrench, rotation=r)
-    files = [str(f) for f in (file, page) if f is not None]
-    if as_json:
-        shares = {n: {"share": s, "displacement": c} for n, c, s in budget.ranked()}
-        found = {"machine": m.name, "wrench": wrench, "displacement": budget.displacement, "elements": shares}
-        print_json(plain(found | {"second_order": budget.rest_share, "files": files}))
-        return
-    console = Console(highlight=False, soft_wrap=True)
-    console.print(escape(str(budget)))
-    if files:
-        console.print(f"wrote {escape(', '.join(files))}")
+    shares = {n: {"share": s, "displacement": c} for n, c, s in budget.ranked()}
+    found = {"machine": m.name, "wrench": wrench, "displacement": budget.displacement, "elements": shares}
+    show(as_json, found | {"second_order": budget.rest_share}, [str(budget)], files)
 
 
 def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:
     """JSON data."""
-    return plain(
-        {
-            "machine": m.name,
-            "legs": {leg.name: [describe(e) for e in leg.elements] for leg in m.description.legs},
-            "base": [describe(e) for e in m.description.base],
-            "platform": [describe(e) for e in m.description.platform],
-            "effects": [effect_text(r, m.description) for r in m.description.effects],
-            "actuators": list(m.actuators),
-            "points": list(m.points),
-            "degrees_of_freedom": counts.total,
-            "platform_freedom": counts.platform,
-            "internal_freedom": counts.internal,
-            "over_constraint": counts.overconstraint,
-            "closure_equations": counts.equations,
-            "joint_coordinates": counts.joints,
-            "free_spins": list(m.free_spins),
-            "picture": None if file is None else str(file),
-        }
-    )
+    return {
+        "machine": m.name,
+        "legs": {leg.name: [describe(e) for e in leg.elements] for leg in m.description.legs},
+        "base": [describe(e) for e in m.description.base],
+        "platform": [describe(e) for e in m.description.platform],
+        "effects": [effect_text(r, m.description) for r in m.description.effects],
+        "actuators": list(m.actuators),
+        "points": list(m.points),
+        "degrees_of_freedom": counts.total,
+        "platform_freedom": counts.platform,
+        "internal_freedom": counts.internal,
+        "over_constraint": counts.overconstraint,
+        "closure_equations": counts.equations,
+        "joint_coordinates": counts.joints,
+        "free_spins": list(m.free_spins),
+        "picture": file,
+    }
 
 
-def show_text(console: Console, m: Machine, counts: Mobility, file: Path | None) -> None:
+def _lines(m: Machine, counts: Mobility, file: Path | None) -> Iterator[Any]:
     """For the terminal."""
     d = m.description
-    tree = Tree(f"[bold]{m.name}[/bold]  {escape(d.title)}")
+    tree = Tree(Text.assemble((m.name, "bold"), f"  {d.title}"))
     for name, elements in _sequences(m):
-        branch = tree.add(name)
+        branch = tree.add(Text(name))
         for e in elements:
             _grow(branch, e)
-    console.print(tree)
+    yield tree
     for r in d.effects:
-        console.print(f"effect: {escape(effect_text(r, d))}")
-    console.print(f"platform: {counts.platform} degrees of freedom, {len(m.actuators)} actuators")
-    console.print(
+        yield f"effect: {effect_text(r, d)}"
+    yield f"platform: {counts.platform} degrees of freedom, {len(m.actuators)} actuators"
+    yield (
         f"mechanism: {counts.joints} joint coordinates, {counts.equations} closure equations of rank "
         f"{counts.independent}: {counts.total} degrees of freedom, {counts.internal} of them internal"
     )
-    console.print(f"over-constraint: {counts.overconstraint}")
-    console.print(f"free spins: {', '.join(m.free_spins) or 'none'}")
+    yield f"over-constraint: {counts.overconstraint}"
+    yield f"free spins: {', '.join(m.free_spins) or 'none'}"
     if file is not None:
-        console.print(f"wrote {escape(str(file))}")
+        yield f"wrote {file}"
 
 
 def _sequences(m: Machine) -> Iterator[tuple[str, tuple[Element, ...]]]:
@@ -174,9 +157,9 @@ def _sequences(m: Machine) -> Iterator[tuple[str, tuple[Element, ...]]]:
 
 
 def _grow(tree: Tree, e: Element) -> None:
-    node = tree.add(escape(describe(e)))
+    node = tree.add(Text(describe(e)))
     for branch in e.branches if isinstance(e, Block) else ():
-        inner = node.add(f"branch {branch.name}")
+        inner = node.add(Text(f"branch {branch.name}"))
         for part in branch.elements:
             _grow(inner, part)
 

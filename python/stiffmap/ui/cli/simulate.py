@@ -10,24 +10,21 @@ import typer
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
-from stiffmap.experiment import Loop, save_experiment
-from stiffmap.experiment import simulate as run
-from stiffmap.experiment.calls import placed
+from stiffmap.experiment import Loop, save_experiment, simulate
 from stiffmap.experiment.virtual import plans as make
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli import plan_options as plans
-from stiffmap.ui.cli.output import JsonOption, print_json
-
-Effects = Annotated[
-    list[str] | None,
-    typer.Option("--effect", help="What the machine has beyond the declared one; repeatable."),
-]
+from stiffmap.ui.cli.inputs import FrameOption, QuantityOption, TargetOption, in_si
+from stiffmap.ui.cli.output import JsonOption, show
 
 
-def simulate(
+def command(
     machine: Annotated[str, typer.Argument(help="Machine: shipped name or machine file.")],
     output: Annotated[Path, written(help="Folder of the virtual experiment.")],
-    effect: Effects = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(help="What the machine has beyond the declared one; repeatable."),
+    ] = None,
     plan: Annotated[
         str,
         typer.Option(
@@ -35,7 +32,7 @@ def simulate(
             "fx … in N and any other column of an experiment), or an experiment folder to repeat."
         ),
     ] = "random",
-    quantity: Annotated[str, typer.Option(help="deflection or position.")] = "deflection",
+    quantity: QuantityOption = "deflection",
     poses: Annotated[int, typer.Option(help="Poses of a random plan.")] = 30,
     loads: Annotated[
         str, typer.Option(help="Loads per pose: axes, full (with sums of pairs and zero), or N at random.")
@@ -62,10 +59,8 @@ def simulate(
     shuffle: Annotated[bool, typer.Option(help="Visit the poses in random order.")] = False,
     temperature: Annotated[str | None, typer.Option(help="First and last temperature, °C, as 20,26.")] = None,
     setups: Annotated[int, typer.Option(help="Set-ups that the poses are dealt to.")] = 1,
-    frame: Annotated[
-        str, typer.Option(help="Instrument's frame: known, offset_unknown or unknown.")
-    ] = "known",
-    tool: Annotated[str, typer.Option(help="Point on the tool: known or offset_unknown.")] = "known",
+    frame: FrameOption = "known",
+    tool: TargetOption = "known",
     unloaded: Annotated[str, typer.Option(help="Unloaded state: centre, approach, unknown.")] = "centre",
     approach: Annotated[bool, typer.Option(help="Reach each pose along ±x, ±y or ±z.")] = False,
     instrument_on: Annotated[str, typer.Option(help="floor, base, or a point of the machine.")] = "floor",
@@ -93,7 +88,7 @@ def simulate(
       [cyan]stiffmap simulate orthoglide-revised --plan experiments/servo --effect 'dead_zone actuator y half_width=5um' -o twin[/cyan]
     """
     chosen = load_machine(machine)
-    size = None if noise is None else 1e-3 * noise
+    size = in_si(noise)
     layout = plans.layout(
         chosen, plan, quantity, poses, loads, plans.sizes(forces), repeats, plans.axes(read),
         size, 1e-3 * angle_noise, seed,
@@ -106,11 +101,10 @@ def simulate(
     layout = make.with_command(layout, chosen) if command else layout
     if not 0 <= outliers < 1:
         raise StiffmapError(f"--outliers: expected a share from 0 to below 1, got {outliers:g}")
-    twin = run(chosen, layout, [placed(chosen, e) for e in effect or []], seed=seed, outlier_share=outliers)
+    twin = simulate(chosen, layout, effect or (), seed=seed, outlier_share=outliers)
     save_experiment(twin, output, "virtual experiment" + "".join(f"; {e}" for e in effect or []))
     number = int(twin.groups.max()) + 1
-    if as_json:
-        found = {"rows": len(twin), "poses": number, "quantity": twin.quantity, "axes": list(twin.axes)}
-        print_json({"machine": chosen.name, **found, "folder": str(output)})
-        return
-    print(f"{output}: {len(twin)} rows of {twin.quantity} at {number} poses; reads {', '.join(twin.axes)}")
+    data = {"machine": chosen.name, "rows": len(twin), "poses": number, "quantity": twin.quantity,
+            "axes": twin.axes, "folder": output}  # fmt: skip
+    told = f"{output}: {len(twin)} rows of {twin.quantity} at {number} poses; reads {', '.join(twin.axes)}"
+    show(as_json, data, [told])

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich import box
-from rich.console import Console
 from rich.table import Table
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.outputs.option import written
-from stiffmap.common.plain import plain
 from stiffmap.common.tables.poses import PoseTable, read_pose_table
 from stiffmap.solve.free_motions import free_motions
 from stiffmap.solve.machine import Machine
@@ -31,15 +29,13 @@ from stiffmap.ui.cli.inputs import (
     RotationOption,
     finish,
     force_given,
-    gravity,
-    machine_with,
+    machine_at,
     numbers,
-    position,
     position_words,
-    rotation,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.cli.statuses import MEANINGS
+from stiffmap.ui.cli.table_text import table as table_of
 
 SCALE = np.array([1e3] * 3 + [1.0] * 3)
 NAMES = ("dx", "dy", "dz", "rx", "ry", "rz")
@@ -47,7 +43,7 @@ SHOWN = 20  # rows of a file that are printed
 """m to mm, rad stays: a compliance then is in mm/N, rad/N, mm/(N mm), rad/(N mm)."""
 
 
-def solve(
+def command(
     machine: MachineArgument,
     at: Annotated[
         str | None,
@@ -84,16 +80,12 @@ def solve(
 
       [cyan]stiffmap solve orthoglide-revised --at poses.csv --force 0,0,-100 -o answers.csv[/cyan]
     """
-    m = machine_with(machine, effect)
-    how: dict[str, Any] = {
-        "rotation": rotation(turned),
-        "point": point,
-        "gravity": gravity(gravity_),
-        "method": method,
-    }
-    if at is not None and (is_file_name(at)):
+    file = Path(at) if at is not None and is_file_name(at) else None
+    m, place, how = machine_at(machine, effect, None if file else at, turned, gravity_)
+    how |= {"point": point, "method": method}
+    if file is not None:
         load = np.r_[force_vector(force), MM * numbers(moment, "moment", 3)]
-        finish(not solve_table(m, Path(at), load, how, output, as_json))
+        finish(not solve_table(m, file, load, how, output, as_json))
         return
     if output is not None:
         raise StiffmapError("--output: only with a file of poses (--at poses.csv)")
@@ -101,64 +93,57 @@ def solve(
     if vector is None:
         from stiffmap.solve.worst_force import worst_force
 
-        acting = worst_force(m, position(at, m), size, **how)
+        acting = worst_force(m, place, size, **how)
     else:
         acting = vector
     load = np.r_[acting, MM * numbers(moment, "moment", 3)]
-    place = position(at, m)
     s = m.solve(place, load, **how)
-    if as_json:
-        print_json(as_plain(m.name, s, load) | {"reason": reason(m, s, place, how["rotation"])})
-    else:
-        console = Console(highlight=False)
-        if vector is None:
-            told = ", ".join(f"{v:.1f}" for v in acting)
-            console.print(f"{size:g} N in the direction that pushes furthest: force ({told}) N")
-        console.print(position_words(place, m))
-        show(console, s)
-        if why := reason(m, s, place, how["rotation"]):
-            console.print(f"reason: {why}", soft_wrap=True)
-        if int(s.status) == Status.SINGULAR and (ways := free_motions(m, s.free_twists)):
-            console.print(f"free: the platform can {'; '.join(ways)}", soft_wrap=True)
+    why = reason(m, s, place, how["rotation"])
+    told: list[Any] = [position_words(place, m), *_lines(s)]
+    if vector is None:
+        furthest = ", ".join(f"{v:.1f}" for v in acting)
+        told.insert(0, f"{size:g} N in the direction that pushes furthest: force ({furthest}) N")
+    told += [f"reason: {why}"] if why else []
+    if int(s.status) == Status.SINGULAR and (ways := free_motions(m, s.free_twists)):
+        told.append(f"free: the platform can {'; '.join(ways)}")
+    show(as_json, as_plain(m.name, s, load) | {"reason": why}, told)
     finish(int(s.status) != Status.CONVERGED)
 
 
 def as_plain(name: str, s: Solution, load: Any) -> Any:
     """A solution as JSON data (SI)."""
-    return plain(
-        {
-            "machine": name,
-            "point": s.point,
-            "wrench": load,
-            "status": Status(int(s.status)).name,
-            "flags": [f.name for f in Flag(int(s.flags))],
-            "displacement": s.displacement,
-            "stiffness": s.stiffness,
-            "compliance": s.compliance,
-            "actuator_effort": dict(zip(s.actuators, s.actuator_effort.tolist(), strict=True)),
-            "leg_wrench": dict(zip(s.legs, s.leg_wrench.tolist(), strict=True)),
-            "joint_coordinates": s.joint_coordinates,
-            "spring_deflection": s.spring_deflection,
-            "indeterminate": list(s.indeterminate),
-        }
-    )
+    return {
+        "machine": name,
+        "point": s.point,
+        "wrench": load,
+        "status": Status(int(s.status)).name,
+        "flags": [f.name for f in Flag(int(s.flags))],
+        "displacement": s.displacement,
+        "stiffness": s.stiffness,
+        "compliance": s.compliance,
+        "actuator_effort": dict(zip(s.actuators, s.actuator_effort, strict=True)),
+        "leg_wrench": dict(zip(s.legs, s.leg_wrench, strict=True)),
+        "joint_coordinates": s.joint_coordinates,
+        "spring_deflection": s.spring_deflection,
+        "indeterminate": list(s.indeterminate),
+    }
 
 
-def show(console: Console, s: Solution) -> None:
+def _lines(s: Solution) -> Iterator[str | Table]:
     """For the terminal: mm, deg, N."""
     flags = ", ".join(str(f.name) for f in Flag(int(s.flags)))
-    console.print(f"status {Status(int(s.status)).name.lower()}" + (f"; flags {flags}" if flags else ""))
+    yield f"status {Status(int(s.status)).name.lower()}" + (f"; flags {flags}" if flags else "")
     d = s.displacement
     if np.isfinite(d).all():
         shift = ", ".join(f"{v:.6f}" for v in 1e3 * d[:3])
-        console.print(f"displacement of {s.point}: ({shift}) mm, norm {1e3 * np.linalg.norm(d[:3]):.6f} mm")
-        console.print(f"rotation: ({', '.join(f'{v:.6f}' for v in np.rad2deg(d[3:]))}) deg")
+        yield f"displacement of {s.point}: ({shift}) mm, norm {1e3 * np.linalg.norm(d[:3]):.6f} mm"
+        yield f"rotation: ({', '.join(f'{v:.6f}' for v in np.rad2deg(d[3:]))}) deg"
     for name, effort in zip(s.actuators, s.actuator_effort, strict=True):
         if np.isfinite(effort):
-            console.print(f"drive {name}: {effort:.4f} (N, or N m for a revolute one)")
+            yield f"drive {name}: {effort:.4f} (N, or N m for a revolute one)"
     if np.isfinite(s.compliance).any():
         scaled = s.compliance * np.outer(SCALE, SCALE) / 1e3
-        console.print(_matrix("loaded compliance: mm and rad per N and N mm", scaled))
+        yield _matrix("loaded compliance: mm and rad per N and N mm", scaled)
 
 
 def reason(m: Machine, s: Solution, at: Any, turned: Any) -> str | None:
@@ -173,12 +158,9 @@ def reason(m: Machine, s: Solution, at: Any, turned: Any) -> str | None:
 
 
 def _matrix(title: str, values: Any) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, title=title, padding=0, pad_edge=False, collapse_padding=True)
-    for head in ("", "fx", "fy", "fz", "mx", "my", "mz"):
-        table.add_column(head, justify="right")
-    for name, row in zip(NAMES, values, strict=True):
-        table.add_row(name, *(f"{v:11.3e}" for v in row))
-    return table
+    rows = ([name, *(f"{v:11.3e}" for v in row)] for name, row in zip(NAMES, values, strict=True))
+    heads = ("", "fx", "fy", "fz", "mx", "my", "mz")
+    return table_of(title, heads, rows, padding=0, pad_edge=False, collapse_padding=True)
 
 
 def is_file_name(text: str) -> bool:
@@ -205,26 +187,19 @@ def solve_table(
     wrench = table.wrench if table.loaded else np.broadcast_to(load, (len(table), 6))
     s = m.solve(table.position, wrench, **{**how, "rotation": how["rotation"] if turned is None else turned})
     words = [Status(int(v)).name for v in s.status]
-    files = []
+    files: list[Path] = []
     if output is not None:
-        head = [
-            "x [mm]",
-            "y [mm]",
-            "z [mm]",
-            *(f"{n} [{'mm' if n[0] == 'd' else 'rad'}]" for n in NAMES),
-            "status",
-        ]
+        units = (f"{n} [{'mm' if n[0] == 'd' else 'rad'}]" for n in NAMES)
+        head = ["x [mm]", "y [mm]", "z [mm]", *units, "status"]
         in_mm = np.hstack([table.position / MM, s.displacement * np.r_[np.full(3, 1 / MM), np.ones(3)]])
         write_rows(output, head, ([*map(repr, row.tolist()), w] for row, w in zip(in_mm, words, strict=True)))
-        files = [str(output)]
-    if as_json:
-        rows = [
-            {"position": p, "wrench": w, "status": state, "displacement": d}
-            for p, w, state, d in zip(table.position, wrench, words, s.displacement, strict=True)
-        ]
-        print_json(plain({"machine": m.name, "point": s.point, "poses": rows, "files": files}))
-    else:
-        _show(table, s, words, files)
+        files = [output]
+    rows = [
+        {"position": p, "wrench": w, "status": state, "displacement": d}
+        for p, w, state, d in zip(table.position, wrench, words, s.displacement, strict=True)
+    ]
+    data = {"machine": m.name, "point": s.point, "poses": rows}
+    show(as_json, data, _rows(table, s, words), files)
     return bool(s.ok.all())
 
 
@@ -233,22 +208,18 @@ def _stand_in(m: Machine) -> Floats | None:
     return None if {"x", "y", "z"} <= set(m.description.task) else m.description.home.p
 
 
-def _show(table: PoseTable, s: Solution, words: list[str], files: list[str]) -> None:
-    out = Table(box=box.SIMPLE, title=f"displacement of {s.point}")
-    for name in ("x", "y", "z", "dx, µm", "dy, µm", "dz, µm", "|d|, µm", ""):
-        out.add_column(name, justify="right")
+def _rows(table: PoseTable, s: Solution, words: list[str]) -> Iterator[str | Table]:
+    heads = ("x", "y", "z", "dx, µm", "dy, µm", "dz, µm", "|d|, µm", "")
+    out = table_of(f"displacement of {s.point}", heads)
     sizes = np.linalg.norm(s.displacement[:, :3], axis=1)
     for i in range(min(len(table), SHOWN)):
         moved = [f"{1e6 * v:.2f}" for v in (*s.displacement[i, :3], sizes[i])]
         where = [f"{v / MM:g}" for v in table.position[i]]
         word = "" if words[i] == "CONVERGED" else words[i].lower()
         out.add_row(*where, *(["-"] * 4 if not np.isfinite(sizes[i]) else moved), word)
-    console = Console(highlight=False)
-    console.print(out)
+    yield out
     if len(table) > SHOWN:
-        console.print(f"{len(table) - SHOWN} more rows (-o answers.csv writes all)")
+        yield f"{len(table) - SHOWN} more rows (-o answers.csv writes all)"
     if np.isfinite(sizes).any():
         worst = int(np.nanargmax(sizes))
-        console.print(f"largest: {1e6 * sizes[worst]:.2f} µm in row {worst + 1} (line {table.lines[worst]})")
-    if files:
-        console.print(f"wrote {', '.join(files)}", soft_wrap=True)
+        yield f"largest: {1e6 * sizes[worst]:.2f} µm in row {worst + 1} (line {table.lines[worst]})"

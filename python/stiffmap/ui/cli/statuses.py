@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.text import Text
 
 from stiffmap.solve.compiled import Status, counted
 
@@ -23,6 +24,6 @@ def failed(status: NDArray[np.uint8]) -> dict[str, int]:
     return {name: n for name, n in counted(status).items() if name != Status.CONVERGED.name}
 
 
-def failed_in_words(failed: Mapping[str, int], what: str = "poses") -> list[str]:
+def failed_in_words(failed: Mapping[str, int], what: str = "poses") -> list[Text]:
     """``12 poses: UNSTABLE (…)``, a line per status."""
-    return [f"{count} {what}: {name} ({MEANINGS[name]})" for name, count in failed.items()]
+    return [Text(f"{count} {what}: {name} ({MEANINGS[name]})", "yellow") for name, count in failed.items()]

@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterator
+from typing import Any
 
-import typer
-from rich import box
-from rich.console import Console
 from rich.table import Table
 
-from stiffmap.common.outputs import make_folder
-from stiffmap.common.plain import plain
 from stiffmap.solve.internal_wrenches import InternalWrenches
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import (
+    AtOption,
     EffectsOption,
     FolderOption,
     GravityOption,
     MachineArgument,
     RotationOption,
     finish,
-    gravity,
-    machine_with,
-    position,
-    rotation,
+    machine_at,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show, write_files
+from stiffmap.ui.cli.table_text import table
 
 
-def stress(
+def command(
     machine: MachineArgument,
-    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    at: AtOption = None,
     turned: RotationOption = None,
     effect: EffectsOption = None,
     gravity_: GravityOption = None,
@@ -51,51 +46,24 @@ def stress(
     """
     import stiffmap
 
-    m = machine_with(machine, effect)
-    none = (0.0, 0.0, 0.0)
-    result = stiffmap.assembly_wrenches(
-        m, position(at, m), rotation=rotation(turned), gravity=none if gravity_ is None else gravity(gravity_)
-    )
-    files = []
-    if output:
-        from stiffmap.ui.plot import save, stress_figure
-
-        files.append(
-            str(
-                save(
-                    stress_figure(result, f"{m.name}: internal wrenches"), make_folder(output) / "stress.png"
-                )
-            )
-        )
+    m, place, how = machine_at(machine, effect, at, turned, gravity_ or "0,0,0")
+    result = stiffmap.assembly_wrenches(m, place, **how)
+    files = write_files(output, _picture(result, m.name))
     status = Status(int(result.status))
-    if as_json:
-        print_json(
-            plain(
-                {
-                    "machine": m.name,
-                    "status": status.name,
-                    "springs": result.springs,
-                    "joints": result.joints,
-                    "legs": result.legs,
-                    "displacement": result.displacement,
-                    "files": files,
-                }
-            )
-        )
-    else:
-        console = Console(highlight=False)
-        console.print(f"status {status.name.lower()}")
-        console.print(_table(result))
-        if files:
-            console.print(f"wrote {', '.join(files)}", soft_wrap=True)
+    data = {"machine": m.name, "status": status.name} | {
+        n: getattr(result, n) for n in ("springs", "joints", "legs", "displacement")
+    }
+    show(as_json, data, [f"status {status.name.lower()}", _table(result)], files)
     finish(status != Status.CONVERGED)
 
 
+def _picture(result: InternalWrenches, name: str) -> Iterator[tuple[str, Any]]:
+    from stiffmap.ui.plot import stress_figure
+
+    yield "stress.png", stress_figure(result, f"{name}: internal wrenches")
+
+
 def _table(result: InternalWrenches) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, title="springs, in their own axes")
-    table.add_column("spring")
-    for head in ("fx, N", "fy, N", "fz, N", "mx, N m", "my, N m", "mz, N m"):
-        table.add_column(head, justify="right")
-    for name, w in result.springs.items():
-        table.add_row(name, *(f"{v:.4f}" for v in w))
-    return table
+    heads = ("spring", "fx, N", "fy, N", "fz, N", "mx, N m", "my, N m", "mz, N m")
+    rows = ([name, *(f"{v:.4f}" for v in w)] for name, w in result.springs.items())
+    return table("springs, in their own axes", heads, rows, left=("spring",))

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 import xarray as xr
-from rich import box
-from rich.console import Console
 from rich.table import Table
 
-from stiffmap.common.broadcasting import Floats
-from stiffmap.common.outputs import make_folder
-from stiffmap.common.plain import plain
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import (
     MM,
+    AtOption,
     EffectsOption,
     FolderOption,
     GravityOption,
@@ -26,17 +22,16 @@ from stiffmap.ui.cli.inputs import (
     MethodOption,
     ToleranceOption,
     finish,
-    gravity,
-    machine_with,
+    machine_at,
     numbers,
-    position,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show, write_files
+from stiffmap.ui.cli.table_text import table
 
 
-def sweep(
+def command(
     machine: MachineArgument,
-    at: Annotated[str | None, typer.Option(help="TCP position in mm, e.g. 0,0,300. [default: home]")] = None,
+    at: AtOption = None,
     direction: Annotated[str, typer.Option(help="Direction of the force, any length.")] = "1,0,0",
     to: Annotated[float, typer.Option(help="Largest force, N.")] = 1000.0,
     from_: Annotated[
@@ -82,135 +77,86 @@ def sweep(
     """
     import stiffmap
 
-    m = machine_with(machine, effect)
-    if limit is not None or control != "force" or cross:
+    m, place, posed = machine_at(machine, effect, at, acting=gravity_)
+    path = limit is not None or control != "force" or bool(cross)
+    how: dict[str, Any] = {"forces": np.linspace(from_, to, max(points, 0)), "method": method}
+    if path:
         reach = limit if limit is None or control == "force" else MM * limit
-        path(
-            m,
-            position(at, m),
-            numbers(direction, "direction", 3),
-            control,
-            reach,
-            points,
-            cross,
-            gravity(gravity_),
-            output,
-            as_json,
-        )
-        return
-    forces = np.linspace(from_, to, max(points, 0))
-    place, u = position(at, m), numbers(direction, "direction", 3)
-    ds = stiffmap.sweep(m, place, u, forces, gravity=gravity(gravity_), method=method)
-    files = write(ds, make_folder(output), MM * tolerance) if output else []
-    if as_json:
-        names = ("position", "direction", "force", "deflection", "deflection_along", "displacement", "status")
-        print_json(plain({"machine": m.name} | {n: ds[n].values for n in names} | {"files": files}))
-    else:
-        console = Console(highlight=False)
-        console.print(as_table(ds))
-        if files:
-            console.print(f"wrote {', '.join(files)}", soft_wrap=True)
-    finish(bool((ds.status != Status.CONVERGED).any()))
+        how = {"control": control, "limit": reach, "steps": points, "cross": cross}
+    ds = stiffmap.sweep(m, place, numbers(direction, "direction", 3), **posed, **how)
+    files = write_files(output, _path_files(m, ds) if path else _files(ds, MM * tolerance))
+    counted = ds.assign(unstable_modes=ds.unstable_modes.astype(int)) if path else ds
+    data = {"machine": m.name} | ({n: ds.attrs[n] for n in ("end", "crossing_end")} if path else {})
+    data |= {n: counted[n].values for n in (OF_PATH if path else OF_FORCES)}
+    show(as_json, data, _path_lines(ds) if path else [as_table(ds)], files)
+    early = path and ds.attrs["end"] != "the limit was reached"
+    finish(early or bool((ds.status != Status.CONVERGED).any()))
 
 
-def write(ds: xr.Dataset, output: Any, tolerance: float) -> list[str]:
-    """Picture and data."""
-    from stiffmap.ui.plot import save, sweep_figure
-    from stiffmap.workspace.maps.files import write_dataset
+def _files(ds: xr.Dataset, tolerance: float) -> Iterator[tuple[str, Any]]:
+    """Data and picture."""
+    from stiffmap.ui.plot import sweep_figure
 
     u = ", ".join(f"{v:.3g}" for v in ds.direction.values)
-    figure = sweep_figure({f"along ({u})": ds}, variable="deflection", tolerance=tolerance)
-    return [str(write_dataset(ds, output / "sweep.nc")), str(save(figure, output / "sweep.png"))]
+    yield "sweep.nc", ds
+    yield "sweep.png", sweep_figure({f"along ({u})": ds}, variable="deflection", tolerance=tolerance)
 
 
 def as_table(ds: xr.Dataset) -> Table:
     """Force, deflection, status."""
-    place = ", ".join(f"{1e3 * v:g}" for v in ds.position.values)
-    table = Table(box=box.SIMPLE_HEAD, title=f"{ds.attrs['machine']} at ({place}) mm")
-    for head in ("force, N", "deflection, mm", "along the force, mm", "compliance, µm/N", "status"):
-        table.add_column(head, justify="left" if head == "status" else "right")
+    heads = ("force, N", "deflection, mm", "along the force, mm", "compliance, µm/N", "status")
+    out = table(_place(ds), heads, left=("status",))
     for i, force in enumerate(ds.force.values):
         values = [1e3 * float(ds[n][i]) for n in ("deflection", "deflection_along")]
         values.append(1e6 * float(ds.compliance_along[i]))
         text = (f"{v:.4f}" if np.isfinite(v) else "–" for v in values)
-        table.add_row(f"{force:g}", *text, Status(int(ds.status[i])).name.lower())
-    return table
+        out.add_row(f"{force:g}", *text, Status(int(ds.status[i])).name.lower())
+    return out
 
 
+def _place(ds: xr.Dataset) -> str:
+    return f"{ds.attrs['machine']} at ({', '.join(f'{1e3 * v:g}' for v in ds.position.values)}) mm"
+
+
+OF_FORCES = ("position", "direction", "force", "deflection", "deflection_along", "displacement", "status")
+OF_PATH = ("force", "deflection", "deflection_along", "unstable_modes", "status", "branch", "critical_force",
+           "critical_deflection", "critical_kind", "mode_leg", "mode_joint")  # fmt: skip
 SHOWN = 20
 
 
-def path(
-    machine: Machine,
-    at: Floats,
-    direction: Floats,
-    control: str,
-    limit: float | None,
-    steps: int,
-    cross: int,
-    gravity: Any,
-    output: Path | None,
-    as_json: bool,
-) -> None:
-    """Follow the path, print it, write it; exit with 1 where it ends early or is unstable somewhere."""
-    import stiffmap
-
-    ds = stiffmap.sweep(
-        machine, at, direction, control=control, limit=limit, steps=steps, cross=cross, gravity=gravity
-    )
-    files = write_path(machine, ds, make_folder(output)) if output else []
-    if as_json:
-        counted = ds.assign(unstable_modes=ds.unstable_modes.astype(int))
-        names = ("force", "deflection", "deflection_along", "unstable_modes", "status", "branch", "critical_force",
-                 "critical_deflection", "critical_kind", "mode_leg", "mode_joint")  # fmt: skip
-        print_json(plain({"machine": machine.name, "end": ds.attrs["end"], "crossing_end": ds.attrs["crossing_end"]}
-                         | {n: counted[n].values for n in names} | {"files": files}))  # fmt: skip
-    else:
-        show(Console(highlight=False), ds)
-        if files:
-            print(f"wrote {', '.join(files)}")
-    reached = ds.attrs["end"] == "the limit was reached"
-    finish(not reached or bool((ds.status != Status.CONVERGED).any()))
-
-
-def write_path(machine: Machine, ds: xr.Dataset, output: Path) -> list[str]:
+def _path_files(machine: Machine, ds: xr.Dataset) -> Iterator[tuple[str, Any]]:
     """Data, the path, and one picture per critical point."""
-    from stiffmap.ui.plot import mode_figure, path_figure, save
-    from stiffmap.workspace.maps.files import write_dataset
+    from stiffmap.ui.plot import mode_figure, path_figure
 
-    files = [write_dataset(ds, output / "path.nc"), save(path_figure(ds), output / "path.png")]
+    yield "path.nc", ds
+    yield "path.png", path_figure(ds)
     for i in range(ds.sizes["critical"]):
-        files.append(save(mode_figure(machine, ds, i), output / f"mode_{i + 1}.png"))
-    return [str(f) for f in files]
+        yield f"mode_{i + 1}.png", mode_figure(machine, ds, i)
 
 
-def show(console: Console, ds: xr.Dataset) -> None:
+def _path_lines(ds: xr.Dataset) -> Iterator[str | Table]:
     """Some points of the path, and what happened on it."""
-    place = ", ".join(f"{1e3 * v:g}" for v in ds.position.values)
-    table = Table(box=box.SIMPLE_HEAD, title=f"{ds.attrs['machine']} at ({place}) mm")
-    for head in ("force, N", "along the force, mm", "deflection, mm", "status"):
-        table.add_column(head, justify="left" if head == "status" else "right")
+    out = table(_place(ds), ("force, N", "along the force, mm", "deflection, mm", "status"), left=("status",))
     branch = ds.branch.values
     for i in np.concatenate([_some(np.flatnonzero(branch == k)) for k in np.unique(branch)]):
         values = [float(ds.force[i]), 1e3 * float(ds.deflection_along[i]), 1e3 * float(ds.deflection[i])]
-        table.add_row(*(f"{v:.4f}" for v in values), Status(int(ds.status[i])).name.lower())
+        out.add_row(*(f"{v:.4f}" for v in values), Status(int(ds.status[i])).name.lower())
         if i + 1 < branch.size and branch[i + 1] != branch[i]:
-            table.add_section()
-    console.print(table)
+            out.add_section()
+    yield out
     for i in range(ds.sizes["critical"]):
         leg = str(ds.mode_leg.values[i])
         more = abs(int(ds.unstable_after[i]) - int(ds.unstable_before[i]))
-        console.print(
+        yield (
             f"{ds.critical_kind.values[i]} point at {float(ds.critical_force[i]):.6g} N, "
             f"{1e3 * float(ds.critical_deflection[i]):.6g} mm; mode: "
             + (f"leg {leg}, " if leg else "")
             + f"most in {ds.mode_joint.values[i]}"
-            + (f"; {more} modes within one step" if more > 1 else ""),
-            soft_wrap=True,
+            + (f"; {more} modes within one step" if more > 1 else "")
         )
-    console.print(f"end: {ds.attrs['end']}")
+    yield f"end: {ds.attrs['end']}"
     if (ds.branch == 1).any():
-        console.print(f"end of the crossing branch: {ds.attrs['crossing_end']}")
+        yield f"end of the crossing branch: {ds.attrs['crossing_end']}"
 
 
 def _some(steps: Any) -> Any:

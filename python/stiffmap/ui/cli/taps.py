@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,16 +10,14 @@ import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.outputs import make_folder
-from stiffmap.common.plain import plain
-from stiffmap.ui.cli.inputs import EffectsOption, FolderOption, MachineArgument, finish, machine_with
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.inputs import EffectsOption, FolderOption, MachineArgument, finish, machine_with, words
+from stiffmap.ui.cli.output import JsonOption, show, write_files
 
 if TYPE_CHECKING:
     from stiffmap.identification.taps import TapDiagnosis, TapTest
 
 
-def taps(
+def command(
     machine: MachineArgument,
     table: Annotated[
         Path,
@@ -57,46 +56,24 @@ def taps(
     measured = load_taps(table, m)
     found = explain_taps(
         m, measured, None if statics is None else load_experiment(statics), default_u=mass_u / 100,
-        only=None if only is None else [k.strip() for k in only.split(",")],
+        only=words(only),
     )  # fmt: skip
     rows = compared(m, measured, found)
-    files = write(m, measured, found, make_folder(output)) if output else []
-    if as_json:
-        print_json(plain({"machine": m.name, **as_plain(found), "modes": rows, "files": files}))
-    else:
-        print(found.sentence)
-        for r in rows:
-            after = "" if r["after_Hz"] is None else f", after {r['after_Hz']:.2f}"
-            mac = "" if r["mac"] is None or np.isnan(r["mac"]) else f", MAC {r['mac']:.2f}"
-            print(
-                f"  {r['measured_Hz']:8.2f} Hz measured, {r['before_Hz']:8.2f} before{after}{mac}{_damping(r)}"
-            )
-        for f in files:
-            print(f"wrote {f}")
+    files = write_files(output, _files(m, measured, found))
+    data = {"machine": m.name, **found.as_plain(), "modes": rows}
+    show(as_json, data, [found.sentence, *map(_row, rows)], files)
     finish(bool(found.alike) or not found.sentence.startswith("Nothing"))
 
 
-def _damping(row: dict[str, Any]) -> str:
-    if np.isnan(row["damping_percent"]):
-        return ""
-    after = row["damping_after_percent"]
-    text = f"; damping {row['damping_percent']:.2f} % measured, {row['damping_before_percent']:.2f} before"
-    return text if after is None else f"{text}, after {after:.2f}"
-
-
-def as_plain(found: TapDiagnosis) -> dict[str, Any]:
-    """Data of an answer."""
-    return {
-        "sentence": found.sentence, "chi2_before": found.before, "readings": found.readings,
-        "named": None if found.named is None else found.named.candidate,
-        "candidates": [
-            {
-                "candidate": e.candidate, "parameters": e.parameters, "u": e.u, "chi2": e.chi2, "statics": e.statics,
-                "taps": e.taps, "disagreement": e.disagreement,
-            }
-            for e in found.alike
-        ],
-    }  # fmt: skip
+def _row(r: dict[str, Any]) -> str:
+    """A mode in a line."""
+    after = "" if r["after_Hz"] is None else f", after {r['after_Hz']:.2f}"
+    mac = "" if r["mac"] is None or np.isnan(r["mac"]) else f", MAC {r['mac']:.2f}"
+    text = f"  {r['measured_Hz']:8.2f} Hz measured, {r['before_Hz']:8.2f} before{after}{mac}"
+    if np.isnan(r["damping_percent"]):
+        return text
+    text += f"; damping {r['damping_percent']:.2f} % measured, {r['damping_before_percent']:.2f} before"
+    return text if (d := r["damping_after_percent"]) is None else f"{text}, after {d:.2f}"
 
 
 def compared(machine: Any, measured: TapTest, found: TapDiagnosis) -> list[dict[str, Any]]:
@@ -118,21 +95,17 @@ def compared(machine: Any, measured: TapTest, found: TapDiagnosis) -> list[dict[
     ]  # fmt: skip
 
 
-def write(machine: Any, measured: TapTest, found: TapDiagnosis, folder: Path) -> list[str]:
+def _files(machine: Any, measured: TapTest, found: TapDiagnosis) -> Iterator[tuple[str, Any]]:
     """Corrected machine and responses before and after."""
     from stiffmap.identification.taps.causes import corrected
-    from stiffmap.ui.plot.style import save
     from stiffmap.ui.plot.vibration import response_figure
     from stiffmap.workspace.vibration import frequency_response
 
     f = np.geomspace(0.3 * measured.frequency.min(), 2 * measured.frequency.max(), 600)
     at = measured.position[0]
     many = {"before": frequency_response(machine, at, f)}
-    out: list[str] = []
     named = found.named
     if named is not None and named.machine is not None and not named.place.kind.startswith("hammer"):
         many["after"] = frequency_response(named.machine, at, f)
-        corrected(machine, named.place, next(iter(named.parameters.values()))).save(folder / "corrected.yaml")
-        out.append(str(folder / "corrected.yaml"))
-    save(response_figure(many), folder / "response.png")
-    return [*out, str(folder / "response.png")]
+        yield "corrected.yaml", corrected(machine, named.place, next(iter(named.parameters.values())))
+    yield "response.png", response_figure(many)

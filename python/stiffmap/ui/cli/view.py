@@ -8,26 +8,33 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.markup import escape
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.inputs import MM, EffectsOption, GravityOption, MachineArgument, machine_with, numbers
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.inputs import (
+    MM,
+    AtOption,
+    EffectsOption,
+    GravityOption,
+    MachineArgument,
+    RotationOption,
+    in_si,
+    machine_with,
+    numbers,
+)
+from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.view.quantities import QUANTITIES
 
 LOCAL = "127.0.0.1"
 
+DEGREE = np.pi / 180
 
-def view(
+
+def command(
     machine: MachineArgument,
-    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
-    rotation: Annotated[
-        str | None,
-        typer.Option(help="Commanded orientation, rotation vector in deg, base axes, e.g. 0,0,30."),
-    ] = None,
+    at: AtOption = None,
+    rotation: RotationOption = None,
     force: Annotated[str, typer.Option(help="Force on the tool in N.")] = "0,0,-300",
     moment: Annotated[str, typer.Option(help="Moment on the tool in N·m.")] = "0,0,0",
     gravity: GravityOption = None,
@@ -139,14 +146,11 @@ def _state(g: dict[str, Any]) -> dict[str, Any]:
         "frequency": g["frequency"],
         "magnification": g["magnify"],
     }
-    if g["at"] is not None:
-        out["position"] = tuple(MM * numbers(g["at"], "at", 3))
-    if g["rotation"] is not None:
-        out["rotation"] = tuple(np.deg2rad(numbers(g["rotation"], "rotation", 3)))
-    if g["gravity"] is not None:
-        out["gravity"] = tuple(numbers(g["gravity"], "gravity", 3))
-    if g["start"] is not None:
-        out["start"] = tuple(numbers(g["start"], "start"))
+    for field, option, count, unit in (
+        ("position", "at", 3, MM), ("rotation", "rotation", 3, DEGREE), ("gravity", "gravity", 3, 1.0), ("start", "start", None, 1.0),
+    ):  # fmt: skip
+        if g[option] is not None:
+            out[field] = tuple(in_si(g[option], option, count, unit))
     if g["plane"] in ("x", "y", "z"):
         out["plane"] = g["plane"]
     elif g["plane"] is not None:
@@ -172,22 +176,15 @@ def _write(model: Any, data: Any, html: Path | None, picture: Path | None, as_js
 
     files = [] if html is None else [write_page(model.moment, html, data)]
     files += [] if picture is None else [write_view_picture(model.moment, picture)]
-    if as_json:
-        print_json({"machine": model.declared.name, "files": [str(f) for f in files]})
-    else:
-        Console(highlight=False).print(f"wrote {escape(', '.join(map(str, files)))}", soft_wrap=True)
+    show(as_json, {"machine": model.declared.name}, [], files)
 
 
 def _serve(model: Any, data: Any, host: str, port: int | None, browser: bool, as_json: bool) -> None:
     from stiffmap.ui.view.open import View
 
     opened = View(model, host, port, data)
-    if as_json:
-        print_json({"machine": model.declared.name, "url": opened.url})
-    else:
-        console = Console(highlight=False)
-        console.print(f"{escape(model.declared.name)}: {escape(opened.url)}", soft_wrap=True)
-        console.print("Ctrl-C ends it", soft_wrap=True)
+    name = model.declared.name
+    show(as_json, {"machine": name, "url": opened.url}, [f"{name}: {opened.url}", "Ctrl-C ends it"])
     if browser:
         webbrowser.open(opened.url)
     opened.wait()

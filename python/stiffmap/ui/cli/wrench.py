@@ -6,29 +6,25 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
 
-from stiffmap.common.plain import plain
 from stiffmap.solve.status import Flag, Status
 from stiffmap.ui.cli.inputs import (
     MM,
+    AtOption,
     EffectsOption,
     GravityOption,
     MachineArgument,
     RotationOption,
     finish,
-    gravity,
-    machine_with,
+    machine_at,
     numbers,
-    position,
-    rotation,
 )
-from stiffmap.ui.cli.output import JsonOption, print_json
+from stiffmap.ui.cli.output import JsonOption, show
 
 
-def wrench(
+def command(
     machine: MachineArgument,
-    at: Annotated[str | None, typer.Option(help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")] = None,
+    at: AtOption = None,
     by: Annotated[str, typer.Option(help="Imposed translation of the point in mm, base axes.")] = "0,0,0",
     turn: Annotated[str, typer.Option(help="Imposed rotation vector in deg, base axes.")] = "0,0,0",
     turned: RotationOption = None,
@@ -47,39 +43,30 @@ def wrench(
 
       [cyan]stiffmap wrench hexapod --by 0,0,-0.2 --turn 0,0.01,0 --json[/cyan]
     """
-    m = machine_with(machine, effect)
+    m, place, how = machine_at(machine, effect, at, turned, gravity_)
     displacement = np.r_[MM * numbers(by, "by", 3), np.deg2rad(numbers(turn, "turn", 3))]
-    held = m.wrench(
-        position(at, m), displacement, rotation=rotation(turned), point=point, gravity=gravity(gravity_)
-    )
+    held = m.wrench(place, displacement, point=point, **how)
     legs = dict(zip(held.legs, held.leg_wrench, strict=True))
-    if as_json:
-        print_json(
-            plain(
-                {
-                    "machine": m.name,
-                    "point": point,
-                    "displacement": displacement,
-                    "status": Status(int(held.status)).name,
-                    "status_without_clamp": Status(int(held.force_status)).name,
-                    "flags": [f.name for f in Flag(int(held.flags))],
-                    "wrench": held.wrench,
-                    "leg_wrench": legs,
-                    "stiffness": held.stiffness,
-                    "leg_stiffness": dict(zip(held.legs, held.leg_stiffness, strict=True)),
-                    "actuator_effort": dict(zip(held.actuators, held.actuator_effort, strict=True)),
-                }
-            )
-        )
-    else:
-        console = Console(highlight=False)
-        free = Status(int(held.force_status)).name.lower()
-        console.print(f"status {Status(int(held.status)).name.lower()}; without the clamp: {free}")
-        for name, w in {
-            "whole machine": held.wrench,
-            **{f"leg {n} on platform": w for n, w in legs.items()},
-        }.items():
-            force = ", ".join(f"{v:.4f}" for v in w[:3])
-            moment = ", ".join(f"{v:.4f}" for v in w[3:])
-            console.print(f"{name}: force ({force}) N, moment about {point} ({moment}) N m", soft_wrap=True)
+    free = Status(int(held.force_status))
+    data = {
+        "machine": m.name,
+        "point": point,
+        "displacement": displacement,
+        "status": Status(int(held.status)).name,
+        "status_without_clamp": free.name,
+        "flags": [f.name for f in Flag(int(held.flags))],
+        "wrench": held.wrench,
+        "leg_wrench": legs,
+        "stiffness": held.stiffness,
+        "leg_stiffness": dict(zip(held.legs, held.leg_stiffness, strict=True)),
+        "actuator_effort": dict(zip(held.actuators, held.actuator_effort, strict=True)),
+    }
+    told = [f"status {Status(int(held.status)).name.lower()}; without the clamp: {free.name.lower()}"]
+    for name, w in {
+        "whole machine": held.wrench,
+        **{f"leg {n} on platform": w for n, w in legs.items()},
+    }.items():
+        force, moment = (", ".join(f"{v:.4f}" for v in part) for part in (w[:3], w[3:]))
+        told.append(f"{name}: force ({force}) N, moment about {point} ({moment}) N m")
+    show(as_json, data, told)
     finish(int(held.status) != Status.CONVERGED)

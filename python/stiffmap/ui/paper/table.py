@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import asdict
-from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.markup import escape
@@ -52,11 +50,6 @@ def as_csv(statements: Sequence[Statement]) -> str:
     writer.writerow(["section", *HEAD[1:]])
     writer.writerows(cells(s) for s in statements)
     return out.getvalue()
-
-
-def as_plain(statements: Sequence[Statement]) -> list[dict[str, Any]]:
-    """For JSON."""
-    return [asdict(s) for s in statements]
 
 
 def cells(s: Statement) -> tuple[str, ...]:

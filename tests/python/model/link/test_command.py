@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import typer
 from tests.python.model.link.link_fields import REFERENCE, WRENCHES, noisy_field
-from typer.testing import CliRunner
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link import calculix, load_link
@@ -20,7 +19,7 @@ from stiffmap.model.link.mesh import checked_mesh
 from stiffmap.model.link.optional import need
 from stiffmap.model.link.readers import read_dat, read_field
 from stiffmap.model.link.solve import Material, Setup, solve_skfem
-from stiffmap.ui.cli.link_command import link_command
+from stiffmap.ui.cli import main
 
 PART = """
 units: {length: mm, stress: GPa}
@@ -33,11 +32,15 @@ CASES = "fx [N],fy [N],fz [N],mx [N*m],my [N*m],mz [N*m]\n" + "\n".join(
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch):
+def run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    app = typer.Typer()
-    app.command("link")(link_command)
-    return lambda *arguments: CliRunner().invoke(app, list(arguments))
+
+    def run(*arguments):
+        code = main(["link", *arguments])
+        said = capsys.readouterr()
+        return SimpleNamespace(exit_code=code, output=said.out + said.err)
+
+    return run
 
 
 @pytest.fixture
@@ -92,7 +95,10 @@ def test_help_has_examples(run):
         (("part.step", "--material", "steel", "--reference", "0,0,0"), "part.step: no such file"),
         (("part.step", "--material", "wood"), "material: expected one of"),
         (("field.csv",), "needs --cases FILE and --reference"),
-        (("bar.yaml", "--reference", "1,2"), "--reference: expected x,y,z in mm, got '1,2'"),
+        (
+            ("bar.yaml", "--reference", "1,2"),
+            "--reference: expected 3 numbers separated by commas, got '1,2'",
+        ),
         (("bar.yaml", "--solver", "magic"), "solver: expected auto, ccx or skfem"),
         (("bar.yaml", "--support", "air"), "support: expected bed or soft, got 'air'"),
         (("bar.yaml", "--cases", "absent.csv"), "absent.csv: no such file"),

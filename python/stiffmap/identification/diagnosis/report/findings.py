@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from stiffmap.common.json_text import json_text
 from stiffmap.common.plain import plain
 from stiffmap.experiment.comparison.summary import Summary
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -183,7 +183,7 @@ class Findings:
 
     def to_json(self) -> str:
         """All fields but arrays and machines, SI; NaN is null."""
-        return json.dumps(self.as_plain(), indent=2, ensure_ascii=False, allow_nan=False)
+        return json_text(self.as_plain())
 
     def as_plain(self) -> dict[str, Any]:
         """JSON data."""
