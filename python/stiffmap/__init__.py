@@ -13,6 +13,7 @@ from stiffmap.solve.status import Flag, Status
 if TYPE_CHECKING:
     from stiffmap.experiment import Experiment, Residual, load_experiment
     from stiffmap.experiment.calls import residual, simulate
+    from stiffmap.experiment.spreadsheet.from_table import experiment_from_table
     from stiffmap.identification.calibration import Calibration
     from stiffmap.identification.calibration.calibrate import calibrate
     from stiffmap.identification.diagnosis import Diagnosis, diagnose
@@ -73,6 +74,7 @@ _HOME = {
     name: module
     for module, names in {
         "stiffmap.experiment": "Experiment Residual load_experiment residual simulate",
+        "stiffmap.experiment.spreadsheet.from_table": "experiment_from_table",
         "stiffmap.identification.calibration": "Calibration calibrate",
         "stiffmap.identification.diagnosis": "Diagnosis diagnose",
         "stiffmap.identification.planning.calls": "monitor plan",
@@ -105,7 +107,7 @@ __all__ = [
     "Calibration", "Commands", "CuttingForce", "DeflectionBudget", "Diagnosis", "Experiment", "Flag",
     "IdentifiedLaw", "Kinematics", "Machine", "Process", "Residual", "Solution", "Status", "StiffmapError",
     "__version__", "accuracy_transmission", "assembly_wrenches", "calibrate", "compensate", "cutting_force",
-    "deflection_budget", "design_sweep", "diagnose", "drive_efforts", "error_map", "floquet_multiplier",
+    "deflection_budget", "design_sweep", "diagnose", "drive_efforts", "error_map", "experiment_from_table", "floquet_multiplier",
     "force_transmission", "forward_kinematics", "frequency_response", "identify_link", "identify_process",
     "import_urdf", "inverse_kinematics", "largest_box", "limiting_depth", "load_experiment", "load_machine",
     "load_process", "load_requirements", "machine_names", "map_estimate", "map_statistics", "measures",

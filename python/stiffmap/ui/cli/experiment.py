@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,11 +19,7 @@ from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.cli.table_text import table as table_of
 
 if TYPE_CHECKING:
-    from stiffmap.experiment import Experiment
-    from stiffmap.experiment.spreadsheet.convert import Imported
-
-
-RECORDED = {"operator", "instrument", "certificate", "date", "temperature", "notes", "source", "sha256"}
+    from stiffmap.experiment.spreadsheet.from_table import FromTable
 
 
 def command(
@@ -117,66 +113,24 @@ def command(
 
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
-    from stiffmap.common.fingerprints import file_digest
-    from stiffmap.common.tables.sheet import Layout, read_sheet
-    from stiffmap.experiment.noise.level import against_the_load, contradictions
-    from stiffmap.experiment.spreadsheet.dh import LEG, arm, read_dh
-    from stiffmap.experiment.spreadsheet.dialogue import Answers
-    from stiffmap.experiment.spreadsheet.folder import make_experiment
-    from stiffmap.experiment.spreadsheet.guess import has_meaning
-    from stiffmap.experiment.spreadsheet.instrument import load_instrument
-    from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, drives_of
-    from stiffmap.experiment.spreadsheet.reading import Reading, read_and_ask
-    from stiffmap.solve.machine import Machine, load_machine
+    from stiffmap.experiment.spreadsheet.from_table import experiment_from_table
 
     if action != "new":
         raise StiffmapError(f"experiment: expected 'new', got '{action}'")
-    wrote = None if instrument is None else load_instrument(instrument)
-    quantity = quantity or (wrote.quantity if wrote else "deflection")
-    if quantity not in ("deflection", "position"):
-        raise StiffmapError(f"--quantity: expected deflection or position, got '{quantity}'")
-    if difference not in DIFFERENCES:
-        raise StiffmapError(f"--difference: expected {' or '.join(DIFFERENCES)}, got '{difference}'")
-    if (machine is None) == (dh is None):
-        raise StiffmapError("experiment: give either --machine or --dh")
     new_file(output / "experiment.yaml", overwrite, output)
-    given = Answers(
-        {k: v.split("|") for k, v in pairs(mapped, "map").items()},
-        pairs(unit, "unit"),
-        _numbers(constant, "set"),
-        _numbers(noise, "noise"),
-    )
-    ask = _prompt if dialogue else None
-    rows = None if dh is None else read_dh(read_sheet(dh), given.units)
-    drives = {f"{LEG}.{r.name}": r.slides for r in rows} if rows else drives_of(load_machine(str(machine)))
-    numbered = any(h.strip("+-").isdigit() for many in given.chosen.values() for h in many)
-    names = header.split(",") if header else ()
-    layout = Layout(has_meaning, names, numbered, which)
-    read = Reading(wrote, drives, difference, quantity == "deflection", layout)
-    table, found, answers, told, joints = read_and_ask(file, sheet, read, given, ask)
-    if rows is not None and joints is None:
-        raise StiffmapError(f"{file}: no column commands a joint; the arm has {', '.join(drives)}")
-    quantity = "position" if (joints and joints.head) or "ll" in found.units else quantity
-    machine = machine or str(output / "machine.yaml")
-    title = f"from {table.file.replace(str(file), file.name)}"
-    kept = {"source": file.name, "sha256": file_digest(file), **pairs(record, "record")}
-    wrong = sorted(set(kept) - RECORDED)
-    if wrong:
-        raise StiffmapError(f"--record: expected one of {', '.join(sorted(RECORDED))}; got '{wrong[0]}'")
-    made = make_experiment(found, table, output, machine, quantity, answers.noise, title, kept)
-    if rows is not None and joints is not None and dh is not None:
-        Machine(arm(rows, dh_convention, output.name, f"from {dh.name}", joints.middle())).save(machine)
-    warnings = [line for line in (against_the_load(made), *contradictions(made)) if line]
-    data = {"folder": output, "rows": len(made), "repeats": found.repeats,
-            "columns": {table.header[c.index]: c.meaning for c in found.columns}, "units": found.units,
-            "warnings": warnings}  # fmt: skip
-    lines = [*(Text(f"WARNING: {line}", "bold red") for line in warnings), *told]
-    lines += [f"left out: {text}" for text in table.aside]
-    show(
-        as_json,
-        data,
-        [*lines, *_told(found, table.header, made, machine, output, joints.columns if joints else {})],
-    )
+    made = experiment_from_table(
+        machine, file, output, columns=pairs(mapped, "map"), units=pairs(unit, "unit"),
+        constants=_numbers(constant, "set"), noise=_numbers(noise, "noise"), dh=dh, dh_convention=dh_convention,
+        difference=difference, quantity=quantity, instrument=instrument, sheet=sheet,
+        header=header.split(",") if header else (), which=which, record=pairs(record, "record"),
+        ask=_prompt if dialogue else None, overwrite=overwrite,
+    )  # fmt: skip
+    found, names = made.understood, made.sheet.header
+    data = {"folder": output, "rows": len(made.experiment), "repeats": found.repeats,
+            "columns": {names[c.index]: c.meaning for c in found.columns}, "units": found.units,
+            "warnings": made.warnings}  # fmt: skip
+    warnings = [Text(f"WARNING: {line}", "bold red") for line in made.warnings]
+    show(as_json, data, [*warnings, *made.remarks, *_told(made)])
 
 
 def _prompt(text: str) -> str:
@@ -188,15 +142,10 @@ def _prompt(text: str) -> str:
         ) from None
 
 
-def _told(
-    found: Imported,
-    header: Sequence[str],
-    made: Experiment,
-    machine: str,
-    output: Path,
-    commands: Mapping[str, tuple[str, str]],
-) -> Iterator[Any]:
+def _told(table: FromTable) -> Iterator[Any]:
     """What each column was taken for, the first rows, and what to do next."""
+    found, header, made = table.understood, table.sheet.header, table.experiment
+    commands = table.commanded.columns if table.commanded else {}
     for c in found.columns:
         if c.meaning in commands:
             yield f"'{header[c.index]}': command of {', '.join(commands[c.meaning])}"
@@ -229,7 +178,7 @@ def _told(
         head, rows = experiment_rows(made)
     yield table_of("the first rows, as understood", head, rows, padding=(0, 1, 0, 0))
     poses = int(made.groups.max()) + 1
-    yield f"{output}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
+    yield f"{table.folder}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
     declared = np.all(~made.read | (made.sigma > 0), axis=0)
     silent = [
         c.name
@@ -238,7 +187,7 @@ def _told(
     ]
     if silent:
         yield f"no noise of {', '.join(silent)} is declared: repeats must show it (five or more), or say --noise {silent[0]}=…"
-    yield Text.assemble("next: ", (f"stiffmap residual {machine} {output}", "cyan"))
+    yield Text.assemble("next: ", (f"stiffmap residual {table.machine} {table.folder}", "cyan"))
 
 
 def _numbers(given: Sequence[str] | None, name: str) -> dict[str, float]:

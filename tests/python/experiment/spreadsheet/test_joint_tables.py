@@ -156,7 +156,7 @@ def test_columns_go_by_name_by_number_or_as_they_are_mapped(
         ("q1,q2,q3,q4,q5,q6,dx [mm]", ["--unit", "joints=mm"], "has no unit of angles"),
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],x,y,z", [], "if an instrument read them, say --map px='x'"),
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],dx [mm]", ["--map", "arm.wrist=q6"], "no drive 'arm.wrist'"),
-        ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],dx [mm]", ["--difference", "both"], "--difference: expected"),
+        ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],dx [mm]", ["--difference", "both"], "difference: expected"),
     ],
 )  # fmt: skip
 def test_what_is_not_clear_is_asked(

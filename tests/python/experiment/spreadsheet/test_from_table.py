@@ -1,0 +1,55 @@
+"""`experiment_from_table` does all that its command does, for Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.ui.cli.app import main
+
+SHEET = """Name;Uhr 1 [µm];Uhr 2 [µm];Last X [N];x [mm];y [mm]
+a;50,5;1,0;100;0;416
+b;-20,25;;200;20;416
+"""
+
+
+def test_the_same_folder_as_by_the_command(tmp_path: Path) -> None:
+    (tmp_path / "sheet.csv").write_text(SHEET, encoding="utf-8")
+    said = {"dx": "Uhr 1 [µm]", "dy": "Uhr 2 [µm]"}
+    made = sm.experiment_from_table(
+        "five-bar", tmp_path / "sheet.csv", tmp_path / "own",
+        columns=said, constants={"z": 0.0}, noise={"dx": 1.0, "dy": 1.0},
+    )  # fmt: skip
+    words = [f"--map={k}={v}" for k, v in said.items()]
+    command = ["experiment", "new", str(tmp_path / "sheet.csv"), "--machine", "five-bar", *words]
+    assert (
+        main([*command, "--set", "z=0", "--noise=dx=1", "--noise=dy=1", "-o", str(tmp_path / "shell")]) == 0
+    )
+    for name in ("data.csv", "experiment.yaml"):
+        assert (tmp_path / "own" / name).read_bytes() == (tmp_path / "shell" / name).read_bytes()
+    e = made.experiment
+    np.testing.assert_allclose(e.reading[:, 0], [50.5e-6, -20.25e-6])
+    assert np.isnan(e.reading[1, 1]) and len(e) == 2 and made.folder == tmp_path / "own"
+    assert sm.load_experiment(made.folder).ids == e.ids
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"columns": 3}, "columns: expected a mapping"),
+        ({"quantity": "speed"}, "quantity: expected"),
+        ({"difference": "both"}, "difference: expected"),
+        ({"record": {"weather": "fine"}}, "record: expected one of"),
+        ({"machine": None}, "give either --machine or --dh"),
+        ({"table": "nowhere.csv"}, "nowhere.csv"),
+    ],
+)
+def test_what_is_wrong_is_one_error(tmp_path: Path, change: dict[str, object], message: str) -> None:
+    (tmp_path / "sheet.csv").write_text(SHEET, encoding="utf-8")
+    call = {"table": tmp_path / "sheet.csv", "folder": tmp_path / "own", "machine": "five-bar"}
+    with pytest.raises(sm.StiffmapError, match=message):
+        sm.experiment_from_table(**{**call, **change})
+    assert not (tmp_path / "own").exists()
