@@ -10,7 +10,7 @@ namespace {
 
 constexpr double no_mass = 1e-13;    // relative to the largest inverse square of a frequency
 constexpr double no_damper = 1e-12;  // relative to the largest damping of a motion without mass
-constexpr double negligible = 1e-9;   // of a tangent and of its eigenvalues, relative
+constexpr double negligible = 1e-9;  // of a tangent and of its eigenvalues, relative
 
 /// Motions that keep all loops closed, their tangent and mass.
 struct Reduced {
