@@ -171,15 +171,14 @@ def fitted(
     start
         ln variances to begin with, by the name of the part; others begin small.
     weights
-        (N,) of heavy tails of a fit that this one goes on from. While readings stand out they are not given up.
+        (N,) of heavy tails of a fit that this one goes on from: no others are tried.
     """
     given = start or {}
     first = np.array([given.get(NOISE, 0.0), *(given.get(p.name, BEGIN) for p in parts)])
+    light = _optimum(columns, tuple(parts), first, np.ones(len(columns.rows)))
     if weights is not None and np.any(weights != 1.0):
         heavy = _weighed(_optimum(columns, tuple(parts), first, weights))
-        if np.any(np.abs(noise_part(heavy)[0]) > STANDS_OUT * heavy.noise):
-            return heavy
-    light = _optimum(columns, tuple(parts), first, np.ones(len(columns.rows)))
+        return max(light, heavy, key=lambda f: f.score)
     mean, _ = noise_part(light)
     typical = min(light.noise, 1.4826 * float(np.median(np.abs(mean))))
     starts = []

@@ -253,7 +253,9 @@ def _active(moment: Moment) -> tuple[bool, bool, bool]:
 
 def look_at_machine(server: Any, rest: Skeleton, extent: float) -> None:
     """The first look: from the front right, from above where all lies in a plane of constant height."""
-    points = rest.points
+    points = np.vstack(
+        [rest.links.reshape(-1, 3), rest.tcp]
+    )  # not the travel of the drives, which reaches far beyond
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     direction = np.array([0.02, -0.05, 1.0] if rest.is_flat else [0.75, -0.9, 0.6])
     server.initial_camera.look_at = tuple(middle)
