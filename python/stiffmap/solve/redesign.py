@@ -26,7 +26,7 @@ def redesigned(description: MachineDescription, values: Mapping[str, float]) -> 
     was found: a search with other numbers might end on another branch.
     StiffmapError for an unknown address or a bad value; HomeError where the numbers reach no machine that closes.
     """
-    declared = _settled(description.declared or description)
+    declared = settled(description.declared or description)
     target = with_values(declared, values)
     try:
         CompiledMachine(target)
@@ -40,7 +40,7 @@ def on_branch_of(base: MachineDescription, other: MachineDescription) -> Machine
     is where its home is declared. HomeError where the numbers reach no machine that closes."""
     if not other.search_home:
         return other
-    start, end = _settled(base.declared or base), other.declared or other
+    start, end = settled(base.declared or base), other.declared or other
     now = {row.address: row.value for row in listed(start)}
     new = {
         row.address: row.value for row in listed(end) if not row.address.partition("/")[2].startswith("home")
@@ -57,7 +57,7 @@ def _with_home(element: Element, home: tuple[float, ...]) -> Element | None:
     return replace(element, home=home) if isinstance(element, Joint) else None
 
 
-def _settled(description: MachineDescription) -> MachineDescription:
+def settled(description: MachineDescription) -> MachineDescription:
     """The description whose home is declared by the coordinates that a search found."""
     if not description.search_home:
         return description

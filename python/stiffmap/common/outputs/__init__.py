@@ -1,7 +1,7 @@
 """The one place that writes files: whole or not at all, one job at a time, space asked for before."""
 
 from stiffmap.common.outputs.alone import only_job, reserved
-from stiffmap.common.outputs.keeping import asked_to_replace, check_replaceable, one_command
+from stiffmap.common.outputs.keeping import asked_to_replace, check_replaceable, new_file, one_command
 from stiffmap.common.outputs.pictures import write_picture
 from stiffmap.common.outputs.space import mapped_array, needs_space
 from stiffmap.common.outputs.tables import guarded, unguarded, write_rows
@@ -23,6 +23,7 @@ __all__ = [
     "make_folder",
     "mapped_array",
     "needs_space",
+    "new_file",
     "one_command",
     "only_job",
     "put_folder",

@@ -52,6 +52,15 @@ def asked_to_replace(path: Path) -> None:
         command.asked.add(os.path.realpath(path))
 
 
+def new_file(file: Path, overwrite: bool, output: Path | None = None) -> Path:
+    """A file to write, of the folder `output` or on its own; FileError where it is there already and may not be replaced."""
+    if file.exists() and not overwrite:
+        raise FileError("exists already; use --overwrite to replace it", file=str(file))
+    if overwrite:
+        asked_to_replace(output or file)
+    return file
+
+
 def check_replaceable(path: str | os.PathLike[str]) -> None:
     """FileError where something is at this output that is an input of the command, or that stiffmap did not write."""
     target = Path(os.path.realpath(path))

@@ -8,9 +8,9 @@ from os import PathLike
 from pathlib import Path
 
 from stiffmap.common.broadcasting import given_path, one_of
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.fingerprints import file_digest
-from stiffmap.common.outputs import asked_to_replace
+from stiffmap.common.outputs import new_file
 from stiffmap.common.short import short_repr
 from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
 from stiffmap.experiment.experiment import Experiment
@@ -109,10 +109,7 @@ def experiment_from_table(
             raise StiffmapError(
                 f"{name}: expected a mapping of columns to what is said of them, got {value!r}"
             )
-    if (output / "experiment.yaml").exists():
-        if not overwrite:
-            raise FileError("exists already; overwrite replaces it", file=str(output / "experiment.yaml"))
-        asked_to_replace(output)
+    new_file(output / "experiment.yaml", overwrite, output)
     wrong = sorted(set(record or ()) - {*RECORDED})
     if wrong:
         raise StiffmapError(f"record: expected one of {', '.join(RECORDED)}; got '{wrong[0]}'")

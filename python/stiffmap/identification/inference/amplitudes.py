@@ -179,11 +179,11 @@ def fitted(
     if weights is not None and np.any(weights != 1.0):
         heavy = _weighed(_optimum(columns, tuple(parts), first, weights))
         return max(light, heavy, key=lambda f: f.score)
-    mean, _ = noise_part(light)
+    mean, sd = noise_part(light)
     typical = min(light.noise, 1.4826 * float(np.median(np.abs(mean))))
     starts = []
     if np.any(np.abs(mean) > STANDS_OUT * typical):
-        starts.append(_heavy(light))
+        starts.append(_heavy(light, mean, sd))
     if columns.alone.any():
         starts.append(np.where(columns.alone, NOTHING, 1.0))
     best = light
@@ -198,15 +198,17 @@ def fitted(
 def _weighed(fit: Fit) -> Fit:
     """The fit with the weights of its heavy tails: in turn weights, and a step to the amplitudes that go with them."""
     for _ in range(WEIGHINGS):
-        before, fit = fit.score, _optimum(fit.columns, fit.parts, fit.t, _heavy(fit), steps=1)
+        before, fit = (
+            fit.score,
+            _optimum(fit.columns, fit.parts, fit.t, _heavy(fit, *noise_part(fit)), steps=1),
+        )
         if abs(fit.score - before) < WEIGHED:
             break
     return fit
 
 
-def _heavy(fit: Fit) -> Floats:
-    """(N,) weights of heavy tails at the posterior of the noise."""
-    mean, sd = noise_part(fit)
+def _heavy(fit: Fit, mean: Floats, sd: Floats) -> Floats:
+    """(N,) weights of heavy tails at the posterior of the noise, its mean and standard deviation (N,)."""
     return np.asarray((DEGREES + 1.0) / (DEGREES + (mean**2 + sd**2) / fit.noise**2))
 
 

@@ -14,7 +14,7 @@ from rich.text import Text
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.inputs import DhConventionOption, OverwriteOption, new_file, pairs
+from stiffmap.ui.cli.inputs import DhConventionOption, OverwriteOption, pairs
 from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.cli.table_text import table as table_of
 
@@ -117,7 +117,6 @@ def command(
 
     if action != "new":
         raise StiffmapError(f"experiment: expected 'new', got '{action}'")
-    new_file(output / "experiment.yaml", overwrite, output)
     made = experiment_from_table(
         machine, file, output, columns=pairs(mapped, "map"), units=pairs(unit, "unit"),
         constants=_numbers(constant, "set"), noise=_numbers(noise, "noise"), dh=dh, dh_convention=dh_convention,

@@ -11,8 +11,9 @@ import typer
 from rich.text import Text
 
 from stiffmap.common.errors import FileError
+from stiffmap.common.outputs import new_file
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.inputs import DhConventionOption, OverwriteOption, new_file, pairs
+from stiffmap.ui.cli.inputs import DhConventionOption, OverwriteOption, pairs
 from stiffmap.ui.cli.output import JsonOption, show
 
 if TYPE_CHECKING:

@@ -10,9 +10,8 @@ import numpy as np
 import typer
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
-from stiffmap.common.outputs import asked_to_replace
 from stiffmap.common.outputs.option import written
 
 if TYPE_CHECKING:
@@ -189,15 +188,6 @@ def machine_at(
     """A machine with effects, its commanded position, and rotation and gravity as keywords."""
     machine = machine_with(name, effects)
     return machine, position(at, machine), {"rotation": rotation(turned), "gravity": gravity(acting)}
-
-
-def new_file(file: Path, overwrite: bool, output: Path | None = None) -> Path:
-    """A file to write, of the folder `output` or on its own; FileError where it is there already and may not be replaced."""
-    if file.exists() and not overwrite:
-        raise FileError("exists already; use --overwrite to replace it", file=str(file))
-    if overwrite:
-        asked_to_replace(output or file)
-    return file
 
 
 def machine_with(name: str, effects: Sequence[str] | None) -> Machine:

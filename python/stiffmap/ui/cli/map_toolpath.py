@@ -29,13 +29,14 @@ def map_toolpath(
 ) -> None:
     """Solve along the path, print the worst place, write table, data and pictures."""
     from stiffmap.workspace.performance import load_motion
+    from stiffmap.workspace.performance.motion.trajectory import way_along
 
     position, given = load_motion(toolpath).places()
     must_take(m, position)
     load = given if given.any() else _load(m, position, force, how)
     wrench = np.hstack([load, np.zeros_like(load)])
     s = m.solve(position, wrench, **how)
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
+    way = way_along(position)
     ds = s.to_xarray(("way",), {"way": ("way", way, {"units": "m"})})
     ds = ds.assign(position=(("way", "axis"), position), force=(("way", "axis"), load))
     pictured = toolpath_figure(ds, m.name) if pictures else None

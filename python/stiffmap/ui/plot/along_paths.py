@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.plot.style import BLACK, MM, headline, line_look, paper
+from stiffmap.workspace.performance.motion.trajectory import way_along
 from stiffmap.workspace.performance.table import MeasuresTable, Row
 
 ALONG = ("path_compliance", "path_effort")
@@ -48,7 +48,7 @@ def _lines(axes: Axes, row: Row, machine: str, number: int, one: bool) -> None:
     positions, values = row.found.positions, row.found.values
     assert positions is not None
     assert values is not None
-    way = MM * _way(positions)
+    way = MM * way_along(positions)
     share = row.found.extra.get("share")
     if one and isinstance(share, np.ndarray):
         for j, drive in enumerate(row.found.extra["drives"]):  # type: ignore[arg-type, var-annotated]
@@ -61,9 +61,3 @@ def _lines(axes: Axes, row: Row, machine: str, number: int, one: bool) -> None:
     limit = None if row.bound is None else row.bound.at_most
     if limit is not None and number == 0:
         axes.axhline(row.measure.factor * limit, color="0.4", linewidth=0.8, label="required: below")
-
-
-def _way(positions: Floats) -> Floats:
-    """(n,) m from the start."""
-    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])

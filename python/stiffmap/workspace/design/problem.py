@@ -22,7 +22,7 @@ from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.machine import Machine
-from stiffmap.solve.redesign import on_branch_of
+from stiffmap.solve.redesign import on_branch_of, settled
 from stiffmap.workspace.design.editing import Editor
 from stiffmap.workspace.design.places import put, unshared
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion, near_or_shipped
@@ -155,7 +155,9 @@ class Design:
 
     @cached_property
     def _base(self) -> MachineDescription:
-        return self._described(unshared(self.document.data))
+        """As the machine file has it, its home found once for all designs."""
+        base = self._described(unshared(self.document.data))
+        return settled(base.declared or base)
 
 
 def load_design(path: str | PathLike[str]) -> Design:

@@ -10,17 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import (
     Floats,
-    batch,
-    rows,
     thread_count,
-    trailing,
     whole_number,
-    wrench_array,
 )
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.rotations import as_rotations
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.performance.motion.inertia import inertias, need_masses
+from stiffmap.workspace.performance.poses import loaded_poses
 from stiffmap.workspace.vibration.damping import Damping, damping_of
 
 SYMMETRIC = 1e-9
@@ -91,13 +87,7 @@ def tip_modes(
             f"point: no point '{point}' on {machine.name}; there are: {', '.join(machine.points)}"
         )
     declared = damping_of(machine, damping)
-    p = trailing(position, (3,), "position", "positions (m)")
-    w = wrench_array(wrench)
-    r = compiled.home_rotation
-    if rotation is not None:
-        r = as_rotations(trailing(rotation, (3, 3), "rotation", "rotation matrices"))
-    shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2])
-    poses, turns, loads = rows(p, shape, (3,)), rows(r, shape, (3, 3)), rows(w, shape, (6,))
+    shape, poses, turns, loads = loaded_poses(machine, position, wrench, rotation)
     cores = thread_count(threads)
     out = compiled.modes(
         inertias(machine), poses, turns, loads, viscous=declared.viscous, loss=declared.loss,

@@ -65,6 +65,7 @@ def test_two_masses_on_two_springs(tmp_path):
     names = sm.load_machine(tmp_path / "machine.yaml").compiled.names.coordinates
     first, second = (found.shape[0][names.index(n)] for n in ("one.first.tx", "one.second.tx"))
     assert abs((first + second) / first) == pytest.approx((1 + np.sqrt(5)) / 2, rel=1e-9)
+    assert 3 * (first**2 + (first + second) ** 2) == pytest.approx(1.0, rel=1e-9)
 
 
 def test_a_mass_at_the_end_of_a_cantilever(tmp_path):

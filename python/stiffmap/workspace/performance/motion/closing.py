@@ -87,7 +87,7 @@ def drive_kinematics(
         threads=thread_count(threads),
     )  # fmt: skip
     drives = list(compiled.drives)
-    shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items() if k != "rates"}
+    shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items()}
     return DriveKinematics(actuators=shaped["coordinates"][..., drives], **shaped)
 
 

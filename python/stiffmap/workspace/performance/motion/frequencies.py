@@ -9,18 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import (
     Floats,
-    batch,
-    rows,
     thread_count,
-    trailing,
     whole_number,
-    wrench_array,
 )
-from stiffmap.common.rotations import as_rotations
 from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.results import OverPoses
 from stiffmap.workspace.performance.motion.inertia import inertias, need_masses
+from stiffmap.workspace.performance.poses import loaded_poses
 
 
 @short_repr
@@ -62,16 +58,10 @@ def natural_frequencies(
     """
     need_masses(machine, "a natural frequency")
     whole_number(modes, "modes", 1)
-    p = trailing(position, (3,), "position", "positions (m)")
-    w = wrench_array(wrench)
-    r = machine.compiled.home_rotation
-    if rotation is not None:
-        r = trailing(rotation, (3, 3), "rotation", "rotation matrices")
-        r = as_rotations(r)
-    shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2])
+    shape, p, r, w = loaded_poses(machine, position, wrench, rotation)
     out = machine.compiled.modes(
-        inertias(machine), rows(p, shape, (3,)), rows(r, shape, (3, 3)), rows(w, shape, (6,)), count=modes, whole=True,
-        gravity=machine.compiled.gravity(gravity), threads=thread_count(threads),
+        inertias(machine), p, r, w, count=modes, whole=True, gravity=machine.compiled.gravity(gravity),
+        threads=thread_count(threads),
     )  # fmt: skip
     w0 = 1 / np.sqrt(out["square"])
     found = {k: out[k].reshape(shape + out[k].shape[1:]) for k in ("coordinates", "status", "flags")}

@@ -29,6 +29,7 @@ from stiffmap.workspace.performance.motion.trajectory import (
     line,
     through,
     timed,
+    way_along,
 )
 from stiffmap.workspace.performance.quantities import quantity_in
 
@@ -119,7 +120,7 @@ def _with_force(run: Trajectory, motion: Motion) -> Trajectory:
     if motion.force.ndim == 1:
         return run.with_force(motion.force)
     assert motion.path is not None
-    way, own = _way(run.position), _way(motion.path.position)
+    way, own = way_along(run.position), way_along(motion.path.position)
     return run.with_force(_between(way / way[-1], own / own[-1], motion.force))
 
 
@@ -199,7 +200,7 @@ def _table(place: FilePath) -> Motion:
             line = table.lines[int(np.argmax(~(feed > 0)))]
             raise FileError("expected a feed above zero", file=file, line=line, key="feed")
         path = _through(p, file)
-        along = _way(p) / _way(p)[-1]
+        along = way_along(p) / way_along(p)[-1]
         force = f[0] if not np.ptp(f, axis=0).any() else _between(path.s, along, f)
         if feed is None:
             return Motion(place.stem, path, None, None, np.inf, force)
@@ -222,11 +223,6 @@ def _table(place: FilePath) -> Motion:
     spline = make_interp_spline(t, p, k=5)
     motion = Trajectory(t, p, spline(t, 1), spline(t, 2), f)
     return Motion(place.stem, None, motion, None, np.inf, np.zeros(3))
-
-
-def _way(points: Floats) -> Floats:
-    """(n,) m along the chords."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
 def _between(s: Floats, at: Floats, values: Floats) -> Floats:

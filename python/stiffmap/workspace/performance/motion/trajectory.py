@@ -85,6 +85,11 @@ def circle(centre: ArrayLike, radius: float, plane: str = "xy", points: int = 40
     return Path(s, c + out[0], out[1], out[2])
 
 
+def way_along(points: Floats) -> Floats:
+    """(n,) m along the chords of points (n, 3) m, from the first."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
 def through(points: ArrayLike, samples: int = 401) -> Path:
     """Smooth path (cubic spline over the chord length) through points (k, 3) m."""
     p = real_array(points, "points")
